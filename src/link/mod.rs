@@ -1,0 +1,1 @@
+//! The serial side: packets, the bus, the servo and the tracker.

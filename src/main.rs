@@ -1,0 +1,2 @@
+//! The `wormd` binary.
+fn main() {}

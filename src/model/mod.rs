@@ -1,0 +1,1 @@
+//! The worm as pure physics.
