@@ -3,5 +3,6 @@
 /// Most cells a worm can have: fixed-size topics and control tables are laid out for this many.
 pub const MAX_CELLS: usize = 16;
 
-pub mod link;
-pub mod model;
+pub mod config;
+pub mod message;
+pub mod realtime;

@@ -1,0 +1,107 @@
+//! What each alarm watches for and what the controller does about it.
+
+use super::check::Checker;
+use crate::message::AlarmKind;
+use serde::Deserialize;
+
+/// What the controller does when an alarm is raised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Policy {
+    /// Goes on, and tells.
+    Warn,
+    /// Keeps the cam where it is.
+    Hold,
+    /// Goes back by `control.back_off_cycles`, then holds.
+    BackOff,
+    /// Stops and latches a fault.
+    Stop,
+}
+
+/// One alarm.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AlarmConfig {
+    /// What the controller does.
+    pub policy: Policy,
+    /// The threshold; its meaning and unit are told with each alarm in [`Alarms`].
+    pub threshold: f64,
+}
+
+/// All alarms.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Alarms {
+    /// The cam lags behind its command by more than this share of a turn.
+    pub motor_stall: AlarmConfig,
+    /// A cell's extension in its step falls short by more than this share of its usual stroke.
+    pub jammed_cell: AlarmConfig,
+    /// The advance of a cycle falls below this share of the usual one.
+    pub no_progress: AlarmConfig,
+    /// The worm moves down the canal by more than this distance beyond its usual retraction, m.
+    pub sliding_down: AlarmConfig,
+    /// Energy per cycle beyond the usual, as a share of it, that counts as a shift worth an alarm.
+    pub energy_over_budget: AlarmConfig,
+    /// Energy left over energy needed for the way home, below which the battery counts as low.
+    pub battery_low: AlarmConfig,
+    /// Share of failed exchanges over half a second.
+    pub link_fault: AlarmConfig,
+    /// Share of missed samples, or of samples in which a cell was not seen, over two seconds.
+    pub tracker_fault: AlarmConfig,
+    /// Servo temperature, °C; hardware errors raise this alarm at once.
+    pub device_fault: AlarmConfig,
+}
+
+const fn alarm(policy: Policy, threshold: f64) -> AlarmConfig {
+    AlarmConfig { policy, threshold }
+}
+
+impl Default for Alarms {
+    fn default() -> Self {
+        Self {
+            motor_stall: alarm(Policy::Stop, 0.01),
+            jammed_cell: alarm(Policy::Stop, 0.4),
+            no_progress: alarm(Policy::Hold, 0.3),
+            sliding_down: alarm(Policy::Hold, 0.003),
+            energy_over_budget: alarm(Policy::Warn, 0.2),
+            battery_low: alarm(Policy::Warn, 1.0),
+            link_fault: alarm(Policy::Warn, 0.2),
+            tracker_fault: alarm(Policy::Warn, 0.3),
+            device_fault: alarm(Policy::Warn, 60.0),
+        }
+    }
+}
+
+impl Alarms {
+    /// The configuration of one alarm.
+    pub fn of(&self, kind: AlarmKind) -> AlarmConfig {
+        match kind {
+            AlarmKind::MotorStall => self.motor_stall,
+            AlarmKind::JammedCell => self.jammed_cell,
+            AlarmKind::NoProgress => self.no_progress,
+            AlarmKind::SlidingDown => self.sliding_down,
+            AlarmKind::EnergyOverBudget => self.energy_over_budget,
+            AlarmKind::BatteryLow => self.battery_low,
+            AlarmKind::LinkFault => self.link_fault,
+            AlarmKind::TrackerFault => self.tracker_fault,
+            AlarmKind::DeviceFault => self.device_fault,
+        }
+    }
+
+    pub(super) fn check(&self, checker: &mut Checker) {
+        for (kind, range, unit) in [
+            (AlarmKind::MotorStall, 0.002..=0.25, "turns"),
+            (AlarmKind::JammedCell, 0.1..=0.95, "of the stroke"),
+            (AlarmKind::NoProgress, 0.0..=0.9, "of the usual advance"),
+            (AlarmKind::SlidingDown, 1e-4..=1.0, "m"),
+            (AlarmKind::EnergyOverBudget, 0.02..=10.0, "of the usual energy"),
+            (AlarmKind::BatteryLow, 0.1..=10.0, "times the way home"),
+            (AlarmKind::LinkFault, 0.001..=1.0, "of the exchanges"),
+            (AlarmKind::TrackerFault, 0.001..=1.0, "of the samples"),
+            (AlarmKind::DeviceFault, 20.0..=120.0, "°C"),
+        ] {
+            let key = format!("alarms.{}.threshold", kind.name().replace('-', "_"));
+            checker.range(&key, self.of(kind).threshold, range, unit);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Checking values, and errors that say where and what to do.
+
+use std::fmt::{self, Display};
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+/// A configuration that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file could not be read.
+    #[error("{}: {source}: give an existing file with --config, or leave --config out for the paper's worm", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not TOML, an unknown key, or a value of the wrong type.
+    #[error("{}:{line}:{column}: {message}", file.display())]
+    Syntax {
+        /// The file.
+        file: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// Values out of range or in contradiction.
+    #[error("{}", ProblemList { file, problems })]
+    Values {
+        /// The file.
+        file: PathBuf,
+        /// Every problem found.
+        problems: Vec<Problem>,
+    },
+}
+
+/// One value that is out of range or contradicts another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// The key, as `section.key`.
+    pub key: String,
+    /// The value that was given.
+    pub value: String,
+    /// What is allowed, or what to do.
+    pub remedy: String,
+}
+
+impl Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}: {}", self.key, self.value, self.remedy)
+    }
+}
+
+struct ProblemList<'a> {
+    file: &'a Path,
+    problems: &'a [Problem],
+}
+
+impl Display for ProblemList<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, problem) in self.problems.iter().enumerate() {
+            let separator = if index == 0 { "" } else { "\n" };
+            write!(f, "{separator}{}: {problem}", self.file.display())?;
+        }
+        Ok(())
+    }
+}
+
+/// Gives a TOML error its place in the file.
+pub(super) fn syntax(text: &str, file: &Path, error: &toml::de::Error) -> ConfigError {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or("");
+    ConfigError::Syntax {
+        file: file.to_path_buf(),
+        line: before.matches('\n').count() + 1,
+        column: before.chars().rev().take_while(|&c| c != '\n').count() + 1,
+        message: error.message().trim().to_owned(),
+    }
+}
+
+/// Collects problems, so that a person sees all of them at once.
+#[derive(Default)]
+pub(super) struct Checker {
+    pub(super) problems: Vec<Problem>,
+}
+
+impl Checker {
+    /// Notes a problem unless `holds`.
+    pub(super) fn require(&mut self, holds: bool, key: &str, value: impl Display, remedy: impl Display) {
+        if !holds {
+            self.problems.push(Problem {
+                key: key.to_owned(),
+                value: value.to_string(),
+                remedy: remedy.to_string(),
+            });
+        }
+    }
+
+    /// Notes a problem unless `value` is a number in `range`; `unit` is for the reader.
+    pub(super) fn range<T: PartialOrd + Display>(&mut self, key: &str, value: T, range: RangeInclusive<T>, unit: &str) {
+        let space = if unit.is_empty() { "" } else { " " };
+        let remedy = format!("must be from {} to {}{space}{unit}", range.start(), range.end());
+        self.require(range.contains(&value), key, value, remedy);
+    }
+}

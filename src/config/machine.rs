@@ -1,0 +1,396 @@
+//! The machine around the worm: port, servo, tracker, loop, limits, battery, operating system, topics.
+
+use super::check::Checker;
+use serde::Deserialize;
+
+/// How both devices are read in one exchange.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReadMode {
+    /// Fast bulk read if both devices answer it at start-up, else bulk read, else separate reads.
+    Auto,
+    /// Fast bulk read: one answer for both devices.
+    FastBulk,
+    /// Bulk read: an answer each.
+    Bulk,
+    /// One read after the other.
+    Separate,
+}
+
+/// The serial port of a real worm.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Port {
+    /// The port's device file.
+    pub path: String,
+    /// Baud rate, the same in the port and in both devices.
+    #[serde(default = "default_baud")]
+    pub baud: u32,
+    /// How both devices are read.
+    #[serde(default = "default_read_mode")]
+    pub read: ReadMode,
+}
+
+/// Baud rates of the X series (XL330-M288 e-manual, register 8).
+pub const BAUD_RATES: [u32; 7] = [9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000];
+
+fn default_baud() -> u32 {
+    4_000_000
+}
+
+fn default_read_mode() -> ReadMode {
+    ReadMode::Auto
+}
+
+impl Port {
+    /// A port with the default baud rate and read mode.
+    pub fn at(path: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            baud: default_baud(),
+            read: default_read_mode(),
+        }
+    }
+
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.require(
+            !self.path.is_empty(),
+            "port.path",
+            "\"\"",
+            "name the port, such as \"/dev/ttyUSB0\", or remove the section [port] for the virtual worm",
+        );
+        let known = BAUD_RATES.contains(&self.baud);
+        checker.require(
+            known,
+            "port.baud",
+            self.baud,
+            format!("must be one of {:?}", BAUD_RATES),
+        );
+    }
+}
+
+/// The servo that turns the cam: a DYNAMIXEL of the X series.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Servo {
+    /// Device ID on the bus.
+    pub id: u8,
+    /// Model number that must answer.
+    pub model_number: u16,
+    /// Present position at which the gait phase is a whole number, counts of 1/4096 turn.
+    pub home_position: i32,
+    /// Cam turns forward when the servo turns in its positive direction.
+    pub positive_is_forward: bool,
+    /// Resistance of the winding at 25 °C, ohm.
+    pub winding_resistance_ohm: f64,
+    /// Torque of the output shaft per current, N m/A, before inner friction.
+    pub torque_constant_n_m_per_a: f64,
+    /// Current limit written to the servo, A.
+    pub current_limit_a: f64,
+    /// Velocity limit written to the servo, rev/min.
+    pub velocity_limit_rev_per_min: f64,
+    /// Temperature limit written to the servo, °C.
+    pub temperature_limit_c: u8,
+    /// Silence after which the servo stops the motor by itself, ms, in steps of 20 ms.
+    pub watchdog_ms: u32,
+}
+
+impl Default for Servo {
+    fn default() -> Self {
+        Self {
+            id: 1,
+            model_number: 1200,
+            home_position: 0,
+            positive_is_forward: true,
+            winding_resistance_ohm: 3.4,
+            torque_constant_n_m_per_a: 0.39,
+            current_limit_a: 1.0,
+            velocity_limit_rev_per_min: 60.0,
+            temperature_limit_c: 70,
+            watchdog_ms: 100,
+        }
+    }
+}
+
+impl Servo {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("servo.id", self.id, 0..=252, "");
+        checker.range(
+            "servo.winding_resistance_ohm",
+            self.winding_resistance_ohm,
+            0.01..=1000.0,
+            "ohm",
+        );
+        checker.range(
+            "servo.torque_constant_n_m_per_a",
+            self.torque_constant_n_m_per_a,
+            1e-3..=100.0,
+            "N m/A",
+        );
+        checker.range("servo.current_limit_a", self.current_limit_a, 0.01..=1.75, "A");
+        checker.range(
+            "servo.velocity_limit_rev_per_min",
+            self.velocity_limit_rev_per_min,
+            0.3..=468.0,
+            "rev/min",
+        );
+        checker.range("servo.temperature_limit_c", self.temperature_limit_c, 30..=100, "°C");
+        checker.range("servo.watchdog_ms", self.watchdog_ms, 20..=2540, "ms");
+        checker.require(
+            self.watchdog_ms.is_multiple_of(20),
+            "servo.watchdog_ms",
+            self.watchdog_ms,
+            "must be a multiple of 20 ms, the servo's unit",
+        );
+    }
+}
+
+/// The device that measures cell positions.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Tracker {
+    /// Device ID on the bus.
+    pub id: u8,
+    /// Model number that must answer.
+    pub model_number: u16,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Standard deviation of one position, m, as far as known.
+    pub noise_m: f64,
+}
+
+impl Default for Tracker {
+    fn default() -> Self {
+        Self {
+            id: 100,
+            model_number: 0x574D,
+            rate_hz: 120.0,
+            noise_m: 1e-4,
+        }
+    }
+}
+
+impl Tracker {
+    pub(super) fn check(&self, servo_id: u8, checker: &mut Checker) {
+        checker.range("tracker.id", self.id, 0..=252, "");
+        checker.require(self.id != servo_id, "tracker.id", self.id, "must differ from servo.id");
+        checker.range("tracker.rate_hz", self.rate_hz, 20.0..=2000.0, "Hz");
+        checker.range("tracker.noise_m", self.noise_m, 1e-7..=5e-3, "m");
+    }
+}
+
+/// The control loop and its patience.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Control {
+    /// Ticks per second.
+    pub rate_hz: f64,
+    /// Share of the tick's period that the exchange may wait for answers.
+    pub bus_wait_share: f64,
+    /// Servo silence after which the link counts as lost, s.
+    pub link_timeout_s: f64,
+    /// Time without a new tracker sample after which the tracker counts as stale, s.
+    pub tracker_timeout_s: f64,
+    /// Estimator silence after which it counts as gone, s.
+    pub estimator_timeout_s: f64,
+    /// Whether the worm crawls only while an estimator is running.
+    pub require_estimator: bool,
+    /// Stiffness of a hold: commanded velocity per angle error, 1/s.
+    pub hold_gain_per_s: f64,
+    /// Gait cycles that a `back-off` goes back before it holds.
+    pub back_off_cycles: f64,
+}
+
+impl Default for Control {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1000.0,
+            bus_wait_share: 0.7,
+            link_timeout_s: 0.1,
+            tracker_timeout_s: 0.5,
+            estimator_timeout_s: 0.5,
+            require_estimator: true,
+            hold_gain_per_s: 5.0,
+            back_off_cycles: 1.0,
+        }
+    }
+}
+
+impl Control {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("control.rate_hz", self.rate_hz, 10.0..=10_000.0, "Hz");
+        checker.range("control.bus_wait_share", self.bus_wait_share, 0.1..=0.95, "");
+        checker.range("control.link_timeout_s", self.link_timeout_s, 0.005..=5.0, "s");
+        checker.range("control.tracker_timeout_s", self.tracker_timeout_s, 0.02..=10.0, "s");
+        checker.range("control.estimator_timeout_s", self.estimator_timeout_s, 0.1..=10.0, "s");
+        checker.range("control.hold_gain_per_s", self.hold_gain_per_s, 0.1..=50.0, "1/s");
+        checker.range("control.back_off_cycles", self.back_off_cycles, 0.1..=100.0, "cycles");
+    }
+}
+
+/// Limits at which the controller stops by itself.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Motor current, A.
+    pub current_a: f64,
+    /// How long the current may stay above the limit, s.
+    pub current_time_s: f64,
+    /// Servo temperature, °C.
+    pub temperature_c: f64,
+    /// Bus voltage, V, averaged over 0.1 s.
+    pub voltage_v: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            current_a: 0.9,
+            current_time_s: 0.5,
+            temperature_c: 65.0,
+            voltage_v: 3.7,
+        }
+    }
+}
+
+impl Limits {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("limits.current_a", self.current_a, 0.01..=5.0, "A");
+        checker.range("limits.current_time_s", self.current_time_s, 0.0..=10.0, "s");
+        checker.range("limits.temperature_c", self.temperature_c, 20.0..=120.0, "°C");
+        checker.range("limits.voltage_v", self.voltage_v, 0.0..=50.0, "V");
+    }
+}
+
+/// The estimator.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Estimator {
+    /// Good cycles on which alarm thresholds are calibrated.
+    pub calibration_cycles: u32,
+    /// A position further than this many standard deviations from where the cell can be is an outlier.
+    pub outlier_sigmas: f64,
+}
+
+impl Default for Estimator {
+    fn default() -> Self {
+        Self {
+            calibration_cycles: 3,
+            outlier_sigmas: 5.0,
+        }
+    }
+}
+
+impl Estimator {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range(
+            "estimator.calibration_cycles",
+            self.calibration_cycles,
+            1..=100,
+            "cycles",
+        );
+        checker.range("estimator.outlier_sigmas", self.outlier_sigmas, 3.0..=20.0, "");
+    }
+}
+
+/// The battery on board.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Battery {
+    /// Energy when full, J.
+    pub capacity_j: f64,
+    /// Open-circuit voltage when full, V.
+    pub full_v: f64,
+    /// Open-circuit voltage when empty, V.
+    pub empty_v: f64,
+    /// Inner resistance, ohm.
+    pub internal_resistance_ohm: f64,
+    /// Power of everything but the motor, W.
+    pub hotel_power_w: f64,
+    /// Share of the charge kept back beyond the way home.
+    pub reserve_share: f64,
+}
+
+impl Battery {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("battery.capacity_j", self.capacity_j, 1.0..=1e7, "J");
+        checker.range("battery.full_v", self.full_v, 1.0..=60.0, "V");
+        checker.range("battery.empty_v", self.empty_v, 0.5..=60.0, "V");
+        checker.require(
+            self.empty_v < self.full_v,
+            "battery.empty_v",
+            self.empty_v,
+            "must be below battery.full_v",
+        );
+        checker.range(
+            "battery.internal_resistance_ohm",
+            self.internal_resistance_ohm,
+            0.0..=10.0,
+            "ohm",
+        );
+        checker.range("battery.hotel_power_w", self.hotel_power_w, 0.0..=100.0, "W");
+        checker.range("battery.reserve_share", self.reserve_share, 0.0..=0.9, "");
+    }
+}
+
+/// What the loop asks of the operating system. A refusal is reported, and the worm still runs.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Realtime {
+    /// Priority under SCHED_FIFO; 0 leaves the ordinary scheduler.
+    pub priority: u8,
+    /// CPU that the loop is pinned to; absent: none.
+    pub cpu: Option<usize>,
+    /// Lock all memory.
+    pub lock_memory: bool,
+}
+
+impl Default for Realtime {
+    fn default() -> Self {
+        Self {
+            priority: 80,
+            cpu: None,
+            lock_memory: true,
+        }
+    }
+}
+
+impl Realtime {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("realtime.priority", self.priority, 0..=99, "");
+        if let Some(cpu) = self.cpu {
+            checker.range("realtime.cpu", cpu, 0..=1023, "");
+        }
+    }
+}
+
+/// Where the shared-memory topics live.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Topics {
+    /// Folder for locks and service files of all worms on this computer; best on a tmpfs.
+    pub root: String,
+}
+
+impl Default for Topics {
+    fn default() -> Self {
+        Self {
+            root: "/dev/shm/wormd".to_owned(),
+        }
+    }
+}
+
+impl Topics {
+    pub(super) fn check(&self, worm_name: &str, checker: &mut Checker) {
+        // A service's socket lies in the root and holds the name twice; a socket's path is short.
+        let most = 48_usize.saturating_sub(2 * worm_name.len());
+        checker.require(
+            self.root.starts_with('/') && self.root.len() <= most,
+            "topics.root",
+            format!("\"{}\"", self.root),
+            format!(
+                "must be an absolute path of at most {most} characters for a worm of this name (socket paths are short)"
+            ),
+        );
+    }
+}

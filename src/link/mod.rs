@@ -1,1 +1,0 @@
-//! The serial side: packets, the bus, the servo and the tracker.

@@ -1,0 +1,81 @@
+//! The `alarm` topic: what is wrong, since when, and by how much.
+
+use super::coded_enum;
+use iceoryx2::prelude::ZeroCopySend;
+
+coded_enum! {
+    /// What an alarm watches. The code is its bit in [`super::Estimate::armed_mask`] and `raised_mask`.
+    AlarmKind, "alarm" {
+        /// The cam does not turn as commanded.
+        MotorStall = 0 => "motor-stall",
+        /// A cell does not extend in its step.
+        JammedCell = 1 => "jammed-cell",
+        /// The cam turns and the worm does not advance.
+        NoProgress = 2 => "no-progress",
+        /// The worm moves down the canal.
+        SlidingDown = 3 => "sliding-down",
+        /// Cycles cost more than they should.
+        EnergyOverBudget = 4 => "energy-over-budget",
+        /// What the battery holds is needed for the way home.
+        BatteryLow = 5 => "battery-low",
+        /// The servo does not answer, or answers badly.
+        LinkFault = 6 => "link-fault",
+        /// The tracker gives no samples, loses many, or does not see a cell.
+        TrackerFault = 7 => "tracker-fault",
+        /// The servo reports a hardware error, heat or low voltage.
+        DeviceFault = 8 => "device-fault",
+    }
+}
+
+coded_enum! {
+    /// How serious an alarm is.
+    Severity, "severity" {
+        /// Worth knowing.
+        Warning = 0 => "warning",
+        /// The worm cannot go on like this.
+        Critical = 1 => "critical",
+    }
+}
+
+/// One change of one alarm: raised or cleared.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("wormd_alarm_v1")]
+#[repr(C)]
+pub struct Alarm {
+    /// Number of this change since the estimator started.
+    pub sequence: u64,
+    /// When it was raised or cleared, ns of `CLOCK_MONOTONIC`.
+    pub time_ns: u64,
+    /// When its condition began, by the estimator's account, ns of `CLOCK_MONOTONIC`.
+    pub since_ns: u64,
+    /// The watched quantity at the change, in the unit of the threshold.
+    pub value: f64,
+    /// The threshold that it passed.
+    pub threshold: f64,
+    /// Gait phase at the change, cycles.
+    pub phase: f64,
+    /// [`AlarmKind`] as a code.
+    pub kind: u32,
+    /// [`Severity`] as a code.
+    pub severity: u32,
+    /// 1 raised, 0 cleared.
+    pub raised: u32,
+    /// The cell that is meant, from 0, or `u32::MAX` where no single cell is meant.
+    pub cell: u32,
+}
+
+impl Alarm {
+    /// No alarm: what fills a fixed-size list behind its end.
+    pub const NONE: Self = Self {
+        sequence: 0,
+        time_ns: 0,
+        since_ns: 0,
+        value: 0.0,
+        threshold: 0.0,
+        phase: 0.0,
+        kind: 0,
+        severity: 0,
+        raised: 0,
+        cell: u32::MAX,
+    };
+}

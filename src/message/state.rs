@@ -1,0 +1,142 @@
+//! The `state` topic: what the controller saw and commanded in one tick.
+
+use super::coded_enum;
+use crate::MAX_CELLS;
+use iceoryx2::prelude::ZeroCopySend;
+
+coded_enum! {
+    /// Where the controller's state machine stands.
+    Mode, "controller mode" {
+        /// No torque; the cam can be turned by hand.
+        Disarmed = 0 => "disarmed",
+        /// Torque on, goal velocity zero, ready to crawl.
+        Armed = 1 => "armed",
+        /// The cam turns at the commanded speed.
+        Crawling = 2 => "crawling",
+        /// The cam is actively kept at the angle it had when the hold began.
+        Holding = 3 => "holding",
+        /// The speed ramps down; torque goes off when the cam stands.
+        Stopping = 4 => "stopping",
+        /// A safety rule stopped the worm; the reason is latched until a reset.
+        Fault = 5 => "fault",
+    }
+}
+
+coded_enum! {
+    /// Why the controller is in [`Mode::Fault`]: the first reason, latched.
+    Fault, "fault" {
+        /// No fault.
+        None = 0 => "none",
+        /// The servo did not answer for longer than the configured time.
+        LinkLost = 1 => "link-lost",
+        /// The tracker gave no new sample for longer than the configured time.
+        TrackerStale = 2 => "tracker-stale",
+        /// The estimator was silent for longer than the configured time.
+        EstimatorSilent = 3 => "estimator-silent",
+        /// The motor current stayed above its limit.
+        OverCurrent = 4 => "over-current",
+        /// The servo is hotter than its limit.
+        OverTemperature = 5 => "over-temperature",
+        /// The bus voltage fell below its limit.
+        UnderVoltage = 6 => "under-voltage",
+        /// The servo reports a hardware error (register 70).
+        ServoHardware = 7 => "servo-hardware",
+        /// The servo's own bus watchdog had stopped the motor.
+        WatchdogTripped = 8 => "watchdog-tripped",
+        /// The servo restarted on its own, and with it torque and watchdog were lost.
+        ServoRestarted = 9 => "servo-restarted",
+        /// An alarm whose policy is `stop`.
+        Alarm = 10 => "alarm",
+    }
+}
+
+/// One tick of the controller, published every tick.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("wormd_state_v1")]
+#[repr(C)]
+pub struct State {
+    /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
+    pub sequence: u64,
+    /// When the tick's exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
+    pub time_ns: u64,
+    /// Gait cycles done, unwrapped: the cam angle over one turn, zero at the configured home.
+    pub phase: f64,
+    /// Cam angle, rad, unwrapped.
+    pub motor_angle_rad: f64,
+    /// Cam velocity, rad/s.
+    pub motor_velocity_rad_s: f64,
+    /// Velocity commanded in this tick, rad/s.
+    pub goal_velocity_rad_s: f64,
+    /// Current in the motor winding, A.
+    pub motor_current_a: f64,
+    /// Share of the bus voltage that the driver puts on the winding, −1 to 1.
+    pub motor_duty: f64,
+    /// Bus voltage, V.
+    pub bus_voltage_v: f64,
+    /// Servo temperature, °C.
+    pub motor_temperature_c: f64,
+    /// When the newest tracker sample was captured, s of the tracker's own clock, unwrapped.
+    pub sample_time_s: f64,
+    /// Cell positions along the canal of the newest tracker sample, m; `NaN` where not seen.
+    pub position_m: [f64; MAX_CELLS],
+    /// Tracker samples since the controller started, unwrapped; grows by one with each sample that was seen.
+    pub sample: u64,
+    /// Tracker samples that came and went between two reads, since the controller started.
+    pub samples_missed: u64,
+    /// Ticks since the controller started in which the servo's answer was missing or unusable.
+    pub link_failures: u64,
+    /// How many cells are in use.
+    pub cell_count: u32,
+    /// Bit i set: cell i was seen in the newest sample.
+    pub valid_mask: u32,
+    /// 1 when the tracker sample is new in this tick, else 0.
+    pub sample_is_new: u32,
+    /// 1 when the motor readings are of this tick, 0 when the last good ones are repeated.
+    pub motor_is_new: u32,
+    /// [`Mode`] as a code.
+    pub mode: u32,
+    /// [`Fault`] as a code: the latched reason.
+    pub fault: u32,
+    /// The [`super::AlarmKind`] behind [`Fault::Alarm`], or `u32::MAX`.
+    pub fault_alarm: u32,
+    /// Servo register 70, hardware error status, as last read.
+    pub hardware_error: u32,
+}
+
+impl State {
+    /// A state in which nothing is known yet, for `cell_count` cells.
+    pub fn unknown(cell_count: usize) -> Self {
+        Self {
+            sequence: 0,
+            time_ns: 0,
+            phase: f64::NAN,
+            motor_angle_rad: f64::NAN,
+            motor_velocity_rad_s: f64::NAN,
+            goal_velocity_rad_s: 0.0,
+            motor_current_a: f64::NAN,
+            motor_duty: f64::NAN,
+            bus_voltage_v: f64::NAN,
+            motor_temperature_c: f64::NAN,
+            sample_time_s: f64::NAN,
+            position_m: [f64::NAN; MAX_CELLS],
+            sample: 0,
+            samples_missed: 0,
+            link_failures: 0,
+            cell_count: cell_count as u32,
+            valid_mask: 0,
+            sample_is_new: 0,
+            motor_is_new: 0,
+            mode: Mode::Disarmed.code(),
+            fault: Fault::None.code(),
+            fault_alarm: u32::MAX,
+            hardware_error: 0,
+        }
+    }
+
+    /// Position of cell `index` if it was seen in the newest sample, m.
+    pub fn position_of(&self, index: usize) -> Option<f64> {
+        (index < self.cell_count as usize && self.valid_mask >> index & 1 == 1)
+            .then(|| self.position_m[index])
+            .filter(|position| position.is_finite())
+    }
+}

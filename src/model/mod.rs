@@ -1,1 +1,0 @@
-//! The worm as pure physics.
