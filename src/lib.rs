@@ -5,4 +5,5 @@ pub const MAX_CELLS: usize = 16;
 
 pub mod config;
 pub mod message;
+pub mod model;
 pub mod realtime;

@@ -1,0 +1,169 @@
+//! One cycle of the periodic crawl, and the closed forms to hold it against.
+
+use super::ledger::Ledger;
+use super::motion::Motion;
+use super::worm::{SlidesDown, Worm};
+use crate::MAX_CELLS;
+
+/// Change of any deformation over a cycle, as a share of the stroke, below which the crawl counts as periodic.
+const PERIODIC_SHARE: f64 = 1e-12;
+/// Cycles after which the search for the periodic crawl ends in any case.
+const MAX_CYCLES: u32 = 10_000;
+/// Advance, as a share of the stroke, up to which the worm counts as standing still: well above rounding.
+const STANDSTILL_SHARE: f64 = 1e-9;
+
+/// What becomes of a worm that keeps stepping.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly every outcome is a cycle, so a box would save no memory"
+)]
+pub enum Outcome {
+    /// It settles into a periodic motion, with or without progress.
+    Steady(Cycle),
+    /// Its tips cannot hold it even at rest.
+    SlidesDown(SlidesDown),
+}
+
+impl Outcome {
+    /// The steady cycle, where there is one.
+    pub fn cycle(&self) -> Option<&Cycle> {
+        match self {
+            Self::Steady(cycle) => Some(cycle),
+            Self::SlidesDown(_) => None,
+        }
+    }
+
+    /// Whether the worm gets forward.
+    pub fn progresses(&self) -> bool {
+        self.cycle().is_some_and(|cycle| cycle.progresses)
+    }
+}
+
+/// One gait cycle of the steady crawl.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cycle {
+    /// Advance L: mean over the cells of the net displacement, m. Negative when the worm slips back by more than it steps.
+    pub advance_m: f64,
+    /// Whether the advance is more than rounding.
+    pub progresses: bool,
+    /// Distance each tip slid forward, m.
+    pub forward_slide_m: [f64; MAX_CELLS],
+    /// Distance each tip slid backward, m, counted positive.
+    pub backward_slide_m: [f64; MAX_CELLS],
+    /// Sliding losses and work against weight and resisting force (11), J.
+    pub energy_loss_j: f64,
+    /// Net actuator work (13), J; equal to `energy_loss_j` because the cycle is periodic.
+    pub energy_actuator_net_j: f64,
+    /// Positive part of the actuator work, the energy of the paper's Table 1, J.
+    pub energy_actuator_positive_j: f64,
+    /// Cost of transport, positive work over m g L; none without progress or weight.
+    pub cot: Option<f64>,
+    /// Positive work over the advance, J/m; none without progress.
+    pub energy_per_distance_j_per_m: Option<f64>,
+    /// Mean over the cycle of Σ δᵢ (8), m.
+    pub mean_deformation_m: f64,
+    /// Cycles from rest to the periodic crawl.
+    pub cycles_to_steady: u32,
+    /// Largest change of a deformation over this cycle, m: how well it closes.
+    pub closure_m: f64,
+}
+
+impl Cycle {
+    /// Whether the worm ends the cycle further back than it began, by more than rounding.
+    pub fn slips_back(&self, worm: &Worm) -> bool {
+        self.advance_m < -STANDSTILL_SHARE * worm.stroke_m()
+    }
+
+    fn new(worm: &Worm, advance_m: f64, account: &Ledger, cycles_to_steady: u32, closure_m: f64) -> Self {
+        let progresses = advance_m > STANDSTILL_SHARE * worm.stroke_m();
+        let positive_j = account.actuator_positive_j;
+        let energy_per_distance_j_per_m = progresses.then(|| positive_j / advance_m);
+        let weight_n = worm.weight_n();
+        Self {
+            advance_m,
+            progresses,
+            forward_slide_m: account.forward_slide_m,
+            backward_slide_m: account.backward_slide_m,
+            energy_loss_j: account.loss_j(),
+            energy_actuator_net_j: account.actuator_net_j,
+            energy_actuator_positive_j: positive_j,
+            cot: energy_per_distance_j_per_m
+                .filter(|_| weight_n > 0.0)
+                .map(|energy| energy / weight_n),
+            energy_per_distance_j_per_m,
+            mean_deformation_m: account.deformation_integral_m,
+            cycles_to_steady,
+            closure_m,
+        }
+    }
+}
+
+/// Crawls forward from rest until no deformation changes over a cycle by more than 10⁻¹² strokes, and accounts for that
+/// cycle.
+///
+/// The deformations of two worms under the same gait never grow apart in the norm of their elastic energy, so the crawl
+/// always tends to a periodic one; should 10 000 cycles not do, the last is returned and its `closure_m` says how far off it
+/// is. For the crawl in reverse use [`Worm::mirrored`].
+///
+/// A worm that falls short of holding only while a cell steps still has a steady cycle, with a negative advance. The way
+/// there can be a jump: once the pull exceeds what the others hold against a sliding cell, the stepping cell no longer
+/// slides forward at all and every step pushes the others back instead. The paper's worm with 3 cells advances by 1.0 mm
+/// just below 44.43° and loses 12.5 mm just above.
+pub fn steady_cycle(worm: &Worm) -> Outcome {
+    crawl_until_periodic(worm).map_or_else(Outcome::SlidesDown, Outcome::Steady)
+}
+
+fn crawl_until_periodic(worm: &Worm) -> Result<Cycle, SlidesDown> {
+    let tolerance_m = PERIODIC_SHARE * worm.stroke_m();
+    let first_positions_m = [0.0; MAX_CELLS];
+    let mut motion = Motion::at_rest(worm, &first_positions_m[..worm.cells()]);
+    let mut cycles = 0;
+    loop {
+        let before = motion.clone();
+        motion.advance_to(worm, before.phase() + 1.0)?;
+        let changes = motion.deformations_m().iter().zip(before.deformations_m());
+        let closure_m = changes
+            .map(|(after, before)| (after - before).abs())
+            .fold(0.0, f64::max);
+        if closure_m <= tolerance_m || cycles == MAX_CYCLES {
+            let advance_m = motion.mean_position_m() - before.mean_position_m();
+            let account = motion.ledger().since(before.ledger());
+            return Ok(Cycle::new(worm, advance_m, &account, cycles, closure_m));
+        }
+        cycles += 1;
+    }
+}
+
+/// Energy that the same worm on rigid contacts would take to cover a distance: n μN L + m g sin λ L, J, with μN = k δmax
+/// for each cell. Rigid tips neither spring back nor slide backward, so each slides forward by the distance itself.
+pub fn rigid_energy_j(worm: &Worm, distance_m: f64) -> f64 {
+    let friction_n: f64 = worm
+        .contacts()
+        .iter()
+        .map(|contact| contact.stiffness_n_per_m * contact.forward_bound_m)
+        .sum();
+    (friction_n + worm.pull_n()) * distance_m
+}
+
+/// The steady cycle of equal cells on the level in closed form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelCycle {
+    /// L = Ls − 2 δmax n/(n−1), m.
+    pub advance_m: f64,
+    /// Positive actuator work n [k δmax L + ½ k δmax² n/(n−1)], J.
+    pub energy_actuator_positive_j: f64,
+}
+
+/// The steady cycle of `cells` equal cells on the level without resisting force: the stepping cell loads from −δmax to
+/// +δmax while every other cell gives back 2 δmax/(n−1), and no tip slides backward. Valid where the advance is positive.
+pub fn level_closed_form(cells: usize, stiffness_n_per_m: f64, max_deformation_m: f64, stroke_m: f64) -> LevelCycle {
+    let n = cells as f64;
+    let give = n / (n - 1.0);
+    let friction_n = stiffness_n_per_m * max_deformation_m;
+    let advance_m = stroke_m - 2.0 * max_deformation_m * give;
+    LevelCycle {
+        advance_m,
+        energy_actuator_positive_j: n * friction_n * (advance_m + 0.5 * max_deformation_m * give),
+    }
+}
