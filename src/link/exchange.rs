@@ -1,0 +1,370 @@
+//! The exchange of a tick: the goal goes out, the readings of both devices come in.
+//!
+//! One write to the port holds two packets: the goal velocity for the servo, and the request for both devices' blocks. So the
+//! USB frame that carries the goal carries the question too. It needs a servo that does not answer writes (status return
+//! level 1): its receipt would collide with the question on a half-duplex line. The receipt is the goal that is read back
+//! with the block.
+//!
+//! | [`ReadPlan`] | question | answers | bytes on the wire with 5 cells |
+//! |---|---|---|---|
+//! | `FastBulk` | one | one, of both devices | 16 + 20 + 96 |
+//! | `Bulk` | one | one of each device | 16 + 20 + 60 + 42 |
+//! | `Separate` | one to each device | one to each | 16 + 14 + 60 + 14 + 42 |
+
+use std::time::Instant;
+
+use super::bus::WaitEnd;
+use super::packet::{
+    DeviceId, FastReply, Instruction, InstructionPacket, Packet, ReadSpan, ReadSpans, Recipient, SegmentError,
+    StatusError, StatusFlags, StatusPacket,
+};
+use super::{Bus, LinkCounters, Port, PortError, ServoReading, TrackerReading, TransactionError, servo, tracker};
+
+/// How the two blocks are read in each tick, as it is configured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReadMode {
+    /// The fastest that both devices know, found out at start-up.
+    #[default]
+    Auto,
+    /// As said.
+    Always(ReadPlan),
+}
+
+/// How the two blocks are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReadPlan {
+    /// Fast bulk read.
+    FastBulk,
+    /// Bulk read, for firmware that does not know the fast one.
+    Bulk,
+    /// A read of each device, for trackers on the Arduino library, which knows no bulk read.
+    Separate,
+}
+
+/// Whom an exchange talks to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExchangePlan {
+    /// The servo.
+    pub servo: DeviceId,
+    /// The tracker.
+    pub tracker: DeviceId,
+    /// Cells to read of the tracker, at most [`MAX_CELLS`](crate::MAX_CELLS).
+    pub cells: usize,
+    /// How they are read.
+    pub read: ReadPlan,
+}
+
+impl ExchangePlan {
+    fn spans(&self) -> [ReadSpan; 2] {
+        [
+            servo::block_span(self.servo),
+            tracker::block_span(self.tracker, self.cells),
+        ]
+    }
+}
+
+/// What an exchange brought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExchangeOutcome {
+    /// The servo's block, or why there is none.
+    pub servo: Result<ServoReading, ReadFailure>,
+    /// The tracker's block, or why there is none.
+    pub tracker: Result<TrackerReading, ReadFailure>,
+    /// The servo reports the goal that was sent. If not, though it was read: the goal got lost, is beyond the velocity limit,
+    /// or is locked by a latched watchdog; or the answer is a late one to an earlier question.
+    pub goal_taken: bool,
+    /// Bytes sent.
+    pub sent_bytes: u32,
+    /// Bytes received.
+    pub received_bytes: u32,
+    /// This exchange and those right before it in which no byte came. Where they do not end the worm is gone, though the
+    /// port is there: switched off, or its cable is out.
+    pub silent_in_a_row: u32,
+}
+
+impl ExchangeOutcome {
+    /// Both devices' data came.
+    #[must_use]
+    pub const fn is_complete(&self) -> bool {
+        self.servo.is_ok() && self.tracker.is_ok()
+    }
+
+    /// The port is gone: it is to be opened again.
+    #[must_use]
+    pub const fn is_disconnected(&self) -> bool {
+        matches!(self.servo, Err(ReadFailure::Port(PortError::Disconnected)))
+            || matches!(self.tracker, Err(ReadFailure::Port(PortError::Disconnected)))
+    }
+}
+
+/// Why a device's data did not come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ReadFailure {
+    /// No answer by the deadline.
+    #[error("no answer by the deadline")]
+    Silent,
+    /// The answer came damaged.
+    #[error("the answer came damaged")]
+    Damaged,
+    /// The device refused.
+    #[error("refused: {0}")]
+    Refused(StatusError),
+    /// Another device answered in its place, or with another length.
+    #[error("an answer that is none to the question")]
+    Malformed,
+    /// The port failed.
+    #[error(transparent)]
+    Port(PortError),
+}
+
+impl ReadFailure {
+    const fn or_damaged(self) -> Self {
+        if matches!(self, Self::Silent) {
+            Self::Damaged
+        } else {
+            self
+        }
+    }
+}
+
+/// What has been read so far.
+struct Harvest {
+    servo: Result<ServoReading, ReadFailure>,
+    tracker: Result<TrackerReading, ReadFailure>,
+}
+
+impl Harvest {
+    const NOTHING: Self = Self {
+        servo: Err(ReadFailure::Silent),
+        tracker: Err(ReadFailure::Silent),
+    };
+
+    /// Takes a block of either device. Whether it was one that was asked for.
+    fn take(
+        &mut self,
+        plan: &ExchangePlan,
+        id: DeviceId,
+        flags: StatusFlags,
+        data: &[u8],
+        counters: &mut LinkCounters,
+    ) {
+        let failure = flags.error.map_or(ReadFailure::Malformed, ReadFailure::Refused);
+        if flags.error.is_none() && data.is_empty() {
+            return; // the receipt of the goal, from a servo that answers writes
+        }
+        let malformed = if id == plan.servo {
+            let block = data.try_into().ok().filter(|_| flags.error.is_none());
+            self.servo = block
+                .map(|block| ServoReading::from_block(block, flags.alert))
+                .ok_or(failure);
+            self.servo == Err(ReadFailure::Malformed)
+        } else if id == plan.tracker {
+            let of_length = flags.error.is_none() && data.len() == usize::from(plan.spans()[1].length);
+            let reading = if of_length {
+                TrackerReading::from_block(data).ok()
+            } else {
+                None
+            };
+            self.tracker = reading.ok_or(failure);
+            self.tracker == Err(ReadFailure::Malformed)
+        } else {
+            counters.wrong_ids += 1;
+            false
+        };
+        counters.malformed += u64::from(malformed);
+    }
+
+    fn take_status(&mut self, plan: &ExchangePlan, status: &StatusPacket<'_>, counters: &mut LinkCounters) {
+        self.take(plan, status.id, status.flags, status.data, counters);
+    }
+
+    fn take_fast_reply(&mut self, plan: &ExchangePlan, reply: FastReply<'_>, counters: &mut LinkCounters) {
+        for segment in reply.segments(plan.spans()) {
+            match segment {
+                Ok(segment) => {
+                    counters.count_flags(segment.flags);
+                    self.take(plan, segment.id, segment.flags, segment.data, counters);
+                }
+                Err(SegmentError::Crc(id)) => {
+                    counters.crc_errors += 1;
+                    self.fail(plan, id, ReadFailure::Damaged);
+                }
+                Err(SegmentError::WrongId { expected, .. }) => {
+                    counters.wrong_ids += 1;
+                    self.fail(plan, expected, ReadFailure::Malformed);
+                }
+                Err(SegmentError::Missing(_)) => {}
+            }
+        }
+    }
+
+    fn fail(&mut self, plan: &ExchangePlan, id: DeviceId, failure: ReadFailure) {
+        if id == plan.servo && self.servo.is_err() {
+            self.servo = Err(failure);
+        } else if id == plan.tracker && self.tracker.is_err() {
+            self.tracker = Err(failure);
+        }
+    }
+
+    /// Where a damaged packet came and good ones did not, damage is the reason, rather than silence.
+    fn blame_damage(&mut self, damaged: bool) {
+        if damaged {
+            self.servo = self.servo.map_err(ReadFailure::or_damaged);
+            self.tracker = self.tracker.map_err(ReadFailure::or_damaged);
+        }
+    }
+
+    /// Each device has said something, be it a refusal.
+    fn is_answered(&self) -> bool {
+        self.servo != Err(ReadFailure::Silent) && self.tracker != Err(ReadFailure::Silent)
+    }
+}
+
+impl<P: Port> Bus<P> {
+    /// Sends the goal velocity and reads both devices' blocks, until both have come or `deadline` has passed.
+    ///
+    /// Allocates nothing, and waits nowhere but on the port. What one device says is used though the other is silent. With
+    /// [`ReadPlan::Separate`] the servo has half of the time, so that its silence does not cost the tracker's answer.
+    pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
+        let before = self.counters;
+        self.counters.exchanges += 1;
+        let mut harvest = Harvest::NOTHING;
+        let end = match plan.read {
+            ReadPlan::FastBulk | ReadPlan::Bulk => {
+                self.exchange_bulk(plan, goal_velocity_rad_s, deadline, &mut harvest)
+            }
+            ReadPlan::Separate => self.exchange_separately(plan, goal_velocity_rad_s, deadline, &mut harvest),
+        };
+        if let Err(TransactionError::Port(error)) = end {
+            let failure = ReadFailure::Port(error);
+            harvest.fail(plan, plan.servo, failure);
+            harvest.fail(plan, plan.tracker, failure);
+        }
+        let counters = &mut self.counters;
+        for failure in [harvest.servo.err(), harvest.tracker.err()] {
+            counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
+        }
+        counters.partial_answers += u64::from(harvest.servo.is_ok() != harvest.tracker.is_ok());
+        let received_bytes = (counters.received_bytes - before.received_bytes) as u32;
+        self.silent_in_a_row = if received_bytes == 0 {
+            self.silent_in_a_row.saturating_add(1)
+        } else {
+            0
+        };
+        let reported_rad_s = harvest.servo.map(|servo| servo.goal_velocity_rad_s);
+        let goal_taken = reported_rad_s.is_ok_and(|found| goal_counts(found) == goal_counts(goal_velocity_rad_s));
+        counters.goals_not_taken += u64::from(harvest.servo.is_ok() && !goal_taken);
+        ExchangeOutcome {
+            goal_taken,
+            servo: harvest.servo,
+            tracker: harvest.tracker,
+            sent_bytes: (counters.sent_bytes - before.sent_bytes) as u32,
+            received_bytes,
+            silent_in_a_row: self.silent_in_a_row,
+        }
+    }
+
+    fn exchange_bulk(
+        &mut self,
+        plan: &ExchangePlan,
+        goal_velocity_rad_s: f64,
+        deadline: Instant,
+        harvest: &mut Harvest,
+    ) -> Result<(), TransactionError> {
+        let wire = plan.spans().map(ReadSpan::to_wire);
+        let spans = ReadSpans::from_valid(&wire);
+        let fast = plan.read == ReadPlan::FastBulk;
+        let instruction = if fast {
+            Instruction::FastBulkRead(spans)
+        } else {
+            Instruction::BulkRead(spans)
+        };
+        let goal = goal_counts(goal_velocity_rad_s);
+        let request = [
+            goal_write(plan.servo, &goal),
+            InstructionPacket {
+                recipient: Recipient::All,
+                instruction,
+            },
+        ];
+        self.send_packets(&request, deadline)?;
+        let end = self.receive_until(deadline, |packet, counters| {
+            match packet {
+                Packet::Status(status) => harvest.take_status(plan, &status, counters),
+                Packet::FastReply(reply) => {
+                    harvest.take_fast_reply(plan, reply, counters);
+                    return true; // there is one, good or not
+                }
+                Packet::Instruction(_) => {} // an echo of the request
+            }
+            harvest.is_answered()
+        })?;
+        if let WaitEnd::DeadlinePassed { damaged } = end {
+            if fast && let Some(reply) = self.decoder.unfinished_fast_reply() {
+                harvest.take_fast_reply(plan, reply, &mut self.counters);
+            }
+            harvest.blame_damage(damaged);
+        }
+        Ok(())
+    }
+
+    fn exchange_separately(
+        &mut self,
+        plan: &ExchangePlan,
+        goal_velocity_rad_s: f64,
+        deadline: Instant,
+        harvest: &mut Harvest,
+    ) -> Result<(), TransactionError> {
+        let goal = goal_counts(goal_velocity_rad_s);
+        let now = Instant::now();
+        let servo_deadline = now + deadline.saturating_duration_since(now) / 2;
+        let [servo_span, tracker_span] = plan.spans();
+        self.send_packets(&[goal_write(plan.servo, &goal), read_of(servo_span)], servo_deadline)?;
+        let servo_end = self.receive_until(servo_deadline, |packet, counters| {
+            if let Packet::Status(status) = packet {
+                harvest.take_status(plan, &status, counters);
+            }
+            harvest.servo != Err(ReadFailure::Silent)
+        })?;
+        if let WaitEnd::DeadlinePassed { damaged: true } = servo_end {
+            harvest.fail(plan, plan.servo, ReadFailure::Damaged);
+        }
+        self.send_packets(&[read_of(tracker_span)], deadline)?;
+        let tracker_end = self.receive_until(deadline, |packet, counters| {
+            if let Packet::Status(status) = packet {
+                harvest.take_status(plan, &status, counters);
+            }
+            harvest.tracker != Err(ReadFailure::Silent)
+        })?;
+        if let WaitEnd::DeadlinePassed { damaged: true } = tracker_end {
+            harvest.fail(plan, plan.tracker, ReadFailure::Damaged);
+        }
+        Ok(())
+    }
+}
+
+fn goal_counts(goal_velocity_rad_s: f64) -> [u8; 4] {
+    servo::scale::velocity_counts(goal_velocity_rad_s).to_le_bytes()
+}
+
+fn goal_write(servo: DeviceId, counts: &[u8; 4]) -> InstructionPacket<'_> {
+    let instruction = Instruction::Write {
+        address: servo::register::GOAL_VELOCITY.address,
+        data: counts,
+    };
+    InstructionPacket {
+        recipient: Recipient::One(servo),
+        instruction,
+    }
+}
+
+const fn read_of(span: ReadSpan) -> InstructionPacket<'static> {
+    let instruction = Instruction::Read {
+        address: span.address,
+        length: span.length,
+    };
+    InstructionPacket {
+        recipient: Recipient::One(span.id),
+        instruction,
+    }
+}

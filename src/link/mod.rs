@@ -1,0 +1,72 @@
+//! The serial side: a worm's servo and tracker, as DYNAMIXEL devices on one bus.
+//!
+//! From the wire up:
+//!
+//! 1. [`packet`] turns bytes into valid values and back (Protocol 2.0), for both ends of the line.
+//! 2. [`servo`] and [`tracker`] say where in a device's control table things stand, what a count is worth, and turn a
+//!    tick's block into a [`ServoReading`] and a [`TrackerReading`] in SI units.
+//! 3. A [`Port`] sends, and waits no longer than it is told. [`Tty`] is the operating system's: opened for one controller
+//!    alone, its USB latency timer found and mended. [`FaultInjector`] makes any port a bad one, from a seed.
+//! 4. A [`Bus`] asks one question at a time on a port: ping, read, write, sync and bulk read, reboot. It counts what goes
+//!    wrong by kind ([`LinkCounters`]).
+//! 5. [`prepare`] makes a worm ready at start-up: right devices, right settings, motor at rest, watchdog set. What it finds
+//!    out of order it mends and tells ([`Finding`]), or refuses with a reason ([`StartupError`]).
+//! 6. [`Bus::exchange`] is what each tick does then: one write with the goal velocity and the question for both devices'
+//!    blocks, then the answers until the deadline. It allocates nothing, logs nothing, and uses a partial answer for what it
+//!    holds.
+//! 7. [`Bus::set_torque`], [`Bus::stop_motor`], [`Bus::rearm_watchdog`] and [`Bus::reboot_servo`] are what a controller
+//!    does between ticks; each change is read back.
+//! 8. [`virtual_worm`] is the other end of the line: the same devices, simulated on a pseudo-terminal.
+//!
+//! ```no_run
+//! use std::path::Path;
+//! use std::time::{Duration, Instant};
+//! use wormd::link::{Bus, LinkSettings, Tty, prepare};
+//!
+//! # fn run(settings: LinkSettings) -> Result<(), Box<dyn std::error::Error>> {
+//! let (tty, mut findings) = Tty::open(Path::new("/dev/ttyUSB0"), settings.baud)?;
+//! let mut bus = Bus::new(tty);
+//! let worm = prepare(&mut bus, &settings, &mut findings)?;
+//! bus.set_torque(worm.plan.servo, true)?;
+//! let outcome = bus.exchange(&worm.plan, 2.5, Instant::now() + Duration::from_millis(3));
+//! if let Ok(servo) = outcome.servo {
+//!     println!("{} rad, {} A", servo.position_rad, servo.current_a);
+//! }
+//! # Ok(()) }
+//! ```
+//!
+//! Times are deadlines on the monotonic clock. Only ports wait; a port in memory makes every test of the link instant.
+//!
+//! What cannot be told: an answer that comes later than the next question looks like the answer to that question, for the
+//! protocol numbers nothing. It is taken for it when it is received first; of two that are there together the newer one has
+//! the last word. When the goal has changed meanwhile, [`ExchangeOutcome::goal_taken`] gives it away; the tracker's sample
+//! counter may, too.
+
+mod bus;
+mod counters;
+mod exchange;
+mod fault_injector;
+mod finding;
+mod latency_timer;
+mod operations;
+pub mod packet;
+mod port;
+mod register;
+pub mod servo;
+mod startup;
+pub mod tracker;
+mod tty;
+pub mod virtual_worm;
+
+pub use bus::{Bus, Identity, TransactionError};
+pub use counters::{LinkCounters, RefusalCounters};
+pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPlan};
+pub use fault_injector::{FaultInjector, Faults};
+pub use finding::Finding;
+pub use operations::OperationError;
+pub use port::{Port, PortError};
+pub use register::Register;
+pub use servo::ServoReading;
+pub use startup::{LinkSettings, Prepared, StartupError, prepare};
+pub use tracker::{NoTrackerBlock, TrackerReading};
+pub use tty::{OpenError, Tty};

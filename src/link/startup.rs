@@ -1,0 +1,417 @@
+//! From a port to a worm that is ready to tick: who is there, is it what the config says, is it set up, can it be mended.
+//!
+//! 1. **Who answers?** Servo and tracker are pinged. When the servo is silent, the usual baud rates are tried and the bus is
+//!    asked who is there, so that the error names the cause.
+//! 2. **Is the motor at rest?** Torque off before anything else is judged; settings are locked otherwise, too. While this goes
+//!    on the servo answers writes (status return level 2), so that a refusal has a reason.
+//! 3. **Are they the right ones, and set up?** Model numbers; no hardware error; cells of the tracker; mode, limits, return
+//!    delay. A setting that is right is not written: EEPROM wears.
+//! 4. **Ready to tick:** status return level 1 (answer reads only, see the exchange), goal zero, watchdog cleared and set.
+//! 5. **How are they read?** The read mode is tried with real requests, and the first reading is kept.
+
+use std::time::{Duration, Instant};
+
+use super::operations::{OperationError, REPLY_TIME};
+use super::packet::DeviceId;
+use super::servo::{self, HardwareErrors, WATCHDOG_LATCHED, register, scale};
+use super::{
+    Bus, ExchangeOutcome, ExchangePlan, Finding, Identity, Port, PortError, ReadMode, ReadPlan, Register, ServoReading,
+    TrackerReading, TransactionError, tracker,
+};
+
+/// Status return level at which only pings and reads are answered.
+const ANSWER_READS: u32 = 1;
+/// Status return level at which everything is answered.
+const ANSWER_ALL: u32 = 2;
+/// Until the line is quiet after something that may or may not be answered.
+const QUIET_TIME: Duration = Duration::from_millis(20);
+/// How often the status return level is written before it counts as refused.
+const STATUS_LEVEL_ATTEMPTS: usize = 3;
+/// Exchanges in which a read mode may show that it works.
+const READ_ATTEMPTS: usize = 5;
+/// Servos of the 330 size, whose firmware up to 51 latches the bus watchdog without stopping the motor (ROBOTIS forum, topic
+/// 4814): XL330-M077 and -M288, XC330-T181, -T288, -M181, -M288.
+const MODELS_OF_SIZE_330: [u16; 6] = [1190, 1200, 1210, 1220, 1230, 1240];
+const LAST_FIRMWARE_WITH_LAME_WATCHDOG: u8 = 51;
+
+/// What the link has to know of a worm. The config fills it in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkSettings {
+    /// Baud rate in bit/s, one of [`servo::BAUD_RATES`]; 1,000,000 is usual.
+    pub baud: u32,
+    /// The servo's ID.
+    pub servo_id: DeviceId,
+    /// The servo's model number, [`servo::XL330_M288_MODEL`] by default.
+    pub servo_model: u16,
+    /// The tracker's ID, [`tracker::DEFAULT_ID`] by default.
+    pub tracker_id: DeviceId,
+    /// The tracker's model number, [`tracker::MODEL`] by default.
+    pub tracker_model: u16,
+    /// Cells of the worm, 1 to [`MAX_CELLS`](crate::MAX_CELLS).
+    pub cells: usize,
+    /// How the devices are read in each tick.
+    pub read: ReadMode,
+    /// Silence in ms after which the motor stops by itself, rounded up to 20 ms; 20 to 2540.
+    pub watchdog_ms: u32,
+    /// The servo's current limit in A; XL330: up to 1.75.
+    pub current_limit_a: f64,
+    /// The servo's velocity limit in rad/s; XL330: up to 49.
+    pub velocity_limit_rad_s: f64,
+    /// Temperature in °C at which the servo shuts down; XL330: up to 100, 70 by default.
+    pub temperature_limit_c: f64,
+}
+
+/// A worm that is ready to tick. Torque is off, the goal is zero, the watchdog is set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prepared {
+    /// How to exchange.
+    pub plan: ExchangePlan,
+    /// Who the servo is.
+    pub servo: Identity,
+    /// Who the tracker is.
+    pub tracker: Identity,
+    /// Cells that the tracker tracks.
+    pub tracker_cells: u8,
+    /// The servo as it stands.
+    pub servo_reading: ServoReading,
+    /// The cells as they lie.
+    pub tracker_reading: TrackerReading,
+}
+
+/// Why a worm cannot be run.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StartupError {
+    /// Nobody answers, or others.
+    #[error(
+        "{device} (ID {id}) does not answer at {baud} baud: check power, cable and the ID in the config; {present}"
+    )]
+    Silent {
+        /// "servo" or "tracker".
+        device: &'static str,
+        /// Who was asked.
+        id: DeviceId,
+        /// In bit/s.
+        baud: u32,
+        /// Who is there instead.
+        present: String,
+    },
+    /// The servo answers at another baud rate.
+    #[error(
+        "servo answers at {found} baud, the config says {configured}: set port.baud to {found}, or register 8 of the servo"
+    )]
+    OtherBaudRate {
+        /// In bit/s.
+        found: u32,
+        /// In bit/s.
+        configured: u32,
+    },
+    /// The device is not the one configured.
+    #[error(
+        "{device} (ID {id}) is of model {found}, the config says {expected}: correct {device}.id or {device}.model_number"
+    )]
+    WrongModel {
+        /// "servo" or "tracker".
+        device: &'static str,
+        /// Who was asked.
+        id: DeviceId,
+        /// Model number found.
+        found: u16,
+        /// Model number configured.
+        expected: u16,
+    },
+    /// The servo has shut down.
+    #[error("the servo reports a hardware error: {0}; remove the cause, then reboot the servo (a reset does so)")]
+    HardwareError(HardwareErrors),
+    /// The tracker sees too few cells.
+    #[error(
+        "the tracker tracks {found} cells, the config says {configured}: correct worm.cells, or set up the tracker"
+    )]
+    TooFewCells {
+        /// Cells that it tracks.
+        found: u8,
+        /// Cells configured.
+        configured: usize,
+    },
+    /// A limit that the register cannot hold.
+    #[error("{value} is no {register} that the servo can hold: correct it in the config")]
+    Limit {
+        /// Which.
+        register: Register,
+        /// What the config asks for, in SI units.
+        value: f64,
+    },
+    /// No way of reading brought both devices' data.
+    #[error(
+        "reading both devices at once brings nothing whole: servo {servo}, tracker {tracker}; try read mode `separate`"
+    )]
+    Unreadable {
+        /// How the servo fared.
+        servo: String,
+        /// How the tracker fared.
+        tracker: String,
+    },
+    /// A register could not be read or set.
+    #[error(transparent)]
+    Operation(#[from] OperationError),
+    /// The port failed.
+    #[error(transparent)]
+    Port(#[from] PortError),
+}
+
+/// Checks servo and tracker and makes them ready to tick. What was out of order goes into `findings`, mended or not, also when
+/// an error ends the check.
+///
+/// # Errors
+/// [`StartupError`]: the worm must not be run.
+pub fn prepare<P: Port>(
+    bus: &mut Bus<P>,
+    settings: &LinkSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<Prepared, StartupError> {
+    let (servo_id, tracker_id) = (settings.servo_id, settings.tracker_id);
+    let servo = identify_servo(bus, settings)?;
+    // Whatever else is wrong: first the motor comes to rest.
+    set_status_level(bus, servo_id, ANSWER_ALL)?;
+    unlock(bus, servo_id, findings)?;
+    let errors = HardwareErrors(bus.register(servo_id, register::HARDWARE_ERROR_STATUS)? as u8);
+    if !errors.is_none() {
+        return Err(StartupError::HardwareError(errors));
+    }
+    warn_of_lame_watchdog(servo, findings);
+
+    let tracker = identify(bus, settings, "tracker", tracker_id, settings.tracker_model)?;
+    let tracker_cells = bus.register(tracker_id, tracker::register::CELL_COUNT)? as u8;
+    if usize::from(tracker_cells) < settings.cells {
+        return Err(StartupError::TooFewCells {
+            found: tracker_cells,
+            configured: settings.cells,
+        });
+    }
+
+    set_up(bus, settings, findings)?;
+    set_status_level(bus, servo_id, ANSWER_READS)?;
+    bus.rearm_watchdog(servo_id, settings.watchdog_ms)?;
+
+    let (plan, servo_reading, tracker_reading) = choose_read_plan(bus, settings, findings)?;
+    Ok(Prepared {
+        plan,
+        servo,
+        tracker,
+        tracker_cells,
+        servo_reading,
+        tracker_reading,
+    })
+}
+
+fn identify_servo<P: Port>(bus: &mut Bus<P>, settings: &LinkSettings) -> Result<Identity, StartupError> {
+    let found = identify(bus, settings, "servo", settings.servo_id, settings.servo_model);
+    let Err(StartupError::Silent { .. }) = found else {
+        return found;
+    };
+    // The tracker answers: it is not the baud rate.
+    if bus.ping(settings.tracker_id, Instant::now() + REPLY_TIME).is_ok() {
+        return found;
+    }
+    let mut rate_found = None;
+    for rate in servo::BAUD_RATES.into_iter().filter(|&rate| rate != settings.baud) {
+        // An adapter need not have every rate.
+        if bus.port_mut().set_baud_rate(rate).is_err() {
+            continue;
+        }
+        bus.settle(Instant::now() + QUIET_TIME)?;
+        if bus.ping(settings.servo_id, Instant::now() + REPLY_TIME).is_ok() {
+            rate_found = Some(rate);
+            break;
+        }
+    }
+    bus.port_mut().set_baud_rate(settings.baud)?;
+    match rate_found {
+        Some(rate) => Err(StartupError::OtherBaudRate {
+            found: rate,
+            configured: settings.baud,
+        }),
+        None => found,
+    }
+}
+
+fn identify<P: Port>(
+    bus: &mut Bus<P>,
+    settings: &LinkSettings,
+    device: &'static str,
+    id: DeviceId,
+    expected: u16,
+) -> Result<Identity, StartupError> {
+    match bus.ask_again(|bus, deadline| bus.ping(id, deadline)) {
+        Ok(identity) if identity.model == expected => Ok(identity),
+        Ok(Identity { model: found, .. }) => Err(StartupError::WrongModel {
+            device,
+            id,
+            found,
+            expected,
+        }),
+        Err(TransactionError::Port(error)) => Err(error.into()),
+        Err(_) => Err(StartupError::Silent {
+            device,
+            id,
+            baud: settings.baud,
+            present: who_is_there(bus),
+        }),
+    }
+}
+
+/// For an error: who answers a broadcast ping.
+fn who_is_there<P: Port>(bus: &mut Bus<P>) -> String {
+    let mut present = Vec::new();
+    let listened = bus.broadcast_ping(Instant::now() + 4 * REPLY_TIME, |id, who| {
+        present.push(format!("{id} (model {})", who.model))
+    });
+    match (listened, present.as_slice()) {
+        (Ok(_), [_, ..]) => format!("these IDs do: {}", present.join(", ")),
+        _ => "nobody does".into(),
+    }
+}
+
+fn warn_of_lame_watchdog(servo: Identity, findings: &mut Vec<Finding>) {
+    if MODELS_OF_SIZE_330.contains(&servo.model) && servo.firmware <= LAST_FIRMWARE_WITH_LAME_WATCHDOG {
+        findings.push(Finding::open(
+            format!(
+                "with firmware {} a servo of this size may turn on when its bus watchdog latches",
+                servo.firmware
+            ),
+            "update it with DYNAMIXEL Wizard 2.0, then pull the plug while it turns, to see that it stops",
+        ));
+    }
+}
+
+/// Sets the status return level, whatever it is now.
+fn set_status_level<P: Port>(bus: &mut Bus<P>, servo: DeviceId, level: u32) -> Result<(), StartupError> {
+    let register = register::STATUS_RETURN_LEVEL;
+    for _ in 0..STATUS_LEVEL_ATTEMPTS {
+        // Whether this write is answered depends on the level before. A receipt is let pass by, lest the next question
+        // collides with it.
+        bus.set_writes_are_answered(false);
+        bus.write_register(servo, register, level, Instant::now() + REPLY_TIME)
+            .map_err(|error| OperationError::Transaction { register, error })?;
+        bus.settle(Instant::now() + QUIET_TIME)?;
+        // At level 0 a read is not answered; then the write has got lost.
+        if bus.read_register(servo, register, Instant::now() + REPLY_TIME) == Ok(level) {
+            bus.set_writes_are_answered(level == ANSWER_ALL);
+            return Ok(());
+        }
+    }
+    let found = bus.register(servo, register)?;
+    Err(OperationError::NotKept {
+        id: servo,
+        register,
+        wanted: level,
+        found,
+    }
+    .into())
+}
+
+/// Switches torque off and clears the watchdog, which lock settings and goal.
+fn unlock<P: Port>(bus: &mut Bus<P>, servo: DeviceId, findings: &mut Vec<Finding>) -> Result<(), StartupError> {
+    if bus.register(servo, register::TORQUE_ENABLE)? != 0 {
+        findings.push(Finding::mended(
+            "torque was on: an earlier controller ended without an orderly stop",
+            "torque off",
+        ));
+    }
+    bus.set_torque(servo, false)?;
+    if bus.register(servo, register::BUS_WATCHDOG)? == u32::from(WATCHDOG_LATCHED) {
+        findings.push(Finding::mended(
+            "the bus watchdog had stopped the motor: the computer fell silent while torque was on",
+            "cleared",
+        ));
+    }
+    bus.set_register(servo, register::BUS_WATCHDOG, 0)?;
+    Ok(())
+}
+
+fn set_up<P: Port>(bus: &mut Bus<P>, settings: &LinkSettings, findings: &mut Vec<Finding>) -> Result<(), StartupError> {
+    let counts = |register: Register, value: f64, unit: f64| {
+        let counts = (value / unit).round();
+        let greatest = 256f64.powi(i32::from(register.size)) - 1.0;
+        if (1.0..=greatest).contains(&counts) {
+            Ok(counts as u32)
+        } else {
+            Err(StartupError::Limit { register, value })
+        }
+    };
+    let velocity_limit = counts(
+        register::VELOCITY_LIMIT,
+        settings.velocity_limit_rad_s,
+        scale::VELOCITY_RAD_S,
+    )?;
+    let wanted = [
+        (register::RETURN_DELAY, 0),
+        (register::OPERATING_MODE, u32::from(servo::VELOCITY_MODE)),
+        (
+            register::TEMPERATURE_LIMIT,
+            counts(register::TEMPERATURE_LIMIT, settings.temperature_limit_c, 1.0)?,
+        ),
+        (
+            register::CURRENT_LIMIT,
+            counts(register::CURRENT_LIMIT, settings.current_limit_a, scale::CURRENT_A)?,
+        ),
+        (register::VELOCITY_LIMIT, velocity_limit),
+    ];
+    for (register, wanted) in wanted {
+        let found = bus.register(settings.servo_id, register)?;
+        if found != wanted {
+            bus.set_register(settings.servo_id, register, wanted)?;
+            let what = if register == register::RETURN_DELAY {
+                format!("the servo waited {} µs before each answer", found * 2)
+            } else {
+                format!("{register} of the servo was {found}")
+            };
+            findings.push(Finding::mended(what, format!("set to {wanted}")));
+        }
+    }
+    Ok(())
+}
+
+fn choose_read_plan<P: Port>(
+    bus: &mut Bus<P>,
+    settings: &LinkSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<(ExchangePlan, ServoReading, TrackerReading), StartupError> {
+    let candidates: &[ReadPlan] = match settings.read {
+        ReadMode::Auto => &[ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate],
+        ReadMode::Always(ReadPlan::FastBulk) => &[ReadPlan::FastBulk],
+        ReadMode::Always(ReadPlan::Bulk) => &[ReadPlan::Bulk],
+        ReadMode::Always(ReadPlan::Separate) => &[ReadPlan::Separate],
+    };
+    let mut last: Option<ExchangeOutcome> = None;
+    for &read in candidates {
+        let (servo, tracker) = (settings.servo_id, settings.tracker_id);
+        let plan = ExchangePlan {
+            servo,
+            tracker,
+            cells: settings.cells,
+            read,
+        };
+        for _ in 0..READ_ATTEMPTS {
+            let outcome = bus.exchange(&plan, 0.0, Instant::now() + REPLY_TIME);
+            if let (Ok(servo_reading), Ok(tracker_reading)) = (outcome.servo, outcome.tracker) {
+                if candidates.len() > 1 && read != ReadPlan::FastBulk {
+                    findings.push(Finding::mended(
+                        "servo and tracker do not both know the fast bulk read, so ticks take longer on the wire",
+                        format!("read mode {read:?}"),
+                    ));
+                }
+                return Ok((plan, servo_reading, tracker_reading));
+            }
+            if outcome.is_disconnected() {
+                return Err(PortError::Disconnected.into());
+            }
+            last = Some(outcome);
+        }
+    }
+    let fate =
+        |failure: Option<super::ReadFailure>| failure.map_or_else(|| "is read".to_owned(), |why| why.to_string());
+    Err(StartupError::Unreadable {
+        servo: fate(last.and_then(|outcome| outcome.servo.err())),
+        tracker: fate(last.and_then(|outcome| outcome.tracker.err())),
+    })
+}

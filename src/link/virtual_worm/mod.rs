@@ -1,0 +1,57 @@
+//! The virtual worm: servo, tracker, motor, body and canal, simulated, so that everything above the serial port can be
+//! run, tested and rehearsed without a robot, and held against a truth that no estimator can see.
+//!
+//! From the physics out to the port:
+//!
+//! 1. A [`supply`] feeds a [`motor`], solved exactly within each step; the motor turns the cam of a [`body`], the exact
+//!    quasi-static solver of [`model`](crate::model) with friction that scatters from cycle to cycle; a camera ([`sight`])
+//!    sees the cells. [`Plant`] steps them together and keeps the [`ledger`] of where the energy went. No clock, no I/O.
+//! 2. `servo` and `tracker` are the devices: control tables with the manual's access rules, modes, watchdog, shutdown.
+//!    [`Devices`] puts both on a bus: bytes and a time in, bytes out. Still no clock.
+//! 3. [`Server`] gives them a clock and a pseudo-terminal; [`VirtualWorm`] runs it in a thread, `wormd virtual-worm` in a
+//!    process.
+//!
+//! What goes wrong is asked for as a [`Fault`], which changes [`conditions`], the parameters of all of the above: see
+//! [`fault`] for the grammar and [`Fault::help`] for the list.
+//!
+//! # Limits
+//! The winding's inductance, the play of the gears and the time of bytes on a real wire are left out. The servo's EEPROM
+//! lasts as long as the process. Positions, currents and voltages are quantised as the registers are; currents and
+//! voltages carry no noise.
+
+pub mod body;
+mod bus;
+pub mod conditions;
+mod control_table;
+mod devices;
+pub mod fault;
+mod fault_kinds;
+pub mod ledger;
+mod line;
+pub mod motor;
+mod options;
+mod plant;
+mod pty;
+mod report;
+mod server;
+mod servo;
+mod servo_table;
+pub mod sight;
+pub mod supply;
+mod tracker;
+
+#[cfg(test)]
+mod behaviour_tests;
+#[cfg(test)]
+mod protocol_tests;
+#[cfg(test)]
+mod test_desk;
+
+pub use devices::{Devices, DevicesError};
+pub use fault::{Fault, FaultError};
+pub use ledger::Account;
+pub use options::Options;
+pub use plant::{DEFAULT_STEP_S, Plant};
+pub use pty::{PortLink, PtyError};
+pub use report::Report;
+pub use server::{Server, ServerError, VirtualWorm};

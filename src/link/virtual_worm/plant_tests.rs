@@ -1,0 +1,218 @@
+use super::*;
+use crate::MAX_CELLS;
+use crate::config::PerCell;
+
+/// Gains as the servo's defaults make them.
+const GAINS: Gains = Gains {
+    velocity_p: 0.066,
+    velocity_i: 11.5,
+    position_p: 20.0,
+    duty_limit: 1.0,
+};
+
+const GAIT_RAD_PER_S: f64 = TAU / 2.5;
+
+fn smooth() -> Config {
+    let mut config = Config::default();
+    config.virtual_worm.scatter_share = 0.0;
+    config
+}
+
+fn crawl(config: &Config, velocity_rad_per_s: f64, seconds: f64) -> Plant {
+    let mut plant = Plant::new(config, None).expect("a worm");
+    plant.set_drive(Drive::Velocity(velocity_rad_per_s), GAINS);
+    plant.advance_to(seconds).expect("a worm");
+    plant
+}
+
+/// `share` is what may be missing: a cycle ends within a step, a total at its end.
+fn assert_closes(account: &Account, share: f64) {
+    let gone_j = account.copper_j + account.friction_inside_j + account.actuator_net_j + account.kinetic_j;
+    assert!(
+        (account.electrical_j - gone_j).abs() <= share * account.electrical_j,
+        "electrical {} J, accounted for {gone_j} J",
+        account.electrical_j
+    );
+}
+
+/// Table 1 of the paper, through motor and cam: advance, positive and net work of the third cycle.
+#[test]
+fn crawls_as_the_paper_says() {
+    for (slope_deg, advance_mm, positive_mj, net_mj) in [
+        (0.0, 6.833, 54.88, 46.88),
+        (30.0, 4.611, 67.12, 62.03),
+        (45.0, 2.072, 71.96, 67.99),
+    ] {
+        let mut config = smooth();
+        config.canal.slope_deg = slope_deg;
+        let plant = crawl(&config, GAIT_RAD_PER_S, 8.0);
+        let cycle = &plant.ledger().cycles()[2];
+        assert!(
+            (cycle.advance_m * 1e3 - advance_mm).abs() < 1e-3,
+            "{slope_deg}: {cycle:?}"
+        );
+        assert!(
+            (cycle.actuator_positive_j * 1e3 - positive_mj).abs() < 0.05,
+            "{slope_deg}: {cycle:?}"
+        );
+        assert!(
+            (cycle.actuator_net_j * 1e3 - net_mj).abs() < 0.05,
+            "{slope_deg}: {cycle:?}"
+        );
+        assert!(
+            (cycle.loss_j - cycle.actuator_net_j).abs() < 1e-5,
+            "{slope_deg}: {cycle:?}"
+        );
+    }
+}
+
+#[test]
+fn energy_closes_over_each_cycle_and_over_all() {
+    let mut plant = crawl(&Config::default(), GAIT_RAD_PER_S, 10.0);
+    assert_eq!(plant.ledger().cycles().len(), 3);
+    for cycle in plant.ledger().cycles() {
+        assert_closes(cycle, 1e-5);
+    }
+    plant.set_drive(Drive::Velocity(-GAIT_RAD_PER_S), GAINS);
+    plant.advance_to(15.0).expect("a worm");
+    plant.set_drive(Drive::Off, GAINS);
+    plant.advance_to(16.0).expect("a worm");
+    assert_closes(&plant.total(), 1e-9);
+    assert_eq!(plant.motor().velocity_rad_per_s(), 0.0);
+}
+
+/// Long simulations take longer steps.
+#[test]
+fn longer_steps_change_little() {
+    let run = |step_s| {
+        let mut plant = Plant::with_step(&smooth(), None, step_s).expect("a worm");
+        plant.set_drive(Drive::Velocity(GAIT_RAD_PER_S), GAINS);
+        plant.advance_to(8.0).expect("a worm");
+        plant.ledger().cycles()[2].clone()
+    };
+    let (fine, coarse) = (run(1e-4), run(1e-3));
+    assert!(
+        (coarse.advance_m / fine.advance_m - 1.0).abs() < 1e-6,
+        "{coarse:?} {fine:?}"
+    );
+    assert!(
+        (coarse.electrical_j / fine.electrical_j - 1.0).abs() < 1e-3,
+        "{coarse:?} {fine:?}"
+    );
+    assert_closes(&coarse, 1e-4);
+}
+
+#[test]
+fn motor_feels_the_load() {
+    let config = smooth();
+    let idle_a = (0.05 + 0.003 * GAIT_RAD_PER_S) / 0.39;
+    let plant = crawl(&config, GAIT_RAD_PER_S, 3.0);
+    let mean_a = {
+        let mut plant = plant.clone();
+        let mut sum_a = 0.0;
+        for _ in 0..10_000 {
+            plant.step().expect("a worm");
+            sum_a += plant.motor().current_a();
+        }
+        sum_a / 10_000.0
+    };
+    let load_a = 46.88e-3 / TAU / 0.39; // net work of a turn
+    assert!(
+        (mean_a - idle_a - load_a).abs() < 1e-3,
+        "{mean_a} against {}",
+        idle_a + load_a
+    );
+}
+
+#[test]
+fn conditions_do_what_they_say() {
+    let config = smooth();
+    let base = crawl(&config, GAIT_RAD_PER_S, 5.0);
+    let run = |change: &dyn Fn(&mut PlantConditions)| {
+        let mut conditions = PlantConditions::default();
+        change(&mut conditions);
+        let mut plant = base.clone();
+        plant.set_conditions(&conditions, Sight::default()).expect("a worm");
+        plant.advance_to(10.0).expect("a worm");
+        let before = base.total();
+        let after = plant.total();
+        (
+            plant,
+            after.advance_m - before.advance_m,
+            after.electrical_j - before.electrical_j,
+        )
+    };
+    let (_, usual_m, usual_j) = run(&|_| {});
+    let (plant, ..) = run(&|c| c.inner_friction_scale = 1e5);
+    assert_eq!(plant.motor().velocity_rad_per_s(), 0.0);
+    assert!(plant.motor().current_a() > 1.0);
+    let (_, jammed_m, _) = run(&|c| c.stroke_scale[1] = 0.0);
+    assert!(jammed_m < 0.8 * usual_m, "{jammed_m} of {usual_m}");
+    let (_, _, stiff_j) = run(&|c| c.inner_friction_scale = 3.0);
+    assert!(stiff_j > 2.0 * usual_j, "{stiff_j} of {usual_j}");
+    let (_, dragged_m, _) = run(&|c| c.drag_n = 1.0);
+    assert!(dragged_m < 0.9 * usual_m, "{dragged_m} of {usual_m}");
+    let (plant, slid_m, slid_j) = run(&|c| c.drag_speed_m_per_s = 0.01);
+    assert!((slid_m - (usual_m - 0.05)).abs() < 1e-6, "{slid_m} beside {usual_m}");
+    assert!((slid_j - usual_j).abs() < 1e-9 && plant.total().backward_slide_m[3] > 0.05);
+    let (plant, fallen_m, _) = run(&|c| {
+        c.slope_deg = Some(60.0);
+        c.friction_scale = [0.2; MAX_CELLS];
+    });
+    assert!(plant.body().slide_m_per_s() < 0.0 && fallen_m < -0.01, "{fallen_m}");
+    assert_closes(&plant.total(), 1e-9);
+    let (plant, ..) = run(&|c| c.supply_drop_v = 2.0);
+    assert!(plant.motor().bus_v() < 3.0);
+    let (plant, ..) = run(&|c| c.heated_to_c = Some(90.0));
+    assert!(plant.motor().case_c() > 85.0);
+}
+
+#[test]
+fn same_seed_same_world() {
+    let mut config = Config::default();
+    config.worm.max_deformation_m = PerCell::Each(vec![2.0e-3, 1.1e-3, 1.75e-3, 2.15e-3]);
+    let one = crawl(&config, GAIT_RAD_PER_S, 6.0);
+    let two = crawl(&config, GAIT_RAD_PER_S, 6.0);
+    assert_eq!((one.total(), one.capture()), (two.total(), two.capture()));
+    config.virtual_worm.seed = 2;
+    assert_ne!(one.total(), crawl(&config, GAIT_RAD_PER_S, 6.0).total());
+}
+
+#[test]
+fn camera_captures_at_its_rate_with_its_noise() {
+    let config = smooth();
+    let mut plant = Plant::new(&config, None).expect("a worm");
+    let truth_m = plant.body().positions_m();
+    let mut samples = 0;
+    let mut square_sum = 0.0;
+    let mut last = plant.capture().sample;
+    for _ in 0..40_000 {
+        plant.step().expect("a worm");
+        if plant.capture().sample != last {
+            last = plant.capture().sample;
+            samples += 1;
+            square_sum += (plant.capture().positions_m[2] - truth_m[2]).powi(2);
+        }
+    }
+    assert!((1199..=1202).contains(&samples), "{samples} in 10 s at 120 Hz");
+    let deviation_m = (square_sum / f64::from(samples)).sqrt();
+    assert!((deviation_m - 1e-4).abs() < 1e-5, "{deviation_m}");
+}
+
+/// A test of the machine as a whole runs a hundred hours; it can only do so when the plant is fast.
+#[test]
+fn plant_is_fast() {
+    let mut plant = crawl(&Config::default(), GAIT_RAD_PER_S, 1.0);
+    let began = std::time::Instant::now();
+    let steps = 1_000_000;
+    for _ in 0..steps {
+        plant.step().expect("a worm");
+    }
+    let per_s = f64::from(steps) / began.elapsed().as_secs_f64();
+    println!(
+        "{:.2} million steps/s, {:.0} times real time",
+        per_s * 1e-6,
+        per_s * plant.step_s()
+    );
+    assert!(per_s > 2e5, "{per_s} steps/s");
+}

@@ -1,0 +1,216 @@
+//! The simulated devices in real time, behind a pseudo-terminal.
+//!
+//! The loop sleeps until bytes come, an answer is due or a little time has passed; then the plant catches up with the
+//! clock. It never spins. Plant and devices know of none of this.
+
+use super::devices::{Devices, DevicesError};
+use super::options::Options;
+use super::pty::{Pty, PtyError};
+use crate::config::Config;
+use crate::model::WormError;
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, ppoll};
+use nix::sys::time::TimeSpec;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Longest sleep while a controller talks.
+const SLEEP_BUSY: Duration = Duration::from_millis(1);
+/// Longest sleep while nobody talks, and with it the time until a stop is noticed.
+const SLEEP_IDLE: Duration = Duration::from_millis(10);
+/// After so long without a byte nobody talks.
+const IDLE_AFTER: Duration = Duration::from_millis(100);
+/// After so long without a byte the peer is taken for gone.
+const GONE_AFTER: Duration = Duration::from_secs(1);
+/// Longest stretch that the plant catches up at once. When this process could not run for longer, the simulated world has
+/// stood still instead: otherwise the bus watchdog would count a silence that was ours, not the controller's.
+const LONGEST_CATCH_UP: Duration = Duration::from_millis(50);
+
+/// Why the virtual worm cannot run, or had to end.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// Nothing to simulate.
+    #[error(transparent)]
+    Devices(#[from] DevicesError),
+    /// No pseudo-terminal.
+    #[error(transparent)]
+    Pty(#[from] PtyError),
+    /// The pseudo-terminal failed.
+    #[error("the pseudo-terminal failed to {doing}: {source}")]
+    Line {
+        /// What was tried.
+        doing: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The plant refused.
+    #[error(transparent)]
+    Worm(#[from] WormError),
+    /// No thread.
+    #[error("cannot start a thread: {0}")]
+    Thread(io::Error),
+    /// The thread of the devices panicked.
+    #[error("the virtual worm's thread panicked; its message is on standard error")]
+    Panicked,
+}
+
+/// Devices on a pseudo-terminal, not yet running.
+#[derive(Debug)]
+pub struct Server {
+    pty: Pty,
+    devices: Devices,
+    strict_baud: bool,
+}
+
+impl Server {
+    /// Opens the pseudo-terminal.
+    ///
+    /// # Errors
+    /// [`ServerError`] when there is nothing to simulate or no pseudo-terminal to be had.
+    pub fn open(config: &Config, options: &Options) -> Result<Self, ServerError> {
+        Ok(Self {
+            devices: Devices::new(config, options)?,
+            pty: Pty::open()?,
+            strict_baud: options.baud.is_some(),
+        })
+    }
+
+    /// Path of the port that a controller opens.
+    pub fn path(&self) -> &Path {
+        self.pty.path()
+    }
+
+    /// Runs until `stop` is true; returns the devices as they are then. Signals interrupt the sleep, so a handler that sets
+    /// `stop` ends it at once.
+    ///
+    /// # Errors
+    /// [`ServerError::Line`] when the pseudo-terminal fails.
+    pub fn run(mut self, stop: &AtomicBool) -> Result<Devices, ServerError> {
+        let failed = |doing| move |source| ServerError::Line { doing, source };
+        let began = Instant::now();
+        let mut skipped = Duration::ZERO; // of the clock, while the world stood still
+        let mut advanced = Duration::ZERO;
+        let mut heard = Duration::ZERO;
+        let mut peer_gone = true;
+        let mut incoming = [0; 4096];
+        let mut outgoing = Vec::with_capacity(4096);
+        while !stop.load(Ordering::Relaxed) {
+            let busy = advanced.saturating_sub(heard) < IDLE_AFTER;
+            let mut sleep = if busy { SLEEP_BUSY } else { SLEEP_IDLE };
+            if let Some(due_s) = self.devices.next_due_s() {
+                let due = Duration::from_secs_f64(due_s.max(0.0)) + skipped;
+                sleep = sleep.min(due.saturating_sub(began.elapsed()));
+            }
+            let mut fds = [PollFd::new(self.pty.master(), PollFlags::POLLIN)];
+            match ppoll(&mut fds, Some(TimeSpec::from_duration(sleep)), None) {
+                Ok(_) | Err(Errno::EINTR) => {}
+                Err(errno) => return Err(failed("wait")(errno.into())),
+            }
+            let count = self.pty.read(&mut incoming).map_err(failed("receive"))?;
+            let mut now = began.elapsed().saturating_sub(skipped);
+            let missing = now.saturating_sub(advanced + LONGEST_CATCH_UP);
+            if missing > Duration::ZERO {
+                tracing::warn!("the virtual worm could not run in time: its world stood still for {missing:?}");
+                skipped += missing;
+                now -= missing;
+            }
+            advanced = now;
+            let now_s = now.as_secs_f64();
+            if count > 0 {
+                heard = now;
+                peer_gone = false;
+            }
+            if count > 0 && self.peer_speaks_our_baud().map_err(failed("read its settings"))? {
+                self.devices.receive(&incoming[..count], now_s)?;
+            } else {
+                self.devices.advance_to(now_s)?;
+            }
+            outgoing.clear();
+            self.devices.take_due(now_s, &mut outgoing);
+            self.pty.write(&outgoing).map_err(failed("send"))?;
+            if !peer_gone && now - heard > GONE_AFTER {
+                peer_gone = true;
+                self.pty.forget_exclusive();
+            }
+        }
+        Ok(self.devices)
+    }
+
+    /// Bytes at another baud rate are noise, which no device understands.
+    fn peer_speaks_our_baud(&self) -> io::Result<bool> {
+        Ok(!self.strict_baud || self.pty.peer_baud()? == self.devices.baud())
+    }
+}
+
+/// Simulated devices that run in a thread of this process, for tests and benchmarks.
+///
+/// ```no_run
+/// use wormd::config::Config;
+/// use wormd::link::virtual_worm::{Options, VirtualWorm};
+///
+/// # fn run() -> Result<(), Box<dyn std::error::Error>> {
+/// let worm = VirtualWorm::spawn(&Config::default(), &Options::default())?;
+/// println!("a controller may open {}", worm.path().display());
+/// let devices = worm.stop()?;
+/// println!("the motor took {} J", devices.plant().total().electrical_j);
+/// # Ok(()) }
+/// ```
+#[derive(Debug)]
+pub struct VirtualWorm {
+    path: PathBuf,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Result<Devices, ServerError>>>,
+}
+
+impl VirtualWorm {
+    /// Opens a pseudo-terminal and runs the devices behind it.
+    ///
+    /// # Errors
+    /// As [`Server::open`], and when no thread can be started.
+    pub fn spawn(config: &Config, options: &Options) -> Result<Self, ServerError> {
+        let server = Server::open(config, options)?;
+        let path = server.path().to_path_buf();
+        let stop = Arc::new(AtomicBool::new(false));
+        let stop_there = Arc::clone(&stop);
+        let thread = std::thread::Builder::new()
+            .name("virtual-worm".to_owned())
+            .spawn(move || server.run(&stop_there))
+            .map_err(ServerError::Thread)?;
+        Ok(Self {
+            path,
+            stop,
+            thread: Some(thread),
+        })
+    }
+
+    /// Path of the port that a controller opens.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Ends the thread, and gives the devices with the truth about everything that happened.
+    ///
+    /// # Errors
+    /// What ended the thread before, if something did.
+    pub fn stop(mut self) -> Result<Devices, ServerError> {
+        self.stop.store(true, Ordering::Relaxed);
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(result)) => result,
+            _ => Err(ServerError::Panicked),
+        }
+    }
+}
+
+impl Drop for VirtualWorm {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // Whoever drops it does not ask how it ended.
+            let _ended = thread.join();
+        }
+    }
+}

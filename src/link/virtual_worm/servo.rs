@@ -1,0 +1,440 @@
+//! The simulated servo: an XL330-M288-T as its manual describes it, around the plant's motor.
+//!
+//! It obeys velocity mode, position and extended position mode, and PWM mode; torque, limits, shutdown and bus watchdog
+//! are the manual's. Where the manual is silent:
+//! - The unit of the velocity gains' time is open; the loop settles in about 20 ms with the factory's gains.
+//! - Switching torque on, and the watchdog, set the velocity goal to 0, so that nothing moves before it is told.
+//! - A position goal is pursued by a velocity goal in proportion to the error. Profiles are kept but not followed, except
+//!   that the profile velocity bounds the velocity of the position modes.
+//! - An overload is a motor that stands at full duty for 2 s; an input voltage error is one that lasts 0.1 s.
+//! - Below 2.8 V it does not run, and comes up as after a reboot.
+//! - After a shutdown, writing 1 to torque enable fails (result fail) until a reboot.
+
+use super::conditions::ServoConditions;
+use super::control_table::{Area, ControlTable, Entry};
+use super::motor::{Drive, Gains};
+use super::plant::Plant;
+use super::servo_table::*;
+use crate::config::Config;
+use crate::link::packet::{BackupAction, DeviceId, ResetScope, StatusError};
+use crate::link::servo::register::*;
+use crate::link::servo::{BAUD_RATES, HardwareErrors, VELOCITY_MODE, WATCHDOG_LATCHED, scale};
+use std::f64::consts::TAU;
+
+/// Silence of a servo that starts, s.
+const BOOT_S: f64 = 0.1;
+/// How long the supply may be out of its limits, s.
+const VOLTAGE_PATIENCE_S: f64 = 0.1;
+/// How long the motor may stand at full duty, s.
+const OVERLOAD_PATIENCE_S: f64 = 2.0;
+/// Below this voltage the servo's processor does not run.
+const BROWNOUT_V: f64 = 2.8;
+/// Below this a motor at full duty counts as standing, rad/s.
+const STANDING_RAD_PER_S: f64 = 0.05;
+/// Time unit of the velocity I gain, s.
+const INTEGRAL_TICK_S: f64 = 1e-4;
+/// Velocity per angle error and count of the position P gain, 1/s: 20 1/s with the factory's 400.
+const POSITION_P_PER_S: f64 = 0.05;
+/// Counts of a turn.
+const TURN: f64 = 4096.0;
+
+/// The servo's electronics.
+#[derive(Debug, Clone)]
+pub(super) struct Servo {
+    table: ControlTable,
+    backup: Option<Vec<u8>>,
+    registered: Option<(u16, Vec<u8>)>,
+    sense: f64, // +1 where positive is forward, −1 where it is not
+    home_counts: f64,
+    turn_base_counts: f64, // whole turns that were forgotten at a start
+    conditions: ServoConditions,
+    starved: bool, // below the brownout voltage
+    boots_until_s: f64,
+    heard_at_s: f64,
+    shut_down: bool,
+    voltage_bad_since_s: Option<f64>,
+    overloaded_since_s: Option<f64>,
+    moved_once: bool,
+}
+
+impl Servo {
+    /// As it comes from the factory but for ID and baud rate, at the home position.
+    pub(super) fn new(config: &Config, baud: Option<u32>) -> Self {
+        let mut table = factory_new();
+        table.set(ID, i64::from(config.servo.id));
+        let code = baud.and_then(|baud| BAUD_RATES.iter().position(|&known| known == baud));
+        if let Some(code) = code {
+            table.set(BAUD_RATE, code as i64);
+        }
+        let mut servo = Self {
+            table,
+            backup: None,
+            registered: None,
+            sense: if config.servo.positive_is_forward { 1.0 } else { -1.0 },
+            home_counts: f64::from(config.servo.home_position),
+            turn_base_counts: 0.0,
+            conditions: ServoConditions::default(),
+            starved: false,
+            boots_until_s: 0.0,
+            heard_at_s: 0.0,
+            shut_down: false,
+            voltage_bad_since_s: None,
+            overloaded_since_s: None,
+            moved_once: false,
+        };
+        servo.forget_turns(0.0);
+        servo
+    }
+
+    pub(super) fn id(&self) -> DeviceId {
+        DeviceId::new(self.table.get(ID) as u8).unwrap_or(DeviceId::MAX) // the table keeps it within 0 to 252
+    }
+
+    /// Whether it listens to this ID besides its own.
+    pub(super) fn has_secondary_id(&self, id: DeviceId) -> bool {
+        self.table.get(SECONDARY_ID) == u32::from(id.get())
+    }
+
+    pub(super) fn baud(&self) -> u32 {
+        BAUD_RATES[self.table.get(BAUD_RATE) as usize] // the table keeps it within 0 to 6
+    }
+
+    pub(super) fn return_delay_s(&self) -> f64 {
+        f64::from(self.table.get(RETURN_DELAY)) * scale::RETURN_DELAY_S
+    }
+
+    pub(super) fn status_return_level(&self) -> u32 {
+        self.table.get(STATUS_RETURN_LEVEL)
+    }
+
+    pub(super) fn alert(&self) -> bool {
+        self.table.get(HARDWARE_ERROR_STATUS) != 0
+    }
+
+    /// Whether it has power and has started.
+    pub(super) fn is_awake(&self, now_s: f64) -> bool {
+        !self.conditions.unpowered && !self.starved && now_s >= self.boots_until_s
+    }
+
+    /// Whether it has ever been told to move and obeyed.
+    pub(super) fn has_moved(&self) -> bool {
+        self.moved_once
+    }
+
+    pub(super) fn identity(&self) -> [u8; 3] {
+        let [low, high] = (self.table.get(MODEL_NUMBER) as u16).to_le_bytes();
+        [low, high, self.table.get(FIRMWARE_VERSION) as u8]
+    }
+
+    /// Takes note that an instruction packet was on the bus: all the bus watchdog asks for.
+    pub(super) fn hear(&mut self, now_s: f64) {
+        self.heard_at_s = now_s;
+    }
+
+    pub(super) fn set_conditions(&mut self, conditions: ServoConditions, plant: &mut Plant, now_s: f64) {
+        let was_unpowered = std::mem::replace(&mut self.conditions, conditions).unpowered;
+        if conditions.unpowered || was_unpowered {
+            self.restart(plant, now_s);
+        }
+        let model_number = conditions
+            .model_number
+            .map_or_else(|| i64::from(crate::link::servo::XL330_M288_MODEL), i64::from);
+        self.table.set(MODEL_NUMBER, model_number);
+    }
+
+    /// Looks after itself: watchdog, voltage, temperature, load. To be called at least every few ms.
+    pub(super) fn supervise(&mut self, plant: &mut Plant, now_s: f64) {
+        let starved = plant.motor().bus_v() < BROWNOUT_V;
+        if starved != self.starved {
+            self.starved = starved;
+            self.restart(plant, now_s);
+        }
+        if !self.is_awake(now_s) {
+            return;
+        }
+        self.supervise_watchdog(plant, now_s);
+        let motor = plant.motor();
+        let mut errors = self.conditions.hardware_errors;
+        let voltage_counts = motor.bus_v() / scale::VOLTAGE_V;
+        let voltage_bad = voltage_counts < f64::from(self.table.get(MIN_VOLTAGE_LIMIT))
+            || voltage_counts > f64::from(self.table.get(MAX_VOLTAGE_LIMIT));
+        if lasts(&mut self.voltage_bad_since_s, voltage_bad, now_s, VOLTAGE_PATIENCE_S) {
+            errors |= HardwareErrors::INPUT_VOLTAGE.0;
+        }
+        if motor.case_c() > f64::from(self.table.get(TEMPERATURE_LIMIT)) {
+            errors |= HardwareErrors::OVERHEATING.0;
+        }
+        let overloaded = motor.duty().abs() > 0.99 && motor.velocity_rad_per_s().abs() < STANDING_RAD_PER_S;
+        if lasts(&mut self.overloaded_since_s, overloaded, now_s, OVERLOAD_PATIENCE_S) {
+            errors |= HardwareErrors::OVERLOAD.0;
+        }
+        let known = self.table.get(HARDWARE_ERROR_STATUS) as u8;
+        if errors & !known != 0 {
+            self.table.set(HARDWARE_ERROR_STATUS, i64::from(errors | known));
+            if u32::from(errors) & self.table.get(SHUTDOWN) != 0 {
+                self.shut_down = true;
+                self.table.set(TORQUE_ENABLE, 0);
+                self.drive(plant);
+            }
+        }
+    }
+
+    fn supervise_watchdog(&mut self, plant: &mut Plant, now_s: f64) {
+        let watchdog = self.table.get(BUS_WATCHDOG);
+        let armed = (1..=127).contains(&watchdog) && self.torque_on();
+        let patience_s = f64::from(watchdog * scale::WATCHDOG_MS) * 1e-3;
+        if armed && now_s - self.heard_at_s >= patience_s {
+            self.table.set(BUS_WATCHDOG, i64::from(WATCHDOG_LATCHED));
+            self.stand(plant);
+        }
+    }
+
+    /// Sets every goal so that the motor stands.
+    fn stand(&mut self, plant: &mut Plant) {
+        self.table.set(GOAL_VELOCITY, 0);
+        let position = self.position_counts(plant);
+        self.table.set(GOAL_POSITION, i64::from(position));
+        if self.table.get(OPERATING_MODE) as u8 == PWM_MODE {
+            self.table.set(GOAL_PWM, 0);
+        }
+        self.drive(plant);
+    }
+
+    fn torque_on(&self) -> bool {
+        self.table.get(TORQUE_ENABLE) == 1
+    }
+
+    /// +1 where positive counts are forward, with the drive mode's reverse bit.
+    fn sense(&self) -> f64 {
+        if self.table.get(DRIVE_MODE) & 1 == 1 {
+            -self.sense
+        } else {
+            self.sense
+        }
+    }
+
+    /// Position without homing offset for a cam angle.
+    fn raw_counts(&self, cam_rad: f64) -> f64 {
+        self.home_counts + self.sense() * cam_rad / TAU * TURN - self.turn_base_counts
+    }
+
+    fn position_counts(&self, plant: &Plant) -> i32 {
+        let offset = f64::from(self.table.signed(HOMING_OFFSET));
+        (self.raw_counts(plant.motor().angle_rad()) + offset).round() as i32
+    }
+
+    fn cam_angle_rad(&self, position_counts: f64) -> f64 {
+        let offset = f64::from(self.table.signed(HOMING_OFFSET));
+        (position_counts - offset + self.turn_base_counts - self.home_counts) * self.sense() / TURN * TAU
+    }
+
+    /// Only the angle within a turn survives a start.
+    fn forget_turns(&mut self, cam_rad: f64) {
+        self.turn_base_counts = 0.0;
+        self.turn_base_counts = (self.raw_counts(cam_rad) / TURN).floor() * TURN;
+    }
+
+    /// Power up: RAM as it is initially, no torque, no errors, position within a turn.
+    fn restart(&mut self, plant: &mut Plant, now_s: f64) {
+        self.table.reset(Area::Ram, &[]);
+        self.table.set(GOAL_PWM, i64::from(self.table.get(PWM_LIMIT)));
+        self.table.set(HARDWARE_ERROR_STATUS, 0);
+        self.table.set(REGISTERED_INSTRUCTION, 0);
+        self.registered = None;
+        self.shut_down = false;
+        self.voltage_bad_since_s = None;
+        self.overloaded_since_s = None;
+        self.boots_until_s = now_s + BOOT_S;
+        self.forget_turns(plant.motor().angle_rad());
+        self.drive(plant);
+    }
+
+    /// Tells the bridge what the registers say.
+    fn drive(&mut self, plant: &mut Plant) {
+        let per_count = scale::DUTY / scale::VELOCITY_RAD_S;
+        let gain = |register, unit: f64| f64::from(self.table.get(register)) * unit;
+        let mode = self.table.get(OPERATING_MODE) as u8;
+        let goal_duty = f64::from(self.table.signed(GOAL_PWM)) * scale::DUTY;
+        let gains = Gains {
+            velocity_p: gain(VELOCITY_P_GAIN, per_count / 128.0),
+            velocity_i: gain(VELOCITY_I_GAIN, per_count / 65_536.0 / INTEGRAL_TICK_S),
+            position_p: gain(POSITION_P_GAIN, POSITION_P_PER_S),
+            duty_limit: (if mode == PWM_MODE { 1.0 } else { goal_duty.abs() }).min(1.0),
+        };
+        let drive = if !self.torque_on() {
+            Drive::Off
+        } else if mode == VELOCITY_MODE {
+            Drive::Velocity(self.sense() * f64::from(self.table.signed(GOAL_VELOCITY)) * scale::VELOCITY_RAD_S)
+        } else if mode == PWM_MODE {
+            Drive::Duty((self.sense() * goal_duty).clamp(-1.0, 1.0))
+        } else {
+            let profile = match self.table.get(PROFILE_VELOCITY) {
+                0 => self.table.get(VELOCITY_LIMIT),
+                profile => profile.min(self.table.get(VELOCITY_LIMIT)),
+            };
+            Drive::Position {
+                goal_rad: self.cam_angle_rad(f64::from(self.table.signed(GOAL_POSITION))),
+                max_velocity_rad_per_s: f64::from(profile) * scale::VELOCITY_RAD_S,
+            }
+        };
+        self.moved_once |= match drive {
+            Drive::Off => false,
+            Drive::Velocity(goal) | Drive::Duty(goal) => goal != 0.0,
+            Drive::Position { goal_rad, .. } => {
+                (goal_rad - plant.motor().angle_rad()).abs() > 2.0 * scale::POSITION_RAD
+            }
+        };
+        plant.set_drive(drive, gains);
+    }
+
+    /// Bytes of the control table as they are now.
+    pub(super) fn read(&mut self, address: u16, length: u16, plant: &Plant, now_s: f64) -> Result<&[u8], StatusError> {
+        self.refresh(plant, now_s);
+        self.table.read(address, length)
+    }
+
+    fn refresh(&mut self, plant: &Plant, now_s: f64) {
+        let motor = plant.motor();
+        let sense = self.sense();
+        let velocity = scale::velocity_counts(sense * motor.velocity_rad_per_s());
+        let counts = |value: f64, unit: f64| (value / unit).round() as i64;
+        let moving = velocity.unsigned_abs() > self.table.get(MOVING_THRESHOLD);
+        let position = i64::from(self.position_counts(plant));
+        let goal_velocity = i64::from(self.table.signed(GOAL_VELOCITY));
+        for (register, value) in [
+            (REALTIME_TICK, (now_s * 1e3) as i64 % 32_768),
+            (MOVING, i64::from(moving)),
+            (PRESENT_PWM, counts(sense * motor.duty(), scale::DUTY)),
+            (PRESENT_CURRENT, counts(sense * motor.current_a(), scale::CURRENT_A)),
+            (PRESENT_VELOCITY, i64::from(velocity)),
+            (PRESENT_POSITION, position),
+            (VELOCITY_TRAJECTORY, goal_velocity),
+            (POSITION_TRAJECTORY, i64::from(self.table.signed(GOAL_POSITION))),
+            (PRESENT_INPUT_VOLTAGE, counts(motor.bus_v(), scale::VOLTAGE_V)),
+            (PRESENT_TEMPERATURE, counts(motor.case_c().clamp(0.0, 255.0), 1.0)),
+        ] {
+            self.table.set(register, value);
+        }
+    }
+
+    /// Everything a write must pass before anything of it happens.
+    fn check_write(&self, address: u16, data: &[u8]) -> Result<Vec<(&'static Entry, i64)>, StatusError> {
+        let writes = self.table.check_write(address, data, self.torque_on())?;
+        let latched = self.table.get(BUS_WATCHDOG) == u32::from(WATCHDOG_LATCHED);
+        for &(entry, value) in &writes {
+            let magnitude = value.unsigned_abs();
+            let beyond = |limit| magnitude > u64::from(self.table.get(limit));
+            let is_goal = [GOAL_PWM, GOAL_CURRENT, GOAL_VELOCITY, GOAL_POSITION].contains(&entry.register);
+            if latched && (is_goal || (entry.register == BUS_WATCHDOG && value != 0)) {
+                return Err(StatusError::DataRange);
+            }
+            let beyond_limit = match entry.register {
+                GOAL_PWM => beyond(PWM_LIMIT),
+                GOAL_CURRENT => beyond(CURRENT_LIMIT),
+                GOAL_VELOCITY => beyond(VELOCITY_LIMIT),
+                GOAL_POSITION if self.table.get(OPERATING_MODE) as u8 == POSITION_MODE => {
+                    let range =
+                        i64::from(self.table.get(MIN_POSITION_LIMIT))..=i64::from(self.table.get(MAX_POSITION_LIMIT));
+                    !range.contains(&value)
+                }
+                _ => false,
+            };
+            if beyond_limit {
+                return Err(StatusError::DataLimit);
+            }
+            match entry.register {
+                OPERATING_MODE if !MODES.contains(&(value as u8)) => return Err(StatusError::DataRange),
+                TORQUE_ENABLE if value == 1 && self.shut_down => return Err(StatusError::ResultFail),
+                _ => {}
+            }
+        }
+        Ok(writes)
+    }
+
+    pub(super) fn write(&mut self, address: u16, data: &[u8], plant: &mut Plant) -> Result<(), StatusError> {
+        for (entry, value) in self.check_write(address, data)? {
+            let before = self.table.get(entry.register);
+            self.table.set(entry.register, value);
+            match entry.register {
+                OPERATING_MODE => {
+                    self.table.set(GOAL_PWM, i64::from(self.table.get(PWM_LIMIT)));
+                    plant.reset_loop();
+                }
+                TORQUE_ENABLE if value == 1 && before == 0 => {
+                    plant.reset_loop();
+                    self.stand(plant);
+                }
+                _ => {}
+            }
+        }
+        self.drive(plant);
+        Ok(())
+    }
+
+    pub(super) fn register_write(&mut self, address: u16, data: &[u8]) -> Result<(), StatusError> {
+        self.check_write(address, data)?;
+        self.registered = Some((address, data.to_vec()));
+        self.table.set(REGISTERED_INSTRUCTION, 1);
+        Ok(())
+    }
+
+    pub(super) fn action(&mut self, plant: &mut Plant) -> Result<(), StatusError> {
+        let (address, data) = self.registered.take().ok_or(StatusError::Instruction)?;
+        self.table.set(REGISTERED_INSTRUCTION, 0);
+        self.write(address, &data, plant)
+    }
+
+    pub(super) fn reboot(&mut self, plant: &mut Plant, now_s: f64) -> Result<(), StatusError> {
+        self.restart(plant, now_s);
+        Ok(())
+    }
+
+    pub(super) fn factory_reset(
+        &mut self,
+        scope: ResetScope,
+        plant: &mut Plant,
+        now_s: f64,
+    ) -> Result<(), StatusError> {
+        match scope {
+            ResetScope::All => self.table.reset(Area::Eeprom, &[]),
+            ResetScope::AllButId => self.table.reset(Area::Eeprom, &[ID]),
+            ResetScope::AllButIdAndBaudRate => self.table.reset(Area::Eeprom, &[ID, BAUD_RATE]),
+        }
+        self.restart(plant, now_s);
+        Ok(())
+    }
+
+    pub(super) fn clear_multi_turn(&mut self, plant: &mut Plant) -> Result<(), StatusError> {
+        if plant.motor().velocity_rad_per_s() != 0.0 {
+            return Err(StatusError::ResultFail);
+        }
+        self.forget_turns(plant.motor().angle_rad());
+        self.stand(plant);
+        Ok(())
+    }
+
+    pub(super) fn backup(&mut self, action: BackupAction, plant: &mut Plant, now_s: f64) -> Result<(), StatusError> {
+        match action {
+            BackupAction::Store if self.torque_on() => return Err(StatusError::Access),
+            BackupAction::Store => {
+                self.backup = Some(self.table.copy_of(Area::Eeprom));
+                self.table.set(BACKUP_READY, 1);
+            }
+            BackupAction::Restore => {
+                let backup = self.backup.as_ref().ok_or(StatusError::ResultFail)?;
+                self.table.take_from(Area::Eeprom, backup);
+                self.restart(plant, now_s);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether what `holds` has held for `patience_s`.
+fn lasts(since_s: &mut Option<f64>, holds: bool, now_s: f64, patience_s: f64) -> bool {
+    if !holds {
+        *since_s = None;
+        return false;
+    }
+    now_s - *since_s.get_or_insert(now_s) >= patience_s
+}

@@ -1,0 +1,86 @@
+//! What the tracker captures: positions with noise, now and then a cell unseen, on a clock of its own.
+
+use super::conditions::Sight;
+use crate::MAX_CELLS;
+use crate::config::Config;
+use crate::link::TrackerReading;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::Rng;
+
+/// The tracker's clock runs fast by this share: an ordinary crystal.
+const CLOCK_DRIFT: f64 = 30e-6;
+
+/// A camera that takes a capture at fixed intervals of its clock.
+#[derive(Debug, Clone)]
+pub struct Camera {
+    interval_s: f64, // of the plant's time
+    noise_m: f64,
+    dropout_share: f64,
+    clock_offset_us: u32,
+    taken: u64,
+    conditions: Sight,
+    reading: TrackerReading,
+}
+
+impl Camera {
+    /// With the configured rate and noise; its clock starts anywhere.
+    pub fn new(config: &Config, chance: &mut Xoshiro256PlusPlus) -> Self {
+        Self {
+            interval_s: 1.0 / (config.tracker.rate_hz * (1.0 + CLOCK_DRIFT)),
+            noise_m: config.virtual_worm.noise_m,
+            dropout_share: config.virtual_worm.dropout_share,
+            clock_offset_us: chance.next_u32(),
+            taken: 0,
+            conditions: Sight::default(),
+            reading: TrackerReading {
+                sample: 0,
+                capture_time_us: 0,
+                cell_count: config.worm.cells as u8, // at most MAX_CELLS
+                valid: 0,
+                positions_m: [0.0; MAX_CELLS],
+            },
+        }
+    }
+
+    /// Changes what it sees.
+    pub fn set_conditions(&mut self, conditions: Sight) {
+        self.conditions = conditions;
+    }
+
+    /// When the next capture is due, s of the plant's time.
+    pub fn due_s(&self) -> f64 {
+        self.taken as f64 * self.interval_s
+    }
+
+    /// Takes the capture that is due.
+    pub fn capture(&mut self, positions_m: &[f64], chance: &mut Xoshiro256PlusPlus) {
+        let noise_m = self.conditions.noise_m.unwrap_or(self.noise_m);
+        let dropout_share = self.conditions.dropout_share.unwrap_or(self.dropout_share);
+        let clock_us = self.due_s() * (1.0 + CLOCK_DRIFT) * 1e6;
+        self.reading.capture_time_us = self.clock_offset_us.wrapping_add(clock_us.round() as u64 as u32);
+        self.reading.valid = 0;
+        for (cell, &position_m) in positions_m.iter().enumerate() {
+            let seen =
+                self.conditions.hidden & (1 << cell) == 0 && (dropout_share == 0.0 || draw(chance) >= dropout_share);
+            let error: f64 = StandardNormal.sample(chance);
+            if seen {
+                self.reading.valid |= 1 << cell;
+                self.reading.positions_m[cell] = position_m + noise_m * error;
+            }
+        }
+        self.taken += 1;
+        self.reading.sample = self.taken as u32; // wraps, as the register does
+    }
+
+    /// The last capture.
+    pub fn reading(&self) -> &TrackerReading {
+        &self.reading
+    }
+}
+
+/// A number in [0, 1).
+pub(super) fn draw(chance: &mut Xoshiro256PlusPlus) -> f64 {
+    // 53 bits are what a float in [0, 1) can hold.
+    (chance.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}

@@ -1,0 +1,7 @@
+//! The link against a worm in memory: exchange, faults, start-up.
+
+mod exchange;
+mod faults;
+mod startup;
+mod tty;
+mod worm;
