@@ -8,3 +8,4 @@ pub mod link;
 pub mod message;
 pub mod model;
 pub mod realtime;
+pub mod topics;

@@ -1,0 +1,162 @@
+//! What killed processes leave behind, and who is alive to mind its removal.
+
+use super::instance::Instance;
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
+
+/// Where POSIX shared memory has its names on Linux.
+const SHARED_MEMORY: &str = "/dev/shm";
+/// The folders that iceoryx2 creates in its root path.
+const ICEORYX_FOLDERS: [&str; 2] = ["nodes", "services"];
+
+/// How long a forked child may take to become another program.
+const FORK_PATIENCE: Duration = Duration::from_millis(5);
+
+/// A process that takes part in a worm's topics.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Peer {
+    /// The process.
+    pub pid: u32,
+    /// Its name, as the kernel knows it.
+    pub name: String,
+}
+
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} (process {})", self.name, self.pid)
+    }
+}
+
+/// Every other process that has something of this worm open or mapped: `wormd` processes, and readers in any other
+/// language that know nothing of our locks.
+pub(super) fn peers(instance: &Instance) -> Vec<Peer> {
+    let presence = instance.lock_path("presence");
+    let segments = format!("{SHARED_MEMORY}/{}", instance.prefix());
+    let scan = || {
+        others(|process| {
+            let maps = fs::read_to_string(process.join("maps")).unwrap_or_default();
+            maps.contains(&segments) || opens(process, |file| file == presence)
+        })
+    };
+    let mut found = scan();
+    if !found.is_empty() {
+        // A child that this process is just starting looks like a peer until it runs its own program.
+        thread::sleep(FORK_PATIENCE);
+        let again = scan();
+        found.retain(|peer| again.iter().any(|other| other.pid == peer.pid));
+    }
+    found
+}
+
+/// Every other process that has the file open.
+pub(super) fn who_has_open(file: &Path) -> Vec<Peer> {
+    others(|process| opens(process, |open| open == file))
+}
+
+/// Whether process `pid` has the file open.
+pub(super) fn has_open(pid: u32, file: &Path) -> bool {
+    opens(&Path::new("/proc").join(pid.to_string()), |open| open == file)
+}
+
+/// The other processes for which `takes_part` holds; it is given the process's folder in `/proc`.
+fn others(takes_part: impl Fn(&Path) -> bool) -> Vec<Peer> {
+    let Ok(processes) = fs::read_dir("/proc") else {
+        return Vec::new();
+    };
+    let pid_of = |entry: &fs::DirEntry| entry.file_name().to_str()?.parse::<u32>().ok();
+    let mut found: Vec<Peer> = processes
+        .flatten()
+        .filter_map(|entry| Some((pid_of(&entry)?, entry.path())))
+        .filter(|(pid, path)| *pid != std::process::id() && takes_part(path))
+        .map(|(pid, path)| Peer {
+            pid,
+            name: fs::read_to_string(path.join("comm"))
+                .unwrap_or_default()
+                .trim()
+                .to_owned(),
+        })
+        .collect();
+    found.sort_by_key(|peer| peer.pid);
+    found
+}
+
+fn opens(process: &Path, is_meant: impl Fn(&Path) -> bool) -> bool {
+    let Ok(descriptors) = fs::read_dir(process.join("fd")) else {
+        return false;
+    };
+    descriptors
+        .flatten()
+        .filter_map(|entry| fs::read_link(entry.path()).ok())
+        .any(|file| is_meant(&file))
+}
+
+/// Files of this worm: shared-memory segments, and what iceoryx2 put into the folder. Locks are not among them.
+fn files(instance: &Instance) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for folder in [Path::new(SHARED_MEMORY), instance.folder()] {
+        for entry in or_empty(fs::read_dir(folder))?.into_iter().flatten().flatten() {
+            if entry
+                .file_name()
+                .as_encoded_bytes()
+                .starts_with(instance.prefix().as_bytes())
+            {
+                found.push(entry.path());
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn or_empty<T>(result: io::Result<T>) -> io::Result<Option<T>> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether anything of an earlier life of this worm is there.
+pub(super) fn is_there(instance: &Instance) -> bool {
+    ICEORYX_FOLDERS.iter().any(|name| instance.folder().join(name).exists())
+        || files(instance).is_ok_and(|files| !files.is_empty())
+}
+
+/// Removes everything of this worm but the locks. Only for one who is sure to be alone.
+pub(super) fn wipe(instance: &Instance) -> io::Result<()> {
+    for file in files(instance)? {
+        or_empty(fs::remove_file(file))?;
+    }
+    for name in ICEORYX_FOLDERS {
+        or_empty(fs::remove_dir_all(instance.folder().join(name)))?;
+    }
+    Ok(())
+}
+
+/// Removes segments of size zero that no process has open: their maker was killed between creating and sizing them.
+/// iceoryx2 0.10 waits for ever for such a segment to grow. Safe while peers live.
+pub(super) fn remove_stillborn(instance: &Instance) -> io::Result<usize> {
+    let is_empty = |path: &PathBuf| {
+        path.metadata()
+            .is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0)
+    };
+    let mut removed = 0;
+    for file in files(instance)?.into_iter().filter(is_empty) {
+        // In this order: a maker that is alive keeps it open until it has a size.
+        if who_has_open(&file).is_empty() && !has_open(std::process::id(), &file) && is_empty(&file) {
+            or_empty(fs::remove_file(&file))?;
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
+/// Removes the instance's folder when nothing is in it any more.
+pub(super) fn remove_folder_if_empty(instance: &Instance) {
+    if let Err(error) = fs::remove_dir(instance.folder()) {
+        tracing::trace!("{}: {error}", instance.folder().display());
+    }
+}

@@ -1,0 +1,126 @@
+//! Roles that only one process of a worm can have.
+
+use super::instance::Instance;
+use super::lock::{Kind, LockError, LockFile};
+use super::residue;
+use std::io;
+use std::marker::PhantomData;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// How long a holder that has just locked may take to write its pid.
+const PID_PATIENCE: Duration = Duration::from_secs(1);
+
+/// A role that one process of a worm has at a time.
+pub trait Role: sealed::Sealed {
+    /// Name as in the lock file and in messages.
+    const NAME: &'static str;
+}
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+macro_rules! roles {
+    ($($(#[$meta:meta])* $role:ident = $name:literal,)+) => {
+        $($(#[$meta])* #[derive(Debug)] pub enum $role {}
+        impl sealed::Sealed for $role {}
+        impl Role for $role { const NAME: &'static str = $name; })+
+    };
+}
+
+roles! {
+    /// The process that commands the actuator.
+    Controller = "controller",
+    /// The process that estimates and raises alarms.
+    Estimator = "estimator",
+    /// The process that starts and ends the others: `wormd up`.
+    Supervisor = "supervisor",
+}
+
+/// Another process has the role.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{worm} already has a {role}, process {pid}: stop it first (kill {pid}), or give this worm another worm.name")]
+pub struct AlreadyRunning {
+    /// The process.
+    pub pid: u32,
+    /// The role.
+    pub role: &'static str,
+    /// The worm.
+    pub worm: String,
+}
+
+/// A role that could not be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum RoleError {
+    /// Another process has it.
+    #[error(transparent)]
+    AlreadyRunning(#[from] AlreadyRunning),
+    /// The lock file cannot be used.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+}
+
+/// Proof that this process has the role `R` of a worm; the role is free again when it is dropped or the process ends.
+#[derive(Debug)]
+pub struct RoleLock<R: Role> {
+    file: LockFile,
+    instance: Instance,
+    _role: PhantomData<R>,
+}
+
+impl<R: Role> RoleLock<R> {
+    /// Takes the role, without waiting for it.
+    ///
+    /// # Errors
+    /// [`AlreadyRunning`] with the process that has it; [`LockError`] when the lock file cannot be used.
+    pub fn take(instance: &Instance) -> Result<Self, RoleError> {
+        let path = instance.lock_path(R::NAME);
+        let begun = Instant::now();
+        loop {
+            if let Some(mut file) = LockFile::try_lock(&path, Kind::Exclusive)? {
+                file.write(&format!("{}\n", std::process::id()))?;
+                return Ok(Self {
+                    file,
+                    instance: instance.clone(),
+                    _role: PhantomData,
+                });
+            }
+            if let Some(pid) = Self::holder(instance) {
+                return Err(AlreadyRunning {
+                    pid,
+                    role: R::NAME,
+                    worm: instance.worm().to_owned(),
+                }
+                .into());
+            }
+            // Its holder is between locking and writing, or just leaving: look again.
+            if begun.elapsed() > PID_PATIENCE {
+                let source = io::Error::other("locked by a process that cannot be seen from here");
+                return Err(LockError { file: path, source }.into());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// The process that has the role now, if any. Does not disturb one that is about to take it.
+    pub fn holder(instance: &Instance) -> Option<u32> {
+        let path = instance.lock_path(R::NAME);
+        read_pid(&path).filter(|&pid| residue::has_open(pid, &path))
+    }
+
+    pub(super) fn instance(&self) -> &Instance {
+        &self.instance
+    }
+}
+
+impl<R: Role> Drop for RoleLock<R> {
+    fn drop(&mut self) {
+        self.file.remove();
+        residue::remove_folder_if_empty(&self.instance);
+    }
+}
+
+fn read_pid(path: &Path) -> Option<u32> {
+    std::fs::read_to_string(path).ok()?.trim().parse().ok()
+}

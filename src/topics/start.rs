@@ -1,0 +1,222 @@
+//! Starting against what killed processes left behind.
+
+use super::instance::Instance;
+use super::lock::{Kind, LockError, LockFile};
+use super::residue::{self, Peer};
+use super::services::{Refused, Services};
+use std::fmt;
+use std::io;
+use std::sync::mpsc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A start that failed.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// A lock file cannot be used.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// Another process has been starting for too long.
+    #[error(
+        "the topics of {worm}: another process has been starting for {waited:?}: {}",
+        Remedy(peers)
+    )]
+    Busy {
+        /// The worm.
+        worm: String,
+        /// How long this one waited.
+        waited: Duration,
+        /// Who takes part.
+        peers: Vec<Peer>,
+    },
+    /// A step hung or failed, and there are peers whose memory must not be wiped.
+    #[error("the topics of {worm} did not open, {reason}: {}", Remedy(peers))]
+    Blocked {
+        /// The worm.
+        worm: String,
+        /// The step that failed, and why.
+        reason: String,
+        /// Who must be stopped.
+        peers: Vec<Peer>,
+    },
+    /// What killed processes left behind cannot be removed.
+    #[error("{folder}: {source}: remove what killed processes left behind, or run as the user who started them")]
+    Wipe {
+        /// The instance's folder.
+        folder: String,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+struct Remedy<'a>(&'a [Peer]);
+
+impl fmt::Display for Remedy<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            return f.write_str("stop every process that uses this worm's topics, and start again");
+        }
+        f.write_str("stop ")?;
+        for (index, peer) in self.0.iter().enumerate() {
+            write!(f, "{}{peer}", if index == 0 { "" } else { ", " })?;
+        }
+        f.write_str(", and start again")
+    }
+}
+
+/// This process takes part in the worm's topics. While it does, nobody wipes them.
+///
+/// Every port and the hub hold it, declared after their iceoryx2 parts, so that those are gone before it is.
+#[derive(Debug)]
+pub(super) struct Presence {
+    instance: Instance,
+    lock: LockFile,
+}
+
+impl Presence {
+    pub(super) fn instance(&self) -> &Instance {
+        &self.instance
+    }
+}
+
+impl Drop for Presence {
+    /// The last to leave takes along what is left: empty folders, and what killed peers had.
+    fn drop(&mut self) {
+        let Ok(Some(start)) = LockFile::try_lock(&self.instance.lock_path("start"), Kind::Exclusive) else {
+            return;
+        };
+        if !self.lock.try_change(Kind::Exclusive) {
+            return;
+        }
+        if residue::is_there(&self.instance)
+            && residue::peers(&self.instance).is_empty()
+            && let Err(error) = residue::wipe(&self.instance)
+        {
+            tracing::debug!("{}: {error}", self.instance.folder().display());
+        }
+        self.lock.remove();
+        start.remove();
+        residue::remove_folder_if_empty(&self.instance);
+    }
+}
+
+/// Opens the services of the instance; each attempt may take `limit`, and waiting for another's start as long.
+pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Presence), StartError> {
+    let start = wait_for_start_lock(instance, limit)?;
+    let (mut lock, mut alone) = enter(instance, limit)?;
+    let mut retried = false;
+    loop {
+        alone = alone && (!residue::is_there(instance) || wipe_if_unused(instance)?);
+        if !alone {
+            match residue::remove_stillborn(instance) {
+                Ok(0) => {}
+                Ok(count) => tracing::info!("removed {count} half-made segments of killed processes"),
+                Err(error) => tracing::debug!("looking for half-made segments: {error}"),
+            }
+        }
+        let reason = match within(limit, instance) {
+            Ok(services) => {
+                lock.try_change(Kind::Shared);
+                drop(start);
+                let instance = instance.clone();
+                return Ok((services, Presence { instance, lock }));
+            }
+            Err(reason) => reason,
+        };
+        // Peers may have left meanwhile; once alone, the wipe mends what stood in the way.
+        alone = alone || lock.try_change(Kind::Exclusive);
+        if retried || !alone {
+            return Err(StartError::Blocked {
+                worm: instance.worm().to_owned(),
+                reason,
+                peers: residue::peers(instance),
+            });
+        }
+        tracing::warn!(
+            "the topics of {} did not open, {reason}: trying once more",
+            instance.worm()
+        );
+        retried = true;
+    }
+}
+
+/// Starts go one after another, so that none sees another's half-made files.
+fn wait_for_start_lock(instance: &Instance, limit: Duration) -> Result<LockFile, StartError> {
+    let path = instance.lock_path("start");
+    let begun = Instant::now();
+    loop {
+        if let Some(lock) = LockFile::try_lock(&path, Kind::Exclusive)? {
+            return Ok(lock);
+        }
+        if begun.elapsed() > limit {
+            return Err(StartError::Busy {
+                worm: instance.worm().to_owned(),
+                waited: limit,
+                peers: residue::who_has_open(&path),
+            });
+        }
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Marks this process as present; the second value says whether it is the only one.
+fn enter(instance: &Instance, limit: Duration) -> Result<(LockFile, bool), StartError> {
+    let path = instance.lock_path("presence");
+    let begun = Instant::now();
+    loop {
+        if let Some(lock) = LockFile::try_lock(&path, Kind::Exclusive)? {
+            return Ok((lock, true));
+        }
+        if let Some(lock) = LockFile::try_lock(&path, Kind::Shared)? {
+            return Ok((lock, false));
+        }
+        if begun.elapsed() > limit {
+            return Err(StartError::Busy {
+                worm: instance.worm().to_owned(),
+                waited: limit,
+                peers: residue::who_has_open(&path),
+            });
+        }
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Wipes the instance unless a process that knows nothing of our locks uses it; says whether it did.
+fn wipe_if_unused(instance: &Instance) -> Result<bool, StartError> {
+    let peers = residue::peers(instance);
+    if let Some(peer) = peers.first() {
+        tracing::debug!("{peer} reads {}: nothing is wiped", instance.worm());
+        return Ok(false);
+    }
+    residue::wipe(instance).map_err(|source| StartError::Wipe {
+        folder: instance.folder().display().to_string(),
+        source,
+    })?;
+    tracing::info!(
+        "removed what killed processes had left of the topics of {}",
+        instance.worm()
+    );
+    Ok(true)
+}
+
+/// Opens the services in a thread of their own, because iceoryx2 can wait for ever for a file that nobody will finish.
+///
+/// The hub's parts may change threads; ports, which may not, come later. A thread that hangs is left behind: it sleeps,
+/// and ends by itself when the file that it waits for is removed.
+fn within(limit: Duration, instance: &Instance) -> Result<Services, String> {
+    let (sender, receiver) = mpsc::channel();
+    let instance = instance.clone();
+    thread::Builder::new()
+        .name("topics-start".to_owned())
+        .spawn(move || {
+            // Nobody listens any more after the limit; the services are then dropped here.
+            let _ = sender.send(Services::open(&instance));
+        })
+        .map_err(|error| format!("no thread could be started ({error})"))?;
+    match receiver.recv_timeout(limit) {
+        Ok(Ok(services)) => Ok(services),
+        Ok(Err(Refused { step, reason })) => Err(format!("{step}: {reason}")),
+        Err(mpsc::RecvTimeoutError::Timeout) => Err(format!("no answer within {limit:?}")),
+        Err(mpsc::RecvTimeoutError::Disconnected) => Err("iceoryx2 gave up with a panic".to_owned()),
+    }
+}

@@ -1,0 +1,84 @@
+//! The topics: which type travels under which name, who writes it, and how much of it is kept.
+
+use super::role::{Controller, Estimator, Role};
+use super::services::{EventService, Services, TopicService};
+use crate::message::{Alarm, Cycle, Estimate, State, Timing};
+use iceoryx2::prelude::ZeroCopySend;
+use std::fmt::Debug;
+
+/// A message that is published on a topic of its own.
+pub trait Topic: sealed::Carried {
+    /// The last part of the service's name, `worm/<name>/…`.
+    const NAME: &'static str;
+    /// Samples that a subscriber can fall behind before it loses the oldest.
+    const BUFFER: usize;
+    /// Last samples that a late joiner gets.
+    const HISTORY: usize;
+    /// The role that publishes it.
+    type Owner: Role;
+
+    /// Number of the sample, growing by one with each, where the topic has one.
+    fn number(&self) -> Option<u64>;
+}
+
+/// A topic whose subscribers can sleep until there is something new.
+pub trait Announced: Topic + sealed::Announced {}
+
+pub(super) mod sealed {
+    use super::*;
+
+    /// Ties a message to its service.
+    ///
+    /// # Safety
+    /// Every pattern of bytes is a valid value: plain numbers and arrays of them, without padding.
+    pub unsafe trait Carried: ZeroCopySend + Copy + Debug + Send + Sync + 'static {
+        fn service(services: &Services) -> &TopicService<Self>;
+    }
+
+    pub trait Announced {
+        fn event(services: &Services) -> &EventService;
+    }
+}
+
+macro_rules! topics {
+    ($($message:ident { $field:ident, owner: $owner:ident, buffer: $buffer:literal, history: $history:literal, number: $number:expr })+) => {
+        $(impl Topic for $message {
+            const NAME: &'static str = stringify!($field);
+            const BUFFER: usize = $buffer;
+            const HISTORY: usize = $history;
+            type Owner = $owner;
+
+            fn number(&self) -> Option<u64> {
+                let number: fn(&Self) -> Option<u64> = $number;
+                number(self)
+            }
+        }
+
+        // SAFETY: `message` has f64, u64, u32 and i32 fields and arrays of them, and no padding.
+        unsafe impl sealed::Carried for $message {
+            fn service(services: &Services) -> &TopicService<Self> { &services.$field }
+        })+
+    };
+}
+
+topics! {
+    State { state, owner: Controller, buffer: 1024, history: 1, number: |state| Some(state.sequence) }
+    Timing { timing, owner: Controller, buffer: 1024, history: 1, number: |timing| Some(timing.sequence) }
+    Estimate { estimate, owner: Estimator, buffer: 256, history: 1, number: |_| None }
+    Cycle { cycle, owner: Estimator, buffer: 64, history: 16, number: |cycle| Some(cycle.index) }
+    Alarm { alarm, owner: Estimator, buffer: 64, history: 32, number: |alarm| Some(alarm.sequence) }
+}
+
+macro_rules! announced {
+    ($($message:ident = $field:ident,)+) => {
+        $(impl sealed::Announced for $message {
+            fn event(services: &Services) -> &EventService { &services.$field }
+        }
+        impl Announced for $message {})+
+    };
+}
+
+announced! {
+    State = state_event,
+    Alarm = alarm_event,
+}
