@@ -1,0 +1,460 @@
+//! The tick: inputs and time in, outputs out. All of the controller's behaviour, none of its I/O.
+
+use super::intake::Intake;
+use super::ramp::{CountRounding, Ramp};
+use super::safety::{Safety, Watched};
+use crate::config::{Config, Policy};
+use crate::link::{ServoReading, TrackerReading};
+use crate::message::{Alarm, AlarmKind, Command, CommandKind, Fault, Mode, Reply, State, Verdict};
+use std::f64::consts::TAU;
+
+/// What a tick is given.
+#[derive(Debug, Clone, Copy)]
+pub struct Inputs<'a> {
+    /// When the exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
+    pub now_ns: u64,
+    /// The servo's answer, if it came.
+    pub servo: Option<&'a ServoReading>,
+    /// The tracker's answer, if it came.
+    pub tracker: Option<&'a TrackerReading>,
+    /// A command that arrived, if any.
+    pub command: Option<Command>,
+    /// Alarm changes that arrived since the last tick.
+    pub alarms: &'a [Alarm],
+    /// Whether an estimate arrived since the last tick.
+    pub estimate_arrived: bool,
+    /// The process was asked to end.
+    pub end: bool,
+    /// What became of the service that the last tick asked for, if it asked for one.
+    pub service: Option<ServiceOutcome>,
+    /// The servo's hardware error status, where it has been read since the last tick.
+    pub hardware_error: Option<u8>,
+}
+
+/// Work on the bus beyond the tick's exchange. It takes several milliseconds, so it happens only while the worm stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Service {
+    /// Prepare the servo as at start-up (which clears a tripped watchdog), then switch torque on.
+    Arm,
+    /// Switch torque off.
+    Disarm,
+}
+
+/// What became of a [`Service`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ServiceOutcome {
+    /// Done, and read back.
+    Done(Service),
+    /// Failed; the loop has logged why.
+    Failed(Service),
+}
+
+/// What a tick gives.
+#[derive(Debug, Clone, Copy)]
+pub struct Outputs {
+    /// What is published.
+    pub state: State,
+    /// Goal velocity for the next exchange, servo counts of 0.229 rev/min.
+    pub goal_counts: i32,
+    /// Work on the bus that must happen before the next exchange.
+    pub service: Option<Service>,
+    /// The answer to this tick's command.
+    pub reply: Option<Reply>,
+    /// The process may end: it was asked to, and the motor is off (or cannot be reached).
+    pub finished: bool,
+}
+
+/// Goal velocity per count, rad/s (XL330-M288 e-manual, register 104: 0.229 rev/min).
+const RAD_S_PER_COUNT: f64 = 0.229 * TAU / 60.0;
+
+/// Cam velocity below which the motor counts as standing, rad/s: two counts.
+const STANDING_RAD_S: f64 = 2.0 * RAD_S_PER_COUNT;
+
+/// Longest wait for the cam to stand before torque goes off, ns.
+const STANDSTILL_PATIENCE_NS: u64 = 500_000_000;
+
+/// Pause between attempts to switch torque off on a servo that does not answer, ns.
+const RETRY_NS: u64 = 500_000_000;
+
+/// Attempts to switch torque off before an ending process gives up; the servo's own watchdog then stops the motor.
+const DISARM_ATTEMPTS: u32 = 3;
+
+/// The controller: a state machine that is advanced by [`Controller::tick`].
+///
+/// ```text
+///             arm              crawl                hold, alarm
+/// disarmed ────────► armed ───────────► crawling ───────────────► holding
+///    ▲                 │                   │  ▲                      │
+///    │                 │ stop              │  └──────── crawl ───────┤
+///    │                 ▼                   ▼ stop                    │
+///    └───────────── stopping ◄───────────────────────────────────────┘
+///
+/// any of these but disarmed ── limit, silence, alarm with policy stop ──► fault ── reset ──► armed
+/// ```
+#[derive(Debug, Clone)]
+pub struct Controller {
+    gait_velocity_rad_s: f64,
+    velocity_limit_rad_s: f64,
+    hold_gain_per_s: f64,
+    back_off_cycles: f64,
+    require_estimator: bool,
+    policies: [Policy; AlarmKind::ALL.len()],
+
+    intake: Intake,
+    safety: Safety,
+    ramp: Ramp,
+    rounding: CountRounding,
+
+    mode: Mode,
+    fault: Fault,
+    fault_alarm: Option<AlarmKind>,
+    /// Cam angle that a hold keeps; unset while the ramp still runs out.
+    hold_angle_rad: Option<f64>,
+    /// Cam angle at which a back-off ends.
+    back_off_until_rad: Option<f64>,
+    mode_since_ns: u64,
+    armed_ns: u64,
+    estimate_seen_ns: Option<u64>,
+    /// The service that is under way, so that none is asked for twice.
+    pending: Option<Service>,
+    /// Torque must still be switched off, not before this time.
+    disarm_due_ns: Option<u64>,
+    disarm_failures: u32,
+    last_ns: Option<u64>,
+}
+
+impl Controller {
+    /// A disarmed controller.
+    pub fn new(config: &Config) -> Self {
+        let gait_velocity_rad_s = config.gait_cycles_per_s() * TAU;
+        let mut policies = [Policy::Warn; AlarmKind::ALL.len()];
+        for kind in AlarmKind::ALL {
+            policies[kind.code() as usize] = config.alarms.of(*kind).policy;
+        }
+        Self {
+            gait_velocity_rad_s,
+            velocity_limit_rad_s: config.servo.velocity_limit_rev_per_min * TAU / 60.0,
+            hold_gain_per_s: config.control.hold_gain_per_s,
+            back_off_cycles: config.control.back_off_cycles,
+            require_estimator: config.control.require_estimator,
+            policies,
+            intake: Intake::new(config),
+            safety: Safety::new(config),
+            ramp: Ramp::at_rest(gait_velocity_rad_s.abs() / config.gait.ramp_s),
+            rounding: CountRounding::default(),
+            mode: Mode::Disarmed,
+            fault: Fault::None,
+            fault_alarm: None,
+            hold_angle_rad: None,
+            back_off_until_rad: None,
+            mode_since_ns: 0,
+            armed_ns: 0,
+            estimate_seen_ns: None,
+            pending: None,
+            disarm_due_ns: None,
+            disarm_failures: 0,
+            last_ns: None,
+        }
+    }
+
+    /// Where the state machine stands.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// The latched reason of a fault.
+    pub fn fault(&self) -> Fault {
+        self.fault
+    }
+
+    /// One tick.
+    pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
+        let now_ns = inputs.now_ns;
+        let dt_s = self
+            .last_ns
+            .replace(now_ns)
+            .map_or(0.0, |last_ns| now_ns.saturating_sub(last_ns) as f64 * 1e-9);
+
+        self.intake.take_servo(now_ns, inputs.servo);
+        self.intake.take_tracker(now_ns, inputs.tracker);
+        if inputs.estimate_arrived {
+            self.estimate_seen_ns = Some(now_ns);
+        }
+        if let Some(bits) = inputs.hardware_error {
+            self.intake.state.hardware_error = u32::from(bits);
+        }
+        if let Some(outcome) = inputs.service {
+            self.take_service(outcome, now_ns);
+        }
+        if self.has_torque() {
+            self.check_safety(inputs, dt_s);
+        }
+        for alarm in inputs.alarms {
+            self.take_alarm(alarm, now_ns);
+        }
+        let reply = inputs.command.map(|command| self.take_command(&command, inputs));
+        if inputs.end {
+            self.begin_end(now_ns);
+        }
+
+        let velocity_rad_s = self.command_velocity(now_ns, dt_s);
+        let service = self.due_service(now_ns);
+        let finished = inputs.end && self.is_over();
+        let servo_rad_s = self.intake.cam().servo_velocity_rad_s(velocity_rad_s);
+        Outputs {
+            state: self.fill_state(now_ns, velocity_rad_s),
+            goal_counts: self.rounding.round(servo_rad_s / RAD_S_PER_COUNT),
+            service,
+            reply,
+            finished,
+        }
+    }
+
+    fn has_torque(&self) -> bool {
+        matches!(self.mode, Mode::Armed | Mode::Crawling | Mode::Holding | Mode::Stopping)
+    }
+
+    fn enter(&mut self, mode: Mode, now_ns: u64) {
+        self.mode = mode;
+        self.mode_since_ns = now_ns;
+        self.hold_angle_rad = None;
+        self.back_off_until_rad = None;
+    }
+
+    fn enter_fault(&mut self, fault: Fault, alarm: Option<AlarmKind>, now_ns: u64) {
+        self.enter(Mode::Fault, now_ns);
+        self.fault = fault;
+        self.fault_alarm = alarm;
+        self.ramp.halt();
+        self.ask_for_disarm(now_ns);
+    }
+
+    fn ask_for_disarm(&mut self, now_ns: u64) {
+        self.disarm_due_ns = Some(now_ns);
+        self.disarm_failures = 0;
+    }
+
+    fn check_safety(&mut self, inputs: &Inputs<'_>, dt_s: f64) {
+        let fault = self.safety.check(&Watched {
+            now_ns: inputs.now_ns,
+            dt_s,
+            // What the servo said before a service is not what it says after it.
+            servo: inputs.servo.filter(|_| inputs.service.is_none()),
+            intake: &self.intake,
+            estimate_seen_ns: self.estimate_seen_ns,
+            armed_ns: self.armed_ns,
+            crawling_since_ns: (self.mode == Mode::Crawling).then_some(self.mode_since_ns),
+        });
+        if let Some(fault) = fault {
+            self.enter_fault(fault, None, inputs.now_ns);
+        }
+    }
+
+    fn take_service(&mut self, outcome: ServiceOutcome, now_ns: u64) {
+        self.pending = None;
+        match outcome {
+            ServiceOutcome::Done(Service::Arm) => {
+                self.fault = Fault::None;
+                self.fault_alarm = None;
+                self.armed_ns = now_ns;
+                self.safety.rearm();
+                self.ramp.halt();
+                self.enter(Mode::Armed, now_ns);
+            }
+            ServiceOutcome::Done(Service::Disarm) => {
+                self.disarm_due_ns = None;
+                if self.mode != Mode::Fault {
+                    self.enter(Mode::Disarmed, now_ns);
+                }
+            }
+            // A disarmed worm stays disarmed, a faulty one faulty; the loop has told why.
+            ServiceOutcome::Failed(Service::Arm) => {}
+            ServiceOutcome::Failed(Service::Disarm) => {
+                self.disarm_failures += 1;
+                self.disarm_due_ns = Some(now_ns + RETRY_NS);
+                if self.mode != Mode::Fault {
+                    self.enter(Mode::Fault, now_ns);
+                    self.fault = Fault::LinkLost;
+                }
+            }
+        }
+    }
+
+    fn take_alarm(&mut self, alarm: &Alarm, now_ns: u64) {
+        // A kind that this version does not know has no policy here either.
+        let Ok(kind) = AlarmKind::try_from(alarm.kind) else {
+            return;
+        };
+        if alarm.raised == 0 || !self.has_torque() {
+            return;
+        }
+        let is_crawling = self.mode == Mode::Crawling;
+        match self.policies[kind.code() as usize] {
+            Policy::Stop if self.mode != Mode::Stopping => self.enter_fault(Fault::Alarm, Some(kind), now_ns),
+            Policy::Hold if is_crawling => self.enter(Mode::Holding, now_ns),
+            // One back-off at a time: an alarm that comes while backing off finds the worm already doing what can be done.
+            Policy::BackOff if is_crawling && self.back_off_until_rad.is_none() => self.begin_back_off(),
+            _ => {}
+        }
+    }
+
+    fn begin_back_off(&mut self) {
+        let backward = -self.ramp.direction_of_target();
+        self.ramp.aim(backward * self.gait_velocity_rad_s.abs());
+        self.back_off_until_rad = Some(self.intake.state.motor_angle_rad + backward * self.back_off_cycles * TAU);
+    }
+
+    fn take_command(&mut self, command: &Command, inputs: &Inputs<'_>) -> Reply {
+        let verdict = match CommandKind::try_from(command.kind) {
+            Err(_) => Verdict::Unknown,
+            Ok(kind) => self.carry_out(kind, command.cycles_per_s, inputs),
+        };
+        Reply {
+            sequence: self.intake.state.sequence,
+            verdict: verdict.code(),
+            mode: self.mode.code(),
+            fault: self.fault.code(),
+            reserved: 0,
+        }
+    }
+
+    fn carry_out(&mut self, kind: CommandKind, cycles_per_s: f64, inputs: &Inputs<'_>) -> Verdict {
+        let now_ns = inputs.now_ns;
+        match (kind, self.mode) {
+            (CommandKind::Arm, Mode::Disarmed) => {
+                self.pending.get_or_insert(Service::Arm);
+                Verdict::Accepted
+            }
+            (CommandKind::Arm, Mode::Armed) => Verdict::Accepted,
+            (CommandKind::Crawl, Mode::Armed | Mode::Crawling | Mode::Holding) => {
+                self.begin_crawl(cycles_per_s, inputs)
+            }
+            (CommandKind::Hold, Mode::Armed | Mode::Crawling | Mode::Holding) => {
+                if self.mode != Mode::Holding {
+                    self.enter(Mode::Holding, now_ns);
+                }
+                Verdict::Accepted
+            }
+            (CommandKind::Stop, Mode::Armed | Mode::Crawling | Mode::Holding) => {
+                self.enter(Mode::Stopping, now_ns);
+                Verdict::Accepted
+            }
+            (CommandKind::Stop, Mode::Stopping | Mode::Disarmed) => Verdict::Accepted,
+            (CommandKind::Reset, Mode::Fault) => {
+                if self.safety.persists(self.fault, now_ns, inputs.servo, &self.intake) {
+                    Verdict::FaultPersists
+                } else {
+                    self.pending.get_or_insert(Service::Arm);
+                    Verdict::Accepted
+                }
+            }
+            _ => Verdict::WrongMode,
+        }
+    }
+
+    fn begin_crawl(&mut self, cycles_per_s: f64, inputs: &Inputs<'_>) -> Verdict {
+        let velocity_rad_s = if cycles_per_s == 0.0 {
+            self.gait_velocity_rad_s
+        } else {
+            cycles_per_s * TAU
+        };
+        if velocity_rad_s.is_nan() || velocity_rad_s.abs() > self.velocity_limit_rad_s {
+            return Verdict::BadSpeed;
+        }
+        if self.require_estimator && self.estimate_seen_ns.is_none() {
+            return Verdict::NoEstimator;
+        }
+        if self.mode != Mode::Crawling {
+            self.enter(Mode::Crawling, inputs.now_ns);
+        }
+        self.back_off_until_rad = None;
+        self.ramp.aim(velocity_rad_s);
+        Verdict::Accepted
+    }
+
+    fn begin_end(&mut self, now_ns: u64) {
+        match self.mode {
+            Mode::Armed | Mode::Crawling | Mode::Holding => self.enter(Mode::Stopping, now_ns),
+            Mode::Disarmed | Mode::Stopping | Mode::Fault => {}
+        }
+        self.pending = self.pending.filter(|service| *service == Service::Disarm);
+    }
+
+    /// The cam velocity that the mode asks for in this tick, rad/s.
+    fn command_velocity(&mut self, now_ns: u64, dt_s: f64) -> f64 {
+        let angle_rad = self.intake.state.motor_angle_rad;
+        match self.mode {
+            Mode::Disarmed | Mode::Armed | Mode::Fault => {
+                self.ramp.halt();
+                0.0
+            }
+            Mode::Crawling => {
+                if self
+                    .back_off_until_rad
+                    .is_some_and(|until_rad| (angle_rad - until_rad) * self.ramp.direction_of_target() >= 0.0)
+                {
+                    self.enter(Mode::Holding, now_ns);
+                }
+                self.ramp.advance(dt_s)
+            }
+            Mode::Holding => self.hold_velocity(angle_rad, dt_s),
+            Mode::Stopping => {
+                self.ramp.aim(0.0);
+                let velocity_rad_s = self.ramp.advance(dt_s);
+                let standing = self.ramp.is_at_rest() && self.intake.state.motor_velocity_rad_s.abs() < STANDING_RAD_S;
+                let patience_is_over = now_ns.saturating_sub(self.mode_since_ns) > STANDSTILL_PATIENCE_NS;
+                if self.disarm_due_ns.is_none() && (standing || (self.ramp.is_at_rest() && patience_is_over)) {
+                    self.ask_for_disarm(now_ns);
+                }
+                velocity_rad_s
+            }
+        }
+    }
+
+    /// A hold first lets the ramp run out, then keeps the angle at which the cam came to stand.
+    fn hold_velocity(&mut self, angle_rad: f64, dt_s: f64) -> f64 {
+        let Some(hold_rad) = self.hold_angle_rad else {
+            self.ramp.aim(0.0);
+            let velocity_rad_s = self.ramp.advance(dt_s);
+            if self.ramp.is_at_rest() {
+                self.hold_angle_rad = Some(angle_rad);
+            }
+            return velocity_rad_s;
+        };
+        let most_rad_s = self.gait_velocity_rad_s.abs();
+        (self.hold_gain_per_s * (hold_rad - angle_rad)).clamp(-most_rad_s, most_rad_s)
+    }
+
+    fn due_service(&mut self, now_ns: u64) -> Option<Service> {
+        if self.disarm_due_ns.is_some_and(|due_ns| now_ns >= due_ns) {
+            // Not again before the outcome of this one is known.
+            self.disarm_due_ns = Some(u64::MAX);
+            self.pending = None;
+            return Some(Service::Disarm);
+        }
+        self.pending.take()
+    }
+
+    fn is_over(&self) -> bool {
+        match self.mode {
+            Mode::Disarmed => true,
+            Mode::Fault => self.disarm_due_ns.is_none() || self.disarm_failures >= DISARM_ATTEMPTS,
+            _ => false,
+        }
+    }
+
+    fn fill_state(&mut self, now_ns: u64, velocity_rad_s: f64) -> State {
+        let state = &mut self.intake.state;
+        state.time_ns = now_ns;
+        state.goal_velocity_rad_s = velocity_rad_s;
+        state.mode = self.mode.code();
+        state.fault = self.fault.code();
+        state.fault_alarm = self.fault_alarm.map_or(u32::MAX, AlarmKind::code);
+        let published = *state;
+        state.sequence += 1;
+        published
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,205 @@
+//! The port and what is on it, as the loop uses it: exchanges, and the services that take longer than a tick.
+
+use super::Service;
+use crate::config::{Config, ReadMode as ConfiguredRead};
+use crate::link::packet::DeviceId;
+use crate::link::servo::{register, scale};
+use crate::link::{
+    Bus, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, OpenError, OperationError, Prepared,
+    ReadMode, ReadPlan, StartupError, Tty, prepare,
+};
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long the servo has to answer a question outside of the ticks.
+const REPLY_TIME: Duration = Duration::from_millis(60);
+
+/// Why the worm's devices cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DriveError {
+    /// The port cannot be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The devices on it are not as they must be.
+    #[error("{path}: {source}", path = path.display())]
+    Startup {
+        /// The port.
+        path: PathBuf,
+        /// What is wrong.
+        source: StartupError,
+    },
+    /// A device did not do what it was told.
+    #[error("{path}: {source}", path = path.display())]
+    Operation {
+        /// The port.
+        path: PathBuf,
+        /// What is wrong.
+        source: OperationError,
+    },
+    /// The configuration names a device ID that cannot be one.
+    #[error("device ID {0} is not from 0 to 252: mend servo.id or tracker.id")]
+    BadId(u8),
+}
+
+/// What the link must know of the worm in `config`.
+///
+/// # Errors
+/// [`DriveError::BadId`] for an ID that no device can have.
+pub fn link_settings(config: &Config, baud: u32) -> Result<LinkSettings, DriveError> {
+    let id = |id: u8| DeviceId::new(id).ok_or(DriveError::BadId(id));
+    let read = config.port.as_ref().map_or(ConfiguredRead::Auto, |port| port.read);
+    Ok(LinkSettings {
+        baud,
+        servo_id: id(config.servo.id)?,
+        servo_model: config.servo.model_number,
+        tracker_id: id(config.tracker.id)?,
+        tracker_model: config.tracker.model_number,
+        cells: config.worm.cells,
+        read: match read {
+            ConfiguredRead::Auto => ReadMode::Auto,
+            ConfiguredRead::FastBulk => ReadMode::Always(ReadPlan::FastBulk),
+            ConfiguredRead::Bulk => ReadMode::Always(ReadPlan::Bulk),
+            ConfiguredRead::Separate => ReadMode::Always(ReadPlan::Separate),
+        },
+        watchdog_ms: config.servo.watchdog_ms,
+        current_limit_a: config.servo.current_limit_a,
+        velocity_limit_rad_s: config.servo.velocity_limit_rev_per_min * TAU / 60.0,
+        temperature_limit_c: f64::from(config.servo.temperature_limit_c),
+    })
+}
+
+/// The open port with a servo and a tracker on it that have passed the start-up checks.
+///
+/// Dropping it stops the motor, whatever the reason: an orderly end, an error, a panic. A process that is killed has no such
+/// moment; then the servo's own watchdog stops the motor.
+pub struct Drive {
+    path: PathBuf,
+    settings: LinkSettings,
+    bus: Bus<Tty>,
+    plan: ExchangePlan,
+    is_gone: bool,
+}
+
+impl Drive {
+    /// Opens the port and prepares the devices.
+    ///
+    /// # Errors
+    /// [`DriveError`], whose text names port, device and remedy.
+    pub fn open(path: &Path, settings: LinkSettings) -> Result<(Self, Prepared, Vec<Finding>), DriveError> {
+        let (port, mut findings) = Tty::open(path, settings.baud)?;
+        let mut bus = Bus::new(port);
+        let prepared = prepare(&mut bus, &settings, &mut findings).map_err(|source| DriveError::Startup {
+            path: path.to_owned(),
+            source,
+        })?;
+        let plan = prepared.plan;
+        Ok((
+            Self {
+                path: path.to_owned(),
+                settings,
+                bus,
+                plan,
+                is_gone: false,
+            },
+            prepared,
+            findings,
+        ))
+    }
+
+    /// One exchange: the goal goes out, readings come in, until `deadline` at the latest. It allocates nothing.
+    pub fn exchange(&mut self, goal_counts: i32, deadline: Instant) -> ExchangeOutcome {
+        let outcome = self
+            .bus
+            .exchange(&self.plan, f64::from(goal_counts) * scale::VELOCITY_RAD_S, deadline);
+        self.is_gone = outcome.is_disconnected();
+        outcome
+    }
+
+    /// Whether the port has gone.
+    pub fn is_gone(&self) -> bool {
+        self.is_gone
+    }
+
+    /// What the link has counted.
+    pub fn counters(&self) -> LinkCounters {
+        self.bus.counters()
+    }
+
+    /// Carries out a service. Gives the servo's hardware error status where it was read.
+    ///
+    /// # Errors
+    /// [`DriveError`]; the motor is then off, or cannot be reached.
+    pub fn serve(&mut self, service: Service) -> Result<Option<u8>, DriveError> {
+        match service {
+            Service::Arm => self.arm().map(|()| Some(0)),
+            Service::Disarm => self.disarm().map(Some),
+        }
+    }
+
+    fn arm(&mut self) -> Result<(), DriveError> {
+        if self.is_gone {
+            let (port, _) = Tty::open(&self.path, self.settings.baud)?;
+            self.bus = Bus::new(port);
+            self.is_gone = false;
+        }
+        if self.hardware_errors().is_ok_and(|bits| bits != 0) {
+            // The only way out of a hardware error is a restart (XL330-M288 e-manual, 2.4.23 "Hardware Error Status").
+            let servo = self.settings.servo_id;
+            self.bus.reboot_servo(servo).map_err(|source| self.operation(source))?;
+        }
+        let mut findings = Vec::new();
+        let prepared = prepare(&mut self.bus, &self.settings, &mut findings).map_err(|source| DriveError::Startup {
+            path: self.path.clone(),
+            source,
+        })?;
+        self.plan = prepared.plan;
+        self.set_torque(true)
+    }
+
+    fn disarm(&mut self) -> Result<u8, DriveError> {
+        self.set_torque(false)?;
+        self.hardware_errors()
+    }
+
+    fn set_torque(&mut self, on: bool) -> Result<(), DriveError> {
+        let servo = self.settings.servo_id;
+        self.bus.set_torque(servo, on).map_err(|source| self.operation(source))
+    }
+
+    fn hardware_errors(&mut self) -> Result<u8, DriveError> {
+        let servo = self.settings.servo_id;
+        let register = register::HARDWARE_ERROR_STATUS;
+        let deadline = Instant::now() + REPLY_TIME;
+        let bits = self
+            .bus
+            .read_register(servo, register, deadline)
+            .map_err(|error| self.operation(OperationError::Transaction { register, error }))?;
+        Ok(bits as u8)
+    }
+
+    fn operation(&self, source: OperationError) -> DriveError {
+        DriveError::Operation {
+            path: self.path.clone(),
+            source,
+        }
+    }
+}
+
+impl Drop for Drive {
+    fn drop(&mut self) {
+        if self.is_gone {
+            return;
+        }
+        let servo = self.settings.servo_id;
+        // Both are tried whatever becomes of the other; should neither arrive, the servo's watchdog stops the motor.
+        let stopped = self.bus.stop_motor(servo);
+        let torque_off = self.bus.set_torque(servo, false);
+        if let Err(error) = stopped.and(torque_off) {
+            tracing::error!(
+                "{}: {error}: the servo's own watchdog stops the motor",
+                self.path.display()
+            );
+        }
+    }
+}

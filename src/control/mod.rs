@@ -1,0 +1,25 @@
+//! The controller: a pure [`Controller::tick`] around an explicit state machine, and the real-time loop that gives it
+//! deadlines.
+//!
+//! In the order in which one tick runs:
+//!
+//! 1. [`Schedule`] says when the tick is due; the loop in [`run()`] sleeps until then.
+//! 2. The link exchanges the goal velocity for readings.
+//! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](crate::message::State), the next
+//!    goal and, rarely, a [`Service`]. It knows the limits (`safety`), the ramps (`ramp`) and how readings become
+//!    messages (`intake`); it takes time as an argument, so all of it is tested in virtual time.
+//! 4. The loop publishes, carries out a service if one is due, and finishes the tick on the schedule.
+
+mod controller;
+mod drive;
+mod intake;
+mod journal;
+mod ramp;
+mod run;
+mod safety;
+mod schedule;
+
+pub use controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
+pub use drive::{Drive, DriveError, link_settings};
+pub use run::{Ending, RunError, run};
+pub use schedule::Schedule;

@@ -1,0 +1,319 @@
+//! The real-time loop: sleeps until each deadline, exchanges, ticks, publishes. All behaviour is in
+//! [`Controller::tick`]; here is only I/O, and the account of where the time went.
+
+use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
+use super::drive::Drive;
+use super::journal::{Entry, Journal};
+use super::schedule::Schedule;
+use crate::config::Config;
+use crate::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
+use crate::realtime::{self, Grant, monotonic_ns};
+use crate::topics::{
+    AnswerError, CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher,
+    Responder, RoleLock, Subscriber,
+};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Alarm changes that one tick takes at most; more wait for the next tick.
+const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
+
+/// Even a tick that was woken late gives the bus this share of a period to answer.
+const LEAST_BUS_SHARE: f64 = 0.3;
+
+/// Why the loop could not start.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A topic cannot be used.
+    #[error(transparent)]
+    Topic(#[from] PortError),
+    /// The logging thread cannot be started.
+    #[error("the logging thread cannot be started: {0}")]
+    Journal(std::io::Error),
+}
+
+/// The loop's ends of the topics.
+struct Ports {
+    state: Publisher<State>,
+    state_event: Notifier<State>,
+    timing: Publisher<Timing>,
+    estimates: Subscriber<Estimate>,
+    alarms: Subscriber<Alarm>,
+    commands: CommandServer,
+}
+
+impl Ports {
+    fn open(hub: &Hub, role: &RoleLock<ControllerRole>) -> Result<Self, PortError> {
+        Ok(Self {
+            state: hub.publisher(role)?,
+            state_event: hub.notifier(role)?,
+            timing: hub.publisher(role)?,
+            estimates: hub.subscriber()?,
+            alarms: hub.subscriber()?,
+            commands: hub.command_server(role)?,
+        })
+    }
+
+    /// What has arrived since the last tick. A topic that cannot be read counts as silent: the safety rules know what to
+    /// do about silence.
+    fn take_alarms(&mut self, into: &mut [Alarm; ALARMS_PER_TICK]) -> usize {
+        let mut count = 0;
+        while count < into.len() {
+            let Ok(Some(alarm)) = self.alarms.next() else { break };
+            into[count] = *alarm;
+            count += 1;
+        }
+        count
+    }
+}
+
+/// What the loop leaves behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ending {
+    /// Ticks that were run.
+    pub ticks: u64,
+    /// Deadlines that passed without a tick.
+    pub overruns: u64,
+    /// Messages that could not be published.
+    pub unpublished: u64,
+}
+
+/// Runs the worm until `end` is set and the motor is off. `ready` is called once, when topics and operating system are set
+/// up, with what the operating system granted.
+///
+/// # Errors
+/// [`RunError`] when the loop could not start. Once it runs, troubles are faults and alarms, not errors.
+pub fn run(
+    config: &Config,
+    drive: &mut Drive,
+    hub: &Hub,
+    role: &RoleLock<ControllerRole>,
+    end: &AtomicBool,
+    ready: impl FnOnce(&[Grant]),
+) -> Result<Ending, RunError> {
+    let ports = Ports::open(hub, role)?;
+    let journal = Journal::start().map_err(RunError::Journal)?;
+    let grants = realtime::request(&config.realtime, 0);
+    ready(&grants);
+    let mut tick_loop = Loop {
+        ports,
+        journal,
+        controller: Controller::new(config),
+        schedule: Schedule::new(config.control.rate_hz, monotonic_ns()),
+        bus_wait_share: config.control.bus_wait_share,
+        alarms: [Alarm::NONE; ALARMS_PER_TICK],
+        last: None,
+        publish_ns: 0,
+        unpublished: 0,
+        ticks: 0,
+        was_gone: false,
+    };
+    while !tick_loop.tick(drive, end.load(Ordering::Relaxed)) {}
+    Ok(Ending {
+        ticks: tick_loop.ticks,
+        overruns: tick_loop.schedule.skipped(),
+        unpublished: tick_loop.unpublished,
+    })
+}
+
+struct Loop {
+    ports: Ports,
+    journal: Journal,
+    controller: Controller,
+    schedule: Schedule,
+    bus_wait_share: f64,
+    alarms: [Alarm; ALARMS_PER_TICK],
+    /// What the last tick decided.
+    last: Option<Outputs>,
+    publish_ns: u64,
+    unpublished: u64,
+    ticks: u64,
+    was_gone: bool,
+}
+
+/// Times of one tick, ns of `CLOCK_MONOTONIC`.
+#[derive(Clone, Copy)]
+struct Times {
+    deadline: u64,
+    woken: u64,
+    exchanged: u64,
+    /// As `exchanged`, or after the service, if one was carried out.
+    resumed: u64,
+    computed: u64,
+    published: u64,
+}
+
+impl Loop {
+    /// One tick; true when the loop is over.
+    fn tick(&mut self, drive: &mut Drive, end: bool) -> bool {
+        let deadline = self.schedule.deadline_ns();
+        while monotonic_ns() < deadline {
+            realtime::sleep_until(deadline);
+        }
+        let woken = monotonic_ns();
+
+        let outcome = drive.exchange(
+            self.last.map_or(0, |last| last.goal_counts),
+            self.bus_deadline(deadline, woken),
+        );
+        self.note_port(drive.is_gone());
+        let exchanged = monotonic_ns();
+
+        let served = self
+            .last
+            .and_then(|last| last.service)
+            .map(|service| serve(drive, service));
+        let resumed = monotonic_ns();
+
+        let alarm_count = self.ports.take_alarms(&mut self.alarms);
+        let estimate_arrived = matches!(self.ports.estimates.latest(), Ok(Some(_)));
+        let (command, responder) = split(self.ports.commands.take());
+        let inputs = Inputs {
+            now_ns: exchanged,
+            servo: outcome.servo.as_ref().ok(),
+            tracker: outcome.tracker.as_ref().ok(),
+            command,
+            alarms: &self.alarms[..alarm_count],
+            estimate_arrived,
+            end,
+            service: served.map(|(outcome, _)| outcome),
+            hardware_error: served.and_then(|(_, hardware_error)| hardware_error),
+        };
+        let mode = self.controller.mode();
+        let outputs = self.controller.tick(&inputs);
+        self.note_mode(mode, &outputs);
+        let computed = monotonic_ns();
+
+        self.publish(&outputs, responder);
+        let published = monotonic_ns();
+        self.finish(
+            Times {
+                deadline,
+                woken,
+                exchanged,
+                resumed,
+                computed,
+                published,
+            },
+            served.is_some(),
+        );
+        self.last = Some(outputs);
+        self.ticks += 1;
+        outputs.finished
+    }
+
+    fn bus_deadline(&self, deadline: u64, woken: u64) -> Instant {
+        let period_ns = self.schedule.period_ns() as f64;
+        let share_ns = (self.bus_wait_share * period_ns) as u64;
+        let least_ns = (LEAST_BUS_SHARE * period_ns) as u64;
+        let wait_ns = (deadline + share_ns).saturating_sub(woken).max(least_ns);
+        Instant::now() + Duration::from_nanos(wait_ns)
+    }
+
+    fn note_port(&mut self, is_gone: bool) {
+        if is_gone != self.was_gone {
+            self.journal
+                .note(if is_gone { Entry::PortLost } else { Entry::PortBack });
+            self.was_gone = is_gone;
+        }
+    }
+
+    fn note_mode(&self, from: Mode, outputs: &Outputs) {
+        let to = self.controller.mode();
+        if from != to {
+            let (fault, alarm) = (self.controller.fault(), outputs.state.fault_alarm);
+            self.journal.note(Entry::ModeChanged { from, to, fault, alarm });
+        }
+    }
+
+    fn publish(&mut self, outputs: &Outputs, responder: Option<Responder>) {
+        let published = self.ports.state.publish(&outputs.state);
+        self.count_unpublished(published);
+        // A system call for each listener, none without: whoever wants to be woken by every tick pays for it here. A listener
+        // that cannot be woken is no trouble of the loop's.
+        let _ = self.ports.state_event.notify();
+        if let (Some(responder), Some(reply)) = (responder, &outputs.reply) {
+            // A client that has gone meanwhile needs no answer.
+            let _ = responder.answer(reply);
+        }
+    }
+
+    fn count_unpublished(&mut self, outcome: Result<(), PublishError>) {
+        self.unpublished += u64::from(outcome.is_err());
+    }
+
+    /// Ends the tick on the schedule and publishes where its time went. A tick in which a service was carried out has
+    /// paused on purpose, while the worm stood: it is no overrun.
+    fn finish(&mut self, times: Times, served: bool) {
+        let skipped = if served {
+            self.schedule.finish_pause(monotonic_ns());
+            0
+        } else {
+            self.schedule.finish(monotonic_ns())
+        };
+        let culprit = if skipped == 0 {
+            Culprit::None
+        } else {
+            find_culprit(&times)
+        };
+        if skipped > 0 {
+            let late_us = (times.published - times.deadline) / 1000;
+            let entry = Entry::Overrun {
+                sequence: self.ticks,
+                skipped,
+                culprit,
+                late_us: u32::try_from(late_us).unwrap_or(u32::MAX),
+            };
+            self.journal.note(entry);
+        }
+        let timing = Timing {
+            sequence: self.ticks,
+            deadline_ns: times.deadline,
+            wake_lateness_ns: times.woken - times.deadline,
+            bus_ns: times.exchanged - times.woken,
+            compute_ns: times.computed - times.resumed,
+            publish_ns: self.publish_ns,
+            overruns: self.schedule.skipped(),
+            overrun: u32::from(skipped > 0),
+            culprit: culprit.code(),
+        };
+        let published = self.ports.timing.publish(&timing);
+        self.count_unpublished(published);
+        self.publish_ns = monotonic_ns() - times.computed;
+    }
+}
+
+/// What took the largest part of a tick that ended late.
+fn find_culprit(times: &Times) -> Culprit {
+    let parts = [
+        (Culprit::Wake, times.woken - times.deadline),
+        (Culprit::Bus, times.exchanged - times.woken),
+        (Culprit::Compute, times.computed - times.resumed),
+        (Culprit::Publish, times.published - times.computed),
+    ];
+    parts
+        .into_iter()
+        .max_by_key(|part| part.1)
+        .map_or(Culprit::None, |part| part.0)
+}
+
+/// Carries out a service and tells what became of it. Logging is in order here: the worm stands.
+fn serve(drive: &mut Drive, service: Service) -> (ServiceOutcome, Option<u8>) {
+    match drive.serve(service) {
+        Ok(hardware_error) => (ServiceOutcome::Done(service), hardware_error),
+        Err(error) => {
+            tracing::error!("{service:?} failed: {error}");
+            (ServiceOutcome::Failed(service), None)
+        }
+    }
+}
+
+fn split(
+    taken: Result<Option<(crate::message::Command, Responder)>, AnswerError>,
+) -> (Option<crate::message::Command>, Option<Responder>) {
+    match taken {
+        Ok(Some((command, responder))) => (Some(command), Some(responder)),
+        // Requests that cannot be read are requests that nobody answers; their sender is told by its time-out.
+        Ok(None) | Err(_) => (None, None),
+    }
+}
