@@ -5,6 +5,7 @@ pub const MAX_CELLS: usize = 16;
 
 pub mod config;
 pub mod control;
+pub mod estimate;
 pub mod link;
 pub mod message;
 pub mod model;

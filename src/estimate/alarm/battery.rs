@@ -1,0 +1,144 @@
+//! Battery low: what the battery holds is needed for the way home.
+//!
+//! **Charge.** Between corrections the charge falls by what is drawn: the motor's power (duty × bus voltage × current), the
+//! hotel power, and what the battery's own resistance burns. The open-circuit voltage, bus voltage + current × inner
+//! resistance on a straight line from empty to full, corrects it: at first with the weight of a mean over the time since
+//! the start, so a usable value stands after a second; later with a time constant of [`CORRECTION_S`], so that neither a
+//! start of the motor nor the 0.1 V steps of the servo's reading show.
+//!
+//! **Way home.** Distance from where the estimator first saw the worm × electrical energy per metre, hotel power included, as
+//! the last cycles paid it. Going home may be steeper or flatter than coming was; the last known cost stands for both. Before
+//! the first cycle that advanced the way home is at most a few strokes, and only the reserve counts.
+//!
+//! The watched value is (charge − reserve) over the energy for the way home.
+
+use super::latch::{Finding, Reading, Verdict};
+use super::motion::{Moment, finite_or_zero};
+use super::sample::Positions;
+use crate::config::{Battery, Config};
+use crate::message::{Cycle, Severity, State};
+
+/// Time constant of the correction by voltage once the charge is known, s.
+const CORRECTION_S: f64 = 600.0;
+/// Time with voltage readings after which the charge is known well enough, s.
+const USABLE_S: f64 = 1.0;
+/// Weight of the newest cycle in the cost per metre.
+const COST_WEIGHT: f64 = 0.1;
+/// A cycle longer than this many steady ones held the worm for a while: its cost is not that of the way.
+const LONGEST_CYCLE: f64 = 1.5;
+/// The cost is known once the weighted way is this share of the stroke.
+const LEAST_ADVANCE_SHARE: f64 = 0.05;
+/// The alarm is over when the ratio is above the threshold by this factor.
+const CLEAR_FACTOR: f64 = 1.15;
+/// Ratios above this are reported as this: the worm is at home.
+const LARGEST_RATIO: f64 = 1000.0;
+
+#[derive(Debug, Clone)]
+pub(super) struct BatteryLow {
+    battery: Option<Battery>,
+    threshold: f64,
+    stroke_m: f64,
+    share: f64,
+    known_s: f64, // time with voltage readings
+    home: Option<Positions>,
+    distance_m: f64,
+    paid_j: f64,   // in the last cycles, older ones weighing less
+    gained_m: f64, // with the same weights
+    since_ns: u64,
+}
+
+impl BatteryLow {
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            battery: config.battery.clone(),
+            threshold: config.alarms.battery_low.threshold,
+            stroke_m: config.worm.stroke_m,
+            share: f64::NAN,
+            known_s: 0.0,
+            home: None,
+            distance_m: 0.0,
+            paid_j: 0.0,
+            gained_m: 0.0,
+            since_ns: 0,
+        }
+    }
+
+    /// Charge left, 0 to 1; `NaN` without a battery or before its voltage was read.
+    pub(super) const fn share(&self) -> f64 {
+        self.share
+    }
+
+    pub(super) fn note_positions(&mut self, positions: &Positions) {
+        match &self.home {
+            None if positions.mask != 0 => self.home = Some(*positions),
+            None => {}
+            Some(home) => {
+                if let Some(moved_m) = positions.median_moved_since(home) {
+                    self.distance_m = moved_m.abs();
+                }
+            }
+        }
+    }
+
+    pub(super) fn note_cycle(&mut self, moment: &Moment, cycle: &Cycle) {
+        let Some(battery) = &self.battery else { return };
+        let way_m = cycle.advance_m.abs();
+        let energy_j = cycle.energy_electrical_j + battery.hotel_power_w * cycle.duration_s;
+        let crawled_through = cycle.duration_s * moment.regime_cycles_per_s.abs() <= LONGEST_CYCLE;
+        if crawled_through && way_m <= self.stroke_m && energy_j > 0.0 && energy_j < 1e9 {
+            self.paid_j += energy_j - COST_WEIGHT * self.paid_j;
+            self.gained_m += way_m - COST_WEIGHT * self.gained_m;
+        }
+    }
+
+    /// Cost of a metre as the last cycles paid it, J/m, once they gained some way.
+    fn cost_j_per_m(&self) -> Option<f64> {
+        (self.gained_m >= LEAST_ADVANCE_SHARE * self.stroke_m).then(|| self.paid_j / self.gained_m)
+    }
+
+    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
+        let Some(battery) = &self.battery else {
+            return Finding::Blind;
+        };
+        let volts = state.bus_voltage_v;
+        if volts.is_finite() && volts > 0.5 * battery.empty_v && volts < 2.0 * battery.full_v {
+            let motor_w = finite_or_zero(state.motor_duty * state.motor_current_a) * volts;
+            let load_w = motor_w.clamp(0.0, 1e3) + battery.hotel_power_w;
+            let amperes = load_w / volts;
+            let drawn_w = load_w + amperes * amperes * battery.internal_resistance_ohm;
+            let open_v = volts + amperes * battery.internal_resistance_ohm;
+            let by_voltage = ((open_v - battery.empty_v) / (battery.full_v - battery.empty_v)).clamp(0.0, 1.0);
+            self.known_s += moment.step_s;
+            if self.share.is_nan() {
+                self.share = by_voltage;
+            }
+            self.share -= drawn_w * moment.step_s / battery.capacity_j;
+            let weight = moment.step_s / self.known_s.clamp(moment.step_s.max(1e-3), CORRECTION_S);
+            self.share = (self.share + weight * (by_voltage - self.share)).clamp(0.0, 1.0);
+        }
+        if self.known_s < USABLE_S {
+            return Finding::Blind;
+        }
+        let left_j = (self.share - battery.reserve_share) * battery.capacity_j;
+        let home_j = self.distance_m * self.cost_j_per_m().unwrap_or(0.0);
+        let ratio = (left_j.max(0.0) / home_j.max(left_j.max(1e-9) / LARGEST_RATIO)).min(LARGEST_RATIO);
+        let verdict = if ratio < self.threshold {
+            Verdict::Bad
+        } else if ratio > CLEAR_FACTOR * self.threshold {
+            Verdict::Good
+        } else {
+            Verdict::Between
+        };
+        if verdict != Verdict::Bad {
+            self.since_ns = moment.now_ns;
+        }
+        Finding::Seen(Reading {
+            value: ratio,
+            threshold: self.threshold,
+            verdict,
+            since_ns: self.since_ns,
+            cell: None,
+            severity: Severity::Warning,
+        })
+    }
+}

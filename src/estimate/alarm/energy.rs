@@ -1,0 +1,115 @@
+//! Energy over budget: cycles cost more than they should.
+//!
+//! Two of Page's charts (see [`super::page`]), one for the electrical energy of a cycle and one for its locomotion energy by
+//! equation (11); either may raise the alarm. Only whole, undisturbed cycles count: crawling at one steady speed from
+//! end to end, every tip's deformation known. What a cycle costs depends on speed and direction, so a new regime calibrates
+//! anew and the alarm is unarmed meanwhile; holding and going on at the same speed keeps what was learned.
+
+use super::latch::{Finding, Reading, Verdict};
+use super::motion::Moment;
+use super::page::{Level, PageChart};
+use crate::config::Config;
+use crate::message::{Cycle, Severity};
+
+/// Least usual locomotion energy, share of the model's prediction: fewer is a bad calibration, not a good worm.
+const LEAST_OF_PREDICTION: f64 = 0.5;
+/// A cycle whose duration is further than this share from the steady one was disturbed.
+const DURATION_SHARE: f64 = 0.1;
+
+#[derive(Debug, Clone)]
+pub(super) struct EnergyOverBudget {
+    fresh: PageChart,
+    electrical: PageChart,
+    locomotion: PageChart,
+    regime: u32,
+    disturbed: bool, // since the last cycle ended
+    reading: Option<Reading>,
+}
+
+impl EnergyOverBudget {
+    pub(super) fn new(config: &Config) -> Self {
+        let fresh = PageChart::new(
+            config.alarms.energy_over_budget.threshold,
+            config.estimator.calibration_cycles,
+        );
+        Self {
+            electrical: fresh.clone(),
+            locomotion: fresh.clone(),
+            fresh,
+            regime: 0,
+            disturbed: true,
+            reading: None,
+        }
+    }
+
+    /// Every tick; `sound` when nothing else is wrong, so that the cycle may count.
+    pub(super) fn update(&mut self, moment: &Moment, cycle: Option<&Cycle>, sound: bool) -> Finding {
+        if moment.regime != self.regime {
+            self.regime = moment.regime;
+            self.electrical = self.fresh.clone();
+            self.locomotion = self.fresh.clone();
+            self.disturbed = true;
+            self.reading = None;
+        }
+        self.disturbed |= !moment.steady || !sound;
+        if let Some(cycle) = cycle {
+            let expected_s = 1.0 / moment.regime_cycles_per_s.abs();
+            let whole = (cycle.duration_s - expected_s).abs() <= DURATION_SHARE * expected_s;
+            if !self.disturbed && whole && cycle.settled == 1 {
+                self.judge(cycle);
+            }
+            self.disturbed = false;
+        }
+        // A new regime has another usual: what was over the old budget says nothing about it.
+        self.reading.map_or(Finding::Idle, Finding::Seen)
+    }
+
+    fn judge(&mut self, cycle: &Cycle) {
+        let began_ns = cycle.end_ns.saturating_sub((cycle.duration_s * 1e9) as u64);
+        let electrical = self.electrical.add(
+            cycle.energy_electrical_j,
+            cycle.energy_electrical_sigma_j,
+            0.0,
+            began_ns,
+        );
+        let locomotion = self.locomotion.add(
+            cycle.energy_loss_j,
+            cycle.energy_loss_sigma_j,
+            LEAST_OF_PREDICTION * cycle.predicted_energy_loss_j,
+            began_ns,
+        );
+        if !self.electrical.can_tell() && !self.locomotion.can_tell() {
+            return;
+        }
+        let nothing = Level {
+            excess: 0.0,
+            reference: 0.0,
+            beyond: false,
+            at_zero: true,
+            since_ns: began_ns,
+        };
+        let (electrical, locomotion) = (electrical.unwrap_or(nothing), locomotion.unwrap_or(nothing));
+        let worse = if locomotion.beyond && !electrical.beyond
+            || locomotion.beyond == electrical.beyond && locomotion.excess > electrical.excess
+        {
+            locomotion
+        } else {
+            electrical
+        };
+        let verdict = if worse.beyond {
+            Verdict::Bad
+        } else if electrical.at_zero && locomotion.at_zero {
+            Verdict::Good
+        } else {
+            Verdict::Between
+        };
+        self.reading = Some(Reading {
+            value: worse.excess,
+            threshold: worse.reference,
+            verdict,
+            since_ns: worse.since_ns,
+            cell: None,
+            severity: Severity::Warning,
+        });
+    }
+}

@@ -1,0 +1,130 @@
+//! No progress: the cam turns and the worm does not advance.
+//!
+//! The advance over the last whole cycle (see [`super::stride`]) is compared, 32 times a cycle, with `threshold` × the usual
+//! advance of this direction. Until that is calibrated, half the share of the model's prediction serves, and where that
+//! is missing or about nothing, 5 % of the stroke stands for "usual": a worm that gains less than a share of that per cycle
+//! does not progress, whatever the model says. When the worm slips from one moment to the next, the advance over the
+//! last cycle falls along a straight line, so the default share of 0.3 tells after 0.7 of a cycle.
+
+use super::latch::{Finding, Reading, Verdict};
+use super::motion::Moment;
+use super::stride::{Stride, Strides, Usual};
+use crate::config::Config;
+use crate::message::{Cycle, Severity};
+
+/// Least advance per cycle that counts as usual, share of the stroke.
+const LEAST_USUAL_SHARE: f64 = 0.05;
+/// Part of the threshold share that is asked of the model's prediction.
+const TRUST_IN_MODEL: f64 = 0.5;
+/// Strides in a row below the limit.
+const CONFIRMATIONS: u32 = 2;
+/// A shortfall within this many standard deviations of the usual advance is scatter.
+const SCATTER_SIGMAS: f64 = 5.0;
+/// The condition began when the advance last was above this share of the usual one.
+const ONSET_SHARE: f64 = 0.9;
+/// How far above the limit, on the way to the usual advance, the worm must be again.
+const CLEAR_SHARE: f64 = 0.25;
+
+#[derive(Debug, Clone)]
+pub(super) struct NoProgress {
+    share: f64,
+    least_usual_m: f64,
+    calibration_cycles: u32,
+    usual: [Usual; 2],             // backward, forward
+    predicted_m: [Option<f64>; 2], // by the model, distance in the crawling direction
+    below: u32,
+    since_ns: u64,
+    reading: Option<Reading>,
+}
+
+impl NoProgress {
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            share: config.alarms.no_progress.threshold,
+            least_usual_m: LEAST_USUAL_SHARE * config.worm.stroke_m,
+            calibration_cycles: config.estimator.calibration_cycles,
+            usual: [Usual::default(); 2],
+            predicted_m: [None; 2],
+            below: 0,
+            since_ns: 0,
+            reading: None,
+        }
+    }
+
+    /// Takes note of the model's prediction.
+    pub(super) fn note_cycle(&mut self, cycle: &Cycle) {
+        let predicted_m = cycle.predicted_advance_m.abs();
+        self.predicted_m[usize::from(cycle.direction > 0)] = Some(predicted_m).filter(|metres| metres.is_finite());
+    }
+
+    /// The usual advance of a direction, m, once it is calibrated.
+    pub(super) fn usual_m(&self, direction: f64) -> Option<f64> {
+        let usual = &self.usual[usize::from(direction > 0.0)];
+        usual.is_known(self.calibration_cycles).then(|| usual.mean_m())
+    }
+
+    /// Takes a stride; `sound` when nothing else is wrong, so that it may serve for calibration.
+    pub(super) fn update(
+        &mut self,
+        moment: &Moment,
+        strides: &Strides,
+        stride: Option<&Stride>,
+        sound: bool,
+    ) -> Finding {
+        let idle = moment.still || !moment.torque;
+        if idle || !strides.is_settled() {
+            self.below = 0;
+            self.reading = None;
+            if !idle {
+                return Finding::Blind;
+            }
+            self.since_ns = moment.now_ns;
+            return Finding::Idle;
+        }
+        if let Some(stride) = stride {
+            self.reading = Some(self.judge(moment, strides, stride.advance_m, sound));
+        }
+        self.reading.map_or(Finding::Blind, Finding::Seen)
+    }
+
+    fn judge(&mut self, moment: &Moment, strides: &Strides, advance_m: f64, sound: bool) -> Reading {
+        let side = usize::from(moment.direction > 0.0);
+        let known = self.usual[side].is_known(self.calibration_cycles);
+        let (usual_m, share, scatter_m) = if known {
+            let usual = &self.usual[side];
+            (usual.mean_m(), self.share, SCATTER_SIGMAS * usual.sigma_m())
+        } else {
+            let predicted_m = self.predicted_m[side].unwrap_or(0.0);
+            (predicted_m, TRUST_IN_MODEL * self.share, 0.0)
+        };
+        let usual_m = usual_m.max(self.least_usual_m);
+        let limit_m = share * usual_m;
+        let below = advance_m < limit_m && usual_m - advance_m > scatter_m;
+        if below {
+            self.below += 1;
+        } else {
+            self.below = 0;
+            if !known && sound && strides.is_exemplary() {
+                self.usual[side].add(advance_m);
+            }
+        }
+        if advance_m >= ONSET_SHARE * usual_m - scatter_m {
+            self.since_ns = moment.now_ns;
+        }
+        let verdict = if self.below >= CONFIRMATIONS {
+            Verdict::Bad
+        } else if advance_m > limit_m + CLEAR_SHARE * (usual_m - limit_m) {
+            Verdict::Good
+        } else {
+            Verdict::Between
+        };
+        Reading {
+            value: advance_m,
+            threshold: limit_m,
+            verdict,
+            since_ns: self.since_ns,
+            cell: None,
+            severity: Severity::Critical,
+        }
+    }
+}

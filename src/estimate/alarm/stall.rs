@@ -1,0 +1,182 @@
+//! Motor stall: the cam does not turn as commanded.
+//!
+//! The lag is ∫ (commanded − measured speed) dt, as share of a turn, with a leak that runs with the *commanded travel*,
+//! not with time:
+//!
+//! d lag = (commanded − measured) − lag · |commanded| / memory, memory = [`MEMORY`] thresholds.
+//!
+//! A cam that stands makes the lag grow to `memory`, so it passes the threshold after −5 ln(1 − 1/5) = 1.12 thresholds of
+//! commanded travel **at any speed**; a cam that turns a little too slowly by a share e settles at e · `memory`, so up
+//! to 20 % too slow is not a stall. What a sound servo lags behind does not count: a rising command is followed with the
+//! time constant [`SERVO_LAG_S`] and a falling one at once, whichever asks for less, and half a count of the goal
+//! register is the servo's own rounding.
+//!
+//! While the commanded speed changes, twice the threshold is needed, unless the current says the motor works hard: the
+//! current only corroborates, the encoder decides.
+
+use super::latch::{Finding, Reading, Verdict};
+use super::motion::{GOAL_UNIT_TURNS_PER_S, Moment, finite_or_zero};
+use crate::config::Config;
+use crate::message::{Severity, State};
+
+/// Travel over which lag is forgotten, in thresholds.
+const MEMORY: f64 = 5.0;
+/// Time constant with which a sound servo follows a rising command, s, generously.
+const SERVO_LAG_S: f64 = 0.04;
+/// Commanded speed below which the threshold falls in proportion: at it the default threshold is passed after 70 ms, and
+/// what the cam was ahead, confirmation and the way to the motor fit into the rest of a tenth of a second.
+const FULL_SPEED_TURNS_PER_S: f64 = 0.16;
+/// The threshold falls no further than this: eight counts of the encoder.
+const LEAST_TURNS: f64 = 0.002;
+/// How far ahead the cam may count as, in thresholds, so that a fast moment does not hide a stall.
+const MOST_AHEAD: f64 = 0.2;
+/// Readings in a row beyond the threshold.
+const CONFIRMATIONS: u32 = 3;
+/// The condition began when the lag last passed this share of the threshold.
+const ONSET_SHARE: f64 = 0.2;
+/// Share of the servo's current limit from which the motor works hard.
+const HARD_WORK_SHARE: f64 = 0.7;
+/// Nothing lags once no motion was commanded for this long, s.
+const SETTLED_S: f64 = 0.2;
+/// Longest pause between readings that is bridged, s; beyond it what was commanded meanwhile is not known.
+const LONGEST_GAP_S: f64 = 0.03;
+/// Faster than any servo turns a cam, turns/s: the encoder's zero was moved.
+const IMPLAUSIBLE_TURNS_PER_S: f64 = 50.0;
+
+#[derive(Debug, Clone)]
+pub(super) struct MotorStall {
+    threshold_turns: f64,
+    hard_work_a: f64,
+    longest_gap_s: f64,
+    reference: f64, // the command that a sound servo must have followed by now, turns/s
+    side: f64,      // direction in which the lag counts, +1 or −1
+    lag: f64,       // turns
+    commanded: f64, // travel commanded since the last reading, turns
+    gap_s: f64,     // time since the last reading
+    uncommanded_s: f64,
+    last_phase: Option<f64>,
+    beyond: u32,
+    since_ns: u64,
+}
+
+impl MotorStall {
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            threshold_turns: config.alarms.motor_stall.threshold,
+            hard_work_a: HARD_WORK_SHARE * config.servo.current_limit_a,
+            longest_gap_s: LONGEST_GAP_S.max(3.0 / config.control.rate_hz),
+            reference: 0.0,
+            side: 1.0,
+            lag: 0.0,
+            commanded: 0.0,
+            gap_s: 0.0,
+            uncommanded_s: 0.0,
+            last_phase: None,
+            beyond: 0,
+            since_ns: 0,
+        }
+    }
+
+    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
+        let Some(phase) = moment.phase.filter(|_| moment.torque) else {
+            self.forget();
+            return Finding::Idle;
+        };
+        self.follow_command(moment);
+        if moment.phase_is_new {
+            self.follow_cam(phase, moment);
+        }
+        if self.uncommanded_s >= SETTLED_S {
+            self.lag = 0.0;
+            self.beyond = 0;
+            return Finding::Idle;
+        }
+        let works_hard = finite_or_zero(state.motor_current_a).abs() >= self.hard_work_a;
+        let usual = self.threshold_at(moment.goal_turns_per_s);
+        let threshold = if moment.steady || works_hard {
+            usual
+        } else {
+            2.0 * usual
+        };
+        if moment.phase_is_new {
+            self.beyond = if self.lag > threshold { self.beyond + 1 } else { 0 };
+        }
+        let verdict = if self.beyond >= CONFIRMATIONS {
+            Verdict::Bad
+        } else if self.lag < 0.5 * threshold {
+            Verdict::Good
+        } else {
+            Verdict::Between
+        };
+        Finding::Seen(Reading {
+            value: self.lag,
+            threshold,
+            verdict,
+            since_ns: self.since_ns,
+            cell: None,
+            severity: Severity::Critical,
+        })
+    }
+
+    /// The threshold at a commanded speed, turns.
+    fn threshold_at(&self, goal_turns_per_s: f64) -> f64 {
+        let share = (goal_turns_per_s.abs() / FULL_SPEED_TURNS_PER_S).min(1.0);
+        (share * self.threshold_turns).max(LEAST_TURNS.min(self.threshold_turns))
+    }
+
+    fn follow_command(&mut self, moment: &Moment) {
+        let goal = moment.goal_turns_per_s;
+        let asked = if goal.abs() < GOAL_UNIT_TURNS_PER_S {
+            0.0
+        } else {
+            goal - goal.signum() * 0.5 * GOAL_UNIT_TURNS_PER_S
+        };
+        self.uncommanded_s = if asked == 0.0 {
+            self.uncommanded_s + moment.step_s
+        } else {
+            0.0
+        };
+        if asked * self.reference < 0.0 {
+            self.reference = 0.0;
+        }
+        if asked.abs() <= self.reference.abs() {
+            self.reference = asked;
+        } else {
+            self.reference += (asked - self.reference) * (moment.step_s / SERVO_LAG_S).min(1.0);
+        }
+        if asked != 0.0 && asked.signum() != self.side {
+            self.side = asked.signum();
+            self.lag = 0.0;
+            self.beyond = 0;
+        }
+        self.commanded += self.reference * moment.step_s;
+        self.gap_s += moment.step_s;
+    }
+
+    fn follow_cam(&mut self, phase: f64, moment: &Moment) {
+        let threshold = self.threshold_at(moment.goal_turns_per_s);
+        let travelled = self.last_phase.map_or(f64::NAN, |last| phase - last);
+        let bridged = self.gap_s <= self.longest_gap_s && travelled.abs() < 0.01 + IMPLAUSIBLE_TURNS_PER_S * self.gap_s;
+        if bridged {
+            let forgotten = (self.commanded.abs() / (MEMORY * threshold)).min(1.0);
+            self.lag += (self.commanded - travelled) * self.side - self.lag * forgotten;
+            self.lag = self.lag.max(-MOST_AHEAD * threshold);
+        }
+        if self.lag <= ONSET_SHARE * threshold {
+            self.since_ns = moment.now_ns;
+        }
+        self.last_phase = Some(phase);
+        self.commanded = 0.0;
+        self.gap_s = 0.0;
+    }
+
+    fn forget(&mut self) {
+        self.reference = 0.0;
+        self.lag = 0.0;
+        self.beyond = 0;
+        self.last_phase = None;
+        self.commanded = 0.0;
+        self.gap_s = 0.0;
+        self.uncommanded_s = SETTLED_S;
+    }
+}

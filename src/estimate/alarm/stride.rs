@@ -1,0 +1,131 @@
+//! How far the worm got in the last gait cycle, told many times a cycle.
+//!
+//! Positions are stored at [`BINS`] phases; one cycle later, at the same phase, the whole periodic part of the motion
+//! cancels and the difference is the advance of the last cycle, whatever the shape of the gait. So nobody waits for the end
+//! of a cycle, and the usual advance is calibrated in phase for each direction by itself.
+
+use super::motion::Moment;
+use super::sample::Positions;
+
+/// Phases per cycle at which positions are kept.
+pub(super) const BINS: usize = 32;
+
+/// The newest advance over one cycle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stride {
+    /// Along the crawling direction, m.
+    pub advance_m: f64,
+    /// Cycles travelled in this direction without a break.
+    pub cycles: f64,
+}
+
+/// What is usual in one direction.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Usual {
+    strides: u32,
+    mean_m: f64,
+    square_m2: f64, // sum of squared deviations
+}
+
+impl Usual {
+    pub(super) fn add(&mut self, advance_m: f64) {
+        self.strides += 1;
+        let off = advance_m - self.mean_m;
+        self.mean_m += off / f64::from(self.strides);
+        self.square_m2 += off * (advance_m - self.mean_m);
+    }
+
+    pub(super) fn is_known(&self, calibration_cycles: u32) -> bool {
+        self.strides >= calibration_cycles.saturating_mul(BINS as u32)
+    }
+
+    pub(super) const fn mean_m(&self) -> f64 {
+        self.mean_m
+    }
+
+    pub(super) fn sigma_m(&self) -> f64 {
+        (self.square_m2 / f64::from(self.strides.max(2) - 1)).sqrt()
+    }
+}
+
+/// Keeps the positions of the last cycle.
+#[derive(Debug, Clone)]
+pub(super) struct Strides {
+    slots: [(i64, Positions); BINS], // bin counted from phase 0, and the positions on entering it
+    bin: Option<i64>,
+    began_phase: f64, // where the unbroken travel in this direction began
+    reversals: u32,
+    torque: bool,
+    after_reversal: bool,
+    newest: Option<Stride>,
+    newest_at: Positions,
+}
+
+impl Strides {
+    pub(super) const fn new() -> Self {
+        Self {
+            slots: [(i64::MIN, Positions::NONE); BINS],
+            bin: None,
+            began_phase: 0.0,
+            reversals: 0,
+            torque: false,
+            after_reversal: false,
+            newest: None,
+            newest_at: Positions::NONE,
+        }
+    }
+
+    /// Takes a sample; the stride, when the cam entered a new bin and the positions one cycle ago are known.
+    pub(super) fn update(&mut self, moment: &Moment, positions: &Positions) -> Option<Stride> {
+        let phase = moment.phase?;
+        let bin = (phase * BINS as f64).floor() as i64;
+        let reversed = moment.reversals != self.reversals;
+        if reversed || !moment.torque || !self.torque || self.bin.is_none() {
+            // Without torque the worm may be carried; after a reversal the tips must first unload.
+            self.after_reversal = reversed && self.bin.is_some() || self.after_reversal && self.newest.is_none();
+            self.slots.fill((i64::MIN, Positions::NONE));
+            self.newest = None;
+            self.began_phase = phase;
+            self.reversals = moment.reversals;
+            self.torque = moment.torque;
+            self.bin = Some(bin);
+            return None;
+        }
+        if self
+            .bin
+            .is_some_and(|last| (bin - last) as f64 * moment.direction <= 0.0)
+        {
+            return None; // in the same bin, or back in an earlier one by the give of a hold
+        }
+        self.bin = Some(bin);
+        let slot = &mut self.slots[bin.rem_euclid(BINS as i64) as usize];
+        let cycle_ago = bin.saturating_sub(moment.direction as i64 * BINS as i64);
+        let earlier = std::mem::replace(slot, (bin, *positions));
+        let moved_m = (earlier.0 == cycle_ago)
+            .then(|| positions.moved_since(&earlier.1))
+            .flatten();
+        self.newest = moved_m.map(|moved_m| Stride {
+            advance_m: moved_m * moment.direction,
+            cycles: (phase - self.began_phase).abs(),
+        });
+        self.newest_at = *positions;
+        self.newest
+    }
+
+    /// The newest stride, carried on by what the worm moved since: along the crawling direction, m.
+    pub(super) fn advance_until(&self, moment: &Moment, positions: &Positions) -> Option<f64> {
+        let since_m = positions.moved_since(&self.newest_at)?;
+        Some(self.newest?.advance_m + since_m * moment.direction)
+    }
+
+    /// Whether the tips have settled into this direction, so that a stride can be compared.
+    pub(super) fn is_settled(&self) -> bool {
+        let needed = if self.after_reversal { 2.0 } else { 1.0 };
+        self.newest.is_some_and(|stride| stride.cycles >= needed)
+    }
+
+    /// Whether a stride may serve as an example of what is usual.
+    pub(super) fn is_exemplary(&self) -> bool {
+        self.newest.is_some_and(|stride| stride.cycles >= 2.0)
+    }
+}

@@ -1,0 +1,16 @@
+//! The whole system in virtual time: the virtual worm, the controller's tick, the estimator and its alarms in one loop, without
+//! processes, ports or clocks.
+//!
+//! - `accuracy`: energy per cycle against the virtual worm's own ledger, within 2 %.
+//! - `stall`: a hard stall is told and the goal is 0 within 100 ms; how near a sound worm comes to the threshold.
+//! - `faults`: what each fault of the virtual worm brings about, by when, and nothing else.
+//! - `hours`: healthy worms on many kinds of journeys, and no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
+//!
+//! Everything is seeded; a failure names its seed.
+
+mod accuracy;
+mod faults;
+mod harness;
+mod hours;
+mod machine;
+mod stall;
