@@ -1,8 +1,52 @@
 //! `wormd`: a shared-memory real-time controller and telemetry daemon for an untethered earthworm robot.
+//!
+//! This is the map of the house. A real-time loop commands the worm's actuator over serial at a fixed rate and publishes what
+//! it sees on shared-memory topics; an estimator process beside it knows, while the worm crawls, what each gait cycle
+//! costs and whether the worm is stuck. The science is Zarrouk, Sharf and Shoham 2016, "Energetic analysis and
+//! experiments of earthworm-like locomotion with compliant surfaces"; equation numbers in these pages are theirs.
+//!
+//! # How data flows
+//!
+//! ```text
+//!   config ──► everything
+//!
+//!   worm ◄─serial─► link ◄──► control ──► topics ──► estimate ──► topics ──► watch, Python, C
+//!                    ▲           ▲                      │  ▲          │
+//!         link::virtual_worm     └───── alarms ─────────┘  │          └──► alarms back to control
+//!                    ▲                                     │
+//!                  model ──────────── prediction ──────────┘
+//! ```
+//!
+//! # The rooms, in reading order
+//! | room | what lives there | knows nothing of |
+//! |---|---|---|
+//! | [`config`] | what a worm is and how it is run: one TOML file, checked once, then trusted | all but the alarms' names |
+//! | [`message`] | what the processes say to each other: one plain type per topic | all |
+//! | [`model`] | pure physics: the exact motion, its energy, the steady cycle, the design study | clocks, files, serial, topics |
+//! | [`link`] | DYNAMIXEL Protocol 2.0: packets, the bus, servo and tracker; [`link::virtual_worm`] is the other end | control, topics |
+//! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | estimate |
+//! | [`topics`] | iceoryx2: one namespace per worm, publishers, subscribers, the command service, the guard at start-up | control, estimate |
+//! | [`estimate`] | pure and streaming: contact points, deformation, energy, cycles, alarms; one code live and on a recording | clocks, files, topics |
+//! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
+//! | [`realtime`] | what a process asks of the operating system, and what it was given | everything but config |
+//! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
+//!
+//! # Rules of the house
+//! - The core is pure and takes time as an argument: [`control::Controller`], [`estimate::Observer`], [`model::Motion`] and the
+//!   physics of the virtual worm run in virtual time in the tests, thousands of times faster than the worm.
+//! - Bytes and valid values are different types: [`link::packet`] knows bytes, [`link::ServoReading`] is a value.
+//! - A tick allocates nothing but what iceoryx2 takes for a loan, logs nothing, and waits for nothing but the bus.
+//! - SI units stand in the names: `stroke_m`, `energy_j`. People read millimetres, millijoules and degrees.
+//! - Faults are injected by a wrapper, never by an `if` in the product.
+//!
+//! # Rooms to come
+//! Recordings and the paper's identification on them, the search for the effect that the model misses, figures and pages, and
+//! the loop's own latency benchmark will each get a room of their own.
 
 /// Most cells a worm can have: fixed-size topics and control tables are laid out for this many.
 pub const MAX_CELLS: usize = 16;
 
+pub mod command;
 pub mod config;
 pub mod control;
 pub mod estimate;
@@ -11,3 +55,4 @@ pub mod message;
 pub mod model;
 pub mod realtime;
 pub mod topics;
+pub mod watch;

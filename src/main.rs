@@ -1,2 +1,73 @@
-//! The `wormd` binary.
-fn main() {}
+//! The `wormd` binary: finds the subcommand, runs it, and turns its outcome into an exit status.
+
+use clap::{Parser, Subcommand};
+use std::io::IsTerminal;
+use std::process::ExitCode;
+use wormd::command::{self, Failure};
+
+/// Real-time controller and telemetry daemon for an untethered earthworm robot
+#[derive(Debug, Parser)]
+#[command(name = "wormd", version, about, max_term_width = 100)]
+struct Arguments {
+    /// Log more: -v tells what each process does, -vv everything
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    verbose: u8,
+    #[command(subcommand)]
+    command: Subcommands,
+}
+
+#[derive(Debug, Subcommand)]
+enum Subcommands {
+    /// The main job: virtual worm (unless a port is configured), controller and estimator, with a live status
+    Up(command::up::UpArgs),
+    /// The controller alone
+    Control(command::control::ControlArgs),
+    /// The estimator alone
+    Estimate(command::estimate::EstimateArgs),
+    /// The simulated devices on a pseudo-terminal
+    VirtualWorm(command::virtual_worm::VirtualWormArgs),
+    /// A command to a running controller
+    Command(command::order::OrderArgs),
+    /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
+    Study(command::study::StudyArgs),
+    /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
+    Check(command::check::CheckArgs),
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let level = match arguments.verbose {
+        0 => tracing::Level::WARN,
+        1 => tracing::Level::INFO,
+        2 => tracing::Level::DEBUG,
+        _ => tracing::Level::TRACE,
+    };
+    tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false)
+        // It would panic where standard error is gone: the parent was killed, the terminal closed.
+        .log_internal_errors(false)
+        .compact()
+        .init();
+    match run(arguments.command, arguments.verbose) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            command::log_line(format_args!("wormd: {failure}"));
+            failure.exit_code()
+        }
+    }
+}
+
+fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
+    match command {
+        Subcommands::Up(args) => command::up::run(&args, verbose),
+        Subcommands::Control(args) => command::control::run(&args),
+        Subcommands::Estimate(args) => command::estimate::run(&args),
+        Subcommands::VirtualWorm(args) => command::virtual_worm::run(&args),
+        Subcommands::Command(args) => command::order::run(&args),
+        Subcommands::Study(args) => command::study::run(&args),
+        Subcommands::Check(args) => command::check::run(&args),
+    }
+}

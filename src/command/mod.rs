@@ -1,0 +1,162 @@
+//! One file per subcommand: arguments in, one library call, exit code out.
+
+pub mod check;
+pub mod control;
+pub mod estimate;
+pub mod order;
+mod print;
+pub mod study;
+pub mod up;
+pub mod virtual_worm;
+
+pub use print::log_line;
+
+use crate::config::{Config, ConfigError};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Why a subcommand did not do what it was asked to, and with which exit status it ends.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Arguments, configuration or input cannot be used: exit status 2.
+    #[error("{0}")]
+    Unusable(String),
+    /// It failed while running: exit status 1.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl Failure {
+    /// Arguments, configuration or input cannot be used, because of `cause`.
+    pub fn unusable(cause: impl std::fmt::Display) -> Self {
+        Self::Unusable(cause.to_string())
+    }
+
+    /// It failed while running, because of `cause`.
+    pub fn failed(cause: impl std::fmt::Display) -> Self {
+        Self::Failed(cause.to_string())
+    }
+
+    /// The exit status.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Unusable(_) => ExitCode::from(2),
+            Self::Failed(_) => ExitCode::FAILURE,
+        }
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Self::unusable(error)
+    }
+}
+
+/// Which worm is meant: the arguments that most subcommands share.
+#[derive(Debug, Clone, Args)]
+pub struct WormArgs {
+    /// Configuration file; without it, the worm of the paper
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Name of the worm, instead of the one in the configuration: several can run on one computer
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// Serial port, instead of the one in the configuration
+    #[arg(long, value_name = "PATH")]
+    pub port: Option<PathBuf>,
+}
+
+impl WormArgs {
+    /// The configuration that the arguments stand for, checked.
+    ///
+    /// # Errors
+    /// What [`Config::load`] says, and a name or port that cannot be used.
+    pub fn load(&self) -> Result<Config, Failure> {
+        let mut config = match &self.config {
+            Some(file) => Config::load(file)?,
+            None => Config::default(),
+        };
+        if let Some(name) = &self.name {
+            config.worm.name.clone_from(name);
+        }
+        if let Some(path) = &self.port {
+            let path = path.to_string_lossy().into_owned();
+            match &mut config.port {
+                Some(port) => port.path = path,
+                None => config.port = Some(crate::config::Port::at(path)),
+            }
+        }
+        let problems = config.problems();
+        if problems.is_empty() {
+            Ok(config)
+        } else {
+            let file = PathBuf::from("command line");
+            Err(ConfigError::Values { file, problems }.into())
+        }
+    }
+
+    /// The same worm as arguments for another process of it.
+    fn forward(&self) -> Vec<std::ffi::OsString> {
+        let mut arguments = Vec::new();
+        let mut push = |flag: &str, value: &Path| {
+            arguments.push(flag.into());
+            arguments.push(value.as_os_str().to_owned());
+        };
+        if let Some(config) = &self.config {
+            push("--config", config);
+        }
+        if let Some(name) = &self.name {
+            push("--name", Path::new(name));
+        }
+        if let Some(port) = &self.port {
+            push("--port", port);
+        }
+        arguments
+    }
+}
+
+/// A flag that SIGINT, SIGTERM and SIGHUP set, instead of ending the process where it stands. SIGHUP stays ignored where it
+/// was, as under `nohup`.
+///
+/// # Errors
+/// When the operating system refuses the handlers.
+pub fn end_on_signal() -> Result<Arc<AtomicBool>, Failure> {
+    let end = Arc::new(AtomicBool::new(false));
+    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
+        if signal == libc::SIGHUP && is_ignored(signal) {
+            continue;
+        }
+        signal_hook::flag::register(signal, Arc::clone(&end))
+            .map_err(|error| Failure::failed(format!("signal {signal} cannot be handled: {error}")))?;
+    }
+    Ok(end)
+}
+
+fn is_ignored(signal: libc::c_int) -> bool {
+    let mut action = std::mem::MaybeUninit::<libc::sigaction>::uninit();
+    // SAFETY: with a null action the call only reads the present one into memory that is ours.
+    let read = unsafe { libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr()) };
+    // SAFETY: the call has filled it in where it returned zero.
+    read == 0 && unsafe { action.assume_init() }.sa_sigaction == libc::SIG_IGN
+}
+
+/// Tells what is legal but foolish in the configuration.
+fn report_advice(config: &Config) {
+    for advice in config.advice() {
+        tracing::warn!("{}: {}", advice.key, advice.text);
+    }
+}
+
+/// Tells what the operating system granted, refusals loudly.
+fn report_grants(grants: &[crate::realtime::Grant]) {
+    for grant in grants {
+        if grant.refusal.is_some() {
+            tracing::warn!("{grant}");
+        } else {
+            tracing::info!("{grant}");
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! What `wormd up` shows while the worm crawls: the moving picture, plain lines, or nothing but the log.
+
+use super::children::Log;
+use crate::command::{Failure, print};
+use crate::config::{Config, Direction};
+use crate::message::{Alarm, AlarmKind, Cycle};
+use crate::watch::Telemetry;
+use crate::watch::view::{self, Subject};
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use ratatui::DefaultTerminal;
+use std::collections::VecDeque;
+use std::io::IsTerminal;
+use std::os::fd::AsFd;
+use std::time::Duration;
+
+/// Lines of the log that the picture remembers.
+const LOG_LINES: usize = 100;
+
+/// What the person at the terminal wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wish {
+    GoOn,
+    Stop,
+}
+
+/// The way in which a run is shown.
+pub(super) enum Screen {
+    /// The moving picture.
+    Picture {
+        terminal: Box<DefaultTerminal>,
+        subject: Subject,
+        log: VecDeque<String>,
+    },
+    /// A line for each cycle and alarm.
+    Lines { cycles: usize, alarms: usize },
+    /// Standard output belongs to the JSON; alarms go to the log.
+    Silent { alarms: usize },
+}
+
+impl Screen {
+    pub(super) fn open(json: bool, plain: bool, config: &Config) -> Result<Self, Failure> {
+        if json {
+            return Ok(Self::Silent { alarms: 0 });
+        }
+        if plain || !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
+            return Ok(Self::Lines { cycles: 0, alarms: 0 });
+        }
+        let terminal = ratatui::try_init()
+            .map_err(|error| Failure::failed(format!("the terminal cannot be used ({error}): try --plain")))?;
+        let bounds_m = config.worm.max_deformation_m.to_vec(config.worm.cells);
+        let subject = Subject {
+            name: config.worm.name.clone(),
+            port: config
+                .port
+                .as_ref()
+                .map_or("the virtual worm".to_owned(), |port| port.path.clone()),
+            slope_deg: config.canal.slope_deg,
+            backward: config.gait.direction == Direction::Backward,
+            rate_hz: config.control.rate_hz,
+            full_scale_m: bounds_m.into_iter().fold(0.0, f64::max),
+        };
+        Ok(Self::Picture {
+            terminal: Box::new(terminal),
+            subject,
+            log: VecDeque::with_capacity(LOG_LINES),
+        })
+    }
+
+    /// Waits for `time`, or until a key is pressed that means something.
+    pub(super) fn wait(&mut self, time: Duration) -> Wish {
+        let Self::Picture { .. } = self else {
+            std::thread::sleep(time);
+            return Wish::GoOn;
+        };
+        read_keys(time)
+    }
+
+    /// Shows what is new.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when standard output is gone.
+    pub(super) fn paint(&mut self, telemetry: &Telemetry, log: &Log) -> Result<(), Failure> {
+        match self {
+            Self::Picture {
+                terminal,
+                subject,
+                log: shown,
+            } => {
+                for line in log.lines.try_iter() {
+                    if shown.len() == LOG_LINES {
+                        shown.pop_front();
+                    }
+                    shown.push_back(line.to_string());
+                }
+                terminal
+                    .draw(|frame| view::draw(frame, subject, telemetry, shown))
+                    .map_err(|error| Failure::failed(format!("the terminal is gone: {error}")))?;
+            }
+            Self::Lines { cycles, alarms } => {
+                forward(log);
+                for cycle in &telemetry.cycles[*cycles..] {
+                    print::line(cycle_line(cycle))?;
+                    *cycles += 1;
+                }
+                for alarm in &telemetry.alarms[*alarms..] {
+                    print::line(alarm_line(alarm))?;
+                    *alarms += 1;
+                }
+            }
+            Self::Silent { alarms } => {
+                forward(log);
+                for alarm in &telemetry.alarms[*alarms..] {
+                    print::log_line(alarm_line(alarm));
+                }
+                *alarms = telemetry.alarms.len();
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives the terminal back and passes on what the processes logged.
+    pub(super) fn close(self, log: &Log) {
+        if let Self::Picture {
+            mut terminal,
+            log: shown,
+            ..
+        } = self
+        {
+            let cursor = terminal.show_cursor();
+            if let Err(error) = ratatui::try_restore().and(cursor) {
+                tracing::debug!("the terminal could not be given back: {error}");
+                // Dropped, it would tell a standard error that is gone, and panic.
+                Box::leak(terminal);
+            }
+            for line in shown {
+                print::log_line(line);
+            }
+        }
+        forward(log);
+    }
+}
+
+/// Waits for `time` or a key. A terminal that is gone has nobody at it who could stop the worm.
+///
+/// crossterm's own events are no use here: they turn round for ever, deaf to signals, once the terminal is gone.
+fn read_keys(time: Duration) -> Wish {
+    let stdin = std::io::stdin();
+    let mut keyboard = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
+    let timeout = PollTimeout::try_from(time).unwrap_or(PollTimeout::ZERO);
+    match poll(&mut keyboard, timeout) {
+        Ok(0) | Err(Errno::EINTR) => return Wish::GoOn,
+        Ok(_) => {}
+        Err(_) => return Wish::Stop,
+    }
+    let mut keys = [0; 64];
+    match nix::unistd::read(stdin.as_fd(), &mut keys) {
+        Ok(0) => Wish::Stop,
+        Ok(count) if means_stop(&keys[..count]) => Wish::Stop,
+        Ok(_) | Err(Errno::EINTR | Errno::EAGAIN) => Wish::GoOn,
+        Err(_) => Wish::Stop,
+    }
+}
+
+/// Whether these keys of a terminal in raw mode hold Ctrl-C or q. Keys that send more than a character begin with escape.
+fn means_stop(keys: &[u8]) -> bool {
+    const CTRL_C: u8 = 3;
+    const ESCAPE: u8 = 27;
+    keys.contains(&CTRL_C) || (keys.first() != Some(&ESCAPE) && keys.contains(&b'q'))
+}
+
+fn forward(log: &Log) {
+    for line in log.lines.try_iter() {
+        print::log_line(line);
+    }
+}
+
+fn cycle_line(cycle: &Cycle) -> String {
+    let head = format!("cycle {:>4}: advance {:6.2} mm, ", cycle.index, cycle.advance_m * 1e3);
+    let electrical = format!("{:.1} mJ electrical", cycle.energy_electrical_j * 1e3);
+    let settling = if cycle.settled == 0 { " (settling)" } else { "" };
+    if !cycle.energy_loss_sigma_j.is_finite() {
+        return format!("{head}{electrical}{settling}");
+    }
+    format!(
+        "{head}energy {:6.2} ± {:.2} mJ by losses, {:6.2} mJ by the actuator, {electrical}{settling}",
+        cycle.energy_loss_j * 1e3,
+        cycle.energy_loss_sigma_j * 1e3,
+        cycle.energy_actuator_net_j * 1e3,
+    )
+}
+
+fn alarm_line(alarm: &Alarm) -> String {
+    let kind = AlarmKind::try_from(alarm.kind).map_or("unknown", AlarmKind::name);
+    let cell = if alarm.cell == u32::MAX {
+        String::new()
+    } else {
+        format!(", cell {}", alarm.cell + 1)
+    };
+    let change = if alarm.raised == 0 { "cleared" } else { "RAISED" };
+    format!(
+        "alarm {kind}{cell}: {change}, {:.4} against {:.4}",
+        alarm.value, alarm.threshold
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_ctrl_c_and_q_stop_the_worm() {
+        for (keys, stops) in [
+            (b"q".as_slice(), true),
+            (b"\x03", true),
+            (b"xq", true),
+            (b"\x1b[A", false),
+            (b"\x1bq", false),
+            (b"\x1a", false),
+        ] {
+            assert_eq!(means_stop(keys), stops, "{keys:?}");
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! `wormd virtual-worm`: the simulated devices on a pseudo-terminal.
+
+use super::{Failure, end_on_signal, print, report_grants};
+use crate::config::Config;
+use crate::link::servo::BAUD_RATES;
+use crate::link::virtual_worm::{Fault, Options, PortLink, Report, Server, ServerError};
+use crate::realtime;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The devices run so far below the loop's priority: a real servo answers however busy the computer is, and so must this one.
+const PRIORITY_BELOW_LOOP: u8 = 10;
+
+/// Runs the simulated servo and tracker behind a pseudo-terminal until SIGTERM or SIGINT.
+///
+/// Prints one line on standard output when ready: the path that a controller opens. Every DYNAMIXEL SDK can talk to it.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = Fault::help())]
+pub struct VirtualWormArgs {
+    /// Where to put a link to the pseudo-terminal; an older link there is replaced
+    #[arg(long, value_name = "PATH")]
+    pub link: PathBuf,
+    /// Configuration; without it the worm of the paper
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// A fault, as listed below; may be given several times
+    #[arg(long = "fault", value_name = "SPEC")]
+    pub faults: Vec<Fault>,
+    /// Set the servo to this baud rate, and answer only a peer that uses the servo's; without it any rate is understood
+    #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
+    pub baud: Option<u32>,
+    /// Write the truth about energy and way to this file at the end, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub ledger: Option<PathBuf>,
+    /// Seed of all randomness, in place of the configured one
+    #[arg(long)]
+    pub seed: Option<u64>,
+}
+
+fn parse_baud(text: &str) -> Result<u32, String> {
+    let baud = text.parse().ok().filter(|baud| BAUD_RATES.contains(baud));
+    baud.ok_or_else(|| format!("must be one of {BAUD_RATES:?}"))
+}
+
+/// Runs `wormd virtual-worm` until a signal ends it.
+///
+/// # Errors
+/// [`Failure::Unusable`] for a configuration, fault, link or ledger that cannot be used; [`Failure::Failed`] when the devices or
+/// their port fail while they run.
+pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
+    let config = args
+        .config
+        .as_deref()
+        .map_or_else(|| Ok(Config::default()), Config::load)?;
+    let options = Options {
+        faults: args.faults.clone(),
+        seed: args.seed,
+        baud: args.baud,
+        ..Options::default()
+    };
+    let end = end_on_signal()?;
+    if let Some(file) = &args.ledger {
+        // A ledger that cannot be written is told now, not after hours.
+        std::fs::write(file, "").map_err(|error| Failure::unusable(ledger_trouble(file, &error)))?;
+    }
+    let server = Server::open(&config, &options).map_err(|error| match error {
+        ServerError::Devices(_) => Failure::unusable(error),
+        _ => Failure::failed(error),
+    })?;
+    let link = PortLink::create(&args.link, server.path()).map_err(Failure::unusable)?;
+    report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
+    // One who does not want to know when it is ready may have closed the pipe.
+    let _ = print::line(args.link.display());
+    let devices = server.run(&end).map_err(Failure::failed)?;
+    drop(link);
+    match &args.ledger {
+        Some(file) => write_ledger(file, &devices.report()),
+        None => Ok(()),
+    }
+}
+
+fn ledger_trouble(file: &Path, error: &io::Error) -> String {
+    format!(
+        "{}: cannot write the ledger: {error}; does its folder exist, and may you write there?",
+        file.display()
+    )
+}
+
+fn write_ledger(file: &Path, report: &Report) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(report).map_err(Failure::failed)?;
+    std::fs::write(file, text + "\n").map_err(|error| Failure::failed(ledger_trouble(file, &error)))
+}

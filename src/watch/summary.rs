@@ -1,0 +1,331 @@
+//! What remains of a run: the summary that `wormd up` prints, as text and as JSON. The JSON names are a contract.
+
+use super::telemetry::Telemetry;
+use crate::message::{Alarm, AlarmKind, Culprit, Cycle, Fault, Mode, Severity};
+use hdrhistogram::Histogram;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// A run in numbers.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// Name of the worm.
+    pub worm: String,
+    /// Time from the first to the last tick, s.
+    pub duration_s: f64,
+    /// Ticks that the controller ran.
+    pub ticks: u64,
+    /// Deadlines that passed without a tick.
+    pub overruns: u64,
+    /// States that the controller published and the estimator never received.
+    pub samples_lost: u64,
+    /// Tracker samples that came and went between two reads.
+    pub tracker_samples_missed: u64,
+    /// Ticks in which the servo's answer was missing or unusable.
+    pub link_failures: u64,
+    /// Where the controller stood before the stop at the end.
+    pub mode: &'static str,
+    /// The latched fault, `none` where there is none.
+    pub fault: &'static str,
+    /// Every finished gait cycle.
+    pub cycles: Vec<CycleSummary>,
+    /// Every alarm that was raised.
+    pub alarms: Vec<AlarmSummary>,
+    /// Where the ticks' time went.
+    pub timing: TimingSummary,
+}
+
+/// One gait cycle.
+#[derive(Debug, Clone, Serialize)]
+pub struct CycleSummary {
+    /// Number of the cycle, from 0.
+    pub index: u64,
+    /// Duration, s.
+    pub duration_s: f64,
+    /// Whether every tip's deformation was known from the start of the cycle.
+    pub settled: bool,
+    /// Distance travelled, m.
+    pub advance_m: f64,
+    /// Its standard error, m.
+    pub advance_sigma_m: f64,
+    /// Forward slide of each tip, m.
+    pub forward_slide_m: Vec<f64>,
+    /// Backward slide of each tip, m.
+    pub backward_slide_m: Vec<f64>,
+    /// Energy by (11), J.
+    pub energy_loss_j: f64,
+    /// Its standard error, J.
+    pub energy_loss_sigma_j: f64,
+    /// Net actuator work (13), J.
+    pub energy_actuator_net_j: f64,
+    /// Positive actuator work, J.
+    pub energy_actuator_positive_j: f64,
+    /// Electrical energy, J.
+    pub energy_electrical_j: f64,
+    /// Copper heat, J.
+    pub energy_copper_j: f64,
+    /// Friction inside the device, J.
+    pub energy_friction_inside_j: f64,
+    /// Cost of transport; null without progress, and while the energy is not known yet.
+    pub cot: Option<f64>,
+    /// Predicted advance, m; null where the model slides down.
+    pub predicted_advance_m: Option<f64>,
+    /// Predicted energy by (11), J.
+    pub predicted_energy_loss_j: Option<f64>,
+    /// Predicted positive actuator work, J.
+    pub predicted_energy_positive_j: Option<f64>,
+}
+
+/// One alarm that was raised.
+#[derive(Debug, Clone, Serialize)]
+pub struct AlarmSummary {
+    /// What it watches.
+    pub alarm: &'static str,
+    /// How serious it is.
+    pub severity: &'static str,
+    /// The cell that is meant, from 1; null where no single cell is meant.
+    pub cell: Option<u32>,
+    /// When it was raised, s since the first tick.
+    pub raised_s: f64,
+    /// When its condition began, s since the first tick.
+    pub since_s: f64,
+    /// When it was cleared, s since the first tick; null while it is still raised.
+    pub cleared_s: Option<f64>,
+    /// The watched quantity when it was raised.
+    pub value: f64,
+    /// The threshold that it passed.
+    pub threshold: f64,
+}
+
+/// Where the ticks' time went.
+#[derive(Debug, Clone, Serialize)]
+pub struct TimingSummary {
+    /// Wake lateness, µs.
+    pub wake_us: Percentiles,
+    /// Bus exchange, µs.
+    pub bus_us: Percentiles,
+    /// Computation, µs.
+    pub compute_us: Percentiles,
+    /// Publishing, µs.
+    pub publish_us: Percentiles,
+    /// Late ticks by culprit.
+    pub culprits: BTreeMap<&'static str, u64>,
+}
+
+/// Percentiles of a duration, µs.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Percentiles {
+    /// Median.
+    pub p50: f64,
+    /// 90th percentile.
+    pub p90: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// 99.9th percentile.
+    pub p99_9: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Percentiles {
+    /// Of a histogram in ns.
+    pub fn of(histogram: &Histogram<u64>) -> Self {
+        let us = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
+        Self {
+            p50: us(0.5),
+            p90: us(0.9),
+            p99: us(0.99),
+            p99_9: us(0.999),
+            max: histogram.max() as f64 * 1e-3,
+        }
+    }
+}
+
+impl Summary {
+    /// What `telemetry` of the worm called `worm` amounts to. `end_mode` is where it stood before it was stopped.
+    pub fn new(worm: &str, telemetry: &Telemetry, end_mode: Mode) -> Self {
+        let start_ns = telemetry.first_state.map_or(0, |state| state.time_ns);
+        let state = telemetry.state;
+        let fault = state
+            .and_then(|state| Fault::try_from(state.fault).ok())
+            .unwrap_or(Fault::None);
+        let durations = &telemetry.durations;
+        Self {
+            worm: worm.to_owned(),
+            duration_s: state.map_or(0.0, |state| seconds_since(start_ns, state.time_ns)),
+            ticks: telemetry.ticks(),
+            overruns: telemetry.timing.map_or(0, |timing| timing.overruns),
+            samples_lost: telemetry.estimate.map_or(0, |estimate| estimate.states_lost),
+            tracker_samples_missed: state.map_or(0, |state| state.samples_missed),
+            link_failures: state.map_or(0, |state| state.link_failures),
+            mode: end_mode.name(),
+            fault: fault.name(),
+            cycles: telemetry.cycles.iter().map(CycleSummary::new).collect(),
+            alarms: alarm_summaries(&telemetry.alarms, start_ns),
+            timing: TimingSummary {
+                wake_us: Percentiles::of(&durations.wake),
+                bus_us: Percentiles::of(&durations.bus),
+                compute_us: Percentiles::of(&durations.compute),
+                publish_us: Percentiles::of(&durations.publish),
+                culprits: Culprit::ALL
+                    .iter()
+                    .zip(telemetry.culprits)
+                    .filter(|(_, count)| *count > 0)
+                    .map(|(culprit, count)| (culprit.name(), count))
+                    .collect(),
+            },
+        }
+    }
+}
+
+fn seconds_since(start_ns: u64, time_ns: u64) -> f64 {
+    time_ns.saturating_sub(start_ns) as f64 * 1e-9
+}
+
+impl CycleSummary {
+    fn new(cycle: &Cycle) -> Self {
+        let cells = (cycle.cell_count as usize).min(crate::MAX_CELLS);
+        let known = |value: f64| value.is_finite().then_some(value);
+        Self {
+            index: cycle.index,
+            duration_s: cycle.duration_s,
+            settled: cycle.settled != 0,
+            advance_m: cycle.advance_m,
+            advance_sigma_m: cycle.advance_sigma_m,
+            forward_slide_m: cycle.forward_slide_m[..cells].to_vec(),
+            backward_slide_m: cycle.backward_slide_m[..cells].to_vec(),
+            energy_loss_j: cycle.energy_loss_j,
+            energy_loss_sigma_j: cycle.energy_loss_sigma_j,
+            energy_actuator_net_j: cycle.energy_actuator_net_j,
+            energy_actuator_positive_j: cycle.energy_actuator_positive_j,
+            energy_electrical_j: cycle.energy_electrical_j,
+            energy_copper_j: cycle.energy_copper_j,
+            energy_friction_inside_j: cycle.energy_friction_inside_j,
+            cot: known(cycle.cot).filter(|_| cycle.energy_loss_sigma_j.is_finite()),
+            predicted_advance_m: known(cycle.predicted_advance_m),
+            predicted_energy_loss_j: known(cycle.predicted_energy_loss_j),
+            predicted_energy_positive_j: known(cycle.predicted_energy_positive_j),
+        }
+    }
+}
+
+fn alarm_summaries(changes: &[Alarm], start_ns: u64) -> Vec<AlarmSummary> {
+    let mut summaries = Vec::new();
+    for (index, alarm) in changes.iter().enumerate().filter(|(_, alarm)| alarm.raised != 0) {
+        let Ok(kind) = AlarmKind::try_from(alarm.kind) else {
+            continue;
+        };
+        let cleared = changes[index..]
+            .iter()
+            .find(|later| later.kind == alarm.kind && later.raised == 0);
+        summaries.push(AlarmSummary {
+            alarm: kind.name(),
+            severity: Severity::try_from(alarm.severity).map_or("unknown", Severity::name),
+            cell: (alarm.cell != u32::MAX).then(|| alarm.cell + 1),
+            raised_s: seconds_since(start_ns, alarm.time_ns),
+            since_s: seconds_since(start_ns, alarm.since_ns),
+            cleared_s: cleared.map(|later| seconds_since(start_ns, later.time_ns)),
+            value: alarm.value,
+            threshold: alarm.threshold,
+        });
+    }
+    summaries
+}
+
+/// The columns of a cycle's mechanical energy, with dashes where it is not known: the tips' deformations were not known yet.
+struct MechanicalEnergy<'a>(&'a CycleSummary);
+
+impl fmt::Display for MechanicalEnergy<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let cycle = self.0;
+        if !cycle.energy_loss_sigma_j.is_finite() {
+            return write!(f, "{:>7}  {:>4}  {:>9}  {:>14}", "-", "", "-", "-");
+        }
+        write!(
+            f,
+            "{:>7.2} ±{:>4.2}  {:>9.2}  {:>14.2}",
+            cycle.energy_loss_j * 1e3,
+            cycle.energy_loss_sigma_j * 1e3,
+            cycle.energy_actuator_net_j * 1e3,
+            cycle.energy_actuator_positive_j * 1e3,
+        )
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {} ticks in {:.1} s, {} overruns, {} samples lost",
+            self.worm, self.ticks, self.duration_s, self.overruns, self.samples_lost
+        )?;
+        if self.cycles.is_empty() {
+            writeln!(f, "no gait cycle was finished")?;
+        } else {
+            writeln!(
+                f,
+                "cycle  advance    energy (11)   (13) net   (13) positive  electrical   copper  friction inside     COT"
+            )?;
+            writeln!(
+                f,
+                "            mm             mJ         mJ              mJ          mJ       mJ               mJ"
+            )?;
+        }
+        for cycle in &self.cycles {
+            writeln!(
+                f,
+                "{:>5}  {:>7.3}  {}  {:>10.1}  {:>7.1}  {:>15.1}  {:>6}{}",
+                cycle.index,
+                cycle.advance_m * 1e3,
+                MechanicalEnergy(cycle),
+                cycle.energy_electrical_j * 1e3,
+                cycle.energy_copper_j * 1e3,
+                cycle.energy_friction_inside_j * 1e3,
+                cycle.cot.map_or("-".to_owned(), |cot| format!("{cot:.2}")),
+                if cycle.settled { "" } else { "  (settling)" },
+            )?;
+        }
+        if let Some(Some(predicted_m)) = self.cycles.last().map(|cycle| cycle.predicted_advance_m) {
+            let energy_j = self
+                .cycles
+                .last()
+                .and_then(|cycle| cycle.predicted_energy_loss_j)
+                .unwrap_or(f64::NAN);
+            writeln!(f, "model  {:>7.3}  {:>7.2}", predicted_m * 1e3, energy_j * 1e3)?;
+        }
+        for alarm in &self.alarms {
+            let cell = alarm.cell.map_or(String::new(), |cell| format!(" (cell {cell})"));
+            let cleared = alarm
+                .cleared_s
+                .map_or("still raised".to_owned(), |s| format!("cleared at {s:.2} s"));
+            writeln!(
+                f,
+                "alarm  {}{cell}: {}, raised at {:.2} s, {cleared}; {:.4} against {:.4}",
+                alarm.alarm, alarm.severity, alarm.raised_s, alarm.value, alarm.threshold
+            )?;
+        }
+        let timing = &self.timing;
+        writeln!(f, "timing µs     p50      p99    p99.9      max")?;
+        for (name, p) in [
+            ("wake", timing.wake_us),
+            ("bus", timing.bus_us),
+            ("compute", timing.compute_us),
+            ("publish", timing.publish_us),
+        ] {
+            writeln!(
+                f,
+                "{name:<8} {:>8.1} {:>8.1} {:>8.1} {:>8.1}",
+                p.p50, p.p99, p.p99_9, p.max
+            )?;
+        }
+        if self.fault != "none" {
+            writeln!(
+                f,
+                "FAULT  {}: see the alarms and the log above, and mend the cause before the next start",
+                self.fault
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,222 @@
+use super::view::{Subject, draw};
+use super::*;
+use crate::MAX_CELLS;
+use crate::message::{Alarm, AlarmKind, Cycle, Estimate, Mode, Severity, State, Timing};
+use crate::model::{Motion, Outcome, Worm, steady_cycle};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use std::collections::VecDeque;
+
+/// What a watcher has heard of the paper's worm after `phase` gait cycles, by the model.
+fn heard(phase: f64) -> Telemetry {
+    let worm = Worm::paper();
+    let mut motion = Motion::at_rest(&worm, &[0.12, 0.08, 0.04, 0.0]);
+    let mut telemetry = Telemetry::default();
+    let Outcome::Steady(steady) = steady_cycle(&worm) else {
+        panic!("the paper's worm holds on the level")
+    };
+    for tick in 0..=100u64 {
+        motion.advance_to(&worm, phase * tick as f64 / 100.0).expect("holds");
+        telemetry.take_timing(&Timing {
+            sequence: tick,
+            deadline_ns: 0,
+            wake_lateness_ns: 20_000 + 1000 * tick,
+            bus_ns: 90_000,
+            compute_ns: 400,
+            publish_ns: 12_000,
+            overruns: 0,
+            overrun: 0,
+            culprit: 0,
+        });
+    }
+    telemetry.take_state(&State {
+        sequence: 100,
+        time_ns: (phase * 2.5e9) as u64,
+        phase,
+        motor_velocity_rad_s: 2.513,
+        motor_current_a: 0.155,
+        bus_voltage_v: 4.9,
+        motor_temperature_c: 31.0,
+        mode: Mode::Crawling.code(),
+        ..State::unknown(4)
+    });
+    let of_cells =
+        |value: &dyn Fn(usize) -> f64| std::array::from_fn(|cell| if cell < 4 { value(cell) } else { f64::NAN });
+    let ledger = motion.ledger();
+    telemetry.take_estimate(&Estimate {
+        state_sequence: 100,
+        time_ns: 0,
+        sample: 50,
+        states_lost: 0,
+        phase,
+        position_m: of_cells(&|cell| motion.positions_m()[cell]),
+        contact_m: of_cells(&|cell| motion.tip_m(cell)),
+        deformation_m: of_cells(&|cell| motion.deformation_m(cell)),
+        force_n: of_cells(&|cell| 980.0 * motion.deformation_m(cell)),
+        forward_slide_m: ledger.forward_slide_m,
+        backward_slide_m: ledger.backward_slide_m,
+        power_electrical_w: 0.2,
+        energy_electrical_j: 1.0,
+        energy_loss_j: ledger.loss_j(),
+        max_deformation_m: [0.00175; MAX_CELLS],
+        battery_share: f64::NAN,
+        cell_count: 4,
+        sliding_mask: 0b0010,
+        armed_mask: 0b1_1100_0001,
+        raised_mask: 1 << AlarmKind::JammedCell.code(),
+    });
+    for index in 0..phase as u64 {
+        telemetry.take_cycle(&Cycle {
+            index,
+            end_ns: 2_500_000_000 * (index + 1),
+            duration_s: 2.5,
+            advance_m: steady.advance_m,
+            advance_sigma_m: 2e-5,
+            forward_slide_m: [0.0; MAX_CELLS],
+            backward_slide_m: [0.0; MAX_CELLS],
+            energy_loss_j: steady.energy_loss_j,
+            energy_loss_sigma_j: 2e-4,
+            energy_actuator_net_j: steady.energy_actuator_net_j,
+            energy_actuator_positive_j: steady.energy_actuator_positive_j,
+            energy_actuator_sigma_j: 2e-4,
+            energy_electrical_j: 0.62,
+            energy_copper_j: 0.2,
+            energy_friction_inside_j: 0.37,
+            energy_electrical_sigma_j: 1e-3,
+            cot: 2.46,
+            predicted_advance_m: steady.advance_m,
+            predicted_energy_loss_j: steady.energy_loss_j,
+            predicted_energy_positive_j: steady.energy_actuator_positive_j,
+            predicted_forward_slide_m: [0.0; MAX_CELLS],
+            predicted_backward_slide_m: [0.0; MAX_CELLS],
+            samples: 300,
+            cell_count: 4,
+            settled: u32::from(index > 0),
+            direction: 1,
+        });
+    }
+    telemetry.take_alarm(&alarm(0, 1_000_000_000, 1));
+    telemetry.take_alarm(&alarm(1, 3_000_000_000, 0));
+    telemetry.take_alarm(&alarm(2, 5_000_000_000, 1));
+    telemetry
+}
+
+fn alarm(sequence: u64, time_ns: u64, raised: u32) -> Alarm {
+    Alarm {
+        sequence,
+        time_ns,
+        since_ns: time_ns - 100_000_000,
+        value: 0.62,
+        threshold: 0.4,
+        phase: 1.0,
+        kind: AlarmKind::JammedCell.code(),
+        severity: Severity::Critical.code(),
+        raised,
+        cell: 1,
+    }
+}
+
+fn painted(width: u16, height: u16, telemetry: &Telemetry) -> String {
+    let subject = Subject {
+        name: "worm1".to_owned(),
+        port: "the virtual worm".to_owned(),
+        slope_deg: 0.0,
+        backward: false,
+        rate_hz: 1000.0,
+        full_scale_m: 0.00175,
+    };
+    let log = VecDeque::from(["[control] a line of the log".to_owned()]);
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a terminal in memory");
+    terminal
+        .draw(|frame| draw(frame, &subject, telemetry, &log))
+        .expect("paints");
+    terminal.backend().to_string()
+}
+
+#[test]
+fn the_picture_shows_what_was_heard() {
+    let picture = painted(110, 34, &heard(3.4));
+    println!("{picture}");
+    for part in [
+        "worm1",
+        "crawling",
+        "cycle 3.40",
+        "jammed-cell cell 2",
+        "6.83",
+        "46.9±0.2",
+        "101 ticks",
+        "a line of the log",
+    ] {
+        assert!(picture.contains(part), "{part:?} is missing in\n{picture}");
+    }
+    let canal = picture
+        .lines()
+        .find(|line| line.contains("▐1▌"))
+        .expect("cell 1 is drawn");
+    for cell in ["▐4▌", "▐3▌", "▐2▌"] {
+        assert!(canal.contains(cell), "{cell} is missing in {canal}");
+    }
+}
+
+/// The terminal that everybody has shows the worm, its tips, its alarms and its cycles.
+#[test]
+fn the_usual_terminal_shows_the_worm() {
+    let picture = painted(80, 24, &heard(3.4));
+    for part in [
+        "▐1▌",
+        "Ctrl-C",
+        "│4 ",
+        "jammed-cell cell 2",
+        "46.9±0.2",
+        "COT",
+        "101 ticks",
+        "slides backward",
+    ] {
+        assert!(picture.contains(part), "{part:?} is missing in\n{picture}");
+    }
+}
+
+/// What is not known yet is not shown as a number.
+#[test]
+fn an_unsettled_cycle_has_no_energy() {
+    let mut telemetry = heard(2.4);
+    let cycle = telemetry.cycles.last_mut().expect("two cycles");
+    cycle.settled = 0;
+    cycle.cot = 0.0;
+    cycle.energy_loss_sigma_j = f64::NAN;
+    let summary = Summary::new("worm1", &telemetry, Mode::Crawling);
+    assert_eq!(summary.cycles[1].cot, None);
+    for text in [summary.to_string(), painted(110, 34, &telemetry)] {
+        assert!(!text.contains("NaN"), "{text}");
+    }
+}
+
+/// A terminal of any size, and a worm of which nothing is known yet, must not end the run.
+#[test]
+fn no_terminal_is_too_small() {
+    for (width, height) in [(1, 1), (10, 3), (40, 12), (79, 24), (250, 80)] {
+        painted(width, height, &Telemetry::default());
+        painted(width, height, &heard(1.5));
+    }
+}
+
+#[test]
+fn a_summary_is_what_was_heard() {
+    let summary = Summary::new("worm1", &heard(3.4), Mode::Crawling);
+    let json = serde_json::to_value(&summary).expect("serialises");
+    assert_eq!(json["ticks"], 101);
+    assert_eq!(json["cycles"].as_array().map(Vec::len), Some(3));
+    assert_eq!(json["cycles"][1]["forward_slide_m"].as_array().map(Vec::len), Some(4));
+    let alarms: Vec<_> = summary
+        .alarms
+        .iter()
+        .map(|alarm| (alarm.cell, alarm.cleared_s.is_some()))
+        .collect();
+    assert_eq!(alarms, [(Some(2), true), (Some(2), false)]);
+    assert!(
+        (80.0..=121.0).contains(&summary.timing.wake_us.p99),
+        "{:?}",
+        summary.timing.wake_us
+    );
+    assert!(summary.to_string().contains("model    6.833    46.88"), "{summary}");
+}

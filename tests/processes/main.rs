@@ -1,0 +1,252 @@
+//! The three processes of a worm for real: real pseudo-terminal, real topics, real signals.
+//!
+//! These tests wait for conditions with a generous bound; they assert what happens, never how fast a shared machine is.
+
+mod leaving;
+mod worm;
+
+use std::time::Duration;
+use worm::{Process, Worm, soon, wait_for};
+use wormd::link::servo::{WATCHDOG_LATCHED, register};
+use wormd::message::{AlarmKind, CommandKind, Fault, Mode, Verdict};
+
+/// Longest wait for anything that a worm does.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+#[test]
+fn the_main_job_crawls_counts_and_leaves_nothing_behind() {
+    let worm = Worm::new("main");
+    let output = worm.wormd(&["up", "--json", "--duration", "9"]).output();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}\n{error}", output.status);
+    let summary: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("standard output is one JSON object");
+    let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
+
+    let ticks = number(&summary["ticks"]) + number(&summary["overruns"]);
+    assert!(
+        (8_900.0..12_000.0).contains(&ticks),
+        "9 s at 1 kHz are about 9000 ticks: {ticks}"
+    );
+    assert_eq!(summary["samples_lost"], 0);
+    assert_eq!(
+        (&summary["mode"], &summary["fault"]),
+        (&"crawling".into(), &"none".into())
+    );
+    assert_eq!(summary["alarms"], serde_json::json!([]), "no alarm on a healthy worm");
+
+    let cycles = summary["cycles"].as_array().expect("a list");
+    assert!((3..=4).contains(&cycles.len()), "9 s of 2.5 s cycles: {}", cycles.len());
+    for cycle in cycles.iter().filter(|cycle| cycle["settled"] == true) {
+        let (advance_mm, loss_mj) = (number(&cycle["advance_m"]) * 1e3, number(&cycle["energy_loss_j"]) * 1e3);
+        assert!((advance_mm - 6.833).abs() < 0.25, "advance {advance_mm} mm");
+        assert!(
+            (loss_mj / 46.88 - 1.0).abs() < 0.06,
+            "energy {loss_mj} mJ, with 1 % scatter of the friction"
+        );
+        let parts = ["energy_copper_j", "energy_friction_inside_j", "energy_actuator_net_j"];
+        let sum: f64 = parts.iter().map(|part| number(&cycle[part])).sum();
+        assert!(
+            (sum / number(&cycle["energy_electrical_j"]) - 1.0).abs() < 1e-9,
+            "the electrical account closes"
+        );
+        assert_eq!(cycle["forward_slide_m"].as_array().map(Vec::len), Some(4));
+    }
+    assert_eq!(worm.residue(), Vec::<String>::new());
+}
+
+#[test]
+fn a_stalled_cam_is_reported_and_stops_the_worm() {
+    let worm = Worm::new("stall");
+    let output = worm
+        .wormd(&["up", "--json", "--duration", "15", "--fault", "stall@1"])
+        .output();
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary even so");
+    assert_eq!(output.status.code(), Some(1), "a run that ended in a fault failed");
+    assert_eq!(
+        (&summary["mode"], &summary["fault"]),
+        (&"fault".into(), &"alarm".into())
+    );
+    let alarm = &summary["alarms"][0];
+    assert_eq!(alarm["alarm"], AlarmKind::MotorStall.name(), "{}", summary["alarms"]);
+}
+
+/// A worm of separate processes, crawling.
+struct Crawling {
+    // In the order in which they are ended when a test is over: the motor is stopped first.
+    controller: Process,
+    estimator: Process,
+    virtual_worm: Process,
+    worm: Worm,
+}
+
+impl Crawling {
+    fn start(name: &str) -> Self {
+        let worm = Worm::new(name);
+        Self::start_again(worm)
+    }
+
+    fn start_again(worm: Worm) -> Self {
+        let virtual_worm = worm.virtual_worm(&[]);
+        let estimator = worm.wormd(&["estimate"]).start();
+        let controller = worm.wormd(&["control", "--port", &worm.port()]).start();
+        let crawling = Self {
+            worm,
+            virtual_worm,
+            estimator,
+            controller,
+        };
+        crawling.make_crawl();
+        crawling
+    }
+
+    fn make_crawl(&self) {
+        assert_eq!(self.worm.order(CommandKind::Arm), Verdict::Accepted);
+        self.wait_for_mode(Mode::Armed);
+        wait_for("a crawl is accepted", PATIENCE, || {
+            self.worm.order(CommandKind::Crawl) == Verdict::Accepted
+        });
+        wait_for("the cam turns", PATIENCE, || {
+            self.worm.state().is_some_and(|state| state.motor_velocity_rad_s > 2.0)
+        });
+    }
+
+    fn wait_for_mode(&self, mode: Mode) {
+        wait_for(mode.name(), PATIENCE, || {
+            self.worm.state().is_some_and(|state| state.mode == mode.code())
+        });
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        self.worm.state().and_then(|state| Fault::try_from(state.fault).ok())
+    }
+
+    /// Ends the processes that still live, then makes the same worm crawl again.
+    fn restart(self) -> Self {
+        let Self {
+            worm,
+            virtual_worm,
+            estimator,
+            controller,
+        } = self;
+        controller.end();
+        estimator.end();
+        virtual_worm.end();
+        Self::start_again(worm)
+    }
+}
+
+#[test]
+fn a_killed_controller_leaves_a_stopped_motor_and_a_clean_restart() {
+    let mut crawling = Crawling::start("kill-c");
+    crawling.controller.kill();
+    // Silence is what the watchdog waits for: every question would feed it.
+    let (mut bus, servo) = crawling.worm.bus();
+    wait_for("the servo's watchdog stops the motor", PATIENCE, || {
+        std::thread::sleep(Duration::from_millis(300));
+        let watchdog = bus.read_register(servo, register::BUS_WATCHDOG, soon());
+        let velocity = bus.read_register(servo, register::PRESENT_VELOCITY, soon());
+        (watchdog, velocity) == (Ok(u32::from(WATCHDOG_LATCHED)), Ok(0))
+    });
+    drop(bus);
+    crawling.restart().worm.order(CommandKind::Stop);
+}
+
+#[test]
+fn a_killed_estimator_stops_the_worm_and_restarts_beside_it() {
+    let mut crawling = Crawling::start("kill-e");
+    crawling.estimator.kill();
+    crawling.wait_for_mode(Mode::Fault);
+    assert_eq!(crawling.fault(), Some(Fault::EstimatorSilent));
+    wait_for("the motor stands", PATIENCE, || {
+        crawling
+            .worm
+            .state()
+            .is_some_and(|state| state.motor_velocity_rad_s == 0.0)
+    });
+    crawling.estimator = crawling.worm.wormd(&["estimate"]).start();
+    assert_eq!(crawling.worm.order(CommandKind::Reset), Verdict::Accepted);
+    crawling.wait_for_mode(Mode::Armed);
+    wait_for("a crawl is accepted", PATIENCE, || {
+        crawling.worm.order(CommandKind::Crawl) == Verdict::Accepted
+    });
+    crawling.wait_for_mode(Mode::Crawling);
+}
+
+#[test]
+fn a_pulled_cable_is_a_lost_link_until_it_is_back() {
+    let mut crawling = Crawling::start("kill-w");
+    crawling.virtual_worm.kill();
+    crawling.wait_for_mode(Mode::Fault);
+    assert_eq!(crawling.fault(), Some(Fault::LinkLost));
+    crawling.virtual_worm = crawling.worm.virtual_worm(&[]);
+    wait_for("a reset finds the worm again", PATIENCE, || {
+        crawling.worm.order(CommandKind::Reset);
+        crawling
+            .worm
+            .state()
+            .is_some_and(|state| state.mode == Mode::Armed.code())
+    });
+    crawling.restart().worm.order(CommandKind::Stop);
+}
+
+#[test]
+fn one_worm_has_one_controller() {
+    let crawling = Crawling::start("two");
+    let second = crawling
+        .worm
+        .wormd(&["control", "--port", &crawling.worm.port()])
+        .output();
+    let error = String::from_utf8_lossy(&second.stderr);
+    assert_eq!(second.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains(&crawling.controller.id().to_string()),
+        "the other process is named: {error}"
+    );
+    // Another name, the same port: the port itself is locked.
+    let other = Worm::new("two-b");
+    let third = other.wormd(&["control", "--port", &crawling.worm.port()]).output();
+    let error = String::from_utf8_lossy(&third.stderr);
+    assert_eq!(third.status.code(), Some(2), "{error}");
+    assert!(error.contains("already in use"), "{error}");
+}
+
+#[test]
+fn devices_that_do_not_fit_are_refused_by_name() {
+    // (arguments of the virtual worm, configuration of the controller, what the error says)
+    let table = [
+        (
+            "baud",
+            &["--baud", "57600"][..],
+            "[port]\npath = \"PORT\"\nbaud = 1000000\n",
+            "57600",
+        ),
+        (
+            "cells",
+            &[][..],
+            "[worm]\ncells = 6\nstep_order = [1, 2, 3, 4, 5, 6]\n[port]\npath = \"PORT\"\n",
+            "cells",
+        ),
+        (
+            "model",
+            &["--fault", "wrong-model:number=1190"][..],
+            "[port]\npath = \"PORT\"\n",
+            "1190",
+        ),
+        (
+            "mute",
+            &["--fault", "silence:device=tracker"][..],
+            "[port]\npath = \"PORT\"\n",
+            "tracker",
+        ),
+    ];
+    for (name, arguments, config, part) in table {
+        let worm = Worm::new(name);
+        let _devices = worm.virtual_worm(arguments);
+        let config = worm.config(&config.replace("PORT", &worm.port()));
+        let output = worm.wormd(&["control", "--config", &config]).output();
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{name}: {error}");
+        assert!(error.contains(part), "{name}: {error}");
+    }
+}

@@ -1,0 +1,290 @@
+//! Real processes of a worm, under a name of their own, ended when a test ends.
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use std::io::{BufRead, BufReader, Read};
+use std::os::fd::OwnedFd;
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::sync::Mutex;
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::{Duration, Instant};
+use wormd::config::Config;
+use wormd::link::packet::DeviceId;
+use wormd::link::{Bus, Tty};
+use wormd::message::{Command as Order, CommandKind, State, Verdict};
+use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
+
+/// One worm on this computer, with a folder for its files.
+pub struct Worm {
+    name: String,
+    folder: tempfile::TempDir,
+    ears: Mutex<Option<Ears>>,
+}
+
+/// Ports of the test itself. They belong to one thread; a test is one.
+struct Ears {
+    client: CommandClient,
+    states: Subscriber<State>,
+    newest: Option<State>,
+}
+
+impl Worm {
+    /// A worm whose name no other test, nor another run of this test, has.
+    pub fn new(name: &str) -> Self {
+        let name = format!("{name}-{}", std::process::id() % 100_000);
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        Self {
+            name,
+            folder,
+            ears: Mutex::new(None),
+        }
+    }
+
+    fn instance(&self) -> Instance {
+        let mut config = Config::default();
+        config.worm.name.clone_from(&self.name);
+        Instance::of(&config).expect("the topics' root can be used")
+    }
+
+    /// The virtual worm's port.
+    pub fn port(&self) -> String {
+        self.folder.path().join("port").to_string_lossy().into_owned()
+    }
+
+    /// A configuration file with this text.
+    pub fn config(&self, text: &str) -> String {
+        let path = self.folder.path().join("worm.toml");
+        std::fs::write(&path, text).expect("a temporary file can be written");
+        path.to_string_lossy().into_owned()
+    }
+
+    /// `wormd` with these arguments and this worm's name.
+    pub fn wormd(&self, arguments: &[&str]) -> Invocation {
+        let named = [arguments, &["--name", &self.name]].concat();
+        Invocation::new(&named)
+    }
+
+    /// The virtual worm, ready.
+    pub fn virtual_worm(&self, more: &[&str]) -> Process {
+        let port = self.port();
+        let mut arguments = vec!["virtual-worm", "--link", &port];
+        arguments.extend(more);
+        Invocation::new(&arguments).start()
+    }
+
+    /// The bus of the virtual worm, for whoever is not the controller.
+    pub fn bus(&self) -> (Bus<Tty>, DeviceId) {
+        let (port, _) = Tty::open(&PathBuf::from(self.port()), 1_000_000).expect("the port is free");
+        (Bus::new(port), DeviceId::new(1).expect("1 is an ID"))
+    }
+
+    fn with_ears<T>(&self, act: impl FnOnce(&mut Ears) -> T) -> T {
+        let mut guard = self.ears.lock().expect("no test thread has panicked");
+        let ears = guard.get_or_insert_with(|| {
+            let hub = Hub::open(&self.instance()).expect("the topics open");
+            Ears {
+                client: hub.command_client().expect("a client"),
+                states: hub.subscriber().expect("a subscriber"),
+                newest: None,
+            }
+        });
+        act(ears)
+    }
+
+    /// Commands the controller.
+    pub fn order(&self, kind: CommandKind) -> Verdict {
+        let order = Order {
+            cycles_per_s: 0.0,
+            kind: kind.code(),
+            reserved: 0,
+        };
+        let reply = self
+            .with_ears(|ears| ears.client.call(order, Duration::from_secs(5)))
+            .expect("an answer");
+        Verdict::try_from(reply.verdict).expect("a known verdict")
+    }
+
+    /// The newest state.
+    pub fn state(&self) -> Option<State> {
+        self.with_ears(|ears| {
+            if let Some(state) = ears.states.latest().expect("states can be read") {
+                ears.newest = Some(*state);
+            }
+            ears.newest
+        })
+    }
+
+    /// Files of this worm that are left in shared memory.
+    pub fn residue(&self) -> Vec<String> {
+        let mut left: Vec<String> = ["/dev/shm", "/dev/shm/wormd"]
+            .iter()
+            .filter_map(|folder| std::fs::read_dir(folder).ok())
+            .flatten()
+            .filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned()))
+            .filter(|file| file.contains(&self.name))
+            .collect();
+        left.sort();
+        left
+    }
+}
+
+/// A call of `wormd` that is not made yet.
+pub struct Invocation {
+    command: Command,
+    what: String,
+}
+
+impl Invocation {
+    fn new(arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wormd"));
+        command.args(arguments).stdin(Stdio::null());
+        Self {
+            command,
+            what: arguments.join(" "),
+        }
+    }
+
+    /// Runs it to its end, which must come within a minute.
+    pub fn output(mut self) -> Output {
+        let mut child = self
+            .command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let pid = Pid::from_raw(child.id() as i32);
+        let (ended, watch) = std::sync::mpsc::channel::<()>();
+        let guard = std::thread::spawn(move || {
+            let hangs = watch.recv_timeout(Duration::from_secs(60)) == Err(RecvTimeoutError::Timeout);
+            if hangs {
+                // The process group is the test's own child alone.
+                let _ = kill(pid, Signal::SIGTERM);
+            }
+            hangs
+        });
+        let mut stdout = child.stdout.take().expect("is piped");
+        let reader = std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            stdout.read_to_end(&mut bytes).expect("can be read");
+            bytes
+        });
+        let mut stderr = Vec::new();
+        child
+            .stderr
+            .take()
+            .expect("is piped")
+            .read_to_end(&mut stderr)
+            .expect("can be read");
+        let status = child.wait().expect("ends");
+        drop(ended);
+        let hung = guard.join().expect("the guard does not panic");
+        assert!(
+            !hung,
+            "`{}` did not end within a minute:\n{}",
+            self.what,
+            String::from_utf8_lossy(&stderr)
+        );
+        Output {
+            status,
+            stdout: reader.join().expect("the reader does not panic"),
+            stderr,
+        }
+    }
+
+    /// Starts it and waits until it says on standard output that it is ready.
+    pub fn start(mut self) -> Process {
+        let mut child = self.command.stdout(Stdio::piped()).spawn().expect("the binary starts");
+        let stdout = child.stdout.take().expect("is piped");
+        let mut line = String::new();
+        BufReader::new(stdout).read_line(&mut line).expect("can be read");
+        assert!(
+            !line.is_empty(),
+            "`{}` ended before it was ready: {:?}",
+            self.what,
+            child.wait()
+        );
+        Process { child }
+    }
+
+    /// Starts it with a terminal of its own.
+    pub fn start_in(mut self, terminal: OwnedFd) -> Process {
+        let copy = || terminal.try_clone().expect("a descriptor is free");
+        let command = self.command.stdin(copy()).stdout(copy()).stderr(copy());
+        Process {
+            child: command.spawn().expect("the binary starts"),
+        }
+    }
+}
+
+/// A running process; dropping it ends it.
+pub struct Process {
+    child: Child,
+}
+
+impl Process {
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// kill -9.
+    pub fn kill(&mut self) {
+        self.child.kill().expect("is alive");
+        self.child.wait().expect("ends");
+    }
+
+    /// Waits until it has ended without being asked to.
+    pub fn ends_by_itself(mut self) -> ExitStatus {
+        let mut status = None;
+        wait_for("an end without being asked", Duration::from_secs(20), || {
+            status = self.child.try_wait().expect("can be waited for");
+            status.is_some()
+        });
+        status.expect("has ended")
+    }
+
+    /// Asks it to end and waits for that.
+    pub fn end(mut self) {
+        self.ask_to_end();
+        wait_for("an orderly end", Duration::from_secs(20), || {
+            matches!(self.child.try_wait(), Ok(Some(_)))
+        });
+    }
+
+    fn ask_to_end(&self) {
+        // It may have been killed by the test.
+        let _ = kill(Pid::from_raw(self.child.id() as i32), Signal::SIGTERM);
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        if matches!(self.child.try_wait(), Ok(Some(_))) {
+            return;
+        }
+        self.ask_to_end();
+        let deadline = Instant::now() + Duration::from_secs(5);
+        while Instant::now() < deadline {
+            if matches!(self.child.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Waits until a condition holds; a test that waits in vain says for what.
+pub fn wait_for(what: &str, patience: Duration, mut condition: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !condition() {
+        assert!(begun.elapsed() < patience, "waited {patience:?} in vain: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A deadline for one answer on the bus.
+pub fn soon() -> Instant {
+    Instant::now() + Duration::from_millis(100)
+}
