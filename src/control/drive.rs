@@ -3,17 +3,14 @@
 use super::Service;
 use crate::config::{Config, ReadMode as ConfiguredRead};
 use crate::link::packet::DeviceId;
-use crate::link::servo::{register, scale};
+use crate::link::servo::scale;
 use crate::link::{
     Bus, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, OpenError, OperationError, Prepared,
     ReadMode, ReadPlan, StartupError, Tty, prepare,
 };
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-
-/// How long the servo has to answer a question outside of the ticks.
-const REPLY_TIME: Duration = Duration::from_millis(60);
+use std::time::Instant;
 
 /// Why the worm's devices cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -144,7 +141,7 @@ impl Drive {
             self.is_gone = false;
         }
         if self.hardware_errors().is_ok_and(|bits| bits != 0) {
-            // The only way out of a hardware error is a restart (XL330-M288 e-manual, 2.4.23 "Hardware Error Status").
+            // The only way out of a hardware error is a restart (XL330-M288 e-manual, "Hardware Error Status").
             let servo = self.settings.servo_id;
             self.bus.reboot_servo(servo).map_err(|source| self.operation(source))?;
         }
@@ -169,13 +166,11 @@ impl Drive {
 
     fn hardware_errors(&mut self) -> Result<u8, DriveError> {
         let servo = self.settings.servo_id;
-        let register = register::HARDWARE_ERROR_STATUS;
-        let deadline = Instant::now() + REPLY_TIME;
-        let bits = self
+        let errors = self
             .bus
-            .read_register(servo, register, deadline)
-            .map_err(|error| self.operation(OperationError::Transaction { register, error }))?;
-        Ok(bits as u8)
+            .hardware_errors(servo)
+            .map_err(|source| self.operation(source))?;
+        Ok(errors.0)
     }
 
     fn operation(&self, source: OperationError) -> DriveError {

@@ -214,6 +214,15 @@ impl Harvest {
         }
     }
 
+    /// This device has said nothing yet.
+    fn is_silent(&self, plan: &ExchangePlan, id: DeviceId) -> bool {
+        if id == plan.servo {
+            self.servo == Err(ReadFailure::Silent)
+        } else {
+            self.tracker == Err(ReadFailure::Silent)
+        }
+    }
+
     /// Each device has said something, be it a refusal.
     fn is_answered(&self) -> bool {
         self.servo != Err(ReadFailure::Silent) && self.tracker != Err(ReadFailure::Silent)
@@ -320,24 +329,27 @@ impl<P: Port> Bus<P> {
         let servo_deadline = now + deadline.saturating_duration_since(now) / 2;
         let [servo_span, tracker_span] = plan.spans();
         self.send_packets(&[goal_write(plan.servo, &goal), read_of(servo_span)], servo_deadline)?;
-        let servo_end = self.receive_until(servo_deadline, |packet, counters| {
-            if let Packet::Status(status) = packet {
-                harvest.take_status(plan, &status, counters);
-            }
-            harvest.servo != Err(ReadFailure::Silent)
-        })?;
-        if let WaitEnd::DeadlinePassed { damaged: true } = servo_end {
-            harvest.fail(plan, plan.servo, ReadFailure::Damaged);
-        }
+        self.receive_answer(plan, plan.servo, servo_deadline, harvest)?;
         self.send_packets(&[read_of(tracker_span)], deadline)?;
-        let tracker_end = self.receive_until(deadline, |packet, counters| {
+        self.receive_answer(plan, plan.tracker, deadline, harvest)
+    }
+
+    /// Waits for the answer of one device to a read of its own.
+    fn receive_answer(
+        &mut self,
+        plan: &ExchangePlan,
+        device: DeviceId,
+        deadline: Instant,
+        harvest: &mut Harvest,
+    ) -> Result<(), TransactionError> {
+        let end = self.receive_until(deadline, |packet, counters| {
             if let Packet::Status(status) = packet {
                 harvest.take_status(plan, &status, counters);
             }
-            harvest.tracker != Err(ReadFailure::Silent)
+            !harvest.is_silent(plan, device)
         })?;
-        if let WaitEnd::DeadlinePassed { damaged: true } = tracker_end {
-            harvest.fail(plan, plan.tracker, ReadFailure::Damaged);
+        if let WaitEnd::DeadlinePassed { damaged: true } = end {
+            harvest.fail(plan, device, ReadFailure::Damaged);
         }
         Ok(())
     }

@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use super::packet::DeviceId;
-use super::servo::{WATCHDOG_LATCHED, register, scale};
+use super::servo::{HardwareErrors, WATCHDOG_LATCHED, register, scale};
 use super::{Bus, Port, Register, TransactionError};
 
 /// How long a device has to answer: more than 16 ms in an FTDI adapter and 14 bytes at 9600 baud both ways.
@@ -53,6 +53,15 @@ impl<P: Port> Bus<P> {
     /// [`OperationError`]; [`NotKept`](OperationError::NotKept) when a hardware error keeps torque off.
     pub fn set_torque(&mut self, servo: DeviceId, on: bool) -> Result<(), OperationError> {
         self.set_register(servo, register::TORQUE_ENABLE, u32::from(on))
+    }
+
+    /// Reads why the servo has shut down, if it has.
+    ///
+    /// # Errors
+    /// [`OperationError`]
+    pub fn hardware_errors(&mut self, servo: DeviceId) -> Result<HardwareErrors, OperationError> {
+        let bits = self.register(servo, register::HARDWARE_ERROR_STATUS)?;
+        Ok(HardwareErrors(bits as u8))
     }
 
     /// Sets the goal velocity to zero.

@@ -173,7 +173,7 @@ pub fn prepare<P: Port>(
     // Whatever else is wrong: first the motor comes to rest.
     set_status_level(bus, servo_id, ANSWER_ALL)?;
     unlock(bus, servo_id, findings)?;
-    let errors = HardwareErrors(bus.register(servo_id, register::HARDWARE_ERROR_STATUS)? as u8);
+    let errors = bus.hardware_errors(servo_id)?;
     if !errors.is_none() {
         return Err(StartupError::HardwareError(errors));
     }

@@ -6,6 +6,7 @@ use super::residue::{self, Peer};
 use super::services::{Refused, Services};
 use std::fmt;
 use std::io;
+use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -142,33 +143,33 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
 
 /// Starts go one after another, so that none sees another's half-made files.
 fn wait_for_start_lock(instance: &Instance, limit: Duration) -> Result<LockFile, StartError> {
-    let path = instance.lock_path("start");
-    let begun = Instant::now();
-    loop {
-        if let Some(lock) = LockFile::try_lock(&path, Kind::Exclusive)? {
-            return Ok(lock);
-        }
-        if begun.elapsed() > limit {
-            return Err(StartError::Busy {
-                worm: instance.worm().to_owned(),
-                waited: limit,
-                peers: residue::who_has_open(&path),
-            });
-        }
-        thread::sleep(Duration::from_millis(1));
-    }
+    wait_for_lock(instance, "start", limit, |path| {
+        LockFile::try_lock(path, Kind::Exclusive)
+    })
 }
 
 /// Marks this process as present; the second value says whether it is the only one.
 fn enter(instance: &Instance, limit: Duration) -> Result<(LockFile, bool), StartError> {
-    let path = instance.lock_path("presence");
+    wait_for_lock(instance, "presence", limit, |path| {
+        if let Some(lock) = LockFile::try_lock(path, Kind::Exclusive)? {
+            return Ok(Some((lock, true)));
+        }
+        Ok(LockFile::try_lock(path, Kind::Shared)?.map(|lock| (lock, false)))
+    })
+}
+
+/// Tries for a lock until it is had or the limit has passed, and then says who has it.
+fn wait_for_lock<T>(
+    instance: &Instance,
+    name: &str,
+    limit: Duration,
+    attempt: impl Fn(&Path) -> Result<Option<T>, LockError>,
+) -> Result<T, StartError> {
+    let path = instance.lock_path(name);
     let begun = Instant::now();
     loop {
-        if let Some(lock) = LockFile::try_lock(&path, Kind::Exclusive)? {
-            return Ok((lock, true));
-        }
-        if let Some(lock) = LockFile::try_lock(&path, Kind::Shared)? {
-            return Ok((lock, false));
+        if let Some(had) = attempt(&path)? {
+            return Ok(had);
         }
         if begun.elapsed() > limit {
             return Err(StartError::Busy {
