@@ -40,8 +40,7 @@
 //! - Faults are injected by a wrapper, never by an `if` in the product.
 //!
 //! # Rooms to come
-//! Recordings and the paper's identification on them, the search for the effect that the model misses, figures and pages, and
-//! the loop's own latency benchmark will each get a room of their own.
+//! The search for the effect that the model misses and the loop's own latency benchmark will each get a room of their own.
 
 /// Most cells a worm can have: fixed-size topics and control tables are laid out for this many.
 pub const MAX_CELLS: usize = 16;

@@ -63,11 +63,19 @@ impl Config {
     /// [`ConfigError`] when the file cannot be read, is not TOML, has an unknown key or a value out of range; its text
     /// names file, line or key, and the remedy.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        Ok(Self::load_with_text(path)?.0)
+    }
+
+    /// As [`Config::load`], with the text of the file: what a log keeps of it.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn load_with_text(path: &Path) -> Result<(Self, String), ConfigError> {
         let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
             file: path.to_path_buf(),
             source,
         })?;
-        Self::from_toml(&text, path)
+        Ok((Self::from_toml(&text, path)?, text))
     }
 
     /// Reads and checks a configuration that is already in memory; `file` is what errors call it.

@@ -1,6 +1,7 @@
 //! The `alarm` topic: what is wrong, since when, and by how much.
 
-use super::coded_enum;
+use super::json::{Name, OrNone};
+use super::{coded_enum, message};
 use iceoryx2::prelude::ZeroCopySend;
 
 coded_enum! {
@@ -37,31 +38,30 @@ coded_enum! {
     }
 }
 
-/// One change of one alarm: raised or cleared.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_alarm_v1")]
-#[repr(C)]
-pub struct Alarm {
-    /// Number of this change since the estimator started.
-    pub sequence: u64,
-    /// When it was raised or cleared, ns of `CLOCK_MONOTONIC`.
-    pub time_ns: u64,
-    /// When its condition began, by the estimator's account, ns of `CLOCK_MONOTONIC`.
-    pub since_ns: u64,
-    /// The watched quantity at the change, in the unit of the threshold.
-    pub value: f64,
-    /// The threshold that it passed.
-    pub threshold: f64,
-    /// Gait phase at the change, cycles.
-    pub phase: f64,
-    /// [`AlarmKind`] as a code.
-    pub kind: u32,
-    /// [`Severity`] as a code.
-    pub severity: u32,
-    /// 1 raised, 0 cleared.
-    pub raised: u32,
-    /// The cell that is meant, from 0, or `u32::MAX` where no single cell is meant.
-    pub cell: u32,
+message! {
+    /// One change of one alarm: raised or cleared.
+    Alarm = "wormd_alarm_v1", made: time_ns, cells: |_| 0, {
+        /// Number of this change since the estimator started.
+        sequence: u64,
+        /// When it was raised or cleared, ns of `CLOCK_MONOTONIC`.
+        time_ns: u64,
+        /// When its condition began, by the estimator's account, ns of `CLOCK_MONOTONIC`.
+        since_ns: u64,
+        /// The watched quantity at the change, in the unit of the threshold.
+        value: f64,
+        /// The threshold that it passed.
+        threshold: f64,
+        /// Gait phase at the change, cycles.
+        phase: f64,
+        /// What is watched: [`AlarmKind`] as a code.
+        kind: u32 as Name<AlarmKind>,
+        /// How serious it is: [`Severity`] as a code.
+        severity: u32 as Name<Severity>,
+        /// 1 raised, 0 cleared.
+        raised: u32,
+        /// The cell that is meant, from 0, or `u32::MAX` where no single cell is meant.
+        cell: u32 as OrNone<u32>,
+    }
 }
 
 impl Alarm {

@@ -1,6 +1,7 @@
 //! The `state` topic: what the controller saw and commanded in one tick.
 
-use super::coded_enum;
+use super::json::{Name, OrNone};
+use super::{AlarmKind, coded_enum, message};
 use crate::MAX_CELLS;
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -50,57 +51,56 @@ coded_enum! {
     }
 }
 
-/// One tick of the controller, published every tick.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_state_v1")]
-#[repr(C)]
-pub struct State {
-    /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
-    pub sequence: u64,
-    /// When the tick's exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
-    pub time_ns: u64,
-    /// Gait cycles done, unwrapped: the cam angle over one turn, zero at the configured home.
-    pub phase: f64,
-    /// Cam angle, rad, unwrapped.
-    pub motor_angle_rad: f64,
-    /// Cam velocity, rad/s.
-    pub motor_velocity_rad_s: f64,
-    /// Velocity commanded in this tick, rad/s.
-    pub goal_velocity_rad_s: f64,
-    /// Current in the motor winding, A.
-    pub motor_current_a: f64,
-    /// Share of the bus voltage that the driver puts on the winding, −1 to 1.
-    pub motor_duty: f64,
-    /// Bus voltage, V.
-    pub bus_voltage_v: f64,
-    /// Servo temperature, °C.
-    pub motor_temperature_c: f64,
-    /// When the newest tracker sample was captured, s of the tracker's own clock, unwrapped.
-    pub sample_time_s: f64,
-    /// Cell positions along the canal of the newest tracker sample, m; `NaN` where not seen.
-    pub position_m: [f64; MAX_CELLS],
-    /// Tracker samples since the controller started, unwrapped; grows by one with each sample that was seen.
-    pub sample: u64,
-    /// Tracker samples that came and went between two reads, since the controller started.
-    pub samples_missed: u64,
-    /// Ticks since the controller started in which the servo's answer was missing or unusable.
-    pub link_failures: u64,
-    /// How many cells are in use.
-    pub cell_count: u32,
-    /// Bit i set: cell i was seen in the newest sample.
-    pub valid_mask: u32,
-    /// 1 when the tracker sample is new in this tick, else 0.
-    pub sample_is_new: u32,
-    /// 1 when the motor readings are of this tick, 0 when the last good ones are repeated.
-    pub motor_is_new: u32,
-    /// [`Mode`] as a code.
-    pub mode: u32,
-    /// [`Fault`] as a code: the latched reason.
-    pub fault: u32,
-    /// The [`super::AlarmKind`] behind [`Fault::Alarm`], or `u32::MAX`.
-    pub fault_alarm: u32,
-    /// Servo register 70, hardware error status, as last read.
-    pub hardware_error: u32,
+message! {
+    /// One tick of the controller, published every tick.
+    State = "wormd_state_v1", made: time_ns, cells: |state| state.cell_count, {
+        /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
+        sequence: u64,
+        /// When the tick's exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
+        time_ns: u64,
+        /// Gait cycles done, unwrapped: the cam angle over one turn, zero at the configured home.
+        phase: f64,
+        /// Cam angle, rad, unwrapped.
+        motor_angle_rad: f64,
+        /// Cam velocity, rad/s.
+        motor_velocity_rad_s: f64,
+        /// Velocity commanded in this tick, rad/s.
+        goal_velocity_rad_s: f64,
+        /// Current in the motor winding, A.
+        motor_current_a: f64,
+        /// Share of the bus voltage that the driver puts on the winding, −1 to 1.
+        motor_duty: f64,
+        /// Bus voltage, V.
+        bus_voltage_v: f64,
+        /// Servo temperature, °C.
+        motor_temperature_c: f64,
+        /// When the newest tracker sample was captured, s of the tracker's own clock, unwrapped.
+        sample_time_s: f64,
+        /// Cell positions along the canal of the newest tracker sample, m; `NaN` where not seen.
+        position_m: [f64; MAX_CELLS],
+        /// Tracker samples since the controller started, unwrapped; grows by one with each sample that was seen.
+        sample: u64,
+        /// Tracker samples that came and went between two reads, since the controller started.
+        samples_missed: u64,
+        /// Ticks since the controller started in which the servo's answer was missing or unusable.
+        link_failures: u64,
+        /// How many cells are in use.
+        cell_count: u32,
+        /// Bit i set: cell i was seen in the newest sample.
+        valid_mask: u32,
+        /// 1 when the tracker sample is new in this tick, else 0.
+        sample_is_new: u32,
+        /// 1 when the motor readings are of this tick, 0 when the last good ones are repeated.
+        motor_is_new: u32,
+        /// Where the state machine stands: [`Mode`] as a code.
+        mode: u32 as Name<Mode>,
+        /// [`Fault`] as a code: the latched reason.
+        fault: u32 as Name<Fault>,
+        /// The [`super::AlarmKind`] behind [`Fault::Alarm`], or `u32::MAX`.
+        fault_alarm: u32 as OrNone<Name<AlarmKind>>,
+        /// Servo register 70, hardware error status, as last read.
+        hardware_error: u32,
+    }
 }
 
 impl State {

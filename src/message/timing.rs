@@ -1,6 +1,7 @@
 //! The `timing` topic: where each tick's time went.
 
-use super::coded_enum;
+use super::json::Name;
+use super::{coded_enum, message};
 use iceoryx2::prelude::ZeroCopySend;
 
 coded_enum! {
@@ -19,27 +20,26 @@ coded_enum! {
     }
 }
 
-/// Where the time of one tick went, published every tick.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_timing_v1")]
-#[repr(C)]
-pub struct Timing {
-    /// The tick's number, as in [`super::State::sequence`].
-    pub sequence: u64,
-    /// The absolute deadline at which the loop asked to be woken, ns of `CLOCK_MONOTONIC`.
-    pub deadline_ns: u64,
-    /// How long after that deadline the loop really ran, ns.
-    pub wake_lateness_ns: u64,
-    /// From the first byte handed to the port to the last byte of the answer (or the end of the wait), ns.
-    pub bus_ns: u64,
-    /// The tick's own computation, ns.
-    pub compute_ns: u64,
-    /// Publishing of the *previous* tick's topics, ns (this tick's is not over when this is sent).
-    pub publish_ns: u64,
-    /// Ticks skipped since the controller started, because an earlier one ended after their deadline.
-    pub overruns: u64,
-    /// 1 when this tick ended after the next deadline.
-    pub overrun: u32,
-    /// [`Culprit`] as a code: what took the largest part of an overrunning tick.
-    pub culprit: u32,
+message! {
+    /// Where the time of one tick went, published every tick.
+    Timing = "wormd_timing_v1", made: deadline_ns, cells: |_| 0, {
+        /// The tick's number, as in [`super::State::sequence`].
+        sequence: u64,
+        /// The absolute deadline at which the loop asked to be woken, ns of `CLOCK_MONOTONIC`.
+        deadline_ns: u64,
+        /// How long after that deadline the loop really ran, ns.
+        wake_lateness_ns: u64,
+        /// From the first byte handed to the port to the last byte of the answer (or the end of the wait), ns.
+        bus_ns: u64,
+        /// The tick's own computation, ns.
+        compute_ns: u64,
+        /// Publishing of the *previous* tick's topics, ns (this tick's is not over when this is sent).
+        publish_ns: u64,
+        /// Ticks skipped since the controller started, because an earlier one ended after their deadline.
+        overruns: u64,
+        /// 1 when this tick ended after the next deadline.
+        overrun: u32,
+        /// [`Culprit`] as a code: what took the largest part of an overrunning tick.
+        culprit: u32 as Name<Culprit>,
+    }
 }

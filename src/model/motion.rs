@@ -80,6 +80,23 @@ impl Motion {
         }
     }
 
+    /// A worm in the middle of its crawl, with these deformations at this phase; those beyond a bound are put on it. The body
+    /// gives way until the balance holds, and stays where it is if it cannot.
+    ///
+    /// # Panics
+    /// When there is not one position and one deformation for each cell.
+    pub fn under_way(worm: &Worm, phase: f64, positions_m: &[f64], deformations_m: &[f64]) -> Self {
+        assert_eq!(deformations_m.len(), worm.cells(), "one deformation for each cell");
+        let mut motion = Self::at_rest(worm, positions_m);
+        motion.phase = phase;
+        motion.deformation_m[..worm.cells()].copy_from_slice(deformations_m);
+        motion.slide_into_bounds(worm);
+        // A body that cannot be held says so when it is to move on.
+        let _ = motion.rebalance(worm);
+        motion.ledger = Ledger::default();
+        motion
+    }
+
     /// Moves on to a phase, in gait cycles, unwrapped; a smaller phase than the present one runs the gait in reverse.
     /// Exact for any increment: many small ones end where a large one does, to rounding. Parameters of the worm that
     /// changed since the last call are taken up first, as by [`rebalance`](Self::rebalance).
@@ -166,6 +183,14 @@ impl Motion {
             .map(|cell| self.displace(worm, cell, distance_m))
             .sum::<f64>();
         self.ledger.settling_loss_j += elastic_before_j - self.elastic_energy_j(worm) - spent_j;
+    }
+
+    /// Lets a tip slide by what is outside this motion: its contact point moves by `slide_m` while the cell stays. The body gives
+    /// way at the next increment.
+    pub(crate) fn slide_tip(&mut self, worm: &Worm, cell: usize, slide_m: f64) {
+        let contact = &worm.contacts()[cell];
+        let deformation_m = self.deformation_m[cell] - slide_m;
+        self.deformation_m[cell] = deformation_m.clamp(-contact.backward_bound_m, contact.forward_bound_m);
     }
 
     /// Positions Xᵢ along the canal, m, cell 0 first.

@@ -232,6 +232,27 @@ impl Worm {
         Ok(self)
     }
 
+    /// This worm with another stroke, m.
+    ///
+    /// # Errors
+    /// [`WormError::OutOfRange`].
+    pub fn with_stroke_m(mut self, stroke_m: f64) -> Result<Self, WormError> {
+        require(stroke_m > 0.0, "stroke_m", stroke_m, "above 0")?;
+        self.stroke_m = stroke_m;
+        Ok(self)
+    }
+
+    /// This worm with another mass of the whole, kg; the cells' shares of it stay.
+    ///
+    /// # Errors
+    /// [`WormError::OutOfRange`].
+    pub fn with_mass_kg(mut self, mass_kg: f64) -> Result<Self, WormError> {
+        require(mass_kg > 0.0, "mass_kg", mass_kg, "above 0")?;
+        let scale = mass_kg / self.mass_kg();
+        self.mass_kg[..self.cells].iter_mut().for_each(|mass| *mass *= scale);
+        Ok(self)
+    }
+
     /// This worm with its cells stepping in another order: `step_order[0]` steps first.
     ///
     /// # Errors
