@@ -27,6 +27,7 @@
 //! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | estimate |
 //! | [`topics`] | iceoryx2: one namespace per worm, publishers, subscribers, the command service, the guard at start-up | control, estimate |
 //! | [`estimate`] | pure and streaming: contact points, deformation, energy, cycles, alarms; one code live and on a recording | clocks, files, topics |
+//! | [`recording`] | logs of the topics, and recordings of cell positions in every format; the replay through the estimator | control |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
 //! | [`realtime`] | what a process asks of the operating system, and what it was given | everything but config |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
@@ -53,5 +54,6 @@ pub mod link;
 pub mod message;
 pub mod model;
 pub mod realtime;
+pub mod recording;
 pub mod topics;
 pub mod watch;

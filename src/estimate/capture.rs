@@ -12,14 +12,14 @@ const JUMP_S: f64 = 0.2;
 
 /// The comparison of the two clocks and the tick before.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Capture {
+pub(crate) struct Capture {
     least_lag_s: Option<(f64, f64)>, // and when
     before: Option<(f64, f64)>,      // time and phase of the tick before
 }
 
 impl Capture {
     /// Notes a tick whose sample, if any, has been placed.
-    pub(super) fn note_tick(&mut self, time_s: f64, phase: f64) {
+    pub(crate) fn note_tick(&mut self, time_s: f64, phase: f64) {
         self.before = Some((time_s, phase));
     }
 
@@ -29,7 +29,7 @@ impl Capture {
     }
 
     /// Time and phase of a sample that came with the tick at `time_s` and `phase`.
-    pub(super) fn place(&mut self, sample_time_s: f64, time_s: f64, phase: f64) -> (f64, f64) {
+    pub(crate) fn place(&mut self, sample_time_s: f64, time_s: f64, phase: f64) -> (f64, f64) {
         let age_s = self.age_s(sample_time_s, time_s);
         let phase_then = match self.before {
             Some((before_s, before)) if before_s < time_s => {

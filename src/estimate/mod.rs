@@ -47,6 +47,7 @@ mod unknown;
 mod update;
 mod window;
 
+pub(crate) use capture::Capture;
 pub use estimator::Estimator;
 pub use observer::{Observer, Report};
 pub use update::{EstimatorError, Update};
