@@ -15,6 +15,9 @@
 //!         link::virtual_worm     └───── alarms ─────────┘  │          └──► alarms back to control
 //!                    ▲                                     │
 //!                  model ──────────── prediction ──────────┘
+//!
+//!   topics ──► recording (MCAP) ──► estimate once more: the same results to the last bit
+//!   recording (MCAP, CSV, C3D, Vicon) ──► identify ──► experiment ──► report
 //! ```
 //!
 //! # The rooms, in reading order
@@ -28,6 +31,8 @@
 //! | [`topics`] | iceoryx2: one namespace per worm, publishers, subscribers, the command service, the guard at start-up | control, estimate |
 //! | [`estimate`] | pure and streaming: contact points, deformation, energy, cycles, alarms; one code live and on a recording | clocks, files, topics |
 //! | [`recording`] | logs of the topics, and recordings of cell positions in every format; the replay through the estimator | control |
+//! | [`identify`] | gait, largest tip deformations and mass from positions alone: section 3.2 of the paper | files, topics, serial |
+//! | [`experiment`] | section 3 on recordings: slides, forces, energy by two methods, theory beside them; recordings from the model | files, topics, serial |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
 //! | [`realtime`] | what a process asks of the operating system, and what it was given | everything but config |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
@@ -50,6 +55,8 @@ pub mod command;
 pub mod config;
 pub mod control;
 pub mod estimate;
+pub mod experiment;
+pub mod identify;
 pub mod link;
 pub mod message;
 pub mod model;

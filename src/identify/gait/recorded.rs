@@ -1,0 +1,101 @@
+//! A recorded gait phase: what it must be like, and which cell steps in which part of it.
+
+use super::{Finder, GaitError, LEAST_CYCLES};
+
+/// How far a recorded phase may fall back behind where it has been, cycles, before it counts as running back.
+const BACKWARD: f64 = 0.03;
+/// What cells may stand off where a recorded phase has them: this many times their noise, and this share of the stroke.
+const CONTRADICTION: (f64, f64) = (5.0, 0.1);
+/// Largest recorded phase, cycles: a worm that crawled for decades, and a sample is still resolved.
+const LARGEST_PHASE: f64 = 1e9;
+
+impl Finder<'_> {
+    /// Takes over a recorded phase, and finds which cell rises in which part of it.
+    pub(super) fn take_phase(&mut self, phase: &[f64]) -> Result<(), GaitError> {
+        let cells = self.cells();
+        if let Some(at) = phase
+            .iter()
+            .position(|phase| phase.is_nan() || phase.abs() > LARGEST_PHASE)
+        {
+            return Err(GaitError::Phase(format!(
+                "at {:.2} s it is {}: count whole cycles from the recording's start",
+                self.time_s[at], phase[at]
+            )));
+        }
+        if runs_back(phase) {
+            let (first, last) = (phase[0], phase[phase.len() - 1]);
+            return Err(if last < first {
+                GaitError::Backward
+            } else {
+                GaitError::Phase(
+                    "it runs back in places: cut the recording to where the worm crawls forward (--from, --to)"
+                        .to_owned(),
+                )
+            });
+        }
+        let cycles = phase[phase.len() - 1] - phase[0];
+        if cycles < LEAST_CYCLES {
+            return Err(GaitError::TooFewSteps { cycles });
+        }
+        if cycles * cells as f64 > phase.len() as f64 {
+            return Err(GaitError::Phase(format!(
+                "{cycles:.0} cycles in {} samples are less than a sample for each step: is it counted in cycles?",
+                phase.len()
+            )));
+        }
+        let mut rise_m = vec![vec![0.0; cells]; cells]; // [part][cell]
+        for sample in 1..phase.len() {
+            let part = ((phase[sample] + phase[sample - 1]) / 2.0 * cells as f64)
+                .floor()
+                .rem_euclid(cells as f64) as usize;
+            let moves: Vec<f64> = self
+                .seen_m
+                .iter()
+                .map(|series| series[sample] - series[sample - 1])
+                .collect();
+            if moves.iter().any(|way| way.is_nan()) {
+                continue;
+            }
+            let mean_m = moves.iter().sum::<f64>() / cells as f64;
+            for (rise_m, way_m) in rise_m[part].iter_mut().zip(moves) {
+                *rise_m += way_m - mean_m;
+            }
+        }
+        let most = |row: &Vec<f64>| (0..cells).max_by(|&a, &b| row[a].total_cmp(&row[b])).unwrap_or(0);
+        let order: Vec<usize> = rise_m.iter().map(most).collect();
+        for cell in 0..cells {
+            if !order.contains(&cell) {
+                return Err(GaitError::Phase(format!(
+                    "in no {cells}th part of its cycles does cell {} move ahead: is the phase counted in cycles, and does it begin with a step?",
+                    cell + 1
+                )));
+            }
+        }
+        self.set_order(order);
+        self.phase = phase.to_vec();
+        for sample in 1..self.phase.len() {
+            self.phase[sample] = self.phase[sample].max(self.phase[sample - 1]);
+        }
+        Ok(())
+    }
+
+    /// Whether the cells at rest stand where a recorded phase has them. `noise_m` is the noise by the positions alone.
+    pub(super) fn check_phase(&self, off_m: f64, noise_m: f64) -> Result<(), GaitError> {
+        if off_m <= CONTRADICTION.0 * noise_m + CONTRADICTION.1 * self.stroke_m {
+            return Ok(());
+        }
+        Err(GaitError::Phase(format!(
+            "the cells stand {:.1} mm off where it has them: is it counted in cycles, and does it begin with a step?",
+            off_m * 1e3
+        )))
+    }
+}
+
+/// Whether a recorded phase goes back, by more than a clock may be late.
+fn runs_back(phase: &[f64]) -> bool {
+    let mut farthest = f64::NEG_INFINITY;
+    phase.iter().any(|&here| {
+        farthest = farthest.max(here);
+        here < farthest - BACKWARD
+    })
+}

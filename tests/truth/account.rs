@@ -1,0 +1,193 @@
+//! What truly happened.
+
+use super::body::Body;
+use super::cam::Cam;
+
+/// Sums since the worm was laid down. A difference of two is the account of the stretch between.
+#[derive(Debug, Clone)]
+pub struct Account {
+    /// Mean position of the cells, m.
+    pub mean_m: f64,
+    /// Distance that each tip slid forward, m.
+    pub forward_slide_m: Vec<f64>,
+    /// Distance that each tip slid backward, m, counted positive.
+    pub backward_slide_m: Vec<f64>,
+    /// Σ k |δ| |ΔX_C|, J.
+    pub friction_j: f64,
+    /// Work against the weight, J.
+    pub weight_j: f64,
+    /// Net actuator work by (13), J: Σ ∫ (k δ + m g sin λ) d(extension).
+    pub actuator_net_j: f64,
+    /// The positive part of it, J.
+    pub actuator_positive_j: f64,
+    /// What the cam really gave, inertia and damping included, J.
+    pub cam_j: f64,
+    /// What the contacts' dampers took, J.
+    pub damping_j: f64,
+}
+
+impl Account {
+    pub fn zero(cells: usize, mean_m: f64) -> Self {
+        Self {
+            mean_m,
+            forward_slide_m: vec![0.0; cells],
+            backward_slide_m: vec![0.0; cells],
+            friction_j: 0.0,
+            weight_j: 0.0,
+            actuator_net_j: 0.0,
+            actuator_positive_j: 0.0,
+            cam_j: 0.0,
+            damping_j: 0.0,
+        }
+    }
+
+    /// Net displacement, m.
+    pub fn advance_m(&self) -> f64 {
+        self.mean_m
+    }
+
+    /// Energy by losses and weight (11), J.
+    pub fn loss_j(&self) -> f64 {
+        self.friction_j + self.weight_j
+    }
+
+    /// `self + share (other − self)`, each entry.
+    fn towards(&self, other: &Self, share: f64) -> Self {
+        self.with(other, |a, b| a + share * (b - a))
+    }
+
+    /// The account since `earlier`.
+    pub fn since(&self, earlier: &Self) -> Self {
+        self.with(earlier, |now, then| now - then)
+    }
+
+    fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        let each = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(&a, &b)| of(a, b)).collect();
+        Self {
+            mean_m: of(self.mean_m, other.mean_m),
+            forward_slide_m: each(&self.forward_slide_m, &other.forward_slide_m),
+            backward_slide_m: each(&self.backward_slide_m, &other.backward_slide_m),
+            friction_j: of(self.friction_j, other.friction_j),
+            weight_j: of(self.weight_j, other.weight_j),
+            actuator_net_j: of(self.actuator_net_j, other.actuator_net_j),
+            actuator_positive_j: of(self.actuator_positive_j, other.actuator_positive_j),
+            cam_j: of(self.cam_j, other.cam_j),
+            damping_j: of(self.damping_j, other.damping_j),
+        }
+    }
+}
+
+/// One whole gait cycle, from one whole number of the phase to the next.
+#[derive(Debug, Clone)]
+pub struct TrueCycle {
+    pub start_s: f64,
+    pub end_s: f64,
+    pub account: Account,
+}
+
+/// Everything there is to know of a recording.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// Largest deformation of each tip, m, forward.
+    pub max_deformation_m: Vec<f64>,
+    pub mass_kg: f64,
+    pub stroke_m: f64,
+    /// Cells from 1, in the order in which they step; the first begins at whole numbers of the phase.
+    pub step_order: Vec<usize>,
+    /// Every whole gait cycle within the recording.
+    pub cycles: Vec<TrueCycle>,
+    /// Phase at each sample of the recording, cycles.
+    pub sample_phase: Vec<f64>,
+    /// Position at each sample before the camera spoilt it, m: `[cell][sample]`.
+    pub sample_position_m: Vec<Vec<f64>>,
+    /// Energy in springs and motion at the first and the last row, J.
+    pub stored_j: [f64; 2],
+    time_s: Vec<f64>,
+    phase: Vec<f64>,
+    accounts: Vec<Account>,
+}
+
+impl Truth {
+    /// Nothing has happened yet.
+    pub fn beginning(body: &Body, cam: &Cam) -> Self {
+        Self {
+            max_deformation_m: body.forward_bound_m.clone(),
+            mass_kg: body.mass_kg,
+            stroke_m: cam.stroke_m,
+            step_order: cam.step_order.iter().map(|cell| cell + 1).collect(),
+            cycles: Vec::new(),
+            sample_phase: Vec::new(),
+            sample_position_m: vec![Vec::new(); cam.cells()],
+            stored_j: [0.0; 2],
+            time_s: Vec::new(),
+            phase: Vec::new(),
+            accounts: Vec::new(),
+        }
+    }
+
+    /// Keeps how things stand; times must grow.
+    pub fn push(&mut self, time_s: f64, phase: f64, account: Account) {
+        self.time_s.push(time_s);
+        self.phase.push(phase);
+        self.accounts.push(account);
+    }
+
+    /// What happened between two times of the recording, s.
+    pub fn over(&self, start_s: f64, end_s: f64) -> Account {
+        let at = |time_s: f64| {
+            let (row, share) = place(&self.time_s, time_s);
+            self.accounts[row].towards(&self.accounts[row + 1], share)
+        };
+        at(end_s).since(&at(start_s))
+    }
+
+    /// Phase at a time of the recording, cycles.
+    pub fn phase_at(&self, time_s: f64) -> f64 {
+        let (row, share) = place(&self.time_s, time_s);
+        self.phase[row] + share * (self.phase[row + 1] - self.phase[row])
+    }
+
+    /// What happened over all of the recording.
+    pub fn overall(&self) -> Account {
+        self.accounts[self.accounts.len() - 1].since(&self.accounts[0])
+    }
+
+    /// Finds the whole cycles among the rows. A cycle begins where the phase leaves its whole number and ends where it
+    /// reaches the next, so rest at either end belongs to none.
+    pub fn find_cycles(&mut self) {
+        let (first, last) = (self.phase[0], self.phase[self.phase.len() - 1]);
+        let between = |row: usize, phase: f64| {
+            let way = self.phase[row + 1] - self.phase[row];
+            let share = if way > 0.0 {
+                (phase - self.phase[row]) / way
+            } else {
+                0.0
+            };
+            self.time_s[row] + share * (self.time_s[row + 1] - self.time_s[row])
+        };
+        let leaves = |phase: f64| between(self.phase.partition_point(|&at| at <= phase) - 1, phase);
+        let reaches = |phase: f64| between(self.phase.partition_point(|&at| at < phase) - 1, phase);
+        self.cycles = (first.ceil() as i64..last.floor() as i64)
+            .map(|number| {
+                let (start_s, end_s) = (leaves(number as f64), reaches(number as f64 + 1.0));
+                TrueCycle {
+                    start_s,
+                    end_s,
+                    account: self.over(start_s, end_s),
+                }
+            })
+            .collect();
+    }
+}
+
+/// The row before a value in a series that does not fall, and how far on the way to the next row it lies; a value outside
+/// is taken to the nearer end.
+fn place(series: &[f64], value: f64) -> (usize, f64) {
+    let row = series
+        .partition_point(|&entry| entry <= value)
+        .clamp(1, series.len() - 1)
+        - 1;
+    let way = series[row + 1] - series[row];
+    let share = if way > 0.0 { (value - series[row]) / way } else { 0.0 };
+    (row, share.clamp(0.0, 1.0))
+}
