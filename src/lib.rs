@@ -34,6 +34,7 @@
 //! | [`identify`] | gait, largest tip deformations and mass from positions alone: section 3.2 of the paper | files, topics, serial |
 //! | [`experiment`] | section 3 on recordings: slides, forces, energy by two methods, theory beside them; recordings from the model | files, topics, serial |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
+//! | [`report`] | what a person looks at afterwards: the page with figures and tables of an experiment, and its CSV | control, serial |
 //! | [`realtime`] | what a process asks of the operating system, and what it was given | everything but config |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
 //!
@@ -62,5 +63,6 @@ pub mod message;
 pub mod model;
 pub mod realtime;
 pub mod recording;
+pub mod report;
 pub mod topics;
 pub mod watch;

@@ -1,0 +1,66 @@
+//! The momentum balance (5): the total force on the body over time.
+
+use super::window::Window;
+use crate::experiment::Analysis;
+use crate::report::number::{fixed, mean};
+use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::plot::{Axis, DrawError, INK, MID, MUTED, Row, Sheet, Stroke, draw};
+use crate::report::runs::Runs;
+
+pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
+    let mut panels = Vec::new();
+    for (name, run) in runs.named() {
+        panels.push(Panel {
+            svg: picture(&name, run)?,
+            title: name,
+            quantity: "force on the body, N".to_owned(),
+        });
+    }
+    Ok(Figure {
+        id: "balance",
+        title: "Does the momentum balance hold?".to_owned(),
+        keys: vec![
+            Key::new(Mark::Line, MID, "contacts and weight together"),
+            Key::new(Mark::Dashed, INK, "their mean over whole cycles"),
+        ],
+        panels,
+        caption: caption(runs),
+    })
+}
+
+fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+    let window = Window::whole(run);
+    let force = || window.points(&run.series.total_force_n, 1.0);
+    let heights = force().map(|(_, newton)| newton).chain([0.0, run.momentum_violation_n]);
+    let sheet = Sheet {
+        description: format!("Total force on the body over time at {name}"),
+        x_label: Some("time, s".to_owned()),
+        x: window.time_axis(),
+        rows: vec![Row::new(Axis::around(heights, 5), 200.0)],
+    };
+    draw(&sheet, |_, plot| {
+        plot.level(0.0, Stroke::new(MUTED, 0.75))?;
+        plot.line(force(), Stroke::new(MID, 0.9))?;
+        plot.level(run.momentum_violation_n, Stroke::new(INK, 1.5).dashed())
+    })
+}
+
+fn caption(runs: Runs<'_>) -> String {
+    let balance = runs.tell(|run| Some(format!("{} N", fixed(run.momentum_violation_n, 3))));
+    let worst = runs.tell(|run| {
+        let force_n = run
+            .series
+            .total_force_n
+            .iter()
+            .copied()
+            .filter(|force_n| force_n.is_finite());
+        let mean_n = run.momentum_violation_n;
+        let squares: Vec<f64> = force_n.map(|force_n| (force_n - mean_n).powi(2)).collect();
+        Some(format!("{} N", fixed(mean(&squares).sqrt(), 3)))
+    });
+    format!(
+        "kt Σδ + m g sin λ, the force that equation (5) wants to vanish in the mean: a worm that rests between its steps gains \
+         no momentum. Mean over whole cycles, with the configured mass: {balance}. About it the force scatters by {worst} (root \
+         mean square), from noise in the positions and from what the model leaves out."
+    )
+}

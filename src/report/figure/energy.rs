@@ -1,0 +1,158 @@
+//! Energy per cycle by both methods, against theory and rigid contacts, figure 8 of the paper.
+
+use crate::experiment::{Analysis, CycleValues};
+use crate::report::number::{fixed, with_error};
+use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::plot::{Axis, Colour, DrawError, INK, LIGHT, MID, MUTED, Row, SHADE, Sheet, Stroke, draw};
+use crate::report::runs::Runs;
+
+/// How bars stand, in places.
+struct Layout {
+    half_bar: f64,
+    pitch: f64,
+    foot: f64,
+}
+
+/// The bars of a slope together at its place.
+const GROUPED: Layout = Layout {
+    half_bar: 0.085,
+    pitch: 0.2,
+    foot: 0.03,
+};
+/// Each bar at a place of its own, where there is but one slope.
+const APART: Layout = Layout {
+    half_bar: 0.3,
+    pitch: 1.0,
+    foot: 0.08,
+};
+
+/// A way to count the energy of a cycle.
+pub(super) struct Method {
+    pub name: &'static str,
+    short: &'static str,
+    pub colour: Colour,
+    pub of: fn(&CycleValues) -> f64,
+}
+
+/// The three that are measured.
+pub(super) const METHODS: [Method; 3] = [
+    Method {
+        name: "losses and weight (11)",
+        short: "(11)",
+        colour: SHADE,
+        of: |values| values.energy_loss_j,
+    },
+    Method {
+        name: "actuator work (13), net",
+        short: "(13) net",
+        colour: MID,
+        of: |values| values.energy_actuator_net_j,
+    },
+    Method {
+        name: "actuator work (13), positive part",
+        short: "(13) positive",
+        colour: LIGHT,
+        of: |values| values.energy_actuator_positive_j,
+    },
+];
+
+pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
+    let mut keys: Vec<Key> = METHODS
+        .iter()
+        .map(|method| Key::new(Mark::Box, method.colour, method.name))
+        .collect();
+    keys.extend([
+        Key::new(Mark::Frame, MUTED, "rigid contacts, same advance"),
+        Key::new(Mark::Diamond, INK, "theory, identified worm"),
+        Key::new(Mark::Ring, INK, "theory, configured worm"),
+    ]);
+    Ok(Figure {
+        id: "energy",
+        title: "What a cycle costs".to_owned(),
+        keys,
+        panels: vec![Panel {
+            title: "energy per cycle".to_owned(),
+            quantity: if runs.0.len() > 1 { "mJ, by slope" } else { "mJ" }.to_owned(),
+            svg: picture(runs)?,
+        }],
+        caption: caption(runs),
+    })
+}
+
+fn picture(runs: Runs<'_>) -> Result<String, DrawError> {
+    let heights = runs.0.iter().flat_map(|run| {
+        let theory = run.theory.identified.iter().chain(&run.theory.nominal);
+        let theory = theory.map(|theory| theory.values.energy_actuator_positive_j * 1e3);
+        let measured = METHODS.iter().flat_map(|method| {
+            let (mean_j, std_j) = ((method.of)(&run.mean), (method.of)(&run.std));
+            [mean_j * 1e3, (mean_j + std_j) * 1e3, (mean_j - std_j) * 1e3]
+        });
+        theory.chain(measured).chain([0.0, run.rigid_energy_j * 1e3])
+    });
+    let (layout, first, places) = match runs.0 {
+        [_] => {
+            let methods = METHODS.iter().map(|method| method.short).chain(["rigid"]);
+            (APART, 0.0, methods.map(str::to_owned).collect())
+        }
+        _ => (GROUPED, -1.5 * GROUPED.pitch, runs.names()),
+    };
+    let sheet = Sheet {
+        description: "Energy per cycle by slope and method".to_owned(),
+        x_label: None,
+        x: Axis::named(places),
+        rows: vec![Row::new(Axis::around(heights, 6), 320.0)],
+    };
+    draw(&sheet, |_, plot| {
+        plot.level(0.0, Stroke::new(MUTED, 1.0))?;
+        for (number, run) in runs.0.iter().enumerate() {
+            let centre = |place: usize| number as f64 + first + place as f64 * layout.pitch;
+            for (place, method) in METHODS.iter().enumerate() {
+                let x = centre(place);
+                let ends = [x - layout.half_bar, x + layout.half_bar];
+                let mj = |values| (method.of)(values) * 1e3;
+                let (mean, std) = (mj(&run.mean), mj(&run.std));
+                plot.fill(ends, [0.0, mean], method.colour, 1.0)?;
+                plot.whisker(x, mean - std, mean + std, layout.foot)?;
+                if let Some(nominal) = &run.theory.nominal {
+                    plot.ring(x + 0.5 * layout.half_bar, mj(&nominal.values), INK)?;
+                }
+                if let Some(identified) = &run.theory.identified {
+                    plot.diamond(x - 0.5 * layout.half_bar, mj(&identified.values), INK)?;
+                }
+            }
+            let x = centre(METHODS.len());
+            let ends = [x - layout.half_bar, x + layout.half_bar];
+            plot.edge(ends, [0.0, run.rigid_energy_j * 1e3], Stroke::new(MUTED, 1.5))?;
+        }
+        Ok(())
+    })
+}
+
+fn caption(runs: Runs<'_>) -> String {
+    let told = |of: fn(&CycleValues) -> f64| {
+        runs.tell(|run| Some(format!("{} mJ", with_error(of(&run.mean) * 1e3, of(&run.std) * 1e3, 1))))
+    };
+    let losses = told(|values| values.energy_loss_j);
+    let net = told(|values| values.energy_actuator_net_j);
+    let theory = runs.tell(|run| {
+        let theory = run.theory.identified.as_ref()?;
+        Some(format!("{} mJ", fixed(theory.values.energy_loss_j * 1e3, 1)))
+    });
+    let theory = if theory.is_empty() { "none".to_owned() } else { theory };
+    let without = runs.without_theory();
+    let rigid = match runs.tell(|run| rigid_ratio(run).map(|ratio| format!("{} times", fixed(ratio, 2)))) {
+        none if none.is_empty() => "Rigid contacts cannot be compared without an advance.".to_owned(),
+        ratios => format!("Compliance costs {ratios} what rigid contacts would take for the same advance."),
+    };
+    format!(
+        "After figure 8 of the paper. By losses and weight (11): {losses}; by net actuator work (13): {net}. Over a steady cycle \
+         the two should agree; the positive part is what a drive pays that cannot take energy back. Theory of the identified \
+         worm, net: {theory}{without}. {rigid}"
+    )
+}
+
+/// Measured energy (11) over that of rigid contacts; none without an advance that would take energy.
+pub(in crate::report) fn rigid_ratio(run: &Analysis) -> Option<f64> {
+    let ratio = run.mean.energy_loss_j / run.rigid_energy_j;
+    (run.rigid_energy_j > 0.0 && ratio.is_finite()).then_some(ratio)
+}

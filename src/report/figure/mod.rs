@@ -1,0 +1,45 @@
+//! The figures, one file for each family; their numbers are those of the paper.
+//!
+//! All draw the same things alike: a cell has one colour, a thin line sticks and a thick one slides, bars are what was
+//! measured, a diamond is theory with the worm identified here and a ring theory with the worm as configured.
+
+mod balance;
+mod closeup;
+mod contacts;
+mod deformations;
+mod energy;
+mod positions;
+mod schematic;
+mod slides;
+mod trend;
+mod window;
+
+use super::page::{Figure, Key, Mark};
+use super::plot::{DrawError, cell_colours};
+use super::runs::Runs;
+
+pub(super) use energy::rigid_ratio;
+pub(super) use schematic::schematic;
+
+/// Every figure of a report, in reading order.
+pub(super) fn all(runs: Runs<'_>) -> Result<Vec<Figure>, DrawError> {
+    Ok(vec![
+        positions::figure(runs)?,
+        closeup::figure(runs)?,
+        contacts::figure(runs)?,
+        deformations::figure(runs)?,
+        balance::figure(runs)?,
+        slides::figure(runs)?,
+        energy::figure(runs)?,
+        trend::figure(runs)?,
+    ])
+}
+
+/// Legend entries of the cells.
+fn cell_keys(cells: usize, mark: Mark) -> Vec<Key> {
+    cell_colours(cells)
+        .into_iter()
+        .enumerate()
+        .map(|(cell, colour)| Key::new(mark, colour, format!("cell {}", cell + 1)))
+        .collect()
+}

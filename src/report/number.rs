@@ -1,0 +1,113 @@
+//! Numbers as people read them: millimetres, millijoules, and as many digits as their error leaves sense in.
+
+/// What stands where there is no value.
+pub const NONE: &str = "—";
+
+/// Most decimals that a small error can ask for beyond those that the quantity has anyway.
+const MORE_DECIMALS: usize = 1;
+
+/// Most values that a sentence lists.
+const MOST_LISTED: usize = 6;
+
+/// A value with a fixed number of decimals and a true minus sign; [`NONE`] where it is not finite.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return NONE.to_owned();
+    }
+    let text = format!("{:.decimals$}", value.abs());
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'0' | b'.'));
+    if value < 0.0 && !is_zero {
+        format!("−{text}")
+    } else {
+        text
+    }
+}
+
+/// A value and its error: `2.00 ± 0.02`, with `decimals`, or with one more where the error is too small to be seen with
+/// those; beyond that stands `± <0.001`. Without a usable error the value alone.
+pub fn with_error(value: f64, error: f64, decimals: usize) -> String {
+    if !value.is_finite() || !error.is_finite() || error <= 0.0 {
+        return fixed(value, decimals);
+    }
+    let wanted = (-error.log10().floor()).max(0.0) as usize;
+    let decimals = wanted.clamp(decimals, decimals + MORE_DECIMALS);
+    let shown = fixed(error, decimals);
+    let smallest = 0.1f64.powi(decimals as i32);
+    if error < 0.5 * smallest {
+        return format!("{} ± <{}", fixed(value, decimals), fixed(smallest, decimals));
+    }
+    format!("{} ± {shown}", fixed(value, decimals))
+}
+
+/// A list in words: `a, b and c`.
+pub fn in_words(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// A few values in words, all of them: `1.90, 1.04 mm`; the range of many: `1.04 to 2.15 mm`.
+pub fn list_or_range(values: &[f64], decimals: usize, unit: &str) -> String {
+    let listed = |values: &[f64]| values.iter().map(|value| fixed(*value, decimals)).collect::<Vec<_>>();
+    if values.len() <= MOST_LISTED {
+        return format!("{} {unit}", listed(values).join(", "));
+    }
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let ends = [
+        finite().fold(f64::INFINITY, f64::min),
+        finite().fold(f64::NEG_INFINITY, f64::max),
+    ];
+    format!("{} {unit}", listed(&ends).join(" to "))
+}
+
+/// A count with its noun: `1 cycle`, `12 cycles`.
+pub fn count(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+/// The mean of the finite values; `NaN` where there is none.
+pub fn mean(values: &[f64]) -> f64 {
+    let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    finite.iter().sum::<f64>() / finite.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_error_asks_for_one_more_decimal_and_no_more() {
+        for (error, text) in [(0.26, "59.8 ± 0.3"), (0.026, "59.78 ± 0.03"), (0.0026, "59.78 ± <0.01")] {
+            assert_eq!(with_error(59.779, error, 1), text);
+        }
+    }
+
+    #[test]
+    fn numbers_are_rounded_to_what_their_error_leaves() {
+        for (value, error, text) in [
+            (2.0, 0.02, "2.00 ± 0.02"),
+            (2.0, 0.0049, "2.000 ± 0.005"),
+            (54.88, 1.24, "54.88 ± 1.24"),
+            (-0.001, 0.05, "0.00 ± 0.05"),
+            (-1.7, 0.05, "−1.70 ± 0.05"),
+            (1234.0, 50.0, "1234.00 ± 50.00"),
+            (2.0, 1e-5, "2.000 ± <0.001"),
+            (2.0, f64::NAN, "2.00"),
+            (2.0, 0.0, "2.00"),
+            (f64::NAN, 0.1, NONE),
+            (f64::INFINITY, f64::INFINITY, NONE),
+        ] {
+            assert_eq!(with_error(value, error, 2), text);
+        }
+    }
+
+    #[test]
+    fn lists_read_as_sentences() {
+        let parts = ["a", "b", "c"].map(str::to_owned);
+        assert_eq!(in_words(&[]), "");
+        assert_eq!(in_words(&parts[..1]), "a");
+        assert_eq!(in_words(&parts), "a, b and c");
+    }
+}

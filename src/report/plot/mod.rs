@@ -1,0 +1,19 @@
+//! Pictures for a page: inline SVG of one style, over `plotters`.
+//!
+//! A picture is a [`Sheet`] with one or more [`Row`]s, drawn by [`draw`] through a [`Plot`], which knows lines, dots, bands,
+//! bars and marks. Whatever is drawn may hold gaps: `NaN` breaks a line and draws nothing, so that no picture ever holds a
+//! coordinate that is not one. Lines are thinned to what the picture can show.
+
+mod axis;
+mod canvas;
+mod palette;
+mod raw;
+#[cfg(test)]
+mod tests;
+mod thin;
+
+pub use axis::Axis;
+pub use canvas::{DrawError, Plot, Row, Sheet, Stroke, draw};
+pub use palette::{Colour, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, cell_colours, css};
+
+pub(super) use raw::Raw;

@@ -1,0 +1,92 @@
+//! What a picture is before it has axes, and what all drawing shares: units, and the style of text.
+
+use super::canvas::{DrawError, Stroke};
+use super::palette::Colour;
+use plotters::coord::Shift;
+use plotters::prelude::{DrawingArea, IntoDrawingArea, PathElement, Polygon, SVGBackend, Text};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color, FontStyle, IntoFont, TextStyle};
+
+/// Dots of the drawing per unit of a sheet: the backend knows whole dots only.
+const DOTS: f64 = 4.0;
+/// Height of text, units.
+pub(super) const TEXT: f64 = 14.0;
+/// What `plotters` divides text sizes by when it writes SVG.
+const TEXT_FACTOR: f64 = 1.24;
+
+/// Units as dots.
+pub(super) fn dots(units: f64) -> i32 {
+    (units * DOTS).round() as i32
+}
+
+/// Height of text as `plotters` wants it.
+pub(super) fn text_size() -> f64 {
+    TEXT * DOTS * TEXT_FACTOR
+}
+
+/// The style of text, and where it stands from its place.
+pub(super) fn text_style(colour: Colour, horizontal: HPos, vertical: VPos, bold: bool) -> TextStyle<'static> {
+    let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
+    ("sans-serif", text_size(), style)
+        .into_font()
+        .color(&colour)
+        .pos(Pos::new(horizontal, vertical))
+}
+
+/// A picture without axes, in units from its upper left corner.
+pub(in crate::report) struct Raw<'b> {
+    /// Where it is drawn.
+    pub(super) area: DrawingArea<SVGBackend<'b>, Shift>,
+}
+
+impl Raw<'_> {
+    /// Draws a picture of a size in units. Gives inline SVG.
+    pub(in crate::report) fn picture(
+        description: &str,
+        width: f64,
+        height: f64,
+        paint: impl FnOnce(&Raw<'_>) -> Result<(), DrawError>,
+    ) -> Result<String, DrawError> {
+        let size = (dots(width) as u32, dots(height) as u32);
+        let mut svg = String::new();
+        let raw = Raw {
+            area: SVGBackend::with_string(&mut svg, size).into_drawing_area(),
+        };
+        paint(&raw)?;
+        raw.area.present()?;
+        drop(raw);
+        // The page sizes its pictures itself, so the opening tag with the backend's fixed size makes way for another.
+        let inside = svg.split_once('>').map_or("", |(_, inside)| inside);
+        let description = crate::report::page::escaped(description);
+        let (width, height) = size;
+        Ok(format!(
+            "<svg class=\"plot\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{description}\">{inside}"
+        ))
+    }
+
+    /// A filled shape.
+    pub(in crate::report) fn shape(
+        &self,
+        corners: &[(f64, f64)],
+        colour: Colour,
+        opacity: f64,
+    ) -> Result<(), DrawError> {
+        let corners = corners.iter().map(|&(x, y)| (dots(x), dots(y))).collect::<Vec<_>>();
+        self.area.draw(&Polygon::new(corners, colour.mix(opacity).filled()))?;
+        Ok(())
+    }
+
+    /// A line.
+    pub(in crate::report) fn path(&self, points: &[(f64, f64)], stroke: Stroke) -> Result<(), DrawError> {
+        let points = points.iter().map(|&(x, y)| (dots(x), dots(y))).collect::<Vec<_>>();
+        self.area.draw(&PathElement::new(points, stroke.style()))?;
+        Ok(())
+    }
+
+    /// Words at a place.
+    pub(super) fn words(&self, place: (f64, f64), words: &str, style: TextStyle<'_>) -> Result<(), DrawError> {
+        let place = (dots(place.0), dots(place.1));
+        self.area.draw(&Text::new(words.to_owned(), place, style))?;
+        Ok(())
+    }
+}
