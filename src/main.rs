@@ -28,8 +28,16 @@ enum Subcommands {
     VirtualWorm(command::virtual_worm::VirtualWormArgs),
     /// A command to a running controller
     Command(command::order::OrderArgs),
+    /// The topics of a worm into a log (MCAP)
+    Record(command::record::RecordArgs),
+    /// A log through the estimator once more: whether it comes to the same results
+    Replay(command::replay::ReplayArgs),
     /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
     Study(command::study::StudyArgs),
+    /// The paper's experiment on a recording: tip deformations, slides, energy, figures
+    Analyze(command::analyze::AnalyzeArgs),
+    /// A recording from the model: what motion capture would have seen
+    Simulate(command::simulate::SimulateArgs),
     /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
     Check(command::check::CheckArgs),
 }
@@ -67,7 +75,11 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Estimate(args) => command::estimate::run(&args),
         Subcommands::VirtualWorm(args) => command::virtual_worm::run(&args),
         Subcommands::Command(args) => command::order::run(&args),
+        Subcommands::Record(args) => command::record::run(&args),
+        Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
+        Subcommands::Analyze(args) => command::analyze::run(&args),
+        Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Check(args) => command::check::run(&args),
     }
 }

@@ -1,10 +1,15 @@
 //! One file per subcommand: arguments in, one library call, exit code out.
 
+pub mod analyze;
 pub mod check;
 pub mod control;
 pub mod estimate;
 pub mod order;
 mod print;
+mod progress;
+pub mod record;
+pub mod replay;
+pub mod simulate;
 pub mod study;
 pub mod up;
 pub mod virtual_worm;
@@ -17,6 +22,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// Why a subcommand did not do what it was asked to, and with which exit status it ends.
 #[derive(Debug, thiserror::Error)]
@@ -75,9 +81,17 @@ impl WormArgs {
     /// # Errors
     /// What [`Config::load`] says, and a name or port that cannot be used.
     pub fn load(&self) -> Result<Config, Failure> {
-        let mut config = match &self.config {
-            Some(file) => Config::load(file)?,
-            None => Config::default(),
+        Ok(self.load_with_text()?.0)
+    }
+
+    /// The configuration, and the text of its file, if there is one.
+    fn load_with_text(&self) -> Result<(Config, Option<String>), Failure> {
+        let (mut config, text) = match &self.config {
+            Some(file) => {
+                let (config, text) = Config::load_with_text(file)?;
+                (config, Some(text))
+            }
+            None => (Config::default(), None),
         };
         if let Some(name) = &self.name {
             config.worm.name.clone_from(name);
@@ -91,7 +105,7 @@ impl WormArgs {
         }
         let problems = config.problems();
         if problems.is_empty() {
-            Ok(config)
+            Ok((config, text))
         } else {
             let file = PathBuf::from("command line");
             Err(ConfigError::Values { file, problems }.into())
@@ -115,6 +129,18 @@ impl WormArgs {
             push("--port", port);
         }
         arguments
+    }
+}
+
+/// A time as an argument.
+fn positive_seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text
+        .parse()
+        .map_err(|_| format!("'{text}' is not a number of seconds"))?;
+    if seconds > 0.0 && seconds <= 1e7 {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err(format!("{text} s is no time to go on for: give more than 0 s"))
     }
 }
 

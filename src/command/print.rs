@@ -10,7 +10,9 @@ use std::io::Write;
 /// [`Failure::Failed`] when nobody reads it any more, as in `wormd … | head -1`.
 pub(super) fn line(text: impl Display) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
-    writeln!(stdout, "{text}")
+    // In one piece: a reader that has seen enough, as `head -1`, leaves none of it unwritten.
+    stdout
+        .write_all(format!("{text}\n").as_bytes())
         .and_then(|()| stdout.flush())
         .map_err(|error| {
             Failure::failed(format!(

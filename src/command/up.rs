@@ -4,7 +4,7 @@ mod children;
 mod ears;
 mod screen;
 
-use super::{Failure, WormArgs, end_on_signal, print};
+use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::config::Config;
 use crate::message::{AlarmKind, Command, CommandKind, Fault, Mode, Verdict};
 use crate::topics::{CommandClient, Hub, Instance, RoleLock, Supervisor};
@@ -47,17 +47,9 @@ pub struct UpArgs {
     /// A fault of the virtual worm, as in `wormd virtual-worm --fault`; can be given several times
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
-}
-
-fn positive_seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text
-        .parse()
-        .map_err(|_| format!("'{text}' is not a number of seconds"))?;
-    if seconds > 0.0 && seconds <= 1e7 {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        Err(format!("{text} s is not a time to crawl: give more than 0 s"))
-    }
+    /// Record all topics to this MCAP file, from the first state to the last, as `wormd record` does
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
 }
 
 /// Runs `wormd up`.
@@ -80,7 +72,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
     // Only now, so that until here Ctrl-C is a signal and errors are seen.
     let mut screen = Screen::open(args.json, args.plain, &config)?;
     let outcome = crawl(args, &config, &instance, &mut processes, &mut screen, &log, &end);
-    processes.end();
+    let unrecorded = processes.end();
     screen.close(&log);
     drop(role);
     let run = outcome?;
@@ -91,7 +83,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
     } else {
         print::line(summary.to_string().trim_end())?;
     }
-    match (run.trouble, run.mode) {
+    match (run.trouble.or(unrecorded), run.mode) {
         (Some(trouble), _) => Err(Failure::failed(trouble)),
         (None, Mode::Fault) => Err(Failure::failed(format!(
             "the worm was stopped by a fault: {}",
@@ -113,12 +105,13 @@ fn fault_in_words(telemetry: &Telemetry) -> String {
     }
 }
 
-/// The processes of the worm, in the order in which they are started. They are ended in the opposite order of importance:
-/// first the controller, which stops the motor.
+/// The processes of the worm. They are ended in the order of importance: first the controller, which stops the motor, last
+/// the recorder, which hears of it.
 struct Processes {
     controller: Child,
     estimator: Child,
     virtual_worm: Option<Child>,
+    recorder: Option<Child>,
 }
 
 impl Processes {
@@ -154,14 +147,27 @@ impl Processes {
             worm.extend(["--port".into(), link]);
         }
         let mut estimator = Child::start("estimate", &with("estimate", &worm), log)?;
+        let mut recorder = None;
+        if let Some(file) = &args.record {
+            let mut arguments = args.worm.forward();
+            arguments.extend(["--out".into(), file.clone().into()]);
+            let mut child = Child::start("record", &with("record", &arguments), log)?;
+            // Both must listen before the controller speaks: the log then has all that the estimator knows.
+            child.wait_until_ready(START_PATIENCE, log, end)?;
+            estimator.wait_until_ready(START_PATIENCE, log, end)?;
+            recorder = Some(child);
+        }
         let mut controller = Child::start("control", &with("control", &worm), log)?;
         controller.be_patient(ramp(config));
         controller.wait_until_ready(START_PATIENCE, log, end)?;
-        estimator.wait_until_ready(START_PATIENCE, log, end)?;
+        if recorder.is_none() {
+            estimator.wait_until_ready(START_PATIENCE, log, end)?;
+        }
         Ok(Self {
             controller,
             estimator,
             virtual_worm,
+            recorder,
         })
     }
 
@@ -181,11 +187,20 @@ impl Processes {
         })
     }
 
-    fn end(&mut self) {
+    /// Ends them all, and says what became of the recording if it is not what was asked for. A worm does not stop for that.
+    fn end(&mut self) -> Option<String> {
         self.controller.end();
         self.estimator.end();
         if let Some(virtual_worm) = &mut self.virtual_worm {
             virtual_worm.end();
+        }
+        let status = self.recorder.as_mut()?.end();
+        match status {
+            Some(status) if status.success() => None,
+            Some(status) => Some(format!(
+                "the recording is not whole: the record process ended, {status}"
+            )),
+            None => Some("the recording may not be whole: nobody knows how the record process ended".to_owned()),
         }
     }
 }

@@ -3,6 +3,7 @@
 //! These tests wait for conditions with a generous bound; they assert what happens, never how fast a shared machine is.
 
 mod leaving;
+mod recording;
 mod worm;
 
 use std::time::Duration;

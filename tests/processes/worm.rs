@@ -65,6 +65,11 @@ impl Worm {
         Invocation::new(&named)
     }
 
+    /// What `wormd replay --json` says of a log.
+    pub fn replay(&self, log: &str) -> Output {
+        Invocation::new(&["replay", "--json", log]).output()
+    }
+
     /// The virtual worm, ready.
     pub fn virtual_worm(&self, more: &[&str]) -> Process {
         let port = self.port();

@@ -1,0 +1,152 @@
+//! The recorder beside a real worm.
+
+use super::worm::{Worm, wait_for};
+use super::{Crawling, PATIENCE};
+use std::path::{Path, PathBuf};
+use wormd::recording::mcap::{messages, read};
+
+/// A gait fast enough for some cycles in a few seconds.
+const FAST: &str = "[gait]\ncycle_s = 1.25\n";
+
+fn path_in(folder: &tempfile::TempDir) -> (PathBuf, String) {
+    let path = folder.path().join("worm.mcap");
+    let argument = path.to_string_lossy().into_owned();
+    (path, argument)
+}
+
+fn length(path: &Path) -> u64 {
+    path.metadata().map_or(0, |metadata| metadata.len())
+}
+
+#[test]
+fn the_main_job_records_what_replays_to_the_same_results() {
+    let worm = Worm::new("record");
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, file) = path_in(&folder);
+    let config = worm.config(FAST);
+    let output = worm
+        .wormd(&[
+            "up",
+            "--json",
+            "--duration",
+            "5",
+            "--config",
+            &config,
+            "--record",
+            &file,
+        ])
+        .output();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}\n{error}", output.status);
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary");
+    assert_eq!(worm.residue(), Vec::<String>::new());
+
+    let log = messages(&path).expect("a log");
+    assert_eq!(log.warnings, Vec::<String>::new(), "it was finished");
+    assert_eq!(log.config.as_deref(), Some(FAST));
+    assert_eq!(log.states[0].sequence, 0, "the very first state is there");
+    assert!(
+        Some(log.states.len() as u64) >= summary["ticks"].as_u64(),
+        "and the last"
+    );
+    assert_eq!(log.states.len(), log.timings.len());
+    assert_eq!(Some(log.cycles.len()), summary["cycles"].as_array().map(Vec::len));
+
+    let output = worm.replay(&file);
+    let replay: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(output.status.success(), "{replay}");
+    assert_eq!(
+        (&replay["complete"], &replay["warnings"]),
+        (&true.into(), &serde_json::json!([]))
+    );
+    assert!(replay["cycles_compared"].as_u64() >= Some(2), "{replay}");
+    assert!(replay["estimates_compared"].as_u64() > Some(400), "{replay}");
+    for what in ["estimates", "cycles", "alarms"] {
+        let figure = |kind: &str| &replay[format!("{what}_{kind}")];
+        assert_eq!(figure("identical"), figure("compared"), "{replay}");
+    }
+    let recording = read(&path).expect("a recording");
+    assert!(recording.cells() == 4 && recording.samples() > 400, "{recording:?}");
+}
+
+#[test]
+fn a_recorder_goes_on_while_others_are_started_anew_and_loses_little_when_it_is_killed() {
+    let worm = Worm::new("recorder");
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, file) = path_in(&folder);
+    // It waits for a worm that is not there yet.
+    let mut recorder = worm.wormd(&["record", "--out", &file]).start();
+    let empty = length(&path);
+    let mut crawling = Crawling::start_again(worm);
+    wait_for("the recorder writes", PATIENCE, || length(&path) > empty);
+    crawling.estimator.kill();
+    crawling.controller.kill();
+    let Crawling { worm, .. } = crawling;
+    let before = worm.state().expect("has been heard");
+    let crawling = Crawling::start_again(worm);
+    wait_for("half a second of the new one", PATIENCE, || {
+        crawling
+            .worm
+            .state()
+            .is_some_and(|state| state.sequence > 500 && state.time_ns > before.time_ns)
+    });
+    let grown = length(&path);
+    wait_for("what has come is safe", PATIENCE, || length(&path) > grown);
+    let safe = crawling.worm.state().expect("is there");
+    recorder.kill();
+    let log = messages(&path).expect("a log");
+    assert!(log.warnings[0].starts_with("cut off after"), "{:?}", log.warnings);
+    let starts = log.states.iter().filter(|state| state.sequence == 0).count();
+    assert_eq!(starts, 2, "both runs of the controller from their first state on");
+    let last_ns = log.states.iter().map(|state| state.time_ns).max().expect("states");
+    assert!(last_ns + 1_000_000_000 > safe.time_ns, "at most a moment is lost");
+    let recording = read(&path).expect("a recording");
+    assert!(
+        recording
+            .warnings
+            .iter()
+            .any(|text| text.contains("the controller was started 2 times"))
+    );
+}
+
+#[test]
+fn only_what_was_asked_for_is_recorded_and_no_file_is_lost() {
+    let crawling = Crawling::start("topics");
+    let worm = &crawling.worm;
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, file) = path_in(&folder);
+    let record = |more: &[&str]| {
+        let arguments = [&["record", "--duration", "0.5", "--out"], more].concat();
+        let output = worm.wormd(&arguments).output();
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        )
+    };
+    let (code, error) = record(&[&file, "--topics", "state,cycle"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(error.contains("(0 lost)") && error.contains("timing 0,"), "{error}");
+    let log = messages(&path).expect("a log");
+    assert!(log.states.len() >= 400 && log.timings.is_empty() && log.estimates.is_empty());
+    assert_eq!((log.config, log.warnings), (None, Vec::new()));
+
+    for (arguments, code, part) in [
+        (&[file.as_str()][..], 2, "is there already: choose another name"),
+        (
+            &["/dev/full", "--force"],
+            1,
+            "cannot be written: No space left on device",
+        ),
+        (&["/nowhere/x.mcap"], 2, "cannot be written: No such file"),
+        (
+            &[file.as_str(), "--topics", "states"],
+            2,
+            "give some of state, timing, estimate, cycle, alarm",
+        ),
+        (&[file.as_str(), "--force"], 0, "recorded: state"),
+    ] {
+        let (found, error) = record(arguments);
+        assert_eq!(found, Some(code), "{arguments:?}: {error}");
+        assert!(error.contains(part), "{part} is not in {error}");
+    }
+}
