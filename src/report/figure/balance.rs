@@ -1,21 +1,15 @@
 //! The momentum balance (5): the total force on the body over time.
 
+use super::panel_per_run;
 use super::window::Window;
 use crate::experiment::Analysis;
 use crate::report::number::{fixed, mean};
-use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::page::{Figure, Key, Mark};
 use crate::report::plot::{Axis, DrawError, INK, MID, MUTED, Row, Sheet, Stroke, draw};
 use crate::report::runs::Runs;
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let mut panels = Vec::new();
-    for (name, run) in runs.named() {
-        panels.push(Panel {
-            svg: picture(&name, run)?,
-            title: name,
-            quantity: "force on the body, N".to_owned(),
-        });
-    }
+    let panels = panel_per_run(runs, "force on the body, N", picture)?;
     Ok(Figure {
         id: "balance",
         title: "Does the momentum balance hold?".to_owned(),

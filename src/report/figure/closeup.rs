@@ -1,11 +1,11 @@
 //! One cycle in close-up, figure 4 of the paper: where each tip sticks, where it slides, and how the first estimate is read
 //! off.
 
-use super::cell_keys;
 use super::window::{Window, of_cell};
+use super::{cell_keys, panel_per_run};
 use crate::experiment::Analysis;
 use crate::report::number::{fixed, list_or_range, mean};
-use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::page::{Figure, Key, Mark};
 use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, cell_colours, draw};
 use crate::report::runs::Runs;
 
@@ -13,14 +13,7 @@ use crate::report::runs::Runs;
 const DOTS: usize = 150;
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let mut panels = Vec::new();
-    for (name, run) in runs.named() {
-        panels.push(Panel {
-            svg: picture(&name, run)?,
-            title: name,
-            quantity: "way since the cycle began, mm".to_owned(),
-        });
-    }
+    let panels = panel_per_run(runs, "way since the cycle began, mm", picture)?;
     let mut keys = cell_keys(runs.cells(), Mark::Thick);
     keys.extend([
         Key::new(Mark::Line, MUTED, "thin: the tip sticks"),

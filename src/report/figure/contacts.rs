@@ -1,10 +1,10 @@
 //! Contact points of the tips, figure 5 of the paper.
 
-use super::cell_keys;
 use super::window::{Window, of_cell};
+use super::{cell_keys, panel_per_run};
 use crate::experiment::Analysis;
 use crate::report::number::{fixed, mean};
-use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::page::{Figure, Key, Mark};
 use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, cell_colours, draw};
 use crate::report::runs::Runs;
 
@@ -12,14 +12,7 @@ use crate::report::runs::Runs;
 const CYCLES: usize = 3;
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let mut panels = Vec::new();
-    for (name, run) in runs.named() {
-        panels.push(Panel {
-            svg: picture(&name, run)?,
-            title: name,
-            quantity: "contact point, from its start, mm".to_owned(),
-        });
-    }
+    let panels = panel_per_run(runs, "contact point, from its start, mm", picture)?;
     let mut keys = cell_keys(runs.cells(), Mark::Line);
     keys.push(Key::new(Mark::Band, MUTED, "step of the cell of that colour"));
     Ok(Figure {

@@ -1,9 +1,10 @@
 //! Deformation of each tip, figure 6 of the paper: one strip for each cell, between its bounds.
 
+use super::panel_per_run;
 use super::window::{Window, of_cell};
 use crate::experiment::Analysis;
 use crate::report::number::list_or_range;
-use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::page::{Figure, Key, Mark};
 use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, cell_colours, draw};
 use crate::report::runs::Runs;
 
@@ -14,14 +15,7 @@ const ALL_STRIPS: f64 = 330.0;
 const STRIP: [f64; 2] = [42.0, 100.0];
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let mut panels = Vec::new();
-    for (name, run) in runs.named() {
-        panels.push(Panel {
-            svg: picture(&name, run)?,
-            title: name,
-            quantity: "tip deformation, mm".to_owned(),
-        });
-    }
+    let panels = panel_per_run(runs, "tip deformation, mm", picture)?;
     Ok(Figure {
         id: "deformations",
         title: "How far each tip is bent".to_owned(),

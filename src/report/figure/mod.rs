@@ -14,9 +14,10 @@ mod slides;
 mod trend;
 mod window;
 
-use super::page::{Figure, Key, Mark};
+use super::page::{Figure, Key, Mark, Panel};
 use super::plot::{DrawError, cell_colours};
 use super::runs::Runs;
+use crate::experiment::Analysis;
 
 pub(super) use energy::rigid_ratio;
 pub(super) use schematic::schematic;
@@ -33,6 +34,23 @@ pub(super) fn all(runs: Runs<'_>) -> Result<Vec<Figure>, DrawError> {
         energy::figure(runs)?,
         trend::figure(runs)?,
     ])
+}
+
+/// One panel for each run, drawn by `picture` from the run's name and analysis.
+fn panel_per_run(
+    runs: Runs<'_>,
+    quantity: &str,
+    picture: impl Fn(&str, &Analysis) -> Result<String, DrawError>,
+) -> Result<Vec<Panel>, DrawError> {
+    runs.named()
+        .map(|(name, run)| {
+            Ok(Panel {
+                svg: picture(&name, run)?,
+                title: name,
+                quantity: quantity.to_owned(),
+            })
+        })
+        .collect()
 }
 
 /// Legend entries of the cells.

@@ -1,22 +1,15 @@
 //! Positions of the cells over time, figure 3 of the paper.
 
-use super::cell_keys;
 use super::window::{Window, of_cell};
+use super::{cell_keys, panel_per_run};
 use crate::experiment::Analysis;
 use crate::report::number::{fixed, with_error};
-use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::page::{Figure, Key, Mark};
 use crate::report::plot::{Axis, DrawError, GRID, Row, Sheet, Stroke, cell_colours, draw};
 use crate::report::runs::Runs;
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let mut panels = Vec::new();
-    for (name, run) in runs.named() {
-        panels.push(Panel {
-            svg: picture(&name, run)?,
-            title: name,
-            quantity: "position along the canal, mm".to_owned(),
-        });
-    }
+    let panels = panel_per_run(runs, "position along the canal, mm", picture)?;
     let mut keys = cell_keys(runs.cells(), Mark::Line);
     keys.push(Key::new(Mark::Thick, GRID, "pale and wide: as measured"));
     Ok(Figure {

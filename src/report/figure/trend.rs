@@ -1,21 +1,15 @@
 //! Advance and energy over the cycles: does anything drift?
 
 use super::energy::METHODS;
+use super::panel_per_run;
 use crate::experiment::{Analysis, CycleResult};
 use crate::report::number::{count, fixed};
-use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::page::{Figure, Key, Mark};
 use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, draw};
 use crate::report::runs::Runs;
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let mut panels = Vec::new();
-    for (name, run) in runs.named() {
-        panels.push(Panel {
-            svg: picture(&name, run)?,
-            title: name,
-            quantity: "above: advance, mm; below: energy, mJ".to_owned(),
-        });
-    }
+    let panels = panel_per_run(runs, "above: advance, mm; below: energy, mJ", picture)?;
     let mut keys = vec![Key::new(Mark::Dot, INK, "advance")];
     keys.extend(
         METHODS
