@@ -211,8 +211,7 @@ impl<'a> Follower<'a> {
 
     /// Force that the actuator of a cell exerts (13), N.
     fn actuator_force_n(&self, cell: usize) -> f64 {
-        let weight_n = self.worm.masses_kg()[cell] * self.worm.gravity_m_per_s2() * self.worm.slope_rad().sin();
-        self.worm.contact(cell).stiffness_n_per_m * self.deformation_m(cell) + weight_n
+        self.worm.contact(cell).stiffness_n_per_m * self.deformation_m(cell) + self.worm.cell_weight_n(cell)
     }
 
     /// The cell that steps just before the present phase, or just after it.
@@ -230,8 +229,7 @@ impl<'a> Follower<'a> {
         self.phase = phase;
         let position_m = self.cells_m(way_m);
         for (cell, at_m) in position_m.into_iter().enumerate() {
-            let weight_n = self.worm.masses_kg()[cell] * self.worm.gravity_m_per_s2() * self.worm.slope_rad().sin();
-            self.totals.ledger.weight_work_j += weight_n * (at_m - self.position_m[cell]);
+            self.totals.ledger.weight_work_j += self.worm.cell_weight_n(cell) * (at_m - self.position_m[cell]);
             self.position_m[cell] = at_m;
             self.slide(cell);
         }

@@ -384,7 +384,7 @@ impl Worm {
     }
 
     /// A cell's own weight along the canal, mᵢ g sin λ, N.
-    pub(super) fn cell_weight_n(&self, cell: usize) -> f64 {
+    pub(crate) fn cell_weight_n(&self, cell: usize) -> f64 {
         self.mass_kg[cell] * self.gravity_m_per_s2 * self.slope_sine
     }
 
