@@ -1,12 +1,16 @@
-//! What the exact motion costs: a whole gait cycle, and the increment of one tick of a 1 kHz loop.
+//! What the motions cost: a whole gait cycle and the increment of one tick of a 1 kHz loop, exact and incremental.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use wormd::MAX_CELLS;
-use wormd::model::{Contact, Motion, Worm, steady_cycle};
+use wormd::model::{Contact, Crawl, Mechanics, Motion, Physics, Worm, steady_cycle};
 
-/// Phase that passes in 1 ms of a 2.5 s gait cycle.
-const TICK: f64 = 1e-3 / 2.5;
+/// Time of a gait cycle, s.
+const CYCLE_S: f64 = 2.5;
+/// Phase that passes in 1 ms of it.
+const TICK: f64 = 1e-3 / CYCLE_S;
+/// Damping ratio of a body with mass, as identified from recordings.
+const DAMPING_RATIO: f64 = 0.1;
 
 fn model(criterion: &mut Criterion) {
     let paper = Worm::paper();
@@ -30,5 +34,34 @@ fn model(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, model);
+/// The incremental motion; a cycle is 400 increments, with mass 596.
+fn incremental(criterion: &mut Criterion) {
+    let linear = Physics::of(Worm::paper());
+    let mut curved = linear.clone();
+    curved.laws.hardening = 0.5;
+    curved.laws.creep_share = 0.3;
+    let motions = [
+        ("quasi-static", &linear, None),
+        ("with inertia", &linear, Some(DAMPING_RATIO)),
+        ("with inertia, pads that harden and creep", &curved, Some(DAMPING_RATIO)),
+    ];
+    for (name, physics, damping_ratio) in motions {
+        let mechanics = Mechanics::new(physics);
+        for (span, increment) in [("gait cycle", 1.0), ("1 ms increment", TICK)] {
+            let mut crawl = Crawl::at_rest(&mechanics, 0.0, &[0.0; 4], damping_ratio).expect("it holds");
+            criterion.bench_function(&format!("incremental {span}, 4 cells, {name}"), |bencher| {
+                bencher.iter(|| {
+                    let phase = crawl.phase() + increment;
+                    let duration_s = increment * CYCLE_S;
+                    crawl
+                        .advance_to(black_box(&mechanics), phase, duration_s)
+                        .expect("it holds");
+                });
+            });
+            black_box(&crawl);
+        }
+    }
+}
+
+criterion_group!(benches, model, incremental);
 criterion_main!(benches);

@@ -23,9 +23,9 @@
 //! # The rooms, in reading order
 //! | room | what lives there | knows nothing of |
 //! |---|---|---|
-//! | [`config`] | what a worm is and how it is run: one TOML file, checked once, then trusted | all but the alarms' names |
+//! | [`config`] | what a worm is and how it is run: one TOML file, checked once, then trusted | all but the names of alarms and effects |
 //! | [`message`] | what the processes say to each other: one plain type per topic | all |
-//! | [`model`] | pure physics: the exact motion, its energy, the steady cycle, the design study | clocks, files, serial, topics |
+//! | [`model`] | pure physics: the exact motion and one for any law, its energy, the steady cycle, the design study; [`model::effect`] has what the paper's theory leaves out | clocks, files, serial, topics |
 //! | [`link`] | DYNAMIXEL Protocol 2.0: packets, the bus, servo and tracker; [`link::virtual_worm`] is the other end | control, topics |
 //! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | estimate |
 //! | [`topics`] | iceoryx2: one namespace per worm, publishers, subscribers, the command service, the guard at start-up | control, estimate |
@@ -34,7 +34,7 @@
 //! | [`identify`] | gait, largest tip deformations and mass from positions alone: section 3.2 of the paper | files, topics, serial |
 //! | [`experiment`] | section 3 on recordings: slides, forces, energy by two methods, theory beside them; recordings from the model | files, topics, serial |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
-//! | [`report`] | what a person looks at afterwards: the page with figures and tables of an experiment, and its CSV | control, serial |
+//! | [`report`] | what a person looks at afterwards: the pages with figures and tables, of an experiment and of the search for the missing effect, and CSV | control, serial |
 //! | [`realtime`] | what a process asks of the operating system, and what it was given | everything but config |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
 //!
@@ -47,7 +47,7 @@
 //! - Faults are injected by a wrapper, never by an `if` in the product.
 //!
 //! # Rooms to come
-//! The search for the effect that the model misses and the loop's own latency benchmark will each get a room of their own.
+//! The loop's own latency benchmark will get a room of its own.
 
 /// Most cells a worm can have: fixed-size topics and control tables are laid out for this many.
 pub const MAX_CELLS: usize = 16;

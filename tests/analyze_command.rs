@@ -1,63 +1,24 @@
 //! `wormd analyze` as people and scripts call it: what cannot be analysed is named and ends with status 2, what can is told.
 
+mod desk;
+
+use desk::{Desk, said, wormd};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
-fn wormd<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wormd"))
-        .args(arguments)
-        .output()
-        .expect("the binary runs")
-}
-
-fn said(output: &Output) -> std::borrow::Cow<'_, str> {
-    String::from_utf8_lossy(&output.stderr)
-}
-
-/// Files of one test.
-struct Desk(tempfile::TempDir);
-
-impl Desk {
-    fn new() -> Self {
-        Self(tempfile::tempdir().expect("a temporary folder"))
+/// The same CSV with its rows changed; `change` gets row number and fields.
+fn changed(desk: &Desk, name: &str, from: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf {
+    let text = std::fs::read_to_string(from).expect("a CSV");
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let mut changed = format!("{}\n", lines.next().expect("a header"));
+    for (row, line) in lines.enumerate() {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        change(row, &mut fields);
+        writeln!(changed, "{}", fields.join(",")).expect("a string");
     }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) -> PathBuf {
-        let path = self.path(name);
-        std::fs::write(&path, text).expect("a temporary file can be written");
-        path
-    }
-
-    /// `wormd simulate` into a file.
-    fn simulate(&self, name: &str, slope_deg: &str, more: &[&str]) -> PathBuf {
-        let path = self.path(name);
-        let mut arguments = vec!["simulate", "--slope", slope_deg, "--out"];
-        let out = path.to_string_lossy().into_owned();
-        arguments.push(&out);
-        arguments.extend(more);
-        let output = wormd(&arguments);
-        assert!(output.status.success(), "{}", said(&output));
-        path
-    }
-
-    /// The same CSV with its rows changed; `change` gets row number and fields.
-    fn changed(&self, name: &str, from: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf {
-        let text = std::fs::read_to_string(from).expect("a CSV");
-        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-        let mut changed = format!("{}\n", lines.next().expect("a header"));
-        for (row, line) in lines.enumerate() {
-            let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
-            change(row, &mut fields);
-            writeln!(changed, "{}", fields.join(",")).expect("a string");
-        }
-        self.write(name, &changed)
-    }
+    desk.write(name, &changed)
 }
 
 fn analyze(recording: &Path, more: &[&str]) -> Output {
@@ -143,7 +104,7 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
             &["4 cells", "6", "--config"],
         ),
         (
-            desk.changed("mm.csv", &good, to_millimetres),
+            changed(&desk, "mm.csv", &good, to_millimetres),
             level,
             &["mm.csv", "millimetres"],
         ),
@@ -158,37 +119,37 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
             &["1.0 gait cycles are too few"],
         ),
         (
-            desk.changed("still.csv", &good, still),
+            changed(&desk, "still.csv", &good, still),
             level,
             &["still.csv", "no cell moves"],
         ),
         (
-            desk.changed("nan.csv", &good, nowhere),
+            changed(&desk, "nan.csv", &good, nowhere),
             level,
             &["nan.csv", "no cell is ever seen"],
         ),
         (
-            desk.changed("unseen.csv", &good, third_unseen),
+            changed(&desk, "unseen.csv", &good, third_unseen),
             level,
             &["cell 3", "never seen"],
         ),
         (
-            desk.changed("fixed.csv", &good, third_fixed),
+            changed(&desk, "fixed.csv", &good, third_fixed),
             level,
             &["cell 3", "does not step"],
         ),
         (
-            desk.changed("back.csv", &good, runs_back),
+            changed(&desk, "back.csv", &good, runs_back),
             level,
             &["back.csv:", "time_s"],
         ),
         (
-            desk.changed("mirrored.csv", &good, mirrored),
+            changed(&desk, "mirrored.csv", &good, mirrored),
             level,
             &["crawls backward", "mirror"],
         ),
         (
-            desk.changed("degrees.csv", &with_phase, in_degrees),
+            changed(&desk, "degrees.csv", &with_phase, in_degrees),
             level,
             &["phase", "counted in cycles"],
         ),

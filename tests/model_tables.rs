@@ -1,6 +1,6 @@
 //! The model against every figure of the paper and of an independent simulation.
 
-use wormd::model::study::{Battery, Failure, Row, Tables, study};
+use wormd::model::study::{Battery, Failure, Row, Study, StudyError, Tables, study};
 use wormd::model::{Contact, Cycle, Worm, level_closed_form, rigid_energy_j, steady_cycle};
 
 /// Cells, slope in degrees and the printed figures, or none where the paper says "Fail".
@@ -48,8 +48,18 @@ const SLOPES_DEG: [f64; 3] = [0.0, 30.0, 45.0];
 /// The largest tip deformations identified in section 3.2.3, m.
 const IDENTIFIED_M: [f64; 4] = [2.0e-3, 1.1e-3, 1.75e-3, 2.15e-3];
 
+fn compare(base: &Worm, cells: &[usize], slopes_deg: &[f64]) -> Result<Vec<Row>, StudyError> {
+    study(&Study {
+        base,
+        effects: &[],
+        cells,
+        slopes_deg,
+        cycle_s: 2.5,
+    })
+}
+
 fn paper_study() -> Vec<Row> {
-    study(&Worm::paper(), &CELLS, &SLOPES_DEG).expect("the paper's designs are valid")
+    compare(&Worm::paper(), &CELLS, &SLOPES_DEG).expect("the paper's designs are valid")
 }
 
 fn paper_row(rows: &[Row], cells: usize, slope_deg: f64) -> &Row {
@@ -145,7 +155,7 @@ fn closed_form_on_the_level() {
 #[test]
 fn slopes_at_which_the_advance_reaches_zero() {
     for (cells, expected_deg) in [(3, 44.4), (4, 59.6), (5, 76.4)] {
-        let progresses = |slope_deg: f64| study(&Worm::paper(), &[cells], &[slope_deg]).expect("valid")[0].progresses;
+        let progresses = |slope_deg: f64| compare(&Worm::paper(), &[cells], &[slope_deg]).expect("valid")[0].progresses;
         let (mut climbs, mut fails) = (0.0, 90.0);
         for _ in 0..40 {
             let middle = 0.5 * (climbs + fails);
@@ -232,7 +242,7 @@ Table 3. Range on 1000 J at 50 % drive efficiency
 
 #[test]
 fn row_as_json() {
-    let rows = study(&Worm::paper(), &[3], &[45.0]).expect("valid");
+    let rows = compare(&Worm::paper(), &[3], &[45.0]).expect("valid");
     assert_eq!(
         serde_json::to_string(&rows).expect("plain numbers"),
         r#"[{"cells":3,"slope_deg":45.0,"progresses":false,"advance_m":null,"energy_positive_j":null,"energy_net_j":null,"cot":null,"energy_per_distance_j_per_m":null}]"#
@@ -242,10 +252,10 @@ fn row_as_json() {
 #[test]
 fn study_of_an_unequal_worm_keeps_its_own_cells_and_averages_for_others() {
     let unequal = Worm::paper().with_max_deformations_m(&IDENTIFIED_M).expect("valid");
-    let rows = study(&unequal, &[4, 5], &[0.0]).expect("valid");
+    let rows = compare(&unequal, &[4, 5], &[0.0]).expect("valid");
     assert_close(rows[0].advance_m.expect("progress"), 6.356e-3, 0.51e-6);
     let mean_m = level_closed_form(5, 980.0, 1.75e-3, 11.5e-3).advance_m;
     assert_close(rows[1].advance_m.expect("progress"), mean_m, 1e-12);
-    assert!(study(&unequal, &[17], &[0.0]).is_err());
-    assert!(study(&unequal, &[4], &[91.0]).is_err());
+    assert!(compare(&unequal, &[17], &[0.0]).is_err());
+    assert!(compare(&unequal, &[4], &[91.0]).is_err());
 }

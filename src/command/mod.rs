@@ -2,8 +2,10 @@
 
 pub mod analyze;
 pub mod check;
+mod columns;
 pub mod control;
 pub mod estimate;
+mod material;
 pub mod order;
 mod print;
 mod progress;
@@ -151,14 +153,34 @@ fn positive_seconds(text: &str) -> Result<Duration, String> {
 /// When the operating system refuses the handlers.
 pub fn end_on_signal() -> Result<Arc<AtomicBool>, Failure> {
     let end = Arc::new(AtomicBool::new(false));
-    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
-        if signal == libc::SIGHUP && is_ignored(signal) {
-            continue;
-        }
-        signal_hook::flag::register(signal, Arc::clone(&end))
-            .map_err(|error| Failure::failed(format!("signal {signal} cannot be handled: {error}")))?;
+    for signal in ending_signals() {
+        signal_hook::flag::register(signal, Arc::clone(&end)).map_err(|error| cannot_handle(signal, &error))?;
     }
     Ok(end)
+}
+
+/// As [`end_on_signal`], until the second flag is set: from then on a signal ends the process where it stands again.
+///
+/// # Errors
+/// When the operating system refuses the handlers.
+fn end_on_signal_until() -> Result<(Arc<AtomicBool>, Arc<AtomicBool>), Failure> {
+    let over = Arc::new(AtomicBool::new(false));
+    for signal in ending_signals() {
+        signal_hook::flag::register_conditional_default(signal, Arc::clone(&over))
+            .map_err(|error| cannot_handle(signal, &error))?;
+    }
+    Ok((end_on_signal()?, over))
+}
+
+fn ending_signals() -> impl Iterator<Item = libc::c_int> {
+    let signals = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP];
+    signals
+        .into_iter()
+        .filter(|&signal| signal != libc::SIGHUP || !is_ignored(signal))
+}
+
+fn cannot_handle(signal: libc::c_int, error: &std::io::Error) -> Failure {
+    Failure::failed(format!("signal {signal} cannot be handled: {error}"))
 }
 
 fn is_ignored(signal: libc::c_int) -> bool {

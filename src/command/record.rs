@@ -6,18 +6,19 @@
 mod desk;
 
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
+use crate::config::Config;
 use crate::message::{Alarm, Cycle, Estimate, State, Timing};
 use crate::recording::mcap::{Channel, Logged, Origin};
 use crate::topics::{Hub, Instance, Subscriber, Topic};
 use clap::Args;
 use desk::{Batch, Desk};
 use nix::time::{ClockId, clock_gettime};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime};
 
 /// How often the topics are emptied. At 1 kHz the fullest holds a second.
-const LOOK: Duration = Duration::from_millis(20);
+pub(super) const LOOK: Duration = Duration::from_millis(20);
 
 /// Arguments of `wormd record`.
 #[derive(Debug, Args)]
@@ -56,47 +57,96 @@ fn channel(name: &str) -> Result<Channel, String> {
 pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     let (config, text) = args.worm.load_with_text()?;
     let end = end_on_signal()?;
-    let instance = Instance::of(&config).map_err(Failure::unusable)?;
-    let now = clock_gettime(ClockId::CLOCK_MONOTONIC).map_err(Failure::failed)?;
-    let origin = Origin {
-        worm: config.worm.name.clone(),
-        cells: config.worm.cells,
-        config: text,
-        begun: SystemTime::now(),
-        begun_ns: Duration::from(now).as_nanos() as u64,
-    };
-    let mut ears = Ears::open(&instance, &args.topics)?;
-    let desk = Desk::open(&args.out, args.force, &origin)?;
+    let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force)?;
     let (worm, file) = (&config.worm.name, args.out.display());
     print::log_line(format_args!("{worm} is recorded to {file}, from its first message on"));
     // One who does not want to know when it is ready may have closed the pipe.
     let _ = print::line("ready");
 
     let mut first_heard: Option<Instant> = None;
-    let mut heard = Ok(());
-    while heard.is_ok() && !end.load(Ordering::Relaxed) {
-        let is_over = |first: Instant| args.duration.is_some_and(|duration| first.elapsed() >= duration);
-        if first_heard.is_some_and(is_over) {
-            break;
+    let mut hear = |recorder: &mut Recorder| {
+        let heard = recorder.hear()?;
+        if heard.messages > 0 {
+            first_heard.get_or_insert_with(Instant::now);
         }
+        let is_over = |first: Instant| args.duration.is_some_and(|duration| first.elapsed() >= duration);
+        Ok(first_heard.is_some_and(is_over))
+    };
+    let mut is_over = Ok(false);
+    while matches!(is_over, Ok(false)) && !end.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
-        heard = hear(&mut ears, &desk, &mut first_heard);
+        is_over = hear(&mut recorder);
     }
     // What came until the word to end belongs to the log.
-    let heard = heard.and_then(|()| hear(&mut ears, &desk, &mut first_heard));
-    let report = desk.close(&ears)?;
-    print::log_line(report);
-    heard
+    let heard = is_over.and_then(|_| hear(&mut recorder));
+    print::log_line(recorder.close()?);
+    heard.map(|_| ())
 }
 
-/// Takes what is new and hands it on.
-fn hear(ears: &mut Ears, desk: &Desk, first_heard: &mut Option<Instant>) -> Result<(), Failure> {
-    let batch = ears.listen()?;
-    if !batch.is_empty() {
-        first_heard.get_or_insert_with(Instant::now);
-        desk.take(batch)?;
+/// The topics of a worm on their way into a log.
+pub(super) struct Recorder {
+    ears: Ears,
+    desk: Desk,
+}
+
+/// What was heard at once.
+pub(super) struct Heard {
+    /// How many messages.
+    pub messages: usize,
+    /// The newest state among them.
+    pub state: Option<State>,
+}
+
+impl Recorder {
+    /// Begins a log with the configuration's text in it; `force` writes over a file that is there.
+    ///
+    /// # Errors
+    /// [`Failure::Unusable`] for a worm or file that cannot be used; [`Failure::Failed`] when the topics fail.
+    pub(super) fn open(
+        config: &Config,
+        text: Option<String>,
+        topics: &[Channel],
+        out: &Path,
+        force: bool,
+    ) -> Result<Self, Failure> {
+        let instance = Instance::of(config).map_err(Failure::unusable)?;
+        let now = clock_gettime(ClockId::CLOCK_MONOTONIC).map_err(Failure::failed)?;
+        let origin = Origin {
+            worm: config.worm.name.clone(),
+            cells: config.worm.cells,
+            config: text,
+            begun: SystemTime::now(),
+            begun_ns: Duration::from(now).as_nanos() as u64,
+        };
+        Ok(Self {
+            ears: Ears::open(&instance, topics)?,
+            desk: Desk::open(out, force, &origin)?,
+        })
     }
-    Ok(())
+
+    /// Takes what is new and hands it on. The topics hold a second of it at least.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when the topics fail or the log cannot be written on.
+    pub(super) fn hear(&mut self) -> Result<Heard, Failure> {
+        let batch = self.ears.listen()?;
+        let heard = Heard {
+            messages: batch.len(),
+            state: batch.states.last().copied(),
+        };
+        if heard.messages > 0 {
+            self.desk.take(batch)?;
+        }
+        Ok(heard)
+    }
+
+    /// Finishes the log and says what is in it.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when the file could not be written to its end; what was written before can be read.
+    pub(super) fn close(self) -> Result<String, Failure> {
+        self.desk.close(&self.ears)
+    }
 }
 
 /// One topic, if it is wanted.

@@ -1,7 +1,7 @@
 //! `wormd simulate`: a recording from the model.
 
 use super::{Failure, log_line};
-use crate::config::Config;
+use crate::config::{Config, ConfigError, Effect};
 use crate::experiment::{Simulation, SimulationError, simulate};
 use crate::recording::{Recording, mcap, write_csv};
 use clap::Args;
@@ -24,6 +24,13 @@ pub struct SimulateArgs {
     /// Configuration; without it the worm of the paper
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// An effect beyond the paper's theory, with its values; several may be given. config/worm.toml tells all names
+    #[arg(
+        long = "effect",
+        value_name = "NAME:PARAM=VALUE,…[,cell=K]",
+        allow_hyphen_values = true
+    )]
+    effects: Vec<Effect>,
     /// Samples per second, in Hz
     #[arg(long, value_name = "HZ", default_value_t = 120.0, allow_negative_numbers = true)]
     rate: f64,
@@ -74,13 +81,19 @@ impl SimulateArgs {
 /// [`Failure::Unusable`] for arguments or a configuration that cannot be used and a worm that slides down; [`Failure::Failed`]
 /// when the file cannot be written to its end.
 pub fn run(args: &SimulateArgs) -> Result<(), Failure> {
-    let (config, config_text) = match &args.config {
+    let (mut config, config_text) = match &args.config {
         Some(file) => {
             let (config, text) = Config::load_with_text(file)?;
             (config, Some(text))
         }
         None => (Config::default(), None),
     };
+    config.effect.extend(args.effects.iter().cloned());
+    let problems = config.problems();
+    if !problems.is_empty() {
+        let file = PathBuf::from("command line");
+        return Err(ConfigError::Values { file, problems }.into());
+    }
     let recording = simulate(&config, &args.simulation()).map_err(|error| match error {
         SimulationError::OutOfRange { .. } => Failure::unusable(format!("--{error}")),
         _ => Failure::unusable(error),

@@ -1,8 +1,9 @@
-//! `wormd study`: Tables 1 and 2 of the paper for any design.
+//! `wormd study`: Tables 1 and 2 of the paper for any design, with every `[[effect]]`.
 
 use super::{Failure, WormArgs, print};
 use crate::model::Worm;
-use crate::model::study::{Battery, Row, Tables, study};
+use crate::model::effect::Setting;
+use crate::model::study::{Battery, Row, Study, Tables, study};
 use clap::Args;
 
 /// Arguments of `wormd study`.
@@ -45,7 +46,14 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
             "--slopes: {slope}°: give slopes from -90 to 90 degrees"
         )));
     }
-    let rows = study(&base, &args.cells, &args.slopes).map_err(Failure::unusable)?;
+    let rows = study(&Study {
+        base: &base,
+        effects: &Setting::configured(&config).map_err(Failure::unusable)?,
+        cells: &args.cells,
+        slopes_deg: &args.slopes,
+        cycle_s: config.gait.cycle_s,
+    })
+    .map_err(Failure::unusable)?;
     let energy_j = args.battery.or(config.battery.map(|battery| battery.capacity_j));
     let battery = energy_j
         .map(|energy_j| Battery::new(energy_j, args.efficiency.unwrap_or(1.0)))

@@ -77,7 +77,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
     drop(role);
     let run = outcome?;
 
-    let summary = Summary::new(&config.worm.name, &run.telemetry, run.mode);
+    let summary = Summary::new(&config.worm, &run.telemetry, run.mode);
     if args.json {
         print::line(serde_json::to_string(&summary).map_err(Failure::failed)?)?;
     } else {

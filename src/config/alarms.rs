@@ -50,6 +50,8 @@ pub struct Alarms {
     pub tracker_fault: AlarmConfig,
     /// Servo temperature, °C; hardware errors raise this alarm at once.
     pub device_fault: AlarmConfig,
+    /// Way in a quarter of a step, or in a whole cycle, that the model does not explain, m.
+    pub model_mismatch: AlarmConfig,
 }
 
 const fn alarm(policy: Policy, threshold: f64) -> AlarmConfig {
@@ -68,6 +70,7 @@ impl Default for Alarms {
             link_fault: alarm(Policy::Warn, 0.2),
             tracker_fault: alarm(Policy::Warn, 0.3),
             device_fault: alarm(Policy::Warn, 60.0),
+            model_mismatch: alarm(Policy::Warn, 1.5e-4),
         }
     }
 }
@@ -85,6 +88,7 @@ impl Alarms {
             AlarmKind::LinkFault => self.link_fault,
             AlarmKind::TrackerFault => self.tracker_fault,
             AlarmKind::DeviceFault => self.device_fault,
+            AlarmKind::ModelMismatch => self.model_mismatch,
         }
     }
 
@@ -99,6 +103,7 @@ impl Alarms {
             (AlarmKind::LinkFault, 0.001..=1.0, "of the exchanges"),
             (AlarmKind::TrackerFault, 0.001..=1.0, "of the samples"),
             (AlarmKind::DeviceFault, 20.0..=120.0, "°C"),
+            (AlarmKind::ModelMismatch, 1e-5..=1.0, "m"),
         ] {
             let key = format!("alarms.{}.threshold", kind.name().replace('-', "_"));
             checker.range(&key, self.of(kind).threshold, range, unit);

@@ -8,6 +8,7 @@
 mod advice;
 mod alarms;
 mod check;
+mod effect;
 mod machine;
 mod virtual_worm;
 mod worm;
@@ -15,6 +16,7 @@ mod worm;
 pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use check::{ConfigError, Problem};
+pub use effect::{Effect, EffectTextError};
 pub use machine::{Battery, Control, Estimator, Limits, Port, ReadMode, Realtime, Servo, Topics, Tracker};
 pub use virtual_worm::VirtualWorm;
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
@@ -28,6 +30,8 @@ use std::path::{Path, PathBuf};
 pub struct Config {
     /// The robot's body.
     pub worm: Worm,
+    /// What the model has beyond the paper's theory; [`Effect`] says who obeys it.
+    pub effect: Vec<Effect>,
     /// The canal that it crawls in.
     pub canal: Canal,
     /// How it crawls.
@@ -57,6 +61,9 @@ pub struct Config {
 }
 
 impl Config {
+    /// `config/worm.toml`: every key with its meaning, and the defaults as values.
+    pub const COMMENTED: &'static str = include_str!("../../config/worm.toml");
+
     /// Reads and checks a configuration file.
     ///
     /// # Errors
@@ -99,6 +106,9 @@ impl Config {
     pub fn problems(&self) -> Vec<Problem> {
         let mut checker = check::Checker::default();
         self.worm.check(&mut checker);
+        for effect in &self.effect {
+            effect.check(self.worm.cells, &mut checker);
+        }
         self.canal.check(&mut checker);
         self.gait.check(&mut checker);
         if let Some(port) = &self.port {

@@ -1,4 +1,6 @@
 use super::*;
+use crate::model::effect::LIBRARY;
+use std::collections::BTreeMap;
 
 fn file() -> &'static Path {
     Path::new("worm.toml")
@@ -7,9 +9,8 @@ fn file() -> &'static Path {
 /// The commented file is the documentation of the defaults: it must say what they are.
 #[test]
 fn the_commented_file_is_the_defaults() {
-    let text = include_str!("../../config/worm.toml");
     assert_eq!(
-        Config::from_toml(text, file()).expect("config/worm.toml is valid"),
+        Config::from_toml(Config::COMMENTED, file()).expect("config/worm.toml is valid"),
         Config::default()
     );
 }
@@ -17,7 +18,7 @@ fn the_commented_file_is_the_defaults() {
 /// The keys that the commented file leaves commented out must be right as well.
 #[test]
 fn the_commented_out_keys_are_accepted() {
-    let text: String = include_str!("../../config/worm.toml")
+    let text: String = Config::COMMENTED
         .lines()
         .map(|line| match line.strip_prefix("# ") {
             Some(rest) if rest.starts_with('[') || rest.split(' ').nth(1) == Some("=") => format!("{rest}\n"),
@@ -31,6 +32,81 @@ fn the_commented_out_keys_are_accepted() {
     );
     assert!(config.battery.is_some() && config.realtime.cpu.is_some());
     assert!(config.virtual_worm.max_deformation_m.is_some());
+    assert_eq!(config.effect.len(), 2);
+}
+
+/// A line of the commented file for each effect of the library, with its parameters and what they may be.
+#[test]
+fn the_commented_file_tells_every_effect() {
+    let mut told = String::new();
+    let mut effects = BTreeMap::new();
+    for line in Config::COMMENTED.lines() {
+        if let Some(line) = line.strip_prefix("#     ") {
+            if let Some((name, _)) = line.split_once(' ').filter(|(name, _)| !name.is_empty()) {
+                told = name.to_owned();
+            }
+            let text: &mut String = effects.entry(told.clone()).or_default();
+            text.push_str(line);
+            text.push('\n');
+        }
+    }
+    assert_eq!(effects.len(), LIBRARY.len(), "{:?}", effects.keys());
+    for effect in LIBRARY {
+        let text = &effects[effect.name];
+        for parameter in effect.parameters {
+            let range = format!("{} to {}", parameter.least, parameter.most);
+            assert!(
+                text.contains(parameter.name) && text.contains(&range),
+                "{}: {range}: {text}",
+                effect.name
+            );
+        }
+    }
+}
+
+#[test]
+fn an_effect_is_read_from_the_command_line() {
+    let drag: Effect = "constant-drag:force_n=-0.2".parse().expect("an effect");
+    assert_eq!(
+        (drag.name.as_str(), drag.cell, drag.parameters["force_n"]),
+        ("constant-drag", None, -0.2)
+    );
+    let clamp: Effect = "unequal-clamping: cell=3, friction_factor=7e-1"
+        .parse()
+        .expect("an effect");
+    assert_eq!((clamp.cell, clamp.parameters["friction_factor"]), (Some(3), 0.7));
+    assert_eq!(clamp.parameters.len(), 1);
+    for (text, expected) in [
+        ("", "'' is no part of an effect: give NAME:PARAM=VALUE"),
+        (":force_n=1", "is no part of an effect"),
+        (
+            "gremlins:force_n=1",
+            "there is no effect `gremlins`: the library has unequal-clamping, ",
+        ),
+        ("constant-drag", "effect `constant-drag` needs `force_n`"),
+        ("constant-drag:", "effect `constant-drag` needs `force_n`"),
+        ("constant-drag:force_n", "'force_n' is no part of an effect"),
+        ("constant-drag:force_n=1,", "'' is no part of an effect"),
+        ("constant-drag:force_n=much", "force_n = 'much' is no number"),
+        ("constant-drag:force_n=1,force_n=2", "force_n is given twice"),
+        ("constant-drag:force=1", "has no parameter `force`: it has force_n"),
+        ("constant-drag:force_n=100", "force_n = 100: must be from -4 to 4 N"),
+        ("constant-drag:force_n=nan", "force_n = NaN: must be from -4 to 4 N"),
+        (
+            "constant-drag:force_n=1,cell=2",
+            "concerns the whole worm: leave `cell` out",
+        ),
+        ("unequal-clamping:friction_factor=0.7", "say which `cell` it concerns"),
+        ("unequal-clamping:friction_factor=0.7,cell=-1", "cell = '-1' is no cell"),
+        ("unequal-clamping:friction_factor=0.7,cell=0", "give 1 to 16"),
+        ("unequal-clamping:friction_factor=0.7,cell=17", "cell 17 of 16"),
+    ] {
+        let error = text.parse::<Effect>().expect_err(text).to_string();
+        assert!(
+            error.contains(expected),
+            "for {text:?}\n  expected … {expected}\n  got      {error}"
+        );
+    }
 }
 
 #[test]
@@ -95,6 +171,27 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         (
             "[topics]\nroot = \"relative\"\n",
             "topics.root = \"relative\": must be an absolute path",
+        ),
+        (
+            "[[effect]]\nname = \"gremlins\"\nforce_n = 0.2\n",
+            "worm.toml: effect = \"gremlins\": there is no effect `gremlins`: the library has unequal-clamping, ",
+        ),
+        (
+            "[[effect]]\nname = \"constant-drag\"\nforce = 0.2\n",
+            "effect = \"constant-drag\": effect `constant-drag` has no parameter `force`: it has force_n",
+        ),
+        (
+            "[[effect]]\nname = \"constant-drag\"\nforce_n = \"much\"\n",
+            "worm.toml:1:1: invalid type: string \"much\", expected f64",
+        ),
+        ("[[effect]]\nforce_n = 0.2\n", "worm.toml:1:1: missing field `name`"),
+        (
+            "[[effect]]\nname = \"unequal-clamping\"\nfriction_factor = 0.7\ncell = 5\n",
+            "effect `unequal-clamping`: cell 5 of 4: give 1 to 4",
+        ),
+        (
+            "[[effect]]\nname = \"unequal-clamping\"\nfriction_factor = 0.7\ncell = 0\n",
+            "effect `unequal-clamping`: cell 0 of 4: give 1 to 4",
         ),
     ];
     for (text, expected) in table {

@@ -9,13 +9,14 @@ use super::electrical::{Electrical, Energies};
 use super::filter::BodyFilter;
 use super::fit::Fit;
 use super::gait::Gait;
+use super::mismatch::{Mismatch, ResidualMap};
 use super::prediction::Predictor;
 use super::unknown;
 use super::update::{EstimatorError, Update};
 use super::window::Window;
 use crate::MAX_CELLS;
 use crate::config::{Config, DeformationSource};
-use crate::message::{Cycle, Estimate, State};
+use crate::message::{Cycle, Estimate, Mode, State};
 
 /// Positions beyond this are no positions, m.
 const FARTHEST_M: f64 = 1e5;
@@ -56,6 +57,7 @@ pub struct Estimator {
     fit: Fit,
     accountant: Accountant,
     identification: Option<Identification>,
+    mismatch: Mismatch,
     predictor: Predictor,
     opened: Opened,
     cycle_index: u64,
@@ -99,6 +101,7 @@ impl Estimator {
             accountant: Accountant::new(cells, fit.unknowns()),
             fit,
             identification: identified.then(|| Identification::new(&tips)),
+            mismatch: Mismatch::new(predictor.worm()),
             predictor,
             opened: Opened {
                 time_s: 0.0,
@@ -125,11 +128,24 @@ impl Estimator {
         &self.estimate
     }
 
+    /// What the model does not explain of the last cycles; empty while the bounds are still being identified.
+    pub fn residual_map(&self) -> &ResidualMap {
+        self.mismatch.map()
+    }
+
+    /// Something is wrong with the worm that has a name of its own: the open cycle does not enter the residual map.
+    pub fn leave_cycle_out(&mut self) {
+        self.mismatch.disturb();
+    }
+
     /// Takes up one state.
     pub fn update(&mut self, state: &State) -> Update<'_> {
         let time_s = state.time_ns as f64 * 1e-9;
         self.notice_restart(state, time_s);
         self.electrical.update(state);
+        if state.mode != Mode::Crawling.code() {
+            self.mismatch.disturb();
+        }
         let mut cycle_ended = false;
         if state.phase.is_finite() {
             cycle_ended = self.follow_phase(state.phase, time_s);
@@ -165,6 +181,7 @@ impl Estimator {
         self.capture.forget();
         self.cycles.forget();
         self.electrical.restart();
+        self.mismatch.forget();
         self.last_seen = None;
         self.last = None;
         self.lose_contacts();
@@ -199,6 +216,7 @@ impl Estimator {
             Event::Goes => false,
             Event::Rests => {
                 self.laid_down = !self.has_crawled;
+                self.mismatch.rest();
                 self.open(time_s);
                 false
             }
@@ -230,6 +248,7 @@ impl Estimator {
     fn begin_window(&mut self) {
         self.window.clear();
         self.window_whole = true;
+        self.mismatch.begin(self.cycles.direction());
         let sense = f64::from(self.cycles.direction());
         self.window_contact_m = self.contacts.contact_m().map(|contact_m| sense * contact_m);
         if let Some(identification) = &mut self.identification {
@@ -275,6 +294,9 @@ impl Estimator {
             self.describe_motion(&account, sense);
             self.correct_contacts(&account, sense);
             self.window_contact_m = account.contact_at_start_m;
+            if self.bounds_are_known() {
+                self.mismatch.take_up(&self.window);
+            }
             self.window.next_cycle();
             self.identify(tips);
         } else {
@@ -287,6 +309,10 @@ impl Estimator {
         self.cycle.predicted_forward_slide_m = prediction.forward_slide_m;
         self.cycle.predicted_backward_slide_m = prediction.backward_slide_m;
         self.cycle_index += 1;
+    }
+
+    fn bounds_are_known(&self) -> bool {
+        self.identification.as_ref().is_none_or(Identification::is_done)
     }
 
     fn describe_electrical(&mut self, end_s: f64, direction: i32) {
@@ -302,7 +328,7 @@ impl Estimator {
     }
 
     fn describe_motion(&mut self, account: &Account, sense: f64) {
-        let known = self.identification.as_ref().is_none_or(Identification::is_done);
+        let known = self.bounds_are_known();
         let (forward_m, backward_m) = account.slides_along_canal_m(sense);
         let cycle = &mut self.cycle;
         cycle.advance_m = sense * account.advance_m;
@@ -361,6 +387,7 @@ impl Estimator {
                 tip.bound_m = bound_m;
             }
             self.contacts.set_tips(&self.tips);
+            self.mismatch.set_identified(self.predictor.worm());
             // The window is accounted for from its start with the new bounds, so its contact points are found anew.
             self.window_contact_m = [f64::NAN; MAX_CELLS];
             self.show_bounds();

@@ -15,6 +15,8 @@
 //! `prediction` what the model expects, and that is the `cycle` topic. Where the largest tip deformations are only
 //! guessed, `bounds` finds them on the first cycles.
 //!
+//! `mismatch` runs the model beside the worm, cycle by cycle, and keeps a map of what it does not explain.
+//!
 //! A cycle at whose start the tips' contact points were not known (the first from rest, or the first after a silence of the
 //! tracker) is reported with a guess of them, `settled = 0`, and standard errors as large as the guess is doubtful.
 //!
@@ -41,6 +43,7 @@ mod estimator;
 mod filter;
 mod fit;
 mod gait;
+pub mod mismatch;
 mod observer;
 mod prediction;
 mod unknown;
@@ -49,5 +52,6 @@ mod window;
 
 pub(crate) use capture::Capture;
 pub use estimator::Estimator;
+pub use mismatch::{Residual, ResidualMap};
 pub use observer::{Observer, Report};
 pub use update::{EstimatorError, Update};

@@ -1,7 +1,7 @@
 //! Estimator and alarms together: what an estimator process, or a recording that is played back, runs.
 
 use super::alarm::{self, AlarmChanges, Watch};
-use super::{Estimator, EstimatorError};
+use super::{Estimator, EstimatorError, ResidualMap};
 use crate::config::Config;
 use crate::message::{Cycle, Estimate, State};
 
@@ -45,8 +45,12 @@ impl Observer {
             state,
             estimate: estimate.as_ref(),
             cycle: cycle.as_ref(),
+            residuals: Some(self.estimator.residual_map()),
         };
         let alarms = self.watch.update(&observation);
+        if !self.watch.is_sound() {
+            self.estimator.leave_cycle_out();
+        }
         Report {
             estimate: estimate.map(|estimate| self.with_alarms(estimate)),
             cycle,
@@ -57,6 +61,11 @@ impl Observer {
     /// The newest estimate, with the alarms as they stand now: for a heartbeat while no sample comes.
     pub fn latest(&self) -> Estimate {
         self.with_alarms(*self.estimator.latest())
+    }
+
+    /// What the model does not explain of the last cycles: cell by cell, step by step, bin by bin.
+    pub fn residual_map(&self) -> &ResidualMap {
+        self.estimator.residual_map()
     }
 
     fn with_alarms(&self, estimate: Estimate) -> Estimate {

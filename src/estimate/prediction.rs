@@ -3,8 +3,9 @@
 use super::account::Tip;
 use crate::MAX_CELLS;
 use crate::config::Config;
+use crate::model::effect::Setting;
 use crate::model::worm::GRAVITY_M_PER_S2;
-use crate::model::{Contact, Motion, Worm, WormError, steady_cycle};
+use crate::model::{Motion, Physics, PhysicsError, Worm, WormError, steady_cycle_of};
 
 /// The model's steady cycle, along the canal.
 #[derive(Debug, Clone, Copy)]
@@ -16,30 +17,25 @@ pub(super) struct Prediction {
     pub(super) backward_slide_m: [f64; MAX_CELLS],
 }
 
-/// The configured worm and its predictions crawling forward and backward.
+/// The configured worm and its predictions crawling forward and backward, with every `[[effect]]`. What the estimator itself
+/// takes from here, tips and resting deformations, is the paper's.
 #[derive(Debug, Clone)]
 pub(super) struct Predictor {
     worm: Worm,
+    effects: Vec<Setting>,
+    is_found: bool, // whether the worm's bounds were identified
+    cycle_s: f64,
     forward: Option<Prediction>,
     backward: Option<Prediction>,
 }
 
 impl Predictor {
-    pub(super) fn new(config: &Config) -> Result<Self, WormError> {
-        let cells = config.worm.cells;
-        let first = Contact::symmetric(config.worm.stiffness_n_per_m.of(0), config.worm.max_deformation_m.of(0));
-        let mut worm = Worm::uniform(cells, first, config.worm.mass_kg, config.worm.stroke_m)?
-            .with_slope_rad(config.canal.slope_deg.to_radians())?
-            .with_step_order(&config.worm.step_order_from_zero())?;
-        for cell in 1..cells {
-            let contact = Contact::symmetric(
-                config.worm.stiffness_n_per_m.of(cell),
-                config.worm.max_deformation_m.of(cell),
-            );
-            worm = worm.with_contact(cell, contact)?;
-        }
+    pub(super) fn new(config: &Config) -> Result<Self, PhysicsError> {
         Ok(Self {
-            worm,
+            worm: Worm::try_from(config)?,
+            effects: Setting::configured(config)?,
+            is_found: false,
+            cycle_s: config.gait.cycle_s,
             forward: None,
             backward: None,
         })
@@ -67,6 +63,11 @@ impl Predictor {
         deformation_m
     }
 
+    /// The worm that predictions are of.
+    pub(super) fn worm(&self) -> &Worm {
+        &self.worm
+    }
+
     /// Weight of the worm, N.
     pub(super) fn weight_n(&self) -> f64 {
         self.worm.weight_n()
@@ -78,25 +79,33 @@ impl Predictor {
     /// [`WormError`] when a bound is no bound.
     pub(super) fn set_bounds(&mut self, bound_m: &[f64]) -> Result<(), WormError> {
         self.worm = self.worm.clone().with_max_deformations_m(bound_m)?;
+        self.is_found = true;
         (self.forward, self.backward) = (None, None);
         Ok(())
     }
 
     /// The steady cycle in a direction, calculated when first asked for.
     pub(super) fn cycle(&mut self, direction: i32) -> Prediction {
-        let worm = &self.worm;
-        if direction < 0 {
-            *self
-                .backward
-                .get_or_insert_with(|| predict(&worm.clone().mirrored(), -1.0))
+        let (kept, sense) = if direction < 0 {
+            (&mut self.backward, -1.0)
         } else {
-            *self.forward.get_or_insert_with(|| predict(worm, 1.0))
-        }
+            (&mut self.forward, 1.0)
+        };
+        *kept.get_or_insert_with(|| {
+            let physics = Physics::of(self.worm.clone());
+            let physics = if self.is_found {
+                physics.found_with(&self.effects)
+            } else {
+                physics.with(&self.effects)
+            };
+            let physics = if direction < 0 { physics.mirrored() } else { physics };
+            predict(&physics, sense, self.cycle_s)
+        })
     }
 }
 
-fn predict(worm: &Worm, sense: f64) -> Prediction {
-    let outcome = steady_cycle(worm);
+fn predict(physics: &Physics, sense: f64, cycle_s: f64) -> Prediction {
+    let outcome = steady_cycle_of(physics, cycle_s);
     let Some(cycle) = outcome.cycle() else {
         return Prediction {
             advance_m: f64::NAN,

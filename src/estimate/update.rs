@@ -2,7 +2,7 @@
 
 use crate::config::Problem;
 use crate::message::{Cycle, Estimate};
-use crate::model::WormError;
+use crate::model::PhysicsError;
 
 /// Why there can be no estimator.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -12,7 +12,7 @@ pub enum EstimatorError {
     Config(Problem),
     /// The configured worm is none to the model.
     #[error("the model refuses the configured worm: {0}")]
-    Worm(#[from] WormError),
+    Physics(#[from] PhysicsError),
 }
 
 /// What became of one state.

@@ -1,13 +1,15 @@
 //! From recordings to figures.
 
+mod theory;
+
+use self::theory::theory;
 use super::account;
-use super::analysis::{
-    Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Theory, TheoryCycle,
-};
+use super::analysis::{Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Theory};
 use super::error::AnalysisError;
 use crate::config::Config;
 use crate::identify::{self, Gait, Prior, fit, gait, onset, search};
-use crate::model::{self, Worm, rigid_energy_j, steady_cycle};
+use crate::model::effect::Setting;
+use crate::model::{Physics, Worm, rigid_energy_j};
 use crate::recording::Recording;
 
 /// What a worm can carry, kg, as in a campaign.
@@ -63,6 +65,7 @@ pub fn analyze(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Vec<Analysis>, AnalysisError> {
     let base = Worm::try_from(config)?;
+    let effects = Setting::configured(config)?;
     let mut prepared = Vec::with_capacity(runs.len());
     for (index, run) in runs.iter().enumerate() {
         progress(Progress {
@@ -95,7 +98,7 @@ pub fn analyze(
             stage: "energy",
             share: 0.9 + 0.1 * index as f64 / runs.len() as f64,
         });
-        analyses.push(prepared.finish(index, &fitted, &base)?);
+        analyses.push(prepared.finish(index, &fitted, &base, &effects)?);
     }
     Ok(analyses)
 }
@@ -174,7 +177,13 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    fn finish(&self, index: usize, fitted: &identify::Fitted, base: &Worm) -> Result<Analysis, AnalysisError> {
+    fn finish(
+        &self,
+        index: usize,
+        fitted: &identify::Fitted,
+        base: &Worm,
+        effects: &[Setting],
+    ) -> Result<Analysis, AnalysisError> {
         let recording = self.run.recording;
         let fitted_run = &fitted.runs[index];
         let worm = &fitted_run.worm;
@@ -247,10 +256,10 @@ impl<'a> Prepared<'a> {
             misfit_ratio: fitted.misfit_ratio,
             rigid_energy_j: rigid_energy_j(worm, mean.advance_m),
             theory: Theory {
-                identified: theory(worm),
-                nominal: theory(&nominal),
+                identified: theory(&Physics::of(worm.clone()).found_with(effects), cycle_s),
+                nominal: theory(&Physics::of(nominal).with(effects), cycle_s),
             },
-            warnings: self.warnings(fitted, &account.cycles, cycle_s, mass_kg, base),
+            warnings: self.warnings(fitted, &account.cycles, cycle_s, mass_kg, base, effects),
             cycles: account.cycles,
             mean,
             std,
@@ -265,8 +274,16 @@ impl<'a> Prepared<'a> {
         cycle_s: f64,
         mass_kg: Option<f64>,
         base: &Worm,
+        effects: &[Setting],
     ) -> Vec<String> {
         let mut warnings = self.run.recording.warnings.clone();
+        if !effects.is_empty() {
+            let names: Vec<&str> = effects.iter().map(|effect| effect.effect().name).collect();
+            warnings.push(format!(
+                "theory's cycles are with the configured effects ({}), but the largest tip deformations, the mass and the energies measured were found with the paper's laws alone: what an effect does to them is in them",
+                names.join(", ")
+            ));
+        }
         let unknown: Vec<String> = fitted
             .max_deformation_sigma_m
             .iter()
@@ -365,33 +382,6 @@ fn mean_deformations(account: &account::Account) -> Vec<f64> {
             integral / whole_s
         })
         .collect()
-}
-
-/// What theory says of a worm's steady cycle; none where it slides down.
-fn theory(worm: &Worm) -> Option<TheoryCycle> {
-    let outcome = steady_cycle(worm);
-    let model::Cycle {
-        advance_m,
-        forward_slide_m,
-        backward_slide_m,
-        energy_loss_j,
-        energy_actuator_net_j,
-        energy_actuator_positive_j,
-        ..
-    } = outcome.cycle()?;
-    let cells = worm.cells();
-    Some(TheoryCycle {
-        values: CycleValues {
-            advance_m: *advance_m,
-            forward_slide_m: forward_slide_m[..cells].to_vec(),
-            backward_slide_m: backward_slide_m[..cells].to_vec(),
-            energy_loss_j: *energy_loss_j,
-            energy_actuator_net_j: *energy_actuator_net_j,
-            energy_actuator_positive_j: *energy_actuator_positive_j,
-        },
-        max_deformation_m: worm.contacts().iter().map(|contact| contact.forward_bound_m).collect(),
-        rigid_energy_j: rigid_energy_j(worm, *advance_m),
-    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Why a recording cannot be analysed, and what to do about it.
 
 use crate::identify::{FitError, GaitError};
+use crate::model::effect::SettingError;
 use crate::model::{SlidesDown, WormError};
 
 /// Why a recording cannot be analysed.
@@ -68,6 +69,9 @@ pub enum AnalysisError {
     /// The configured worm is none.
     #[error("the model refuses the configured worm: {0}")]
     Worm(#[from] WormError),
+    /// A configured effect cannot be switched on.
+    #[error(transparent)]
+    Effect(#[from] SettingError),
     /// Nothing fits.
     #[error(transparent)]
     Fit(#[from] FitError),

@@ -9,7 +9,7 @@ const MEDIAN_SAMPLES: usize = 5;
 const OUTLIER: (f64, f64) = (8.0, 0.06);
 
 /// Standard deviation of the noise on one position, m, by second differences: robust against everything that moves smoothly.
-pub(super) fn noise_by_differences(measured_m: &[Vec<f64>]) -> f64 {
+pub(crate) fn noise_by_differences(measured_m: &[Vec<f64>]) -> f64 {
     let mut sizes: Vec<f64> = measured_m
         .iter()
         .flat_map(|series| {
@@ -29,7 +29,7 @@ pub(super) fn noise_by_differences(measured_m: &[Vec<f64>]) -> f64 {
 }
 
 /// Replaces outliers by `NaN`; how many there were.
-pub(super) fn leave_out_outliers(series: &mut [f64], filled: &[f64], noise_m: f64) -> usize {
+pub(crate) fn leave_out_outliers(series: &mut [f64], filled: &[f64], noise_m: f64) -> usize {
     let seen: Vec<usize> = (0..series.len()).filter(|&sample| filled[sample].is_finite()).collect();
     let values: Vec<f64> = seen.iter().map(|&sample| filled[sample]).collect();
     if values.is_empty() {
@@ -68,7 +68,7 @@ pub(super) fn leave_out_outliers(series: &mut [f64], filled: &[f64], noise_m: f6
 }
 
 /// The samples between the first and the last in which every filled series has a value.
-pub(super) fn usable_range(filled_m: &[Vec<f64>]) -> std::ops::Range<usize> {
+pub(crate) fn usable_range(filled_m: &[Vec<f64>]) -> std::ops::Range<usize> {
     let whole = |sample: &usize| filled_m.iter().all(|series| series[*sample].is_finite());
     let samples = filled_m[0].len();
     let first = (0..samples).find(whole).unwrap_or(0);

@@ -7,7 +7,7 @@
 
 /// A random walk under noise, for given samples.
 #[derive(Debug, Clone)]
-pub(super) struct Drift {
+pub(crate) struct Drift {
     per_cycle_m2: f64,
     step_m2: Vec<f64>, // variance that the walk gathers before each sample
     gain: Vec<f64>,    // 0 where nothing was seen

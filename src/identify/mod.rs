@@ -8,8 +8,8 @@
 //!
 //! Pure: series in, figures out; knows of no files.
 
-mod clean;
-mod drift;
+pub(crate) mod clean;
+pub(crate) mod drift;
 pub mod fit;
 pub mod gait;
 pub mod onset;

@@ -25,6 +25,8 @@ coded_enum! {
         TrackerFault = 7 => "tracker-fault",
         /// The servo reports a hardware error, heat or low voltage.
         DeviceFault = 8 => "device-fault",
+        /// The worm makes a way that the model does not explain.
+        ModelMismatch = 9 => "model-mismatch",
     }
 }
 
@@ -51,7 +53,7 @@ message! {
         value: f64,
         /// The threshold that it passed.
         threshold: f64,
-        /// Gait phase at the change, cycles.
+        /// Gait phase at the change, cycles; of a model mismatch, the last one at which the gait was where it shows.
         phase: f64,
         /// What is watched: [`AlarmKind`] as a code.
         kind: u32 as Name<AlarmKind>,

@@ -1,5 +1,7 @@
-//! The worm that a configuration describes.
+//! The worm that a configuration describes, and what happens to it.
 
+use super::effect::{Setting, SettingError};
+use super::physics::Physics;
 use super::worm::{Contact, Worm, WormError};
 use crate::config::Config;
 
@@ -20,5 +22,39 @@ impl TryFrom<&Config> for Worm {
             worm = worm.with_contact(cell, contact(cell))?;
         }
         Ok(worm)
+    }
+}
+
+/// Why a configuration describes no physics; a checked one does.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PhysicsError {
+    /// The worm cannot be one.
+    #[error(transparent)]
+    Worm(#[from] WormError),
+    /// An effect cannot be switched on like that.
+    #[error(transparent)]
+    Effect(#[from] SettingError),
+}
+
+impl TryFrom<&Config> for Physics {
+    type Error = PhysicsError;
+
+    /// The worm of `[worm]` in the canal of `[canal]` with every `[[effect]]`.
+    ///
+    /// # Errors
+    /// [`PhysicsError`] for values that a checked configuration does not hold.
+    fn try_from(config: &Config) -> Result<Self, PhysicsError> {
+        Ok(Self::of(Worm::try_from(config)?).with(&Setting::configured(config)?))
+    }
+}
+
+impl Setting {
+    /// Every `[[effect]]` of a configuration.
+    ///
+    /// # Errors
+    /// [`SettingError`] for one that a checked configuration does not hold.
+    pub fn configured(config: &Config) -> Result<Vec<Self>, SettingError> {
+        let cells = config.worm.cells;
+        config.effect.iter().map(|effect| effect.setting(cells)).collect()
     }
 }

@@ -1,7 +1,8 @@
 //! One cycle of the periodic crawl, and the closed forms to hold it against.
 
 use super::ledger::Ledger;
-use super::motion::Motion;
+use super::locomotion::Locomotion;
+use super::physics::Physics;
 use super::worm::{SlidesDown, Worm};
 use crate::MAX_CELLS;
 
@@ -9,6 +10,12 @@ use crate::MAX_CELLS;
 const PERIODIC_SHARE: f64 = 1e-12;
 /// Cycles after which the search for the periodic crawl ends in any case.
 const MAX_CYCLES: u32 = 10_000;
+/// As [`PERIODIC_SHARE`], for the incremental motion, whose increments do not end where the events are.
+const NEARLY_PERIODIC_SHARE: f64 = 1e-7;
+/// As [`MAX_CYCLES`], for the incremental motion.
+const MAX_INCREMENTAL_CYCLES: u32 = 1000;
+/// Cycles from rest after which the cycle of a crawl that never becomes periodic is taken: as many as a recording has.
+pub const CYCLES_BEFORE: u32 = 10;
 /// Advance, as a share of the stroke, up to which the worm counts as standing still: well above rounding.
 const STANDSTILL_SHARE: f64 = 1e-9;
 
@@ -51,9 +58,10 @@ pub struct Cycle {
     pub forward_slide_m: [f64; MAX_CELLS],
     /// Distance each tip slid backward, m, counted positive.
     pub backward_slide_m: [f64; MAX_CELLS],
-    /// Sliding losses and work against weight and resisting force (11), J.
+    /// Sliding losses and work against weight and resisting forces (11), J.
     pub energy_loss_j: f64,
-    /// Net actuator work (13), J; equal to `energy_loss_j` because the cycle is periodic.
+    /// Net actuator work (13), J; equal to `energy_loss_j` in a periodic cycle, but for what pads that creep or yield and sudden slides
+    /// turn to heat.
     pub energy_actuator_net_j: f64,
     /// Positive part of the actuator work, the energy of the paper's Table 1, J.
     pub energy_actuator_positive_j: f64,
@@ -65,7 +73,7 @@ pub struct Cycle {
     pub mean_deformation_m: f64,
     /// Cycles from rest to the periodic crawl.
     pub cycles_to_steady: u32,
-    /// Largest change of a deformation over this cycle, m: how well it closes.
+    /// Largest change of a deformation over this cycle, m: how well it closes. A crawl that never becomes periodic closes badly.
     pub closure_m: f64,
 }
 
@@ -111,22 +119,39 @@ impl Cycle {
 /// slides forward at all and every step pushes the others back instead. The paper's worm with 3 cells advances by 1.0 mm
 /// just below 44.43° and loses 12.5 mm just above.
 pub fn steady_cycle(worm: &Worm) -> Outcome {
-    crawl_until_periodic(worm).map_or_else(Outcome::SlidesDown, Outcome::Steady)
+    // The exact motion has no clock, so the time of a cycle does not matter.
+    steady_cycle_of(&Physics::of(worm.clone()), 1.0)
 }
 
-fn crawl_until_periodic(worm: &Worm) -> Result<Cycle, SlidesDown> {
-    let tolerance_m = PERIODIC_SHARE * worm.stroke_m();
-    let first_positions_m = [0.0; MAX_CELLS];
-    let mut motion = Motion::at_rest(worm, &first_positions_m[..worm.cells()]);
+/// As [`steady_cycle`], under any physics, with gait cycles of `cycle_s`. Both are the same where the exact motion serves; else
+/// the crawl goes on until no deformation changes over a cycle by more than 10⁻⁷ strokes, or for 1000 cycles.
+///
+/// Wear, a tether and a patch in the canal leave no periodic crawl: their figures are those of the cycle that follows
+/// [`CYCLES_BEFORE`] cycles from rest, of a worm whose cells all begin at position 0. For the crawl in reverse use
+/// [`Physics::mirrored`].
+///
+/// A worm that begins to slide down in one of these cycles does so in the [`Outcome`].
+pub fn steady_cycle_of(physics: &Physics, cycle_s: f64) -> Outcome {
+    crawl_until_periodic(physics, cycle_s).map_or_else(Outcome::SlidesDown, Outcome::Steady)
+}
+
+fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<Cycle, SlidesDown> {
+    let worm = &physics.worm;
+    let mut motion = Locomotion::at_rest(physics, &[0.0; MAX_CELLS][..worm.cells()])?;
+    let (share, most_cycles) = match (motion.is_exact(), physics.laws.are_periodic()) {
+        (true, _) => (PERIODIC_SHARE, MAX_CYCLES),
+        (false, true) => (NEARLY_PERIODIC_SHARE, MAX_INCREMENTAL_CYCLES),
+        (false, false) => (0.0, CYCLES_BEFORE),
+    };
     let mut cycles = 0;
     loop {
         let before = motion.clone();
-        motion.advance_to(worm, before.phase() + 1.0)?;
-        let changes = motion.deformations_m().iter().zip(before.deformations_m());
-        let closure_m = changes
-            .map(|(after, before)| (after - before).abs())
+        motion.advance_to(f64::from(cycles + 1), cycle_s)?;
+        let closure_m = (0..worm.cells())
+            .map(|cell| (motion.deformation_m(cell) - before.deformation_m(cell)).abs())
             .fold(0.0, f64::max);
-        if closure_m <= tolerance_m || cycles == MAX_CYCLES {
+        let is_closed = physics.laws.are_periodic() && closure_m <= share * worm.stroke_m();
+        if is_closed || cycles == most_cycles {
             let advance_m = motion.mean_position_m() - before.mean_position_m();
             let account = motion.ledger().since(before.ledger());
             return Ok(Cycle::new(worm, advance_m, &account, cycles, closure_m));

@@ -17,9 +17,10 @@ pub struct Ledger {
     pub backward_slide_m: [f64; MAX_CELLS],
     /// Work against the weight, Σ mᵢ g sin λ ΔXᵢ, J; negative downhill.
     pub weight_work_j: f64,
-    /// Work against the resisting force, J.
+    /// Work against resisting forces and drag, J.
     pub resisting_work_j: f64,
-    /// Energy set free by sudden slides of an unbalanced body, which ends as heat outside (11), J.
+    /// Energy that ends as heat outside (11), J: set free by sudden slides of an unbalanced body, or lost within pads that creep or
+    /// yield.
     pub settling_loss_j: f64,
     /// Net actuator work (13), J.
     pub actuator_net_j: f64,
@@ -50,6 +51,16 @@ impl Ledger {
             actuator_positive_j: self.actuator_positive_j - earlier.actuator_positive_j,
             deformation_integral_m: self.deformation_integral_m - earlier.deformation_integral_m,
         }
+    }
+
+    /// Books a slide of a tip, m with its sign, and the heat of it, J.
+    pub(super) fn slide(&mut self, cell: usize, slide_m: f64, loss_j: f64) {
+        if slide_m > 0.0 {
+            self.forward_slide_m[cell] += slide_m;
+        } else {
+            self.backward_slide_m[cell] -= slide_m;
+        }
+        self.sliding_loss_j[cell] += loss_j;
     }
 
     /// Adds the work of an actuator force that runs in a straight line while the cell extends by `extension_m`.

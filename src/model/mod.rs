@@ -15,22 +15,36 @@
 //! - [`worm`]: [`Worm`], the description of one worm in one canal, validated once.
 //! - [`motion`]: [`Motion`], the streaming state. Between two events (a tip starting or ceasing to slide) everything is
 //!   a straight line in the gait phase, so it runs from event to event and is exact for every increment.
+//! - [`effect`]: what the theory leaves out, a library of effects; [`Physics`] is a worm with any of them.
+//! - [`Crawl`]: the motion increment by increment, under every law of [`Laws`] and with inertia. [`Locomotion`] is whichever of the
+//!   two motions the physics ask for.
 //! - [`ledger`]: [`Ledger`], where the energy went, with an identity that closes at every instant.
-//! - [`cycle`]: [`steady_cycle`], one cycle of the periodic crawl, and the closed forms beside it.
+//! - [`cycle`]: [`steady_cycle`] and [`steady_cycle_of`], one cycle of the periodic crawl, and the closed forms beside it.
 //! - [`study`]: Tables 1 and 2 of the paper for any design, and the range on a battery.
 //!
 //! # Limits
-//! Inertia, damping, the drop from static to kinetic friction and coupling between neighbouring contacts are not
-//! modelled. The phase is the only clock.
+//! The exact motion and the steady cycle know no inertia, damping, drop from static to kinetic friction or anything else that
+//! [`Laws`] adds: its only clock is the phase. Coupling between neighbouring contacts is in neither.
 
 mod configured;
+mod crawl;
 pub mod cycle;
+pub mod effect;
 pub mod ledger;
+mod locomotion;
+mod mechanics;
 pub mod motion;
+mod pad;
+mod physics;
 pub mod study;
 pub mod worm;
 
-pub use cycle::{Cycle, LevelCycle, Outcome, level_closed_form, rigid_energy_j, steady_cycle};
+pub use configured::PhysicsError;
+pub use crawl::Crawl;
+pub use cycle::{Cycle, LevelCycle, Outcome, level_closed_form, rigid_energy_j, steady_cycle, steady_cycle_of};
 pub use ledger::Ledger;
+pub use locomotion::Locomotion;
+pub use mechanics::Mechanics;
 pub use motion::Motion;
+pub use physics::{Laws, Patch, Physics, View};
 pub use worm::{Contact, SlidesDown, Worm, WormError};

@@ -375,13 +375,8 @@ impl Motion {
             return 0.0;
         }
         self.deformation_m[cell] = held_m;
-        if slide_m > 0.0 {
-            self.ledger.forward_slide_m[cell] += slide_m;
-        } else {
-            self.ledger.backward_slide_m[cell] -= slide_m;
-        }
         let loss_j = contact.stiffness_n_per_m * held_m * slide_m;
-        self.ledger.sliding_loss_j[cell] += loss_j;
+        self.ledger.slide(cell, slide_m, loss_j);
         loss_j
     }
 }

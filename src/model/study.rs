@@ -8,8 +8,12 @@
 //! - With another number of cells nobody can say what the added cells would be like: all cells get the mean contact and
 //!   the mean mass of the base worm and its full stroke. Where the base cells are unequal, its own row thus differs a little
 //!   from the trend of the others, and rightly so.
+//!
+//! Effects act on every design alike. One that names a cell means the cell of that number; a design without it is refused.
 
-use super::cycle::{Outcome, steady_cycle};
+use super::cycle::{Outcome, steady_cycle_of};
+use super::effect::{Setting, SettingError};
+use super::physics::Physics;
 use super::worm::{Contact, Worm, WormError};
 use serde::Serialize;
 use std::fmt;
@@ -58,9 +62,10 @@ pub struct Row {
 }
 
 impl Row {
-    /// Computes the steady cycle of a worm and takes its figures.
-    pub fn of(worm: &Worm, slope_deg: f64) -> Self {
-        let outcome = steady_cycle(worm);
+    /// Computes the steady cycle of a worm, in gait cycles of `cycle_s`, and takes its figures.
+    pub fn of(physics: &Physics, slope_deg: f64, cycle_s: f64) -> Self {
+        let worm = &physics.worm;
+        let outcome = steady_cycle_of(physics, cycle_s);
         let progress = outcome.cycle().filter(|cycle| cycle.progresses);
         let failure = match &outcome {
             Outcome::SlidesDown(_) => Some(Failure::SlidesDown),
@@ -106,17 +111,56 @@ pub fn design(base: &Worm, cells: usize, slope_deg: f64) -> Result<Worm, WormErr
         .with_slope_rad(slope_rad)
 }
 
+/// What is compared, and under what.
+#[derive(Debug, Clone, Copy)]
+pub struct Study<'a> {
+    /// The worm that the designs are made from, without effects.
+    pub base: &'a Worm,
+    /// Effects on every design.
+    pub effects: &'a [Setting],
+    /// Numbers of cells.
+    pub cells: &'a [usize],
+    /// Slopes, degrees, positive uphill.
+    pub slopes_deg: &'a [f64],
+    /// Time of a gait cycle, s: what depends on time asks for it.
+    pub cycle_s: f64,
+}
+
+/// Why there is no study.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum StudyError {
+    /// A design cannot be one.
+    #[error(transparent)]
+    Worm(#[from] WormError),
+    /// An effect names a cell that a design does not have.
+    #[error("a design of {cells} cells: {source}: leave the effect out, or that number of cells")]
+    Effect {
+        /// Cells of the design.
+        cells: usize,
+        /// What is wrong with the effect.
+        source: SettingError,
+    },
+}
+
 /// The rows for every number of cells on every slope, cells outermost, in the order given.
 ///
 /// # Errors
-/// [`WormError`] when a number of cells or a slope is out of its range.
-pub fn study(base: &Worm, cells: &[usize], slopes_deg: &[f64]) -> Result<Vec<Row>, WormError> {
-    let cases = cells
-        .iter()
-        .flat_map(|&cells| slopes_deg.iter().map(move |&slope_deg| (cells, slope_deg)));
-    cases
-        .map(|(cells, slope_deg)| Ok(Row::of(&design(base, cells, slope_deg)?, slope_deg)))
-        .collect()
+/// [`StudyError`] when a number of cells or a slope is out of its range, or an effect does not fit a design.
+pub fn study(study: &Study<'_>) -> Result<Vec<Row>, StudyError> {
+    let mut rows = Vec::with_capacity(study.cells.len() * study.slopes_deg.len());
+    for &cells in study.cells {
+        for &slope_deg in study.slopes_deg {
+            let worm = design(study.base, cells, slope_deg)?;
+            for effect in study.effects {
+                effect
+                    .check_cells(cells)
+                    .map_err(|source| StudyError::Effect { cells, source })?;
+            }
+            let physics = Physics::of(worm).with(study.effects);
+            rows.push(Row::of(&physics, slope_deg, study.cycle_s));
+        }
+    }
+    Ok(rows)
 }
 
 /// A battery cannot be like this.

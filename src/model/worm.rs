@@ -133,7 +133,7 @@ pub struct Worm {
     contact: [Contact; MAX_CELLS],
     mass_kg: [f64; MAX_CELLS],
     stroke_m: f64,                  // above 0
-    stroke_scale: [f64; MAX_CELLS], // in 0..=1
+    stroke_scale: [f64; MAX_CELLS], // 0 or more
     slope_rad: f64,                 // in −π/2..=π/2
     slope_sine: f64,                // of slope_rad, kept because the solver needs it in every increment
     step_order: [usize; MAX_CELLS], // its first `cells` entries are a permutation
@@ -393,6 +393,71 @@ impl Worm {
         self.resisting_force_n / self.cells as f64
     }
 
+    /// Scales the friction of one cell, or of all: both bounds.
+    pub(crate) fn scale_friction(&mut self, cell: Option<usize>, factor: f64) {
+        for contact in &mut self.contact[cells_meant(cell, self.cells)] {
+            contact.forward_bound_m *= factor;
+            contact.backward_bound_m *= factor;
+        }
+    }
+
+    /// Scales the stiffness of one cell's contact, or of all; the friction force stays, so the bounds shrink as it grows.
+    pub(crate) fn scale_stiffness(&mut self, cell: Option<usize>, factor: f64) {
+        for contact in &mut self.contact[cells_meant(cell, self.cells)] {
+            contact.stiffness_n_per_m *= factor;
+            contact.forward_bound_m /= factor;
+            contact.backward_bound_m /= factor;
+        }
+    }
+
+    /// Scales what every tip holds backward.
+    pub(super) fn scale_backward_friction(&mut self, factor: f64) {
+        for contact in &mut self.contact {
+            contact.backward_bound_m *= factor;
+        }
+    }
+
+    /// Scales the stroke of one cell, or of all.
+    pub(crate) fn scale_stroke(&mut self, cell: Option<usize>, factor: f64) {
+        for scale in &mut self.stroke_scale[cells_meant(cell, self.cells)] {
+            *scale *= factor;
+        }
+    }
+
+    /// Adds a resisting force, N.
+    pub(super) fn add_resisting_force_n(&mut self, force_n: f64) {
+        self.resisting_force_n += force_n;
+    }
+
+    /// Adds mass in equal shares, kg; what would be left below nothing is nothing.
+    pub(crate) fn add_mass_kg(&mut self, mass_kg: f64) {
+        let share_kg = mass_kg / self.cells as f64;
+        for mass in &mut self.mass_kg[..self.cells] {
+            *mass = (*mass + share_kg).max(0.0);
+        }
+    }
+
+    /// Puts back the forward bounds, the masses and the mean stroke of `found`, the same worm before effects.
+    pub(super) fn keep_found(&mut self, found: &Self) {
+        let mean_scale = self.stroke_scale[..self.cells].iter().sum::<f64>() / self.cells as f64;
+        for cell in 0..self.cells {
+            let contact = &mut self.contact[cell];
+            let bound_m = found.contact[cell].forward_bound_m;
+            if contact.forward_bound_m > 0.0 {
+                contact.backward_bound_m *= bound_m / contact.forward_bound_m;
+            }
+            contact.forward_bound_m = bound_m;
+            self.stroke_scale[cell] /= mean_scale;
+        }
+        self.mass_kg = found.mass_kg;
+    }
+
+    /// Tilts the canal further, rad, up to the vertical.
+    pub(crate) fn tilt_rad(&mut self, angle_rad: f64) {
+        self.slope_rad = (self.slope_rad + angle_rad).clamp(-FRAC_PI_2, FRAC_PI_2);
+        self.slope_sine = self.slope_rad.sin();
+    }
+
     /// Whether the tips can hold the resting worm.
     ///
     /// # Errors
@@ -439,4 +504,9 @@ impl Worm {
             })
         }
     }
+}
+
+/// One cell, or all of them.
+fn cells_meant(cell: Option<usize>, cells: usize) -> std::ops::Range<usize> {
+    cell.map_or(0..cells, |cell| cell.min(cells - 1)..cell.min(cells - 1) + 1)
 }

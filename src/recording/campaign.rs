@@ -65,6 +65,8 @@ pub struct Campaign {
     pub worm: Option<PathBuf>,
     /// The worm as it is believed to be.
     pub config: Config,
+    /// The text of the configuration's file; `None` for the worm of the paper.
+    pub config_text: Option<String>,
     /// At least one.
     pub runs: Vec<Run>,
 }
@@ -121,7 +123,13 @@ impl Campaign {
             return Err(reader.invalid(0..0, "there is no run in it", remedy));
         }
         let worm = file.worm.map(|worm| reader.beside(&worm));
-        let config = worm.as_deref().map_or_else(|| Ok(Config::default()), Config::load)?;
+        let (config, config_text) = match worm.as_deref() {
+            Some(worm) => {
+                let (config, text) = Config::load_with_text(worm)?;
+                (config, Some(text))
+            }
+            None => (Config::default(), None),
+        };
         let mut runs: Vec<(Run, PathBuf)> = Vec::with_capacity(file.run.len());
         for entry in &file.run {
             let run = reader.run(entry)?;
@@ -145,6 +153,7 @@ impl Campaign {
             file: path.to_path_buf(),
             worm,
             config,
+            config_text,
             runs: runs.into_iter().map(|(run, _)| run).collect(),
         })
     }

@@ -28,7 +28,7 @@ pub(super) fn try_directory(path: &Path) -> Result<(), ReportError> {
 }
 
 /// Writes a file beside its place and moves it there: who reads it sees the old one or the new one, never a part.
-pub(super) fn replace(path: PathBuf, content: &[u8]) -> Result<PathBuf, ReportError> {
+pub(crate) fn replace(path: PathBuf, content: &[u8]) -> Result<PathBuf, ReportError> {
     let mut beside = path.clone().into_os_string();
     beside.push(format!(".{}.part", std::process::id()));
     let beside = PathBuf::from(beside);

@@ -7,7 +7,7 @@
 //! # The map, in reading order
 //! - [`number`]: numbers as people read them.
 //! - [`plot`]: pictures as inline SVG; what is not finite is never drawn.
-//! - [`page`] and [`table`]: the page, its style, figures and tables. These four know nothing of worms.
+//! - [`page`], [`table`] and `tile`: the page, its style, figures, tables and large figures. These know nothing of worms.
 //! - `runs`, `figure`, `summary`, `tables`: what this report shows.
 //! - `sheets` and `file`: the CSV, and how files are replaced.
 
@@ -21,6 +21,9 @@ mod sheets;
 mod summary;
 pub mod table;
 mod tables;
+mod tile;
+
+pub(crate) use file::replace as replace_file;
 
 use crate::experiment::Analysis;
 use page::Page;

@@ -39,6 +39,47 @@ pub fn with_error(value: f64, error: f64, decimals: usize) -> String {
     format!("{} ± {shown}", fixed(value, decimals))
 }
 
+/// A value and its error with two digits of the error: `0.620 ± 0.018`. Without a usable error the value alone, with three
+/// digits.
+pub fn to_error(value: f64, error: f64) -> String {
+    if !error.is_finite() || error <= 0.0 {
+        return significant(value, 3);
+    }
+    let decimals = decimals_for(error, 2);
+    if value.is_finite() {
+        format!("{} ± {}", fixed(value, decimals), fixed(error, decimals))
+    } else {
+        NONE.to_owned()
+    }
+}
+
+/// A value with so many digits that count, and no exponent.
+pub fn significant(value: f64, digits: usize) -> String {
+    fixed(value, decimals_for(value, digits))
+}
+
+/// Most decimals that anything is shown with.
+const MOST_DECIMALS: f64 = 6.0;
+
+fn decimals_for(value: f64, digits: usize) -> usize {
+    if value == 0.0 || !value.is_finite() {
+        return digits.saturating_sub(1);
+    }
+    (digits as f64 - 1.0 - value.abs().log10().floor()).clamp(0.0, MOST_DECIMALS) as usize
+}
+
+/// A share as a percentage; near 0 and 100 % it shows which side it is on.
+pub fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    match percent {
+        _ if 0.0 < percent && percent < 0.1 => "<0.1 %".to_owned(),
+        _ if 99.9 < percent && percent < 100.0 => ">99.9 %".to_owned(),
+        _ if !percent.is_finite() => NONE.to_owned(),
+        _ if percent.abs() < 1.0 || (99.0 < percent && percent < 100.0) => format!("{} %", fixed(percent, 1)),
+        _ => format!("{} %", fixed(percent, 0)),
+    }
+}
+
 /// A list in words: `a, b and c`.
 pub fn in_words(parts: &[String]) -> String {
     match parts {
@@ -101,6 +142,30 @@ mod tests {
         ] {
             assert_eq!(with_error(value, error, 2), text);
         }
+    }
+
+    #[test]
+    fn an_error_of_any_size_leaves_two_digits() {
+        for (value, error, text) in [
+            (0.6204, 0.0183, "0.620 ± 0.018"),
+            (-123.4, 12.0, "−123 ± 12"),
+            (1234.0, 250.0, "1234 ± 250"),
+            (3e-5, 4e-6, "0.000030 ± 0.000004"),
+            (0.01234, 0.0, "0.0123"),
+            (0.0, f64::NAN, "0.00"),
+            (f64::NAN, 0.1, NONE),
+        ] {
+            assert_eq!(to_error(value, error), text);
+        }
+    }
+
+    #[test]
+    fn a_share_says_whether_anything_is_missing() {
+        let shares = [0.0, 1e-5, 0.004, 0.5, -0.2, 0.996, 0.99999, 1.0, 1.3, f64::NAN];
+        let texts = [
+            "0.0 %", "<0.1 %", "0.4 %", "50 %", "−20 %", "99.6 %", ">99.9 %", "100 %", "130 %", NONE,
+        ];
+        assert_eq!(shares.map(percent), texts);
     }
 
     #[test]

@@ -112,6 +112,7 @@ pub struct Figure {
 #[derive(Debug, Clone)]
 pub struct Page {
     title: String,
+    style: &'static str,
     body: String,
     figures: usize,
 }
@@ -121,9 +122,15 @@ impl Page {
     pub fn new(title: &str) -> Self {
         Self {
             title: title.to_owned(),
+            style: "",
             body: String::new(),
             figures: 0,
         }
+    }
+
+    /// The page with a style of its own beyond the common one.
+    pub fn with_style(self, style: &'static str) -> Self {
+        Self { style, ..self }
     }
 
     /// Adds what is HTML already.
@@ -197,9 +204,10 @@ impl Page {
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
+             <title>{}</title>\n<style>\n{}{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
             escaped(&self.title),
             include_str!("style.css"),
+            self.style,
             self.body
         )
     }

@@ -1,12 +1,12 @@
 //! The head of the page: what was recorded, and the answer, before any figure.
 
 use super::figure::{rigid_ratio, schematic};
-use super::number::{NONE, count, fixed, with_error};
+use super::number::{count, fixed, with_error};
 use super::page::{Page, escaped};
 use super::plot::{DrawError, cell_colours, css};
 use super::runs::Runs;
+use super::tile::{Tile, push_row};
 use crate::experiment::{Analysis, CycleValues};
-use std::fmt::Write;
 
 pub(super) fn add(page: &mut Page, title: &str, runs: Runs<'_>) -> Result<(), DrawError> {
     page.html(&format!("<h1>{}</h1>", escaped(title)));
@@ -66,6 +66,7 @@ fn answer(runs: Runs<'_>) -> Result<String, DrawError> {
             &mut html,
             &format!("<b>Largest tip deformation</b><small>{found}</small>"),
             &tips(run),
+            "",
         );
     }
     for (name, run) in runs.named() {
@@ -74,7 +75,7 @@ fn answer(runs: Runs<'_>) -> Result<String, DrawError> {
         let place = format!("{picture}<b>{name}</b><small>{recording}</small>");
         let mut tiles = if shared.is_some() { Vec::new() } else { tips(run) };
         tiles.extend(cycle(run));
-        push_row(&mut html, &place, &tiles);
+        push_row(&mut html, &place, &tiles, "");
     }
     html.push_str("</section>");
     html.push_str(
@@ -91,14 +92,6 @@ fn has_tips_of(run: &Analysis, other: &Analysis) -> bool {
         && same(&run.max_deformation_sigma_m, &other.max_deformation_sigma_m)
 }
 
-/// One figure of the answer. Its texts are HTML already.
-struct Tile {
-    name: String,
-    value: String,
-    unit: &'static str,
-    how: &'static str,
-}
-
 fn tips(run: &Analysis) -> Vec<Tile> {
     let colours = cell_colours(run.cells).into_iter().enumerate();
     colours
@@ -107,8 +100,8 @@ fn tips(run: &Analysis) -> Vec<Tile> {
             Tile {
                 name: format!("<i style=\"--c:{}\"></i>cell {}", css(colour), cell + 1),
                 value: with_error(mm(&run.max_deformation_m), mm(&run.max_deformation_sigma_m), 2),
-                unit: "mm",
-                how: "",
+                unit: "mm".to_owned(),
+                how: String::new(),
             }
         })
         .collect()
@@ -118,15 +111,15 @@ fn cycle(run: &Analysis) -> Vec<Tile> {
     let energy = |how, of: fn(&CycleValues) -> f64| Tile {
         name: "energy per cycle".to_owned(),
         value: with_error(of(&run.mean) * 1e3, of(&run.std) * 1e3, 1),
-        unit: "mJ",
-        how,
+        unit: "mJ".to_owned(),
+        how: str::to_owned(how),
     };
     vec![
         Tile {
             name: "advance per cycle".to_owned(),
             value: with_error(run.mean.advance_m * 1e3, run.std.advance_m * 1e3, 2),
-            unit: "mm",
-            how: "net displacement, mean of the cells",
+            unit: "mm".to_owned(),
+            how: "net displacement, mean of the cells".to_owned(),
         },
         energy("losses and weight (11)", |values| values.energy_loss_j),
         energy("net actuator work (13)", |values| values.energy_actuator_net_j),
@@ -134,26 +127,8 @@ fn cycle(run: &Analysis) -> Vec<Tile> {
         Tile {
             name: "against rigid contacts".to_owned(),
             value: fixed(rigid_ratio(run).unwrap_or(f64::NAN), 2),
-            unit: "×",
-            how: "energy (11) for the same advance",
+            unit: "×".to_owned(),
+            how: "energy (11) for the same advance".to_owned(),
         },
     ]
-}
-
-/// Adds a row of tiles; `place` is HTML already.
-fn push_row(html: &mut String, place: &str, tiles: &[Tile]) {
-    let _ = write!(html, "<div class=\"row\"><div class=\"place\">{place}</div><ul>"); // A String takes all.
-    for Tile { name, value, unit, how } in tiles {
-        let unit = if value == NONE { "" } else { unit };
-        let (value, error) = value.split_once(" ± ").unwrap_or((value, ""));
-        let error = match error {
-            "" => String::new(),
-            error => format!("<em>± {}</em>", escaped(error)),
-        };
-        let _ = write!(
-            html,
-            "<li><span>{name}</span><strong>{value}<small>{unit}</small></strong>{error}<span class=\"how\">{how}</span></li>"
-        ); // As above.
-    }
-    html.push_str("</ul></div>\n");
 }

@@ -4,11 +4,12 @@
 //! [`Telemetry`] takes the messages of the topics as they come, whoever reads them; [`view::draw`] paints it, and
 //! [`Summary`] is what remains of it, as text and as the JSON that scripts read.
 
+pub(crate) mod mismatch;
 mod summary;
 mod telemetry;
 pub mod view;
 
-pub use summary::{AlarmSummary, CycleSummary, Percentiles, Summary, TimingSummary};
+pub use summary::{AlarmSummary, CycleSummary, Percentiles, PlaceSummary, Summary, TimingSummary};
 pub use telemetry::Telemetry;
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! What remains of a run: the summary that `wormd up` prints, as text and as JSON. The JSON names are a contract.
 
+use super::mismatch;
 use super::telemetry::Telemetry;
+use crate::config::Worm;
 use crate::message::{Alarm, AlarmKind, Culprit, Cycle, Fault, Mode, Severity};
 use hdrhistogram::Histogram;
 use serde::Serialize;
@@ -96,6 +98,17 @@ pub struct AlarmSummary {
     pub value: f64,
     /// The threshold that it passed.
     pub threshold: f64,
+    /// Where in the gait a model mismatch shows; null for other alarms.
+    pub place: Option<PlaceSummary>,
+}
+
+/// A place in the gait.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PlaceSummary {
+    /// Gait phase, 0 to 1.
+    pub phase: f64,
+    /// The cell that steps there, from 1.
+    pub stepping_cell: usize,
 }
 
 /// Where the ticks' time went.
@@ -143,8 +156,8 @@ impl Percentiles {
 }
 
 impl Summary {
-    /// What `telemetry` of the worm called `worm` amounts to. `end_mode` is where it stood before it was stopped.
-    pub fn new(worm: &str, telemetry: &Telemetry, end_mode: Mode) -> Self {
+    /// What `telemetry` of a worm amounts to. `end_mode` is where it stood before it was stopped.
+    pub fn new(worm: &Worm, telemetry: &Telemetry, end_mode: Mode) -> Self {
         let start_ns = telemetry.first_state.map_or(0, |state| state.time_ns);
         let state = telemetry.state;
         let fault = state
@@ -152,7 +165,7 @@ impl Summary {
             .unwrap_or(Fault::None);
         let durations = &telemetry.durations;
         Self {
-            worm: worm.to_owned(),
+            worm: worm.name.clone(),
             duration_s: state.map_or(0.0, |state| seconds_since(start_ns, state.time_ns)),
             ticks: telemetry.ticks(),
             overruns: telemetry.timing.map_or(0, |timing| timing.overruns),
@@ -162,7 +175,7 @@ impl Summary {
             mode: end_mode.name(),
             fault: fault.name(),
             cycles: telemetry.cycles.iter().map(CycleSummary::new).collect(),
-            alarms: alarm_summaries(&telemetry.alarms, start_ns),
+            alarms: alarm_summaries(&telemetry.alarms, start_ns, &worm.step_order),
             timing: TimingSummary {
                 wake_us: Percentiles::of(&durations.wake),
                 bus_us: Percentiles::of(&durations.bus),
@@ -210,7 +223,7 @@ impl CycleSummary {
     }
 }
 
-fn alarm_summaries(changes: &[Alarm], start_ns: u64) -> Vec<AlarmSummary> {
+fn alarm_summaries(changes: &[Alarm], start_ns: u64, step_order: &[usize]) -> Vec<AlarmSummary> {
     let mut summaries = Vec::new();
     for (index, alarm) in changes.iter().enumerate().filter(|(_, alarm)| alarm.raised != 0) {
         let Ok(kind) = AlarmKind::try_from(alarm.kind) else {
@@ -228,6 +241,8 @@ fn alarm_summaries(changes: &[Alarm], start_ns: u64) -> Vec<AlarmSummary> {
             cleared_s: cleared.map(|later| seconds_since(start_ns, later.time_ns)),
             value: alarm.value,
             threshold: alarm.threshold,
+            place: mismatch::place_of(alarm, step_order)
+                .map(|(phase, stepping_cell)| PlaceSummary { phase, stepping_cell }),
         });
     }
     summaries
@@ -295,7 +310,14 @@ impl fmt::Display for Summary {
             writeln!(f, "model  {:>7.3}  {:>7.2}", predicted_m * 1e3, energy_j * 1e3)?;
         }
         for alarm in &self.alarms {
-            let cell = alarm.cell.map_or(String::new(), |cell| format!(" (cell {cell})"));
+            let cell = match (alarm.cell, &alarm.place) {
+                (Some(cell), Some(place)) => {
+                    let what = mismatch::text(cell, place.stepping_cell, place.phase, alarm.value);
+                    format!(" ({what}; `wormd explain` names the cause)")
+                }
+                (Some(cell), None) => format!(" (cell {cell})"),
+                (None, _) => String::new(),
+            };
             let cleared = alarm
                 .cleared_s
                 .map_or("still raised".to_owned(), |s| format!("cleared at {s:.2} s"));

@@ -1,6 +1,7 @@
 use super::view::{Subject, draw};
 use super::*;
 use crate::MAX_CELLS;
+use crate::config::Worm as WormConfig;
 use crate::message::{Alarm, AlarmKind, Cycle, Estimate, Mode, Severity, State, Timing};
 use crate::model::{Motion, Outcome, Worm, steady_cycle};
 use ratatui::Terminal;
@@ -123,6 +124,7 @@ fn painted(width: u16, height: u16, telemetry: &Telemetry) -> String {
         slope_deg: 0.0,
         backward: false,
         rate_hz: 1000.0,
+        step_order: vec![1, 2, 3, 4],
         full_scale_m: 0.00175,
     };
     let log = VecDeque::from(["[control] a line of the log".to_owned()]);
@@ -184,7 +186,7 @@ fn an_unsettled_cycle_has_no_energy() {
     cycle.settled = 0;
     cycle.cot = 0.0;
     cycle.energy_loss_sigma_j = f64::NAN;
-    let summary = Summary::new("worm1", &telemetry, Mode::Crawling);
+    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling);
     assert_eq!(summary.cycles[1].cot, None);
     for text in [summary.to_string(), painted(110, 34, &telemetry)] {
         assert!(!text.contains("NaN"), "{text}");
@@ -202,7 +204,7 @@ fn no_terminal_is_too_small() {
 
 #[test]
 fn a_summary_is_what_was_heard() {
-    let summary = Summary::new("worm1", &heard(3.4), Mode::Crawling);
+    let summary = Summary::new(&WormConfig::default(), &heard(3.4), Mode::Crawling);
     let json = serde_json::to_value(&summary).expect("serialises");
     assert_eq!(json["ticks"], 101);
     assert_eq!(json["cycles"].as_array().map(Vec::len), Some(3));
@@ -219,4 +221,27 @@ fn a_summary_is_what_was_heard() {
         summary.timing.wake_us
     );
     assert!(summary.to_string().contains("model    6.833    46.88"), "{summary}");
+}
+
+/// A model mismatch says where it is, in the picture, in the summary and in its JSON; no other alarm has a place.
+#[test]
+fn a_mismatch_is_told_with_its_place() {
+    let mut telemetry = heard(7.4);
+    telemetry.take_alarm(&Alarm {
+        value: 3.1e-4,
+        threshold: 1.5e-4,
+        phase: 6.55,
+        kind: AlarmKind::ModelMismatch.code(),
+        severity: Severity::Warning.code(),
+        ..alarm(3, 6_000_000_000, 1)
+    });
+    let words = "cell 2 while cell 3 steps, phase 0.55: +0.31 mm a cycle unexplained";
+    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling);
+    assert!(summary.to_string().contains(words), "{summary}");
+    let places: Vec<_> = summary.alarms.iter().map(|alarm| alarm.place.is_some()).collect();
+    assert_eq!(places, [false, false, true]);
+    let json = serde_json::to_value(&summary).expect("serialises");
+    assert_eq!(json["alarms"][2]["place"]["stepping_cell"], 3);
+    let picture = painted(250, 34, &telemetry);
+    assert!(picture.contains("phase 0.55: +0.31"), "{picture}");
 }

@@ -1,5 +1,6 @@
 //! The live picture in a terminal: the canal with the worm in it, what each tip does, cycles, alarms and loop health.
 
+use super::mismatch;
 use super::telemetry::Telemetry;
 use crate::message::{Alarm, AlarmKind, Cycle, Estimate, Fault, Mode, Severity};
 use ratatui::Frame;
@@ -22,6 +23,8 @@ pub struct Subject {
     pub backward: bool,
     /// Tick rate, Hz.
     pub rate_hz: f64,
+    /// The order in which the cells step, from 1.
+    pub step_order: Vec<usize>,
     /// Largest deformation that the bars show, m.
     pub full_scale_m: f64,
 }
@@ -52,7 +55,7 @@ pub fn draw(frame: &mut Frame<'_>, subject: &Subject, telemetry: &Telemetry, log
     frame.render_widget(headline(subject, telemetry), head);
     draw_canal(frame, canal, subject, telemetry);
     draw_tips(frame, tips, subject, telemetry);
-    draw_alarms(frame, alarms, telemetry);
+    draw_alarms(frame, alarms, subject, telemetry);
     draw_cycles(frame, cycles, telemetry);
     draw_health(frame, health, subject, telemetry);
     let lines: Vec<Line<'_>> = log
@@ -358,13 +361,13 @@ fn bar(share: f64) -> String {
         .collect()
 }
 
-fn draw_alarms(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {
+fn draw_alarms(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
     let raised = telemetry.raised();
     let (armed_mask, raised_mask) = telemetry
         .estimate
         .map_or((0, 0), |estimate| (estimate.armed_mask, estimate.raised_mask));
     let armed = armed_mask.count_ones();
-    let mut lines: Vec<Line<'_>> = raised.iter().map(alarm_line).collect();
+    let mut lines: Vec<Line<'_>> = raised.iter().map(|alarm| alarm_line(alarm, subject)).collect();
     if lines.is_empty() && raised_mask == 0 {
         lines.push(Line::raw("none raised").fg(Color::Green));
         if let Some(last) = telemetry.alarms.last() {
@@ -385,7 +388,7 @@ fn draw_alarms(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {
     frame.render_widget(paragraph.block(Block::bordered().title(title)), area);
 }
 
-fn alarm_line(alarm: &Alarm) -> Line<'static> {
+fn alarm_line(alarm: &Alarm, subject: &Subject) -> Line<'static> {
     let name = AlarmKind::try_from(alarm.kind).map_or("?", AlarmKind::name);
     let cell = if alarm.cell == u32::MAX {
         String::new()
@@ -397,12 +400,11 @@ fn alarm_line(alarm: &Alarm) -> Line<'static> {
     } else {
         Color::Yellow
     };
-    Line::from(format!(
-        "{name}{cell}: {:.4} against {:.4}",
-        alarm.value, alarm.threshold
-    ))
-    .fg(colour)
-    .bold()
+    let text = mismatch::text_of(alarm, &subject.step_order).map_or_else(
+        || format!("{name}{cell}: {:.4} against {:.4}", alarm.value, alarm.threshold),
+        |what| format!("{name}: {what}"),
+    );
+    Line::from(text).fg(colour).bold()
 }
 
 fn draw_cycles(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {

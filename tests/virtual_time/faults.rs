@@ -47,7 +47,8 @@ const BATTERY: &str = "[battery]\ncapacity_j = 400.0\nfull_v = 5.6\nempty_v = 4.
                        hotel_power_w = 0.5\nreserve_share = 0.1\n";
 
 use AlarmKind::{
-    BatteryLow, DeviceFault, EnergyOverBudget, JammedCell, LinkFault, MotorStall, NoProgress, SlidingDown, TrackerFault,
+    BatteryLow, DeviceFault, EnergyOverBudget, JammedCell, LinkFault, ModelMismatch, MotorStall, NoProgress,
+    SlidingDown, TrackerFault,
 };
 use Fault as F;
 use Mode::{Crawling, Fault as Faulty, Holding};
@@ -63,7 +64,14 @@ const CASES: &[Case] = &[
         Faulty,
         F::Alarm,
     ),
-    case(LEVEL, "jam:cell=1,share=0.8", None, &[], Crawling, F::None),
+    case(
+        LEVEL,
+        "jam:cell=1,share=0.8",
+        Some((ModelMismatch, 25.0)),
+        &[],
+        Crawling,
+        F::None,
+    ),
     case(
         STEEP,
         "slip:friction=0.4",
@@ -197,7 +205,14 @@ const CASES: &[Case] = &[
         Faulty,
         F::LinkLost,
     ),
-    case(LEVEL, "drag:force=0.3", None, &[], Crawling, F::None),
+    case(
+        LEVEL,
+        "drag:force=0.3",
+        Some((ModelMismatch, 25.0)),
+        &[],
+        Crawling,
+        F::None,
+    ),
 ];
 
 /// Why the case did not go as it should, if it did not, and what happened.
@@ -254,7 +269,7 @@ slope, fault: alarms and how long after it they came, how it ended
  0° stall                      motor-stall 0.03 s, fault (alarm)
  0° jam:cell=2                 jammed-cell 2.07 s, fault (alarm)
 30° jam:cell=4,share=0.4       jammed-cell 0.82 s, fault (alarm)
- 0° jam:cell=1,share=0.8       crawling
+ 0° jam:cell=1,share=0.8       model-mismatch 13.74 s, crawling
 30° slip:friction=0.4          sliding-down 0.31 s, no-progress 0.40 s, holding
 45° slip:friction=0.3          sliding-down 0.13 s, no-progress 0.15 s, holding
  0° slide:speed=0.003          no-progress 1.72 s, sliding-down 3.26 s, holding
@@ -276,7 +291,7 @@ slope, fault: alarms and how long after it they came, how it ended
  0° corrupt:share=0.3          link-fault 0.87 s, crawling
  0° drop:share=0.02            crawling
  0° delay:ms=2                 link-fault 0.10 s, tracker-fault 0.49 s, fault (link-lost)
- 0° drag:force=0.3             crawling
+ 0° drag:force=0.3             model-mismatch 11.24 s, crawling
 ";
 
 #[test]

@@ -4,6 +4,7 @@
 //! - `accuracy`: energy per cycle against the virtual worm's own ledger, within 2 %.
 //! - `stall`: a hard stall is told and the goal is 0 within 100 ms; how near a sound worm comes to the threshold.
 //! - `faults`: what each fault of the virtual worm brings about, by when, and nothing else.
+//! - `mismatch`: which worms the model does not explain, and that those of the file and a few per cent off are quiet.
 //! - `hours`: healthy worms on many kinds of journeys, and no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
 //!
 //! Everything is seeded; a failure names its seed.
@@ -13,4 +14,5 @@ mod faults;
 mod harness;
 mod hours;
 mod machine;
+mod mismatch;
 mod stall;

@@ -1,5 +1,6 @@
 //! What a person reads in the terminal: the tips, then a cycle in figures, one column for each recording.
 
+use crate::command::columns::{Row, aligned};
 use crate::experiment::{Analysis, CycleValues, TheoryCycle};
 use crate::report::number::{NONE, count, fixed, mean, with_error};
 
@@ -24,8 +25,6 @@ fn head(run: &Analysis) -> String {
         fixed(run.noise_m * 1e3, 3)
     )
 }
-
-type Row = Vec<String>;
 
 /// Largest tip deformations by each method. Recordings of one campaign are identified together, so the first speaks for all.
 fn tips(analyses: &[Analysis]) -> Vec<Row> {
@@ -120,25 +119,4 @@ fn cycle(analyses: &[Analysis]) -> Vec<Row> {
         fixed(run.misfit_ratio, 2)
     }));
     rows
-}
-
-/// Rows with their columns under each other: words to the left, figures to the right.
-fn aligned(rows: &[Row]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column: usize| {
-        let widths = rows.iter().filter_map(|row| row.get(column));
-        widths.map(|field| field.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let line = |row: &Row| {
-        let mut line = String::new();
-        for (column, (field, width)) in row.iter().zip(&widths).enumerate() {
-            line += &match column {
-                0 => format!("{field:<width$}"),
-                _ => format!("  {field:>width$}"),
-            };
-        }
-        line
-    };
-    rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }

@@ -28,12 +28,9 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    pub(super) fn is_empty(&self) -> bool {
-        self.states.is_empty()
-            && self.timings.is_empty()
-            && self.estimates.is_empty()
-            && self.cycles.is_empty()
-            && self.alarms.is_empty()
+    /// How many messages.
+    pub(super) fn len(&self) -> usize {
+        self.states.len() + self.timings.len() + self.estimates.len() + self.cycles.len() + self.alarms.len()
     }
 }
 

@@ -4,8 +4,8 @@ use super::children::Log;
 use crate::command::{Failure, print};
 use crate::config::{Config, Direction};
 use crate::message::{Alarm, AlarmKind, Cycle};
-use crate::watch::Telemetry;
 use crate::watch::view::{self, Subject};
+use crate::watch::{Telemetry, mismatch};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use ratatui::DefaultTerminal;
@@ -33,18 +33,27 @@ pub(super) enum Screen {
         log: VecDeque<String>,
     },
     /// A line for each cycle and alarm.
-    Lines { cycles: usize, alarms: usize },
+    Lines {
+        cycles: usize,
+        alarms: usize,
+        step_order: Vec<usize>,
+    },
     /// Standard output belongs to the JSON; alarms go to the log.
-    Silent { alarms: usize },
+    Silent { alarms: usize, step_order: Vec<usize> },
 }
 
 impl Screen {
     pub(super) fn open(json: bool, plain: bool, config: &Config) -> Result<Self, Failure> {
+        let step_order = config.worm.step_order.clone();
         if json {
-            return Ok(Self::Silent { alarms: 0 });
+            return Ok(Self::Silent { alarms: 0, step_order });
         }
         if plain || !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
-            return Ok(Self::Lines { cycles: 0, alarms: 0 });
+            return Ok(Self::Lines {
+                cycles: 0,
+                alarms: 0,
+                step_order,
+            });
         }
         let terminal = ratatui::try_init()
             .map_err(|error| Failure::failed(format!("the terminal cannot be used ({error}): try --plain")))?;
@@ -58,6 +67,7 @@ impl Screen {
             slope_deg: config.canal.slope_deg,
             backward: config.gait.direction == Direction::Backward,
             rate_hz: config.control.rate_hz,
+            step_order,
             full_scale_m: bounds_m.into_iter().fold(0.0, f64::max),
         };
         Ok(Self::Picture {
@@ -97,21 +107,25 @@ impl Screen {
                     .draw(|frame| view::draw(frame, subject, telemetry, shown))
                     .map_err(|error| Failure::failed(format!("the terminal is gone: {error}")))?;
             }
-            Self::Lines { cycles, alarms } => {
+            Self::Lines {
+                cycles,
+                alarms,
+                step_order,
+            } => {
                 forward(log);
                 for cycle in &telemetry.cycles[*cycles..] {
                     print::line(cycle_line(cycle))?;
                     *cycles += 1;
                 }
                 for alarm in &telemetry.alarms[*alarms..] {
-                    print::line(alarm_line(alarm))?;
+                    print::line(alarm_line(alarm, step_order))?;
                     *alarms += 1;
                 }
             }
-            Self::Silent { alarms } => {
+            Self::Silent { alarms, step_order } => {
                 forward(log);
                 for alarm in &telemetry.alarms[*alarms..] {
-                    print::log_line(alarm_line(alarm));
+                    print::log_line(alarm_line(alarm, step_order));
                 }
                 *alarms = telemetry.alarms.len();
             }
@@ -190,7 +204,7 @@ fn cycle_line(cycle: &Cycle) -> String {
     )
 }
 
-fn alarm_line(alarm: &Alarm) -> String {
+fn alarm_line(alarm: &Alarm, step_order: &[usize]) -> String {
     let kind = AlarmKind::try_from(alarm.kind).map_or("unknown", AlarmKind::name);
     let cell = if alarm.cell == u32::MAX {
         String::new()
@@ -198,6 +212,9 @@ fn alarm_line(alarm: &Alarm) -> String {
         format!(", cell {}", alarm.cell + 1)
     };
     let change = if alarm.raised == 0 { "cleared" } else { "RAISED" };
+    if let Some(what) = mismatch::text_of(alarm, step_order) {
+        return format!("alarm {kind}: {change}, {what}");
+    }
     format!(
         "alarm {kind}{cell}: {change}, {:.4} against {:.4}",
         alarm.value, alarm.threshold

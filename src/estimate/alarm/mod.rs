@@ -4,8 +4,8 @@
 //! gives back the alarms that were raised or cleared. It owns no clock: time is [`State::time_ns`]. It allocates nothing.
 //!
 //! Read in this order: `motion` tells what the cam does and `sample` which positions to trust; each detector (`stall`,
-//! `jam`, `stride` with `progress` and `sliding`, `page` with `energy`, `battery`, `link`, `tracker`, `device`) tells in
-//! its head how it decides; `latch` turns what they find into one "raised" and one "cleared".
+//! `jam`, `stride` with `progress` and `sliding`, `page` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`)
+//! tells in its head how it decides; `latch` turns what they find into one "raised" and one "cleared".
 //!
 //! **Calibration.** What is usual is learned on the first `estimator.calibration_cycles` good cycles, in the gait's phase:
 //! extensions and energy for the present speed and direction, advance and retraction for each direction. Where a
@@ -15,7 +15,7 @@
 //!
 //! **Clearing.** An alarm is cleared when its condition was clearly over for a while. Stall, jam and lack of progress
 //! exist only while the worm is asked to move: they also clear two seconds after it no longer is, so that a reset of the
-//! fault that they caused is possible. Energy and battery keep their alarm through pauses.
+//! fault that they caused is possible. Energy, battery and model mismatch keep their alarm through pauses.
 //!
 //! **Restart.** When the controller's sequence goes back everything raised is cleared and learned anew, except the charge of
 //! the battery, which did not change.
@@ -27,6 +27,7 @@ mod energy;
 mod jam;
 mod latch;
 mod link;
+mod mismatch;
 mod motion;
 mod page;
 mod progress;
@@ -43,6 +44,7 @@ pub use changes::AlarmChanges;
 
 use crate::MAX_CELLS;
 use crate::config::Config;
+use crate::estimate::ResidualMap;
 use crate::message::{AlarmKind, Cycle, Estimate, State};
 use latch::{Finding, Latch, Patience};
 use motion::{Moment, Motion};
@@ -57,6 +59,8 @@ pub struct Observation<'a> {
     pub estimate: Option<&'a Estimate>,
     /// The gait cycle that ended, if one did.
     pub cycle: Option<&'a Cycle>,
+    /// What the model does not explain, as of now.
+    pub residuals: Option<&'a ResidualMap>,
 }
 
 /// Watches one worm for everything that [`AlarmKind`] names.
@@ -90,6 +94,7 @@ struct Detectors {
     link: link::LinkFault,
     tracker: tracker::TrackerFault,
     device: device::DeviceFault,
+    mismatch: mismatch::ModelMismatch,
     by_position: [Finding; 3], // jam, progress, sliding, as of the last sample
     sample_age_s: f64,
 }
@@ -109,6 +114,7 @@ impl Watch {
             link: link::LinkFault::new(config),
             tracker: tracker::TrackerFault::new(config),
             device: device::DeviceFault::new(config),
+            mismatch: mismatch::ModelMismatch::new(config),
             by_position: [Finding::Blind; 3],
             sample_age_s: 0.0,
         };
@@ -140,20 +146,16 @@ impl Watch {
             self.detectors.clone_from(&self.fresh);
             moment = self.detectors.motion.update(state);
         }
-        let sound = [
-            AlarmKind::MotorStall,
-            AlarmKind::JammedCell,
-            AlarmKind::NoProgress,
-            AlarmKind::SlidingDown,
-            AlarmKind::TrackerFault,
-        ]
-        .iter()
-        .all(|kind| !self.is_raised(*kind));
+        let sound = self.is_sound();
         let findings = self.findings(&moment, observation, sound);
         self.armed_mask = 0;
         for (finding, latch) in findings.iter().zip(&mut self.latches) {
             self.armed_mask |= u32::from(finding.watches()) << latch.kind().code();
-            if let Some(alarm) = latch.update(moment.now_ns, state.phase, finding) {
+            let phase = match latch.kind() {
+                AlarmKind::ModelMismatch => self.detectors.mismatch.phase_before(state.phase),
+                _ => state.phase,
+            };
+            if let Some(alarm) = latch.update(moment.now_ns, phase, finding) {
                 changes.push(alarm, &mut self.next_sequence);
             }
         }
@@ -173,6 +175,19 @@ impl Watch {
             .sum()
     }
 
+    /// Whether no alarm stands that makes a cycle no example of how the worm crawls.
+    pub fn is_sound(&self) -> bool {
+        [
+            AlarmKind::MotorStall,
+            AlarmKind::JammedCell,
+            AlarmKind::NoProgress,
+            AlarmKind::SlidingDown,
+            AlarmKind::TrackerFault,
+        ]
+        .iter()
+        .all(|kind| !self.is_raised(*kind))
+    }
+
     /// Charge left in the battery, 0 to 1; `NaN` without a battery or before its voltage was read.
     pub const fn battery_share(&self) -> f64 {
         self.battery.share()
@@ -184,7 +199,12 @@ impl Watch {
 
     /// What every detector finds, in the order of [`AlarmKind::ALL`].
     fn findings(&mut self, moment: &Moment, observation: &Observation<'_>, sound: bool) -> [Finding; KINDS] {
-        let Observation { state, estimate, cycle } = *observation;
+        let Observation {
+            state,
+            estimate,
+            cycle,
+            residuals,
+        } = *observation;
         let detectors = &mut self.detectors;
         detectors.sight.follow(state, self.cells);
         if let Some(cycle) = cycle {
@@ -216,6 +236,7 @@ impl Watch {
             detectors.link.update(moment, state),
             detectors.tracker.update(moment, state),
             detectors.device.update(moment, state),
+            detectors.mismatch.update(moment, residuals),
         ]
     }
 }
@@ -245,6 +266,7 @@ const fn patience_of(kind: AlarmKind) -> Patience {
         AlarmKind::LinkFault => (0.0, 1.0),
         AlarmKind::TrackerFault => (0.0, 2.0),
         AlarmKind::DeviceFault => (0.0, 2.0),
+        AlarmKind::ModelMismatch => (0.0, 0.0),
     };
     Patience {
         raise_after_ns: (raise_after_s * 1e9) as u64,

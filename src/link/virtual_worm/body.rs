@@ -1,9 +1,11 @@
-//! The worm's body in its canal, driven by the cam: the exact solver of [`model`](crate::model) with scatter and faults.
+//! The worm's body in its canal, driven by the cam: the motion of [`model`](crate::model) under every `[[effect]]`, with scatter and
+//! faults.
 
 use super::conditions::PlantConditions;
 use crate::MAX_CELLS;
 use crate::config::Config;
-use crate::model::{Contact, Ledger, Motion, Worm, WormError};
+use crate::model::effect::{Setting, SettingError};
+use crate::model::{Contact, Ledger, Locomotion, Physics, SlidesDown, View, Worm, WormError};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
@@ -18,56 +20,68 @@ const SLIDE_DRAG_N_S_PER_M: f64 = 50.0;
 /// Share by which a sliding body's pull stays below what its tips hold, so that the balance exists.
 const HOLD_MARGIN: f64 = 1e-9;
 
+/// Times that a step is tried again with less pull on a body that begins to slide within it.
+const SLIDING_TRIALS: u32 = 4;
+
+/// Why there is no body.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BodyError {
+    /// The configuration describes no worm.
+    #[error(transparent)]
+    Worm(#[from] WormError),
+    /// An effect cannot be switched on.
+    #[error(transparent)]
+    Effect(#[from] SettingError),
+    /// Nothing holds it, whatever slides.
+    #[error("{0}: give worm.max_deformation_m or canal.slope_deg, or an effect, other values")]
+    SlidesDown(#[from] SlidesDown),
+}
+
 /// Cells, contacts and cam.
 #[derive(Debug, Clone)]
 pub struct Body {
-    nominal: Worm, // without scatter and faults
+    nominal: Worm, // without scatter, faults and effects
+    effects: Vec<Setting>,
     slope_rad: f64,
     scatter_share: f64,
     scatter: [f64; MAX_CELLS], // factors of the largest tip deformations, in this cycle
     conditions: PlantConditions,
-    worm: Worm, // as it is now
-    slide_m_per_s: f64,
-    dragged_m: f64, // down the canal, tips and all
-    motion: Motion,
+    physics: Physics, // as they are now, but for what a slide takes off the pull
+    relief_n: f64,    // what the slide takes off the pull
+    dragged_m: f64,   // down the canal, tips and all
+    motion: Locomotion,
 }
 
 impl Body {
     /// At rest at phase 0, cell 1 in front.
     ///
     /// # Errors
-    /// [`WormError`] when the configuration was not checked and describes no worm.
-    pub fn new(config: &Config) -> Result<Self, WormError> {
-        let body = &config.worm;
-        let bounds_m = config
-            .virtual_worm
-            .max_deformation_m
-            .as_ref()
-            .unwrap_or(&body.max_deformation_m);
-        let contact = |cell| Contact::symmetric(body.stiffness_n_per_m.of(cell), bounds_m.of(cell));
-        let slope_rad = config.canal.slope_deg.to_radians();
-        let mut nominal = Worm::uniform(body.cells, contact(0), body.mass_kg, body.stroke_m)?
-            .with_step_order(&body.step_order_from_zero())?
-            .with_slope_rad(slope_rad)?;
-        for cell in 1..body.cells {
-            nominal = nominal.with_contact(cell, contact(cell))?;
+    /// [`BodyError`] when the configuration was not checked and describes no worm.
+    pub fn new(config: &Config) -> Result<Self, BodyError> {
+        let mut nominal = Worm::try_from(config)?;
+        if let Some(bounds_m) = &config.virtual_worm.max_deformation_m {
+            let bounds_m: Vec<f64> = (0..nominal.cells()).map(|cell| bounds_m.of(cell)).collect();
+            nominal = nominal.with_max_deformations_m(&bounds_m)?;
         }
-        let positions_m: Vec<f64> = (0..body.cells)
-            .map(|cell| (body.cells - 1 - cell) as f64 * body.cell_spacing_m)
+        let positions_m: Vec<f64> = (0..nominal.cells())
+            .rev()
+            .map(|behind| behind as f64 * config.worm.cell_spacing_m)
             .collect();
-        let mut new = Self {
-            slope_rad,
+        let effects = Setting::configured(config)?;
+        let physics = Physics::of(nominal.clone()).with(&effects);
+        let relief_n = relief_n(&physics);
+        Ok(Self {
+            slope_rad: nominal.slope_rad(),
+            nominal,
+            effects,
             scatter_share: config.virtual_worm.scatter_share,
             scatter: [1.0; MAX_CELLS],
             conditions: PlantConditions::default(),
-            worm: nominal.clone(),
-            slide_m_per_s: 0.0,
+            motion: Locomotion::at_rest(&relieved(&physics, relief_n)?, &positions_m)?,
+            physics,
+            relief_n,
             dragged_m: 0.0,
-            motion: Motion::at_rest(&nominal, &positions_m),
-            nominal,
-        };
-        new.take_up()?;
-        Ok(new)
+        })
     }
 
     /// Draws the tip deformations of the next cycle.
@@ -94,7 +108,7 @@ impl Body {
         self.take_up()
     }
 
-    /// Makes the worm of this moment from what is nominal, scattered and wrong.
+    /// Makes the physics of this moment from what is nominal, scattered and wrong.
     fn take_up(&mut self) -> Result<(), WormError> {
         let slope_rad = self.conditions.slope_deg.map_or(self.slope_rad, f64::to_radians);
         let mut worm = self
@@ -112,39 +126,57 @@ impl Body {
                 )?
                 .with_stroke_scale(cell, self.conditions.stroke_scale[cell])?;
         }
-        // A body that slides is balanced by the drag of its sliding: its tips hold what they can, the drag the rest.
-        let pull_n = worm.pull_n();
-        let excess_n = match worm.check_hold() {
-            Ok(()) => 0.0,
-            Err(slides) => pull_n - (slides.hold_n * (1.0 - HOLD_MARGIN)).copysign(pull_n),
-        };
-        self.slide_m_per_s = -excess_n / SLIDE_DRAG_N_S_PER_M;
-        self.worm = worm.with_resisting_force_n(self.conditions.drag_n - excess_n)?;
+        self.physics = Physics::of(worm).with(&self.effects);
+        self.relieve(relief_n(&self.physics))
+    }
+
+    /// Takes the drag of a sliding body off the pull.
+    fn relieve(&mut self, relief_n: f64) -> Result<(), WormError> {
+        self.relief_n = relief_n;
         // The balance exists, so this cannot fail; if it did, the next advance would say so again.
-        let _balanced = self.motion.rebalance(&self.worm);
+        let _balanced = self.motion.take_up(&relieved(&self.physics, relief_n)?);
         Ok(())
     }
 
     /// Turns the cam to a phase in gait cycles within `dt_s`. Returns the net work that the cam did, J.
-    pub fn advance_to(&mut self, phase: f64, dt_s: f64) -> f64 {
+    ///
+    /// # Errors
+    /// [`WormError`] never for a checked configuration.
+    pub fn advance_to(&mut self, phase: f64, dt_s: f64) -> Result<f64, WormError> {
         self.dragged_m += self.conditions.drag_speed_m_per_s * dt_s;
-        if self.slide_m_per_s != 0.0 {
-            self.motion.translate(&self.worm, self.slide_m_per_s * dt_s);
+        if self.relief_n != 0.0 {
+            self.motion.translate(self.slide_m_per_s() * dt_s, dt_s);
         }
-        if phase == self.motion.phase() {
-            return 0.0;
+        if self.motion.is_exact() && phase == self.motion.phase() {
+            return Ok(0.0);
         }
         let before_j = self.motion.ledger().actuator_net_j;
-        // `take_up` has made sure that the tips hold, so the solver does not refuse.
-        let advanced = self.motion.advance_to(&self.worm, phase);
-        debug_assert!(advanced.is_ok(), "{advanced:?}");
-        self.motion.ledger().actuator_net_j - before_j
+        if self.relief_n != 0.0 && !self.motion.is_exact() {
+            self.relieve(relief_n(&self.physics))?;
+        }
+        // Tips that hold at rest may fail on the way: worn down, on a slick patch, against a tether.
+        for _ in 0..SLIDING_TRIALS {
+            let Err(slides) = self.motion.advance_to(phase, dt_s) else {
+                break;
+            };
+            self.relieve(self.relief_n + excess_n(&slides))?;
+        }
+        Ok(self.motion.ledger().actuator_net_j - before_j)
     }
 
-    /// Load torque on the cam now, N m: the stepping cell's actuator force times its extension per angle.
+    /// Load torque on the cam now, N m.
     pub fn torque_n_m(&self) -> f64 {
-        let stroke_m = self.worm.stroke_of_m(self.motion.stepping_cell(&self.worm));
-        self.motion.actuator_force_n(&self.worm) * stroke_m * self.worm.cells() as f64 / TAU
+        self.motion.drive_load_j() / TAU
+    }
+
+    /// Share of its speed that the motor is left under its present load.
+    pub fn speed_share(&self, sense: f64) -> f64 {
+        self.physics.speed_share(sense * self.motion.actuator_force_n())
+    }
+
+    /// What lengths look like to the tracker.
+    pub fn view(&self) -> View {
+        self.physics.view
     }
 
     /// Number of cells.
@@ -180,6 +212,27 @@ impl Body {
 
     /// Velocity of the slide of a body that its tips cannot hold, m/s; 0 while they hold.
     pub fn slide_m_per_s(&self) -> f64 {
-        self.slide_m_per_s
+        -self.relief_n / SLIDE_DRAG_N_S_PER_M
     }
+}
+
+/// What must be taken off the pull of a body so that its tips hold it at rest, N: a body that slides is balanced by the drag of
+/// its sliding, its tips hold what they can.
+fn relief_n(physics: &Physics) -> f64 {
+    physics
+        .clamped_worm()
+        .check_hold()
+        .map_or_else(|slides| excess_n(&slides), |()| 0.0)
+}
+
+fn excess_n(slides: &SlidesDown) -> f64 {
+    slides.pull_n - (slides.hold_n * (1.0 - HOLD_MARGIN)).copysign(slides.pull_n)
+}
+
+fn relieved(physics: &Physics, relief_n: f64) -> Result<Physics, WormError> {
+    let resisting_n = physics.worm.resisting_force_n() - relief_n;
+    Ok(Physics {
+        worm: physics.worm.clone().with_resisting_force_n(resisting_n)?,
+        ..physics.clone()
+    })
 }

@@ -1,5 +1,6 @@
 //! What the devices do with what comes along their line: dispatch, order and form of the answers.
 
+use super::body::BodyError;
 use super::conditions::Conditions;
 use super::fault::Fault;
 use super::line::{Line, derived_seed};
@@ -39,7 +40,7 @@ enum Device {
 }
 
 impl Bus {
-    pub(super) fn new(config: &Config, options: &Options) -> Result<Self, WormError> {
+    pub(super) fn new(config: &Config, options: &Options) -> Result<Self, BodyError> {
         let mut bus = Self {
             now_s: 0.0,
             crawl_began_s: None,

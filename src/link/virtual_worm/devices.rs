@@ -7,6 +7,7 @@
 //! A damaged instruction is answered with a CRC error by the device whose ID it bears, an unknown one with an instruction
 //! error. The return delay is kept by each device; the time that bytes take on a real wire is not modelled.
 
+use super::body::BodyError;
 use super::bus::Bus;
 use super::options::Options;
 use super::plant::Plant;
@@ -21,9 +22,9 @@ const IDLE_S: f64 = 5e-3;
 /// Why the devices cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DevicesError {
-    /// The configuration describes no worm.
+    /// The configuration describes no body.
     #[error(transparent)]
-    Worm(#[from] WormError),
+    Body(#[from] BodyError),
     /// A fault names a cell that this worm does not have.
     #[error("the fault {fault} names cell {cell}, but the worm has {cells} cells: give a cell from 1 to {cells}")]
     NoSuchCell {

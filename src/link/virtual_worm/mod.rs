@@ -3,8 +3,8 @@
 //!
 //! From the physics out to the port:
 //!
-//! 1. A [`supply`] feeds a [`motor`], solved exactly within each step; the motor turns the cam of a [`body`], the exact
-//!    quasi-static solver of [`model`](crate::model) with friction that scatters from cycle to cycle; a camera ([`sight`])
+//! 1. A [`supply`] feeds a [`motor`], solved exactly within each step; the motor turns the cam of a [`body`], the
+//!    quasi-static motion of [`model`](crate::model) under every `[[effect]]`, with friction that scatters from cycle to cycle; a camera ([`sight`])
 //!    sees the cells. [`Plant`] steps them together and keeps the [`ledger`] of where the energy went. No clock, no I/O.
 //! 2. `servo` and `tracker` are the devices: control tables with the manual's access rules, modes, watchdog, shutdown.
 //!    [`Devices`] puts both on a bus: bytes and a time in, bytes out. Still no clock.
@@ -15,6 +15,9 @@
 //! [`fault`] for the grammar and [`Fault::help`] for the list.
 //!
 //! # Limits
+//! Of the effects, `sensor-latency` is left out: the tracker's captures are as old as the bus makes them. `motor-droop` slows the
+//! velocity that the servo is told to keep.
+//!
 //! The winding's inductance, the play of the gears and the time of bytes on a real wire are left out. The servo's EEPROM
 //! lasts as long as the process. Positions, currents and voltages are quantised as the registers are; currents and
 //! voltages carry no noise.

@@ -1,11 +1,11 @@
 //! The whole machine without its electronics: supply, motor, body and camera, stepped together, and the truth about them.
 //!
 //! One cam turn is one gait cycle. In a step of fixed length the motor is solved against the load torque that the body
-//! exerts at its beginning; then the cam turns the body, exactly, and what the body really took beyond that torque is
+//! exerts at its beginning; then the cam turns the body, and what the body really took beyond that torque is
 //! taken out of the motor's kinetic energy. So electrical energy = copper heat + friction inside + net actuator work +
 //! change of kinetic energy holds to rounding over any stretch.
 
-use super::body::Body;
+use super::body::{Body, BodyError};
 use super::conditions::{PlantConditions, Sight};
 use super::ledger::{Account, Standing, TruthLedger};
 use super::motor::{Drive, Gains, Motor};
@@ -44,8 +44,8 @@ impl Plant {
     /// At rest at gait phase 0 and time 0. `seed` takes the place of the configured one.
     ///
     /// # Errors
-    /// [`WormError`] when the configuration was not checked and describes no worm.
-    pub fn new(config: &Config, seed: Option<u64>) -> Result<Self, WormError> {
+    /// [`BodyError`] when the configuration was not checked and describes no worm.
+    pub fn new(config: &Config, seed: Option<u64>) -> Result<Self, BodyError> {
         Self::with_step(config, seed, DEFAULT_STEP_S)
     }
 
@@ -53,7 +53,7 @@ impl Plant {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn with_step(config: &Config, seed: Option<u64>, step_s: f64) -> Result<Self, WormError> {
+    pub fn with_step(config: &Config, seed: Option<u64>, step_s: f64) -> Result<Self, BodyError> {
         let mut chance = Xoshiro256PlusPlus::seed_from_u64(seed.unwrap_or(config.virtual_worm.seed));
         let mut body = Body::new(config)?;
         body.scatter(&mut chance)?;
@@ -130,23 +130,28 @@ impl Plant {
     /// [`WormError`] never for a checked configuration.
     pub fn step(&mut self) -> Result<(), WormError> {
         let load_n_m = self.body.torque_n_m();
+        let drive = match self.drive {
+            Drive::Velocity(rad_per_s) => Drive::Velocity(rad_per_s * self.body.speed_share(rad_per_s.signum())),
+            other => other,
+        };
         let before_j = self.motor.kinetic_j();
         let mut energy = self
             .motor
-            .step(self.drive, &self.gains, load_n_m, &mut self.supply, self.step_s);
+            .step(drive, &self.gains, load_n_m, &mut self.supply, self.step_s);
         self.steps += 1;
         let phase = self.motor.angle_rad() / TAU;
         let mut work_j = 0.0;
         let mut left_s = self.step_s;
         if (phase - self.cycle_began_at).abs() >= 1.0 {
             let boundary = self.cycle_began_at + (phase - self.cycle_began_at).signum();
-            work_j += self.body.advance_to(boundary, left_s);
-            left_s = 0.0;
+            let share = (boundary - self.body.phase()) / (phase - self.body.phase());
+            work_j += self.body.advance_to(boundary, share * self.step_s)?;
+            left_s -= share * self.step_s;
             self.cycle_began_at = boundary;
             self.ledger.close_cycle(&standing(self.time_s(), &self.body));
             self.body.scatter(&mut self.chance)?;
         }
-        work_j += self.body.advance_to(phase, left_s);
+        work_j += self.body.advance_to(phase, left_s)?;
         let missing_j = energy.load_j - work_j + self.owed_j;
         if missing_j != 0.0 {
             self.owed_j = self.motor.give_kinetic(missing_j);
@@ -154,7 +159,11 @@ impl Plant {
         energy.kinetic_j = self.motor.kinetic_j() - before_j;
         self.ledger.add(&energy);
         if self.time_s() >= self.camera.due_s() {
-            self.camera.capture(&self.body.positions_m(), &mut self.chance);
+            let mut seen_m = self.body.positions_m();
+            seen_m
+                .iter_mut()
+                .for_each(|position_m| *position_m *= self.body.view().scale);
+            self.camera.capture(&seen_m, &mut self.chance);
         }
         Ok(())
     }

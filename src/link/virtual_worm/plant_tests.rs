@@ -1,6 +1,7 @@
 use super::*;
 use crate::MAX_CELLS;
 use crate::config::PerCell;
+use crate::model::{Physics, steady_cycle_of};
 
 /// Gains as the servo's defaults make them.
 const GAINS: Gains = Gains {
@@ -165,6 +166,57 @@ fn conditions_do_what_they_say() {
     assert!(plant.motor().bus_v() < 3.0);
     let (plant, ..) = run(&|c| c.heated_to_c = Some(90.0));
     assert!(plant.motor().case_c() > 85.0);
+}
+
+/// With effects the body crawls as the model says it must; the account closes all the same.
+#[test]
+fn effects_act_on_the_body() {
+    for (name, parameters) in [
+        ("pad-hardening", vec![("hardening", 1.0)]),
+        ("backlash", vec![("play_m", 1e-3)]),
+        ("viscous-drag", vec![("drag_n_s_per_m", 10.0)]),
+        ("unequal-clamping", vec![("friction_factor", 0.6)]),
+    ] {
+        let mut config = smooth();
+        config.effect.push(crate::config::Effect {
+            name: name.to_owned(),
+            cell: (name == "unequal-clamping").then_some(2),
+            parameters: parameters
+                .iter()
+                .map(|&(name, value)| (name.to_owned(), value))
+                .collect(),
+        });
+        let plant = crawl(&config, GAIT_RAD_PER_S, 11.0);
+        let physics = Physics::try_from(&config).expect("a worm");
+        let outcome = steady_cycle_of(&physics, 2.5);
+        let expected = outcome.cycle().expect("it holds");
+        let cycle = &plant.ledger().cycles()[3];
+        assert!(
+            (cycle.advance_m - expected.advance_m).abs() < 2e-5,
+            "{name}: {cycle:?} {expected:?}"
+        );
+        let (found_j, expected_j) = (cycle.actuator_net_j, expected.energy_actuator_net_j);
+        assert!(
+            (found_j / expected_j - 1.0).abs() < 0.01,
+            "{name}: {found_j} J, not {expected_j} J"
+        );
+        assert_closes(&plant.total(), 1e-9);
+    }
+}
+
+/// A body that comes to slide on its way, worn down, slides and does not stop the world.
+#[test]
+fn a_body_worn_down_slides() {
+    let mut config = smooth();
+    config.canal.slope_deg = 40.0;
+    config.effect.push(crate::config::Effect {
+        name: "wear".to_owned(),
+        cell: None,
+        parameters: [("loss_per_cycle".to_owned(), 0.15)].into(),
+    });
+    let plant = crawl(&config, GAIT_RAD_PER_S, 40.0);
+    assert!(plant.body().slide_m_per_s() < 0.0, "{}", plant.body().slide_m_per_s());
+    assert!(plant.body().phase() > 14.0, "{}", plant.body().phase());
 }
 
 #[test]

@@ -12,6 +12,10 @@ const NARROWEST: f64 = 1e-6;
 const FEW_PLACES: f64 = 3.0;
 /// Room beyond the outermost values, as a share of their range.
 const MARGIN: f64 = 0.05;
+/// Room beyond the largest value of a logarithmic axis, as a share of its decades: what stands behind a bar must fit.
+const ROOM_BEHIND: f64 = 0.16;
+/// Most ticks of a logarithmic axis.
+const MOST_POWERS: usize = 6;
 
 /// An axis: what it spans, where its ticks are and what they are called.
 #[derive(Debug, Clone)]
@@ -20,12 +24,14 @@ pub struct Axis {
     high: f64,
     ticks: Vec<f64>,
     labels: Labels,
+    is_logarithmic: bool, // then low is positive
 }
 
 #[derive(Debug, Clone)]
 enum Labels {
     Decimals(usize),
     Names(Vec<String>),
+    Powers,
 }
 
 impl Axis {
@@ -67,7 +73,44 @@ impl Axis {
             high: places - 1.0 + room,
             ticks: (0..names.len()).map(|place| place as f64).collect(),
             labels: Labels::Names(names),
+            is_logarithmic: false,
         }
+    }
+
+    /// Rows with names, as a list is read: the first stands on top, at the highest place, the last at place 0.
+    pub fn listed(mut names: Vec<String>) -> Self {
+        names.reverse();
+        Self {
+            low: -0.5,
+            high: names.len().max(1) as f64 - 0.5,
+            ..Self::named(names)
+        }
+    }
+
+    /// Logarithmic from `least`, a power of ten, to the largest value that can be drawn and some room behind it.
+    pub fn powers_of_ten(least: f64, values: impl IntoIterator<Item = f64>) -> Self {
+        let drawable = values.into_iter().filter(|value| Self::can_show(*value));
+        let largest = drawable.fold(10.0 * least, f64::max);
+        let decades = (largest / least).log10();
+        let high = least * 10f64.powf(decades * (1.0 + ROOM_BEHIND));
+        let powers = (high / least).log10().floor() as usize;
+        let every = powers / MOST_POWERS + 1;
+        let ticks = (0..=powers).step_by(every);
+        Self {
+            low: least,
+            high,
+            ticks: ticks.map(|power| least * 10f64.powi(power as i32)).collect(),
+            labels: Labels::Powers,
+            is_logarithmic: true,
+        }
+    }
+
+    /// Characters of its longest name; 0 where its ticks are numbers.
+    pub fn longest_name(&self) -> usize {
+        let Labels::Names(names) = &self.labels else {
+            return 0;
+        };
+        names.iter().map(|name| name.chars().count()).max().unwrap_or(0)
     }
 
     /// Whether a value can be drawn at all.
@@ -95,7 +138,16 @@ impl Axis {
             high,
             ticks: (0..count).map(|tick| (first + tick as f64) * step).collect(),
             labels: Labels::Decimals((-step.log10().floor()).clamp(0.0, 9.0) as usize),
+            is_logarithmic: false,
         }
+    }
+
+    /// Where a value lies between its ends, as a share; what a logarithmic axis cannot hold lies at its low end.
+    fn share(&self, value: f64) -> f64 {
+        if self.is_logarithmic {
+            return (value.max(self.low) / self.low).log10() / (self.high / self.low).log10();
+        }
+        (value - self.low) / (self.high - self.low)
     }
 }
 
@@ -131,8 +183,7 @@ impl Ranged for Axis {
     type ValueType = f64;
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let share = (value - self.low) / (self.high - self.low);
-        (f64::from(limit.0) + share * f64::from(limit.1 - limit.0)).round() as i32
+        (f64::from(limit.0) + self.share(*value) * f64::from(limit.1 - limit.0)).round() as i32
     }
 
     fn key_points<Hint: KeyPointHint>(&self, _hint: Hint) -> Vec<f64> {
@@ -149,6 +200,7 @@ impl ValueFormatter<f64> for Axis {
         match &self.labels {
             Labels::Decimals(decimals) => number::fixed(*value, *decimals),
             Labels::Names(names) => names.get(value.round() as usize).cloned().unwrap_or_default(),
+            Labels::Powers => number::fixed(*value, (-value.log10()).ceil().clamp(0.0, 9.0) as usize),
         }
     }
 }
@@ -167,6 +219,19 @@ mod tests {
         assert_eq!(labels(&Axis::between(0.0, 1.1, 5)), ["0.0", "0.5", "1.0"]);
         assert_eq!(labels(&Axis::between(0.0, 30.1, 6)), ["0", "10", "20", "30"]);
         assert_eq!(labels(&Axis::named(vec!["0°".to_owned()])), ["0°"]);
+        assert_eq!(
+            labels(&Axis::listed(["a", "b"].map(str::to_owned).to_vec())),
+            ["b", "a"]
+        );
+        assert_eq!(labels(&Axis::powers_of_ten(1.0, [350.0])), ["1", "10", "100"]);
+        assert_eq!(labels(&Axis::powers_of_ten(0.1, [f64::NAN, -4.0])), ["0.1", "1"]);
+    }
+
+    #[test]
+    fn a_logarithmic_axis_holds_what_it_cannot_show_at_its_end() {
+        let axis = Axis::powers_of_ten(1.0, [100.0]);
+        let places = [-5.0, 0.0, 1.0, 10.0, 100.0].map(|value| axis.map(&value, (0, 232)));
+        assert_eq!(places, [0, 0, 0, 100, 200]);
     }
 
     #[test]

@@ -15,6 +15,9 @@ use plotters::style::{Color, IntoFont, ShapeStyle};
 /// Width of a sheet, in units; text and lines are sized for about that many CSS pixels.
 const WIDTH: f64 = 600.0;
 const LEFT: f64 = 50.0;
+/// Width of a character of a name to the left, and of what else stands there.
+const NAME_CHARACTER: f64 = 0.53 * TEXT;
+const BESIDE_NAME: f64 = 14.0;
 const RIGHT: f64 = 10.0;
 const ROW_LABEL: f64 = 44.0;
 const TOP: f64 = 20.0;
@@ -107,6 +110,7 @@ pub struct Plot<'p, 'a, 'b> {
     chart: &'p mut Chart<'a, 'b>,
     x: &'p Axis,
     y: &'p Axis,
+    width: f64, // units, without the axis
 }
 
 impl Plot<'_, '_, '_> {
@@ -121,14 +125,19 @@ impl Plot<'_, '_, '_> {
             if let [alone] = piece[..] {
                 piece.push(alone); // A line from a point to itself has round ends and is seen as a dot.
             }
-            if stroke.dashed {
-                let (dash, gap) = (dots(5.0), dots(5.0));
-                self.chart
-                    .draw_series(DashedLineSeries::new(piece, dash, gap, stroke.style()))?;
-            } else {
-                self.chart
-                    .draw_series(std::iter::once(PathElement::new(piece, stroke.style())))?;
-            }
+            self.draw_piece(piece, stroke)?;
+        }
+        Ok(())
+    }
+
+    fn draw_piece(&mut self, piece: Vec<(f64, f64)>, stroke: Stroke) -> Result<(), DrawError> {
+        if stroke.dashed {
+            let (dash, gap) = (dots(5.0), dots(5.0));
+            self.chart
+                .draw_series(DashedLineSeries::new(piece, dash, gap, stroke.style()))?;
+        } else {
+            self.chart
+                .draw_series(std::iter::once(PathElement::new(piece, stroke.style())))?;
         }
         Ok(())
     }
@@ -147,8 +156,7 @@ impl Plot<'_, '_, '_> {
     /// [`DrawError`].
     pub fn upright(&mut self, x: f64, from: f64, to: f64, stroke: Stroke) -> Result<(), DrawError> {
         if [x, from, to].into_iter().all(Axis::can_show) {
-            let path = PathElement::new(vec![(x, from), (x, to)], stroke.style());
-            self.chart.draw_series(std::iter::once(path))?;
+            self.draw_piece(vec![(x, from), (x, to)], stroke)?;
         }
         Ok(())
     }
@@ -229,7 +237,7 @@ impl Plot<'_, '_, '_> {
 
     /// Whether a name of so many characters fits above a band so wide.
     pub fn has_room(&self, width: f64, characters: usize) -> bool {
-        let units = width / (self.x.high() - self.x.low()) * (WIDTH - LEFT - ROW_LABEL);
+        let units = width / (self.x.high() - self.x.low()) * self.width;
         units > 0.6 * TEXT * characters as f64 + 4.0
     }
 
@@ -239,12 +247,57 @@ impl Plot<'_, '_, '_> {
     /// [`DrawError`].
     pub fn band(&mut self, x: [f64; 2], colour: Colour, opacity: f64, name: &str) -> Result<(), DrawError> {
         self.fill(x, [self.y.low(), self.y.high()], colour, opacity)?;
-        let centre = 0.5 * (x[0] + x[1]);
+        self.name_above(0.5 * (x[0] + x[1]), colour, name)
+    }
+
+    /// A name above the plot.
+    ///
+    /// # Errors
+    /// [`DrawError`].
+    pub fn name_above(&mut self, centre: f64, colour: Colour, name: &str) -> Result<(), DrawError> {
         if Axis::can_show(centre) && !name.is_empty() {
             let style = text_style(colour, HPos::Center, VPos::Bottom, true);
             let text = Text::new(name.to_owned(), (0, -dots(2.0)), style);
             self.chart
                 .draw_series(std::iter::once(EmptyElement::at((centre, self.y.high())) + text))?;
+        }
+        Ok(())
+    }
+
+    /// Words that begin just behind a place.
+    ///
+    /// # Errors
+    /// [`DrawError`].
+    pub fn words_behind(&mut self, x: f64, y: f64, colour: Colour, words: &str) -> Result<(), DrawError> {
+        if Axis::can_show(x) && Axis::can_show(y) {
+            let style = text_style(colour, HPos::Left, VPos::Center, false);
+            let text = Text::new(words.to_owned(), (dots(5.0), 0), style);
+            self.chart
+                .draw_series(std::iter::once(EmptyElement::at((x, y)) + text))?;
+        }
+        Ok(())
+    }
+
+    /// A ribbon between two lines, from points of a place and two heights that grow in x; broken where one is not finite.
+    ///
+    /// # Errors
+    /// [`DrawError`].
+    pub fn ribbon(
+        &mut self,
+        points: impl IntoIterator<Item = (f64, [f64; 2])>,
+        colour: Colour,
+        opacity: f64,
+    ) -> Result<(), DrawError> {
+        let points: Vec<(f64, [f64; 2])> = points.into_iter().collect();
+        let can_show = |(x, y): &(f64, [f64; 2])| [*x, y[0], y[1]].into_iter().all(Axis::can_show);
+        for piece in points.split(|point| !can_show(point)) {
+            if piece.len() < 2 {
+                continue; // It has no width.
+            }
+            let there = piece.iter().map(|(x, y)| (*x, y[0]));
+            let back = piece.iter().rev().map(|(x, y)| (*x, y[1]));
+            let ribbon = Polygon::new(there.chain(back).collect::<Vec<_>>(), colour.mix(opacity).filled());
+            self.chart.draw_series(std::iter::once(ribbon))?;
         }
         Ok(())
     }
@@ -272,6 +325,8 @@ pub fn draw(
     mut paint: impl FnMut(usize, &mut Plot<'_, '_, '_>) -> Result<(), DrawError>,
 ) -> Result<String, DrawError> {
     let rows_height: f64 = sheet.rows.iter().map(|row| row.height + BETWEEN_ROWS).sum();
+    let longest_name = sheet.rows.iter().map(|row| row.y.longest_name()).max().unwrap_or(0);
+    let left = (NAME_CHARACTER * longest_name as f64 + BESIDE_NAME).clamp(LEFT, 0.5 * WIDTH);
     let foot = TICK_LABELS + if sheet.x_label.is_some() { X_LABEL } else { 0.0 };
     let height = TOP + rows_height - BETWEEN_ROWS + foot;
     let right = if sheet.rows.iter().any(|row| row.label.is_some()) {
@@ -289,14 +344,16 @@ pub fn draw(
                 .clone()
                 .shrink((0, dots(top)), (dots(WIDTH - right), dots(row.height + tick_labels)));
             let mut chart = ChartBuilder::on(&whole)
-                .set_label_area_size(LabelAreaPosition::Left, dots(LEFT))
+                .set_label_area_size(LabelAreaPosition::Left, dots(left))
                 .set_label_area_size(LabelAreaPosition::Bottom, dots(tick_labels))
                 .build_cartesian_2d(sheet.x.clone(), row.y.clone())?;
-            draw_axes(&mut chart, is_last)?;
+            // Between named rows a grid has nothing to say.
+            draw_axes(&mut chart, is_last, row.y.longest_name() == 0)?;
             let mut plot = Plot {
                 chart: &mut chart,
                 x: &sheet.x,
                 y: &row.y,
+                width: WIDTH - left - right,
             };
             paint(number, &mut plot)?;
             if let Some((label, colour)) = &row.label {
@@ -306,14 +363,14 @@ pub fn draw(
             top += row.height + BETWEEN_ROWS;
         }
         if let Some(x_label) = &sheet.x_label {
-            let place = (0.5 * (LEFT + WIDTH - right), height - 2.0);
+            let place = (0.5 * (left + WIDTH - right), height - 2.0);
             raw.words(place, x_label, text_style(MUTED, HPos::Center, VPos::Bottom, false))?;
         }
         Ok(())
     })
 }
 
-fn draw_axes(chart: &mut Chart<'_, '_>, with_x_labels: bool) -> Result<(), DrawError> {
+fn draw_axes(chart: &mut Chart<'_, '_>, with_x_labels: bool, with_y_grid: bool) -> Result<(), DrawError> {
     let grid = Stroke::new(GRID, 1.0).style();
     let mut mesh = chart.configure_mesh();
     mesh.disable_x_mesh()
@@ -322,6 +379,9 @@ fn draw_axes(chart: &mut Chart<'_, '_>, with_x_labels: bool) -> Result<(), DrawE
         .axis_style(Stroke::new(MUTED, 0.75).style())
         .set_all_tick_mark_size(dots(3.0))
         .label_style(("sans-serif", text_size()).into_font().color(&MUTED));
+    if !with_y_grid {
+        mesh.disable_y_mesh();
+    }
     if !with_x_labels {
         mesh.disable_x_axis();
     }

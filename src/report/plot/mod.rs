@@ -14,6 +14,6 @@ mod thin;
 
 pub use axis::Axis;
 pub use canvas::{DrawError, Plot, Row, Sheet, Stroke, draw};
-pub use palette::{Colour, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, cell_colours, css};
+pub use palette::{ACCENT, Colour, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, cell_colours, css, diverging};
 
 pub(super) use raw::Raw;

@@ -17,6 +17,8 @@ pub const SHADE: Colour = RGBColor(0x3d, 0x52, 0x66);
 pub const MID: Colour = RGBColor(0x83, 0x98, 0xab);
 /// Third of them.
 pub const LIGHT: Colour = RGBColor(0xc4, 0xd0, 0xda);
+/// What is to be seen first among them.
+pub const ACCENT: Colour = RGBColor(0xc8, 0x10, 0x2e);
 /// The ground.
 pub const PAPER: Colour = RGBColor(0xff, 0xff, 0xff);
 
@@ -53,6 +55,32 @@ pub fn cell_colours(cells: usize) -> Vec<Colour> {
             mixed(MANY[stop], MANY[stop + 1], place - stop as f64)
         })
         .collect()
+}
+
+/// Stops of the diverging scale, from none to most, below and above zero: blue and orange, which the colour-blind tell apart,
+/// each as dark as its counterpart.
+const BELOW: [Colour; 4] = [
+    RGBColor(0xf7, 0xf7, 0xf7),
+    RGBColor(0xa6, 0xcb, 0xe8),
+    RGBColor(0x3b, 0x86, 0xc2),
+    RGBColor(0x0a, 0x3d, 0x75),
+];
+const ABOVE: [Colour; 4] = [
+    RGBColor(0xf7, 0xf7, 0xf7),
+    RGBColor(0xfb, 0xc1, 0x86),
+    RGBColor(0xd9, 0x6c, 0x14),
+    RGBColor(0x7a, 0x2e, 0x04),
+];
+
+/// Diverging colour of a value as a share of the largest, −1 to 1; grey where it is not known.
+pub fn diverging(share: f64) -> Colour {
+    if share.is_nan() {
+        return LIGHT;
+    }
+    let stops = if share < 0.0 { BELOW } else { ABOVE };
+    let place = share.abs().min(1.0) * (stops.len() - 1) as f64;
+    let stop = (place.floor() as usize).min(stops.len() - 2);
+    mixed(stops[stop], stops[stop + 1], place - stop as f64)
 }
 
 fn mixed(from: Colour, to: Colour, share: f64) -> Colour {

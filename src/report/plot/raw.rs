@@ -57,6 +57,8 @@ impl Raw<'_> {
         drop(raw);
         // The page sizes its pictures itself, so the opening tag with the backend's fixed size makes way for another.
         let inside = svg.split_once('>').map_or("", |(_, inside)| inside);
+        // The backend makes names safe but for control characters, which no page may hold; it ends its own lines with one.
+        let inside = inside.replace(|character: char| character.is_control() && character != '\n', " ");
         let description = crate::report::page::escaped(description);
         let (width, height) = size;
         Ok(format!(

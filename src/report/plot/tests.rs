@@ -27,6 +27,8 @@ fn what_is_not_finite_draws_nothing() {
                 plot.ring(x, y, INK)?;
                 plot.diamond(x, y, INK)?;
                 plot.fill([1.0, x], [0.0, y], INK, 1.0)?;
+                plot.words_behind(x, y, INK, "words")?;
+                plot.ribbon([(x, [y, 0.0]), (5.0, [0.0, y])], INK, 1.0)?;
                 plot.edge([1.0, x], [0.0, y], STROKE())?;
                 plot.whisker(x, y, y, 0.1)
             });
@@ -34,6 +36,7 @@ fn what_is_not_finite_draws_nothing() {
         }
         let drawn = picture(|plot| {
             plot.level(bad, STROKE())?;
+            plot.name_above(bad, INK, "name")?;
             plot.band([1.0, bad], INK, 1.0, "name")
         });
         assert_eq!(drawn, empty, "with {bad}");

@@ -63,6 +63,7 @@ proptest! {
                 state: &state,
                 estimate: sampled.then_some(&estimate),
                 cycle: ended.then_some(&cycle),
+                residuals: None,
             });
             for alarm in &changes {
                 prop_assert_eq!(alarm.sequence, numbered);

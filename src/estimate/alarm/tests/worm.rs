@@ -204,6 +204,7 @@ impl Bench {
             state: &self.state,
             estimate: sampled.then_some(&self.estimate),
             cycle: cycle.as_ref(),
+            residuals: None,
         };
         let changes = self.watch.update(&observation);
         self.changes.extend_from_slice(&changes);

@@ -1,0 +1,401 @@
+//! The motion under any of the laws, increment by increment.
+//!
+//! # One increment
+//! The drive moves each cell in the body; the body's translation is the one unknown. Every cell's force grows with the
+//! translation, so Σ Fᵢ + pull + M a = 0 is one monotone scalar equation, solved by Newton's method within a bracket. The law of
+//! each tip takes the whole increment at once (a *return mapping*), which is exact for springs with sliders as long as no cell
+//! turns within it; curved and rate-dependent laws are taken at the increment's end (implicit Euler). `balance` solves it; here is
+//! what it does to the worm.
+//!
+//! # Inertia
+//! By default there is none and the motion is quasi-static, as [`Motion`](super::Motion) is: both give the same figures where both
+//! apply. With a damping ratio the mean of the cells has mass: Newmark's method with constant mean acceleration, which neither
+//! damps nor excites. That is a tenth of a millimetre at 2.5 s a cycle, and seen in recordings.
+
+mod balance;
+mod carry;
+
+use super::ledger::Ledger;
+use super::mechanics::Mechanics;
+use super::pad::{Hold, Loaded, Pad};
+use super::worm::SlidesDown;
+use crate::MAX_CELLS;
+
+/// Velocity of the body beyond which nothing holds it, m/s.
+const LOST_M_S: f64 = 1.0;
+/// Increments that a step is cut into at least.
+const PARTS_OF_STEP: f64 = 100.0;
+/// Longest increment of a body with mass, s: a small part of a swing.
+const LONGEST_S: f64 = 4.2e-3;
+/// Shortest increment, s: nothing that depends on time happens in no time.
+const SHORTEST_S: f64 = 1e-9;
+/// Time that a worm laid down is given to come to rest, s: until nothing creeps or flows any more.
+const SETTLING_S: f64 = 1e6;
+
+/// A worm in motion under any of the laws. Fixed size, no heap; takes its [`Mechanics`] at every call, so that they may change
+/// while it moves.
+#[derive(Debug, Clone)]
+pub struct Crawl {
+    cells: usize,
+    cell: [Cell; MAX_CELLS],
+    position_m: [f64; MAX_CELLS],
+    phase: f64,
+    first_phase: f64,
+    travelled_m: f64, // by the mean of the cells
+    velocity_m_s: f64,
+    acceleration_m_s2: f64,
+    rate_m_s: f64, // of the body's translation in the last increment
+    damping_ratio: Option<f64>,
+    ledger: Ledger,
+}
+
+/// One cell in motion.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cell {
+    pad: Pad,
+    drive_m: f64,
+    damping_n: f64, // of the pad, in the last increment
+    drag_n: f64,    // on the cell, in the last increment
+    trial: Trial,
+}
+
+/// What the increment under way does to a cell.
+#[derive(Debug, Clone, Copy, Default)]
+struct Trial {
+    driven_m: f64,
+    friction: f64,
+    hold: Hold,
+    shift_m: f64,
+    loaded: Loaded,
+}
+
+/// What one increment is solved for.
+struct Increment {
+    step_s: f64,
+    relaxing: f64,
+    damping_n_per_m: f64,
+    drag_n_per_m: f64,
+    inertia_n_per_m: f64, // 0 without mass
+}
+
+impl Crawl {
+    /// A worm at rest: the tips, laid down unloaded, gave way together until they carry the pull. Without a damping ratio the
+    /// motion is quasi-static.
+    ///
+    /// # Errors
+    /// [`SlidesDown`] when they cannot.
+    ///
+    /// # Panics
+    /// When there is not one position for each cell.
+    pub fn at_rest(
+        mechanics: &Mechanics,
+        phase: f64,
+        first_positions_m: &[f64],
+        damping_ratio: Option<f64>,
+    ) -> Result<Self, SlidesDown> {
+        let cells = mechanics.worm.cells();
+        assert_eq!(first_positions_m.len(), cells, "one first position for each cell");
+        let mut position_m = [0.0; MAX_CELLS];
+        position_m[..cells].copy_from_slice(first_positions_m);
+        let mut crawl = Self {
+            cells,
+            cell: [Cell::default(); MAX_CELLS],
+            position_m,
+            phase,
+            first_phase: phase,
+            travelled_m: 0.0,
+            velocity_m_s: 0.0,
+            acceleration_m_s2: 0.0,
+            rate_m_s: 0.0,
+            damping_ratio: None,
+            ledger: Ledger::default(),
+        };
+        mechanics.worm.check_hold()?;
+        crawl.take_up(mechanics);
+        // A tether is slack where the worm has come to rest.
+        let mut untethered = mechanics.clone();
+        untethered.laws.tether_n_per_m = 0.0;
+        crawl.increment(&untethered, phase, SETTLING_S)?;
+        for cell in &mut crawl.cell {
+            (cell.damping_n, cell.drag_n) = (0.0, 0.0);
+        }
+        Ok(Self {
+            position_m,
+            travelled_m: 0.0,
+            rate_m_s: 0.0,
+            damping_ratio,
+            ledger: Ledger::default(),
+            ..crawl
+        })
+    }
+
+    /// Moves on to a phase that is reached evenly after `duration_s`.
+    ///
+    /// # Errors
+    /// [`SlidesDown`] when the tips cannot hold the worm.
+    pub fn advance_to(&mut self, mechanics: &Mechanics, phase: f64, duration_s: f64) -> Result<(), SlidesDown> {
+        let from = self.phase;
+        let parts = self.parts(phase, duration_s);
+        for part in 1..parts as usize {
+            self.increment(
+                mechanics,
+                from + (phase - from) * part as f64 / parts,
+                duration_s / parts,
+            )?;
+        }
+        self.increment(mechanics, phase, duration_s / parts)
+    }
+
+    /// Increments that a way to a phase is cut into.
+    fn parts(&self, phase: f64, duration_s: f64) -> f64 {
+        let by_phase = (phase - self.phase).abs() * self.cells as f64 * PARTS_OF_STEP;
+        let by_time = if self.damping_ratio.is_some() {
+            duration_s / LONGEST_S
+        } else {
+            0.0
+        };
+        by_phase.max(by_time).ceil().max(1.0)
+    }
+
+    /// Takes up changed mechanics at the present phase: nothing moves, and cells step on from where they are.
+    ///
+    /// # Panics
+    /// When the number of cells is another.
+    pub fn take_up(&mut self, mechanics: &Mechanics) {
+        assert_eq!(self.cells, mechanics.worm.cells(), "a motion keeps its number of cells");
+        let cam = mechanics.cam(self.phase);
+        for (index, cell) in self.cell[..self.cells].iter_mut().enumerate() {
+            cell.drive_m = mechanics.drive_at_m(index, &cam);
+        }
+    }
+
+    /// Moves the whole body along the canal against the contacts, balance or not, within `duration_s`: how a worm that cannot hold
+    /// slides down. What the slide sets free beyond friction is booked as settling loss.
+    pub fn translate(&mut self, mechanics: &Mechanics, distance_m: f64, duration_s: f64) {
+        let before_j = self.elastic_energy_j(mechanics);
+        let earlier = self.ledger.clone();
+        let increment = self.prepare(mechanics, self.phase, duration_s.max(SHORTEST_S));
+        self.try_out(mechanics, &increment, distance_m);
+        self.take(mechanics, &increment, distance_m, self.phase);
+        let spent_j = self.ledger.since(&earlier).loss_j();
+        self.ledger.settling_loss_j = earlier.settling_loss_j + before_j - self.elastic_energy_j(mechanics) - spent_j;
+    }
+
+    /// Begins a run here: the cells stand at these positions, and cycles and way count from now on.
+    ///
+    /// # Panics
+    /// When there is not one position for each cell.
+    pub fn begin_at(&mut self, positions_m: &[f64]) {
+        self.position_m[..self.cells].copy_from_slice(positions_m);
+        self.first_phase = self.phase;
+        self.travelled_m = 0.0;
+        self.ledger = Ledger::default();
+    }
+
+    /// Positions Xᵢ along the canal, m.
+    pub fn positions_m(&self) -> &[f64] {
+        &self.position_m[..self.cells]
+    }
+
+    /// Mean position of the cells, m.
+    pub fn mean_position_m(&self) -> f64 {
+        self.positions_m().iter().sum::<f64>() / self.cells as f64
+    }
+
+    /// Deformation of a cell's pad, m.
+    pub fn deformation_m(&self, cell: usize) -> f64 {
+        self.cell[..self.cells][cell].pad.deformation_m
+    }
+
+    /// Contact force on a cell's pad, N, positive when the pad is deformed forward.
+    pub fn contact_force_n(&self, cell: usize) -> f64 {
+        self.cell[..self.cells][cell].pad.force_n
+    }
+
+    /// Gait phase, cycles, unwrapped.
+    pub fn phase(&self) -> f64 {
+        self.phase
+    }
+
+    /// The account of energy and slides since the motion began.
+    pub fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// Force that the stepping cell's actuator exerts, N: its contact force, its weight along the canal and its share of every other
+    /// force on the worm (13).
+    pub fn actuator_force_n(&self, mechanics: &Mechanics) -> f64 {
+        let step = (self.phase * self.cells as f64).floor();
+        let cell = mechanics.worm.step_order()[step.rem_euclid(self.cells as f64) as usize];
+        self.driving_force_n(mechanics, cell)
+    }
+
+    /// Work of the whole drive for each cycle of phase as things stand, J: Σ force × dX/dφ over the cells that step.
+    pub fn drive_load_j(&self, mechanics: &Mechanics) -> f64 {
+        let cam = mechanics.cam(self.phase);
+        (0..self.cells)
+            .map(|cell| self.driving_force_n(mechanics, cell) * mechanics.drive_slope_m(cell, &cam))
+            .sum()
+    }
+
+    /// Energy that the worm gives back when it is let go, J: of the pads and of the drive that holds the cells.
+    pub fn elastic_energy_j(&self, mechanics: &Mechanics) -> f64 {
+        let compliance = mechanics.laws.compliance_m_per_n;
+        let cells = self.cell[..self.cells]
+            .iter()
+            .zip(&mechanics.pad)
+            .zip(&mechanics.standing_n);
+        cells
+            .map(|((cell, law), standing_n)| {
+                law.elastic_j(&cell.pad) + 0.5 * compliance * (cell.pad.force_n + standing_n).powi(2)
+            })
+            .sum()
+    }
+
+    /// Energy of a body with mass in motion, J; 0 without a damping ratio.
+    pub fn kinetic_energy_j(&self, mechanics: &Mechanics) -> f64 {
+        0.5 * mechanics.mass_kg * self.velocity_m_s * self.velocity_m_s
+    }
+
+    /// What a cell's actuator exerts, N.
+    fn driving_force_n(&self, mechanics: &Mechanics, cell: usize) -> f64 {
+        self.cell[cell].pad.force_n + mechanics.standing_n[cell] + self.passing_force_n(mechanics, cell)
+    }
+
+    /// What acts on a cell beside its contact, its weight and its share of the constant force, N.
+    fn passing_force_n(&self, mechanics: &Mechanics, cell: usize) -> f64 {
+        let Cell { damping_n, drag_n, .. } = self.cell[cell];
+        damping_n + drag_n + self.shared_force_n(mechanics) / self.cells as f64
+    }
+
+    /// Tether and inertia of the whole worm, N.
+    fn shared_force_n(&self, mechanics: &Mechanics) -> f64 {
+        mechanics.laws.tether_n_per_m * self.travelled_m + mechanics.mass_kg * self.acceleration_m_s2
+    }
+
+    fn increment(&mut self, mechanics: &Mechanics, phase: f64, step_s: f64) -> Result<(), SlidesDown> {
+        let increment = self.prepare(mechanics, phase, step_s.max(SHORTEST_S));
+        let mut translation_m = self.solve(mechanics, &increment)?;
+        // Each pass lets further tips break away.
+        for _ in 0..self.cells {
+            if mechanics.laws.static_over_kinetic <= 1.0 || !self.break_away(mechanics) {
+                break;
+            }
+            translation_m = self.solve(mechanics, &increment)?;
+        }
+        self.take(mechanics, &increment, translation_m, phase);
+        if self.velocity_m_s.abs() > LOST_M_S {
+            return Err(self.slides(mechanics));
+        }
+        Ok(())
+    }
+
+    /// Makes every cell ready for an increment to a phase.
+    fn prepare(&mut self, mechanics: &Mechanics, phase: f64, step_s: f64) -> Increment {
+        let laws = &mechanics.laws;
+        let even = mechanics.has_even_friction();
+        let cam = mechanics.cam(phase);
+        for (index, cell) in self.cell[..self.cells].iter_mut().enumerate() {
+            cell.trial.driven_m = mechanics.drive_at_m(index, &cam) - cell.drive_m;
+            cell.trial.friction = if even {
+                1.0
+            } else {
+                let tip_m = self.position_m[index] - cell.pad.deformation_m;
+                mechanics.friction(tip_m, phase - self.first_phase)
+            };
+            cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction);
+        }
+        let (damping_n_s_per_m, mass_kg) = match self.damping_ratio {
+            Some(ratio) => (ratio * mechanics.critical_n_s_per_m, mechanics.mass_kg),
+            None => (0.0, 0.0),
+        };
+        Increment {
+            step_s,
+            relaxing: if laws.creep_share > 0.0 {
+                1.0 - (-step_s / laws.creep_time_s).exp()
+            } else {
+                0.0
+            },
+            damping_n_per_m: damping_n_s_per_m / step_s,
+            drag_n_per_m: laws.drag_n_s_per_m / step_s,
+            inertia_n_per_m: 4.0 * mass_kg / (step_s * step_s),
+        }
+    }
+
+    /// Lets the tips that begin to slide in this trial do so against kinetic friction; whether there are any.
+    fn break_away(&mut self, mechanics: &Mechanics) -> bool {
+        let mut any = false;
+        for (cell, law) in self.cell[..self.cells].iter_mut().zip(&mechanics.pad) {
+            let sense = cell.trial.loaded.sliding;
+            if sense != 0 && cell.pad.sliding != sense {
+                cell.pad.sliding = sense;
+                cell.trial.hold = law.hold(&cell.pad, cell.trial.friction);
+                any = true;
+            }
+        }
+        any
+    }
+
+    /// Takes over the trial that balances the body, and books it: every force runs in a straight line within an increment.
+    fn take(&mut self, mechanics: &Mechanics, increment: &Increment, translation_m: f64, phase: f64) {
+        let cells = self.cells as f64;
+        let mean_shift_m = self.cell[..self.cells]
+            .iter()
+            .map(|cell| cell.trial.shift_m)
+            .sum::<f64>()
+            / cells;
+        let shared_before_n = self.shared_force_n(mechanics) / cells;
+        let tether_before_m = self.travelled_m;
+        if increment.inertia_n_per_m > 0.0 {
+            let acceleration_m_s2 = self.acceleration_after(mean_shift_m, increment);
+            self.velocity_m_s = 2.0 * mean_shift_m / increment.step_s - self.velocity_m_s;
+            self.acceleration_m_s2 = acceleration_m_s2;
+        }
+        self.travelled_m += mean_shift_m;
+        let shared_after_n = self.shared_force_n(mechanics) / cells;
+        let tether_n = mechanics.laws.tether_n_per_m * 0.5 * (tether_before_m + self.travelled_m) / cells;
+        let resisting_n = mechanics.worm.cell_resistance_n() + tether_n;
+        let mut deformation_m = 0.0;
+        for (index, cell) in self.cell[..self.cells].iter_mut().enumerate() {
+            let Trial {
+                driven_m,
+                shift_m,
+                loaded,
+                hold,
+                ..
+            } = cell.trial;
+            let (law, standing_n) = (&mechanics.pad[index], mechanics.standing_n[index]);
+            let (before_m, before_n) = (cell.pad.deformation_m, cell.pad.force_n);
+            let lost_j = law.take(&mut cell.pad, &loaded, &hold, increment.relaxing);
+            let strain_m = loaded.deformation_m - before_m;
+            let (damping_n, drag_n) = (increment.damping_n_per_m * strain_m, increment.drag_n_per_m * shift_m);
+            let damped_j = 0.5 * (cell.damping_n + damping_n) * shift_m;
+            let dragged_j = 0.5 * (cell.drag_n + drag_n) * shift_m;
+            let ledger = &mut self.ledger;
+            if loaded.slide_m != 0.0 {
+                ledger.slide(index, loaded.slide_m, loaded.force_n * loaded.slide_m);
+            }
+            ledger.weight_work_j += mechanics.worm.cell_weight_n(index) * shift_m;
+            ledger.resisting_work_j += resisting_n * shift_m + dragged_j;
+            ledger.settling_loss_j += lost_j + damped_j;
+            let passing_before_n = cell.damping_n + cell.drag_n + shared_before_n;
+            let passing_after_n = damping_n + drag_n + shared_after_n;
+            if driven_m != 0.0 {
+                ledger.add_actuator_work(
+                    before_n + standing_n + passing_before_n,
+                    loaded.force_n + standing_n + passing_after_n,
+                    driven_m,
+                );
+                cell.drive_m += driven_m;
+            }
+            // The drive gives way to the contact alone: every other force acts over the way that the cell itself makes.
+            ledger.actuator_net_j += 0.5 * (passing_before_n + passing_after_n) * (shift_m - translation_m - driven_m);
+            deformation_m += 0.5 * (before_m + loaded.deformation_m);
+            self.position_m[index] += shift_m;
+            (cell.damping_n, cell.drag_n) = (damping_n, drag_n);
+        }
+        self.ledger.deformation_integral_m += deformation_m * (phase - self.phase).abs();
+        self.rate_m_s = translation_m / increment.step_s;
+        self.phase = phase;
+    }
+}

@@ -1,0 +1,196 @@
+//! A worm with everything that happens to it: the paper's theory, and what effects add to it.
+
+use super::effect::Setting;
+use super::worm::Worm;
+
+/// Laws beside the paper's theory: what only the incremental motion knows. The default is none of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Laws {
+    /// Force at which a resting tip begins to slide, over the force at which it goes on sliding; 1 or more.
+    pub static_over_kinetic: f64,
+    /// Stiffness of the pads over that of the bristles by which their tips hold on (Dahl's law): no tip begins to slide quite
+    /// suddenly; 0 or more.
+    pub presliding: f64,
+    /// β of the pad's force k δ (1 + β (δ/d)²), d = μN/k; 0 or more.
+    pub hardening: f64,
+    /// Stiffness of a Maxwell branch beside the pad's spring, as a share of it; 0 or more.
+    pub creep_share: f64,
+    /// Its time constant, s; above 0.
+    pub creep_time_s: f64,
+    /// Share of the pad's stiffness that yields, in elements whose yield deformations are spread evenly up to μN/k; 0 to 0.8.
+    pub yielding_share: f64,
+    /// Resistance to each cell's velocity, N s/m; 0 or more.
+    pub drag_n_s_per_m: f64,
+    /// Resisting force for each metre travelled since the motion began, N/m.
+    pub tether_n_per_m: f64,
+    /// Compliance of the drive that holds each cell in the body, m/N; 0 or more.
+    pub compliance_m_per_n: f64,
+    /// Play that the drive runs through before a stepping cell follows, m; 0 or more.
+    pub play_m: f64,
+    /// By what share of a step each step begins early; 0 to 0.5.
+    pub overlap: f64,
+    /// Stretch of the canal with other friction.
+    pub patch: Patch,
+    /// Share of the friction that is lost with every cycle; below 1.
+    pub wear_per_cycle: f64,
+}
+
+/// A stretch of the canal with other friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patch {
+    /// Where it begins, m along the canal.
+    pub from_m: f64,
+    /// How long it is, m.
+    pub length_m: f64,
+    /// Friction there over that elsewhere.
+    pub friction_factor: f64,
+}
+
+impl Default for Laws {
+    fn default() -> Self {
+        Self {
+            static_over_kinetic: 1.0,
+            presliding: 0.0,
+            hardening: 0.0,
+            creep_share: 0.0,
+            creep_time_s: 1.0,
+            yielding_share: 0.0,
+            drag_n_s_per_m: 0.0,
+            tether_n_per_m: 0.0,
+            compliance_m_per_n: 0.0,
+            play_m: 0.0,
+            overlap: 0.0,
+            patch: Patch {
+                from_m: 0.0,
+                length_m: 0.0,
+                friction_factor: 1.0,
+            },
+            wear_per_cycle: 0.0,
+        }
+    }
+}
+
+impl Laws {
+    /// Whether every law is the paper's, so that the exact motion serves.
+    pub fn are_piecewise_linear(&self) -> bool {
+        self.neutral() == Self::default()
+    }
+
+    /// Whether one cycle can be like the next: nothing depends on the place, or on how far or how long the worm has crawled.
+    pub fn are_periodic(&self) -> bool {
+        let laws = self.neutral();
+        laws.tether_n_per_m == 0.0 && laws.wear_per_cycle == 0.0 && laws.patch == Self::default().patch
+    }
+
+    /// These laws with the shape of whatever has no strength put to its default.
+    fn neutral(&self) -> Self {
+        let standard = Self::default();
+        let mut laws = *self;
+        if laws.creep_share == 0.0 {
+            laws.creep_time_s = standard.creep_time_s;
+        }
+        if laws.patch.friction_factor == 1.0 || laws.patch.length_m == 0.0 {
+            laws.patch = standard.patch;
+        }
+        laws
+    }
+}
+
+/// The measurement, where it is not what it says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// What is measured over what is, for lengths.
+    pub scale: f64,
+    /// How old a measured position is, s.
+    pub latency_s: f64,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self {
+            scale: 1.0,
+            latency_s: 0.0,
+        }
+    }
+}
+
+/// A worm in its canal, and everything that happens to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physics {
+    /// The worm as the paper's theory knows it.
+    pub worm: Worm,
+    /// What the theory leaves out.
+    pub laws: Laws,
+    /// How the friction falls with the slope: by the factor 1 − s (1 − cos λ).
+    pub slope_clamping: f64,
+    /// Share of its speed that the motor loses for each newton that its cell exerts, 1/N: speed over 1 + d F.
+    pub slowdown_per_n: f64,
+    /// How it is measured.
+    pub view: View,
+}
+
+impl Physics {
+    /// Whether the crawl becomes periodic: no law that knows place, way or number of cycles.
+    pub fn is_periodic(&self) -> bool {
+        let laws = &self.laws;
+        laws.wear_per_cycle == 0.0 && laws.tether_n_per_m == 0.0 && laws.patch.friction_factor == 1.0
+    }
+
+    /// The paper's theory and nothing else.
+    pub fn of(worm: Worm) -> Self {
+        Self {
+            worm,
+            laws: Laws::default(),
+            slope_clamping: 0.0,
+            slowdown_per_n: 0.0,
+            view: View::default(),
+        }
+    }
+
+    /// These physics with effects; their order does not matter.
+    pub fn with<'a>(mut self, effects: impl IntoIterator<Item = &'a Setting>) -> Self {
+        for effect in effects {
+            effect.apply(&mut self);
+        }
+        self
+    }
+
+    /// These physics with effects on a worm whose bounds, mass and stroke were identified from positions: what effects make of
+    /// these is in them already and is not done twice.
+    pub fn found_with<'a>(self, effects: impl IntoIterator<Item = &'a Setting>) -> Self {
+        let found = self.worm.clone();
+        let mut physics = self.with(effects);
+        physics.worm.keep_found(&found);
+        physics.slope_clamping = 0.0;
+        physics.view.scale = 1.0;
+        physics
+    }
+
+    /// The worm with what the slope does to its clamps: what the motions take.
+    pub fn clamped_worm(&self) -> Worm {
+        let factor = 1.0 - self.slope_clamping * (1.0 - self.worm.slope_rad().cos());
+        let mut worm = self.worm.clone();
+        if factor != 1.0 {
+            worm.scale_friction(None, factor.max(0.0));
+        }
+        worm
+    }
+
+    /// The same worm seen from the other end of the canal, as [`Worm::mirrored`]. Play and overlap keep to the beginning of each
+    /// step, which in reverse was its end: a cycle's totals do not depend on that.
+    pub fn mirrored(mut self) -> Self {
+        self.worm = self.worm.mirrored();
+        self.laws.patch.from_m = -(self.laws.patch.from_m + self.laws.patch.length_m);
+        self
+    }
+
+    /// Whether the exact motion serves: no law but the paper's.
+    pub fn is_piecewise_linear(&self) -> bool {
+        self.laws.are_piecewise_linear()
+    }
+
+    /// The motor's speed against a force of the stepping cell, as a share of its speed without.
+    pub fn speed_share(&self, actuator_force_n: f64) -> f64 {
+        1.0 / (1.0 + self.slowdown_per_n * actuator_force_n.max(0.0))
+    }
+}

@@ -1,0 +1,255 @@
+//! `model-mismatch`: quiet on worms as the file has them or a few per cent off; raised and placed on what the model does not know.
+//!
+//! The virtual worm is made from another configuration than the one that controller and estimator read.
+
+use super::harness::{Session, config};
+use super::machine::Wired;
+use std::fmt::Write;
+use wormd::link::virtual_worm::Options;
+use wormd::message::{Alarm, AlarmKind, CommandKind};
+
+const RATE_HZ: f64 = 250.0;
+const CYCLE_S: f64 = 2.5;
+/// Cycles within which a mismatch that was there from the start must be told.
+const SOON_CYCLES: f64 = 8.5;
+/// Cycles for which a sound worm is watched.
+const LONG_CYCLES: f64 = 60.0;
+
+const EQUAL: [f64; 4] = [1.75; 4];
+const PAPER: [f64; 4] = [2.0, 1.1, 1.75, 2.15];
+const SLOPES_DEG: [f64; 4] = [0.0, 15.0, 30.0, 45.0];
+
+/// What a worm and its canal are.
+#[derive(Clone, Copy)]
+struct World {
+    bounds_mm: [f64; 4],
+    slope_deg: f64,
+    stroke_mm: f64,
+    stiffness_n_per_m: f64,
+}
+
+impl World {
+    fn of(bounds_mm: [f64; 4], slope_deg: f64) -> Self {
+        Self {
+            bounds_mm,
+            slope_deg,
+            stroke_mm: 11.5,
+            stiffness_n_per_m: 980.0,
+        }
+    }
+
+    /// With another friction at all cells, or at one.
+    fn friction(mut self, factor: f64, cell: Option<usize>) -> Self {
+        for (index, bound_mm) in self.bounds_mm.iter_mut().enumerate() {
+            *bound_mm *= if cell.is_none_or(|cell| cell == index) {
+                factor
+            } else {
+                1.0
+            };
+        }
+        self
+    }
+
+    /// With other springs under the same friction forces.
+    fn stiffness(self, factor: f64) -> Self {
+        Self {
+            stiffness_n_per_m: self.stiffness_n_per_m * factor,
+            ..self.friction(1.0 / factor, None)
+        }
+    }
+
+    fn stroke(self, factor: f64) -> Self {
+        Self {
+            stroke_mm: self.stroke_mm * factor,
+            ..self
+        }
+    }
+
+    fn slope(self, more_deg: f64) -> Self {
+        Self {
+            slope_deg: self.slope_deg + more_deg,
+            ..self
+        }
+    }
+
+    fn toml(&self) -> String {
+        format!(
+            "control.rate_hz = {RATE_HZ}\ncanal.slope_deg = {:?}\n[worm]\nmax_deformation_m = {:?}\nstroke_m = {:?}\nstiffness_n_per_m = {:?}\n",
+            self.slope_deg,
+            self.bounds_mm.map(|mm| mm * 1e-3),
+            self.stroke_mm * 1e-3,
+            self.stiffness_n_per_m,
+        )
+    }
+}
+
+/// A worm that crawls; the file says the first, the world is the second.
+fn crawling(file: &World, world: &World, faults: &[&str], seed: u64) -> Session<Wired> {
+    let options = Options {
+        faults: faults.iter().map(|fault| fault.parse().expect("a fault")).collect(),
+        seed: Some(seed),
+        step_s: Some(1e-3),
+        ..Options::default()
+    };
+    let machine = Wired::new(&config(&world.toml()), &options);
+    Session::crawling(&config(&file.toml()), machine, RATE_HZ)
+}
+
+fn told(session: &Session<Wired>) -> Option<Alarm> {
+    let is_ours = |alarm: &&Alarm| alarm.kind == AlarmKind::ModelMismatch.code();
+    session.raised.iter().find(is_ours).copied()
+}
+
+fn is_raised(session: &Session<Wired>) -> bool {
+    session.observer.latest().raised_mask >> AlarmKind::ModelMismatch.code() & 1 == 1
+}
+
+#[test]
+fn a_sound_worm_raises_no_mismatch() {
+    let mut wrongs = String::new();
+    for (index, (bounds_mm, slope_deg)) in [EQUAL, PAPER]
+        .iter()
+        .flat_map(|&bounds| SLOPES_DEG.map(|slope| (bounds, slope)))
+        .enumerate()
+    {
+        let file = World::of(bounds_mm, slope_deg);
+        for (what, world, faults) in [
+            ("as the file has it", file, &[][..]),
+            ("0.3 mm of noise", file, &["noise:m=0.0003@0"]),
+            ("unseen positions", file, &["dropout:share=0.1@0"]),
+            ("friction +3 %", file.friction(1.03, None), &[]),
+            ("friction -3 %", file.friction(0.97, None), &[]),
+            ("stroke +2 %", file.stroke(1.02), &[]),
+            ("stroke -2 %", file.stroke(0.98), &[]),
+            ("stiffness +3 %", file.stiffness(1.03), &[]),
+            ("stiffness -3 %", file.stiffness(0.97), &[]),
+            ("cell 2 +5 %", file.friction(1.05, Some(1)), &[]),
+            ("cell 3 -5 %", file.friction(0.95, Some(2)), &[]),
+        ] {
+            let mut session = crawling(&file, &world, faults, 1 + index as u64);
+            session.run_s(LONG_CYCLES * CYCLE_S, |_| {});
+            if !session.raised.is_empty() {
+                writeln!(wrongs, "{bounds_mm:?} at {slope_deg}°, {what}: {:?}", session.raised).expect("text has room");
+            }
+        }
+    }
+    assert!(wrongs.is_empty(), "{wrongs}");
+}
+
+/// What is there from the start is told within eight cycles or so. On the level, a cell with less friction than the file says
+/// gives way in its own step, and is named.
+#[test]
+fn what_the_model_does_not_know_is_told() {
+    let mut wrongs = String::new();
+    let mut check = |what: String, file: World, world: World, faults: &[&str], cell: Option<u32>| {
+        for seed in 1..=3 {
+            let mut session = crawling(&file, &world, faults, seed);
+            let began_s = session.now_s();
+            session.run_s(SOON_CYCLES * CYCLE_S + 2.0, |_| {});
+            let alarm = told(&session);
+            let cycles = alarm.map(|alarm| (alarm.time_ns as f64 * 1e-9 - began_s) / CYCLE_S);
+            println!(
+                "{what}, seed {seed}: {cycles:.1?} cycles, {:.2?} mm",
+                alarm.map(|alarm| alarm.value * 1e3)
+            );
+            let is_soon = cycles.is_some_and(|cycles| cycles <= SOON_CYCLES);
+            let is_named = cell.is_none_or(|cell| {
+                alarm.is_some_and(|alarm| alarm.cell == cell && (alarm.phase.rem_euclid(1.0) * 4.0) as u32 == cell)
+            });
+            if !is_soon || !is_named || session.raised.len() != 1 {
+                writeln!(wrongs, "{what}, seed {seed}: {cycles:?} {:?}", session.raised).expect("text has room");
+            }
+        }
+    };
+    for slope_deg in [0.0, 15.0, 30.0] {
+        let file = World::of(EQUAL, slope_deg);
+        for cell in 0..4 {
+            for factor in [0.7, 1.3] {
+                let is_named = slope_deg < 30.0;
+                let named = is_named.then_some(cell as u32);
+                let what = format!("{slope_deg}°, cell {} times {factor}", cell + 1);
+                check(what, file, file.friction(factor, Some(cell)), &[], named);
+            }
+        }
+        check(format!("{slope_deg}°, drag"), file, file, &["drag:force=0.3@0"], None);
+    }
+    for (bounds_mm, slope_deg, more_deg) in [
+        (EQUAL, 0.0, 3.0),
+        (EQUAL, 30.0, 3.0),
+        (PAPER, 15.0, 3.0),
+        (PAPER, 15.0, -3.0),
+        (PAPER, 30.0, 3.0),
+        (PAPER, 30.0, -3.0),
+    ] {
+        let file = World::of(bounds_mm, slope_deg);
+        check(
+            format!("{slope_deg}°{more_deg:+}°"),
+            file,
+            file.slope(more_deg),
+            &[],
+            None,
+        );
+    }
+    let paper = World::of(PAPER, 0.0);
+    check(
+        "drag on the paper's worm".to_owned(),
+        paper,
+        paper,
+        &["drag:force=0.3@0"],
+        None,
+    );
+    assert!(wrongs.is_empty(), "{wrongs}");
+}
+
+/// A drag that comes and goes is told and cleared, and the map shows where it took the way.
+#[test]
+fn a_mismatch_that_is_over_is_cleared() {
+    let file = World::of(EQUAL, 15.0);
+    let mut session = crawling(&file, &file, &["drag:force=0.3@30..75"], 1);
+    session.run_s(28.0, |_| {});
+    assert!(!is_raised(&session));
+    session.run_s(45.0, |_| {});
+    assert!(is_raised(&session), "{:?}", session.raised);
+    let map = session.observer.residual_map();
+    assert_eq!((map.cells(), map.direction(), map.entries().count()), (4, 1, 64));
+    let way_m: f64 = map.entries().map(|entry| entry.mean_m).sum::<f64>() / 4.0;
+    assert!((way_m + 3.6e-4).abs() < 6e-5, "{way_m} m a cycle");
+    session.run_s(60.0, |_| {});
+    assert!(!is_raised(&session));
+    assert_eq!(session.raised.len(), 1);
+}
+
+/// Cycles with a hold are left out, here with a slip of 1.6 mm in each, and a reversal begins another map.
+#[test]
+fn holds_and_reversals_are_left_out() {
+    const CRAWL_S: f64 = 3.7 * CYCLE_S;
+    const HOLD_S: f64 = 3.0;
+    let file = World::of(PAPER, 15.0);
+    for (factor, expected) in [(1.0, false), (0.7, true)] {
+        let slips: Vec<String> = (0..4)
+            .map(|part| CRAWL_S + f64::from(part) * (CRAWL_S + HOLD_S) + 0.5)
+            .map(|begins_s| format!("slide:speed=0.0008@{begins_s}..{}", begins_s + 2.0))
+            .collect();
+        let slips: Vec<&str> = slips.iter().map(String::as_str).collect();
+        let mut session = crawling(&file, &file.friction(factor, Some(0)), &slips, 2);
+        for part in 0..4 {
+            session.run_s(CRAWL_S, |_| {});
+            let direction = session.observer.residual_map().direction();
+            assert_eq!(direction, if part == 2 { -1 } else { 1 }, "part {part}");
+            session.command(CommandKind::Hold, 0.0);
+            session.run_s(HOLD_S, |_| {});
+            session.command(CommandKind::Crawl, if part == 1 { -0.4 } else { 0.4 });
+        }
+        session.run_s(8.0 * CYCLE_S, |_| {});
+        assert_eq!(
+            told(&session).is_some(),
+            expected,
+            "friction times {factor}: {:?}",
+            session.raised
+        );
+        let map = session.observer.residual_map();
+        assert!(map.entries().count() > 0);
+        let largest_m = map.entries().map(|entry| entry.unexplained_m.abs()).fold(0.0, f64::max);
+        assert_eq!(largest_m > 1e-4, expected, "{largest_m} m with friction times {factor}");
+    }
+}
