@@ -18,6 +18,7 @@
 //!
 //!   topics ──► recording (MCAP) ──► estimate once more: the same results to the last bit
 //!   recording (MCAP, CSV, C3D, Vicon) ──► identify ──► experiment ──► report
+//!            └───────────────────────────────► explain ──► report, and the model with the missing effect in it
 //! ```
 //!
 //! # The rooms, in reading order
@@ -33,6 +34,7 @@
 //! | [`recording`] | logs of the topics, and recordings of cell positions in every format; the replay through the estimator | control |
 //! | [`identify`] | gait, largest tip deformations and mass from positions alone: section 3.2 of the paper | files, topics, serial |
 //! | [`experiment`] | section 3 on recordings: slides, forces, energy by two methods, theory beside them; recordings from the model | files, topics, serial |
+//! | [`explain`] | where model and recordings disagree, which effect is missing, and what to try next | files, topics, serial |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
 //! | [`report`] | what a person looks at afterwards: the pages with figures and tables, of an experiment and of the search for the missing effect, and CSV | control, serial |
 //! | [`realtime`] | what a process asks of the operating system, and what it was given | everything but config |
@@ -57,6 +59,7 @@ pub mod config;
 pub mod control;
 pub mod estimate;
 pub mod experiment;
+pub mod explain;
 pub mod identify;
 pub mod link;
 pub mod message;

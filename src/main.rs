@@ -36,6 +36,8 @@ enum Subcommands {
     Study(command::study::StudyArgs),
     /// The paper's experiment on a recording: tip deformations, slides, energy, figures
     Analyze(command::analyze::AnalyzeArgs),
+    /// Where model and recordings disagree, and which physical effect the model misses
+    Explain(command::explain::ExplainArgs),
     /// A recording from the model: what motion capture would have seen
     Simulate(command::simulate::SimulateArgs),
     /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
@@ -79,6 +81,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
         Subcommands::Analyze(args) => command::analyze::run(&args),
+        Subcommands::Explain(args) => command::explain::run(&args),
         Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Check(args) => command::check::run(&args),
     }

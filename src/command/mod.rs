@@ -5,6 +5,7 @@ pub mod check;
 mod columns;
 pub mod control;
 pub mod estimate;
+pub mod explain;
 mod material;
 pub mod order;
 mod print;

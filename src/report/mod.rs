@@ -10,7 +10,9 @@
 //! - [`page`], [`table`] and `tile`: the page, its style, figures, tables and large figures. These know nothing of worms.
 //! - `runs`, `figure`, `summary`, `tables`: what this report shows.
 //! - `sheets` and `file`: the CSV, and how files are replaced.
+//! - [`explain`]: another page, on the search for the effect that the model misses.
 
+pub mod explain;
 mod figure;
 mod file;
 pub mod number;

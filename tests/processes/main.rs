@@ -2,6 +2,7 @@
 //!
 //! These tests wait for conditions with a generous bound; they assert what happens, never how fast a shared machine is.
 
+mod explaining;
 mod leaving;
 mod recording;
 mod worm;

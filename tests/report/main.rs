@@ -1,5 +1,7 @@
 //! The report: complete, well formed, self-contained and free of nonsense for every worm and for what may be missing.
 
+mod answer;
+mod explain;
 mod html;
 mod sample;
 
@@ -94,7 +96,8 @@ fn every_figure_is_there_well_formed_and_within_its_picture() {
     for (name, runs) in odd_inputs() {
         let page = page_of(name, &runs);
         html::assert_well_formed(&page, name);
-        html::assert_drawn_within(&page, name);
+        let pictures = html::assert_drawn_within(&page, name);
+        assert!(pictures >= 9, "{name}: only {pictures} pictures");
         for figure in FIGURES {
             assert!(
                 page.contains(&format!("<figure id=\"{figure}\"")),

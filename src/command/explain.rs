@@ -1,0 +1,136 @@
+//! `wormd explain`: where model and recordings disagree, which physical effect the model misses, and what to try next.
+//!
+//! A campaign, one recording, or the worm that is crawling now (`live`) goes in; after a look at what is stated of it
+//! (`conditions`) it is searched. What comes out is kept in a folder (`folder`) and told in the terminal (`text`).
+
+mod conditions;
+mod folder;
+mod live;
+mod text;
+
+use super::material::{Material, READING, SourceArgs};
+use super::progress::Progress;
+use super::{Failure, WormArgs, log_line, print};
+use crate::config::Config;
+use crate::explain::{Answer, Options, explain, write_back};
+use crate::report;
+use clap::Args;
+use folder::Folder;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `wormd explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// A campaign (TOML) of several recordings, or one recording (CSV, Vicon Nexus CSV, C3D, MCAP)
+    #[arg(value_name = "CAMPAIGN|RECORDING", required_unless_present = "live")]
+    recording: Option<PathBuf>,
+    #[command(flatten)]
+    source: SourceArgs,
+    /// Folder for report.html, report.json, model.toml with the effect in it, and model.diff
+    #[arg(long, value_name = "DIR", required_unless_present = "json")]
+    out: Option<PathBuf>,
+    /// Print one JSON object instead of text
+    #[arg(long)]
+    json: bool,
+    /// Seed of the search
+    #[arg(long, value_name = "N", default_value_t = Options::default().seed)]
+    seed: u64,
+    /// Record the worm that is crawling now, into DIR/live.mcap, and explain that; at its configured slope unless --slope is
+    /// given
+    #[arg(long, conflicts_with = "recording", requires = "out")]
+    live: bool,
+    /// Name of the running worm, instead of the one in the configuration
+    #[arg(long, value_name = "NAME", requires = "live")]
+    name: Option<String>,
+    /// Gait cycles to record of the running worm
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "live", value_parser = clap::value_parser!(u32).range(6..=1000))]
+    cycles: u32,
+}
+
+/// Runs `wormd explain`. Every verdict is a success.
+///
+/// # Errors
+/// [`Failure::Unusable`] for a recording, campaign, configuration or folder that cannot be used, and a running worm that does
+/// not crawl; [`Failure::Failed`] when the worm stops while it is recorded or a file cannot be written.
+pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
+    let mut progress = Progress::begin();
+    let (source, material) = args.read(&mut progress)?;
+    let folder = args.out.as_deref().map(Folder::prepare).transpose()?;
+    let mut answer = match search(&material, args.seed, &mut progress) {
+        Ok(answer) => answer,
+        Err((failure, stage)) => {
+            if let Some(folder) = &folder {
+                // The reason why there is no answer is what to tell, whatever becomes of its file.
+                let _ = folder.write_failure(&failure, stage, &material.runs());
+            }
+            return Err(failure);
+        }
+    };
+    let believed = material.config_text.as_deref().unwrap_or(Config::COMMENTED);
+    let model = write_back::model(believed, &material.config, &answer);
+    if let Ok(model) = &model {
+        answer.figures.model_diff.clone_from(&model.diff);
+    }
+    let written = folder.as_ref().map(|folder| {
+        progress.tell("report", 1.0);
+        // First what cannot be drawn again without another search; the page, which can fail for more reasons, is the last.
+        folder.write_answer(&answer)?;
+        folder.write_model(model.as_ref().map_err(Failure::failed)?)?;
+        folder.write_page(&answer, &title(&source))
+    });
+    drop(progress);
+    for warning in &answer.warnings {
+        log_line(format_args!("note: {warning}"));
+    }
+    if args.json {
+        print::line(serde_json::to_string(&answer).map_err(Failure::failed)?)?;
+    } else {
+        print::line(text::text(&answer))?;
+    }
+    written.transpose()?;
+    if let Some(folder) = &folder {
+        log_line(folder);
+    }
+    Ok(())
+}
+
+impl ExplainArgs {
+    /// What is to be explained, and where it comes from.
+    fn read(&self, progress: &mut Progress) -> Result<(PathBuf, Material), Failure> {
+        if let Some(recording) = &self.recording {
+            return Ok((recording.clone(), self.source.read(recording, progress)?));
+        }
+        let worm = WormArgs {
+            config: self.source.config.clone(),
+            name: self.name.clone(),
+            port: None,
+        };
+        let (config, text) = worm.load_with_text()?;
+        let slope_deg = self.source.slope.unwrap_or(config.canal.slope_deg);
+        let folder = self.out.as_deref().unwrap_or(Path::new("."));
+        report::prepare(folder).map_err(Failure::unusable)?;
+        let log = folder.join("live.mcap");
+        live::record(&config, text, self.cycles, &log, progress)?;
+        let material = self.source.read_recording(&log, slope_deg, progress)?;
+        Ok((log, material))
+    }
+}
+
+/// The answer; or why there is none, and how far the search had come.
+fn search(material: &Material, seed: u64, progress: &mut Progress) -> Result<Answer, (Failure, &'static str)> {
+    let runs = material.runs();
+    conditions::check(&runs, &material.config).map_err(|failure| (failure, "reading"))?;
+    let mut stage = "gait";
+    let answer = explain(&runs, &material.config, &Options { seed }, &mut |step| {
+        stage = step.stage;
+        progress.tell(stage, READING + (1.0 - READING) * step.share);
+    });
+    answer.map_err(|error| (Failure::unusable(error), stage))
+}
+
+/// What the page is called.
+fn title(source: &Path) -> String {
+    source
+        .file_stem()
+        .map_or_else(|| "worm".to_owned(), |stem| stem.to_string_lossy().into_owned())
+}

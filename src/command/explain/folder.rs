@@ -1,0 +1,80 @@
+//! The folder that an explanation is kept in. Files of an earlier one are replaced, each at once; other files are left alone.
+
+use crate::command::Failure;
+use crate::experiment::Run;
+use crate::explain::Answer;
+use crate::explain::write_back::{self, ModelText};
+use crate::report;
+use serde::Serialize;
+use serde_json::json;
+use std::fmt::{self, Display};
+use std::path::{Path, PathBuf};
+
+/// A folder that can be written in.
+pub(super) struct Folder(PathBuf);
+
+impl Folder {
+    /// Makes the folder if need be and tries whether it can be written in, so that nobody waits for a search in vain.
+    ///
+    /// # Errors
+    /// [`Failure::Unusable`].
+    pub(super) fn prepare(dir: &Path) -> Result<Self, Failure> {
+        report::prepare(dir).map_err(Failure::unusable)?;
+        Ok(Self(dir.to_owned()))
+    }
+
+    /// `report.json`: what `--json` prints.
+    pub(super) fn write_answer(&self, answer: &Answer) -> Result<(), Failure> {
+        self.write_json(answer)
+    }
+
+    /// `report.json` where there is no answer: why not, how far the search had come, and what it was made on.
+    pub(super) fn write_failure(&self, failure: &Failure, stage: &str, runs: &[Run<'_>]) -> Result<(), Failure> {
+        let run = |run: &Run<'_>| {
+            json!({
+                "recording": run.recording.source.display().to_string(),
+                "slope_deg": run.slope_deg,
+                "payload_kg": run.payload_kg,
+                "cycle_s": run.cycle_s,
+                "warnings": run.recording.warnings,
+            })
+        };
+        let runs: Vec<_> = runs.iter().map(run).collect();
+        self.write_json(&json!({ "error": failure.to_string(), "stage": stage, "runs": runs }))
+    }
+
+    /// `model.toml` and `model.diff`.
+    pub(super) fn write_model(&self, model: &ModelText) -> Result<(), Failure> {
+        self.write(write_back::FILE, &model.text)?;
+        self.write("model.diff", &model.unified)
+    }
+
+    /// `report.html`.
+    pub(super) fn write_page(&self, answer: &Answer, title: &str) -> Result<(), Failure> {
+        report::explain::write(answer, title, &self.0)
+            .map(drop)
+            .map_err(Failure::failed)
+    }
+
+    fn write_json(&self, value: &impl Serialize) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(value).map_err(Failure::failed)?;
+        self.write("report.json", &(text + "\n"))
+    }
+
+    fn write(&self, name: &str, text: &str) -> Result<(), Failure> {
+        report::replace_file(self.0.join(name), text.as_bytes())
+            .map(drop)
+            .map_err(Failure::failed)
+    }
+}
+
+impl Display for Folder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let folder = self.0.display();
+        write!(
+            f,
+            "{folder}/report.html: look at it in a browser; the model is {folder}/{}, what is new in it {folder}/model.diff",
+            write_back::FILE
+        )
+    }
+}

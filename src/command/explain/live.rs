@@ -1,0 +1,135 @@
+//! `wormd explain --live`: the running worm is recorded first.
+
+use crate::command::material::READING;
+use crate::command::progress::Progress;
+use crate::command::record::{LOOK, Recorder};
+use crate::command::{Failure, end_on_signal_until};
+use crate::config::Config;
+use crate::message::{Fault, Mode, State};
+use crate::recording::mcap::Channel;
+use crate::topics::{Controller, Hub, Instance, RoleLock};
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// How long a worm may be silent before it counts as gone. Its controller speaks in every tick.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Gait cycles recorded beyond the last whole one, so that its end is seen.
+const MARGIN_CYCLES: f64 = 0.05;
+
+/// Records the crawling worm over `cycles` whole gait cycles into a log, which replaces an older one.
+///
+/// # Errors
+/// [`Failure::Unusable`] when no worm of this name runs, or it does not crawl; [`Failure::Failed`] when it stops, falls silent or
+/// is no longer to be recorded before that, or the log cannot be written. What was recorded is kept.
+pub(super) fn record(
+    config: &Config,
+    text: Option<String>,
+    cycles: u32,
+    log: &Path,
+    progress: &mut Progress,
+) -> Result<(), Failure> {
+    let instance = Instance::of(config).map_err(Failure::unusable)?;
+    // While it is open others leave the worm's folder alone; with it goes a folder that was made in vain.
+    let _hub = Hub::open(&instance).map_err(Failure::failed)?;
+    if RoleLock::<Controller>::holder(&instance).is_none() {
+        let worm = &config.worm.name;
+        return Err(Failure::unusable(format!(
+            "no worm {worm} is running: start it with `wormd up --name {worm}`, or give the name of another with --name"
+        )));
+    }
+    let (end, over) = end_on_signal_until()?;
+    let topics = [Channel::State, Channel::Estimate, Channel::Cycle, Channel::Alarm];
+    let mut recorder = Recorder::open(config, text, &topics, log, true)?;
+    let mut watch = Watch::new(&config.worm.name, cycles);
+    let mut done = Ok(false);
+    while matches!(done, Ok(false)) {
+        if end.load(Ordering::Relaxed) {
+            done = Err(watch.ended_early("was no longer to be recorded", log));
+            break;
+        }
+        std::thread::sleep(LOOK);
+        done = recorder.hear().and_then(|heard| watch.see(heard.state.as_ref(), log));
+        progress.tell("recording the worm", READING * watch.share());
+    }
+    recorder.close()?;
+    // Nothing more needs an orderly end, and a search may take long.
+    over.store(true, Ordering::Relaxed);
+    done.map(|_| ())
+}
+
+/// How far the recording is, by what the worm says of itself.
+struct Watch<'a> {
+    worm: &'a str,
+    cycles: f64,
+    heard: Instant,
+    first_phase: Option<f64>,
+    phase: f64,
+}
+
+impl<'a> Watch<'a> {
+    fn new(worm: &'a str, cycles: u32) -> Self {
+        Self {
+            worm,
+            cycles: f64::from(cycles),
+            heard: Instant::now(),
+            first_phase: None,
+            phase: f64::NAN,
+        }
+    }
+
+    /// Takes the newest state, if there is one, and says whether all cycles are recorded.
+    fn see(&mut self, state: Option<&State>, log: &Path) -> Result<bool, Failure> {
+        let Some(state) = state else {
+            if self.heard.elapsed() < PATIENCE {
+                return Ok(false);
+            }
+            return Err(self.ended_early("fell silent", log));
+        };
+        self.heard = Instant::now();
+        if state.mode != Mode::Crawling.code() {
+            let mode = Mode::try_from(state.mode).map_or("unknown", Mode::name);
+            let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
+            let why = match fault {
+                Fault::None => mode.to_owned(),
+                fault => format!("{mode}: {fault}"),
+            };
+            if self.first_phase.is_some() {
+                return Err(self.ended_early(&format!("stopped crawling ({why})"), log));
+            }
+            let worm = self.worm;
+            return Err(Failure::unusable(format!(
+                "{worm} does not crawl ({why}): let it crawl first, with `wormd command crawl --name {worm}`"
+            )));
+        }
+        if state.phase.is_finite() {
+            self.phase = state.phase;
+            self.first_phase.get_or_insert(state.phase);
+        }
+        Ok(self.made() >= self.wanted())
+    }
+
+    /// Gait cycles since the recording began.
+    fn made(&self) -> f64 {
+        self.first_phase.map_or(0.0, |first| (self.phase - first).abs())
+    }
+
+    /// Gait cycles until the last whole one has ended, in either direction.
+    fn wanted(&self) -> f64 {
+        // A cycle that had begun before the recording is not whole in it.
+        1.0 + self.cycles + MARGIN_CYCLES
+    }
+
+    fn share(&self) -> f64 {
+        self.made() / self.wanted()
+    }
+
+    fn ended_early(&self, what: &str, log: &Path) -> Failure {
+        let (made, file) = (self.made(), log.display());
+        Failure::failed(format!(
+            "{} {what} after {made:.1} of {} gait cycles: what was recorded is kept, and may be enough for `wormd explain {file} --slope DEG`",
+            self.worm, self.cycles
+        ))
+    }
+}

@@ -1,0 +1,277 @@
+//! What the search found: the JSON contract of `wormd explain`, and what its page is drawn from.
+//!
+//! Cells count from 1 here, as people read them; phases count gait cycles from the start of one, 0 to 1.
+
+use serde::Serialize;
+
+/// The outcome in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Model and data agree, once the model is recalibrated within its priors.
+    Agrees,
+    /// One answer, up to its exact twins.
+    Explained,
+    /// Several effects explain the data about equally well.
+    Ambiguous,
+    /// No effect of the library explains the data.
+    OutsideLibrary,
+}
+
+/// The whole answer.
+#[derive(Debug, Clone, Serialize)]
+pub struct Answer {
+    /// The outcome in a word.
+    pub verdict: Verdict,
+    /// The outcome in a sentence or two.
+    pub sentence: String,
+    /// The effects that explain the data: one, or a pair that acts together; empty unless explained or ambiguous.
+    pub effects: Vec<NamedEffect>,
+    /// Others that explain them about as well, best first.
+    pub rivals: Vec<NamedEffect>,
+    /// Where model and data disagree after recalibration, most significant first.
+    pub r#where: Vec<Place>,
+    /// The gap, stage by stage.
+    #[serde(rename = "gap")]
+    pub stages: Vec<Stage>,
+    /// What is left, where nothing explains it.
+    pub remainder: Option<Remainder>,
+    /// What would best settle what is open.
+    pub next_experiment: Option<NextExperiment>,
+    /// The recalibrated model: what was free within its prior, and where it came to lie.
+    pub calibration: Vec<Calibrated>,
+    /// The screening of the whole library, most significant first.
+    pub screening: Vec<Screened>,
+    /// Improvement, in units of the log likelihood ratio, that the best of the whole library would reach by chance alone one
+    /// time in twenty.
+    pub threshold: f64,
+    /// The recordings.
+    pub runs: Vec<RunSummary>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Series and maps for figures; not part of the JSON.
+    #[serde(skip)]
+    pub figures: Figures,
+}
+
+/// An effect with its values.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedEffect {
+    /// Its name in the library.
+    pub name: String,
+    /// Effects or descriptions that no positions can tell from it.
+    pub twins: Vec<String>,
+    /// Its parameters.
+    pub parameters: Vec<FoundParameter>,
+    /// The cell where one is meant, from 1.
+    pub cell: Option<usize>,
+    /// Share of the gap after recalibration that it closes, down to the noise floor, on cycles that it was not fitted to.
+    pub closure: f64,
+    /// Its closure less that of the best effect of another kind.
+    pub margin: f64,
+    /// Probability among the effects of the library, from held-out likelihoods.
+    pub probability: f64,
+    /// Improvement over the recalibrated model: rise of twice the log likelihood.
+    pub improvement: f64,
+    /// Which experiment tells it from its neighbours.
+    pub separated_by: String,
+}
+
+/// A parameter as found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FoundParameter {
+    /// Name in files.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Its standard error.
+    pub sigma: f64,
+    /// Its unit; empty for none.
+    pub unit: String,
+    /// The cell where one is meant, from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cell: Option<usize>,
+}
+
+/// A place where model and data disagree.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// The cell that is not where the model has it, from 1.
+    pub cell: usize,
+    /// The cell that steps meanwhile, from 1.
+    pub stepping_cell: usize,
+    /// Gait phase at the middle of the bin, 0 to 1.
+    pub phase: f64,
+    /// Slope of the run, degrees.
+    pub slope_deg: f64,
+    /// Way that the cell makes in the bin beyond the model's, m in each cycle.
+    pub residual_m: f64,
+    /// That in standard errors, by bootstrap over blocks of cycles.
+    pub significance: f64,
+}
+
+/// One stage of the shrinking gap.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stage {
+    /// `baseline`, `recalibrated`, `named`, `best-wrong`, `free-form` or `floor`.
+    pub stage: &'static str,
+    /// The effect, where the stage has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effect: Option<String>,
+    /// Root mean square of the positions' residual within cycles, on the data it was fitted to, m.
+    pub fit_rms_m: f64,
+    /// The same on cycles that it was not fitted to, m.
+    pub held_out_rms_m: f64,
+    /// Mean over the runs of how far the advance per cycle is off, m.
+    pub advance_error_m: f64,
+    /// Mean over the runs of how far the energy per cycle (11) is off, J.
+    pub energy_error_j: f64,
+}
+
+/// What no effect explains.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Remainder {
+    /// In words: which cells, phases and slopes, which period.
+    pub description: String,
+    /// Share of the gap that stays open after the best effect.
+    pub open_share: f64,
+    /// Period along the way or in time, where there is one: in cycles.
+    pub period_cycles: Option<f64>,
+    /// Where it is largest.
+    pub places: Vec<Place>,
+}
+
+/// A proposal for the next experiment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NextExperiment {
+    /// What to change: `slope_deg`, `cycle_s`, `payload_kg`, `start_m`, `cycles`, `dwell_s`, or a measurement on the bench.
+    pub change: String,
+    /// To which value; none for a measurement.
+    pub value: Option<f64>,
+    /// Unit of the value.
+    pub unit: String,
+    /// In words, with how to do it.
+    pub description: String,
+    /// What each rival predicts.
+    pub predictions: Vec<Prediction>,
+    /// Expected distance between the two nearest predictions, in standard deviations.
+    pub separation_sigma: Option<f64>,
+}
+
+/// What an effect predicts of an experiment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Prediction {
+    /// The effect.
+    pub effect: String,
+    /// Advance per cycle that it predicts, m.
+    pub advance_m: Option<f64>,
+    /// In words.
+    pub description: String,
+}
+
+/// A parameter of the recalibrated model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Calibrated {
+    /// What it is.
+    pub name: String,
+    /// The value believed.
+    pub believed: f64,
+    /// The value found.
+    pub found: f64,
+    /// Its standard error.
+    pub sigma: f64,
+    /// Its unit; empty for none.
+    pub unit: &'static str,
+    /// It lies at the end of what its prior allows.
+    pub at_limit: bool,
+}
+
+/// One effect's score at zero severity, other parameters projected out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Screened {
+    /// The effect.
+    pub name: String,
+    /// The cell where one is meant, from 1.
+    pub cell: Option<usize>,
+    /// Expected rise of twice the log likelihood, to first order.
+    pub score: f64,
+    /// Rise of twice the log likelihood after the refit, where it was refitted; none where it did not converge.
+    pub improvement: Option<f64>,
+    /// What became of it: `screened-out`, `refitted`, `did-not-converge`, `not-visible`.
+    pub outcome: &'static str,
+}
+
+/// A recording of the campaign.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunSummary {
+    /// Where it comes from.
+    pub recording: String,
+    /// Slope, degrees.
+    pub slope_deg: f64,
+    /// Known extra mass, kg.
+    pub payload_kg: f64,
+    /// Whole gait cycles.
+    pub cycles: usize,
+    /// Time of a gait cycle, s.
+    pub cycle_s: f64,
+    /// Whether the gait phase was recorded.
+    pub phase_recorded: bool,
+    /// Whether the worm was laid down where the recording begins.
+    pub laid_down: bool,
+    /// Standard deviation of one position, m.
+    pub noise_m: f64,
+    /// Random walk that the body makes in a cycle beyond any model, m.
+    pub drift_per_cycle_m: f64,
+    /// Mean advance per cycle: measured, by the recalibrated model, by the named one (where there is one), m.
+    pub advance_m: [f64; 3],
+}
+
+/// What the page draws beyond the JSON.
+#[derive(Debug, Clone, Default)]
+pub struct Figures {
+    /// One map for each run: residual of the recalibrated model.
+    pub maps_before: Vec<ResidualMap>,
+    /// The same for the named model, where there is one.
+    pub maps_after: Vec<ResidualMap>,
+    /// Each run's way of the body within a cycle.
+    pub cycles: Vec<CycleSeries>,
+    /// The old model's text and the new one's difference to it, as lines with ' ', '-' or '+' before them.
+    pub model_diff: Vec<String>,
+}
+
+/// Residual by cell and phase of one run.
+#[derive(Debug, Clone, Default)]
+pub struct ResidualMap {
+    /// Slope, degrees.
+    pub slope_deg: f64,
+    /// The cell, from 1, that steps in each bin.
+    pub stepping_cell: Vec<usize>,
+    /// Phase at the middle of each bin.
+    pub phase: Vec<f64>,
+    /// Way beyond the model's in the bin, mean over the cycles, m: `[cell][bin]`.
+    pub residual_m: Vec<Vec<f64>>,
+    /// That in standard errors: `[cell][bin]`; `NaN` where too few cycles tell.
+    pub significance: Vec<Vec<f64>>,
+    /// What the largest significance on all maps of the campaign stays below by chance, nineteen times in twenty.
+    pub limit: f64,
+}
+
+/// The mean cycle of one run: data and models, all over the same phases.
+#[derive(Debug, Clone, Default)]
+pub struct CycleSeries {
+    /// Slope, degrees.
+    pub slope_deg: f64,
+    /// Phase, 0 to 1.
+    pub phase: Vec<f64>,
+    /// Mean position of the cells since the start of the cycle less what the stroke alone would make, m: measured, mean over
+    /// the settled cycles.
+    pub measured_m: Vec<f64>,
+    /// Standard deviation over the cycles, m.
+    pub scatter_m: Vec<f64>,
+    /// By the believed model, m.
+    pub baseline_m: Vec<f64>,
+    /// By the recalibrated model, m.
+    pub recalibrated_m: Vec<f64>,
+    /// By the named model, m; empty where there is none.
+    pub named_m: Vec<f64>,
+}

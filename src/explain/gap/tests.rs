@@ -1,0 +1,134 @@
+use super::super::fixture::{Campaign, NOISE_M, Truth, WALK_M, hypothesis, problem, record, scene, taken};
+use super::{Measured, cycles};
+use crate::explain::answer::Stage;
+use crate::explain::predict::Scene;
+use crate::recording::Recording;
+
+const EFFECTS: [Truth<'static>; 3] = [
+    Some(("slope-error", None, &[3.0])),
+    Some(("unequal-clamping", Some(1), &[1.25])),
+    Some(("wear", None, &[0.02])),
+];
+
+/// Every cycle of every run held out, or none.
+fn fold(scene: &Scene<'_>, out: bool) -> Vec<Vec<bool>> {
+    scene.observed.iter().map(|_| vec![out; 20]).collect()
+}
+
+struct Stages {
+    baseline: Stage,
+    named: Stage,
+    free_form: Stage,
+    floor: Stage,
+}
+
+fn stages(recordings: &[Recording], truth: Truth<'_>) -> Stages {
+    let scene = scene(recordings, &Campaign::default());
+    let problem = problem(&scene, &hypothesis(truth));
+    let (baseline, named) = (taken(&problem, hypothesis(None)), taken(&problem, hypothesis(truth)));
+    let measured = Measured::new(&problem, &named);
+    let folds = [(named.clone(), fold(&scene, true))];
+    Stages {
+        baseline: measured.stage("baseline", None, &baseline, &[]),
+        named: measured.stage("named", Some("it".to_owned()), &named, &folds),
+        free_form: measured.free_form_stage(&baseline),
+        floor: measured.floor_stage(),
+    }
+}
+
+#[test]
+fn the_gap_shrinks_to_the_floor_that_noise_and_walk_make() {
+    let floor_m = (NOISE_M * NOISE_M + WALK_M * WALK_M / 6.0).sqrt();
+    for truth in EFFECTS {
+        let recordings = record(&Campaign::default(), truth, 1);
+        let Stages {
+            baseline,
+            named,
+            free_form,
+            floor,
+        } = stages(&recordings, truth);
+        let near = |rms_m: f64, expected_m: f64, share: f64| (rms_m / expected_m - 1.0).abs() < share;
+        let told = format!("{truth:?}\n{baseline:?}\n{named:?}\n{free_form:?}\n{floor:?}\nexpected {floor_m}");
+        assert!(near(floor.held_out_rms_m, floor_m, 0.03), "{told}");
+        assert!(near(named.held_out_rms_m, floor.held_out_rms_m, 0.03), "{told}");
+        assert!(baseline.held_out_rms_m > 1.2 * floor.held_out_rms_m, "{told}");
+        assert!(free_form.fit_rms_m < floor.held_out_rms_m, "{told}");
+        assert!(
+            (1.0..1.1).contains(&(free_form.held_out_rms_m / floor.held_out_rms_m)),
+            "{told}"
+        );
+        assert!(named.advance_error_m < 3.0 * floor.advance_error_m, "{told}");
+        assert!(baseline.advance_error_m > 10.0 * floor.advance_error_m, "{told}");
+        assert!(free_form.advance_error_m < 0.1 * floor.advance_error_m, "{told}");
+        assert!(named.energy_error_j < 0.15 * baseline.energy_error_j, "{told}");
+    }
+}
+
+#[test]
+fn the_advance_that_a_model_misses_is_told() {
+    let truth = EFFECTS[0];
+    let campaign = Campaign::default();
+    let recordings = record(&campaign, truth, 2);
+    let scene = scene(&recordings, &campaign);
+    let per_cycle_m = |run: usize, truth: Truth<'_>| {
+        let (hypothesis, at) = hypothesis(truth);
+        let position_m = scene.predict(run, &hypothesis, &at).expect("it holds").position_m;
+        let observed = &scene.observed[run];
+        let last = position_m.len() - 1;
+        let cycle = observed
+            .phase
+            .partition_point(|phase| *phase < observed.phase[observed.samples() - 1] - 1.0);
+        position_m[last] - position_m[(cycle + 1) * observed.cells() - 1]
+    };
+    let missed_m = (0..2)
+        .map(|run| (per_cycle_m(run, truth) - per_cycle_m(run, None)).abs())
+        .sum::<f64>()
+        / 2.0;
+    let told_m = stages(&recordings, truth).baseline.advance_error_m;
+    assert!((told_m - missed_m).abs() < 2.0 * WALK_M, "{told_m} for {missed_m}");
+}
+
+#[test]
+fn only_cycles_that_were_held_out_count_as_such() {
+    let campaign = Campaign::default();
+    let recordings = record(&campaign, None, 3);
+    let scene = scene(&recordings, &campaign);
+    let problem = problem(&scene, &hypothesis(None));
+    let (right, wrong) = (
+        taken(&problem, hypothesis(None)),
+        taken(&problem, hypothesis(EFFECTS[0])),
+    );
+    let measured = Measured::new(&problem, &right);
+    let rms_m = |folds: &[_]| measured.stage("named", None, &right, folds).held_out_rms_m;
+    let wrong_m = measured.stage("named", None, &wrong, &[]).fit_rms_m;
+    let right_m = rms_m(&[]);
+    assert_eq!(rms_m(&[(right.clone(), fold(&scene, true))]), right_m);
+    assert_eq!(
+        rms_m(&[
+            (wrong.clone(), fold(&scene, true)),
+            (right.clone(), fold(&scene, false))
+        ]),
+        wrong_m
+    );
+    assert!(rms_m(&[(wrong, fold(&scene, false))]).is_nan());
+}
+
+#[test]
+fn the_mean_cycle_follows_the_model_that_made_it() {
+    let campaign = Campaign::default();
+    let truth = EFFECTS[1];
+    let recordings = record(&campaign, truth, 4);
+    let scene = scene(&recordings, &campaign);
+    let problem = problem(&scene, &hypothesis(truth));
+    let (baseline, named) = (taken(&problem, hypothesis(None)), taken(&problem, hypothesis(truth)));
+    for series in cycles(&problem, &baseline, &baseline, Some(&named)) {
+        let off_m = |model_m: &[f64]| {
+            let pairs = model_m.iter().zip(&series.measured_m);
+            pairs.map(|(model_m, m)| (model_m - m).abs()).fold(0.0, f64::max)
+        };
+        assert!(off_m(&series.named_m) < 5e-5, "{series:?}");
+        assert!(off_m(&series.baseline_m) > 3e-4, "{series:?}");
+        assert!((48..=96).contains(&series.phase.len()), "{} bins", series.phase.len());
+        assert_eq!(series.baseline_m, series.recalibrated_m);
+    }
+}

@@ -1,0 +1,108 @@
+//! What a hypothesis says of data that it was not fitted to.
+//!
+//! Whole slopes are left out one after the other, and blocks of neighbouring cycles on all slopes. For each the fit is made
+//! anew by Gauss-Newton steps on what remains, and the residuals that it leaves on what was left out are simulated exactly. Every
+//! sample is left out once in each way; the mean over both ways counts.
+
+use super::fit::{Fit, Problem, in_parallel};
+use super::observed::Observed;
+
+/// Blocks of neighbouring cycles.
+const BLOCKS: usize = 3;
+/// Steps of the fit anew.
+const STEPS: usize = 2;
+
+/// What is left out at once.
+#[derive(Debug, Clone)]
+pub(super) struct Fold {
+    /// For each run and whole cycle since its first sample, whether it is left out.
+    pub left_out: Vec<Vec<bool>>,
+}
+
+/// A hypothesis on data that it was not fitted to.
+#[derive(Debug, Clone)]
+pub(super) struct HeldOut {
+    /// Square sum of the residuals on what was left out, mean over the ways of leaving out.
+    pub misfit: f64,
+    /// The fit anew without each fold.
+    pub fits: Vec<(Fit, Vec<Vec<bool>>)>,
+}
+
+/// Which cycle since the first sample a sample is in.
+pub(super) fn cycle_of(observed: &Observed<'_>, sample: usize) -> usize {
+    (observed.phase[sample] - observed.phase[0]).max(0.0).floor() as usize
+}
+
+/// All folds of a campaign: first the slopes, where there are several, then the blocks of cycles.
+pub(super) fn folds(problem: &Problem<'_, '_>) -> Vec<Fold> {
+    let observed = &problem.scene.observed;
+    let cycles = |observed: &Observed<'_>| cycle_of(observed, observed.samples() - 1) + 1;
+    let mut folds = Vec::new();
+    if observed.len() > 1 {
+        for run in 0..observed.len() {
+            let left_out = observed
+                .iter()
+                .enumerate()
+                .map(|(other, seen)| vec![other == run; cycles(seen)]);
+            folds.push(Fold {
+                left_out: left_out.collect(),
+            });
+        }
+    }
+    for block in 0..BLOCKS {
+        let left_out = observed.iter().map(|seen| {
+            let first = cycle_of(seen, seen.counts_from);
+            let count = cycles(seen);
+            (0..count)
+                .map(|cycle| cycle >= first && (cycle - first) * BLOCKS / (count - first).max(1) == block)
+                .collect()
+        });
+        folds.push(Fold {
+            left_out: left_out.collect(),
+        });
+    }
+    folds
+}
+
+impl Fold {
+    /// For each residual, whether it stays in.
+    fn stays(&self, problem: &Problem<'_, '_>) -> Vec<bool> {
+        let mut stays = Vec::new();
+        for (observed, left_out) in problem.scene.observed.iter().zip(&self.left_out) {
+            let of = |sample: usize| !left_out[cycle_of(observed, sample)];
+            let samples = observed.counts_from..observed.samples();
+            stays.extend(samples.clone().map(of));
+            for sample in samples {
+                stays.extend(std::iter::repeat_n(of(sample), observed.cells()));
+            }
+        }
+        stays
+    }
+}
+
+/// Holds a fitted hypothesis, whose derivatives are there, against every fold.
+pub(super) fn hold_out(problem: &Problem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
+    let anew = in_parallel(folds.len(), |number| {
+        let fold = &folds[number];
+        let stays = fold.stays(problem);
+        let mut without = fit.clone();
+        for _ in 0..STEPS {
+            without = problem.step_without(without, &stays);
+        }
+        let misfit: f64 = without
+            .residual
+            .iter()
+            .zip(&stays)
+            .filter(|(_, stays)| !**stays)
+            .map(|(residual, _)| residual * residual)
+            .sum();
+        without.jacobian = Vec::new();
+        (misfit, (without, fold.left_out.clone()))
+    });
+    let slopes = folds.len() - BLOCKS;
+    let ways = if slopes > 0 { 2.0 } else { 1.0 };
+    HeldOut {
+        misfit: anew.iter().map(|(misfit, _)| misfit).sum::<f64>() / ways,
+        fits: anew.into_iter().map(|(_, without)| without).collect(),
+    }
+}

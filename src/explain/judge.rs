@@ -1,0 +1,188 @@
+//! The judgement: agree, explain, leave it open, or admit that the library has no name for it.
+//!
+//! # The rules, in their order
+//! 1. The best effect must improve the fit by more than the best of the whole library would by chance, with a margin for what
+//!    real pads and cams do; else model and data **agree**.
+//! 2. Effects are compared by what they say of data that they were not fitted to. Those close to the best stay in the answer, for
+//!    a small difference proves nothing between two models of which neither is quite right; exact twins are one answer with
+//!    several names.
+//! 3. What the best leaves must be noise: if a free form could still take away a good part of the gap, pairs of effects are
+//!    tried, and if no pair closes it either, the cause is **outside the library**.
+//! 4. One answer left is **explained**, several are **ambiguous**.
+
+use super::answer::Verdict;
+use super::fit::{Fit, Problem};
+use super::held_out::{Fold, HeldOut, hold_out as hold_out_fit};
+use super::parameter::Supposed;
+use super::predict::rest;
+
+/// Effects that are held against data they were not fitted to.
+const HELD_OUT: usize = 6;
+/// Share of the gap that may stay open, and how much of the misfit at least counts as open.
+const OPEN: (f64, f64) = (0.25, 90.0);
+/// A pair must close this share of what the single effect left open.
+const PAIR_CLOSES: f64 = 0.5;
+/// Difference of the held-out misfits up to which two effects explain the data equally well: absolute, and as a share of what
+/// the best one gains.
+const ALIKE: (f64, f64) = (10.0, 0.01);
+/// Share of the best improvement that an answer must reach.
+const COUNTS: f64 = 0.5;
+/// How much less certain probabilities are than held-out likelihoods say, for models that are never quite right.
+const TEMPER: f64 = 0.5;
+
+/// Pairs of effects that no positions can tell apart.
+const TWINS: [(&str, &str); 2] = [
+    ("constant-drag", "directional-friction"),
+    ("lost-stroke", "sensor-scale"),
+];
+
+/// Effects that were fitted.
+#[derive(Debug, Clone)]
+pub(super) struct Find {
+    pub supposed: Vec<Supposed>,
+    pub fit: Fit,
+    /// Fall of the misfit from the recalibrated model.
+    pub improvement: f64,
+    pub held_out: Option<HeldOut>,
+}
+
+impl Find {
+    /// Misfit on data that it was not fitted to.
+    pub fn held_out_misfit(&self) -> f64 {
+        self.held_out.as_ref().map_or(f64::INFINITY, |held_out| held_out.misfit)
+    }
+}
+
+/// Whether no positions can tell two effects apart.
+pub(super) fn are_twins(one: &Supposed, other: &Supposed) -> bool {
+    let whole = one.cell.is_none() && other.cell.is_none();
+    let named = |a: &str, b: &str| one.effect.name == a && other.effect.name == b;
+    whole && TWINS.iter().any(|(a, b)| named(a, b) || named(b, a))
+}
+
+/// Whether two answers are the same up to twins, or the same effect on another cell.
+fn are_alike(one: &Find, other: &Find) -> bool {
+    let alike = |a: &Supposed, b: &Supposed| a.effect.name == b.effect.name || are_twins(a, b);
+    one.supposed.len() == other.supposed.len()
+        && one.supposed.iter().all(|a| other.supposed.iter().any(|b| alike(a, b)))
+}
+
+/// How much of the misfit a free form could take away.
+pub(super) struct Open {
+    whole: f64,
+}
+
+impl Open {
+    /// What is open after recalibration.
+    pub fn of(problem: &Problem<'_, '_>, recalibrated: &Fit) -> Self {
+        Self {
+            whole: explainable(problem, recalibrated),
+        }
+    }
+
+    /// Share of it that a fit leaves open.
+    pub fn share(&self, problem: &Problem<'_, '_>, fit: &Fit) -> f64 {
+        (explainable(problem, fit) / self.whole.max(1.0)).max(0.0)
+    }
+
+    /// Whether what a fit leaves is noise, or too little to matter.
+    pub fn is_closed(&self, problem: &Problem<'_, '_>, fit: &Fit) -> bool {
+        let left = explainable(problem, fit);
+        left < OPEN.1.max(OPEN.0 * self.whole)
+    }
+}
+
+/// How much of the misfit a free form would take away beyond chance.
+fn explainable(problem: &Problem<'_, '_>, fit: &Fit) -> f64 {
+    let runs = problem.scene.observed.iter().enumerate();
+    runs.filter_map(|(run, observed)| {
+        let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
+        Some(problem.noise[run].explainable(observed, &rest(observed, &predicted)))
+    })
+    .sum()
+}
+
+/// The outcome.
+pub(super) struct Judged {
+    pub verdict: Verdict,
+    /// What explains the data, best first, twins and other cells of the same effect left out; the best find even where nothing is
+    /// named.
+    pub candidates: Vec<Find>,
+    /// Probability of each candidate.
+    pub probability: Vec<f64>,
+    /// The best find of another kind that is no candidate.
+    pub best_wrong: Option<Find>,
+    /// Share of the gap that the best leaves open.
+    pub open_share: f64,
+    /// Every find, for the record.
+    pub all: Vec<Find>,
+}
+
+/// Holds the best finds against data that they were not fitted to, and puts the best of them first.
+pub(super) fn hold_out(problem: &Problem<'_, '_>, recalibrated: &Fit, finds: &mut [Find], folds: &[Fold]) {
+    for find in finds.iter_mut().take(HELD_OUT) {
+        let mut held_out = hold_out_fit(problem, &find.fit, folds);
+        held_out.misfit += problem.excess_of_repeating(recalibrated, &find.fit);
+        find.held_out = Some(held_out);
+    }
+    finds.sort_by(|a, b| a.held_out_misfit().total_cmp(&b.held_out_misfit()));
+}
+
+/// Judges; `singles` and `pairs` best first.
+pub(super) fn judge(
+    problem: &Problem<'_, '_>,
+    open: &Open,
+    singles: Vec<Find>,
+    pairs: Vec<Find>,
+    threshold: f64,
+) -> Judged {
+    let mut all = singles.clone();
+    all.extend(pairs.iter().cloned());
+    let improves = singles.iter().any(|find| find.improvement > threshold);
+    let (mut finds, mut closed) = (singles, true);
+    if improves {
+        closed = open.is_closed(problem, &finds[0].fit);
+        if let (false, Some(pair)) = (closed, pairs.first()) {
+            let (single_share, pair_share) = (open.share(problem, &finds[0].fit), open.share(problem, &pair.fit));
+            let gains = pair.improvement - finds[0].improvement > threshold;
+            if gains && pair_share < PAIR_CLOSES * single_share {
+                closed = open.is_closed(problem, &pair.fit);
+                finds = pairs;
+            }
+        }
+    }
+    let mut kinds: Vec<Find> = Vec::new();
+    let most = finds.iter().map(|find| find.improvement).fold(0.0, f64::max);
+    // What hardly improves the fit is no candidate, whatever chance does for it on data left out.
+    finds.sort_by_key(|find| find.improvement < COUNTS * most);
+    for find in finds {
+        if !kinds.iter().any(|kind| are_alike(kind, &find)) {
+            kinds.push(find);
+        }
+    }
+    let best = kinds.first().map_or(f64::INFINITY, Find::held_out_misfit);
+    let gain = kinds.first().map_or(0.0, |find| find.improvement);
+    let alike = ALIKE.0 + ALIKE.1 * gain;
+    let is_candidate = |find: &&Find| find.held_out_misfit() - best < alike && find.improvement >= COUNTS * most;
+    let count = kinds.iter().take_while(is_candidate).count();
+    let others = kinds.split_off(count.max(usize::from(!kinds.is_empty())));
+    let weight = |find: &Find| (-0.5 * TEMPER * (find.held_out_misfit() - best)).exp();
+    let whole: f64 = kinds.iter().chain(&others).map(weight).sum();
+    let verdict = if !improves {
+        Verdict::Agrees
+    } else if !closed {
+        Verdict::OutsideLibrary
+    } else if kinds.len() > 1 {
+        Verdict::Ambiguous
+    } else {
+        Verdict::Explained
+    };
+    Judged {
+        verdict,
+        probability: kinds.iter().map(|find| weight(find) / whole).collect(),
+        open_share: kinds.first().map_or(0.0, |find| open.share(problem, &find.fit)),
+        best_wrong: others.into_iter().next(),
+        candidates: kinds,
+        all,
+    }
+}

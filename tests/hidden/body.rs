@@ -1,0 +1,220 @@
+//! A body with mass on tips that give, damp, grip and slide.
+//!
+//! The drive fixes how the cells stand to each other but for its compliance, so what is left is the body's translation b. Its
+//! momentum is P = M b' + Σ mᵢ eᵢ' with eᵢ the cells' extensions, and only contacts, weight and drags change it. The momentum
+//! is what is integrated, so a sudden change of eᵢ' needs no infinite force.
+
+use super::flaws::Flaws;
+use super::gear::Gear;
+use super::make::Make;
+use super::stranger::Stranger;
+use super::tip::{Limits, Pad, Tip};
+use super::{CELLS, GRAVITY_M_S2};
+
+/// Time in which a cell held by a compliant drive follows its force, s: far below any step, far above the time step.
+const FOLLOW_S: f64 = 2e-3;
+/// Time over which the hand that lays the worm down lets go of it, s.
+const LOWERING_S: f64 = 0.1;
+
+/// A worm with all that is hidden in it.
+#[derive(Debug, Clone)]
+pub struct Worm {
+    pub make: Make,
+    pub flaws: Flaws,
+    pub stranger: Option<Stranger>,
+}
+
+impl Worm {
+    /// The same worm with nothing hidden.
+    pub fn honest(&self) -> Self {
+        Self {
+            make: self.make.clone(),
+            flaws: Flaws::default(),
+            stranger: None,
+        }
+    }
+
+    fn pads(&self, mass_kg: f64) -> [Pad; CELLS] {
+        let Self { make, flaws, .. } = self;
+        let stiffness: f64 = make.stiffness_n_per_m.iter().sum();
+        let damping = 2.0 * make.damping_ratio * (stiffness * mass_kg).sqrt() / CELLS as f64;
+        std::array::from_fn(|cell| {
+            let stiffness_n_per_m = make.stiffness_n_per_m[cell] * flaws.stiffness_factor[cell];
+            Pad {
+                stiffness_n_per_m,
+                damping_n_s_per_m: damping,
+                hardening: flaws.hardening,
+                creep_share: flaws.creep_share,
+                creep_s: flaws.creep_s,
+                yielding_share: flaws.yielding_share,
+                yielding_m: make.friction_n[cell] * flaws.friction_factor[cell] / stiffness_n_per_m,
+                bristle_n_per_m: make.bristle_ratio * stiffness_n_per_m,
+                static_over_kinetic: flaws.static_over_kinetic,
+            }
+        })
+    }
+}
+
+/// Where and how heavily the worm crawls on one run.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// Slope as it truly is but for what is hidden, degrees.
+    pub slope_deg: f64,
+    /// Known extra mass, kg.
+    pub payload_kg: f64,
+    /// Where the first cell is laid down, m.
+    pub start_m: f64,
+}
+
+/// What changes from cycle to cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<'a> {
+    /// Gait phase at the end of the time step, cycles.
+    pub phase: f64,
+    /// Cycles since the run's start.
+    pub cycles: f64,
+    /// Each tip's friction over its mean in this cycle.
+    pub scatter: &'a [f64; CELLS],
+    /// Whether a jump of the friction is due.
+    pub jumped: bool,
+}
+
+/// The body in motion.
+#[derive(Debug, Clone)]
+pub struct Motion<'a> {
+    worm: &'a Worm,
+    gear: Gear,
+    pads: [Pad; CELLS],
+    mass_kg: f64,
+    slope_rad: f64,
+    step_s: f64,
+    time_s: f64,
+    momentum_n_s: f64,
+    /// Velocity of the body's translation over the last time step, m/s.
+    pub translation_m_s: f64,
+    pub position_m: [f64; CELLS],
+    velocity_m_s: [f64; CELLS],
+    tips: [Tip; CELLS],
+    extension_m: [f64; CELLS],
+    /// How far each cell stands off from its place in the body, m, backward.
+    stand_off_m: [f64; CELLS],
+    mean_m: f64,
+    /// Mean position where the run began, m.
+    begin_m: f64,
+}
+
+impl<'a> Motion<'a> {
+    /// A worm just laid down, undeformed and at rest; `step_s` is the integrator's time step.
+    pub fn laid_down(worm: &'a Worm, place: Place, phase: f64, step_s: f64) -> Self {
+        let gear = Gear::new(&worm.make, &worm.flaws, worm.stranger.as_ref());
+        let mass_kg = worm.make.mass_kg + worm.flaws.mass_kg + place.payload_kg;
+        let position_m: [f64; CELLS] = std::array::from_fn(|cell| place.start_m - worm.make.spacing_m * cell as f64);
+        let mean_m = position_m.iter().sum::<f64>() / CELLS as f64;
+        Self {
+            pads: worm.pads(worm.make.mass_kg),
+            mass_kg,
+            slope_rad: (place.slope_deg + worm.flaws.angle_deg).to_radians(),
+            step_s,
+            time_s: 0.0,
+            momentum_n_s: 0.0,
+            translation_m_s: 0.0,
+            position_m,
+            velocity_m_s: [0.0; CELLS],
+            tips: position_m.map(Tip::laid_down),
+            extension_m: gear.extensions_m(phase),
+            stand_off_m: [0.0; CELLS],
+            mean_m,
+            begin_m: mean_m,
+            gear,
+            worm,
+        }
+    }
+
+    /// From here on counts the way of the run.
+    pub fn begin(&mut self) {
+        self.begin_m = self.mean_m;
+    }
+
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Force that the drive gives the stepping cell (13), N.
+    pub fn actuator_n(&self, phase: f64) -> f64 {
+        let weight_n = self.mass_kg / CELLS as f64 * GRAVITY_M_S2 * self.slope_rad.sin();
+        self.tips[self.gear.stepping(phase)].elastic_n + weight_n
+    }
+
+    /// One time step.
+    pub fn step(&mut self, now: Moment) {
+        let step_s = self.step_s;
+        let cell_kg = self.mass_kg / CELLS as f64;
+        self.momentum_n_s -= self.pull_n() * step_s;
+
+        let follow = step_s / (FOLLOW_S + step_s);
+        let mut extension_m = self.gear.extensions_m(now.phase);
+        for ((extension_m, stand_off_m), tip) in extension_m.iter_mut().zip(&mut self.stand_off_m).zip(&self.tips) {
+            let held_m = self.worm.flaws.compliance_m_per_n * tip.elastic_n;
+            *stand_off_m += follow * (held_m - *stand_off_m);
+            *extension_m -= *stand_off_m;
+        }
+        let extended_m: f64 = extension_m
+            .iter()
+            .zip(&self.extension_m)
+            .map(|(new, old)| new - old)
+            .sum();
+        self.translation_m_s = (self.momentum_n_s - cell_kg * extended_m / step_s) / self.mass_kg;
+        for (cell, extension_m) in extension_m.into_iter().enumerate() {
+            let way_m = extension_m - self.extension_m[cell] + self.translation_m_s * step_s;
+            let limits = self.limits(cell, now);
+            self.position_m[cell] += way_m;
+            self.velocity_m_s[cell] = way_m / step_s;
+            self.tips[cell].follow(way_m, step_s, &self.pads[cell], limits);
+        }
+        self.extension_m = extension_m;
+        self.mean_m = self.position_m.iter().sum::<f64>() / CELLS as f64;
+        self.time_s += step_s;
+    }
+
+    /// All that pulls the worm back, N.
+    fn pull_n(&self) -> f64 {
+        let flaws = &self.worm.flaws;
+        let lowered = (self.time_s / LOWERING_S).min(1.0);
+        let gone_m = self.mean_m - self.begin_m;
+        let mut pull_n = lowered * (self.mass_kg * GRAVITY_M_S2 * self.slope_rad.sin() + flaws.force_n);
+        pull_n += flaws.tether_n_per_m * gone_m.max(0.0);
+        for cell in 0..CELLS {
+            pull_n += self.tips[cell].force_n + flaws.drag_n_s_per_m * self.velocity_m_s[cell];
+        }
+        if let Some(stranger) = &self.worm.stranger {
+            pull_n += lowered * stranger.on_worm_n(gone_m);
+            pull_n += lowered
+                * self
+                    .position_m
+                    .iter()
+                    .map(|&place_m| stranger.on_cell_n(place_m))
+                    .sum::<f64>();
+        }
+        pull_n
+    }
+
+    fn limits(&self, cell: usize, now: Moment) -> Limits {
+        let Worm { make, flaws, stranger } = self.worm;
+        let mut limit_n = make.friction_n[cell] * flaws.friction_factor[cell] * now.scatter[cell];
+        limit_n *= 1.0 - flaws.slope_sensitivity * (1.0 - self.slope_rad.cos());
+        if flaws.loss_per_cycle > 0.0 {
+            limit_n *= (1.0 - flaws.loss_per_cycle).powf(now.cycles.max(0.0));
+        }
+        if let Some(patch) = flaws.patch {
+            let inside = (patch.from_m..patch.from_m + patch.length_m).contains(&self.tips[cell].place_m);
+            limit_n *= if inside { patch.friction_factor } else { 1.0 };
+        }
+        if let Some(stranger) = stranger {
+            limit_n *= stranger.friction_factor(now.cycles, now.jumped);
+        }
+        Limits {
+            forward_n: limit_n,
+            backward_n: limit_n * flaws.backward_over_forward,
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! The 22 effects of the library, by the names that they have everywhere, and how strongly each is thrown.
+//!
+//! Severities are log-uniform between two ends, from what nobody can see to what nobody can overlook; a [`Band`] narrows
+//! that to a part of the logarithm.
+
+use super::CELLS;
+use super::flaws::{Flaws, Patch};
+use rand::RngExt;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// An effect as it truly is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueEffect {
+    /// Its name in the library; another name where the library has none for it.
+    pub name: &'static str,
+    /// The cell that it sits in, from 0, where it sits in one.
+    pub cell: Option<usize>,
+    /// Its figures, by the library's names.
+    pub parameters: Vec<(&'static str, f64)>,
+}
+
+impl TrueEffect {
+    /// Its cell, from 1, and its figures.
+    pub fn in_words(&self) -> String {
+        let cell = self.cell.map(|cell| format!("cell {}", cell + 1));
+        let figures = self
+            .parameters
+            .iter()
+            .map(|(name, value)| format!("{name} {value:.3e}"));
+        cell.into_iter().chain(figures).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// A part of the range of severities, as shares of its logarithm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Band {
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Band {
+    pub const WHOLE: Self = Self { from: 0.0, to: 1.0 };
+    pub const UPPER_HALF: Self = Self { from: 0.5, to: 1.0 };
+
+    /// The `part`-th of `parts` equal parts.
+    pub fn part(part: usize, parts: usize) -> Self {
+        let share = |part: usize| part as f64 / parts as f64;
+        Self {
+            from: share(part),
+            to: share(part + 1),
+        }
+    }
+
+    fn severity(self, least: f64, most: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
+        let share = self.from + (self.to - self.from) * rng.random::<f64>();
+        least * (most / least).powf(share)
+    }
+
+    /// A factor as far from 1, either way, as the ranges below and above say.
+    fn factor(self, below: [f64; 2], above: [f64; 2], rng: &mut Xoshiro256PlusPlus) -> f64 {
+        if rng.random::<bool>() {
+            1.0 - self.severity(below[0], below[1], rng)
+        } else {
+            1.0 + self.severity(above[0], above[1], rng)
+        }
+    }
+}
+
+macro_rules! effects {
+    ($($variant:ident = $name:literal,)*) => {
+        /// An effect of the library.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Effect {
+            $($variant,)*
+        }
+
+        impl Effect {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// Its name in the library.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)*
+                }
+            }
+        }
+    };
+}
+
+effects! {
+    UnequalClamping = "unequal-clamping",
+    UnequalStiffness = "unequal-stiffness",
+    DirectionalFriction = "directional-friction",
+    BreakawayFriction = "breakaway-friction",
+    PadHardening = "pad-hardening",
+    PadCreep = "pad-creep",
+    PadHysteresis = "pad-hysteresis",
+    ViscousDrag = "viscous-drag",
+    ConstantDrag = "constant-drag",
+    Payload = "payload",
+    SlopeError = "slope-error",
+    TetherDrag = "tether-drag",
+    LostStroke = "lost-stroke",
+    ActuatorCompliance = "actuator-compliance",
+    Backlash = "backlash",
+    StepOverlap = "step-overlap",
+    SlickPatch = "slick-patch",
+    Wear = "wear",
+    MotorDroop = "motor-droop",
+    SensorScale = "sensor-scale",
+    SensorLatency = "sensor-latency",
+    SlopeClamping = "slope-clamping",
+}
+
+impl Effect {
+    /// The effect of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|effect| effect.name() == name)
+    }
+
+    /// What it belongs to; effects of different classes do not look alike.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::UnequalClamping | Self::UnequalStiffness => "one pad",
+            Self::PadHardening | Self::PadCreep | Self::PadHysteresis => "pad law",
+            Self::BreakawayFriction => "friction law",
+            Self::DirectionalFriction
+            | Self::ViscousDrag
+            | Self::ConstantDrag
+            | Self::Payload
+            | Self::SlopeError
+            | Self::TetherDrag
+            | Self::SlopeClamping => "load",
+            Self::Wear | Self::SlickPatch => "friction that changes",
+            Self::LostStroke | Self::ActuatorCompliance | Self::SensorScale => "stroke",
+            Self::Backlash | Self::StepOverlap | Self::MotorDroop | Self::SensorLatency => "timing",
+        }
+    }
+
+    /// Whether it can be seen only beside the cam's own phase.
+    pub fn needs_phase(self) -> bool {
+        matches!(self, Self::SensorLatency | Self::MotorDroop | Self::Backlash)
+    }
+
+    /// Throws how strong it is and where, and puts it into the worm.
+    pub fn hide(self, band: Band, flaws: &mut Flaws, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
+        let cell = rng.random_range(0..CELLS);
+        let mut of_cell = None;
+        let parameters = match self {
+            Self::UnequalClamping => {
+                of_cell = Some(cell);
+                let factor = band.factor([0.1, 0.6], [0.1, 0.6], rng);
+                flaws.friction_factor[cell] = factor;
+                vec![("friction_factor", factor)]
+            }
+            Self::UnequalStiffness => {
+                of_cell = Some(cell);
+                let factor = band.factor([0.1, 0.6], [0.1, 0.6], rng);
+                flaws.stiffness_factor[cell] = factor;
+                vec![("stiffness_factor", factor)]
+            }
+            Self::DirectionalFriction => {
+                flaws.backward_over_forward = band.factor([0.05, 0.5], [0.05, 0.6], rng);
+                vec![("backward_over_forward", flaws.backward_over_forward)]
+            }
+            Self::BreakawayFriction => {
+                flaws.static_over_kinetic = 1.0 + band.severity(0.05, 0.8, rng);
+                vec![("static_over_kinetic", flaws.static_over_kinetic)]
+            }
+            Self::PadHardening => {
+                flaws.hardening = band.severity(0.03, 1.5, rng);
+                vec![("hardening", flaws.hardening)]
+            }
+            Self::PadCreep => {
+                flaws.creep_share = band.severity(0.05, 1.5, rng);
+                flaws.creep_s = Band::WHOLE.severity(0.1, 3.0, rng);
+                vec![("creep_share", flaws.creep_share), ("time_constant_s", flaws.creep_s)]
+            }
+            Self::PadHysteresis => {
+                flaws.yielding_share = band.severity(0.05, 0.8, rng);
+                vec![("yielding_share", flaws.yielding_share)]
+            }
+            Self::ViscousDrag => {
+                flaws.drag_n_s_per_m = band.severity(0.5, 30.0, rng);
+                vec![("drag_n_s_per_m", flaws.drag_n_s_per_m)]
+            }
+            Self::ConstantDrag => {
+                flaws.force_n = band.severity(0.02, 0.8, rng);
+                vec![("force_n", flaws.force_n)]
+            }
+            Self::Payload => {
+                flaws.mass_kg = band.severity(0.005, 0.15, rng);
+                vec![("mass_kg", flaws.mass_kg)]
+            }
+            Self::SlopeError => {
+                let angle_deg = band.severity(0.2, 4.0, rng);
+                flaws.angle_deg = if rng.random::<bool>() { angle_deg } else { -angle_deg };
+                vec![("angle_deg", flaws.angle_deg)]
+            }
+            Self::TetherDrag => {
+                // The force at the end of the level run, over the way that a worm makes there.
+                flaws.tether_n_per_m = band.severity(0.05, 1.0, rng) / LEVEL_WAY_M;
+                vec![("force_per_distance_n_per_m", flaws.tether_n_per_m)]
+            }
+            Self::LostStroke if rng.random::<bool>() => {
+                of_cell = Some(cell);
+                let share = band.severity(0.01, 0.12, rng);
+                flaws.stroke_factor[cell] = 1.0 - share;
+                vec![("lost_share", share)]
+            }
+            Self::LostStroke => vec![("lost_share", lose_all(band, flaws, rng))],
+            Self::ActuatorCompliance => {
+                flaws.compliance_m_per_n = band.severity(1e-5, 3e-4, rng);
+                vec![("compliance_m_per_n", flaws.compliance_m_per_n)]
+            }
+            Self::Backlash => {
+                flaws.play_m = band.severity(0.05e-3, 1e-3, rng);
+                vec![("play_m", flaws.play_m)]
+            }
+            Self::StepOverlap => {
+                flaws.overlap = band.severity(0.02, 0.3, rng);
+                vec![("overlap", flaws.overlap)]
+            }
+            Self::SlickPatch => {
+                let patch = Patch {
+                    // On the level the four cells together pass over all from 120 mm behind the first to 70 mm ahead.
+                    from_m: rng.random_range(-0.11..0.05),
+                    length_m: rng.random_range(0.015..0.060),
+                    friction_factor: 1.0 - band.severity(0.1, 0.7, rng),
+                };
+                flaws.patch = Some(patch);
+                vec![
+                    ("from_m", patch.from_m),
+                    ("length_m", patch.length_m),
+                    ("friction_factor", patch.friction_factor),
+                ]
+            }
+            Self::Wear => {
+                flaws.loss_per_cycle = band.severity(0.001, 0.03, rng);
+                vec![("loss_per_cycle", flaws.loss_per_cycle)]
+            }
+            Self::MotorDroop => {
+                flaws.slowdown_per_n = band.severity(0.01, 0.3, rng);
+                vec![("slowdown_per_n", flaws.slowdown_per_n)]
+            }
+            Self::SensorScale => {
+                flaws.scale = band.factor([0.04, 0.12], [0.04, 0.12], rng);
+                vec![("scale", flaws.scale)]
+            }
+            Self::SensorLatency => {
+                flaws.latency_s = band.severity(0.004, 0.060, rng);
+                vec![("latency_s", flaws.latency_s)]
+            }
+            Self::SlopeClamping => {
+                flaws.slope_sensitivity = band.severity(0.05, 1.2, rng);
+                vec![("sensitivity", flaws.slope_sensitivity)]
+            }
+        };
+        TrueEffect {
+            name: self.name(),
+            cell: of_cell,
+            parameters,
+        }
+    }
+}
+
+/// Way of a worm on the level in twelve cycles, m.
+const LEVEL_WAY_M: f64 = 0.080;
+
+/// Shortens the stroke of every cell; returns the share that is lost.
+pub fn lose_all(band: Band, flaws: &mut Flaws, rng: &mut Xoshiro256PlusPlus) -> f64 {
+    let share = band.severity(0.04, 0.15, rng);
+    flaws.stroke_factor = [1.0 - share; CELLS];
+    share
+}
+
+/// Makes every pad softer and weaker by the same factor, which no position can tell from a payload.
+pub fn soften(flaws: &mut Flaws, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
+    let factor = rng.random_range(0.68..0.82);
+    flaws.stiffness_factor = [factor; CELLS];
+    // The largest deformation, friction force over stiffness, stays.
+    flaws.friction_factor = [factor; CELLS];
+    TrueEffect {
+        name: "softer-pads",
+        cell: None,
+        parameters: vec![("stiffness_factor", factor)],
+    }
+}

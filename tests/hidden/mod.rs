@@ -1,0 +1,46 @@
+//! Worms with an effect hidden in them: what the search for the missing effect is held against.
+//!
+//! It shares no code with the library's model, on purpose: it knows of the library only [`wormd::recording::Recording`],
+//! which it makes, and [`wormd::config::Config`], the belief that goes with it. The library moves its worm quasi-statically,
+//! event by event; this one has mass, dampers and a time step ([`body`]), and each tip holds by a bristle that gives before
+//! it slides ([`tip`]). Nothing is quite as believed: friction, stiffness, stroke, mass and slope are off by a few per cent
+//! ([`make`]), friction scatters from cycle to cycle, the motor is uneven, and the camera's noise is correlated in time.
+//!
+//! ```text
+//!   seed ─► Make ─────┐
+//!   Effect ─► Flaws ──┼─► Worm ─► Scene (one for each run) ─► Recording ┐
+//!   Stranger ─────────┘                                                 ├─► HiddenCampaign
+//!                                        the same dice, nothing hidden ─┘
+//! ```
+//!
+//! [`effect`] has the library's 22 effects by name, [`stranger`] what no library names, [`campaign`] throws the dice and
+//! makes the runs, [`repeat`] makes one more run of the same worm under another condition, and [`split`] lists the cases.
+//! An answer is held against the truth by [`verdict`], and many of them by [`table`].
+
+#![allow(dead_code, reason = "every crate that includes this module uses its own part of it")]
+
+pub mod body;
+pub mod campaign;
+pub mod effect;
+pub mod flaws;
+pub mod gear;
+pub mod make;
+pub mod repeat;
+pub mod scene;
+pub mod split;
+pub mod stranger;
+pub mod table;
+pub mod tip;
+pub mod verdict;
+pub mod visible;
+
+// The camera and the motor are those that the identification is judged by.
+#[path = "../truth/camera.rs"]
+pub mod camera;
+#[path = "../truth/cam.rs"]
+pub mod drive;
+
+/// Cells of every worm here.
+pub const CELLS: usize = 4;
+/// Standard gravity as the paper rounds it, m/s².
+pub const GRAVITY_M_S2: f64 = 9.81;

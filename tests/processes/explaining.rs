@@ -1,0 +1,55 @@
+//! `wormd explain --live` beside a real worm.
+
+use super::Crawling;
+use super::worm::Worm;
+use wormd::config::Config;
+use wormd::message::{CommandKind, Mode, Verdict};
+use wormd::recording::mcap::messages;
+
+#[test]
+fn the_crawling_worm_is_recorded_and_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("found");
+    let dir = out.to_str().expect("plain");
+    let live = |worm: &Worm| {
+        let output = worm
+            .wormd(&["explain", "--live", "--cycles", "6", "--json", "--out", dir])
+            .output();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said, output.stdout)
+    };
+    let nobody = Worm::new("nobody");
+    let (code, said, _) = live(&nobody);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(
+        said.contains("no worm nobody-") && said.contains("wormd up --name"),
+        "{said}"
+    );
+
+    assert_eq!(nobody.residue(), Vec::<String>::new());
+
+    let crawling = Crawling::start("explain");
+    let (code, said, answer) = live(&crawling.worm);
+    assert_eq!(code, Some(0), "{said}");
+    let answer: serde_json::Value = serde_json::from_slice(&answer).expect("one JSON object");
+    let run = &answer["runs"][0];
+    assert_eq!((&run["slope_deg"], &run["phase_recorded"]), (&0.0.into(), &true.into()));
+    assert!(run["cycles"].as_u64() >= Some(6), "{run}");
+    let log = out.join("live.mcap");
+    assert_eq!(run["recording"], log.to_string_lossy().as_ref());
+    assert_eq!(
+        messages(&log).expect("a log").warnings,
+        Vec::<String>::new(),
+        "it was finished"
+    );
+    Config::load(&out.join("model.toml")).expect("a model");
+
+    assert_eq!(crawling.worm.order(CommandKind::Hold), Verdict::Accepted);
+    crawling.wait_for_mode(Mode::Holding);
+    let (code, said, _) = live(&crawling.worm);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(
+        said.contains("does not crawl (holding)") && said.contains("wormd command crawl"),
+        "{said}"
+    );
+}
