@@ -74,6 +74,9 @@ pub struct Instance {
     iceoryx: IoxConfig,
 }
 
+/// Mode of a worm's folder: its user's alone.
+const PRIVATE: u32 = 0o700;
+
 impl Instance {
     /// The namespace of the configured worm.
     ///
@@ -150,24 +153,30 @@ impl Instance {
         };
         DirBuilder::new()
             .recursive(true)
-            .mode(0o700)
+            .mode(PRIVATE)
             .create(&self.folder)
             .map_err(unusable)?;
-        let owner = match self.folder.symlink_metadata() {
-            Ok(metadata) => metadata.uid(),
+        let (owner, mode) = match self.folder.symlink_metadata() {
+            Ok(metadata) => (metadata.uid(), metadata.mode() & 0o777),
             // Removed again by a process that was just leaving: whoever takes a lock creates it anew.
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
             Err(error) => return Err(unusable(error)),
         };
         let user = nix::unistd::geteuid().as_raw();
-        if owner == user {
-            Ok(())
-        } else {
-            Err(InstanceError::Foreign {
+        if owner != user {
+            return Err(InstanceError::Foreign {
                 folder: self.folder.clone(),
                 owner,
                 user,
-            })
+            });
+        }
+        if mode == PRIVATE {
+            return Ok(());
+        }
+        // Made under another umask, which iceoryx2 changes for moments in its own threads.
+        match std::fs::set_permissions(&self.folder, Permissions::from_mode(PRIVATE)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(unusable(error)),
+            _ => Ok(()),
         }
     }
 }
