@@ -12,7 +12,7 @@ pub enum ExplainError {
     NoRun,
     /// A recording is of a worm with another number of cells.
     #[error(
-        "{recording}: {found} cells, but the worm is configured with {configured}: list recordings of the configured worm, or set worm.cells and worm.step_order"
+        "{recording}: {found} cells, but the worm is configured with {configured}: list recordings of the configured worm, or give its own --config (worm.cells, worm.step_order)"
     )]
     Cells {
         /// The recording.
