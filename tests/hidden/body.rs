@@ -40,6 +40,7 @@ impl Worm {
         let damping = 2.0 * make.damping_ratio * (stiffness * mass_kg).sqrt() / CELLS as f64;
         std::array::from_fn(|cell| {
             let stiffness_n_per_m = make.stiffness_n_per_m[cell] * flaws.stiffness_factor[cell];
+            let friction_n = make.friction_n[cell] * flaws.friction_factor[cell];
             Pad {
                 stiffness_n_per_m,
                 damping_n_s_per_m: damping,
@@ -47,9 +48,11 @@ impl Worm {
                 creep_share: flaws.creep_share,
                 creep_s: flaws.creep_s,
                 yielding_share: flaws.yielding_share,
-                yielding_m: make.friction_n[cell] * flaws.friction_factor[cell] / stiffness_n_per_m,
-                bristle_n_per_m: make.bristle_ratio * stiffness_n_per_m,
-                static_over_kinetic: flaws.static_over_kinetic,
+                yielding_m: friction_n / stiffness_n_per_m,
+                bristle_n_per_m: friction_n / make.contact.presliding_m,
+                contact: make.contact,
+                // Hidden breakaway friction is what the two bounds then are; it does not come on top of the contact's own.
+                static_over_kinetic: flaws.static_over_kinetic.max(make.contact.static_over_kinetic),
             }
         })
     }
@@ -86,7 +89,10 @@ pub struct Motion<'a> {
     gear: Gear,
     pads: [Pad; CELLS],
     mass_kg: f64,
-    slope_rad: f64,
+    /// Weight along the canal, N.
+    weight_n: f64,
+    /// What the slope leaves of the friction.
+    grip_on_slope: f64,
     step_s: f64,
     time_s: f64,
     momentum_n_s: f64,
@@ -110,10 +116,12 @@ impl<'a> Motion<'a> {
         let mass_kg = worm.make.mass_kg + worm.flaws.mass_kg + place.payload_kg;
         let position_m: [f64; CELLS] = std::array::from_fn(|cell| place.start_m - worm.make.spacing_m * cell as f64);
         let mean_m = position_m.iter().sum::<f64>() / CELLS as f64;
+        let slope_rad = (place.slope_deg + worm.flaws.angle_deg).to_radians();
         Self {
             pads: worm.pads(worm.make.mass_kg),
             mass_kg,
-            slope_rad: (place.slope_deg + worm.flaws.angle_deg).to_radians(),
+            weight_n: mass_kg * GRAVITY_M_S2 * slope_rad.sin(),
+            grip_on_slope: 1.0 - worm.flaws.slope_sensitivity * (1.0 - slope_rad.cos()),
             step_s,
             time_s: 0.0,
             momentum_n_s: 0.0,
@@ -141,8 +149,7 @@ impl<'a> Motion<'a> {
 
     /// Force that the drive gives the stepping cell (13), N.
     pub fn actuator_n(&self, phase: f64) -> f64 {
-        let weight_n = self.mass_kg / CELLS as f64 * GRAVITY_M_S2 * self.slope_rad.sin();
-        self.tips[self.gear.stepping(phase)].elastic_n + weight_n
+        self.tips[self.gear.stepping(phase)].elastic_n + self.weight_n / CELLS as f64
     }
 
     /// One time step.
@@ -181,7 +188,7 @@ impl<'a> Motion<'a> {
         let flaws = &self.worm.flaws;
         let lowered = (self.time_s / LOWERING_S).min(1.0);
         let gone_m = self.mean_m - self.begin_m;
-        let mut pull_n = lowered * (self.mass_kg * GRAVITY_M_S2 * self.slope_rad.sin() + flaws.force_n);
+        let mut pull_n = lowered * (self.weight_n + flaws.force_n);
         pull_n += flaws.tether_n_per_m * gone_m.max(0.0);
         for cell in 0..CELLS {
             pull_n += self.tips[cell].force_n + flaws.drag_n_s_per_m * self.velocity_m_s[cell];
@@ -201,7 +208,7 @@ impl<'a> Motion<'a> {
     fn limits(&self, cell: usize, now: Moment) -> Limits {
         let Worm { make, flaws, stranger } = self.worm;
         let mut limit_n = make.friction_n[cell] * flaws.friction_factor[cell] * now.scatter[cell];
-        limit_n *= 1.0 - flaws.slope_sensitivity * (1.0 - self.slope_rad.cos());
+        limit_n *= self.grip_on_slope;
         if flaws.loss_per_cycle > 0.0 {
             limit_n *= (1.0 - flaws.loss_per_cycle).powf(now.cycles.max(0.0));
         }

@@ -4,7 +4,7 @@ use super::body::{Place, Worm};
 use super::effect::{Band, Effect, TrueEffect, lose_all, soften};
 use super::flaws::Flaws;
 use super::make::{Make, normal};
-use super::scene::{Eyes, Lost, Played, STEP_S, Scene, uneven};
+use super::scene::{Eyes, Lost, Played, STEP_S, Scene};
 use super::stranger::Stranger;
 use super::visible::{Visible, advances_m};
 use rand::{RngExt, SeedableRng};
@@ -140,7 +140,7 @@ fn thrown(wanted: Wanted, seed: u64, throw: u64) -> Option<HiddenCampaign> {
                 payload_kg: 0.0,
                 start_m: 0.0,
             },
-            drive: uneven(cycle_s, &mut rng),
+            drive: make.motor.drive(cycle_s, &mut rng),
             eyes: eyes.clone(),
             warm_up_cycles,
             cycles: CYCLES,
@@ -160,7 +160,7 @@ fn thrown(wanted: Wanted, seed: u64, throw: u64) -> Option<HiddenCampaign> {
         scenes.iter_mut().for_each(|scene| scene.with_phase = true);
     }
     let worm = Worm { make, flaws, stranger };
-    let (slopes_deg, played, honest) = crawled(&worm, &mut scenes, steepest_deg)?;
+    let (slopes_deg, played, honest) = crawled(&worm, !truth.is_empty(), &mut scenes, steepest_deg)?;
 
     let what: Vec<&str> = truth.iter().map(|effect| effect.name).collect();
     let what = if what.is_empty() {
@@ -233,7 +233,7 @@ fn hidden(
 type Crawled = (Vec<f64>, Vec<Played>, Vec<Played>);
 
 /// Plays every run on the steepest of its slopes on which the worm crawls with what is hidden in it and without.
-fn crawled(worm: &Worm, scenes: &mut [Scene], steepest_deg: f64) -> Option<Crawled> {
+fn crawled(worm: &Worm, is_flawed: bool, scenes: &mut [Scene], steepest_deg: f64) -> Option<Crawled> {
     let steep = [45.0, 40.0, 35.0, 25.0, 18.0];
     let choices: [&[f64]; 3] = [&[0.0], &[30.0, 20.0, 12.0], &steep];
     let mut all = Crawled::default();
@@ -247,7 +247,11 @@ fn crawled(worm: &Worm, scenes: &mut [Scene], steepest_deg: f64) -> Option<Crawl
         let (slope_deg, played, honest) = able.find_map(|slope_deg| {
             scene.place.slope_deg = slope_deg + error_deg;
             let played = crawl(worm, scene).ok()?;
-            let honest = crawl(&worm.honest(), scene).ok()?;
+            let honest = if is_flawed {
+                crawl(&worm.honest(), scene).ok()?
+            } else {
+                played.clone()
+            };
             Some((slope_deg, played, honest))
         })?;
         all.0.push(slope_deg);

@@ -47,7 +47,7 @@ impl Gear {
             let turns = (begun / cells).floor();
             let done = ((begun - turns * cells) / (1.0 + self.overlap)).min(1.0);
             let way_m = (self.stroke_m[cell] * self.share(done) - self.play_m).max(0.0);
-            let wave_m = if done < 1.0 {
+            let wave_m = if done < 1.0 && self.wave_m[cell] != 0.0 {
                 self.wave_m[cell] * (TAU * done).sin()
             } else {
                 0.0

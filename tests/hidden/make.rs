@@ -1,6 +1,8 @@
 //! How a worm was made: everywhere near what is believed of it, nowhere quite.
 
 use super::CELLS;
+use super::motor::Motor;
+use super::tip::contact::{Contact, between};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -20,12 +22,13 @@ pub struct Make {
     pub stroke_m: f64,
     /// Distance between neighbouring cells at rest, m.
     pub spacing_m: f64,
-    /// Stiffness of a tip's bristle over that of its pad.
-    pub bristle_ratio: f64,
+    /// How the tips hold to the canal.
+    pub contact: Contact,
     /// Damping of the contacts; 1 is critical for the body on all its tips.
     pub damping_ratio: f64,
     /// Share of a step in which the cam gets a cell to speed, and again in which it stops it.
     pub rounding: f64,
+    pub motor: Motor,
     /// Standard deviation of each tip's friction from cycle to cycle, as a share.
     pub scatter: f64,
     /// Cells from 0, in the order in which they step.
@@ -33,7 +36,7 @@ pub struct Make {
 }
 
 impl Make {
-    /// The worm that is believed in, on tips that hardly give before they slide.
+    /// The worm that is believed in, on tips that do not give before they slide.
     pub fn nominal() -> Self {
         Self {
             mass_kg: 0.333,
@@ -41,9 +44,10 @@ impl Make {
             stiffness_n_per_m: [980.0; CELLS],
             stroke_m: 0.0115,
             spacing_m: 0.040,
-            bristle_ratio: 2000.0,
+            contact: Contact::rigid(),
             damping_ratio: 0.3,
             rounding: 0.005,
+            motor: Motor::even(),
             scatter: 0.0,
             step_order: std::array::from_fn(|cell| cell),
         }
@@ -63,9 +67,10 @@ impl Make {
             stroke_m: nominal.stroke_m * about_one(0.01, rng),
             // Cells are said to sit "about 40 mm apart": their distance must not give a wrong ruler away.
             spacing_m: rng.random_range(0.036..0.044),
-            bristle_ratio: rng.random_range(30.0..60.0),
+            contact: Contact::draw(rng),
             damping_ratio: 10f64.powf(rng.random_range(-1.0..0.0)),
-            rounding: rng.random_range(0.002..0.01),
+            rounding: between(0.002, 0.03, rng),
+            motor: Motor::draw(rng),
             scatter: rng.random_range(0.005..0.015),
             step_order: if rng.random_range(0..4) == 0 {
                 shuffled(rng)

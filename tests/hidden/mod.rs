@@ -2,9 +2,10 @@
 //!
 //! It shares no code with the library's model, on purpose: it knows of the library only [`wormd::recording::Recording`],
 //! which it makes, and [`wormd::config::Config`], the belief that goes with it. The library moves its worm quasi-statically,
-//! event by event; this one has mass, dampers and a time step ([`body`]), and each tip holds by a bristle that gives before
-//! it slides ([`tip`]). Nothing is quite as believed: friction, stiffness, stroke, mass and slope are off by a few per cent
-//! ([`make`]), friction scatters from cycle to cycle, the motor is uneven, and the camera's noise is correlated in time.
+//! event by event; this one has mass, dampers and a time step ([`body`]), and its tips hold by one of several friction laws,
+//! which is part of the throw ([`tip`]). Nothing is quite as believed: friction, stiffness, stroke, mass and slope are off by
+//! a few per cent ([`make`]), friction scatters from cycle to cycle, the cam is rounded and the motor uneven as each machine
+//! has it ([`motor`]), and the camera's noise is correlated in time.
 //!
 //! ```text
 //!   seed ─► Make ─────┐
@@ -25,6 +26,7 @@ pub mod effect;
 pub mod flaws;
 pub mod gear;
 pub mod make;
+pub mod motor;
 pub mod repeat;
 pub mod scene;
 pub mod split;

@@ -3,7 +3,7 @@
 use super::body::Place;
 use super::campaign::{HiddenCampaign, SLOPE_SIGMA_DEG, crawl};
 use super::make::normal;
-use super::scene::{Lost, Scene, uneven};
+use super::scene::{Lost, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wormd::recording::Recording;
@@ -58,7 +58,7 @@ impl HiddenCampaign {
                 payload_kg: condition.payload_kg,
                 start_m: condition.start_shift_m,
             },
-            drive: uneven(condition.cycle_s, &mut rng),
+            drive: self.worm.make.motor.drive(condition.cycle_s, &mut rng),
             warm_up_cycles: 0.0,
             cycles: condition.cycles,
             dwell_s: condition.dwell_s,

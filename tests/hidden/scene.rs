@@ -4,10 +4,10 @@ use super::CELLS;
 use super::body::{Moment, Motion, Place, Worm};
 use super::camera::{Camera, Watch};
 use super::drive::Drive;
-use rand::{RngExt, SeedableRng};
+use super::tip::contact::between;
+use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use std::f64::consts::TAU;
 use std::path::PathBuf;
 use wormd::recording::Recording;
 
@@ -46,23 +46,12 @@ impl Eyes {
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
         Self {
             camera: Camera {
-                noise_m: rng.random_range(0.05e-3..0.1e-3),
+                noise_m: between(0.03e-3, 0.15e-3, rng),
                 ..Camera::default()
             },
-            drift_m: rng.random_range(0.02e-3..0.04e-3),
-            drift_s: rng.random_range(0.03..0.1),
+            drift_m: between(0.01e-3, 0.05e-3, rng),
+            drift_s: between(0.02, 0.2, rng),
         }
-    }
-}
-
-/// A motor as uneven as real ones.
-pub fn uneven(cycle_s: f64, rng: &mut Xoshiro256PlusPlus) -> Drive {
-    Drive {
-        swing_per_step: rng.random_range(0.0..0.1),
-        swing_per_turn: rng.random_range(0.0..0.05),
-        wander: 0.01,
-        angles_rad: std::array::from_fn(|_| rng.random_range(0.0..TAU)),
-        ..Drive::even(cycle_s)
     }
 }
 

@@ -16,8 +16,8 @@ impl Split {
     /// Below the first seed.
     fn base(self) -> u64 {
         match self {
-            Self::Development => 1_000_000,
-            Self::Test => 2_000_000,
+            Self::Development => 41_300_000,
+            Self::Test => 73_900_000,
         }
     }
 

@@ -1,24 +1,24 @@
-//! One tip: a pad that gives, in series with a bristle that grips the canal.
+//! One tip: a pad that gives, in series with a contact that grips the canal.
 //!
 //! The pad between cell and tip is a spring with a damper beside it, and with what may be hidden in it: a cubic part, a
-//! Maxwell branch, elements that yield. The tip itself has no mass and holds to the canal by the bristle of LuGre's friction,
-//! z' = v (1 − σ |z| sgn(v z) / F) with v the tip's velocity and F the friction limit: it gives a little before it slides, and
-//! slides at σ z = F. Without mass the forces of pad and bristle are equal at every moment; with both taken linear over a
-//! time step, that is a quadratic equation for v, so the bristle's stiffness does not bound the time step.
+//! Maxwell branch, elements that yield. The tip itself has no mass and holds to the canal by the friction law that was drawn
+//! for the worm ([`contact`]). Without mass the forces of pad and contact are equal at every moment; with the pad taken
+//! linear over a time step, each law solves that for the tip's way at the step's end.
+
+pub mod contact;
+pub mod coulomb;
+pub mod dahl;
+pub mod elasto_plastic;
+pub mod fall;
+pub mod lugre;
+
+use contact::{Contact, Push};
+use fall::Memory;
 
 /// How many elements the yielding share of a pad is made of.
 const ELEMENTS: usize = 16;
 /// Deformation at which the pad's cubic part equals β times its linear part, m.
 const HARDENING_M: f64 = 1.75e-3;
-/// Share of its limit from which a tip counts as sliding.
-const SLIDING: f64 = 0.97;
-/// Way over which the limit of a tip that has begun to slide falls to its kinetic value, m.
-const DROP_M: f64 = 0.1e-3;
-/// A tip slower than this rests, m/s.
-const REST_M_S: f64 = 0.3e-3;
-/// Rest after which the static limit holds again, s.
-const RESTORED_S: f64 = 0.010;
-
 /// What a pad and its tip are made of.
 #[derive(Debug, Clone)]
 pub struct Pad {
@@ -31,6 +31,8 @@ pub struct Pad {
     /// Deformation to which the elements that yield are spread, m.
     pub yielding_m: f64,
     pub bristle_n_per_m: f64,
+    pub contact: Contact,
+    /// Friction limit of a tip at rest over that of a sliding one.
     pub static_over_kinetic: f64,
 }
 
@@ -62,9 +64,7 @@ pub struct Tip {
     bristle_m: f64,
     crept_m: f64,
     yielded_m: [f64; ELEMENTS],
-    /// Way since it began to slide, m, with the sign of the direction.
-    slid_m: f64,
-    rested_s: f64,
+    memory: Memory,
 }
 
 impl Tip {
@@ -78,8 +78,7 @@ impl Tip {
             bristle_m: 0.0,
             crept_m: 0.0,
             yielded_m: [0.0; ELEMENTS],
-            slid_m: 0.0,
-            rested_s: 0.0,
+            memory: Memory::default(),
         }
     }
 
@@ -87,38 +86,33 @@ impl Tip {
     pub fn follow(&mut self, way_m: f64, step_s: f64, pad: &Pad, limits: Limits) {
         let stiffness = pad.tangent_n_per_m(self.deformation_m);
         let damping = pad.damping_n_s_per_m / step_s;
-        let bristle = pad.bristle_n_per_m;
         // What pulls the tip if it stays where it is, and what holds it.
         let pull_n = self.elastic_n + (stiffness + damping) * way_m;
-        let excess_n = pull_n - bristle * self.bristle_m;
-        let sign = excess_n.signum();
+        let sign = (pull_n - pad.bristle_n_per_m * self.bristle_m).signum();
         let limit_n = if sign > 0.0 {
             limits.forward_n
         } else {
             limits.backward_n
-        } * self.grip(sign, pad);
-        // With s the way of the tip: (pull − (stiffness + damping) s) (1 + σ |s| / F) = σ (z + s).
-        let yielding = bristle / limit_n;
-        let square = yielding * (stiffness + damping);
-        let linear = stiffness + damping + bristle - yielding * sign * pull_n;
-        let root = (linear * linear + 4.0 * square * excess_n.abs()).sqrt();
-        // Both forms of the same root; each loses digits where the other does not.
-        let way = if linear > 0.0 {
-            2.0 * excess_n.abs() / (linear + root)
-        } else {
-            (root - linear) / (2.0 * square)
         };
-        let tip_m = sign * way;
-
-        self.bristle_m = (self.bristle_m + tip_m) / (1.0 + yielding * way);
+        let left = pad.contact.fall.left(&self.memory, sign);
+        let gone = pad.contact.law.go(&Push {
+            pull_n: sign * pull_n,
+            slack_n_per_m: stiffness + damping,
+            limit_n: limit_n * (1.0 + (pad.static_over_kinetic - 1.0) * left),
+            bristle_n_per_m: pad.bristle_n_per_m,
+            bristle_m: sign * self.bristle_m,
+            step_s,
+        });
+        let tip_m = sign * gone.way_m;
+        let bristle_m = sign * gone.bristle_m;
+        let slipped_m = tip_m - (bristle_m - self.bristle_m);
+        self.memory.keep(&pad.contact.fall, tip_m, slipped_m, step_s);
+        self.bristle_m = bristle_m;
         self.place_m += tip_m;
         let strained_m = way_m - tip_m;
         self.deformation_m += strained_m;
         self.deform(step_s, pad);
         self.force_n = self.elastic_n + damping * strained_m;
-        if pad.static_over_kinetic != 1.0 {
-            self.remember(tip_m, limit_n, step_s, pad);
-        }
     }
 
     /// The pad's elastic force at its new deformation.
@@ -139,27 +133,5 @@ impl Tip {
             }
         }
         self.elastic_n = force_n;
-    }
-
-    /// The limit over the kinetic one.
-    fn grip(&self, sign: f64, pad: &Pad) -> f64 {
-        let slid_m = (sign * self.slid_m).max(0.0);
-        1.0 + (pad.static_over_kinetic - 1.0) * (-slid_m / DROP_M).exp()
-    }
-
-    /// Keeps how far the tip has slid since it last rested or turned.
-    fn remember(&mut self, tip_m: f64, limit_n: f64, step_s: f64, pad: &Pad) {
-        let slides = (pad.bristle_n_per_m * self.bristle_m).abs() > SLIDING * limit_n;
-        self.rested_s = if tip_m.abs() < REST_M_S * step_s {
-            self.rested_s + step_s
-        } else {
-            0.0
-        };
-        if self.rested_s > RESTORED_S || (tip_m * self.slid_m < 0.0 && tip_m.abs() > REST_M_S * step_s) {
-            self.slid_m = 0.0;
-        }
-        if slides {
-            self.slid_m += tip_m;
-        }
     }
 }

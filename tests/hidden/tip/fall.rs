@@ -1,0 +1,97 @@
+//! How the static bound of a tip falls to the kinetic one once it slides, and comes back.
+
+use super::contact::between;
+use rand::RngExt;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// A tip slower than this rests, m/s.
+const REST_M_S: f64 = 0.3e-3;
+/// Shares of the Stribeck speed below which the bound is static and above which it is kinetic, to one in a thousand.
+const WHOLLY: [f64; 2] = [1e-3, 7.0];
+
+/// What the bound falls with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fall {
+    /// Stribeck's curve over the tip's speed, which friction feels with a lag.
+    Speed {
+        stribeck_m_s: f64,
+        /// 1 after Tustin, 2 after Gauss.
+        power: i32,
+        /// How late friction follows the speed, s.
+        lag_s: f64,
+    },
+    /// The way since the contact broke; a rest heals it.
+    Way {
+        drop_m: f64,
+        /// Rest after which the static bound holds again, s.
+        restored_s: f64,
+    },
+}
+
+impl Fall {
+    pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
+        if rng.random::<bool>() {
+            Self::Speed {
+                stribeck_m_s: between(1e-3, 4e-3, rng),
+                power: rng.random_range(1..=2),
+                lag_s: between(4e-3, 12e-3, rng),
+            }
+        } else {
+            Self::Way {
+                drop_m: between(20e-6, 200e-6, rng),
+                restored_s: between(5e-3, 30e-3, rng),
+            }
+        }
+    }
+
+    /// How much of the static bound's excess is left to a tip that is pulled in a direction.
+    pub fn left(&self, memory: &Memory, sign: f64) -> f64 {
+        match *self {
+            Self::Speed {
+                stribeck_m_s, power, ..
+            } => {
+                let speed = memory.speed_m_s / stribeck_m_s;
+                if speed < WHOLLY[0] {
+                    1.0
+                } else if speed > WHOLLY[1] {
+                    0.0
+                } else {
+                    (-speed.powi(power)).exp()
+                }
+            }
+            Self::Way { drop_m, .. } => {
+                let slid_m = sign * memory.slid_m;
+                if slid_m > 0.0 { (-slid_m / drop_m).exp() } else { 1.0 }
+            }
+        }
+    }
+}
+
+/// What a tip's friction remembers of its motion.
+#[derive(Debug, Clone, Default)]
+pub struct Memory {
+    /// Speed as friction feels it, m/s.
+    speed_m_s: f64,
+    /// Way since the contact broke, m, with the sign of the direction.
+    slid_m: f64,
+    rested_s: f64,
+}
+
+impl Memory {
+    /// After a time step in which the tip went `way_m`, `slipped_m` of it beyond its bristle's bend.
+    pub fn keep(&mut self, fall: &Fall, way_m: f64, slipped_m: f64, step_s: f64) {
+        match *fall {
+            Fall::Speed { lag_s, .. } => {
+                self.speed_m_s += (way_m.abs() - self.speed_m_s * step_s) / (lag_s + step_s);
+            }
+            Fall::Way { restored_s, .. } => {
+                let moves = way_m.abs() > REST_M_S * step_s;
+                self.rested_s = if moves { 0.0 } else { self.rested_s + step_s };
+                if self.rested_s > restored_s || (moves && way_m * self.slid_m < 0.0) {
+                    self.slid_m = 0.0;
+                }
+                self.slid_m += slipped_m;
+            }
+        }
+    }
+}
