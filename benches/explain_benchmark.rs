@@ -138,7 +138,8 @@ fn search(campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<explain::Answ
         recording: &extra.recording,
         slope_deg: extra.condition.slope_deg,
         payload_kg: extra.condition.payload_kg,
-        cycle_s: Some(extra.condition.cycle_s + extra.condition.dwell_s),
+        // The time that the motor takes for a turn, rests left out.
+        cycle_s: Some(extra.condition.cycle_s),
     });
     let runs: Vec<Run> = own.chain(proposed).collect();
     let options = explain::Options::default();
@@ -194,12 +195,13 @@ fn screened(effect: &explain::answer::Screened) -> Screened {
     }
 }
 
-/// The proposed run, on the middle slope where it changes something else: there weight counts and every worm crawls.
+/// The proposed run as the campaign's experimenter would make it: on the slope that the proposal names, as usual but for one
+/// change.
 fn proposal(next: &explain::answer::NextExperiment, campaign: &HiddenCampaign) -> Proposal {
-    let usual = campaign.usual(campaign.slopes_deg[1]);
-    let Some(value) = next.value else {
+    let (Some(value), Some(slope_deg)) = (next.value, next.slope_deg) else {
         return Proposal::Measurement;
     };
+    let usual = campaign.usual(slope_deg);
     Proposal::Run(match next.change.as_str() {
         "slope_deg" => Condition {
             slope_deg: value,
@@ -214,7 +216,7 @@ fn proposal(next: &explain::answer::NextExperiment, campaign: &HiddenCampaign) -
             ..usual
         },
         "start_m" => Condition {
-            start_shift_m: value,
+            start_shift_m: begun_m(campaign, slope_deg) + value,
             ..usual
         },
         "cycles" => Condition { cycles: value, ..usual },
@@ -224,4 +226,22 @@ fn proposal(next: &explain::answer::NextExperiment, campaign: &HiddenCampaign) -
         },
         _ => return Proposal::Measurement,
     })
+}
+
+/// How far up the canal the worm lay where the recording on a slope begins, m: a worm under way had crawled there, and a start
+/// further up is meant from there.
+fn begun_m(campaign: &HiddenCampaign, slope_deg: f64) -> f64 {
+    let repeated = campaign
+        .slopes_deg
+        .iter()
+        .position(|&deg| deg == slope_deg)
+        .unwrap_or(0);
+    let from_its_place_m = campaign.recordings[repeated].position_m.iter().enumerate();
+    let ways_m: Vec<f64> = from_its_place_m
+        .filter_map(|(cell, series_m)| {
+            let first_m = series_m.iter().find(|at_m| at_m.is_finite())?;
+            Some(first_m + campaign.worm.make.spacing_m * cell as f64)
+        })
+        .collect();
+    ways_m.iter().sum::<f64>() / ways_m.len() as f64
 }

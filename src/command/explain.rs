@@ -1,6 +1,6 @@
 //! `wormd explain`: where model and recordings disagree, which physical effect the model misses, and what to try next.
 //!
-//! A campaign, one recording, or the worm that is crawling now (`live`) goes in; after a look at what is stated of it
+//! A campaign of recordings or of mere advances, one recording, or the worm that is crawling now (`live`) goes in; after a look at what is stated of it
 //! (`conditions`) it is searched. What comes out is kept in a folder (`folder`) and told in the terminal (`text`).
 
 mod conditions;
@@ -12,7 +12,8 @@ use super::material::{Material, READING, SourceArgs};
 use super::progress::Progress;
 use super::{Failure, WormArgs, log_line, print};
 use crate::config::Config;
-use crate::explain::{Answer, Options, explain, write_back};
+use crate::experiment::Progress as Step;
+use crate::explain::{Answer, Options, explain, explain_advances, write_back};
 use crate::report;
 use clap::Args;
 use folder::Folder;
@@ -21,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `wormd explain`.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
-    /// A campaign (TOML) of several recordings, or one recording (CSV, Vicon Nexus CSV, C3D, MCAP)
+    /// A campaign (TOML) of several recordings or of advances, or one recording (CSV, Vicon Nexus CSV, C3D, MCAP)
     #[arg(value_name = "CAMPAIGN|RECORDING", required_unless_present = "live")]
     recording: Option<PathBuf>,
     #[command(flatten)]
@@ -98,7 +99,7 @@ impl ExplainArgs {
     /// What is to be explained, and where it comes from.
     fn read(&self, progress: &mut Progress) -> Result<(PathBuf, Material), Failure> {
         if let Some(recording) = &self.recording {
-            return Ok((recording.clone(), self.source.read(recording, progress)?));
+            return Ok((recording.clone(), self.source.read_also_advances(recording, progress)?));
         }
         let worm = WormArgs {
             config: self.source.config.clone(),
@@ -121,10 +122,15 @@ fn search(material: &Material, seed: u64, progress: &mut Progress) -> Result<Ans
     let runs = material.runs();
     conditions::check(&runs, &material.config).map_err(|failure| (failure, "reading"))?;
     let mut stage = "gait";
-    let answer = explain(&runs, &material.config, &Options { seed }, &mut |step| {
+    let mut tell = |step: Step| {
         stage = step.stage;
         progress.tell(stage, READING + (1.0 - READING) * step.share);
-    });
+    };
+    let answer = if material.advances.is_empty() {
+        explain(&runs, &material.config, &Options { seed }, &mut tell)
+    } else {
+        explain_advances(&material.advances, &material.config, &mut tell)
+    };
     answer.map_err(|error| (Failure::unusable(error), stage))
 }
 

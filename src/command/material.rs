@@ -4,7 +4,7 @@ use super::Failure;
 use super::progress::Progress;
 use crate::config::Config;
 use crate::experiment::Run;
-use crate::recording::{Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, mcap, open_with_progress};
+use crate::recording::{Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, mcap, open_with_progress};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -49,12 +49,14 @@ fn payload_kg(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Recordings of one worm, and what is known about it and about each.
+/// Recordings of one worm, or advances that it made, and what is known about it and about each.
 pub(super) struct Material {
     pub config: Config,
     /// The text that the configuration was read from; none for the worm of the paper.
     pub config_text: Option<String>,
     pub is_campaign: bool,
+    /// Where these are given, there is no recording.
+    pub advances: Vec<Advance>,
     recordings: Vec<Recording>,
     conditions: Vec<Conditions>,
 }
@@ -66,7 +68,7 @@ struct Conditions {
 }
 
 impl Material {
-    /// The recordings with their conditions, at least one.
+    /// The recordings with their conditions.
     pub fn runs(&self) -> Vec<Run<'_>> {
         let conditioned = self.recordings.iter().zip(&self.conditions);
         conditioned
@@ -81,11 +83,26 @@ impl Material {
 }
 
 impl SourceArgs {
-    /// Reads a campaign, a TOML file, or else one recording.
+    /// Reads a campaign of recordings, a TOML file, or else one recording.
     ///
     /// # Errors
     /// [`Failure::Unusable`] names the file, the place in it and the remedy.
     pub(super) fn read(&self, path: &Path, progress: &mut Progress) -> Result<Material, Failure> {
+        let material = self.read_also_advances(path, progress)?;
+        if material.advances.is_empty() {
+            return Ok(material);
+        }
+        Err(Failure::unusable(format!(
+            "{}: it lists advances, and there is nothing in them to analyse: list recordings, or ask `wormd explain` about it",
+            path.display()
+        )))
+    }
+
+    /// As [`read`](Self::read), but a campaign may list advances instead.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub(super) fn read_also_advances(&self, path: &Path, progress: &mut Progress) -> Result<Material, Failure> {
         if has_extension(path, "toml") {
             return self.read_campaign(path, progress);
         }
@@ -115,6 +132,12 @@ impl SourceArgs {
             )));
         }
         let campaign = Campaign::load(path).map_err(Failure::unusable)?;
+        if !campaign.advances.is_empty() && (self.from.is_some() || self.to.is_some() || self.axis.is_some()) {
+            return Err(Failure::unusable(format!(
+                "{}: it lists advances, of which nothing can be cut or turned: leave out --from, --to and --axis",
+                path.display()
+            )));
+        }
         Ok(Material {
             recordings: campaign
                 .open_all(&self.options(), &mut |share| progress.tell("reading", READING * share))
@@ -128,6 +151,7 @@ impl SourceArgs {
                     cycle_s: run.cycle_s,
                 })
                 .collect(),
+            advances: campaign.advances,
             config: campaign.config,
             config_text: campaign.config_text,
             is_campaign: true,
@@ -159,6 +183,7 @@ impl SourceArgs {
             config,
             config_text,
             is_campaign: false,
+            advances: Vec::new(),
             recordings: vec![recording],
             conditions: vec![Conditions {
                 slope_deg,

@@ -54,6 +54,13 @@ pub struct Answer {
     pub figures: Figures,
 }
 
+impl Answer {
+    /// Whether it rests on advances alone, without a recording.
+    pub fn is_by_advances(&self) -> bool {
+        !self.runs.is_empty() && self.runs.iter().all(|run| run.advance_sigma_m.is_some())
+    }
+}
+
 /// An effect with its values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NamedEffect {
@@ -150,6 +157,9 @@ pub struct NextExperiment {
     pub value: Option<f64>,
     /// Unit of the value.
     pub unit: String,
+    /// Slope of the run to be made, degrees: that of the run to be repeated where something else is changed; none for a
+    /// measurement.
+    pub slope_deg: Option<f64>,
     /// In words, with how to do it.
     pub description: String,
     /// What each rival predicts.
@@ -224,6 +234,10 @@ pub struct RunSummary {
     pub drift_per_cycle_m: f64,
     /// Mean advance per cycle: measured, by the recalibrated model, by the named one (where there is one), m.
     pub advance_m: [f64; 3],
+    /// Standard error of the measured one, m, where it alone was given, without a recording; whatever needs positions then has
+    /// no value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub advance_sigma_m: Option<f64>,
 }
 
 /// What the page draws beyond the JSON.

@@ -215,6 +215,7 @@ fn runs(problem: &Problem<'_, '_>, parts: &Parts, named: Option<&Find>) -> Vec<R
                 predicted_m(&parts.recalibrated),
                 named.map_or(f64::NAN, |find| predicted_m(&find.fit)),
             ],
+            advance_sigma_m: None,
         }
     };
     problem.scene.observed.iter().enumerate().map(of).collect()
@@ -244,7 +245,7 @@ fn advance_m(observed: &Observed<'_>, position_m: impl Fn(usize, usize) -> f64) 
 }
 
 /// The effects of a find, as people read them.
-fn named_effects(find: &Find, probability: f64, closure: f64, margin: f64) -> Vec<NamedEffect> {
+pub(super) fn named_effects(find: &Find, probability: f64, closure: f64, margin: f64) -> Vec<NamedEffect> {
     let sigmas = find.fit.sigmas();
     let of = |(place, supposed): (usize, &Supposed)| {
         let quantities = find.fit.hypothesis.free.iter().enumerate();
@@ -329,7 +330,7 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
 }
 
 /// What was recalibrated, as people read it.
-fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
+pub(super) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
     let sigmas = fit.sigmas();
     let quantities = fit.hypothesis.free.iter().enumerate();
     quantities

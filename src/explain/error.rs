@@ -61,6 +61,22 @@ pub enum ExplainError {
         /// What is needed.
         needed: usize,
     },
+    /// Too few advances to tell anything by.
+    #[error(
+        "{found} advance alone: a recalibration explains any one figure: list the advances on at least two slopes, or recordings"
+    )]
+    FewAdvances {
+        /// How many were given.
+        found: usize,
+    },
+    /// An advance without a standard error, by which alone a gap can be told from chance.
+    #[error(
+        "{recording}: it and its standard error must be known: give advance_m, and a positive advance_sigma_m, in metres"
+    )]
+    NoSigma {
+        /// The advance.
+        recording: String,
+    },
     /// The slope is none.
     #[error("{recording}: a slope of {slope_deg}°: give -90 to 90 degrees")]
     Slope {

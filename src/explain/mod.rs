@@ -18,8 +18,10 @@
 //! - `screen`: the whole library at a glance; `droop`: the one effect that shows in time alone.
 //! - `held_out`: data left out; `judge`: the rules of the judgement.
 //! - `localise`: where the gap is; `gap`: how it shrinks; `propose`: the next experiment; `words`: the answer in words.
+//! - `advances`: the same where only advances per cycle are known.
 //! - `assemble`: all of it put together; [`write_back`]: the model's file with the answer in it.
 
+mod advances;
 pub mod answer;
 mod assemble;
 mod droop;
@@ -42,6 +44,7 @@ mod words;
 pub mod write_back;
 
 pub use crate::experiment::Run;
+pub use advances::explain_advances;
 pub use answer::{Answer, Verdict};
 pub use error::ExplainError;
 pub use search::{Options, explain};

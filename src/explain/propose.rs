@@ -12,6 +12,7 @@ use super::answer::{NextExperiment, Prediction};
 use super::fit::{Fit, Problem, in_parallel};
 use super::parameter::{Supposed, What as Quantity};
 use crate::model::effect::Setting;
+pub(super) use change::SLOPES_DEG;
 use change::{Change, What, changes};
 use trial::{Reach, Said, Trial, blank, plain_distance};
 
@@ -21,7 +22,7 @@ const WORTH_IT: f64 = 3.0;
 /// Changes of one kind that are looked at closely.
 const CLOSE_LOOKS: usize = 2;
 /// Share of the stroke that every rival's worm must advance in a cycle: one that hardly gets on is no experiment.
-const LEAST_ADVANCE: f64 = 0.05;
+pub(super) const LEAST_ADVANCE: f64 = 0.05;
 
 /// A change with what it would show.
 struct Weighed {
@@ -169,6 +170,7 @@ fn in_answer(problem: &Problem<'_, '_>, candidates: &[&Fit], best: &Weighed) -> 
         change: change.to_owned(),
         value: Some(best.change.value),
         unit: unit.to_owned(),
+        slope_deg: Some(best.change.slope_deg),
         description: best.change.in_words(),
         predictions: predictions.collect(),
         separation_sigma: Some(best.separation),
@@ -215,6 +217,7 @@ fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
         change: supposed.effect.separated_by.to_owned(),
         value: None,
         unit: String::new(),
+        slope_deg: None,
         description: format!(
             "No single run of this worm tells these apart. Measure {} directly ({}).",
             supposed.effect.name, supposed.effect.separated_by

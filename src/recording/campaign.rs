@@ -1,4 +1,5 @@
-//! Campaigns: several recordings of one worm on different slopes, listed in a TOML file.
+//! Campaigns: several recordings of one worm on different slopes, listed in a TOML file; or, where nobody recorded positions, its
+//! measured advances.
 
 use super::open::{OpenOptions, open_with_progress};
 use super::series::{Recording, RecordingError};
@@ -12,6 +13,8 @@ const SLOPES_DEG: RangeInclusive<f64> = -90.0..=90.0;
 /// What a worm can carry on top of its own mass, kg.
 pub(crate) const PAYLOADS_KG: RangeInclusive<f64> = 0.0..=100.0;
 const CYCLES_S: RangeInclusive<f64> = 0.5..=120.0;
+/// The least standard error of an advance that anybody can claim, m.
+const LEAST_SIGMA_M: f64 = 1e-6;
 
 /// Why a campaign cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -67,8 +70,25 @@ pub struct Campaign {
     pub config: Config,
     /// The text of the configuration's file; `None` for the worm of the paper.
     pub config_text: Option<String>,
-    /// At least one.
+    /// Its recordings; none where it lists advances.
     pub runs: Vec<Run>,
+    /// Its advances; none where it lists recordings. At least one of either.
+    pub advances: Vec<Advance>,
+}
+
+/// A run of which only the advance is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Advance {
+    /// Slope of the canal, degrees, positive uphill, −90 to 90.
+    pub slope_deg: f64,
+    /// Known extra mass, kg, 0 to 100.
+    pub payload_kg: f64,
+    /// Time of a gait cycle where it is not the configured one, s, 0.5 to 120.
+    pub cycle_s: Option<f64>,
+    /// Mean advance of a settled cycle, m, less than a stroke to either side.
+    pub advance_m: f64,
+    /// Its standard error, m, 1 µm to a stroke.
+    pub sigma_m: f64,
 }
 
 /// One recording of a campaign.
@@ -95,10 +115,12 @@ struct CampaignFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RunEntry {
-    recording: Spanned<PathBuf>,
+    recording: Option<Spanned<PathBuf>>,
     slope_deg: Spanned<f64>,
     payload_kg: Option<Spanned<f64>>,
     cycle_s: Option<Spanned<f64>>,
+    advance_m: Option<Spanned<f64>>,
+    advance_sigma_m: Option<Spanned<f64>>,
 }
 
 impl Campaign {
@@ -106,7 +128,8 @@ impl Campaign {
     /// them. Paths in the file are relative to it.
     ///
     /// # Errors
-    /// [`CampaignError`] with the line for an unknown key, a value out of range, a missing file, or a recording listed twice.
+    /// [`CampaignError`] with the line for an unknown key, a value out of range, a missing file, a recording listed twice, an advance
+    /// without its standard error, or recordings beside advances.
     pub fn load(path: &Path) -> Result<Self, CampaignError> {
         let text = std::fs::read_to_string(path).map_err(|source| CampaignError::Read {
             file: path.to_path_buf(),
@@ -115,7 +138,8 @@ impl Campaign {
         let reader = Reader { path, text: &text };
         let file: CampaignFile = toml::from_str(&text).map_err(|error| {
             let remedy =
-                "a campaign holds worm = \"FILE\" and [[run]] with recording, slope_deg, payload_kg and cycle_s";
+                "a campaign holds worm = \"FILE\" and [[run]] with recording (or advance_m and advance_sigma_m), slope_deg, payload_kg \
+                 and cycle_s";
             reader.invalid(error.span().unwrap_or(0..0), error.message().trim(), remedy)
         })?;
         if file.run.is_empty() {
@@ -131,9 +155,20 @@ impl Campaign {
             None => (Config::default(), None),
         };
         let mut runs: Vec<(Run, PathBuf)> = Vec::with_capacity(file.run.len());
+        let mut advances = Vec::new();
         for entry in &file.run {
-            let run = reader.run(entry)?;
-            let real_path = reader.find(entry, &run)?;
+            let Some(recording) = &entry.recording else {
+                if !runs.is_empty() {
+                    return Err(reader.mixed(entry));
+                }
+                advances.push(reader.advance(entry, config.worm.stroke_m)?);
+                continue;
+            };
+            if !advances.is_empty() || entry.advance_m.is_some() || entry.advance_sigma_m.is_some() {
+                return Err(reader.mixed(entry));
+            }
+            let run = reader.run(entry, recording)?;
+            let real_path = reader.find(recording, &run)?;
             if let Some((earlier, _)) = runs.iter().find(|(_, other)| *other == real_path) {
                 let problem = if earlier.slope_deg == run.slope_deg {
                     format!("{} is listed twice", run.recording.display())
@@ -145,7 +180,7 @@ impl Campaign {
                         run.slope_deg
                     )
                 };
-                return Err(reader.invalid(entry.recording.span(), &problem, "list each recording once"));
+                return Err(reader.invalid(recording.span(), &problem, "list each recording once"));
             }
             runs.push((run, real_path));
         }
@@ -155,6 +190,7 @@ impl Campaign {
             config,
             config_text,
             runs: runs.into_iter().map(|(run, _)| run).collect(),
+            advances,
         })
     }
 
@@ -214,17 +250,59 @@ impl Reader<'_> {
         self.path.parent().unwrap_or(Path::new("")).join(path)
     }
 
-    fn run(&self, entry: &RunEntry) -> Result<Run, CampaignError> {
+    fn run(&self, entry: &RunEntry, recording: &Spanned<PathBuf>) -> Result<Run, CampaignError> {
+        let (slope_deg, payload_kg, cycle_s) = self.conditions(entry)?;
+        Ok(Run {
+            recording: self.beside(recording.get_ref()),
+            slope_deg,
+            payload_kg,
+            cycle_s,
+        })
+    }
+
+    /// Slope in degrees, payload in kg, and time of a cycle in s.
+    fn conditions(&self, entry: &RunEntry) -> Result<(f64, f64, Option<f64>), CampaignError> {
         let payload_kg = entry.payload_kg.as_ref();
         let payload_kg = payload_kg.map(|value| self.within("payload_kg", value, PAYLOADS_KG, "kg"));
         let cycle_s = entry.cycle_s.as_ref();
         let cycle_s = cycle_s.map(|value| self.within("cycle_s", value, CYCLES_S, "s"));
-        Ok(Run {
-            recording: self.beside(entry.recording.get_ref()),
-            slope_deg: self.within("slope_deg", &entry.slope_deg, SLOPES_DEG, "degrees")?,
-            payload_kg: payload_kg.transpose()?.unwrap_or(0.0),
-            cycle_s: cycle_s.transpose()?,
+        Ok((
+            self.within("slope_deg", &entry.slope_deg, SLOPES_DEG, "degrees")?,
+            payload_kg.transpose()?.unwrap_or(0.0),
+            cycle_s.transpose()?,
+        ))
+    }
+
+    /// A run without a recording.
+    fn advance(&self, entry: &RunEntry, stroke_m: f64) -> Result<Advance, CampaignError> {
+        let (slope_deg, payload_kg, cycle_s) = self.conditions(entry)?;
+        let (Some(advance_m), Some(sigma_m)) = (&entry.advance_m, &entry.advance_sigma_m) else {
+            let (problem, remedy) = match &entry.advance_m {
+                Some(_) => (
+                    "an advance without its standard error",
+                    "add advance_sigma_m, in m: nothing else tells a gap from chance",
+                ),
+                None => (
+                    "a run without recording or advance",
+                    "give recording = \"FILE\", or advance_m and advance_sigma_m where nobody recorded positions",
+                ),
+            };
+            return Err(self.invalid(entry.slope_deg.span(), problem, remedy));
+        };
+        let unit = "m, no more than a stroke";
+        Ok(Advance {
+            slope_deg,
+            payload_kg,
+            cycle_s,
+            advance_m: self.within("advance_m", advance_m, -stroke_m..=stroke_m, unit)?,
+            sigma_m: self.within("advance_sigma_m", sigma_m, LEAST_SIGMA_M..=stroke_m, unit)?,
         })
+    }
+
+    fn mixed(&self, entry: &RunEntry) -> CampaignError {
+        let problem = "recordings and advances in one campaign";
+        let remedy = "list recordings only, which say more, or advances only: a recording's advance is in it";
+        self.invalid(entry.slope_deg.span(), problem, remedy)
     }
 
     fn within(
@@ -242,11 +320,11 @@ impl Reader<'_> {
     }
 
     /// The recording's one true path.
-    fn find(&self, entry: &RunEntry, run: &Run) -> Result<PathBuf, CampaignError> {
+    fn find(&self, recording: &Spanned<PathBuf>, run: &Run) -> Result<PathBuf, CampaignError> {
         run.recording.canonicalize().map_err(|error| {
             let problem = format!("{}: {error}", run.recording.display());
             let remedy = "give the recording's path relative to the campaign's file";
-            self.invalid(entry.recording.span(), &problem, remedy)
+            self.invalid(recording.span(), &problem, remedy)
         })
     }
 }

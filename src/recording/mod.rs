@@ -36,7 +36,7 @@ mod vicon;
 mod write;
 
 pub(crate) use campaign::PAYLOADS_KG;
-pub use campaign::{Campaign, CampaignError, Run};
+pub use campaign::{Advance, Campaign, CampaignError, Run};
 pub use canal::{Axis, AxisError};
 pub use open::{OpenOptions, open, open_with_progress};
 pub use series::{Motor, Recording, RecordingError};

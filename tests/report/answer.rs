@@ -256,6 +256,7 @@ fn runs(figures: &Figures, is_named: bool) -> Vec<RunSummary> {
             advance_m(&series.recalibrated_m),
             if is_named { advance_m(&series.named_m) } else { f64::NAN },
         ],
+        advance_sigma_m: None,
     };
     figures.cycles.iter().map(run).collect()
 }
@@ -295,6 +296,7 @@ pub fn explained(cells: usize) -> Answer {
             change: "pull test of one cell".to_owned(),
             value: None,
             unit: String::new(),
+            slope_deg: None,
             description: "Pull cell 2 alone along the canal with a spring balance until it slides.".to_owned(),
             predictions: vec![Prediction {
                 effect: "unequal-clamping".to_owned(),
@@ -347,6 +349,7 @@ pub fn ambiguous() -> Answer {
             change: "payload_kg".to_owned(),
             value: Some(0.1),
             unit: "kg".to_owned(),
+            slope_deg: Some(30.0),
             description: "Repeat the run at 30° with 100 g fixed to the worm's body.".to_owned(),
             predictions: vec![
                 prediction("slope-error", 3.112, "advances less, for the weight pulls more on the steeper canal"),
@@ -384,6 +387,7 @@ pub fn outside() -> Answer {
             change: "start_m".to_owned(),
             value: Some(0.005),
             unit: "m".to_owned(),
+            slope_deg: Some(30.0),
             description: "Lay the worm down 5 mm further up the canal and repeat the run at 30°.".to_owned(),
             predictions: Vec::new(),
             separation_sigma: Some(1.4),

@@ -2,7 +2,7 @@
 
 use crate::command::columns::{Row, aligned};
 use crate::explain::Answer;
-use crate::explain::answer::{Calibrated, NamedEffect, NextExperiment, Place, Remainder, Stage};
+use crate::explain::answer::{Calibrated, NamedEffect, NextExperiment, Place, Remainder, RunSummary, Stage};
 use crate::model::effect;
 use crate::report::number::{NONE, fixed};
 
@@ -19,11 +19,14 @@ pub(super) fn text(answer: &Answer) -> String {
     if !answer.r#where.is_empty() {
         parts.push(aligned(&places(&answer.r#where)));
     }
-    if !answer.stages.is_empty() {
+    if !answer.stages.is_empty() && !answer.is_by_advances() {
         parts.push(aligned(&gap(&answer.stages)));
     }
     if !answer.calibration.is_empty() {
         parts.push(aligned(&calibration(&answer.calibration)));
+    }
+    if answer.is_by_advances() {
+        parts.push(aligned(&advances(&answer.runs)));
     }
     parts.extend(answer.remainder.as_ref().map(remainder));
     parts.extend(answer.next_experiment.as_ref().map(next));
@@ -61,6 +64,11 @@ fn effect_text(before: &str, named: &NamedEffect) -> String {
             "  what would tell it from its neighbours: {}",
             named.separated_by
         ));
+    }
+    if !named.closure.is_finite() {
+        // Of what shows in times or advances alone, nothing was held out.
+        lines.push(format!("  probability {}", fixed(named.probability, 2)));
+        return lines.join("\n");
     }
     let than = if named.margin < 0.0 { "less" } else { "more" };
     lines.push(format!(
@@ -126,6 +134,21 @@ fn gap(stages: &[Stage]) -> Vec<Row> {
             fixed(stage.fit_rms_m * 1e3, 3),
             fixed(stage.advance_error_m * 1e3, 3),
             fixed(stage.energy_error_j * 1e3, 2),
+        ]
+    }));
+    rows
+}
+
+fn advances(runs: &[RunSummary]) -> Vec<Row> {
+    let head = ["advance, mm a cycle", "measured", "recalibrated", "first candidate"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    rows.extend(runs.iter().map(|run| {
+        let [measured_m, recalibrated_m, named_m] = run.advance_m;
+        vec![
+            format!("  {}°", fixed(run.slope_deg, 1)),
+            quantity(measured_m, run.advance_sigma_m.unwrap_or(f64::NAN), "m").replace(" mm", ""),
+            fixed(recalibrated_m * 1e3, 2),
+            fixed(named_m * 1e3, 2),
         ]
     }));
     rows
@@ -266,6 +289,7 @@ mod tests {
                 change: "slope_deg".to_owned(),
                 value: Some(45.0),
                 unit: "deg".to_owned(),
+                slope_deg: Some(45.0),
                 description: "Tilt the canal to 45°.".to_owned(),
                 predictions: vec![Prediction {
                     effect: "payload".to_owned(),

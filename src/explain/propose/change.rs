@@ -4,7 +4,7 @@ use super::super::predict::Scene;
 
 /// Slopes, degrees; factors on the cycle time, and the cycle times in s that motors do; extra masses, kg; ways that the start is
 /// shifted by, m; factors on the number of cycles; rests after each cycle, s.
-const SLOPES_DEG: [f64; 7] = [-30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0];
+pub(in super::super) const SLOPES_DEG: [f64; 7] = [-30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0];
 const CYCLE_FACTORS: [f64; 3] = [0.5, 2.0, 4.0];
 const CYCLES_S: std::ops::RangeInclusive<f64> = 0.8..=20.0;
 const PAYLOADS_KG: [f64; 3] = [0.05, 0.1, 0.2];

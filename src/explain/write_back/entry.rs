@@ -6,6 +6,9 @@ use crate::model::effect::{self, Effect};
 
 /// The entries that an answer adds to the end of a model; empty where nothing was named.
 pub(super) fn entries(answer: &Answer) -> String {
+    if answer.verdict == Verdict::Ambiguous && answer.is_by_advances() {
+        return undecided(answer);
+    }
     let (heading, rivals) = match answer.verdict {
         Verdict::Agrees | Verdict::OutsideLibrary => return String::new(),
         Verdict::Explained if answer.effects.len() > 1 => ("Found by `wormd explain`; these act together.", &[][..]),
@@ -26,6 +29,15 @@ pub(super) fn entries(answer: &Answer) -> String {
         text += &entry(rival, "").lines().map(commented_out).collect::<String>();
     }
     text
+}
+
+/// The candidates of a few advances: none is sure enough to be switched on.
+fn undecided(answer: &Answer) -> String {
+    let candidates = answer.effects.iter().chain(&answer.rivals);
+    let entries = candidates.map(|effect| entry(effect, "").lines().map(commented_out).collect::<String>());
+    let heading = "\n# Found by `wormd explain`: the advances do not decide between these, and each was fitted with a recalibration of its\n\
+                   # own. To try one, take its comment signs away.\n";
+    heading.to_owned() + &entries.collect::<String>()
 }
 
 fn commented_out(line: &str) -> String {

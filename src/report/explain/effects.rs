@@ -84,6 +84,10 @@ fn why(answer: &Answer) -> String {
             percent(effects.first().map_or(f64::NAN, |effect| effect.closure)),
             best_wrong(answer)
         ),
+        (Verdict::Ambiguous, effects) if answer.is_by_advances() => format!(
+            "Each of these alone brings the model within chance of the advances: {}. To name one would be a guess.",
+            words::names(effects.iter().chain(&answer.rivals))
+        ),
         (Verdict::Ambiguous, effects) => {
             let candidates = effects.iter().chain(&answer.rivals);
             let closed: Vec<String> = candidates
@@ -133,7 +137,7 @@ impl Screened {
             "screened-out" => "not refitted, others promised more",
             "refitted" => "refitted",
             "did-not-converge" => "the fit did not converge",
-            "not-visible" => "not visible in these recordings",
+            "not-visible" => "not visible in these data",
             other => other,
         }
     }
@@ -256,15 +260,13 @@ fn picture(answer: &Answer) -> Result<String, DrawError> {
 
 /// The effects named and their rivals beside each other.
 fn candidates(answer: &Answer) -> Table {
-    let head = [
-        "effect",
-        "",
-        "values",
-        "gap closed",
-        "ahead of the others",
-        "probability",
-        "improvement",
-    ];
+    let is_held_out = !answer.is_by_advances();
+    let judged: &[&str] = if is_held_out {
+        &["gap closed", "ahead of the others"]
+    } else {
+        &[]
+    };
+    let head = [&["effect", "", "values"], judged, &["probability", "improvement"]].concat();
     let mut table = Table::new("The candidates", head);
     table.word_columns = 3;
     let named = match answer.verdict {
@@ -276,15 +278,16 @@ fn candidates(answer: &Answer) -> Table {
             .parameters
             .iter()
             .map(|found| Quantity::of(&effect.name, found).in_words());
-        table.rows.push(vec![
+        let mut row = vec![
             with_cell(&effect.name, effect.cell),
             role.to_owned(),
             quantities.collect::<Vec<_>>().join("; "),
-            percent(effect.closure),
-            percent(effect.margin),
-            percent(effect.probability),
-            fixed(effect.improvement, 1),
-        ]);
+        ];
+        if is_held_out {
+            row.extend([percent(effect.closure), percent(effect.margin)]);
+        }
+        row.extend([percent(effect.probability), fixed(effect.improvement, 1)]);
+        table.rows.push(row);
     };
     answer.effects.iter().for_each(|effect| add(effect, named));
     let rival = match answer.verdict {
@@ -292,11 +295,13 @@ fn candidates(answer: &Answer) -> Table {
         _ => "rival",
     };
     answer.rivals.iter().for_each(|effect| add(effect, rival));
-    table.note = Some(
+    let held_out = if is_held_out {
         "Gap closed: share of what the recalibrated model leaves open, down to the noise, on cycles that the effect was not \
-         fitted to. Ahead of the others: how much less of it the best effect of another kind closes. ± is one standard error."
-            .to_owned(),
-    );
+         fitted to. Ahead of the others: how much less of it the best effect of another kind closes. "
+    } else {
+        ""
+    };
+    table.note = Some(format!("{held_out}± is one standard error."));
     table
 }
 

@@ -90,7 +90,11 @@ pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
         page.paragraph("There are no stages to compare: the answer holds no model judged on held-out cycles.");
         return Ok(());
     }
-    page.figure(&figure(answer, &bars)?);
+    if answer.is_by_advances() {
+        page.paragraph("Nothing was held out of so few advances: what shrinks is how far the model is off them.");
+    } else {
+        page.figure(&figure(answer, &bars)?);
+    }
     page.table(&table(answer));
     Ok(())
 }
@@ -201,32 +205,45 @@ fn shortened(text: &str) -> String {
 }
 
 fn table(answer: &Answer) -> Table {
-    let head = [
-        "model",
-        "rms, fitted cycles, mm",
-        "rms, held-out cycles, mm",
-        "advance off by, mm a cycle",
-        "energy (11) off by, mJ a cycle",
-    ];
-    let mut table = Table::new("The gap, stage by stage", head);
+    let is_by_advances = answer.is_by_advances();
+    let off = "advance off by, mm a cycle";
+    let head: &[&str] = if is_by_advances {
+        &["model", off]
+    } else {
+        &[
+            "model",
+            "rms, fitted cycles, mm",
+            "rms, held-out cycles, mm",
+            off,
+            "energy (11) off by, mJ a cycle",
+        ]
+    };
+    let mut table = Table::new("The gap, stage by stage", head.iter().copied());
     let told = stages(answer.verdict).iter().filter_map(|told| {
         let stage = stage(answer, told.key)?;
         Some((name(told, stage), stage))
     });
     let floor = stage(answer, "floor").map(|stage| ("noise floor".to_owned(), stage));
     for (name, stage) in told.chain(floor) {
-        table.rows.push(vec![
-            name,
-            fixed(stage.fit_rms_m * 1e3, 3),
-            fixed(stage.held_out_rms_m * 1e3, 3),
-            fixed(stage.advance_error_m * 1e3, 3),
-            fixed(stage.energy_error_j * 1e3, 2),
-        ]);
+        let off_mm = fixed(stage.advance_error_m * 1e3, 3);
+        table.rows.push(if is_by_advances {
+            vec![name, off_mm]
+        } else {
+            vec![
+                name,
+                fixed(stage.fit_rms_m * 1e3, 3),
+                fixed(stage.held_out_rms_m * 1e3, 3),
+                off_mm,
+                fixed(stage.energy_error_j * 1e3, 2),
+            ]
+        });
     }
-    table.note = Some(
+    let note = if is_by_advances {
+        "Mean over the slopes of how far the advance is off."
+    } else {
         "Held-out cycles were kept from every fit, so a model that merely bends to the data gains nothing there. Advance and \
          energy: mean over the runs of how far they are off."
-            .to_owned(),
-    );
+    };
+    table.note = Some(note.to_owned());
     table
 }

@@ -23,6 +23,10 @@ const DARK: f64 = 0.7;
 const MOST_PLACES: usize = 24;
 
 pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
+    if answer.is_by_advances() {
+        page.paragraph("Advances tell that there is a gap, and on which slopes; in which cell and when, only recorded positions do.");
+        return Ok(());
+    }
     page.paragraph(&told(answer));
     let maps = &answer.figures.maps_before;
     if maps.iter().all(|map| map.phase.is_empty()) {

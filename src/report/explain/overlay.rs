@@ -20,6 +20,12 @@ const MEASURED: Colour = LIGHT;
 const MEASURED_WIDTH: f64 = 6.0;
 
 pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
+    if answer.is_by_advances() {
+        page.paragraph(
+            "There is no cycle to show, for no positions were recorded; the advances stand at the end of this page.",
+        );
+        return Ok(());
+    }
     let cycles = &answer.figures.cycles;
     if cycles.iter().all(|run| run.phase.is_empty()) {
         page.paragraph("There is no mean cycle to show: the answer holds none of any run.");

@@ -3,7 +3,7 @@
 use super::words::{self, Quantity, clause, with_cell};
 use crate::explain::answer::{NamedEffect, RunSummary, Stage};
 use crate::explain::{Answer, Verdict};
-use crate::report::number::{count, fixed, in_words, percent};
+use crate::report::number::{NONE, count, fixed, in_words, percent};
 use crate::report::page::{Page, escaped};
 use crate::report::plot::{cell_colours, css};
 use crate::report::runs::{names_by_slope, told};
@@ -33,6 +33,13 @@ fn lead(answer: &Answer) -> String {
         warnings => format!(" {} at the end of this page.", count(warnings, "warning")),
     };
     let names = names_by_slope(answer.runs.iter().map(|run| run.slope_deg));
+    if answer.is_by_advances() {
+        let advances = count(answer.runs.len(), "advance");
+        return format!(
+            "What the model of the worm misses, by {advances} a cycle, at {}, without a recording.{warned}",
+            in_words(&names)
+        );
+    }
     let length = |run: &RunSummary| {
         let cycles = count(run.cycles, "whole cycle");
         Some(format!("{cycles} of {} s", fixed(run.cycle_s, 2)))
@@ -50,7 +57,12 @@ fn lead(answer: &Answer) -> String {
 
 fn headline(answer: &Answer) -> String {
     match (answer.verdict, &answer.effects[..]) {
-        (Verdict::Agrees, _) => "Nothing is missing from the model that these recordings could show.".to_owned(),
+        (Verdict::Agrees, _) => {
+            format!(
+                "Nothing is missing from the model that these {} could show.",
+                words::evidence(answer)
+            )
+        }
         (Verdict::Explained, [effect]) => {
             let about = words::sentence(&effect.name);
             format!(
@@ -62,9 +74,13 @@ fn headline(answer: &Answer) -> String {
             format!("Missing from the model: {}, which act together.", words::names(effects))
         }
         (Verdict::Ambiguous, effects) => format!(
-            "Something is missing from the model, and these recordings cannot tell whether it is {}.",
+            "Something is missing from the model, and these {} cannot tell whether it is {}.",
+            words::evidence(answer),
             either(effects, &answer.rivals)
         ),
+        (Verdict::OutsideLibrary, _) if answer.is_by_advances() => {
+            "Something is missing from the model, and no known effect alone explains it.".to_owned()
+        }
         (Verdict::OutsideLibrary, _) => {
             "Something is missing from the model, and no known effect explains it.".to_owned()
         }
@@ -98,7 +114,9 @@ fn values(answer: &Answer) -> String {
             let colour = colours.get(cell.checked_sub(1)?)?;
             Some(format!("<i style=\"--c:{}\"></i>", css(*colour)))
         });
+        let of_one_cell = effect.parameters.iter().any(|found| found.cell.is_some());
         let cell = match effect.cell {
+            None if of_one_cell => "<small>one cell, not told which</small>".to_owned(),
             Some(cell) => format!("<small>{}cell {cell}</small>", dot.unwrap_or_default()),
             None => "<small>the whole worm</small>".to_owned(),
         };
@@ -150,7 +168,9 @@ fn tiles(effect: &NamedEffect) -> Vec<Tile> {
         ),
         share("probability", effect.probability, "among the effects of the library"),
     ];
-    parameters.chain(judged).collect()
+    // What was not held against anything is not told as a dash.
+    let told = judged.into_iter().filter(|tile| tile.value != NONE);
+    parameters.chain(told).collect()
 }
 
 /// What the effect does, unless the headline told it, what cannot be told from it, and what would tell: HTML.
@@ -182,7 +202,11 @@ fn foot(effect: &NamedEffect, is_told: bool) -> String {
 }
 
 fn gap_tiles(answer: &Answer) -> Vec<Tile> {
-    let stages = answer.stages.iter().filter_map(|stage| {
+    let held_out = answer
+        .stages
+        .iter()
+        .filter(|stage| !answer.is_by_advances() || stage.held_out_rms_m.is_finite());
+    let stages = held_out.filter_map(|stage| {
         let (name, how) = match stage.stage {
             "baseline" => ("as believed", ""),
             "recalibrated" => ("recalibrated", "within what was allowed"),
@@ -209,8 +233,15 @@ fn gap_tile(stage: &Stage, name: &str, how: &str) -> Tile {
 fn note(answer: &Answer) -> String {
     match (answer.verdict, answer.effects.is_empty()) {
         (Verdict::Agrees, _) => {
-            "An effect too weak to stand out of the noise of these recordings may still be there; longer recordings and more \
-             slopes show weaker ones."
+            format!(
+                "An effect too weak to stand out of the noise of these {} may still be there; longer recordings and more slopes \
+                 show weaker ones.",
+                words::evidence(answer)
+            )
+        }
+        (_, false) if answer.is_by_advances() => {
+            "± is one standard error. So few scalars leave much open: each value is what this effect would need if it alone were \
+             missing."
                 .to_owned()
         }
         (_, true) => "No value is given, for no effect is named.".to_owned(),

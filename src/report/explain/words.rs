@@ -124,6 +124,15 @@ pub(super) fn cells(answer: &Answer) -> usize {
     cells.clamp(1, crate::MAX_CELLS)
 }
 
+/// What the answer rests on, in words.
+pub(super) fn evidence(answer: &Answer) -> &'static str {
+    if answer.is_by_advances() {
+        "advances"
+    } else {
+        "recordings"
+    }
+}
+
 /// A length in mm with its unit.
 pub(super) fn mm(length_m: f64) -> String {
     format!("{} mm", fixed(length_m * 1e3, 3))
