@@ -358,6 +358,7 @@ pub(super) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
                     (name, free.centre.exp(), found, sigma, unit)
                 }
                 Nuisance::Presliding => ("presliding".to_owned(), free.centre, value, sigma, ""),
+                Nuisance::Rounding => ("rounding".to_owned(), free.centre, value, sigma, ""),
             };
             Some(Calibrated {
                 name,

@@ -30,6 +30,8 @@ pub(super) enum Nuisance {
     Damping,
     /// Stiffness of the pads over that of the bristles that their tips hold on by.
     Presliding,
+    /// Share of a step in which a cell comes to speed.
+    Rounding,
 }
 
 /// A quantity that is free in a fit.
@@ -68,6 +70,8 @@ const SLOPE_OF_DEG: (f64, f64, f64) = (0.15, 0.6, 0.05);
 const CLOCK_S: (f64, f64, f64) = (1e-3, 3e-3, 5e-4);
 /// Of the presliding: centre, standard deviation, least, most, step.
 const PRESLIDING: (f64, f64, f64, f64, f64) = (0.02, 0.015, 1e-3, 0.08, 2e-3);
+/// Of the cam's rounding, as of the presliding: no cam has sharp corners.
+const ROUNDING: (f64, f64, f64, f64, f64) = (0.05, 0.05, 0.0, 0.3, 5e-3);
 /// Logarithm of the damping ratio: centre, standard deviation, limits' distance, step.
 const DAMPING: (f64, f64, f64, f64) = (-0.9, 1.0, 2.2, 0.1);
 
@@ -87,6 +91,7 @@ impl Nuisance {
         all.extend((0..runs).map(|run| Self::SlopeOf(run).free(SLOPE_OF_DEG)));
         if with_clock {
             all.push(Self::Clock.free(CLOCK_S));
+            all.push(Self::Rounding.free_within(ROUNDING));
         }
         let (centre, sigma, reach, step) = DAMPING;
         all.push(Free {
@@ -95,13 +100,7 @@ impl Nuisance {
             most: centre + reach,
             ..Self::Damping.free((sigma, reach, step))
         });
-        let (centre, sigma, least, most, step) = PRESLIDING;
-        all.push(Free {
-            centre,
-            least,
-            most,
-            ..Self::Presliding.free((sigma, most, step))
-        });
+        all.push(Self::Presliding.free_within(PRESLIDING));
         all
     }
 
@@ -116,6 +115,15 @@ impl Nuisance {
         }
     }
 
+    fn free_within(self, (centre, sigma, least, most, step): (f64, f64, f64, f64, f64)) -> Free {
+        Free {
+            centre,
+            least,
+            most,
+            ..self.free((sigma, most, step))
+        }
+    }
+
     /// Puts its value into the worm of a run, where it concerns the worm.
     pub fn apply(self, value: f64, run: usize, worm: &mut Worm) {
         match self {
@@ -126,7 +134,7 @@ impl Nuisance {
             Self::StiffnessOf(cell) => worm.scale_stiffness(Some(cell), value.exp()),
             Self::StrokeOf(cell) => worm.scale_stroke(Some(cell), value.exp()),
             Self::SlopeOf(of) if of == run => worm.tilt_rad(value.to_radians()),
-            Self::SlopeOf(_) | Self::Clock | Self::Damping | Self::Presliding => {}
+            Self::SlopeOf(_) | Self::Clock | Self::Damping | Self::Presliding | Self::Rounding => {}
         }
     }
 }

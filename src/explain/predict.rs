@@ -97,6 +97,7 @@ impl Scene<'_> {
                     Nuisance::Clock => physics.view.latency_s += value,
                     Nuisance::Damping => damping = value.exp(),
                     Nuisance::Presliding => physics.laws.presliding = value,
+                    Nuisance::Rounding => physics.laws.rounding = value,
                     _ => {}
                 }
             }

@@ -27,6 +27,9 @@ const STRONG: f64 = 8.0;
 const DRAWS: usize = 4000;
 /// Share of the draws that the threshold lies above.
 const CONFIDENCE: f64 = 0.95;
+/// Slips over which a tip may lose its grip, m, and rests in which it may win it back, s.
+const SLIPS_M: [f64; 3] = [1e-5, 1e-4, 1e-3];
+const GRIPS_S: [f64; 2] = [0.05, 0.3];
 /// Times in which a creeping pad may relax, s, and how long slick patches may be and how they are spaced, m.
 const CREEP_TIMES_S: [f64; 3] = [0.1, 0.4, 1.5];
 const PATCH_LENGTHS_M: [f64; 2] = [0.02, 0.05];
@@ -72,6 +75,10 @@ fn trials(effect: &Effect, canal_m: (f64, f64)) -> Vec<Vec<f64>> {
     let severity = &effect.parameters[0];
     let shapes: Vec<Vec<f64>> = match effect.name {
         "pad-creep" => CREEP_TIMES_S.iter().map(|&time_s| vec![time_s]).collect(),
+        "breakaway-friction" => SLIPS_M
+            .iter()
+            .flat_map(|&slip_m| GRIPS_S.map(|grip_s| vec![slip_m, grip_s]))
+            .collect(),
         "slick-patch" => {
             let places = ((canal_m.1 - canal_m.0) / PATCH_SPACING_M).ceil().clamp(1.0, 60.0) as usize;
             let from_m = (0..places).map(|place| canal_m.0 + PATCH_SPACING_M * place as f64);

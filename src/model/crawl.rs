@@ -135,6 +135,9 @@ impl Crawl {
     /// [`SlidesDown`] when the tips cannot hold the worm.
     pub fn advance_to(&mut self, mechanics: &Mechanics, phase: f64, duration_s: f64) -> Result<(), SlidesDown> {
         let from = self.phase;
+        if phase == from && duration_s < SHORTEST_S {
+            return Ok(());
+        }
         let parts = self.parts(phase, duration_s);
         for part in 1..parts as usize {
             self.increment(
@@ -275,14 +278,7 @@ impl Crawl {
 
     fn increment(&mut self, mechanics: &Mechanics, phase: f64, step_s: f64) -> Result<(), SlidesDown> {
         let increment = self.prepare(mechanics, phase, step_s.max(SHORTEST_S));
-        let mut translation_m = self.solve(mechanics, &increment)?;
-        // Each pass lets further tips break away.
-        for _ in 0..self.cells {
-            if mechanics.laws.static_over_kinetic <= 1.0 || !self.break_away(mechanics) {
-                break;
-            }
-            translation_m = self.solve(mechanics, &increment)?;
-        }
+        let translation_m = self.solve(mechanics, &increment)?;
         self.take(mechanics, &increment, translation_m, phase);
         if self.velocity_m_s.abs() > LOST_M_S {
             return Err(self.slides(mechanics));
@@ -303,7 +299,7 @@ impl Crawl {
                 let tip_m = self.position_m[index] - cell.pad.deformation_m;
                 mechanics.friction(tip_m, phase - self.first_phase)
             };
-            cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction);
+            cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction, step_s);
         }
         let (damping_n_s_per_m, mass_kg) = match self.damping_ratio {
             Some(ratio) => (ratio * mechanics.critical_n_s_per_m, mechanics.mass_kg),
@@ -320,20 +316,6 @@ impl Crawl {
             drag_n_per_m: laws.drag_n_s_per_m / step_s,
             inertia_n_per_m: 4.0 * mass_kg / (step_s * step_s),
         }
-    }
-
-    /// Lets the tips that begin to slide in this trial do so against kinetic friction; whether there are any.
-    fn break_away(&mut self, mechanics: &Mechanics) -> bool {
-        let mut any = false;
-        for (cell, law) in self.cell[..self.cells].iter_mut().zip(&mechanics.pad) {
-            let sense = cell.trial.loaded.sliding;
-            if sense != 0 && cell.pad.sliding != sense {
-                cell.pad.sliding = sense;
-                cell.trial.hold = law.hold(&cell.pad, cell.trial.friction);
-                any = true;
-            }
-        }
-        any
     }
 
     /// Takes over the trial that balances the body, and books it: every force runs in a straight line within an increment.
@@ -361,12 +343,11 @@ impl Crawl {
                 driven_m,
                 shift_m,
                 loaded,
-                hold,
                 ..
             } = cell.trial;
             let (law, standing_n) = (&mechanics.pad[index], mechanics.standing_n[index]);
             let (before_m, before_n) = (cell.pad.deformation_m, cell.pad.force_n);
-            let lost_j = law.take(&mut cell.pad, &loaded, &hold, increment.relaxing);
+            let lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.relaxing);
             let strain_m = loaded.deformation_m - before_m;
             let (damping_n, drag_n) = (increment.damping_n_per_m * strain_m, increment.drag_n_per_m * shift_m);
             let damped_j = 0.5 * (cell.damping_n + damping_n) * shift_m;

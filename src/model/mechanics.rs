@@ -43,6 +43,8 @@ impl Mechanics {
                 forward_n: stiffness * bound_m,
                 backward_n: stiffness * contact.backward_bound_m,
                 static_over_kinetic: laws.static_over_kinetic,
+                slip_m: laws.slip_m,
+                grip_s: laws.grip_s,
                 presliding: laws.presliding,
                 hardening_per_m2: if bound_m > 0.0 {
                     laws.hardening / (bound_m * bound_m)
@@ -112,7 +114,7 @@ impl Mechanics {
             turns += 1.0;
             steps -= cells;
         }
-        let share = (steps / (1.0 + overlap)).min(1.0);
+        let share = self.rounded((steps / (1.0 + overlap)).min(1.0));
         let play_m = self.laws.play_m.min(stroke_m);
         turns * (stroke_m - play_m) + (stroke_m * share - play_m).max(0.0)
     }
@@ -123,10 +125,38 @@ impl Mechanics {
         let steps = (cam.steps - self.place_of[cell] as f64 + self.laws.overlap).rem_euclid(cells);
         let share = steps / (1.0 + self.laws.overlap);
         let stroke_m = self.worm.stroke_of_m(cell);
-        if share < 1.0 && stroke_m * share >= self.laws.play_m {
-            stroke_m * cells / (1.0 + self.laws.overlap)
+        if share < 1.0 && stroke_m * self.rounded(share) >= self.laws.play_m {
+            stroke_m * self.speed(share) * cells / (1.0 + self.laws.overlap)
         } else {
             0.0
+        }
+    }
+
+    /// How far a step is done after a share of its time: evenly, but for the corners of the cam, where the cell gains its speed and
+    /// loses it evenly over the rounding's share of the step.
+    #[inline]
+    fn rounded(&self, share: f64) -> f64 {
+        let rounding = self.laws.rounding;
+        if rounding == 0.0 {
+            return share;
+        }
+        let from_end = share.min(1.0 - share);
+        let near = if from_end < rounding {
+            0.5 * from_end * from_end / rounding
+        } else {
+            from_end - 0.5 * rounding
+        } / (1.0 - rounding);
+        if share < 0.5 { near } else { 1.0 - near }
+    }
+
+    /// Speed over the mean one of the step, after a share of its time.
+    fn speed(&self, share: f64) -> f64 {
+        let rounding = self.laws.rounding;
+        let from_end = share.min(1.0 - share);
+        if from_end < rounding {
+            from_end / rounding / (1.0 - rounding)
+        } else {
+            1.0 / (1.0 - rounding)
         }
     }
 

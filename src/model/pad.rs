@@ -7,10 +7,10 @@
 pub(super) const ELEMENTS: usize = 4;
 /// Force, as a share of a tip's friction, to which a curved law is inverted.
 const INVERSION_SHARE: f64 = 1e-12;
+/// Share of a cell's shift to which a curved pad on bristles is solved.
+const STRAIN_SHARE: f64 = 1e-9;
 /// Share of its friction from which a tip on bristles counts as sliding.
 const SLIDES_FROM: f64 = 0.98;
-/// Share of its kinetic friction below which a tip that slid grips anew.
-const GRIPS_BELOW: f64 = 0.5;
 /// Iterations after which an inversion ends in any case: halving alone would do by then.
 const MOST_ITERATIONS: usize = 80;
 
@@ -21,6 +21,8 @@ pub(super) struct PadLaw {
     pub forward_n: f64,         // kinetic friction, sliding forward
     pub backward_n: f64,
     pub static_over_kinetic: f64,
+    pub slip_m: f64,
+    pub grip_s: f64,
     /// Stiffness of the pad over that of the bristles by which its tip holds on; 0 for a tip that slides suddenly.
     pub presliding: f64,
     pub hardening_per_m2: f64,
@@ -34,8 +36,9 @@ pub(super) struct PadLaw {
 pub(super) struct Pad {
     pub deformation_m: f64,
     pub force_n: f64,
-    pub sliding: i8, // −1, 0, 1
-    relaxed_m: f64,  // of the creeping branch
+    slip_m_s: f64,  // in the last increment
+    slipped: f64,   // share of what it holds at rest beyond its kinetic friction that is lost
+    relaxed_m: f64, // of the creeping branch
     yielding_m: [f64; ELEMENTS],
 }
 
@@ -44,7 +47,8 @@ pub(super) struct Pad {
 pub(super) struct Hold {
     least_n: f64,
     most_n: f64,
-    // Deformations under these forces, once they were asked for: both hang on the tip's state alone, not on the shift.
+    // Deformation and force before the cell moves, and deformations under the limits, once they were asked for: all hang on the tip's state alone, not on the shift.
+    still: Option<(f64, f64)>,
     least_m: Option<f64>,
     most_m: Option<f64>,
 }
@@ -65,18 +69,18 @@ impl PadLaw {
         self.hardening_per_m2 == 0.0 && self.creep_n_per_m == 0.0 && self.element_n_per_m == 0.0
     }
 
-    /// What a tip can hold, with its friction scaled by `friction`.
-    pub fn hold(&self, pad: &Pad, friction: f64) -> Hold {
-        let ratio = |sense: i8| {
-            if pad.sliding == sense {
-                friction
-            } else {
-                friction * self.static_over_kinetic
-            }
-        };
+    /// What a tip can hold at the end of an increment, with its friction scaled by `friction`. It is taken to slip on as it
+    /// slipped before: with what it really slips, the force would fall as the cell goes on, and not be one solution.
+    pub fn hold(&self, pad: &Pad, friction: f64, step_s: f64) -> Hold {
+        let mut limit = friction;
+        if self.static_over_kinetic != 1.0 {
+            let slipped = self.slipped(pad, pad.slip_m_s * step_s, step_s);
+            limit *= 1.0 + (self.static_over_kinetic - 1.0) * (1.0 - slipped);
+        }
         Hold {
-            least_n: -self.backward_n * ratio(-1),
-            most_n: self.forward_n * ratio(1),
+            least_n: -self.backward_n * limit,
+            most_n: self.forward_n * limit,
+            still: None,
             least_m: None,
             most_m: None,
         }
@@ -86,8 +90,7 @@ impl PadLaw {
     #[inline]
     pub fn load(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, relaxing: f64) -> Loaded {
         if self.presliding > 0.0 && shift_m != 0.0 {
-            let limit_n = if shift_m > 0.0 { hold.most_n } else { hold.least_n };
-            return self.load_bristles(pad, shift_m, limit_n, relaxing);
+            return self.load_bristles(pad, shift_m, hold, relaxing);
         }
         let reach_m = pad.deformation_m + shift_m;
         let (reach_n, tangent_n_per_m) = if self.is_linear() {
@@ -125,47 +128,47 @@ impl PadLaw {
     }
 
     /// A tip that holds by bristles: its force tends to the friction as its cell goes on (Dahl's law), by implicit Euler;
-    /// `limit_n` has the sign of the shift. A curved pad is taken for a straight line from where it is, twice, the second time
-    /// towards where the first led.
-    fn load_bristles(&self, pad: &Pad, shift_m: f64, limit_n: f64, relaxing: f64) -> Loaded {
+    /// the limit has the sign of the shift.
+    ///
+    /// With u = 1 − F/limit, what is left of the friction, and c the bristles' share of the way, the pad takes u/(u + c) of the
+    /// shift and the tip slides the rest. For a straight pad that is a quadratic in u at the increment's end.
+    fn load_bristles(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, relaxing: f64) -> Loaded {
+        let (still_m, still_n) = *hold
+            .still
+            .get_or_insert_with(|| self.still(pad, hold.least_n, hold.most_n, relaxing));
+        let limit_n = if shift_m > 0.0 { hold.most_n } else { hold.least_n };
         let is_linear = self.is_linear();
-        // The creeping branch relaxes even where nothing moves.
-        let (still_n, mut slope) = if is_linear {
-            (pad.force_n, self.stiffness_n_per_m)
+        let slope = if is_linear {
+            self.stiffness_n_per_m
         } else {
-            self.force(pad, pad.deformation_m, relaxing)
+            self.force(pad, still_m, relaxing).1
         };
-        // What is left of the friction, 1 − F/limit: it falls by u/(u + c) for each way over which the pad alone would reach
-        // the limit, so u₁² + (c − u₀ + way) u₁ = u₀ c at an increment's end.
+        let share = self.presliding * slope / self.stiffness_n_per_m;
         let left = (1.0 - still_n / limit_n).max(0.0);
-        let mut loaded = (pad.deformation_m, still_n, 0.0);
-        for _ in 0..if is_linear { 1 } else { 2 } {
-            let share = self.presliding * slope / self.stiffness_n_per_m;
-            let linear = share - left + shift_m * slope / limit_n;
-            let root = (linear * linear + 4.0 * left * share).sqrt();
-            // The form of the root that does not cancel.
-            let after = if linear > 0.0 {
-                2.0 * left * share / (linear + root)
-            } else {
-                0.5 * (root - linear)
-            };
-            let tangent = slope * after / root;
-            if is_linear {
-                let force_n = limit_n * (1.0 - after);
-                loaded = (force_n / slope, force_n, tangent);
-            } else {
-                let strain_m = limit_n * (left - after) / slope;
-                let deformation_m = pad.deformation_m + strain_m;
-                let (force_n, slope_there) = self.force(pad, deformation_m, relaxing);
-                loaded = (deformation_m, force_n, tangent);
-                slope = if strain_m == 0.0 {
-                    slope_there
-                } else {
-                    (force_n - still_n) / strain_m
-                };
-            }
-        }
-        let (deformation_m, force_n, tangent_n_per_m) = loaded;
+        let linear = share - left + shift_m * slope / limit_n;
+        let root = (linear * linear + 4.0 * left * share).sqrt();
+        // The form of the root that does not cancel.
+        let after = if linear > 0.0 {
+            2.0 * left * share / (linear + root)
+        } else {
+            0.5 * (root - linear)
+        };
+        let (deformation_m, force_n, tangent_n_per_m) = if is_linear {
+            let force_n = limit_n * (1.0 - after);
+            (force_n / slope, force_n, slope * after / root)
+        } else if left == 0.0 {
+            (still_m, limit_n, 0.0)
+        } else {
+            let (strain_m, force_n, tangent) = self.strain_bristles(
+                pad,
+                still_m,
+                shift_m,
+                limit_n,
+                relaxing,
+                limit_n * (left - after) / slope,
+            );
+            (still_m + strain_m, force_n, tangent)
+        };
         Loaded {
             deformation_m,
             force_n,
@@ -179,22 +182,77 @@ impl PadLaw {
         }
     }
 
-    /// In which sense a tip counts as sliding after an increment: what broke away does not grip anew before its force has
-    /// fallen well below the friction, so that a swing of the body is not taken for rest.
-    fn sliding(&self, pad: &Pad, loaded: &Loaded, hold: &Hold) -> i8 {
-        let kinetic_n = if pad.sliding > 0 { hold.most_n } else { -hold.least_n };
-        if loaded.sliding == 0 && f64::from(pad.sliding) * loaded.force_n > GRIPS_BELOW * kinetic_n {
-            pad.sliding
+    /// Deformation and force of a tip before its cell moves: the creeping branch relaxes even where nothing moves, and what is
+    /// held beyond the friction, as after breaking away, is let go.
+    fn still(&self, pad: &Pad, least_n: f64, most_n: f64, relaxing: f64) -> (f64, f64) {
+        let still_n = if self.is_linear() {
+            pad.force_n
         } else {
-            loaded.sliding
+            self.force(pad, pad.deformation_m, relaxing).0
+        };
+        let held_n = still_n.clamp(least_n, most_n);
+        if held_n == still_n {
+            (pad.deformation_m, still_n)
+        } else {
+            (self.invert(pad, held_n, relaxing), held_n)
         }
     }
 
+    /// A curved pad on bristles: how much of a shift it takes, by Newton's method from what a straight one would take. Both u
+    /// and the excess over u/(u + c) of the shift are monotone in it, so the root is alone.
+    /// Returns strain, force and its slope over the shift.
+    fn strain_bristles(
+        &self,
+        pad: &Pad,
+        still_m: f64,
+        shift_m: f64,
+        limit_n: f64,
+        relaxing: f64,
+        guess_m: f64,
+    ) -> (f64, f64, f64) {
+        let mut strain_m = guess_m;
+        let (mut low_m, mut high_m) = (shift_m.min(0.0), shift_m.max(0.0));
+        let mut tries = 0;
+        loop {
+            let (force_n, slope) = self.force(pad, still_m + strain_m, relaxing);
+            let left = 1.0 - force_n / limit_n;
+            let share = self.presliding * slope / self.stiffness_n_per_m;
+            let excess_m = strain_m * (left + share) - shift_m * left;
+            let steepness = left + share + (shift_m - strain_m) * slope / limit_n;
+            tries += 1;
+            if excess_m.abs() <= STRAIN_SHARE * shift_m.abs() || tries == MOST_ITERATIONS {
+                return (strain_m, force_n, slope * left / steepness);
+            }
+            if excess_m > 0.0 {
+                high_m = strain_m;
+            } else {
+                low_m = strain_m;
+            }
+            let newton_m = strain_m - excess_m / steepness;
+            strain_m = if newton_m > low_m && newton_m < high_m {
+                newton_m
+            } else {
+                0.5 * (low_m + high_m)
+            };
+        }
+    }
+
+    /// What a tip has lost of its grip after an increment in which it slips so far: slip takes it, rest gives it back.
+    fn slipped(&self, pad: &Pad, slip_m: f64, step_s: f64) -> f64 {
+        let slip = slip_m / self.slip_m;
+        (pad.slipped + slip) / (1.0 + slip + step_s / self.grip_s)
+    }
+
     /// Takes over a load. Returns the energy that is lost in the pad or set free when a tip breaks away, J.
-    pub fn take(&self, pad: &mut Pad, loaded: &Loaded, hold: &Hold, relaxing: f64) -> f64 {
+    pub fn take(&self, pad: &mut Pad, loaded: &Loaded, step_s: f64, relaxing: f64) -> f64 {
         let deformation_m = loaded.deformation_m;
         let before_n = pad.force_n;
-        pad.sliding = self.sliding(pad, loaded, hold);
+        if self.static_over_kinetic != 1.0 {
+            // What bristles give before the tip slides is no slip.
+            let slip_m = f64::from(loaded.sliding).abs() * loaded.slide_m.abs();
+            pad.slipped = self.slipped(pad, slip_m, step_s);
+            pad.slip_m_s = slip_m / step_s;
+        }
         pad.force_n = loaded.force_n;
         // What a tip holds more while it rests than while it slides goes with the slide, half of it on the way.
         let freed_j = 0.5 * (before_n - loaded.force_n) * loaded.slide_m;

@@ -8,6 +8,10 @@ use super::worm::Worm;
 pub struct Laws {
     /// Force at which a resting tip begins to slide, over the force at which it goes on sliding; 1 or more.
     pub static_over_kinetic: f64,
+    /// Slip over which a tip loses what it holds at rest beyond its kinetic friction, m; above 0.
+    pub slip_m: f64,
+    /// Time of rest in which it wins that back, s; above 0.
+    pub grip_s: f64,
     /// Stiffness of the pads over that of the bristles by which their tips hold on (Dahl's law): no tip begins to slide quite
     /// suddenly; 0 or more.
     pub presliding: f64,
@@ -29,6 +33,8 @@ pub struct Laws {
     pub play_m: f64,
     /// By what share of a step each step begins early; 0 to 0.5.
     pub overlap: f64,
+    /// Share of a step in which the cam brings a cell to speed, and the same to rest: rounded corners; 0 to 0.5.
+    pub rounding: f64,
     /// Stretch of the canal with other friction.
     pub patch: Patch,
     /// Share of the friction that is lost with every cycle; below 1.
@@ -50,6 +56,8 @@ impl Default for Laws {
     fn default() -> Self {
         Self {
             static_over_kinetic: 1.0,
+            slip_m: 1e-4,
+            grip_s: 0.1,
             presliding: 0.0,
             hardening: 0.0,
             creep_share: 0.0,
@@ -60,6 +68,7 @@ impl Default for Laws {
             compliance_m_per_n: 0.0,
             play_m: 0.0,
             overlap: 0.0,
+            rounding: 0.0,
             patch: Patch {
                 from_m: 0.0,
                 length_m: 0.0,
@@ -86,6 +95,9 @@ impl Laws {
     fn neutral(&self) -> Self {
         let standard = Self::default();
         let mut laws = *self;
+        if laws.static_over_kinetic == 1.0 {
+            (laws.slip_m, laws.grip_s) = (standard.slip_m, standard.grip_s);
+        }
         if laws.creep_share == 0.0 {
             laws.creep_time_s = standard.creep_time_s;
         }

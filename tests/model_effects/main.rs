@@ -59,7 +59,7 @@ fn strong() -> Vec<Setting> {
 fn strong_value(parameter: &wormd::model::effect::Parameter) -> f64 {
     match parameter.name {
         "from_m" => 0.02,
-        "length_m" | "time_constant_s" => parameter.neutral,
+        "length_m" | "time_constant_s" | "slip_m" | "grip_s" => parameter.neutral,
         _ => parameter.neutral + 15.0 * parameter.notable,
     }
 }

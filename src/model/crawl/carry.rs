@@ -25,20 +25,14 @@ impl Crawl {
         let shift_m = mean_m - self.mean_position_m();
         let increment = self.prepare(mechanics, phase, step_s.max(SHORTEST_S));
         let mut translation_m = 0.0;
-        // Each pass lets further tips break away.
-        for _ in 0..=self.cells {
-            for _ in 0..MOST_TRIALS {
-                self.try_out(mechanics, &increment, translation_m);
-                let tried_m: f64 = self.cell[..self.cells].iter().map(|cell| cell.trial.shift_m).sum();
-                let missing_m = shift_m - tried_m / self.cells as f64;
-                if missing_m.abs() < FOUND_M {
-                    break;
-                }
-                translation_m += missing_m;
-            }
-            if mechanics.laws.static_over_kinetic <= 1.0 || !self.break_away(mechanics) {
+        for _ in 0..MOST_TRIALS {
+            self.try_out(mechanics, &increment, translation_m);
+            let tried_m: f64 = self.cell[..self.cells].iter().map(|cell| cell.trial.shift_m).sum();
+            let missing_m = shift_m - tried_m / self.cells as f64;
+            if missing_m.abs() < FOUND_M {
                 break;
             }
+            translation_m += missing_m;
         }
         self.take(mechanics, &increment, translation_m, phase);
     }
