@@ -90,7 +90,8 @@ pub fn explain_advances(
 
 /// What of the nuisances an advance knows of: neither the clock nor what damps and softens the first moment of a slide.
 fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
-    let within_a_cycle = |nuisance: Nuisance| matches!(nuisance, Nuisance::Damping | Nuisance::Presliding);
+    let within_a_cycle =
+        |nuisance: Nuisance| matches!(nuisance, Nuisance::Damping | Nuisance::Presliding | Nuisance::Viscosity);
     let mut all = Nuisance::all(cells, runs, false);
     all.retain(|free| !matches!(free.what, What::Nuisance(nuisance) if within_a_cycle(nuisance)));
     all

@@ -142,8 +142,10 @@ pub struct Remainder {
     pub description: String,
     /// Share of the gap that stays open after the best effect.
     pub open_share: f64,
-    /// Period along the way or in time, where there is one: in cycles.
+    /// Every how many cycles it comes back, where it does so in time.
     pub period_cycles: Option<f64>,
+    /// Every how much canal it comes back, m, where it does so along the way.
+    pub period_m: Option<f64>,
     /// Where it is largest.
     pub places: Vec<Place>,
 }

@@ -12,6 +12,7 @@ use super::judge::{Find, Judged, are_twins};
 use super::localise::{map, places};
 use super::observed::Observed;
 use super::parameter::{Nuisance, Supposed, What};
+use super::period::period;
 use super::propose::propose;
 use super::screen::Screening;
 use super::words;
@@ -20,6 +21,8 @@ use crate::model::effect::{LIBRARY, Visible};
 
 /// Places listed at most.
 const PLACES: usize = 12;
+/// Share of the held-out gap that the best effect must close to be named.
+const CLOSES: f64 = 0.15;
 /// Improvement from which a motor that droops is named: chance reaches 4 one time in twenty, and there is one such quantity.
 const DROOPS: f64 = 16.0;
 
@@ -38,15 +41,22 @@ pub(super) struct Parts {
 pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts) -> Answer {
     let judged = &parts.judged;
     let droop = parts.droop.as_ref().filter(|droop| droop.improvement > DROOPS);
-    let verdict = match (judged.verdict, droop) {
-        (Verdict::Agrees, Some(_)) => Verdict::Explained,
-        (verdict, _) => verdict,
-    };
-    let named: &[Find] = match judged.verdict {
+    let mut named: &[Find] = match judged.verdict {
         Verdict::Explained | Verdict::Ambiguous => &judged.candidates,
         Verdict::Agrees | Verdict::OutsideLibrary => &[],
     };
-    let gap = Gap::measure(problem, parts, named);
+    let mut gap = Gap::measure(problem, parts, named);
+    let mut of_positions = judged.verdict;
+    let refused = gap.closure.first().copied().filter(|closure| *closure < CLOSES);
+    if refused.is_some() {
+        named = &[];
+        gap = Gap::measure(problem, parts, named);
+        of_positions = Verdict::OutsideLibrary;
+    }
+    let verdict = match (of_positions, droop) {
+        (Verdict::Agrees, Some(_)) => Verdict::Explained,
+        (verdict, _) => verdict,
+    };
     let mut effects = Vec::new();
     let mut rivals = Vec::new();
     for (place, find) in named.iter().enumerate() {
@@ -68,10 +78,12 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
     };
     let remainder = (verdict == Verdict::OutsideLibrary).then(|| {
         let places = places(&maps_after, PLACES);
+        let period = period(problem, best.unwrap_or(&parts.recalibrated));
         Remainder {
             description: words::remainder(judged, &places),
             open_share: judged.open_share,
-            period_cycles: None,
+            period_cycles: period.cycles,
+            period_m: period.way_m,
             places,
         }
     });
@@ -86,7 +98,7 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
     let runs = runs(problem, parts, named.first());
     Answer {
         verdict,
-        sentence: words::sentence(verdict, &effects, &rivals, judged, parts.threshold),
+        sentence: words::sentence(verdict, &effects, &rivals, judged, refused, parts.threshold),
         r#where: places(&maps_before, PLACES),
         effects,
         rivals,
@@ -359,6 +371,7 @@ pub(super) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
                 }
                 Nuisance::Presliding => ("presliding".to_owned(), free.centre, value, sigma, ""),
                 Nuisance::Rounding => ("rounding".to_owned(), free.centre, value, sigma, ""),
+                Nuisance::Viscosity => ("viscosity".to_owned(), free.centre, value, sigma, "N s/m"),
             };
             Some(Calibrated {
                 name,

@@ -22,6 +22,9 @@ const DAMPING: (f64, f64, f64) = (1e-3, 6.0, 0.25);
 /// Damping beyond which no step leads downhill.
 const MOST_DAMPING: f64 = 1e6;
 
+/// Rows of all columns of derivatives that fit the processor's cache together.
+const ROWS_AT_ONCE: usize = 512;
+
 /// The campaign with its noise: everything a misfit needs.
 pub(super) struct Problem<'s, 'a> {
     pub scene: &'s Scene<'a>,
@@ -49,11 +52,23 @@ impl Fit {
     pub fn normal(&self, counts: Option<&[bool]>) -> DMatrix<f64> {
         let count = self.at.len();
         let mut normal = DMatrix::zeros(count, count);
+        let rows = self.residual.len();
+        for from in (0..rows).step_by(ROWS_AT_ONCE) {
+            let part = from..rows.min(from + ROWS_AT_ONCE);
+            let counts = counts.map(|counts| &counts[part.clone()]);
+            for row in 0..count {
+                for column in 0..=row {
+                    normal[(row, column)] += dot(
+                        &self.jacobian[row][part.clone()],
+                        &self.jacobian[column][part.clone()],
+                        counts,
+                    );
+                }
+            }
+        }
         for row in 0..count {
-            for column in 0..=row {
-                let product = dot(&self.jacobian[row], &self.jacobian[column], counts);
-                normal[(row, column)] = product;
-                normal[(column, row)] = product;
+            for column in 0..row {
+                normal[(column, row)] = normal[(row, column)];
             }
             normal[(row, row)] += self.hypothesis.free[row].sigma.powi(-2);
         }
@@ -102,12 +117,12 @@ impl Fit {
 pub(super) fn dot(a: &[f64], b: &[f64], counts: Option<&[bool]>) -> f64 {
     match counts {
         None => {
-            // Four sums side by side: the order is fixed, and the processor can do them at once.
-            let mut sums = [0.0; 4];
-            let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-            let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
-            for (a, b) in a4.zip(b4) {
-                for lane in 0..4 {
+            // Eight sums side by side: the order is fixed, and the processor can do them at once.
+            let mut sums = [0.0; 8];
+            let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+            let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(a, b)| a * b).sum();
+            for (a, b) in a8.zip(b8) {
+                for lane in 0..8 {
                     sums[lane] += a[lane] * b[lane];
                 }
             }

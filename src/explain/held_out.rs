@@ -3,9 +3,20 @@
 //! Whole slopes are left out one after the other, and blocks of neighbouring cycles on all slopes. For each the fit is made
 //! anew by Gauss-Newton steps on what remains, and the residuals that it leaves on what was left out are simulated exactly. Every
 //! sample is left out once in each way; the mean over both ways counts.
+//!
+//! # The score
+//! What was left out has conditions of its own that nothing else tells, such as how its slope was off. So the score is twice the
+//! negative logarithm of the probability that the fit gives to the data left out, with all that it does not know: with residuals r
+//! there, derivatives J, and C the covariance that what remains leaves,
+//!
+//! ```text
+//! rᵀ (1 + J C Jᵀ)⁻¹ r + log det (1 + J C Jᵀ) = |r|² − gᵀ N⁻¹ g + log (det N / det C⁻¹),   N = C⁻¹ + Jᵀ J,   g = Jᵀ r
+//! ```
+//! An effect that could have been anything gives little to any outcome, and so pays for its freedom.
 
-use super::fit::{Fit, Problem, in_parallel};
+use super::fit::{Fit, Problem, dot, in_parallel};
 use super::observed::Observed;
+use nalgebra::{DMatrix, DVector};
 
 /// Blocks of neighbouring cycles.
 const BLOCKS: usize = 3;
@@ -22,7 +33,7 @@ pub(super) struct Fold {
 /// A hypothesis on data that it was not fitted to.
 #[derive(Debug, Clone)]
 pub(super) struct HeldOut {
-    /// Square sum of the residuals on what was left out, mean over the ways of leaving out.
+    /// The score: as a misfit, mean over the ways of leaving out.
     pub misfit: f64,
     /// The fit anew without each fold.
     pub fits: Vec<(Fit, Vec<Vec<bool>>)>,
@@ -89,13 +100,7 @@ pub(super) fn hold_out(problem: &Problem<'_, '_>, fit: &Fit, folds: &[Fold]) -> 
         for _ in 0..STEPS {
             without = problem.step_without(without, &stays);
         }
-        let misfit: f64 = without
-            .residual
-            .iter()
-            .zip(&stays)
-            .filter(|(_, stays)| !**stays)
-            .map(|(residual, _)| residual * residual)
-            .sum();
+        let misfit = score(&without, &stays);
         without.jacobian = Vec::new();
         (misfit, (without, fold.left_out.clone()))
     });
@@ -105,4 +110,32 @@ pub(super) fn hold_out(problem: &Problem<'_, '_>, fit: &Fit, folds: &[Fold]) -> 
         misfit: anew.iter().map(|(misfit, _)| misfit).sum::<f64>() / ways,
         fits: anew.into_iter().map(|(_, without)| without).collect(),
     }
+}
+
+/// Twice the negative logarithm of the probability, up to a constant that no hypothesis changes, of the data that do not stay.
+fn score(without: &Fit, stays: &[bool]) -> f64 {
+    let left_out: Vec<bool> = stays.iter().map(|stays| !stays).collect();
+    let residual = &without.residual;
+    let misfit = dot(residual, residual, Some(&left_out));
+    // What lies at a limit is known as well as it can be.
+    let open: Vec<usize> = (0..without.at.len())
+        .filter(|&quantity| !without.at_limit(quantity))
+        .collect();
+    let (known, whole) = (without.normal(Some(stays)), without.normal(None));
+    let factor = |normal: &DMatrix<f64>| {
+        let mut matrix = DMatrix::from_fn(open.len(), open.len(), |row, column| normal[(open[row], open[column])]);
+        for row in 0..open.len() {
+            matrix[(row, row)] *= 1.0 + 1e-9;
+        }
+        matrix.cholesky()
+    };
+    let (Some(known), Some(whole)) = (factor(&known), factor(&whole)) else {
+        return misfit;
+    };
+    let drawn = DVector::from_iterator(
+        open.len(),
+        open.iter()
+            .map(|&quantity| dot(&without.jacobian[quantity], residual, Some(&left_out))),
+    );
+    misfit - drawn.dot(&whole.solve(&drawn)) + whole.ln_determinant() - known.ln_determinant()
 }

@@ -17,7 +17,7 @@
 //! - `parameter`: what may be turned, with priors; `predict`: what a hypothesis says of every sample; `fit`: least squares.
 //! - `screen`: the whole library at a glance; `droop`: the one effect that shows in time alone.
 //! - `held_out`: data left out; `judge`: the rules of the judgement.
-//! - `localise`: where the gap is; `gap`: how it shrinks; `propose`: the next experiment; `words`: the answer in words.
+//! - `localise`: where the gap is; `period`: whether it comes back; `gap`: how it shrinks; `propose`: the next experiment; `words`: the answer in words.
 //! - `advances`: the same where only advances per cycle are known.
 //! - `assemble`: all of it put together; [`write_back`]: the model's file with the answer in it.
 
@@ -36,6 +36,7 @@ mod localise;
 mod noise;
 mod observed;
 mod parameter;
+mod period;
 mod predict;
 mod propose;
 mod screen;

@@ -32,6 +32,8 @@ pub(super) enum Nuisance {
     Presliding,
     /// Share of a step in which a cell comes to speed.
     Rounding,
+    /// Resistance of the contacts to each cell's velocity, N s/m.
+    Viscosity,
 }
 
 /// A quantity that is free in a fit.
@@ -72,8 +74,14 @@ const CLOCK_S: (f64, f64, f64) = (1e-3, 3e-3, 5e-4);
 const PRESLIDING: (f64, f64, f64, f64, f64) = (0.02, 0.015, 1e-3, 0.08, 2e-3);
 /// Of the cam's rounding, as of the presliding: no cam has sharp corners.
 const ROUNDING: (f64, f64, f64, f64, f64) = (0.05, 0.05, 0.0, 0.3, 5e-3);
+/// Of the viscosity, as of the presliding: no contact is quite dry. At the paper's speed 1 N s/m is 18 mN, of some 2 N of friction.
+const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 0.5, 0.0, 4.0, 0.1);
 /// Logarithm of the damping ratio: centre, standard deviation, limits' distance, step.
 const DAMPING: (f64, f64, f64, f64) = (-0.9, 1.0, 2.2, 0.1);
+
+/// Standard deviation of the prior of an effect's severity, in notable changes: 3° of slope, 0.4 N of drag, 0.4 of one cell's
+/// friction. Of two that explain the same, that which need be less extreme is the likelier.
+const SEVERE: f64 = 20.0;
 
 impl Nuisance {
     /// The nuisances of a campaign.
@@ -101,6 +109,7 @@ impl Nuisance {
             ..Self::Damping.free((sigma, reach, step))
         });
         all.push(Self::Presliding.free_within(PRESLIDING));
+        all.push(Self::Viscosity.free_within(VISCOSITY));
         all
     }
 
@@ -134,13 +143,14 @@ impl Nuisance {
             Self::StiffnessOf(cell) => worm.scale_stiffness(Some(cell), value.exp()),
             Self::StrokeOf(cell) => worm.scale_stroke(Some(cell), value.exp()),
             Self::SlopeOf(of) if of == run => worm.tilt_rad(value.to_radians()),
-            Self::SlopeOf(_) | Self::Clock | Self::Damping | Self::Presliding | Self::Rounding => {}
+            Self::SlopeOf(_) | Self::Clock | Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity => {}
         }
     }
 }
 
 impl Free {
-    /// A parameter of an effect: no prior but its range.
+    /// A parameter of an effect: no prior but its range, but for the first one, its severity. That is drawn to neutral weakly: data
+    /// that know nothing of it obey, so what only the data left out would show is not kept when they are left out.
     pub fn of_effect(place: usize, number: usize, parameter: &Parameter) -> Self {
         Self {
             what: What::Effect {
@@ -148,7 +158,11 @@ impl Free {
                 parameter: number,
             },
             centre: parameter.neutral,
-            sigma: f64::INFINITY,
+            sigma: if number == 0 {
+                SEVERE * parameter.notable
+            } else {
+                f64::INFINITY
+            },
             least: parameter.least,
             most: parameter.most,
             step: 0.2 * parameter.notable,

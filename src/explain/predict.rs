@@ -98,6 +98,7 @@ impl Scene<'_> {
                     Nuisance::Damping => damping = value.exp(),
                     Nuisance::Presliding => physics.laws.presliding = value,
                     Nuisance::Rounding => physics.laws.rounding = value,
+                    Nuisance::Viscosity => physics.laws.drag_n_s_per_m += value,
                     _ => {}
                 }
             }

@@ -3,20 +3,30 @@
 use super::answer::{NamedEffect, Place, Verdict};
 use super::fit::{Fit, Problem};
 use super::judge::Judged;
+use super::parameter::What;
 
-/// The outcome in a sentence or two.
+/// The outcome in a sentence or two. `refused` is the share of the held-out gap that the best effect closes where it is too
+/// little to name it.
 pub(super) fn sentence(
     verdict: Verdict,
     effects: &[NamedEffect],
     rivals: &[NamedEffect],
     judged: &Judged,
+    refused: Option<f64>,
     threshold: f64,
 ) -> String {
-    let best = judged.all.iter().map(|find| find.improvement).fold(0.0, f64::max);
     match verdict {
-        Verdict::Agrees => format!(
-            "Model and data agree once the model is recalibrated within its priors: the best effect of the library improves the fit by {best:.0}, and {threshold:.0} is asked for."
-        ),
+        Verdict::Agrees => {
+            let best = judged.all.iter().map(|find| find.improvement).fold(0.0, f64::max);
+            let why = if best > threshold {
+                "what improves the fit by more is too weak to be told, or is not kept on data left out"
+            } else {
+                "no effect of the library does"
+            };
+            format!(
+                "Model and data agree once the model is recalibrated within its priors: an effect must improve the fit by {threshold:.0}, and {why} (best: {best:.0})."
+            )
+        }
         Verdict::Explained => format!("{} explains the data{}.", names(effects), closing(effects)),
         Verdict::Ambiguous => format!(
             "{} explains the data{}, but so does {}: these data cannot decide between them.",
@@ -24,19 +34,25 @@ pub(super) fn sentence(
             closing(effects),
             rivals.iter().map(name).collect::<Vec<_>>().join(", and so does ")
         ),
-        Verdict::OutsideLibrary => format!(
-            "Model and data disagree, and no effect of the library, alone or in a pair, explains how: {} comes nearest and leaves {:.0} % of the gap open.",
-            judged.candidates.first().map_or_else(
-                || "none".to_owned(),
-                |find| find
-                    .supposed
-                    .iter()
-                    .map(|supposed| supposed.effect.name)
-                    .collect::<Vec<_>>()
-                    .join(" with ")
-            ),
-            100.0 * judged.open_share
-        ),
+        Verdict::OutsideLibrary => {
+            let nearest = judged.candidates.first().map_or_else(
+                || "none that is strong enough to be told keeps what it promises on data left out".to_owned(),
+                |find| {
+                    let names: Vec<&str> = find.supposed.iter().map(|supposed| supposed.effect.name).collect();
+                    let how_near = match refused {
+                        Some(closure) => format!(
+                            "closes {:.0} % of the gap on cycles that it was not fitted to",
+                            100.0 * closure.max(0.0)
+                        ),
+                        None => format!("leaves {:.0} % of the gap open", 100.0 * judged.open_share),
+                    };
+                    format!("{} comes nearest and {how_near}", names.join(" with "))
+                },
+            );
+            format!(
+                "Model and data disagree, and no effect of the library, alone or in a pair, explains how: {nearest}."
+            )
+        }
     }
 }
 
@@ -98,7 +114,7 @@ pub(super) fn warnings(problem: &Problem<'_, '_>, fit: &Fit) -> Vec<String> {
     }
     let limits = fit.hypothesis.free.iter().enumerate();
     let at_limit = limits
-        .filter(|(at, free)| free.sigma.is_finite() && fit.at_limit(*at))
+        .filter(|(at, free)| matches!(free.what, What::Nuisance(_)) && fit.at_limit(*at))
         .count();
     if at_limit > 0 {
         warnings.push(format!(

@@ -1,7 +1,10 @@
 //! One tip under any of the laws: what force a shift of its cell calls up, and where the tip slides.
 //!
-//! The force on a pad never falls as its cell moves on, but for the drop at breakaway, which is a change of state between two
-//! solutions and not part of either. So the balance of the body stays one monotone scalar equation.
+//! The force on a pad never falls as its cell moves on, for what a tip can hold is settled before its increment: where it breaks
+//! away, the fall comes with the next ones. So the balance of the body stays one monotone scalar equation.
+//!
+//! Slip takes what a tip holds beyond its kinetic friction, and rest gives it back: θ′ = (1 − θ)/t − θ |v|/d, the ageing law of
+//! rate and state (Dieterich 1979, Ruina 1983), of which Stribeck's curve is what a steady slide feels.
 
 /// Yielding elements of a pad: enough that the curve of their sum shows no corners in positions.
 pub(super) const ELEMENTS: usize = 4;
@@ -47,7 +50,8 @@ pub(super) struct Pad {
 pub(super) struct Hold {
     least_n: f64,
     most_n: f64,
-    // Deformation and force before the cell moves, and deformations under the limits, once they were asked for: all hang on the tip's state alone, not on the shift.
+    // Deformation and force before the cell moves, and deformations under the limits, once they were asked for: all hang on the
+    // tip's state alone, not on the shift.
     still: Option<(f64, f64)>,
     least_m: Option<f64>,
     most_m: Option<f64>,

@@ -16,7 +16,7 @@
 //!
 //! [`effect`] has the library's 22 effects by name, [`stranger`] what no library names, [`campaign`] throws the dice and
 //! makes the runs, [`repeat`] makes one more run of the same worm under another condition, and [`split`] lists the cases.
-//! An answer is held against the truth by [`verdict`], and many of them by [`table`].
+//! An answer is held against the truth by [`verdict`], and many of them by [`table`]; [`library`] asks the library's own search.
 
 #![allow(dead_code, reason = "every crate that includes this module uses its own part of it")]
 
@@ -25,6 +25,7 @@ pub mod campaign;
 pub mod effect;
 pub mod flaws;
 pub mod gear;
+pub mod library;
 pub mod make;
 pub mod motor;
 pub mod repeat;

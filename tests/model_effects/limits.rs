@@ -17,6 +17,9 @@ fn way_m(physics: &Physics, damping_ratio: Option<f64>, cycle_s: f64, parts: u32
     crawl.mean_position_m()
 }
 
+/// Calls in two cycles where a law asks for the finest increments.
+const FINEST: u32 = 102_400;
+
 /// Breakaway makes a jump of every tip's first slide, which an increment finds only when it is over: the way's error falls as the
 /// increment does, not as its square, so that this law, alone or with all others, asks for the finest.
 #[test]
@@ -29,7 +32,7 @@ fn half_the_increments_make_the_same_way() {
         };
         for setting in strong() {
             let parts = if setting.effect().name == "breakaway-friction" {
-                51_200
+                FINEST
             } else {
                 6_400
             };
@@ -40,7 +43,7 @@ fn half_the_increments_make_the_same_way() {
                 setting.effect().name
             );
         }
-        let change_m = change_m(&level.clone().with(&strong()), 51_200);
+        let change_m = change_m(&level.clone().with(&strong()), FINEST);
         assert!(
             change_m < 1e-6,
             "all together, inertia {damping_ratio:?}: {change_m} m a cycle"

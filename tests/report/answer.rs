@@ -377,10 +377,10 @@ pub fn outside() -> Answer {
         rivals: Vec::new(),
         stages: stages(None, None),
         remainder: Some(Remainder {
-            description: "all cells, while cells 2 and 3 step, at 30° and 40°, with a period of 11 mm along the way"
-                .to_owned(),
+            description: "all cells, while cells 2 and 3 step, at 30° and 40°".to_owned(),
             open_share: 0.62,
-            period_cycles: Some(2.39),
+            period_cycles: None,
+            period_m: Some(0.011),
             places: places(&answer.figures.maps_before)[..3].to_vec(),
         }),
         next_experiment: Some(NextExperiment {

@@ -121,7 +121,7 @@ fn each_verdict_is_told_in_its_own_words() {
                 "No value is given, for no effect is named.",
                 "What is left: all cells, while cells 2 and 3 step",
                 "62 % of the gap stays open",
-                "It comes back every 2.39 cycles.",
+                "It comes back every 11.0 mm of the canal.",
                 "There is no map below, for no effect is named.",
                 "start shifted along the canal by 5 mm",
             ],

@@ -168,14 +168,17 @@ fn calibration(calibration: &[Calibrated]) -> Vec<Row> {
 }
 
 fn remainder(remainder: &Remainder) -> String {
-    let period = remainder
+    let in_time = remainder
         .period_cycles
         .map(|cycles| format!(", with a period of {} cycles", fixed(cycles, 1)));
+    let along = remainder
+        .period_m
+        .map(|period_m| format!(", with a period of {} mm of canal", fixed(period_m * 1e3, 1)));
     format!(
         "what is left: {}; {} % of the gap stays open{}",
         remainder.description,
         fixed(remainder.open_share * 1e2, 0),
-        period.unwrap_or_default()
+        in_time.or(along).unwrap_or_default()
     )
 }
 
@@ -283,6 +286,7 @@ mod tests {
                 description: "cell 1 while cell 4 steps".to_owned(),
                 open_share: 0.4,
                 period_cycles: Some(3.5),
+                period_m: None,
                 places: Vec::new(),
             }),
             next_experiment: Some(NextExperiment {

@@ -8,7 +8,7 @@
 use super::super::answer::{Remainder, Verdict};
 use super::super::fit::Fit;
 use super::super::judge::{Find, are_twins};
-use super::super::parameter::Supposed;
+use super::super::parameter::{Supposed, What};
 use super::table::Table;
 
 /// A quantile of chi-square: its first values from 1 degree of freedom on, and the same quantile of the normal distribution.
@@ -191,6 +191,7 @@ impl Judged {
             ),
             open_share: best.misfit / recalibrated.misfit,
             period_cycles: None,
+            period_m: None,
             places: Vec::new(),
         })
     }
@@ -210,7 +211,7 @@ impl Judged {
             )
         }));
         let at_limit = (0..fit.hypothesis.free.len())
-            .filter(|&at| fit.hypothesis.free[at].sigma.is_finite() && fit.at_limit(at))
+            .filter(|&at| matches!(fit.hypothesis.free[at].what, What::Nuisance(_)) && fit.at_limit(at))
             .count();
         if at_limit > 0 {
             warnings.push(format!(

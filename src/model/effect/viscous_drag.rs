@@ -21,7 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
         neutral: 0.0,
         least: 0.0,
         most: 120.0,
-        notable: 0.5,
+        notable: 1.0,
     }],
     apply,
 };

@@ -29,6 +29,12 @@ pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
         if let Some(period) = remainder.period_cycles {
             page.paragraph(&format!("It comes back every {} cycles.", significant(period, 3)));
         }
+        if let Some(period_m) = remainder.period_m {
+            page.paragraph(&format!(
+                "It comes back every {} mm of the canal.",
+                significant(1e3 * period_m, 3)
+            ));
+        }
         if !remainder.places.is_empty() {
             let mut table = map::table(&remainder.places);
             table.title = "Where it is largest".to_owned();
