@@ -22,7 +22,7 @@ mod next;
 mod table;
 
 use super::answer::{Answer, Figures, RunSummary, Screened, Stage};
-use super::assemble::{calibration, named_effects};
+use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
 use super::fit::{Fit, in_parallel};
 use super::judge::Find;
@@ -31,7 +31,7 @@ use super::predict::Hypothesis;
 use super::screen::hypotheses;
 use crate::config::Config;
 use crate::experiment::Progress;
-use crate::model::effect::{LIBRARY, Parameter};
+use crate::model::effect::Parameter;
 use crate::recording::Advance;
 use judge::{Judged, Kind};
 use table::Table;
@@ -170,17 +170,7 @@ fn screening(supposed: &[Supposed], finds: &[Option<Find>]) -> Vec<Screened> {
         })
         .collect();
     rows.sort_by(|a, b| b.score.total_cmp(&a.score));
-    for effect in LIBRARY {
-        if !rows.iter().any(|row| row.name == effect.name) {
-            rows.push(Screened {
-                name: effect.name.to_owned(),
-                cell: None,
-                score: 0.0,
-                improvement: None,
-                outcome: "not-visible",
-            });
-        }
-    }
+    add_unscreened(&mut rows, |_| "not-visible");
     rows
 }
 

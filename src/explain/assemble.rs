@@ -17,7 +17,7 @@ use super::propose::propose;
 use super::screen::Screening;
 use super::words;
 use crate::config::Config;
-use crate::model::effect::{LIBRARY, Visible};
+use crate::model::effect::{Effect, LIBRARY, Visible};
 
 /// Places listed at most.
 const PLACES: usize = 12;
@@ -323,6 +323,16 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
             }
         })
         .collect();
+    add_unscreened(&mut rows, |effect| match effect.visible {
+        Visible::PhaseTime if droops => "refitted",
+        Visible::PhaseTime => "screened-out",
+        _ => "not-visible",
+    });
+    rows
+}
+
+/// Adds every effect of the library that has no row yet, with what became of it.
+pub(super) fn add_unscreened(rows: &mut Vec<Screened>, outcome: impl Fn(&Effect) -> &'static str) {
     for effect in LIBRARY {
         if !rows.iter().any(|row| row.name == effect.name) {
             rows.push(Screened {
@@ -330,15 +340,10 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
                 cell: None,
                 score: 0.0,
                 improvement: None,
-                outcome: if effect.visible == Visible::PhaseTime {
-                    if droops { "refitted" } else { "screened-out" }
-                } else {
-                    "not-visible"
-                },
+                outcome: outcome(effect),
             });
         }
     }
-    rows
 }
 
 /// What was recalibrated, as people read it.

@@ -215,7 +215,10 @@ impl PadLaw {
         guess_m: f64,
     ) -> (f64, f64, f64) {
         let mut strain_m = guess_m;
-        let (mut low_m, mut high_m) = (shift_m.min(0.0), shift_m.max(0.0));
+        let mut bracket = Bracket {
+            low_m: shift_m.min(0.0),
+            high_m: shift_m.max(0.0),
+        };
         let mut tries = 0;
         loop {
             let (force_n, slope) = self.force(pad, still_m + strain_m, relaxing);
@@ -227,17 +230,7 @@ impl PadLaw {
             if excess_m.abs() <= STRAIN_SHARE * shift_m.abs() || tries == MOST_ITERATIONS {
                 return (strain_m, force_n, slope * left / steepness);
             }
-            if excess_m > 0.0 {
-                high_m = strain_m;
-            } else {
-                low_m = strain_m;
-            }
-            let newton_m = strain_m - excess_m / steepness;
-            strain_m = if newton_m > low_m && newton_m < high_m {
-                newton_m
-            } else {
-                0.5 * (low_m + high_m)
-            };
+            strain_m = bracket.next_m(strain_m, excess_m, steepness);
         }
     }
 
@@ -316,26 +309,42 @@ impl PadLaw {
         let mut at_m = pad.deformation_m;
         // Neither relaxing nor yielding makes the force fall, so the spring alone reaches the target within this.
         let far_m = (target_n.abs() + self.force(pad, at_m, relaxing).0.abs()) / self.stiffness_n_per_m;
-        let (mut low_m, mut high_m) = (at_m - 2.0 * far_m, at_m + 2.0 * far_m);
+        let mut bracket = Bracket {
+            low_m: at_m - 2.0 * far_m,
+            high_m: at_m + 2.0 * far_m,
+        };
         for _ in 0..MOST_ITERATIONS {
             let (force_n, slope) = self.force(pad, at_m, relaxing);
             let excess_n = force_n - target_n;
             if excess_n.abs() <= INVERSION_SHARE * scale_n {
                 break;
             }
-            if excess_n > 0.0 {
-                high_m = at_m;
-            } else {
-                low_m = at_m;
-            }
-            let newton_m = at_m - excess_n / slope;
-            at_m = if newton_m > low_m && newton_m < high_m {
-                newton_m
-            } else {
-                0.5 * (low_m + high_m)
-            };
+            at_m = bracket.next_m(at_m, excess_n, slope);
         }
         at_m
+    }
+}
+
+/// Where the root of something that grows lies.
+struct Bracket {
+    low_m: f64,
+    high_m: f64,
+}
+
+impl Bracket {
+    /// Narrows it by the excess found at a place, and gives the next: Newton's, or the middle where that lies outside.
+    fn next_m(&mut self, at_m: f64, excess: f64, slope: f64) -> f64 {
+        if excess > 0.0 {
+            self.high_m = at_m;
+        } else {
+            self.low_m = at_m;
+        }
+        let newton_m = at_m - excess / slope;
+        if newton_m > self.low_m && newton_m < self.high_m {
+            newton_m
+        } else {
+            0.5 * (self.low_m + self.high_m)
+        }
     }
 }
 
