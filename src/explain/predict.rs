@@ -8,6 +8,7 @@
 //! phase had to be found from the positions, what the stepping cell does relative to the others went into it and tells nothing
 //! more: that direction is taken out.
 
+use super::misread::Misread;
 use super::noise::RunNoise;
 use super::observed::Observed;
 use super::parameter::{Free, Nuisance, Supposed, What};
@@ -140,6 +141,9 @@ pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, 
     let time_s = &observed.run.recording.time_s;
     // What is seen now happened the latency ago.
     let mut clock = Clock::new(time_s, &observed.phase, physics.view.latency_s);
+    if !observed.phase_recorded && physics.laws.overlap > 0.0 {
+        clock.misread = Some(Misread::new(physics.laws.overlap, cells));
+    }
     let first_phase = clock.phase_at(0);
     let mut crawl = start(observed, &mechanics, first_phase, damping)?;
     let crawled = if observed.laid_down { SETTLING_CYCLES } else { 0.0 };
@@ -226,6 +230,7 @@ struct Clock<'a> {
     time_s: &'a [f64],
     phase: &'a [f64],
     latency_s: f64,
+    misread: Option<Misread>,
     after: usize,
 }
 
@@ -235,12 +240,18 @@ impl<'a> Clock<'a> {
             time_s,
             phase,
             latency_s,
+            misread: None,
             after: 1,
         }
     }
 
     /// For samples asked in order.
     fn phase_at(&mut self, sample: usize) -> f64 {
+        let phase = self.recorded_at(sample);
+        self.misread.as_ref().map_or(phase, |misread| misread.mended(phase))
+    }
+
+    fn recorded_at(&mut self, sample: usize) -> f64 {
         if self.latency_s == 0.0 {
             return self.phase[sample];
         }
