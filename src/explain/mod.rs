@@ -15,7 +15,8 @@
 //! - `search`: the steps, one after the other.
 //! - `observed`: the recordings as the search sees them; `noise`: how well the worm repeats itself.
 //! - `parameter`: what may be turned, with priors; `predict`: what a hypothesis says of every sample;
-//!   `misread`: where the phase was read off overlapping steps; `fit`: least squares.
+//!   `misread`: where the phase was read off overlapping steps; `fit`: least squares; `leap`:
+//!   from one valley of it to another.
 //! - `screen`: the whole library at a glance; `droop`: the one effect that shows in time alone.
 //! - `held_out`: data left out; `judge`: the rules of the judgement.
 //! - `localise`: where the gap is; `period`: whether it comes back; `gap`: how it shrinks; `propose`: the next experiment; `words`: the answer in words.
@@ -33,6 +34,7 @@ mod fixture;
 mod gap;
 mod held_out;
 mod judge;
+mod leap;
 mod localise;
 mod misread;
 mod noise;

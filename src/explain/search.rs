@@ -7,6 +7,7 @@ use super::error::ExplainError;
 use super::fit::{Fit, Problem};
 use super::held_out;
 use super::judge::{self, Find, Open};
+use super::leap::leap;
 use super::noise::RunNoise;
 use super::observed::Observed;
 use super::parameter::{Nuisance, Supposed};
@@ -28,6 +29,8 @@ const NEXT_CELL: f64 = 0.5;
 const PAIR_SEEDS: usize = 2;
 const PAIRED: usize = 3;
 const SCREENED_FOR_PAIRS: usize = 8;
+/// Improvement from which it is worth looking for a better valley.
+const LEAST_TO_LEAP: f64 = 10.0;
 /// How much larger an improvement must be than what chance reaches one time in twenty, and how large at least: real pads, cams and
 /// tips leave a little of their own. Chosen on the development split.
 const SAFETY: f64 = 2.5;
@@ -258,7 +261,10 @@ fn refit(
     let mut finds: Vec<Find> = Vec::with_capacity(chosen.len());
     for (done, rough) in chosen.iter().enumerate() {
         progress(0.5 + 0.5 * done as f64 / chosen.len() as f64);
-        let fit = problem.fit(&rough.hypothesis, rough.at.clone(), Some(rough));
+        let mut fit = problem.fit(&rough.hypothesis, rough.at.clone(), Some(rough));
+        if base.misfit - fit.misfit > LEAST_TO_LEAP {
+            fit = leap(problem, fit);
+        }
         finds.push(Find {
             improvement: base.misfit - fit.misfit - problem.excess_of_repeating(base, &fit),
             supposed: fit.hypothesis.supposed.clone(),

@@ -55,11 +55,15 @@ fn strong() -> Vec<Setting> {
     LIBRARY.iter().map(setting).collect()
 }
 
-/// Fifteen times what is just noticed, but for places.
+/// Fifteen times what is just noticed, to the side where there is room for it, but for places.
 fn strong_value(parameter: &wormd::model::effect::Parameter) -> f64 {
     match parameter.name {
         "from_m" => 0.02,
         "length_m" | "time_constant_s" | "slip_m" | "grip_s" => parameter.neutral,
-        _ => parameter.neutral + 15.0 * parameter.notable,
+        _ => {
+            let strong = 15.0 * parameter.notable;
+            let is_room_above = parameter.neutral + strong <= parameter.most;
+            parameter.neutral + if is_room_above { strong } else { -strong }
+        }
     }
 }

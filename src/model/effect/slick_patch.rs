@@ -1,4 +1,4 @@
-//! `slick-patch`: A stretch of the canal has less friction, or more.
+//! `slick-patch`: A stretch of the canal has less friction.
 //!
 //! A wet spot, a polished tile.
 
@@ -7,7 +7,7 @@ use super::{Effect, Parameter, Scope, Visible};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "slick-patch",
-    sentence: "A stretch of the canal has less friction, or more.",
+    sentence: "A stretch of the canal has less friction.",
     formula: "μN = f · μN for tips within [a, a + l]",
     signature: "fixed in space",
     twins: &[],
@@ -21,7 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
             about: "friction there over that elsewhere",
             neutral: 1.0,
             least: 0.1,
-            most: 2.0,
+            most: 1.0,
             notable: 0.05,
         },
         Parameter {
