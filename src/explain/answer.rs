@@ -3,6 +3,7 @@
 //! Cells count from 1 here, as people read them; phases count gait cycles from the start of one, 0 to 1.
 
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// The outcome in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -72,6 +73,9 @@ pub struct NamedEffect {
     pub parameters: Vec<FoundParameter>,
     /// The cell where one is meant, from 1.
     pub cell: Option<usize>,
+    /// The other effects of the same answer, in words: a pair explains the data only together.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub together_with: Vec<String>,
     /// Share of the gap after recalibration that it closes, down to the noise floor, on cycles that it was not fitted to.
     pub closure: f64,
     /// Its closure less that of the best effect of another kind.
@@ -82,6 +86,36 @@ pub struct NamedEffect {
     pub improvement: f64,
     /// Which experiment tells it from its neighbours.
     pub separated_by: String,
+}
+
+impl NamedEffect {
+    /// Its name, and its cell where one is meant.
+    pub fn in_words(&self) -> String {
+        with_cell(&self.name, self.cell)
+    }
+}
+
+/// An effect with its cell, from 1, where one is meant: `unequal-clamping of cell 2`.
+pub fn with_cell(name: &str, cell: Option<usize>) -> String {
+    match cell {
+        Some(cell) => format!("{name} of cell {cell}"),
+        None => name.to_owned(),
+    }
+}
+
+/// Rivals in words, one entry for each answer: those of a pair are one answer.
+pub fn answers_in_words(rivals: &[NamedEffect]) -> Vec<String> {
+    let mut answers: Vec<(BTreeSet<&str>, String)> = Vec::new();
+    let names: Vec<String> = rivals.iter().map(NamedEffect::in_words).collect();
+    for (rival, name) in rivals.iter().zip(&names) {
+        let with = rival.together_with.iter().map(String::as_str);
+        let all: BTreeSet<&str> = with.clone().chain([name.as_str()]).collect();
+        if !answers.iter().any(|(other, _)| *other == all) {
+            let in_order: Vec<&str> = with.chain([name.as_str()]).collect();
+            answers.push((all, in_order.join(" together with ")));
+        }
+    }
+    answers.into_iter().map(|(_, words)| words).collect()
 }
 
 /// A parameter as found.

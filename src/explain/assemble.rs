@@ -2,7 +2,7 @@
 
 use super::answer::{
     Answer, Calibrated, Figures, FoundParameter, NamedEffect, Remainder, ResidualMap, RunSummary, Screened, Stage,
-    Verdict,
+    Verdict, with_cell,
 };
 use super::droop::Droop;
 use super::fit::{Fit, Problem};
@@ -51,7 +51,11 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
     if refused.is_some() {
         named = &[];
         gap = Gap::measure(problem, parts, named);
-        of_positions = Verdict::OutsideLibrary;
+        of_positions = if judged.nothing_open {
+            Verdict::Agrees
+        } else {
+            Verdict::OutsideLibrary
+        };
     }
     let verdict = match (of_positions, droop) {
         (Verdict::Agrees, Some(_)) => Verdict::Explained,
@@ -60,13 +64,18 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
     let mut effects = Vec::new();
     let mut rivals = Vec::new();
     for (place, find) in named.iter().enumerate() {
-        let list = if place == 0 { &mut effects } else { &mut rivals };
-        list.extend(named_effects(
-            find,
-            judged.probability[place],
-            gap.closure[place],
-            gap.margin(place),
-        ));
+        let found = named_effects(find, judged.probability[place], gap.closure[place], gap.margin(place));
+        if place == 0 {
+            effects = found;
+        } else {
+            // What the first answer names already is no rival of it.
+            let is_new = |effect: &NamedEffect| {
+                !effects
+                    .iter()
+                    .any(|named: &NamedEffect| named.in_words() == effect.in_words())
+            };
+            rivals.extend(found.into_iter().filter(is_new));
+        }
     }
     effects.extend(droop.map(droop_effect));
     let final_fit = named.first().map_or(&parts.recalibrated, |find| &find.fit);
@@ -185,6 +194,7 @@ fn droop_effect(droop: &Droop) -> NamedEffect {
     NamedEffect {
         name: effect.name.to_owned(),
         twins: Vec::new(),
+        together_with: Vec::new(),
         parameters: vec![FoundParameter {
             name: parameter.name.to_owned(),
             value: droop.slowdown_per_n,
@@ -259,6 +269,7 @@ fn advance_m(observed: &Observed<'_>, position_m: impl Fn(usize, usize) -> f64) 
 /// The effects of a find, as people read them.
 pub(super) fn named_effects(find: &Find, probability: f64, closure: f64, margin: f64) -> Vec<NamedEffect> {
     let sigmas = find.fit.sigmas();
+    let name = |supposed: &Supposed| with_cell(supposed.effect.name, supposed.cell.map(|cell| cell + 1));
     let of = |(place, supposed): (usize, &Supposed)| {
         let quantities = find.fit.hypothesis.free.iter().enumerate();
         let parameters = quantities.filter_map(|(at, free)| match free.what {
@@ -279,6 +290,12 @@ pub(super) fn named_effects(find: &Find, probability: f64, closure: f64, margin:
             twins: twins(supposed),
             parameters: parameters.collect(),
             cell: supposed.cell.map(|cell| cell + 1),
+            together_with: find
+                .supposed
+                .iter()
+                .filter(|other| *other != supposed)
+                .map(name)
+                .collect(),
             closure,
             margin,
             probability,

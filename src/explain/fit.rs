@@ -192,19 +192,11 @@ impl Problem<'_, '_> {
         runs.flat_map(|run| self.run_residuals(run, hypothesis, at)).collect()
     }
 
-    /// What priors add to the misfit.
-    fn prior_misfit(hypothesis: &Hypothesis, at: &[f64]) -> f64 {
-        let with_value = hypothesis.free.iter().zip(at);
-        with_value
-            .map(|(free, value)| ((value - free.centre) / free.sigma).powi(2))
-            .sum()
-    }
-
     /// A hypothesis at some values, without derivatives.
     pub fn evaluate(&self, hypothesis: &Hypothesis, at: Vec<f64>) -> Fit {
         let residual = self.residuals(hypothesis, &at);
         Fit {
-            misfit: dot(&residual, &residual, None) + Self::prior_misfit(hypothesis, &at),
+            misfit: dot(&residual, &residual, None) + prior_misfit(hypothesis, &at),
             hypothesis: hypothesis.clone(),
             at,
             residual,
@@ -246,7 +238,7 @@ impl Problem<'_, '_> {
     /// it leads downhill, and none if it never does.
     pub fn step_without(&self, fit: Fit, stays: &[bool]) -> Fit {
         let misfit =
-            |fit: &Fit| dot(&fit.residual, &fit.residual, Some(stays)) + Self::prior_misfit(&fit.hypothesis, &fit.at);
+            |fit: &Fit| dot(&fit.residual, &fit.residual, Some(stays)) + prior_misfit(&fit.hypothesis, &fit.at);
         let (normal, gradient) = (fit.normal(Some(stays)), fit.gradient(Some(stays)));
         let whole = step(&fit, &normal, &gradient, 1e-6);
         let here = misfit(&fit);
@@ -260,7 +252,7 @@ impl Problem<'_, '_> {
                 .collect();
             let residual = self.residuals_here(&fit.hypothesis, &at);
             let trial = Fit {
-                misfit: dot(&residual, &residual, None) + Self::prior_misfit(&fit.hypothesis, &at),
+                misfit: dot(&residual, &residual, None) + prior_misfit(&fit.hypothesis, &at),
                 hypothesis: fit.hypothesis.clone(),
                 at,
                 residual,
@@ -365,6 +357,14 @@ impl Problem<'_, '_> {
         }
         fit
     }
+}
+
+/// What priors add to the misfit.
+pub(super) fn prior_misfit(hypothesis: &Hypothesis, at: &[f64]) -> f64 {
+    let with_value = hypothesis.free.iter().zip(at);
+    with_value
+        .map(|(free, value)| ((value - free.centre) / free.sigma).powi(2))
+        .sum()
 }
 
 /// Step of a difference that stays within the limits.

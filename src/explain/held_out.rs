@@ -12,9 +12,10 @@
 //! ```text
 //! rᵀ (1 + J C Jᵀ)⁻¹ r + log det (1 + J C Jᵀ) = |r|² − gᵀ N⁻¹ g + log (det N / det C⁻¹),   N = C⁻¹ + Jᵀ J,   g = Jᵀ r
 //! ```
-//! An effect that could have been anything gives little to any outcome, and so pays for its freedom.
+//! An effect that could have been anything gives little to any outcome, and so pays for its freedom. Added is what the values of the
+//! whole fit cost by their priors: of two hypotheses that say the same of the data, that which need be less extreme is the likelier.
 
-use super::fit::{Fit, Problem, dot, in_parallel};
+use super::fit::{Fit, Problem, dot, in_parallel, prior_misfit};
 use super::observed::Observed;
 use nalgebra::{DMatrix, DVector};
 
@@ -107,7 +108,7 @@ pub(super) fn hold_out(problem: &Problem<'_, '_>, fit: &Fit, folds: &[Fold]) -> 
     let slopes = folds.len() - BLOCKS;
     let ways = if slopes > 0 { 2.0 } else { 1.0 };
     HeldOut {
-        misfit: anew.iter().map(|(misfit, _)| misfit).sum::<f64>() / ways,
+        misfit: anew.iter().map(|(misfit, _)| misfit).sum::<f64>() / ways + prior_misfit(&fit.hypothesis, &fit.at),
         fits: anew.into_iter().map(|(_, without)| without).collect(),
     }
 }

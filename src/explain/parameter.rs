@@ -80,12 +80,12 @@ const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 0.5, 0.0, 4.0, 0.1);
 const DAMPING: (f64, f64, f64, f64) = (-0.9, 1.0, 2.2, 0.1);
 
 /// Standard deviation of the prior of an effect's severity, in notable changes: 3° of slope, 0.4 N of drag, 0.4 of one cell's
-/// friction. Of two that explain the same, that which need be less extreme is the likelier.
+/// friction.
 const SEVERE: f64 = 20.0;
 
 impl Nuisance {
     /// The nuisances of a campaign.
-    pub fn all(cells: usize, runs: usize, with_clock: bool) -> Vec<Free> {
+    pub fn all(cells: usize, runs: usize, phase_recorded: bool) -> Vec<Free> {
         let mut all = vec![
             Self::Friction.free(FRICTION),
             Self::Stiffness.free(STIFFNESS),
@@ -97,7 +97,7 @@ impl Nuisance {
             all.push(Self::StrokeOf(cell).free(STROKE_OF));
         }
         all.extend((0..runs).map(|run| Self::SlopeOf(run).free(SLOPE_OF_DEG)));
-        if with_clock {
+        if phase_recorded {
             all.push(Self::Clock.free(CLOCK_S));
             all.push(Self::Rounding.free_within(ROUNDING));
         }

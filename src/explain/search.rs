@@ -10,7 +10,7 @@ use super::judge::{self, Find, Open};
 use super::leap::leap;
 use super::noise::RunNoise;
 use super::observed::Observed;
-use super::parameter::{Nuisance, Supposed};
+use super::parameter::{Nuisance, Supposed, What};
 use super::predict::{Hypothesis, Scene, believed, predict, rest};
 use super::screen::{self, Screening};
 use crate::config::Config;
@@ -24,8 +24,8 @@ const NOISE_ROUNDS: usize = 2;
 const REFITTED: usize = 8;
 const CELLS_REFITTED: usize = 2;
 const NEXT_CELL: f64 = 0.5;
-/// Single effects from which pairs are tried, effects that are refitted on top of each, and how many that screened best are tried
-/// roughly before.
+/// Single effects from which pairs are tried where the best leaves a gap, effects that are refitted on top of each, and how many
+/// that screened best are tried roughly before.
 const PAIR_SEEDS: usize = 2;
 const PAIRED: usize = 3;
 const SCREENED_FOR_PAIRS: usize = 8;
@@ -160,12 +160,22 @@ pub fn explain(
     tell("pairs", 0.75);
     let open = Open::of(&problem, &recalibrated);
     let mut pairs = Vec::new();
-    if finds
-        .first()
-        .is_some_and(|best| best.improvement > threshold && !open.is_closed(&problem, &best.fit))
-    {
-        pairs = pair_up(&problem, &recalibrated, &finds, &supposed, options.seed);
+    if let Some(best) = finds.first().filter(|best| best.improvement > threshold) {
+        let seeds = if open.is_closed(&problem, &best.fit) {
+            1
+        } else {
+            PAIR_SEEDS
+        };
+        let seeds = judge::kinds(&finds).into_iter().take(seeds);
+        pairs = pair_up(&problem, &recalibrated, seeds, &supposed, threshold, options.seed);
         judge::hold_out(&problem, &recalibrated, &mut pairs, &folds);
+        if let Some(alone) = pairs
+            .first()
+            .and_then(|pair| alone(&problem, &recalibrated, &finds[0], pair))
+        {
+            finds[0] = alone;
+            judge::hold_out(&problem, &recalibrated, &mut finds[..1], &folds);
+        }
     }
     tell("judgement", 0.9);
     let judged = judge::judge(&problem, &open, finds, pairs, threshold, recalibrated_held_out.misfit);
@@ -265,12 +275,7 @@ fn refit(
         if base.misfit - fit.misfit > LEAST_TO_LEAP {
             fit = leap(problem, fit);
         }
-        finds.push(Find {
-            improvement: base.misfit - fit.misfit - problem.excess_of_repeating(base, &fit),
-            supposed: fit.hypothesis.supposed.clone(),
-            held_out: None,
-            fit,
-        });
+        finds.push(Find::of(problem, base, fit));
     }
     finds.sort_by(|a, b| b.improvement.total_cmp(&a.improvement));
     finds
@@ -300,16 +305,38 @@ fn choose(rough: Vec<Fit>, base: &Fit, most: usize) -> Vec<Fit> {
     chosen
 }
 
-/// Pairs of effects: each of the best single ones with what screens best on top of it.
-fn pair_up(
+/// A single effect fitted anew from where it lies in a pair, where that is a better fit: a pair may have found a better valley, which
+/// does not prove that both of it are there.
+fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Find, pair: &Find) -> Option<Find> {
+    let hypothesis = &single.fit.hypothesis;
+    let place_in_pair = pair.supposed.iter().position(|one| single.supposed == [*one])?;
+    let from_pair = |what: What| {
+        let what = match what {
+            What::Effect { parameter, .. } => What::Effect {
+                place: place_in_pair,
+                parameter,
+            },
+            nuisance => nuisance,
+        };
+        let place = pair.fit.hypothesis.free.iter().position(|free| free.what == what)?;
+        Some(pair.fit.at[place])
+    };
+    let at: Option<Vec<f64>> = hypothesis.free.iter().map(|free| from_pair(free.what)).collect();
+    let find = Find::of(problem, recalibrated, problem.fit(hypothesis, at?, None));
+    (find.improvement > single.improvement).then_some(find)
+}
+
+/// Pairs of effects: each of the best single ones with what screens best, and above the threshold, on top of it.
+fn pair_up<'f>(
     problem: &Problem<'_, '_>,
     recalibrated: &Fit,
-    finds: &[Find],
+    seeds: impl Iterator<Item = &'f Find>,
     supposed: &[Supposed],
+    threshold: f64,
     seed: u64,
 ) -> Vec<Find> {
     let mut pairs: Vec<Find> = Vec::new();
-    for first in finds.iter().take(PAIR_SEEDS) {
+    for first in seeds {
         let others: Vec<Supposed> = supposed
             .iter()
             .filter(|other| !first.supposed.contains(other) && !judge::are_twins(other, &first.supposed[0]))
@@ -320,11 +347,11 @@ fn pair_up(
         let effects_from = at.len() - screen::effect_quantities(&first.fit.hypothesis);
         at[effects_from..].copy_from_slice(&first.fit.at[effects_from..]);
         let about = problem.with_derivatives(&first.fit.hypothesis, at);
-        let (screened, _) = screen::screen(problem, &base, &others, seed);
-        let promising = &screened[..screened.len().min(SCREENED_FOR_PAIRS)];
-        for mut find in refit(problem, &base, &about, promising, PAIRED, &mut |_| ()) {
-            find.improvement =
-                recalibrated.misfit - find.fit.misfit - problem.excess_of_repeating(recalibrated, &find.fit);
+        let (mut promising, _) = screen::screen(problem, &base, &others, seed);
+        promising.retain(|screening| screening.score > threshold);
+        promising.truncate(SCREENED_FOR_PAIRS);
+        for find in refit(problem, &base, &about, &promising, PAIRED, &mut |_| ()) {
+            let find = Find::of(problem, recalibrated, find.fit);
             let is_new = !pairs
                 .iter()
                 .any(|pair| pair.supposed.iter().all(|one| find.supposed.contains(one)));

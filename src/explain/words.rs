@@ -1,6 +1,6 @@
 //! The answer in words.
 
-use super::answer::{NamedEffect, Place, Verdict};
+use super::answer::{NamedEffect, Place, Verdict, answers_in_words};
 use super::fit::{Fit, Problem};
 use super::judge::Judged;
 use super::parameter::What;
@@ -19,7 +19,7 @@ pub(super) fn sentence(
         Verdict::Agrees => {
             let best = judged.all.iter().map(|find| find.improvement).fold(0.0, f64::max);
             let why = if best > threshold {
-                "what improves the fit by more is too weak to be told, or is not kept on data left out"
+                "what improves the fit by more is too weak to be told, is not kept on data left out, or closes next to nothing of the gap"
             } else {
                 "no effect of the library does"
             };
@@ -32,7 +32,7 @@ pub(super) fn sentence(
             "{} explains the data{}, but so does {}: these data cannot decide between them.",
             names(effects),
             closing(effects),
-            rivals.iter().map(name).collect::<Vec<_>>().join(", and so does ")
+            answers_in_words(rivals).join(", and so does ")
         ),
         Verdict::OutsideLibrary => {
             let nearest = judged.candidates.first().map_or_else(
@@ -56,15 +56,9 @@ pub(super) fn sentence(
     }
 }
 
-fn name(effect: &NamedEffect) -> String {
-    match effect.cell {
-        Some(cell) => format!("{} of cell {cell}", effect.name),
-        None => effect.name.clone(),
-    }
-}
-
 fn names(effects: &[NamedEffect]) -> String {
-    effects.iter().map(name).collect::<Vec<_>>().join(" together with ")
+    let names: Vec<String> = effects.iter().map(NamedEffect::in_words).collect();
+    names.join(" together with ")
 }
 
 fn closing(effects: &[NamedEffect]) -> String {

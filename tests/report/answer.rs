@@ -176,6 +176,7 @@ pub fn found(
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
         parameters: parameters.collect(),
         cell,
+        together_with: Vec::new(),
         closure,
         margin,
         probability: 0.5 + 0.5 * margin,

@@ -15,7 +15,10 @@ const MOST_DECIMALS: f64 = 6.0;
 pub(super) fn text(answer: &Answer) -> String {
     let mut parts = vec![answer.sentence.clone()];
     parts.extend(answer.effects.iter().map(|named| effect_text("", named)));
-    parts.extend(answer.rivals.iter().map(|named| effect_text("about as well: ", named)));
+    parts.extend(answer.rivals.iter().map(|named| {
+        let with = named.together_with.iter().map(|other| format!("{other} with "));
+        effect_text(&format!("about as well: {}", with.collect::<String>()), named)
+    }));
     if !answer.r#where.is_empty() {
         parts.push(aligned(&places(&answer.r#where)));
     }
@@ -251,6 +254,7 @@ mod tests {
                 cell: None,
             }],
             cell: None,
+            together_with: Vec::new(),
             closure: 0.947,
             margin: 0.312,
             probability: 0.98,

@@ -26,7 +26,11 @@ pub(super) fn entries(answer: &Answer) -> String {
         text += "\n# The data do not decide against these. To try one, take its comment signs away and the entry above out.\n";
     }
     for rival in rivals {
-        text += &entry(rival, "").lines().map(commented_out).collect::<String>();
+        let heading = match &rival.together_with[..] {
+            [] => String::new(),
+            others => format!("Only together with {}.", others.join(" and ")),
+        };
+        text += &entry(rival, &heading).lines().map(commented_out).collect::<String>();
     }
     text
 }

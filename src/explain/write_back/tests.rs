@@ -27,6 +27,7 @@ fn named(name: &str, cell: Option<usize>, parameters: &[(&str, f64, f64, &str)])
             })
             .collect(),
         cell,
+        together_with: Vec::new(),
         closure: 0.95,
         margin: 0.2,
         probability: 0.99,

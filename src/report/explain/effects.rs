@@ -284,9 +284,13 @@ fn candidates(answer: &Answer) -> Table {
             .parameters
             .iter()
             .map(|found| Quantity::of(&effect.name, found).in_words());
+        let role = match &effect.together_with[..] {
+            [] => role.to_owned(),
+            others => format!("{role}, with {}", in_words(others)),
+        };
         let mut row = vec![
             with_cell(&effect.name, effect.cell),
-            role.to_owned(),
+            role,
             quantities.collect::<Vec<_>>().join("; "),
         ];
         if is_held_out {

@@ -1,7 +1,7 @@
 //! The head of the page: the answer in a sentence, then its values, before any figure.
 
 use super::words::{self, Quantity, clause, with_cell};
-use crate::explain::answer::{NamedEffect, RunSummary, Stage};
+use crate::explain::answer::{NamedEffect, RunSummary, Stage, answers_in_words};
 use crate::explain::{Answer, Verdict};
 use crate::report::number::{NONE, count, fixed, in_words, percent};
 use crate::report::page::{Page, escaped};
@@ -93,7 +93,7 @@ fn either(effects: &[NamedEffect], rivals: &[NamedEffect]) -> String {
     if !effects.is_empty() {
         candidates.push(words::names(effects));
     }
-    candidates.extend(rivals.iter().map(|rival| with_cell(&rival.name, rival.cell)));
+    candidates.extend(answers_in_words(rivals));
     match &candidates[..] {
         [] => "one effect or another".to_owned(),
         [only] => format!("{only} or another effect"),

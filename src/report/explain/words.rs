@@ -1,6 +1,7 @@
 //! Effects, parameters and cells in words, and quantities in the units that people read.
 
 use crate::explain::Answer;
+pub(super) use crate::explain::answer::with_cell;
 use crate::explain::answer::{FoundParameter, NamedEffect};
 use crate::model::effect::{self, Parameter};
 use crate::report::number::{fixed, in_words, to_error};
@@ -87,20 +88,9 @@ pub(super) fn formula(name: &str) -> &'static str {
     effect::named(name).map_or("", |effect| effect.formula)
 }
 
-/// An effect with its cell: `unequal-clamping of cell 2`.
-pub(super) fn with_cell(name: &str, cell: Option<usize>) -> String {
-    match cell {
-        Some(cell) => format!("{name} of cell {cell}"),
-        None => name.to_owned(),
-    }
-}
-
 /// Several effects in words, in their order.
 pub(super) fn names<'a>(effects: impl IntoIterator<Item = &'a NamedEffect>) -> String {
-    let names: Vec<String> = effects
-        .into_iter()
-        .map(|effect| with_cell(&effect.name, effect.cell))
-        .collect();
+    let names: Vec<String> = effects.into_iter().map(NamedEffect::in_words).collect();
     in_words(&names)
 }
 
