@@ -268,7 +268,7 @@ fn advance_m(observed: &Observed<'_>, position_m: impl Fn(usize, usize) -> f64) 
 
 /// The effects of a find, as people read them.
 pub(super) fn named_effects(find: &Find, probability: f64, closure: f64, margin: f64) -> Vec<NamedEffect> {
-    let sigmas = find.fit.sigmas();
+    let sigmas = find.sigmas();
     let name = |supposed: &Supposed| with_cell(supposed.effect.name, supposed.cell.map(|cell| cell + 1));
     let of = |(place, supposed): (usize, &Supposed)| {
         let quantities = find.fit.hypothesis.free.iter().enumerate();

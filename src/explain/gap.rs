@@ -19,6 +19,7 @@ mod mean_cycle;
 
 use super::answer::Stage;
 use super::fit::{Fit, Problem};
+use super::held_out::FitWithout;
 use super::observed::Observed;
 use super::predict::{Predicted, rest};
 pub(super) use mean_cycle::cycles;
@@ -113,13 +114,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
     /// The stage of a model, fitted to everything in `all`. In each of `folds` it was fitted without the cycles for which the list
     /// of their run says so, numbered by whole cycles from the first sample; without folds it was fitted to nothing, and is
     /// off by as much everywhere. Figures are `NaN` where the model cannot make a run.
-    pub fn stage(
-        &self,
-        name: &'static str,
-        effect: Option<String>,
-        all: &Fit,
-        folds: &[(Fit, Vec<Vec<bool>>)],
-    ) -> Stage {
+    pub fn stage(&self, name: &'static str, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
         let left = self.left(all);
         let fit_rms_m = self.rms(&left, |_, _| true);
         let mut held_out = Squares::default();

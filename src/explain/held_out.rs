@@ -31,13 +31,24 @@ pub(super) struct Fold {
     pub left_out: Vec<Vec<bool>>,
 }
 
+/// A fit, and what was left out for it, as [`Fold::left_out`] says.
+pub(super) type FitWithout = (Fit, Vec<Vec<bool>>);
+
 /// A hypothesis on data that it was not fitted to.
 #[derive(Debug, Clone)]
 pub(super) struct HeldOut {
     /// The score: as a misfit, mean over the ways of leaving out.
     pub misfit: f64,
     /// The fit anew without each fold.
-    pub fits: Vec<(Fit, Vec<Vec<bool>>)>,
+    pub fits: Vec<FitWithout>,
+}
+
+impl HeldOut {
+    /// The fits of each way of leaving out: every sample is left out once in each.
+    pub fn ways(&self) -> Vec<&[FitWithout]> {
+        let (slopes, blocks) = self.fits.split_at(self.fits.len().saturating_sub(BLOCKS));
+        [slopes, blocks].into_iter().filter(|way| !way.is_empty()).collect()
+    }
 }
 
 /// Which cycle since the first sample a sample is in.

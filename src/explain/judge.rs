@@ -92,10 +92,37 @@ impl Find {
         gain > threshold && single.held_out_misfit() - self.held_out_misfit() > HOLDS * gain
     }
 
+    /// Standard errors of all quantities: of noise, and of how they come apart when slopes or cycles are left out, for a law that is
+    /// not quite the worm's is wrong otherwise on each.
+    pub fn sigmas(&self) -> Vec<f64> {
+        let of_noise = self.fit.sigmas();
+        let Some(held_out) = &self.held_out else {
+            return of_noise;
+        };
+        let ways = held_out.ways();
+        let apart = |quantity: usize| {
+            ways.iter()
+                .map(move |way| jackknife(way.iter().map(|(fit, _)| fit.at[quantity])))
+        };
+        let with_apart = of_noise.iter().enumerate();
+        with_apart
+            .map(|(quantity, sigma)| apart(quantity).fold(*sigma, f64::hypot))
+            .collect()
+    }
+
     /// Misfit on data that it was not fitted to.
     pub fn held_out_misfit(&self) -> f64 {
         self.held_out.as_ref().map_or(f64::INFINITY, |held_out| held_out.misfit)
     }
+}
+
+/// Standard error of an estimate from what it becomes when each part of the data is left out in turn (the jackknife of Quenouille and
+/// Tukey).
+fn jackknife(left_out: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = left_out.clone().count() as f64;
+    let mean = left_out.clone().sum::<f64>() / count;
+    let squares: f64 = left_out.map(|at| (at - mean).powi(2)).sum();
+    ((count - 1.0) / count * squares).sqrt()
 }
 
 /// Whether no positions can tell two effects apart.
