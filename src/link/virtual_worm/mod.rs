@@ -15,7 +15,7 @@
 //! [`fault`] for the grammar and [`Fault::help`] for the list.
 //!
 //! # Limits
-//! Of the effects, `sensor-latency` is left out: the tracker's captures are as old as the bus makes them. `motor-droop` slows the
+//! Of the effects, `sensor-latency` cannot be negative here, for no camera sees what is still to come. `motor-droop` slows the
 //! velocity that the servo is told to keep.
 //!
 //! The winding's inductance, the play of the gears and the time of bytes on a real wire are left out. The servo's EEPROM

@@ -159,11 +159,10 @@ impl Plant {
         energy.kinetic_j = self.motor.kinetic_j() - before_j;
         self.ledger.add(&energy);
         if self.time_s() >= self.camera.due_s() {
+            let view = self.body.view();
             let mut seen_m = self.body.positions_m();
-            seen_m
-                .iter_mut()
-                .for_each(|position_m| *position_m *= self.body.view().scale);
-            self.camera.capture(&seen_m, &mut self.chance);
+            seen_m.iter_mut().for_each(|position_m| *position_m *= view.scale);
+            self.camera.capture(&seen_m, view.latency_s, &mut self.chance);
         }
         Ok(())
     }

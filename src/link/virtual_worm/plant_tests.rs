@@ -251,6 +251,40 @@ fn camera_captures_at_its_rate_with_its_noise() {
     assert!((deviation_m - 1e-4).abs() < 1e-5, "{deviation_m}");
 }
 
+/// A camera that is late by two captures and a half shows the mean of what a prompt one showed two and three captures ago.
+#[test]
+fn a_late_camera_shows_what_was() {
+    let film = |captures_late: f64| {
+        let mut config = smooth();
+        config.virtual_worm.noise_m = 0.0;
+        config.effect.push(crate::config::Effect {
+            name: "sensor-latency".to_owned(),
+            cell: None,
+            parameters: [(
+                "latency_s".to_owned(),
+                captures_late / (config.tracker.rate_hz * (1.0 + 30e-6)),
+            )]
+            .into(),
+        });
+        let mut plant = Plant::new(&config, None).expect("a worm");
+        plant.set_drive(Drive::Velocity(GAIT_RAD_PER_S), GAINS);
+        let mut film_m = Vec::new();
+        while plant.time_s() < 6.0 {
+            plant.step().expect("a worm");
+            if plant.capture().sample as usize > film_m.len() {
+                film_m.push(plant.capture().positions_m[1]);
+            }
+        }
+        film_m
+    };
+    let (prompt_m, late_m) = (film(0.0), film(2.5));
+    assert!((prompt_m[700] - prompt_m[0]).abs() > 5e-3, "the worm crawls");
+    for capture in 3..prompt_m.len() {
+        let expected_m = 0.5 * (prompt_m[capture - 2] + prompt_m[capture - 3]);
+        assert!((late_m[capture] - expected_m).abs() < 1e-9, "capture {capture}");
+    }
+}
+
 /// A test of the machine as a whole runs a hundred hours; it can only do so when the plant is fast.
 #[test]
 fn plant_is_fast() {

@@ -1,4 +1,4 @@
-//! What the tracker captures: positions with noise, now and then a cell unseen, on a clock of its own.
+//! What the tracker captures: positions with noise, now and then a cell unseen or older than its time stamp, on a clock of its own.
 
 use super::conditions::Sight;
 use crate::MAX_CELLS;
@@ -7,6 +7,7 @@ use crate::link::TrackerReading;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::Rng;
+use std::collections::VecDeque;
 
 /// The tracker's clock runs fast by this share: an ordinary crystal.
 const CLOCK_DRIFT: f64 = 30e-6;
@@ -19,6 +20,9 @@ pub struct Camera {
     dropout_share: f64,
     clock_offset_us: u32,
     taken: u64,
+    /// What was there at the last captures, oldest first, as far back as one may have to be: when, s of the plant's time, and
+    /// where the cells were, m.
+    past: VecDeque<(f64, Vec<f64>)>,
     conditions: Sight,
     reading: TrackerReading,
 }
@@ -32,6 +36,7 @@ impl Camera {
             dropout_share: config.virtual_worm.dropout_share,
             clock_offset_us: chance.next_u32(),
             taken: 0,
+            past: VecDeque::new(),
             conditions: Sight::default(),
             reading: TrackerReading {
                 sample: 0,
@@ -53,14 +58,16 @@ impl Camera {
         self.taken as f64 * self.interval_s
     }
 
-    /// Takes the capture that is due.
-    pub fn capture(&mut self, positions_m: &[f64], chance: &mut Xoshiro256PlusPlus) {
+    /// Takes the capture that is due, which shows what was there `latency_s` ago. No camera sees what is still to come: a negative
+    /// latency counts as none.
+    pub fn capture(&mut self, positions_m: &[f64], latency_s: f64, chance: &mut Xoshiro256PlusPlus) {
+        let positions_m = self.as_of_ago(positions_m, latency_s);
         let noise_m = self.conditions.noise_m.unwrap_or(self.noise_m);
         let dropout_share = self.conditions.dropout_share.unwrap_or(self.dropout_share);
         let clock_us = self.due_s() * (1.0 + CLOCK_DRIFT) * 1e6;
         self.reading.capture_time_us = self.clock_offset_us.wrapping_add(clock_us.round() as u64 as u32);
         self.reading.valid = 0;
-        for (cell, &position_m) in positions_m.iter().enumerate() {
+        for (cell, position_m) in positions_m.into_iter().enumerate() {
             let seen =
                 self.conditions.hidden & (1 << cell) == 0 && (dropout_share == 0.0 || draw(chance) >= dropout_share);
             let error: f64 = StandardNormal.sample(chance);
@@ -71,6 +78,23 @@ impl Camera {
         }
         self.taken += 1;
         self.reading.sample = self.taken as u32; // wraps, as the register does
+    }
+
+    /// Where the cells were a while before the capture that is due, at which they are at `now_m`; at the first capture before that.
+    fn as_of_ago(&mut self, now_m: &[f64], latency_s: f64) -> Vec<f64> {
+        let then_s = self.due_s() - latency_s;
+        self.past.push_back((self.due_s(), now_m.to_vec()));
+        while self.past.get(1).is_some_and(|(after_s, _)| *after_s <= then_s) {
+            self.past.pop_front();
+        }
+        match (&self.past[0], self.past.get(1)) {
+            ((before_s, before_m), Some((after_s, after_m))) if then_s > *before_s => {
+                let share = (then_s - before_s) / (after_s - before_s);
+                let both = before_m.iter().zip(after_m);
+                both.map(|(before, after)| before + share * (after - before)).collect()
+            }
+            ((_, before_m), _) => before_m.clone(),
+        }
     }
 
     /// The last capture.

@@ -284,13 +284,9 @@ fn candidates(answer: &Answer) -> Table {
             .parameters
             .iter()
             .map(|found| Quantity::of(&effect.name, found).in_words());
-        let role = match &effect.together_with[..] {
-            [] => role.to_owned(),
-            others => format!("{role}, with {}", in_words(others)),
-        };
         let mut row = vec![
             with_cell(&effect.name, effect.cell),
-            role,
+            role.to_owned(),
             quantities.collect::<Vec<_>>().join("; "),
         ];
         if is_held_out {
@@ -304,7 +300,12 @@ fn candidates(answer: &Answer) -> Table {
         Verdict::Ambiguous => "candidate",
         _ => "rival",
     };
-    answer.rivals.iter().for_each(|effect| add(effect, rival));
+    for effect in &answer.rivals {
+        match &effect.together_with[..] {
+            [] => add(effect, rival),
+            others => add(effect, &format!("{rival}, with {}", in_words(others))),
+        }
+    }
     let held_out = if is_held_out {
         "Gap closed: share of what the recalibrated model leaves open, down to the noise, on cycles that the effect was not \
          fitted to. Ahead of the others: how much less of it the best effect of another kind closes. "
