@@ -35,8 +35,10 @@ fn check_cycle(run: &Run<'_>, config: &Config) -> Result<(), Failure> {
     };
     // Without a gait the search has more to say.
     let gait = gait::find(&recording.time_s, &recording.position_m, &recording.filled(), prior).ok();
+    let contradicts = |seen_s: f64| (seen_s - stated_s).abs() > CYCLE_SHARE * stated_s;
     match gait.and_then(|gait| cycle_s(&gait, &recording.time_s)) {
-        Some(seen_s) if (seen_s - stated_s).abs() > CYCLE_SHARE * stated_s => Err(Failure::unusable(format!(
+        // Where the worm rests between the cycles, its cam's turn may be stated, or the whole.
+        Some([seen_s, turning_s]) if contradicts(seen_s) && contradicts(turning_s) => Err(Failure::unusable(format!(
             "{}: a gait cycle took {seen_s:.2} s, but cycle_s = {stated_s} is stated: give the time of this run, or leave \
              cycle_s out",
             recording.source.display()
@@ -45,12 +47,22 @@ fn check_cycle(run: &Run<'_>, config: &Config) -> Result<(), Failure> {
     }
 }
 
-/// Mean time of the whole gait cycles, s, rests before and after them left out; none where there is no whole one.
-fn cycle_s(gait: &Gait, time_s: &[f64]) -> Option<f64> {
+/// Mean time of the whole gait cycles, s, rests before and after them left out, and what it would be if every step took as long as
+/// the middle one of all, so that rests between the cycles are left out, too; none where there is no whole cycle.
+fn cycle_s(gait: &Gait, time_s: &[f64]) -> Option<[f64; 2]> {
     let (first, last) = (gait.phase.first()?.ceil(), gait.phase.last()?.floor());
-    let begun_s = time_s.get(gait.phase.partition_point(|phase| *phase <= first))?;
-    let ended_s = time_s.get(gait.phase.partition_point(|phase| *phase < last))?;
-    (last > first).then(|| (ended_s - begun_s) / (last - first))
+    let begun_s = |phase: f64| time_s.get(gait.phase.partition_point(|at| *at <= phase)).copied();
+    let ended_s = |phase: f64| time_s.get(gait.phase.partition_point(|at| *at < phase)).copied();
+    let cells = gait.step_order.len() as f64;
+    let steps = ((last - first) * cells).round() as usize;
+    let step_s = |step: usize| {
+        let phase = |step: usize| first + step as f64 / cells;
+        Some(ended_s(phase(step + 1))? - begun_s(phase(step))?)
+    };
+    let mut steps_s: Vec<f64> = (0..steps).map(step_s).collect::<Option<_>>()?;
+    steps_s.sort_by(f64::total_cmp);
+    let middle_s = steps_s.get(steps / 2)?;
+    Some([(ended_s(last)? - begun_s(first)?) / (last - first), middle_s * cells])
 }
 
 fn check_payload(run: &Run<'_>, believed: &Worm) -> Result<(), Failure> {
@@ -77,4 +89,33 @@ fn check_payload(run: &Run<'_>, believed: &Worm) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rest_between_the_cycles_is_told_from_the_turning() {
+        let (turn_s, dwell_s, rate_hz) = (2.5, 1.0, 120.0);
+        let time_s: Vec<f64> = (0..3000).map(|sample| f64::from(sample) / rate_hz).collect();
+        let phase = time_s.iter().map(|time_s| {
+            let cycle = (time_s / (turn_s + dwell_s)).floor();
+            cycle + ((time_s - cycle * (turn_s + dwell_s)) / turn_s).min(1.0)
+        });
+        let gait = Gait {
+            step_order: vec![0, 1, 2, 3],
+            phase: phase.collect(),
+            phase_sigma: 0.0,
+            stroke_m: 0.0115,
+            place_m: vec![0.0; 4],
+            noise_m: 0.0,
+            body_m: Vec::new(),
+            seen: Vec::new(),
+            outliers: 0,
+        };
+        let [seen_s, turning_s] = cycle_s(&gait, &time_s).expect("whole cycles");
+        assert!((seen_s - 3.5).abs() < 0.2, "{seen_s}");
+        assert!((turning_s - turn_s).abs() < 0.1, "{turning_s}");
+    }
 }
