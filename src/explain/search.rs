@@ -24,8 +24,8 @@ const NOISE_ROUNDS: usize = 2;
 const REFITTED: usize = 8;
 const CELLS_REFITTED: usize = 2;
 const NEXT_CELL: f64 = 0.5;
-/// Single effects from which pairs are tried where the best leaves a gap, effects that are refitted on top of each, and how many
-/// that screened best are tried roughly before.
+/// Single effects from which pairs are tried where the best leaves a gap (from the best alone where it leaves none), effects that
+/// are refitted on top of each, and how many that screened best are tried roughly before.
 const PAIR_SEEDS: usize = 2;
 const PAIRED: usize = 3;
 const SCREENED_FOR_PAIRS: usize = 8;
@@ -305,8 +305,8 @@ fn choose(rough: Vec<Fit>, base: &Fit, most: usize) -> Vec<Fit> {
     chosen
 }
 
-/// A single effect fitted anew from where it lies in a pair, where that is a better fit: a pair may have found a better valley, which
-/// does not prove that both of it are there.
+/// A single effect fitted anew from where it lies in a pair, where that is a better fit: what a pair gains may be owed to a better
+/// valley of its first effect, and not to the second.
 fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Find, pair: &Find) -> Option<Find> {
     let hypothesis = &single.fit.hypothesis;
     let place_in_pair = pair.supposed.iter().position(|one| single.supposed == [*one])?;

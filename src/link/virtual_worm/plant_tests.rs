@@ -1,6 +1,7 @@
 use super::*;
 use crate::MAX_CELLS;
 use crate::config::PerCell;
+use crate::link::virtual_worm::sight::CLOCK_DRIFT;
 use crate::model::{Physics, steady_cycle_of};
 
 /// Gains as the servo's defaults make them.
@@ -262,7 +263,7 @@ fn a_late_camera_shows_what_was() {
             cell: None,
             parameters: [(
                 "latency_s".to_owned(),
-                captures_late / (config.tracker.rate_hz * (1.0 + 30e-6)),
+                captures_late / (config.tracker.rate_hz * (1.0 + CLOCK_DRIFT)),
             )]
             .into(),
         });

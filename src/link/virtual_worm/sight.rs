@@ -10,7 +10,7 @@ use rand_xoshiro::rand_core::Rng;
 use std::collections::VecDeque;
 
 /// The tracker's clock runs fast by this share: an ordinary crystal.
-const CLOCK_DRIFT: f64 = 30e-6;
+pub(super) const CLOCK_DRIFT: f64 = 30e-6;
 
 /// A camera that takes a capture at fixed intervals of its clock.
 #[derive(Debug, Clone)]
