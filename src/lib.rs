@@ -37,7 +37,7 @@
 //! | [`explain`] | where model and recordings disagree, which effect is missing, and what to try next | files, topics, serial |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
 //! | [`report`] | what a person looks at afterwards: the pages with figures and tables, of an experiment and of the search for the missing effect, and CSV | control, serial |
-//! | [`realtime`] | what a process asks of the operating system, and what it was given | everything but config |
+//! | [`realtime`] | what a process asks of the operating system, what it really has, and how the computer is set for it | everything but config |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
 //!
 //! # Rules of the house

@@ -3,7 +3,8 @@
 use super::{Failure, WormArgs, print};
 use crate::config::{Config, Realtime};
 use crate::control::{Drive, link_settings};
-use crate::realtime;
+use crate::realtime::machine::{self, Setting};
+use crate::realtime::{self, InForce};
 use crate::topics::{Hub, Instance};
 use clap::Args;
 use serde::Serialize;
@@ -40,6 +41,17 @@ struct Finding {
     found: String,
     /// What to do about it; null where nothing needs doing.
     remedy: Option<String>,
+}
+
+impl From<Setting> for Finding {
+    fn from(setting: Setting) -> Self {
+        Self {
+            level: if setting.good { Level::Good } else { Level::Warning },
+            subject: setting.subject,
+            found: setting.found,
+            remedy: setting.remedy,
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -95,7 +107,9 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     };
     check_config(&args.worm, &config, &mut report);
     check_realtime(&config.realtime, &mut report);
-    check_kernel(&mut report);
+    for setting in machine::settings(config.realtime.cpu) {
+        report.findings.push(setting.into());
+    }
     check_topics(&config, &mut report);
     check_port(&config, &mut report);
 
@@ -133,10 +147,13 @@ fn check_config(worm: &WormArgs, config: &Config, report: &mut Report) {
     }
 }
 
-/// Asks for what the loop would ask for, in a thread that ends at once.
+/// Asks for what the loop would ask for, in a thread that ends at once, and reads back what that thread then has.
 fn check_realtime(wanted: &Realtime, report: &mut Report) {
-    let wanted = wanted.clone();
-    let Ok(grants) = std::thread::spawn(move || realtime::request(&wanted, 0)).join() else {
+    let trial = {
+        let wanted = wanted.clone();
+        move || (realtime::request(&wanted, 0), InForce::of_this_thread())
+    };
+    let Ok((grants, in_force)) = std::thread::spawn(trial).join() else {
         report.note(
             Level::Error,
             "scheduler",
@@ -156,53 +173,26 @@ fn check_realtime(wanted: &Realtime, report: &mut Report) {
             ),
         }
     }
-}
-
-fn read_setting(path: &str) -> Option<String> {
-    std::fs::read_to_string(path).ok().map(|text| text.trim().to_owned())
-}
-
-fn check_kernel(report: &mut Report) {
-    let version = read_setting("/proc/sys/kernel/version").unwrap_or_default();
-    if version.contains("PREEMPT_RT") || version.contains("PREEMPT RT") {
-        report.good("kernel", "fully preemptible (PREEMPT_RT)");
-    } else {
-        let remedy = "a PREEMPT_RT kernel bounds the worst wake lateness; without it, rare late ticks of some milliseconds are normal";
-        report.note(Level::Warning, "kernel", version, remedy);
-    }
-    match read_setting("/sys/devices/system/clocksource/clocksource0/current_clocksource") {
-        Some(clock) if matches!(clock.as_str(), "tsc" | "kvm-clock" | "arch_sys_counter") => {
-            report.good("clock source", clock)
+    match in_force {
+        Ok(in_force) => {
+            let shortfalls = in_force.shortfalls(wanted, 0);
+            if shortfalls.is_empty() {
+                report.good("in force", in_force.to_string());
+            } else {
+                report.note(
+                    Level::Warning,
+                    "in force",
+                    in_force.to_string(),
+                    format!("less than configured: {}", shortfalls.join("; ")),
+                );
+            }
         }
-        Some(clock) => {
-            report.note(
-                Level::Warning,
-                "clock source",
-                clock,
-                "reading it costs microseconds; prefer tsc (kernel option tsc=reliable)",
-            );
-        }
-        None => {}
-    }
-    match read_setting("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor") {
-        Some(governor) if governor != "performance" => {
-            report.note(
-                Level::Warning,
-                "CPU governor",
-                governor,
-                "`cpupower frequency-set -g performance` saves tens of microseconds per wake",
-            );
-        }
-        Some(governor) => report.good("CPU governor", governor),
-        None => {}
-    }
-    match read_setting("/proc/sys/kernel/sched_rt_runtime_us").as_deref() {
-        Some("-1") => report.good("real-time throttling", "off"),
-        Some(runtime) => report.good(
-            "real-time throttling",
-            format!("{runtime} µs of each second may be real time; the loop needs far less"),
+        Err(error) => report.note(
+            Level::Warning,
+            "in force",
+            format!("cannot be read back: {error}"),
+            "mount /proc, so that what the kernel really grants can be told",
         ),
-        None => {}
     }
 }
 

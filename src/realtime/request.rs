@@ -1,8 +1,6 @@
-//! What a process asks of the operating system to be in time, and what it was given.
-//!
-//! Every request is answered with a [`Grant`] that says what was asked, what is in force, and what to do about a refusal.
-//! A refusal never ends the process: the worm still runs, and its operator is told.
+//! What a process asks of the operating system, and the answer to each request.
 
+use super::{InForce, cpus};
 use crate::config::Realtime;
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
@@ -24,16 +22,16 @@ pub struct Refusal {
     /// The operating system's words.
     pub reason: String,
     /// What to do about it.
-    pub remedy: &'static str,
+    pub remedy: String,
 }
 
 impl Grant {
-    fn new(request: String, outcome: Result<(), io::Error>, remedy: &'static str) -> Self {
+    fn new(request: String, outcome: io::Result<()>, remedy: &str) -> Self {
         Self {
             request,
             refusal: outcome.err().map(|error| Refusal {
                 reason: error.to_string(),
-                remedy,
+                remedy: remedy.to_owned(),
             }),
         }
     }
@@ -61,20 +59,21 @@ pub fn request(wanted: &Realtime, priority_offset: u8) -> Vec<Grant> {
             "allow it with `ulimit -l unlimited`, LimitMEMLOCK=infinity in the service, or CAP_IPC_LOCK",
         ));
     }
-    if wanted.priority > 0 {
-        let priority = wanted.priority.saturating_sub(priority_offset).max(1);
+    if let Some(priority) = fifo_priority(wanted, priority_offset) {
         grants.push(Grant::new(
             format!("SCHED_FIFO priority {priority}"),
             set_fifo(priority),
             "allow it with `ulimit -r 99`, LimitRTPRIO=99 in the service, or CAP_SYS_NICE",
         ));
     }
-    if let (Some(cpu), 0) = (wanted.cpu, priority_offset) {
-        grants.push(Grant::new(
-            format!("pinned to CPU {cpu}"),
-            pin(cpu),
-            "name a CPU that this computer has and this process may use in realtime.cpu",
-        ));
+    if let Some(cpu) = pinned_cpu(wanted, priority_offset) {
+        grants.push(Grant {
+            request: format!("pinned to CPU {cpu}"),
+            refusal: pin(cpu).err().map(|error| {
+                let allowed = InForce::of_this_thread().map(|in_force| in_force.cpus);
+                pin_refusal(cpu, &cpus::online(), &allowed.unwrap_or_default(), &error)
+            }),
+        });
     }
     grants.push(Grant::new(
         "timer slack 1 ns".to_owned(),
@@ -82,6 +81,16 @@ pub fn request(wanted: &Realtime, priority_offset: u8) -> Vec<Grant> {
         "timers may fire 50 µs late without SCHED_FIFO",
     ));
     grants
+}
+
+/// Priority that [`request`] asks for; absent: none.
+pub(super) fn fifo_priority(wanted: &Realtime, priority_offset: u8) -> Option<u8> {
+    (wanted.priority > 0).then(|| wanted.priority.saturating_sub(priority_offset).max(1))
+}
+
+/// CPU that [`request`] asks for; absent: none. Only the loop has one for itself.
+pub(super) fn pinned_cpu(wanted: &Realtime, priority_offset: u8) -> Option<usize> {
+    wanted.cpu.filter(|_| priority_offset == 0)
 }
 
 fn lock_memory() -> io::Result<()> {
@@ -115,28 +124,58 @@ fn pin(cpu: usize) -> io::Result<()> {
     nix::sched::sched_setaffinity(nix::unistd::Pid::from_raw(0), &set).map_err(io::Error::from)
 }
 
-/// Time of `CLOCK_MONOTONIC`, ns: the clock of all deadlines and time stamps.
-pub fn monotonic_ns() -> u64 {
-    match nix::time::clock_gettime(nix::time::ClockId::CLOCK_MONOTONIC) {
-        Ok(now) => now.tv_sec() as u64 * 1_000_000_000 + now.tv_nsec() as u64,
-        // The clock exists on every Linux; the call has no other way to fail.
-        Err(error) => unreachable!("CLOCK_MONOTONIC: {error}"),
+/// Why `cpu` is refused on a computer with CPUs `online` to a process that may use those `allowed`; `words` are the
+/// operating system's, which names no CPU.
+fn pin_refusal(cpu: usize, online: &[usize], allowed: &[usize], words: &io::Error) -> Refusal {
+    let usable = if allowed.is_empty() { online } else { allowed };
+    let one_of = if usable.len() == 1 { "" } else { "one of " };
+    let name = format!("name {one_of}{} in realtime.cpu", cpus::named(usable));
+    if usable.is_empty() || usable.contains(&cpu) {
+        Refusal {
+            reason: words.to_string(),
+            remedy: "name another CPU in realtime.cpu, or none".to_owned(),
+        }
+    } else if online.contains(&cpu) {
+        Refusal {
+            reason: format!("this process may use {} only", cpus::named(usable)),
+            remedy: format!("{name}, or allow CPU {cpu} with AllowedCPUs= in the service and its slice"),
+        }
+    } else {
+        Refusal {
+            reason: format!("this computer has {}", cpus::named(online)),
+            remedy: name,
+        }
     }
 }
 
-/// Sleeps until `deadline_ns` of `CLOCK_MONOTONIC`; a signal ends the sleep early.
-pub fn sleep_until(deadline_ns: u64) {
-    let deadline = libc::timespec {
-        tv_sec: (deadline_ns / 1_000_000_000) as libc::time_t,
-        tv_nsec: (deadline_ns % 1_000_000_000) as libc::c_long,
-    };
-    // SAFETY: the pointer is to a live timespec; with TIMER_ABSTIME the remaining time is not written.
-    unsafe {
-        libc::clock_nanosleep(
-            libc::CLOCK_MONOTONIC,
-            libc::TIMER_ABSTIME,
-            &raw const deadline,
-            std::ptr::null_mut(),
-        );
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_cpu_is_answered_with_those_that_may_be_used() {
+        for (cpu, online, allowed, reason, remedy) in [
+            (
+                7,
+                &[0, 1][..],
+                &[0, 1][..],
+                "this computer has CPUs 0-1",
+                "name one of CPUs 0-1 in",
+            ),
+            (1, &[0], &[0], "this computer has CPU 0", "name CPU 0 in"),
+            (
+                3,
+                &[0, 1, 2, 3],
+                &[0, 1],
+                "this process may use CPUs 0-1 only",
+                "AllowedCPUs=",
+            ),
+            (1, &[0, 1], &[0, 1], "the kernel's words", "name another CPU"),
+            (1, &[], &[], "the kernel's words", "name another CPU"),
+        ] {
+            let refusal = pin_refusal(cpu, online, allowed, &io::Error::other("the kernel's words"));
+            assert_eq!(refusal.reason, reason);
+            assert!(refusal.remedy.contains(remedy), "{}", refusal.remedy);
+        }
     }
 }
