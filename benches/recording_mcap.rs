@@ -46,9 +46,14 @@ fn timing(tick: u64) -> Timing {
         bus_ns: 92_000 + tick % 1013,
         compute_ns: 1_100 + tick % 97,
         publish_ns: 1_300 + tick % 89,
+        notify_ns: 16_000 + tick % 83,
+        waited_ns: 0,
+        stolen_ns: 0,
         overruns: 0,
         overrun: 0,
         culprit: 0,
+        minor_faults: 0,
+        major_faults: 0,
     }
 }
 

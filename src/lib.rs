@@ -16,6 +16,7 @@
 //!                    ▲                                     │
 //!                  model ──────────── prediction ──────────┘
 //!
+//!   timing ──► latency, held against a bare sleeper and a bare publisher ──► report
 //!   topics ──► recording (MCAP) ──► estimate once more: the same results to the last bit
 //!   recording (MCAP, CSV, C3D, Vicon) ──► identify ──► experiment ──► report
 //!            └───────────────────────────────► explain ──► report, and the model with the missing effect in it
@@ -35,8 +36,9 @@
 //! | [`identify`] | gait, largest tip deformations and mass from positions alone: section 3.2 of the paper | files, topics, serial |
 //! | [`experiment`] | section 3 on recordings: slides, forces, energy by two methods, theory beside them; recordings from the model | files, topics, serial |
 //! | [`explain`] | where model and recordings disagree, which effect is missing, and what to try next | files, topics, serial |
+//! | [`latency`] | durations in histograms, the account of where each tick's time went, the floor of machine and transport that it is held against | explain, serial |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
-//! | [`report`] | what a person looks at afterwards: the pages with figures and tables, of an experiment and of the search for the missing effect, and CSV | control, serial |
+//! | [`report`] | what a person looks at afterwards: the pages with figures and tables, of an experiment, of the search for the missing effect and of the loop's latency, and CSV | control, serial |
 //! | [`realtime`] | what a process asks of the operating system, what it really has, and how the computer is set for it | everything but config |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
 //!
@@ -44,12 +46,10 @@
 //! - The core is pure and takes time as an argument: [`control::Controller`], [`estimate::Observer`], [`model::Motion`] and the
 //!   physics of the virtual worm run in virtual time in the tests, thousands of times faster than the worm.
 //! - Bytes and valid values are different types: [`link::packet`] knows bytes, [`link::ServoReading`] is a value.
-//! - A tick allocates nothing but what iceoryx2 takes for a loan, logs nothing, and waits for nothing but the bus.
+//! - A tick allocates nothing but what iceoryx2 takes for a loan, logs nothing, waits for nothing but the bus, and calls the system for
+//!   nothing but its sleep, the port and the event that wakes who listens. A late one also asks the kernel who is to blame.
 //! - SI units stand in the names: `stroke_m`, `energy_j`. People read millimetres, millijoules and degrees.
 //! - Faults are injected by a wrapper, never by an `if` in the product.
-//!
-//! # Rooms to come
-//! The loop's own latency benchmark will get a room of its own.
 
 /// Most cells a worm can have: fixed-size topics and control tables are laid out for this many.
 pub const MAX_CELLS: usize = 16;
@@ -61,6 +61,7 @@ pub mod estimate;
 pub mod experiment;
 pub mod explain;
 pub mod identify;
+pub mod latency;
 pub mod link;
 pub mod message;
 pub mod model;

@@ -31,9 +31,14 @@ fn timing(sequence: u64) -> Timing {
         bus_ns: 3,
         compute_ns: 4,
         publish_ns: 5,
+        notify_ns: 0,
+        waited_ns: 0,
+        stolen_ns: 0,
         overruns: 6,
         overrun: 0,
         culprit: 0,
+        minor_faults: 0,
+        major_faults: 0,
     }
 }
 

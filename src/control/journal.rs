@@ -1,5 +1,7 @@
-//! What the loop has to tell, without a log call in a tick: entries go through a bounded queue to a thread that logs.
+//! What the loop has to tell, without a log call in a tick: entries go through a bounded queue to a thread that logs. The same
+//! thread reads the loop's counters every now and then, for the [evidence](super::evidence) in late ticks.
 
+use super::evidence::{Counters, Counts, Snapshot};
 use crate::message::{Culprit, Fault, Mode};
 use crossbeam::queue::ArrayQueue;
 use std::sync::Arc;
@@ -10,7 +12,7 @@ use std::time::Duration;
 /// Entries that may wait; more are dropped and counted.
 const CAPACITY: usize = 256;
 
-/// How often the logging thread looks. A person reads the log; the topics are for those in a hurry.
+/// How often the logging thread looks, and reads the counters. A person reads the log; the topics are for those in a hurry.
 const POLL: Duration = Duration::from_millis(20);
 
 /// One thing that happened in a tick.
@@ -36,6 +38,9 @@ struct Shared {
     queue: ArrayQueue<Entry>,
     dropped: AtomicU64,
     end: AtomicBool,
+    counters: Counters,
+    snapshot: Snapshot,
+    ticks: AtomicU64,
 }
 
 /// The loop's end of the queue. Dropping it ends the logging thread, after the last entry.
@@ -45,13 +50,16 @@ pub(super) struct Journal {
 }
 
 impl Journal {
-    /// Starts the logging thread. It runs under the ordinary scheduler as long as this is called before real-time
-    /// priority is requested.
+    /// Starts the logging thread of the calling thread's loop. It runs under the ordinary scheduler as long as this is called
+    /// before real-time priority is requested.
     pub(super) fn start() -> std::io::Result<Self> {
         let shared = Arc::new(Shared {
             queue: ArrayQueue::new(CAPACITY),
             dropped: AtomicU64::new(0),
             end: AtomicBool::new(false),
+            counters: Counters::of_this_thread(),
+            snapshot: Snapshot::default(),
+            ticks: AtomicU64::new(0),
         });
         let writer = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
@@ -69,6 +77,20 @@ impl Journal {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
+
+    /// Tells how many ticks the loop has run.
+    pub(super) fn count_ticks(&self, ticks: u64) {
+        self.shared.ticks.store(ticks, Ordering::Relaxed);
+    }
+
+    /// What the kernel has counted in tick number `tick`, which ends now. For late ticks alone: it costs system calls.
+    pub(super) fn evidence(&self, tick: u64) -> Counts {
+        let now = self.shared.counters.read();
+        let evidence = self.shared.snapshot.evidence(tick, now);
+        // The next late tick may come before the logging thread looks again; this one's causes are not its.
+        self.shared.snapshot.store(tick, now);
+        evidence
+    }
 }
 
 impl Drop for Journal {
@@ -84,6 +106,8 @@ impl Drop for Journal {
 fn write_entries(shared: &Shared) {
     let mut overruns = Overruns::default();
     loop {
+        let ticks = shared.ticks.load(Ordering::Relaxed);
+        shared.snapshot.store(ticks, shared.counters.read());
         // Read before the queue, so that entries noted before the end are not lost.
         let is_over = shared.end.load(Ordering::Acquire);
         while let Some(entry) = shared.queue.pop() {

@@ -8,10 +8,12 @@
 //! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](crate::message::State), the next
 //!    goal and, rarely, a [`Service`]. It knows the limits (`safety`), the ramps (`ramp`) and how readings become
 //!    messages (`intake`); it takes time as an argument, so all of it is tested in virtual time.
-//! 4. The loop publishes, carries out a service if one is due, and finishes the tick on the schedule.
+//! 4. The loop publishes, wakes who listens, carries out a service if one is due, and finishes the tick on the schedule. A tick
+//!    that was late gets its culprit, by what the kernel has counted (`evidence`); what there is to log goes to the `journal`.
 
 mod controller;
 mod drive;
+mod evidence;
 mod intake;
 mod journal;
 mod ramp;

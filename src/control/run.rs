@@ -3,6 +3,7 @@
 
 use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
 use super::drive::Drive;
+use super::evidence::{Counts, Parts, find_culprit};
 use super::journal::{Entry, Journal};
 use super::schedule::Schedule;
 use crate::config::Config;
@@ -20,6 +21,9 @@ const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
 
 /// Even a tick that was woken late gives the bus this share of a period to answer.
 const LEAST_BUS_SHARE: f64 = 0.3;
+
+/// Stack that is made ready before the first tick, bytes: many times what a tick uses.
+const STACK_BYTES: usize = 256 * 1024;
 
 /// Why the loop could not start.
 #[derive(Debug, thiserror::Error)]
@@ -94,6 +98,7 @@ pub fn run(
     let ports = Ports::open(hub, role)?;
     let journal = Journal::start().map_err(RunError::Journal)?;
     let grants = realtime::request(&config.realtime, 0);
+    prefault_stack();
     ready(&grants);
     let mut tick_loop = Loop {
         ports,
@@ -125,6 +130,7 @@ struct Loop {
     alarms: [Alarm; ALARMS_PER_TICK],
     /// What the last tick decided.
     last: Option<Outputs>,
+    /// What the last tick's publishing took.
     publish_ns: u64,
     unpublished: u64,
     ticks: u64,
@@ -136,11 +142,14 @@ struct Loop {
 struct Times {
     deadline: u64,
     woken: u64,
+    /// What the devices were given for their answer.
+    bus_allowed: u64,
     exchanged: u64,
     /// As `exchanged`, or after the service, if one was carried out.
     resumed: u64,
     computed: u64,
     published: u64,
+    notified: u64,
 }
 
 impl Loop {
@@ -152,9 +161,10 @@ impl Loop {
         }
         let woken = monotonic_ns();
 
+        let bus_allowed = self.bus_allowed_ns(deadline, woken);
         let outcome = drive.exchange(
             self.last.map_or(0, |last| last.goal_counts),
-            self.bus_deadline(deadline, woken),
+            Instant::now() + Duration::from_nanos(bus_allowed),
         );
         self.note_port(drive.is_gone());
         let exchanged = monotonic_ns();
@@ -184,30 +194,42 @@ impl Loop {
         self.note_mode(mode, &outputs);
         let computed = monotonic_ns();
 
-        self.publish(&outputs, responder);
+        let published_state = self.ports.state.publish(&outputs.state);
+        self.count_unpublished(published_state);
         let published = monotonic_ns();
+        // A system call for each listener, none without: whoever wants to be woken by every tick pays for it here. A listener
+        // that cannot be woken is no trouble of the loop's.
+        let _ = self.ports.state_event.notify();
+        let notified = monotonic_ns();
+        if let (Some(responder), Some(reply)) = (responder, &outputs.reply) {
+            // A client that has gone meanwhile needs no answer.
+            let _ = responder.answer(reply);
+        }
         self.finish(
             Times {
                 deadline,
                 woken,
+                bus_allowed,
                 exchanged,
                 resumed,
                 computed,
                 published,
+                notified,
             },
             served.is_some(),
         );
         self.last = Some(outputs);
         self.ticks += 1;
+        self.journal.count_ticks(self.ticks);
         outputs.finished
     }
 
-    fn bus_deadline(&self, deadline: u64, woken: u64) -> Instant {
+    /// How long the devices may take for their answer, ns.
+    fn bus_allowed_ns(&self, deadline: u64, woken: u64) -> u64 {
         let period_ns = self.schedule.period_ns() as f64;
         let share_ns = (self.bus_wait_share * period_ns) as u64;
         let least_ns = (LEAST_BUS_SHARE * period_ns) as u64;
-        let wait_ns = (deadline + share_ns).saturating_sub(woken).max(least_ns);
-        Instant::now() + Duration::from_nanos(wait_ns)
+        (deadline + share_ns).saturating_sub(woken).max(least_ns)
     }
 
     fn note_port(&mut self, is_gone: bool) {
@@ -226,18 +248,6 @@ impl Loop {
         }
     }
 
-    fn publish(&mut self, outputs: &Outputs, responder: Option<Responder>) {
-        let published = self.ports.state.publish(&outputs.state);
-        self.count_unpublished(published);
-        // A system call for each listener, none without: whoever wants to be woken by every tick pays for it here. A listener
-        // that cannot be woken is no trouble of the loop's.
-        let _ = self.ports.state_event.notify();
-        if let (Some(responder), Some(reply)) = (responder, &outputs.reply) {
-            // A client that has gone meanwhile needs no answer.
-            let _ = responder.answer(reply);
-        }
-    }
-
     fn count_unpublished(&mut self, outcome: Result<(), PublishError>) {
         self.unpublished += u64::from(outcome.is_err());
     }
@@ -251,21 +261,11 @@ impl Loop {
         } else {
             self.schedule.finish(monotonic_ns())
         };
-        let culprit = if skipped == 0 {
-            Culprit::None
+        let (culprit, evidence) = if skipped == 0 {
+            (Culprit::None, Counts::default())
         } else {
-            find_culprit(&times)
+            self.explain_late_tick(&times, skipped)
         };
-        if skipped > 0 {
-            let late_us = (times.published - times.deadline) / 1000;
-            let entry = Entry::Overrun {
-                sequence: self.ticks,
-                skipped,
-                culprit,
-                late_us: u32::try_from(late_us).unwrap_or(u32::MAX),
-            };
-            self.journal.note(entry);
-        }
         let timing = Timing {
             sequence: self.ticks,
             deadline_ns: times.deadline,
@@ -273,28 +273,47 @@ impl Loop {
             bus_ns: times.exchanged - times.woken,
             compute_ns: times.computed - times.resumed,
             publish_ns: self.publish_ns,
+            notify_ns: times.notified - times.published,
+            waited_ns: evidence.waited_ns,
+            stolen_ns: evidence.stolen_ns,
             overruns: self.schedule.skipped(),
             overrun: u32::from(skipped > 0),
             culprit: culprit.code(),
+            minor_faults: u32::try_from(evidence.minor_faults).unwrap_or(u32::MAX),
+            major_faults: u32::try_from(evidence.major_faults).unwrap_or(u32::MAX),
         };
         let published = self.ports.timing.publish(&timing);
         self.count_unpublished(published);
-        self.publish_ns = monotonic_ns() - times.computed;
+        self.publish_ns = monotonic_ns() - times.notified + times.published - times.computed;
+    }
+
+    /// Finds who made a tick late that cost `skipped` deadlines, and has it logged.
+    fn explain_late_tick(&self, times: &Times, skipped: u64) -> (Culprit, Counts) {
+        let evidence = self.journal.evidence(self.ticks);
+        let parts = Parts {
+            wake: times.woken - times.deadline,
+            bus: times.exchanged - times.woken,
+            bus_allowed: times.bus_allowed,
+            compute: times.computed - times.resumed,
+            publish: times.notified - times.computed,
+        };
+        let culprit = find_culprit(&parts, &evidence);
+        let late_us = (times.notified - times.deadline) / 1000;
+        self.journal.note(Entry::Overrun {
+            sequence: self.ticks,
+            skipped,
+            culprit,
+            late_us: u32::try_from(late_us).unwrap_or(u32::MAX),
+        });
+        (culprit, evidence)
     }
 }
 
-/// What took the largest part of a tick that ended late.
-fn find_culprit(times: &Times) -> Culprit {
-    let parts = [
-        (Culprit::Wake, times.woken - times.deadline),
-        (Culprit::Bus, times.exchanged - times.woken),
-        (Culprit::Compute, times.computed - times.resumed),
-        (Culprit::Publish, times.published - times.computed),
-    ];
-    parts
-        .into_iter()
-        .max_by_key(|part| part.1)
-        .map_or(Culprit::None, |part| part.0)
+/// Touches as much stack as a tick could ever use, so that no tick waits for its pages.
+#[inline(never)]
+fn prefault_stack() {
+    let mut stack = [0_u8; STACK_BYTES];
+    std::hint::black_box(&mut stack);
 }
 
 /// Carries out a service and tells what became of it. Logging is in order here: the worm stands.

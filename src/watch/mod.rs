@@ -9,7 +9,7 @@ mod summary;
 mod telemetry;
 pub mod view;
 
-pub use summary::{AlarmSummary, CycleSummary, Percentiles, PlaceSummary, Summary, TimingSummary};
+pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, Summary, TimingSummary};
 pub use telemetry::Telemetry;
 
 #[cfg(test)]

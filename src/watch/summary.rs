@@ -3,8 +3,8 @@
 use super::mismatch;
 use super::telemetry::Telemetry;
 use crate::config::Worm;
-use crate::message::{Alarm, AlarmKind, Culprit, Cycle, Fault, Mode, Severity};
-use hdrhistogram::Histogram;
+use crate::latency::{Percentiles, WorstTicks};
+use crate::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Severity};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -122,37 +122,12 @@ pub struct TimingSummary {
     pub compute_us: Percentiles,
     /// Publishing, µs.
     pub publish_us: Percentiles,
+    /// Waking who listens, µs.
+    pub notify_us: Percentiles,
     /// Late ticks by culprit.
     pub culprits: BTreeMap<&'static str, u64>,
-}
-
-/// Percentiles of a duration, µs.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Percentiles {
-    /// Median.
-    pub p50: f64,
-    /// 90th percentile.
-    pub p90: f64,
-    /// 99th percentile.
-    pub p99: f64,
-    /// 99.9th percentile.
-    pub p99_9: f64,
-    /// Largest.
-    pub max: f64,
-}
-
-impl Percentiles {
-    /// Of a histogram in ns.
-    pub fn of(histogram: &Histogram<u64>) -> Self {
-        let us = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
-        Self {
-            p50: us(0.5),
-            p90: us(0.9),
-            p99: us(0.99),
-            p99_9: us(0.999),
-            max: histogram.max() as f64 * 1e-3,
-        }
-    }
+    /// The worst ticks, the worst first.
+    pub worst_ticks: WorstTicks,
 }
 
 impl Summary {
@@ -163,7 +138,7 @@ impl Summary {
         let fault = state
             .and_then(|state| Fault::try_from(state.fault).ok())
             .unwrap_or(Fault::None);
-        let durations = &telemetry.durations;
+        let account = &telemetry.account;
         Self {
             worm: worm.name.clone(),
             duration_s: state.map_or(0.0, |state| seconds_since(start_ns, state.time_ns)),
@@ -177,16 +152,13 @@ impl Summary {
             cycles: telemetry.cycles.iter().map(CycleSummary::new).collect(),
             alarms: alarm_summaries(&telemetry.alarms, start_ns, &worm.step_order),
             timing: TimingSummary {
-                wake_us: Percentiles::of(&durations.wake),
-                bus_us: Percentiles::of(&durations.bus),
-                compute_us: Percentiles::of(&durations.compute),
-                publish_us: Percentiles::of(&durations.publish),
-                culprits: Culprit::ALL
-                    .iter()
-                    .zip(telemetry.culprits)
-                    .filter(|(_, count)| *count > 0)
-                    .map(|(culprit, count)| (culprit.name(), count))
-                    .collect(),
+                wake_us: account.wake.percentiles(),
+                bus_us: account.bus.percentiles(),
+                compute_us: account.compute.percentiles(),
+                publish_us: account.publish.percentiles(),
+                notify_us: account.notify.percentiles(),
+                culprits: account.culprits.clone(),
+                worst_ticks: account.worst.clone(),
             },
         }
     }
@@ -334,11 +306,30 @@ impl fmt::Display for Summary {
             ("bus", timing.bus_us),
             ("compute", timing.compute_us),
             ("publish", timing.publish_us),
+            ("notify", timing.notify_us),
         ] {
             writeln!(
                 f,
                 "{name:<8} {:>8.1} {:>8.1} {:>8.1} {:>8.1}",
                 p.p50, p.p99, p.p99_9, p.max
+            )?;
+        }
+        for (culprit, ticks) in &timing.culprits {
+            writeln!(f, "late     {ticks} tick(s), culprit {culprit}")?;
+        }
+        if let Some(worst) = timing.worst_ticks.ticks().first().filter(|worst| worst.late) {
+            writeln!(
+                f,
+                "worst    tick {}: {:.0} µs after its deadline, of these wake {:.0}, bus {:.0}, compute {:.0}, publish {:.0}, notify {:.0}; \
+                 culprit {}",
+                worst.sequence,
+                worst.total_us(),
+                worst.wake_us,
+                worst.bus_us,
+                worst.compute_us,
+                worst.publish_us,
+                worst.notify_us,
+                worst.culprit
             )?;
         }
         if self.fault != "none" {

@@ -1,13 +1,10 @@
 //! The messages of one worm, gathered.
 
-use crate::message::{Alarm, AlarmKind, Culprit, Cycle, Estimate, State, Timing};
-use hdrhistogram::Histogram;
-
-/// Longest time that the histograms tell apart, ns: a second. What takes longer counts as a second.
-const LONGEST_NS: u64 = 1_000_000_000;
+use crate::latency::Account;
+use crate::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
 
 /// Everything that a watcher has heard so far.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Telemetry {
     /// The first state that was heard.
     pub first_state: Option<State>,
@@ -21,58 +18,8 @@ pub struct Telemetry {
     pub cycles: Vec<Cycle>,
     /// All alarm changes.
     pub alarms: Vec<Alarm>,
-    /// Wake lateness, bus exchange, computation and publishing of every tick heard, ns.
-    pub durations: Durations,
-    /// Ticks that ended late, by culprit code.
-    pub culprits: [u64; Culprit::ALL.len()],
-}
-
-/// Histograms of where the ticks' time went.
-#[derive(Debug, Clone)]
-pub struct Durations {
-    /// Wake lateness, ns.
-    pub wake: Histogram<u64>,
-    /// Bus exchange, ns.
-    pub bus: Histogram<u64>,
-    /// Computation, ns.
-    pub compute: Histogram<u64>,
-    /// Publishing, ns.
-    pub publish: Histogram<u64>,
-}
-
-impl Durations {
-    fn new() -> Self {
-        // Two significant digits up to a second: a few tens of kilobytes each. The bounds are constants, and valid.
-        let empty = Histogram::new_with_max(LONGEST_NS, 2).unwrap_or_else(|error| unreachable!("{error}"));
-        Self {
-            wake: empty.clone(),
-            bus: empty.clone(),
-            compute: empty.clone(),
-            publish: empty,
-        }
-    }
-
-    fn record(&mut self, timing: &Timing) {
-        self.wake.saturating_record(timing.wake_lateness_ns);
-        self.bus.saturating_record(timing.bus_ns);
-        self.compute.saturating_record(timing.compute_ns);
-        self.publish.saturating_record(timing.publish_ns);
-    }
-}
-
-impl Default for Telemetry {
-    fn default() -> Self {
-        Self {
-            first_state: None,
-            state: None,
-            estimate: None,
-            timing: None,
-            cycles: Vec::new(),
-            alarms: Vec::new(),
-            durations: Durations::new(),
-            culprits: [0; Culprit::ALL.len()],
-        }
-    }
+    /// Where the ticks' time went, and who made late ones late.
+    pub account: Account,
 }
 
 impl Telemetry {
@@ -84,12 +31,7 @@ impl Telemetry {
 
     /// Takes a timing.
     pub fn take_timing(&mut self, timing: &Timing) {
-        self.durations.record(timing);
-        if timing.overrun != 0
-            && let Some(count) = self.culprits.get_mut(timing.culprit as usize)
-        {
-            *count += 1;
-        }
+        self.account.take(timing);
         self.timing = Some(*timing);
     }
 

@@ -25,9 +25,14 @@ fn heard(phase: f64) -> Telemetry {
             bus_ns: 90_000,
             compute_ns: 400,
             publish_ns: 12_000,
+            notify_ns: 0,
+            waited_ns: 0,
+            stolen_ns: 0,
             overruns: 0,
             overrun: 0,
             culprit: 0,
+            minor_faults: 0,
+            major_faults: 0,
         });
     }
     telemetry.take_state(&State {

@@ -456,8 +456,7 @@ fn draw_cycles(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {
 }
 
 fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
-    let durations = &telemetry.durations;
-    let us = |ns: u64| ns as f64 * 1e-3;
+    let account = &telemetry.account;
     let mut lines = vec![
         Line::raw(format!("{} ticks at {} Hz", telemetry.ticks(), subject.rate_hz)),
         Line::raw(format!(
@@ -467,16 +466,15 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
         )),
         Line::raw("µs         p50     p99      max").bold(),
     ];
-    for (name, histogram) in [
-        ("wake", &durations.wake),
-        ("bus", &durations.bus),
-        ("compute", &durations.compute),
+    for (name, durations) in [
+        ("wake", &account.wake),
+        ("bus", &account.bus),
+        ("compute", &account.compute),
     ] {
+        let us = durations.percentiles();
         lines.push(Line::raw(format!(
             "{name:<8}{:>6.0}{:>8.0}{:>9.0}",
-            us(histogram.value_at_quantile(0.5)),
-            us(histogram.value_at_quantile(0.99)),
-            us(histogram.max()),
+            us.p50, us.p99, us.max
         )));
     }
     if let Some(share) = telemetry

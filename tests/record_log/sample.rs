@@ -63,9 +63,14 @@ pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Told {
             bus_ns: u64::MAX,
             compute_ns: 1_000,
             publish_ns: 2_000,
+            notify_ns: 0,
+            waited_ns: 0,
+            stolen_ns: 0,
             overruns: 0,
             overrun: 0,
             culprit: 0,
+            minor_faults: 0,
+            major_faults: 0,
         });
         if tick < late {
             continue;

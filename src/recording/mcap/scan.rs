@@ -246,6 +246,14 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
             return Ok(());
         };
         let schema = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
+        if known == Channel::Timing && schema != known.type_name() {
+            // Where the loop's time went is of no use to any analysis: a log with timings of an older version is read without.
+            if self.channels.insert(channel.id, None).is_none() {
+                self.foreign
+                    .push(format!("{} ('{schema}', of another version)", channel.topic));
+            }
+            return Ok(());
+        }
         let problem = if channel.message_encoding != MESSAGE_ENCODING {
             format!(
                 "holds messages encoded as '{}', not as '{MESSAGE_ENCODING}'",
