@@ -1,23 +1,24 @@
 //! `wormd estimate`: the estimator alone, beside a running controller.
 
 use super::{Failure, WormArgs, end_on_signal, print, report_grants};
+use crate::config::Config;
 use crate::estimate::{Observer, Report};
 use crate::message::{Alarm, Cycle, Estimate, State};
-use crate::realtime;
+use crate::realtime::{self, Grant};
 use crate::topics::{Estimator, Hub, Instance, Notifier, PortError, PublishError, Publisher, RoleLock};
 use clap::Args;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How often the estimator looks for new states, and so how late it knows at most. It looks by itself, for being woken by
-/// the controller would cost the real-time loop a system call and an interrupt to another CPU: more than the rest of a tick.
-const LOOK: Duration = Duration::from_millis(2);
+/// How long the estimator sleeps at most while the controller wakes it with no state, and so how late it knows at most should
+/// an event ever get lost.
+const LONGEST_SLEEP: Duration = Duration::from_millis(10);
 
 /// How often it says that it lives while no sample comes.
 const HEARTBEAT: Duration = Duration::from_millis(50);
 
 /// The estimator runs so far below the loop's priority: above ordinary processes, never in the loop's way.
-const PRIORITY_BELOW_LOOP: u8 = 20;
+pub(super) const PRIORITY_BELOW_LOOP: u8 = 20;
 
 /// Arguments of `wormd estimate`.
 #[derive(Debug, Args)]
@@ -35,17 +36,43 @@ pub fn run(args: &EstimateArgs) -> Result<(), Failure> {
     let end = end_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;
     let role = RoleLock::<Estimator>::take(&instance).map_err(Failure::unusable)?;
-    let mut observer = Observer::new(&config).map_err(Failure::unusable)?;
     let hub = Hub::open(&instance).map_err(Failure::failed)?;
-    let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
-    let mut voice = Voice::open(&hub, &role).map_err(Failure::failed)?;
-    report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
-    // One who does not want to know when it is ready may have closed the pipe.
-    let _ = print::line("ready");
+    attend(
+        &config,
+        &hub,
+        &role,
+        &end,
+        |grants| {
+            report_grants(grants);
+            // One who does not want to know when it is ready may have closed the pipe.
+            let _ = print::line("ready");
+        },
+        |_| {},
+    )
+}
 
+/// Estimates until `end` is set: sleeps until the controller's event, takes every state that has come, tells what it found.
+/// `ready` is called once it listens; `heard` for each state as soon as it is in hand.
+///
+/// # Errors
+/// As [`run`].
+pub(super) fn attend(
+    config: &Config,
+    hub: &Hub,
+    role: &RoleLock<Estimator>,
+    end: &AtomicBool,
+    ready: impl FnOnce(&[Grant]),
+    mut heard: impl FnMut(&State),
+) -> Result<(), Failure> {
+    let mut observer = Observer::new(config).map_err(Failure::unusable)?;
+    let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
+    let bell = hub.listener::<State>().map_err(Failure::failed)?;
+    let mut voice = Voice::open(hub, role).map_err(Failure::failed)?;
+    ready(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     while !end.load(Ordering::Relaxed) {
-        std::thread::sleep(LOOK);
+        bell.wait(LONGEST_SLEEP).map_err(Failure::failed)?;
         while let Some(state) = states.next().map_err(Failure::failed)? {
+            heard(&state);
             voice.tell(&observer.update(&state)).map_err(Failure::failed)?;
         }
         if voice.spoken.elapsed() >= HEARTBEAT {

@@ -7,6 +7,9 @@ use super::topic::Topic;
 use iceoryx2::port::publisher::{Publisher as Port, PublisherCreateError};
 use iceoryx2::port::update_connections::{ConnectionFailure, UpdateConnections};
 use iceoryx2::port::{LoanError, SendError};
+use iceoryx2::sample_mut::SampleMut;
+use iceoryx2::sample_mut_uninit::SampleMutUninit;
+use std::mem::MaybeUninit;
 use std::sync::Arc;
 
 /// A value that could not be published.
@@ -59,12 +62,12 @@ impl<T: Topic> Publisher<T> {
         })
     }
 
-    /// Publishes a copy of the value.
+    /// Publishes a copy of the value, written once, into the shared memory itself.
     ///
     /// # Errors
     /// [`PublishError`]; the other subscribers have got the value then.
     pub fn publish(&self, value: &T) -> Result<(), PublishError> {
-        self.publish_with(|slot| *slot = *value)
+        send(self.loan()?.write_payload(*value))
     }
 
     /// Publishes what `fill` writes, in the shared memory itself. The slot holds zeros before.
@@ -72,19 +75,16 @@ impl<T: Topic> Publisher<T> {
     /// # Errors
     /// As [`Publisher::publish`].
     pub fn publish_with(&self, fill: impl FnOnce(&mut T)) -> Result<(), PublishError> {
-        let topic = T::NAME;
-        let mut loan = self
-            .port
-            .loan_uninit()
-            .map_err(|reason| PublishError::Loan { topic, reason })?;
-        loan.payload_mut().write(zeroed());
-        // SAFETY: the payload was written in the line above.
-        let mut sample = unsafe { loan.assume_init() };
+        let mut sample = self.loan()?.write_payload(zeroed());
         fill(sample.payload_mut());
-        match sample.send() {
-            Ok(_) => Ok(()),
-            Err(reason) => Err(PublishError::Send { topic, reason }),
-        }
+        send(sample)
+    }
+
+    fn loan(&self) -> Result<SampleMutUninit<Ipc, MaybeUninit<T>, ()>, PublishError> {
+        let topic = T::NAME;
+        self.port
+            .loan_uninit()
+            .map_err(|reason| PublishError::Loan { topic, reason })
     }
 
     /// Lets late joiners in, and gives them the history. For a publisher that has had nothing to say for a while.
@@ -95,6 +95,13 @@ impl<T: Topic> Publisher<T> {
         self.port
             .update_connections()
             .map_err(|reason| PublishError::Connect { topic: T::NAME, reason })
+    }
+}
+
+fn send<T: Topic>(sample: SampleMut<Ipc, T, ()>) -> Result<(), PublishError> {
+    match sample.send() {
+        Ok(_) => Ok(()),
+        Err(reason) => Err(PublishError::Send { topic: T::NAME, reason }),
     }
 }
 
