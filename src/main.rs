@@ -40,6 +40,11 @@ enum Subcommands {
     Explain(command::explain::ExplainArgs),
     /// A recording from the model: what motion capture would have seen
     Simulate(command::simulate::SimulateArgs),
+    /// The loop's own latency, from deadline to alarm, against what this computer can do at best
+    Latency(command::latency::LatencyArgs),
+    /// The bare sleeper of `wormd latency`
+    #[command(hide = true)]
+    LatencyFloor(command::latency::FloorArgs),
     /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
     Check(command::check::CheckArgs),
 }
@@ -83,6 +88,8 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Analyze(args) => command::analyze::run(&args),
         Subcommands::Explain(args) => command::explain::run(&args),
         Subcommands::Simulate(args) => command::simulate::run(&args),
+        Subcommands::Latency(args) => command::latency::run(&args, verbose),
+        Subcommands::LatencyFloor(args) => command::latency::run_floor(&args),
         Subcommands::Check(args) => command::check::run(&args),
     }
 }

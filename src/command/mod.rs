@@ -2,10 +2,13 @@
 
 pub mod analyze;
 pub mod check;
+mod children;
 mod columns;
 pub mod control;
+mod ears;
 pub mod estimate;
 pub mod explain;
+pub mod latency;
 mod material;
 pub mod order;
 mod print;

@@ -2,7 +2,7 @@
 
 use super::{Failure, WormArgs, print};
 use crate::message::{Command, CommandKind, Fault, Mode, Reply, Verdict};
-use crate::topics::{Hub, Instance};
+use crate::topics::{CommandClient, Hub, Instance};
 use clap::{Args, ValueEnum};
 use std::time::Duration;
 
@@ -88,6 +88,27 @@ pub fn run(args: &OrderArgs) -> Result<(), Failure> {
         print::line(format_args!("{}: {kind} accepted", config.worm.name))?;
     }
     Ok(())
+}
+
+/// Gives a controller a plain command.
+///
+/// # Errors
+/// [`Failure::Failed`] when it does not answer, or refuses.
+pub(super) fn give(client: &CommandClient, kind: CommandKind) -> Result<(), Failure> {
+    let command = Command {
+        cycles_per_s: 0.0,
+        kind: kind.code(),
+        reserved: 0,
+    };
+    let reply = client.call(command, PATIENCE).map_err(Failure::failed)?;
+    match Verdict::try_from(reply.verdict) {
+        Ok(Verdict::Accepted) => Ok(()),
+        Ok(verdict) => Err(Failure::failed(format!(
+            "the controller: {}",
+            refusal(kind, verdict, &reply)
+        ))),
+        Err(error) => Err(Failure::failed(error)),
+    }
 }
 
 fn mode_name(reply: &Reply) -> &'static str {

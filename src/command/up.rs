@@ -1,17 +1,16 @@
 //! `wormd up`: the main job. Starts the processes of a worm, makes it crawl, shows what it does, stops it in order, sums up.
 
-mod children;
-mod ears;
 mod screen;
 
+use super::children::{Child, Log, START_PATIENCE};
+use super::ears::{Ears, MODE_PATIENCE};
+use super::order::give;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::config::Config;
-use crate::message::{AlarmKind, Command, CommandKind, Fault, Mode, Verdict};
+use crate::message::{AlarmKind, CommandKind, Fault, Mode};
 use crate::topics::{CommandClient, Hub, Instance, RoleLock, Supervisor};
 use crate::watch::{Summary, Telemetry};
-use children::{Child, Log};
 use clap::Args;
-use ears::Ears;
 use screen::{Screen, Wish};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -20,15 +19,6 @@ use std::time::{Duration, Instant};
 
 /// How often topics are read and the picture is painted.
 const FRAME: Duration = Duration::from_millis(50);
-
-/// How long a process may take to be ready. Starting beside the remains of a killed worm takes the longest.
-const START_PATIENCE: Duration = Duration::from_secs(20);
-
-/// How long the controller may take to answer a command.
-const ANSWER_PATIENCE: Duration = Duration::from_secs(2);
-
-/// How long the worm may take to reach a mode that it was commanded into, beside the time of the ramp.
-const MODE_PATIENCE: Duration = Duration::from_secs(5);
 
 /// Arguments of `wormd up`.
 #[derive(Debug, Args)]
@@ -236,8 +226,10 @@ fn crawl(
     let mut ears = Ears::open(&hub)?;
     let mut telemetry = Telemetry::default();
 
-    start_crawling(&client, config, &mut ears, &mut telemetry, processes, end)
-        .map_err(|failure| processes.find_ended().map_or(failure, Failure::Failed))?;
+    ears.start_crawling(&client, config, &mut telemetry, end, || {
+        processes.find_ended().is_some()
+    })
+    .map_err(|failure| processes.find_ended().map_or(failure, Failure::Failed))?;
     let begun = Instant::now();
     let mut trouble = None;
     while !end.load(Ordering::Relaxed) && args.duration.is_none_or(|duration| begun.elapsed() < duration) {
@@ -271,36 +263,6 @@ fn crawl(
     })
 }
 
-fn start_crawling(
-    client: &CommandClient,
-    config: &Config,
-    ears: &mut Ears,
-    telemetry: &mut Telemetry,
-    processes: &mut Processes,
-    end: &AtomicBool,
-) -> Result<(), Failure> {
-    order(client, CommandKind::Arm)?;
-    let armed = ears.wait_for(
-        telemetry,
-        MODE_PATIENCE,
-        || end.load(Ordering::Relaxed) || processes.find_ended().is_some(),
-        |telemetry| {
-            telemetry.state.is_some_and(|state| state.mode == Mode::Armed.code())
-                && (telemetry.estimate.is_some() || !config.control.require_estimator)
-        },
-    );
-    if end.load(Ordering::Relaxed) {
-        return Ok(());
-    }
-    if !armed {
-        let mode = ears.mode(telemetry);
-        return Err(Failure::failed(format!(
-            "the worm was not ready to crawl within {MODE_PATIENCE:?} (it is {mode}); the log tells why"
-        )));
-    }
-    order(client, CommandKind::Crawl)
-}
-
 /// Stops the worm; false when it did not say that it stands.
 fn stop(
     client: &CommandClient,
@@ -309,7 +271,7 @@ fn stop(
     telemetry: &mut Telemetry,
     processes: &mut Processes,
 ) -> bool {
-    if let Err(failure) = order(client, CommandKind::Stop) {
+    if let Err(failure) = give(client, CommandKind::Stop) {
         // A worm in a fault has stopped already and refuses a stop.
         tracing::debug!("{failure}");
     }
@@ -324,18 +286,4 @@ fn stop(
                 .any(|stopped| mode == Some(stopped.code()))
         },
     )
-}
-
-fn order(client: &CommandClient, kind: CommandKind) -> Result<(), Failure> {
-    let command = Command {
-        cycles_per_s: 0.0,
-        kind: kind.code(),
-        reserved: 0,
-    };
-    let reply = client.call(command, ANSWER_PATIENCE).map_err(Failure::failed)?;
-    match Verdict::try_from(reply.verdict) {
-        Ok(Verdict::Accepted) => Ok(()),
-        Ok(verdict) => Err(Failure::failed(format!("the controller refused to {kind}: {verdict}"))),
-        Err(error) => Err(Failure::failed(error)),
-    }
 }

@@ -1,14 +1,28 @@
-//! How late the loop is, and where each late tick's time went.
+//! How late the loop is, where each late tick's time went, and how near that comes to what the machine can do.
 //!
 //! In reading order:
 //! - [`histogram`]: durations in histograms, and their [`Percentiles`].
 //! - [`timeline`]: one tick as its parts on the clock; [`WorstTicks`], the worst ones of a run.
 //! - [`account`]: what the `timing` topic tells of a run, and how long states took to whoever received them.
+//! - [`bare`] and [`floor`]: what the machine and iceoryx2 can do at best, measured beside the loop.
+//! - [`stress`]: a load beside it.
+//! - [`outcome`]: what a run has found, as JSON shows it; [`measure`]: its durations, each with its name and its floor;
+//!   [`blame`]: what each culprit means.
+//!
+//! `wormd latency` puts them together.
 
 pub mod account;
+pub mod bare;
+pub mod blame;
+pub mod floor;
 pub mod histogram;
+pub mod measure;
+pub mod outcome;
+pub mod stress;
 pub mod timeline;
 
 pub use account::{Account, Deliveries};
 pub use histogram::{Durations, Percentiles};
+pub use measure::{Measure, ratio};
+pub use outcome::Outcome;
 pub use timeline::{Tick, WorstTicks};

@@ -11,10 +11,12 @@
 //! - `runs`, `figure`, `summary`, `tables`: what this report shows.
 //! - `sheets` and `file`: the CSV, and how files are replaced.
 //! - [`explain`]: another page, on the search for the effect that the model misses.
+//! - [`latency`]: another page, on how late the loop is and why.
 
 pub mod explain;
 mod figure;
 mod file;
+pub mod latency;
 pub mod number;
 pub mod page;
 pub mod plot;
@@ -70,6 +72,9 @@ pub enum ReportError {
     /// A table could not be written as CSV.
     #[error("a table could not be written as CSV: {0}")]
     Csv(#[from] csv::Error),
+    /// What a page shows could not be written as JSON.
+    #[error("what was found could not be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
 }
 
 /// What was written.

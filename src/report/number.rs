@@ -23,6 +23,15 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// A value as it was set, a rate or a time, with two decimals at most and none that say nothing: `1000`, `0.25`.
+pub fn shortest(value: f64) -> String {
+    let text = fixed(value, 2);
+    match text.split_once('.') {
+        Some(_) => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        None => text,
+    }
+}
+
 /// A value and its error: `2.00 ± 0.02`, with `decimals`, or with one more where the error is too small to be seen with
 /// those; beyond that stands `± <0.001`. Without a usable error the value alone.
 pub fn with_error(value: f64, error: f64, decimals: usize) -> String {
@@ -166,6 +175,12 @@ mod tests {
             "0.0 %", "<0.1 %", "0.4 %", "50 %", "−20 %", "99.6 %", ">99.9 %", "100 %", "130 %", NONE,
         ];
         assert_eq!(shares.map(percent), texts);
+    }
+
+    #[test]
+    fn what_was_set_has_no_idle_decimals() {
+        let values = [1000.0, 0.25, 12.5, 0.0, -3.0, f64::NAN];
+        assert_eq!(values.map(shortest), ["1000", "0.25", "12.5", "0", "−3", NONE]);
     }
 
     #[test]

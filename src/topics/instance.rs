@@ -137,7 +137,7 @@ impl Instance {
         format!("worm/{}/{topic}", self.worm)
     }
 
-    pub(super) fn iceoryx(&self) -> &IoxConfig {
+    pub(crate) fn iceoryx(&self) -> &IoxConfig {
         &self.iceoryx
     }
 

@@ -3,6 +3,7 @@
 //! These tests wait for conditions with a generous bound; they assert what happens, never how fast a shared machine is.
 
 mod explaining;
+mod latency;
 mod leaving;
 mod recording;
 mod worm;
@@ -54,6 +55,18 @@ fn the_main_job_crawls_counts_and_leaves_nothing_behind() {
         );
         assert_eq!(cycle["forward_slide_m"].as_array().map(Vec::len), Some(4));
     }
+    let timing = &summary["timing"];
+    assert_eq!(timing["worst_ticks"].as_array().map(Vec::len), Some(10));
+    let late: f64 = timing["culprits"]
+        .as_object()
+        .expect("culprits")
+        .values()
+        .map(number)
+        .sum();
+    assert!(
+        late <= number(&summary["overruns"]),
+        "a late tick costs a deadline at least: {timing}"
+    );
     assert_eq!(worm.residue(), Vec::<String>::new());
 }
 

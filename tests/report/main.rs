@@ -3,6 +3,8 @@
 mod answer;
 mod explain;
 mod html;
+mod latency;
+mod latency_sample;
 mod sample;
 
 use sample::analysis;

@@ -1,6 +1,6 @@
 //! What `wormd up` shows while the worm crawls: the moving picture, plain lines, or nothing but the log.
 
-use super::children::Log;
+use crate::command::children::Log;
 use crate::command::{Failure, print};
 use crate::config::{Config, Direction};
 use crate::message::{Alarm, AlarmKind, Cycle};

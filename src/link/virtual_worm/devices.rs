@@ -49,6 +49,8 @@ pub struct Devices {
     decoder: Decoder,
     heard_byte_s: f64,
     bus: Bus,
+    /// When the worm began to crawl on the clock of whoever runs the devices in real time, ns.
+    pub(super) crawl_began_ns: Option<u64>,
 }
 
 impl Devices {
@@ -76,6 +78,7 @@ impl Devices {
             decoder: Decoder::new(),
             heard_byte_s: 0.0,
             bus: Bus::new(config, options)?,
+            crawl_began_ns: None,
         })
     }
 

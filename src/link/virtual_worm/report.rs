@@ -11,6 +11,8 @@ pub struct Report {
     pub time_s: f64,
     /// When the worm began to crawl, s; null when it never did.
     pub crawl_began_s: Option<f64>,
+    /// The same moment on `CLOCK_MONOTONIC`, ns; null in virtual time.
+    pub crawl_began_ns: Option<u64>,
     /// Gait phase reached, cycles.
     pub phase: f64,
     /// Charge left, share; 1 without a battery.
@@ -32,6 +34,7 @@ impl Devices {
         Report {
             time_s: plant.time_s(),
             crawl_began_s: self.crawl_began_s(),
+            crawl_began_ns: self.crawl_began_ns,
             phase: plant.body().phase(),
             charge_share: plant.supply().charge_share(),
             servo_c: plant.motor().case_c(),

@@ -8,6 +8,7 @@ use super::options::Options;
 use super::pty::{Pty, PtyError};
 use crate::config::Config;
 use crate::model::WormError;
+use crate::realtime::monotonic_ns;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
@@ -92,6 +93,7 @@ impl Server {
     pub fn run(mut self, stop: &AtomicBool) -> Result<Devices, ServerError> {
         let failed = |doing| move |source| ServerError::Line { doing, source };
         let began = Instant::now();
+        let began_ns = monotonic_ns();
         let mut skipped = Duration::ZERO; // of the clock, while the world stood still
         let mut advanced = Duration::ZERO;
         let mut heard = Duration::ZERO;
@@ -128,6 +130,12 @@ impl Server {
                 self.devices.receive(&incoming[..count], now_s)?;
             } else {
                 self.devices.advance_to(now_s)?;
+            }
+            if self.devices.crawl_began_ns.is_none()
+                && let Some(crawl_s) = self.devices.crawl_began_s()
+            {
+                let crawl = Duration::from_secs_f64(crawl_s) + skipped;
+                self.devices.crawl_began_ns = Some(began_ns + crawl.as_nanos() as u64);
             }
             outgoing.clear();
             self.devices.take_due(now_s, &mut outgoing);

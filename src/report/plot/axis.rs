@@ -16,6 +16,12 @@ const MARGIN: f64 = 0.05;
 const ROOM_BEHIND: f64 = 0.16;
 /// Most ticks of a logarithmic axis.
 const MOST_POWERS: usize = 6;
+/// Room beyond the outermost values of a logarithmic axis, as a factor.
+const LOGARITHMIC_MARGIN: f64 = 1.05;
+/// Room behind the end of a logarithmic axis for half of the tick's name there, as a share of its decades.
+const HALF_NAME: f64 = 0.02;
+/// Fewer powers of ten than this leave an axis without scale: then twice and five times a power are told, too.
+const FEW_POWERS: usize = 3;
 
 /// An axis: what it spans, where its ticks are and what they are called.
 #[derive(Debug, Clone)]
@@ -32,6 +38,7 @@ enum Labels {
     Decimals(usize),
     Names(Vec<String>),
     Powers,
+    Thousands, // 20, 1k, 5M
 }
 
 impl Axis {
@@ -105,6 +112,36 @@ impl Axis {
         }
     }
 
+    /// Logarithmic around two positive values, out to the next of 1, 2 or 5 times a power of ten, with ticks at the powers of
+    /// ten and thousands written as `k`. From 1 to 10 where the values are none that it can hold.
+    pub fn logarithmic(least: f64, largest: f64) -> Self {
+        let can_hold = 0.0 < least && least <= largest && Self::can_show(largest);
+        let (low, high) = if can_hold {
+            let low = 1.0 / round_step(LOGARITHMIC_MARGIN / least);
+            (low, round_step(LOGARITHMIC_MARGIN * largest))
+        } else {
+            (1.0, 10.0)
+        };
+        let exponents = low.log10().floor() as i32..=high.log10().ceil() as i32;
+        let lies_within = |tick: &f64| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(tick);
+        let powers = exponents.map(|exponent| 10f64.powi(exponent));
+        let tens: Vec<f64> = powers.clone().filter(lies_within).collect();
+        let ticks = if tens.len() < FEW_POWERS {
+            let steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|step| step * power));
+            steps.filter(lies_within).collect()
+        } else {
+            let every = (tens.len() - 1) / MOST_POWERS + 1;
+            tens.into_iter().step_by(every).collect()
+        };
+        Self {
+            low,
+            high: high * (high / low).powf(HALF_NAME),
+            ticks,
+            labels: Labels::Thousands,
+            is_logarithmic: true,
+        }
+    }
+
     /// Characters of its longest name; 0 where its ticks are numbers.
     pub fn longest_name(&self) -> usize {
         let Labels::Names(names) = &self.labels else {
@@ -143,7 +180,7 @@ impl Axis {
     }
 
     /// Where a value lies between its ends, as a share; what a logarithmic axis cannot hold lies at its low end.
-    fn share(&self, value: f64) -> f64 {
+    pub(super) fn share(&self, value: f64) -> f64 {
         if self.is_logarithmic {
             return (value.max(self.low) / self.low).log10() / (self.high / self.low).log10();
         }
@@ -178,6 +215,17 @@ fn round_step(at_least: f64) -> f64 {
         .unwrap_or(10.0 * power)
 }
 
+/// A value of an axis that runs through many powers of ten: `0.05`, `20`, `1k`, `5M`.
+fn in_thousands(value: f64) -> String {
+    let (value, unit) = match value {
+        _ if value >= 1e6 => (value * 1e-6, "M"),
+        _ if value >= 1e3 => (value * 1e-3, "k"),
+        _ => (value, ""),
+    };
+    let decimals = (-value.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{}{unit}", number::fixed(value, decimals))
+}
+
 impl Ranged for Axis {
     type FormatOption = NoDefaultFormatting;
     type ValueType = f64;
@@ -201,6 +249,7 @@ impl ValueFormatter<f64> for Axis {
             Labels::Decimals(decimals) => number::fixed(*value, *decimals),
             Labels::Names(names) => names.get(value.round() as usize).cloned().unwrap_or_default(),
             Labels::Powers => number::fixed(*value, (-value.log10()).ceil().clamp(0.0, 9.0) as usize),
+            Labels::Thousands => in_thousands(*value),
         }
     }
 }
@@ -232,6 +281,25 @@ mod tests {
         let axis = Axis::powers_of_ten(1.0, [100.0]);
         let places = [-5.0, 0.0, 1.0, 10.0, 100.0].map(|value| axis.map(&value, (0, 232)));
         assert_eq!(places, [0, 0, 0, 100, 200]);
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_a_scale_however_far_it_reaches() {
+        let table: [(f64, f64, &[&str]); 8] = [
+            (1.0, 9000.0, &["1", "10", "100", "1k", "10k"]),
+            (0.03, 40.0, &["0.1", "1", "10"]),
+            (0.06, 0.3, &["0.05", "0.1", "0.2", "0.5"]),
+            (900.0, 1100.0, &["500", "1k", "2k"]),
+            (7.0, 7.0, &["5", "10"]),
+            (0.6, 4e6, &["1", "100", "10k", "1M"]),
+            (f64::NAN, 10.0, &["1", "2", "5", "10"]),
+            (0.0, f64::INFINITY, &["1", "2", "5", "10"]),
+        ];
+        for (least, largest, expected) in table {
+            let axis = Axis::logarithmic(least, largest);
+            assert_eq!(labels(&axis), expected, "{least} to {largest}");
+            assert!(axis.low < axis.high, "{least} to {largest}");
+        }
     }
 
     #[test]

@@ -14,6 +14,8 @@ mod thin;
 
 pub use axis::Axis;
 pub use canvas::{DrawError, Plot, Row, Sheet, Stroke, draw};
-pub use palette::{ACCENT, Colour, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, cell_colours, css, diverging};
+pub use palette::{
+    ACCENT, BLUE, Colour, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, VERMILION, cell_colours, css, diverging,
+};
 
 pub(super) use raw::Raw;

@@ -22,10 +22,15 @@ pub const ACCENT: Colour = RGBColor(0xc8, 0x10, 0x2e);
 /// The ground.
 pub const PAPER: Colour = RGBColor(0xff, 0xff, 0xff);
 
+/// What is measured, where something else stands before it.
+pub const BLUE: Colour = RGBColor(0x00, 0x72, 0xb2);
+/// What stands before it; the colour-blind tell the two apart.
+pub const VERMILION: Colour = RGBColor(0xd5, 0x5e, 0x00);
+
 /// Okabe and Ito's colours, which the colour-blind tell apart, without black and yellow.
 const FEW: [Colour; 6] = [
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xd5, 0x5e, 0x00),
+    BLUE,
+    VERMILION,
     RGBColor(0x00, 0x9e, 0x73),
     RGBColor(0xcc, 0x79, 0xa7),
     RGBColor(0xe6, 0x9f, 0x00),

@@ -22,7 +22,7 @@ pub(super) fn pieces(points: impl IntoIterator<Item = (f64, f64)>) -> Vec<Vec<(f
 /// The first, lowest, highest and last point in every column of a picture so many columns wide, in their order: the line
 /// drawn through them is the one through all points. `piece` must grow in x.
 pub(super) fn thinned(piece: &[(f64, f64)], x: &Axis, columns: usize) -> Vec<(f64, f64)> {
-    let column = |point: &(f64, f64)| ((point.0 - x.low()) / (x.high() - x.low()) * columns as f64).floor();
+    let column = |point: &(f64, f64)| (x.share(point.0) * columns as f64).floor();
     let mut kept = Vec::new();
     for group in piece.chunk_by(|one, next| column(one) == column(next)) {
         let by_height = |one: &usize, other: &usize| group[*one].1.total_cmp(&group[*other].1);

@@ -1,6 +1,6 @@
-//! The processes of a running worm, as children of `wormd up`.
+//! The processes of a running worm, as children of this one: of `wormd up`, or of `wormd latency`.
 
-use crate::command::{Failure, print};
+use super::{Failure, print};
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, unbounded};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -11,6 +11,9 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child as Process, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+/// How long a process may take to be ready. Starting beside the remains of a killed worm takes the longest.
+pub(super) const START_PATIENCE: Duration = Duration::from_secs(20);
 
 /// Time that a process is given to end in order, once the worm stands.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -146,6 +149,12 @@ impl Child {
         } else {
             Failure::Failed(text)
         })
+    }
+
+    /// The last line on the standard output of a child that has ended, if it has written any since it was ready.
+    pub(super) fn last_line(&self) -> Option<String> {
+        // The thread that forwards them ends, and with it this, when all have been forwarded.
+        self.stdout_lines.iter().last().map(|line| line.text)
     }
 
     /// How it ended, if it has.

@@ -1,10 +1,16 @@
-//! What `wormd up` hears of its worm.
+//! What a parent of the worm's processes hears of its worm, and how it gets it to crawl.
 
-use crate::command::Failure;
-use crate::message::{Alarm, Cycle, Estimate, Mode, State, Timing};
-use crate::topics::{Hub, Subscriber};
+use super::Failure;
+use super::order::give;
+use crate::config::Config;
+use crate::message::{Alarm, CommandKind, Cycle, Estimate, Mode, State, Timing};
+use crate::topics::{CommandClient, Hub, Subscriber};
 use crate::watch::Telemetry;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+/// How long the worm may take to reach a mode that it was commanded into, beside the time of the ramp.
+pub(super) const MODE_PATIENCE: Duration = Duration::from_secs(5);
 
 /// All topics of the worm.
 pub(super) struct Ears {
@@ -73,5 +79,36 @@ impl Ears {
             .state
             .and_then(|state| Mode::try_from(state.mode).ok())
             .unwrap_or(Mode::Disarmed)
+    }
+
+    /// Has the worm armed, waits until it and the estimator are ready, and has it crawl; nothing more once `end` is set.
+    pub(super) fn start_crawling(
+        &mut self,
+        client: &CommandClient,
+        config: &Config,
+        telemetry: &mut Telemetry,
+        end: &AtomicBool,
+        mut hopeless: impl FnMut() -> bool,
+    ) -> Result<(), Failure> {
+        give(client, CommandKind::Arm)?;
+        let armed = self.wait_for(
+            telemetry,
+            MODE_PATIENCE,
+            || end.load(Ordering::Relaxed) || hopeless(),
+            |telemetry| {
+                telemetry.state.is_some_and(|state| state.mode == Mode::Armed.code())
+                    && (telemetry.estimate.is_some() || !config.control.require_estimator)
+            },
+        );
+        if end.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        if !armed {
+            let mode = self.mode(telemetry);
+            return Err(Failure::failed(format!(
+                "the worm was not ready to crawl within {MODE_PATIENCE:?} (it is {mode}); the log tells why"
+            )));
+        }
+        give(client, CommandKind::Crawl)
     }
 }
