@@ -26,6 +26,9 @@ macro_rules! roles {
         $($(#[$meta])* #[derive(Debug)] pub enum $role {}
         impl sealed::Sealed for $role {}
         impl Role for $role { const NAME: &'static str = $name; })+
+
+        /// Names of all roles.
+        const NAMES: &[&str] = &[$($name),+];
     };
 }
 
@@ -118,6 +121,18 @@ impl<R: Role> Drop for RoleLock<R> {
     fn drop(&mut self) {
         self.file.remove();
         residue::remove_folder_if_empty(&self.instance);
+    }
+}
+
+/// Removes the lock files of roles whose holders were killed.
+pub(super) fn remove_abandoned(instance: &Instance) {
+    for path in NAMES.iter().map(|name| instance.lock_path(name)) {
+        // A lock that somebody holds is not abandoned; and locking makes the file where there is none.
+        if path.exists()
+            && let Ok(Some(file)) = LockFile::try_lock(&path, Kind::Exclusive)
+        {
+            file.remove();
+        }
     }
 }
 

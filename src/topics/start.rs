@@ -3,6 +3,7 @@
 use super::instance::Instance;
 use super::lock::{Kind, LockError, LockFile};
 use super::residue::{self, Peer};
+use super::role;
 use super::services::{Refused, Services};
 use std::fmt;
 use std::io;
@@ -95,6 +96,7 @@ impl Drop for Presence {
         {
             tracing::debug!("{}: {error}", self.instance.folder().display());
         }
+        role::remove_abandoned(&self.instance);
         self.lock.remove();
         start.remove();
         residue::remove_folder_if_empty(&self.instance);

@@ -23,6 +23,21 @@ fn a_reader_that_leaves_stops_the_worm() {
 }
 
 #[test]
+fn a_killed_parent_leaves_neither_processes_nor_files() {
+    let worm = Worm::new("orphans");
+    let log = tempfile::NamedTempFile::new().expect("a temporary file");
+    let path = log.path().with_extension("mcap").to_string_lossy().into_owned();
+    let recorded = || std::fs::metadata(&path).map_or(0, |file| file.len());
+    let mut up = worm.wormd(&["up", "--json", "--record", &path]).start_silent();
+    wait_for("a worm that is recorded", PATIENCE, || recorded() > 100_000);
+    up.kill();
+    wait_for("the end of its children, with all they had", PATIENCE, || {
+        worm.residue().is_empty()
+    });
+    std::fs::remove_file(&path).expect("the log is there");
+}
+
+#[test]
 fn a_terminal_that_goes_stops_the_worm() {
     let worm = Worm::new("hangup");
     let size = Winsize {

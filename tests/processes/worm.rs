@@ -212,6 +212,14 @@ impl Invocation {
         Process { child }
     }
 
+    /// Starts it, and hears nothing of it.
+    pub fn start_silent(mut self) -> Process {
+        let command = self.command.stdout(Stdio::null()).stderr(Stdio::null());
+        Process {
+            child: command.spawn().expect("the binary starts"),
+        }
+    }
+
     /// Starts it with a terminal of its own.
     pub fn start_in(mut self, terminal: OwnedFd) -> Process {
         let copy = || terminal.try_clone().expect("a descriptor is free");
