@@ -301,3 +301,9 @@ pub fn wait_for(what: &str, patience: Duration, mut condition: impl FnMut() -> b
 pub fn soon() -> Instant {
     Instant::now() + Duration::from_millis(100)
 }
+
+/// Late ticks in a table of culprits.
+pub fn late_ticks(culprits: &serde_json::Value) -> f64 {
+    let counts = culprits.as_object().expect("a table of culprits").values();
+    counts.map(|count| count.as_f64().expect("a count")).sum()
+}

@@ -101,7 +101,7 @@ impl House {
         self.file.path()
     }
 
-    /// How a process or the estimator ended that should not have.
+    /// How a process ended that should not have.
     pub(super) fn find_ended(&mut self) -> Option<String> {
         if let Some(status) = self.controller.exit_status() {
             return Some(format!("the controller ended by itself, {status}"));
