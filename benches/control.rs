@@ -33,6 +33,8 @@ fn tick(criterion: &mut Criterion) {
     };
     let mut inputs = Inputs {
         now_ns: 0,
+        absent_ns: 0,
+        lost_exchanges: 0,
         servo: Some(&READING),
         tracker: None,
         command: None,

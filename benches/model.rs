@@ -1,8 +1,12 @@
 //! What the motions cost: a whole gait cycle and the increment of one tick of a 1 kHz loop, exact and incremental.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use std::f64::consts::TAU;
 use std::hint::black_box;
 use wormd::MAX_CELLS;
+use wormd::config::Config;
+use wormd::link::virtual_worm::Plant;
+use wormd::link::virtual_worm::motor::{Drive, Gains};
 use wormd::model::{Contact, Crawl, Mechanics, Motion, Physics, Worm, steady_cycle};
 
 /// Time of a gait cycle, s.
@@ -63,5 +67,20 @@ fn incremental(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, model, incremental);
+/// The virtual worm's motor, body and camera together: a hundred simulated hours need it to be fast.
+fn plant(criterion: &mut Criterion) {
+    let gains = Gains {
+        velocity_p: 0.0663,
+        velocity_i: 11.5,
+        position_p: 20.0,
+        duty_limit: 1.0,
+    };
+    let mut plant = Plant::new(&Config::default(), Some(1)).expect("the paper's worm");
+    plant.set_drive(Drive::Velocity(TAU / CYCLE_S), gains);
+    criterion.bench_function("a step of the virtual worm's plant", |bencher| {
+        bencher.iter(|| plant.step().expect("it holds"));
+    });
+}
+
+criterion_group!(benches, model, incremental, plant);
 criterion_main!(benches);

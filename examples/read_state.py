@@ -37,11 +37,13 @@ class State(ctypes.Structure):
         ("motor_duty", ctypes.c_double),
         ("bus_voltage_v", ctypes.c_double),
         ("motor_temperature_c", ctypes.c_double),
+        ("motor_time_s", ctypes.c_double),
         ("sample_time_s", ctypes.c_double),
         ("position_m", ctypes.c_double * MAX_CELLS),
         ("sample", ctypes.c_uint64),
         ("samples_missed", ctypes.c_uint64),
         ("link_failures", ctypes.c_uint64),
+        ("host_paused_ns", ctypes.c_uint64),
         ("cell_count", ctypes.c_uint32),
         ("valid_mask", ctypes.c_uint32),
         ("sample_is_new", ctypes.c_uint32),
@@ -54,7 +56,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name():
-        return "wormd_state_v1"
+        return "wormd_state_v2"
 
 
 def join(worm, root):

@@ -39,6 +39,7 @@
 //! | [`latency`] | durations in histograms, the account of where each tick's time went, the floor of machine and transport that it is held against | explain, serial |
 //! | [`watch`] | what a person sees: telemetry gathered, the picture in the terminal, the summary | control, serial |
 //! | [`report`] | what a person looks at afterwards: the pages with figures and tables, of an experiment, of the search for the missing effect and of the loop's latency, and CSV | control, serial |
+//! | [`logging`] | how often what recurs is logged | all |
 //! | [`realtime`] | what a process asks of the operating system, what it really has, and how the computer is set for it | everything but config |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | |
 //!
@@ -63,6 +64,7 @@ pub mod explain;
 pub mod identify;
 pub mod latency;
 pub mod link;
+pub mod logging;
 pub mod message;
 pub mod model;
 pub mod realtime;

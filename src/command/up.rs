@@ -91,6 +91,12 @@ fn fault_in_words(telemetry: &Telemetry) -> String {
     let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
     match AlarmKind::try_from(state.fault_alarm) {
         Ok(alarm) if fault == Fault::Alarm => format!("{fault} {alarm}"),
+        _ if fault == Fault::HostPaused => format!(
+            "{fault}: the computer did not run the controller for {:.0} ms, longer than the servo's bus watchdog waits; \
+             `wormd check` says what keeps the computer from pausing, servo.watchdog_ms allows longer pauses, and \
+             control.resume_after_pause crawls on after one",
+            telemetry.account.host_pauses.newest_s * 1e3
+        ),
         _ => fault.to_string(),
     }
 }

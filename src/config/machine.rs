@@ -199,6 +199,10 @@ pub struct Control {
     pub hold_gain_per_s: f64,
     /// Gait cycles that a `back-off` goes back before it holds.
     pub back_off_cycles: f64,
+    /// Whether a loop whose computer cannot hold `rate_hz` goes on at a steady fraction of it.
+    pub adapt_rate: bool,
+    /// Whether the worm crawls on by itself, where that is safe, after a pause of the computer has stopped it.
+    pub resume_after_pause: bool,
 }
 
 impl Default for Control {
@@ -212,6 +216,8 @@ impl Default for Control {
             require_estimator: true,
             hold_gain_per_s: 5.0,
             back_off_cycles: 1.0,
+            adapt_rate: true,
+            resume_after_pause: false,
         }
     }
 }

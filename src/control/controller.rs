@@ -1,7 +1,9 @@
 //! The tick: inputs and time in, outputs out. All of the controller's behaviour, none of its I/O.
 
 use super::intake::Intake;
+use super::presence::{Passed, Presence};
 use super::ramp::{CountRounding, Ramp};
+use super::resume::Resume;
 use super::safety::{Safety, Watched};
 use crate::config::{Config, Policy};
 use crate::link::{ServoReading, TrackerReading};
@@ -13,6 +15,10 @@ use std::f64::consts::TAU;
 pub struct Inputs<'a> {
     /// When the exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
     pub now_ns: u64,
+    /// For how long since the tick before the loop could not run though it had to, ns: nobody can be blamed for silence then.
+    pub absent_ns: u64,
+    /// Earlier exchanges of which it is known now that the servo never answers.
+    pub lost_exchanges: u32,
     /// The servo's answer, if it came.
     pub servo: Option<&'a ServoReading>,
     /// The tracker's answer, if it came.
@@ -60,6 +66,8 @@ pub struct Outputs {
     pub service: Option<Service>,
     /// The answer to this tick's command.
     pub reply: Option<Reply>,
+    /// The pause of the computer that ended in this tick, ns; 0 where there was none.
+    pub host_paused_ns: u64,
     /// The process may end: it was asked to, and the motor is off (or cannot be reached).
     pub finished: bool,
 }
@@ -100,6 +108,7 @@ pub struct Controller {
     require_estimator: bool,
     policies: [Policy; AlarmKind::ALL.len()],
 
+    presence: Presence,
     intake: Intake,
     safety: Safety,
     ramp: Ramp,
@@ -108,6 +117,9 @@ pub struct Controller {
     mode: Mode,
     fault: Fault,
     fault_alarm: Option<AlarmKind>,
+    /// How long the computer paused since the servo's last answer, ns; kept as it was when a fault was latched.
+    paused_unanswered_ns: u64,
+    resume: Resume,
     /// Cam angle that a hold keeps; unset while the ramp still runs out.
     hold_angle_rad: Option<f64>,
     /// Cam angle at which a back-off ends.
@@ -120,7 +132,6 @@ pub struct Controller {
     /// Torque must still be switched off, not before this time.
     disarm_due_ns: Option<u64>,
     disarm_failures: u32,
-    last_ns: Option<u64>,
 }
 
 impl Controller {
@@ -138,6 +149,7 @@ impl Controller {
             back_off_cycles: config.control.back_off_cycles,
             require_estimator: config.control.require_estimator,
             policies,
+            presence: Presence::default(),
             intake: Intake::new(config),
             safety: Safety::new(config),
             ramp: Ramp::at_rest(gait_velocity_rad_s.abs() / config.gait.ramp_s),
@@ -145,6 +157,8 @@ impl Controller {
             mode: Mode::Disarmed,
             fault: Fault::None,
             fault_alarm: None,
+            paused_unanswered_ns: 0,
+            resume: Resume::new(config),
             hold_angle_rad: None,
             back_off_until_rad: None,
             mode_since_ns: 0,
@@ -153,7 +167,6 @@ impl Controller {
             pending: None,
             disarm_due_ns: None,
             disarm_failures: 0,
-            last_ns: None,
         }
     }
 
@@ -167,16 +180,23 @@ impl Controller {
         self.fault
     }
 
-    /// One tick.
-    pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
-        let now_ns = inputs.now_ns;
-        let dt_s = self
-            .last_ns
-            .replace(now_ns)
-            .map_or(0.0, |last_ns| now_ns.saturating_sub(last_ns) as f64 * 1e-9);
+    /// How long the computer paused before the fault [`Fault::HostPaused`], ns.
+    pub fn pause_of_fault_ns(&self) -> u64 {
+        self.paused_unanswered_ns
+    }
 
-        self.intake.take_servo(now_ns, inputs.servo);
-        self.intake.take_tracker(now_ns, inputs.tracker);
+    /// One tick. All of it goes by the loop's own clock, which stands still while the computer pauses.
+    pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
+        let Passed {
+            present_ns: now_ns,
+            step_ns,
+            pause_ns,
+        } = self.presence.advance(inputs.now_ns, inputs.absent_ns);
+        let dt_s = step_ns as f64 * 1e-9;
+
+        self.intake.state.link_failures += u64::from(inputs.lost_exchanges);
+        self.intake.take_servo(inputs.now_ns, now_ns, inputs.servo);
+        self.intake.take_tracker(inputs.now_ns, now_ns, inputs.tracker);
         if inputs.estimate_arrived {
             self.estimate_seen_ns = Some(now_ns);
         }
@@ -186,13 +206,23 @@ impl Controller {
         if let Some(outcome) = inputs.service {
             self.take_service(outcome, now_ns);
         }
+        self.resume.take_alarms(inputs.alarms);
+        if self.mode != Mode::Fault {
+            self.paused_unanswered_ns += pause_ns;
+        }
         if self.has_torque() {
-            self.check_safety(inputs, dt_s);
+            self.check_safety(inputs, now_ns, dt_s);
+        }
+        if self.mode != Mode::Fault && inputs.servo.is_some() {
+            self.paused_unanswered_ns = 0;
         }
         for alarm in inputs.alarms {
             self.take_alarm(alarm, now_ns);
         }
-        let reply = inputs.command.map(|command| self.take_command(&command, inputs));
+        self.resume_by_itself(now_ns, pause_ns, inputs);
+        let reply = inputs
+            .command
+            .map(|command| self.take_command(&command, now_ns, inputs.servo));
         if inputs.end {
             self.begin_end(now_ns);
         }
@@ -202,10 +232,11 @@ impl Controller {
         let finished = inputs.end && self.is_over();
         let servo_rad_s = self.intake.cam().servo_velocity_rad_s(velocity_rad_s);
         Outputs {
-            state: self.fill_state(now_ns, velocity_rad_s),
+            state: self.fill_state(inputs.now_ns, velocity_rad_s),
             goal_counts: self.rounding.round(servo_rad_s / RAD_S_PER_COUNT),
             service,
             reply,
+            host_paused_ns: pause_ns,
             finished,
         }
     }
@@ -234,19 +265,37 @@ impl Controller {
         self.disarm_failures = 0;
     }
 
-    fn check_safety(&mut self, inputs: &Inputs<'_>, dt_s: f64) {
+    fn check_safety(&mut self, inputs: &Inputs<'_>, now_ns: u64, dt_s: f64) {
         let fault = self.safety.check(&Watched {
-            now_ns: inputs.now_ns,
+            now_ns,
             dt_s,
             // What the servo said before a service is not what it says after it.
             servo: inputs.servo.filter(|_| inputs.service.is_none()),
             intake: &self.intake,
             estimate_seen_ns: self.estimate_seen_ns,
+            paused_ns: self.paused_unanswered_ns,
             armed_ns: self.armed_ns,
             crawling_since_ns: (self.mode == Mode::Crawling).then_some(self.mode_since_ns),
         });
         if let Some(fault) = fault {
-            self.enter_fault(fault, None, inputs.now_ns);
+            if fault == Fault::HostPaused && self.mode == Mode::Crawling && self.back_off_until_rad.is_none() {
+                self.resume.begin(now_ns, self.ramp.target_rad_s());
+            }
+            self.enter_fault(fault, None, now_ns);
+        }
+    }
+
+    /// Prepares the servo anew after a pause of the computer, where the configuration asks for it and it is safe.
+    fn resume_by_itself(&mut self, now_ns: u64, pause_ns: u64, inputs: &Inputs<'_>) {
+        let is_disarmed = self.mode == Mode::Fault && self.disarm_due_ns.is_none() && self.pending.is_none();
+        let devices_answer = inputs.servo.is_some_and(|servo| !servo.alert)
+            && !self
+                .safety
+                .persists(Fault::TrackerStale, now_ns, inputs.servo, &self.intake);
+        if inputs.end || inputs.command.is_some() {
+            self.resume.give_up();
+        } else if self.resume.is_due(now_ns, pause_ns, is_disarmed && devices_answer) {
+            self.pending = Some(Service::Arm);
         }
     }
 
@@ -260,6 +309,10 @@ impl Controller {
                 self.safety.rearm();
                 self.ramp.halt();
                 self.enter(Mode::Armed, now_ns);
+                if let Some(velocity_rad_s) = self.resume.take_velocity_rad_s() {
+                    self.enter(Mode::Crawling, now_ns);
+                    self.ramp.aim(velocity_rad_s);
+                }
             }
             ServiceOutcome::Done(Service::Disarm) => {
                 self.disarm_due_ns = None;
@@ -268,7 +321,7 @@ impl Controller {
                 }
             }
             // A disarmed worm stays disarmed, a faulty one faulty; the loop has told why.
-            ServiceOutcome::Failed(Service::Arm) => {}
+            ServiceOutcome::Failed(Service::Arm) => self.resume.give_up(),
             ServiceOutcome::Failed(Service::Disarm) => {
                 self.disarm_failures += 1;
                 self.disarm_due_ns = Some(now_ns + RETRY_NS);
@@ -304,10 +357,10 @@ impl Controller {
         self.back_off_until_rad = Some(self.intake.state.motor_angle_rad + backward * self.back_off_cycles * TAU);
     }
 
-    fn take_command(&mut self, command: &Command, inputs: &Inputs<'_>) -> Reply {
+    fn take_command(&mut self, command: &Command, now_ns: u64, servo: Option<&ServoReading>) -> Reply {
         let verdict = match CommandKind::try_from(command.kind) {
             Err(_) => Verdict::Unknown,
-            Ok(kind) => self.carry_out(kind, command.cycles_per_s, inputs),
+            Ok(kind) => self.carry_out(kind, command.cycles_per_s, now_ns, servo),
         };
         Reply {
             sequence: self.intake.state.sequence,
@@ -318,8 +371,13 @@ impl Controller {
         }
     }
 
-    fn carry_out(&mut self, kind: CommandKind, cycles_per_s: f64, inputs: &Inputs<'_>) -> Verdict {
-        let now_ns = inputs.now_ns;
+    fn carry_out(
+        &mut self,
+        kind: CommandKind,
+        cycles_per_s: f64,
+        now_ns: u64,
+        servo: Option<&ServoReading>,
+    ) -> Verdict {
         match (kind, self.mode) {
             (CommandKind::Arm, Mode::Disarmed) => {
                 self.pending.get_or_insert(Service::Arm);
@@ -327,7 +385,7 @@ impl Controller {
             }
             (CommandKind::Arm, Mode::Armed) => Verdict::Accepted,
             (CommandKind::Crawl, Mode::Armed | Mode::Crawling | Mode::Holding) => {
-                self.begin_crawl(cycles_per_s, inputs)
+                self.begin_crawl(cycles_per_s, now_ns)
             }
             (CommandKind::Hold, Mode::Armed | Mode::Crawling | Mode::Holding) => {
                 if self.mode != Mode::Holding {
@@ -341,7 +399,7 @@ impl Controller {
             }
             (CommandKind::Stop, Mode::Stopping | Mode::Disarmed) => Verdict::Accepted,
             (CommandKind::Reset, Mode::Fault) => {
-                if self.safety.persists(self.fault, now_ns, inputs.servo, &self.intake) {
+                if self.safety.persists(self.fault, now_ns, servo, &self.intake) {
                     Verdict::FaultPersists
                 } else {
                     self.pending.get_or_insert(Service::Arm);
@@ -352,7 +410,7 @@ impl Controller {
         }
     }
 
-    fn begin_crawl(&mut self, cycles_per_s: f64, inputs: &Inputs<'_>) -> Verdict {
+    fn begin_crawl(&mut self, cycles_per_s: f64, now_ns: u64) -> Verdict {
         let velocity_rad_s = if cycles_per_s == 0.0 {
             self.gait_velocity_rad_s
         } else {
@@ -365,7 +423,7 @@ impl Controller {
             return Verdict::NoEstimator;
         }
         if self.mode != Mode::Crawling {
-            self.enter(Mode::Crawling, inputs.now_ns);
+            self.enter(Mode::Crawling, now_ns);
         }
         self.back_off_until_rad = None;
         self.ramp.aim(velocity_rad_s);
@@ -446,6 +504,7 @@ impl Controller {
     fn fill_state(&mut self, now_ns: u64, velocity_rad_s: f64) -> State {
         let state = &mut self.intake.state;
         state.time_ns = now_ns;
+        state.host_paused_ns = self.presence.paused_ns();
         state.goal_velocity_rad_s = velocity_rad_s;
         state.mode = self.mode.code();
         state.fault = self.fault.code();

@@ -37,11 +37,21 @@ impl Cam {
 pub(super) struct Intake {
     cam: Cam,
     pub(super) state: State,
+    servo_clock: Option<ServoClock>,
     tracker: Option<TrackerClock>,
-    /// Time of the last servo answer, ns.
+    /// When the servo last answered, ns of the loop's own clock.
     pub(super) servo_seen_ns: Option<u64>,
-    /// Time of the last new tracker sample, ns.
+    /// When the last new tracker sample came, ns of the loop's own clock.
     pub(super) sample_seen_ns: Option<u64>,
+}
+
+/// The servo's own clock as last read.
+#[derive(Debug, Clone, Copy)]
+struct ServoClock {
+    tick_ms: u16,
+    read_ns: u64,
+    /// The register has been seen to count; some imitations of the servo never do.
+    counts: bool,
 }
 
 /// The tracker's own counters as last seen.
@@ -49,7 +59,15 @@ pub(super) struct Intake {
 struct TrackerClock {
     sample: u32,
     capture_us: u32,
+    arrived_ns: u64,
 }
+
+/// Values of the servo's realtime tick (XL330-M288 e-manual, register 120: 0 to 32,767 ms).
+const REALTIME_TICKS: u16 = 32_768;
+
+/// How much further than the computer's clock the servo's may go between two readings, ms: the first of them may have come late, from
+/// before a pause of the computer.
+const LATEST_READING_MS: u64 = 2_000;
 
 /// A counter step larger than this is a tracker that started anew, not samples that were missed.
 const RESTART_STEP: u32 = 100_000;
@@ -59,6 +77,7 @@ impl Intake {
         Self {
             cam: Cam::new(config),
             state: State::unknown(config.worm.cells),
+            servo_clock: None,
             tracker: None,
             servo_seen_ns: None,
             sample_seen_ns: None,
@@ -69,14 +88,12 @@ impl Intake {
         self.cam
     }
 
-    pub(super) fn take_servo(&mut self, now_ns: u64, reading: Option<&ServoReading>) {
+    /// Takes what the servo said at `now_ns` of the computer's clock, which is `present_ns` of the loop's own.
+    pub(super) fn take_servo(&mut self, now_ns: u64, present_ns: u64, reading: Option<&ServoReading>) {
         let state = &mut self.state;
         state.motor_is_new = u32::from(reading.is_some());
-        let Some(reading) = reading else {
-            state.link_failures += 1;
-            return;
-        };
-        self.servo_seen_ns = Some(now_ns);
+        let Some(reading) = reading else { return };
+        self.servo_seen_ns = Some(present_ns);
         state.motor_angle_rad = self.cam.angle_rad(reading);
         state.phase = state.motor_angle_rad / TAU;
         state.motor_velocity_rad_s = self.cam.sign * reading.velocity_rad_s;
@@ -84,14 +101,51 @@ impl Intake {
         state.motor_duty = self.cam.sign * reading.duty;
         state.bus_voltage_v = reading.voltage_v;
         state.motor_temperature_c = reading.temperature_c;
+        self.follow_servo_clock(now_ns, reading.realtime_tick_ms);
     }
 
-    pub(super) fn take_tracker(&mut self, now_ns: u64, reading: Option<&TrackerReading>) {
+    /// Unwraps the servo's clock. Where it cannot have gone on as it reads, because the servo restarted or was silent for longer than
+    /// its counter reaches, this computer's clock tells how long it was away.
+    fn follow_servo_clock(&mut self, now_ns: u64, tick_ms: u16) {
+        let Some(last) = self.servo_clock else {
+            self.servo_clock = Some(ServoClock {
+                tick_ms,
+                read_ns: now_ns,
+                counts: false,
+            });
+            return;
+        };
+        let counts = last.counts || tick_ms != last.tick_ms;
+        self.servo_clock = Some(ServoClock {
+            tick_ms,
+            read_ns: now_ns,
+            counts,
+        });
+        if !counts {
+            return;
+        }
+        let by_servo_ms = u64::from(tick_ms.wrapping_sub(last.tick_ms) % REALTIME_TICKS);
+        let elapsed_ns = now_ns.saturating_sub(last.read_ns);
+        let elapsed_ms = elapsed_ns / 1_000_000;
+        let is_plausible =
+            by_servo_ms <= elapsed_ms + LATEST_READING_MS && elapsed_ms < u64::from(REALTIME_TICKS) - LATEST_READING_MS;
+        let step_s = if is_plausible {
+            by_servo_ms as f64 * 1e-3
+        } else {
+            elapsed_ns as f64 * 1e-9
+        };
+        let time_s = &mut self.state.motor_time_s;
+        *time_s = if time_s.is_nan() { 0.0 } else { *time_s } + step_s;
+    }
+
+    /// Takes what the tracker said, likewise.
+    pub(super) fn take_tracker(&mut self, now_ns: u64, present_ns: u64, reading: Option<&TrackerReading>) {
         self.state.sample_is_new = 0;
         let Some(reading) = reading else { return };
         let clock = TrackerClock {
             sample: reading.sample,
             capture_us: reading.capture_time_us,
+            arrived_ns: now_ns,
         };
         let (step, elapsed_us) = match self.tracker {
             None => (1, 0),
@@ -101,18 +155,18 @@ impl Intake {
                 clock.capture_us.wrapping_sub(last.capture_us),
             ),
         };
-        let first = self.tracker.replace(clock).is_none();
+        let before = self.tracker.replace(clock);
         let state = &mut self.state;
         let restarted = step > RESTART_STEP;
         state.sample += 1;
         if !restarted {
             state.samples_missed += u64::from(step) - 1;
         }
-        if first {
+        if before.is_none() {
             state.sample_time_s = f64::from(clock.capture_us) * 1e-6;
         } else if restarted {
             // The old clock is gone; this computer's own clock tells how long the tracker was away.
-            let away_ns = now_ns.saturating_sub(self.sample_seen_ns.unwrap_or(now_ns));
+            let away_ns = now_ns.saturating_sub(before.map_or(now_ns, |before| before.arrived_ns));
             state.sample_time_s += away_ns as f64 * 1e-9;
         } else {
             state.sample_time_s += f64::from(elapsed_us) * 1e-6;
@@ -123,6 +177,6 @@ impl Intake {
             let seen = state.valid_mask >> cell & 1 == 1;
             state.position_m[cell] = if seen { reading.positions_m[cell] } else { f64::NAN };
         }
-        self.sample_seen_ns = Some(now_ns);
+        self.sample_seen_ns = Some(present_ns);
     }
 }

@@ -2,7 +2,9 @@
 //! thread reads the loop's counters every now and then, for the [evidence](super::evidence) in late ticks.
 
 use super::evidence::{Counters, Counts, Snapshot};
+use crate::logging::Summed;
 use crate::message::{Culprit, Fault, Mode};
+use crate::realtime::monotonic_ns;
 use crossbeam::queue::ArrayQueue;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -23,6 +25,16 @@ pub(super) enum Entry {
         to: Mode,
         fault: Fault,
         alarm: u32,
+        /// The pause behind [`Fault::HostPaused`].
+        pause_ns: u64,
+    },
+    HostPaused {
+        pause_ns: u64,
+        evidence: Counts,
+    },
+    RateChanged {
+        configured_hz: f64,
+        held_hz: f64,
     },
     Overrun {
         sequence: u64,
@@ -104,7 +116,7 @@ impl Drop for Journal {
 }
 
 fn write_entries(shared: &Shared) {
-    let mut overruns = Overruns::default();
+    let mut recurring = Recurring::default();
     loop {
         let ticks = shared.ticks.load(Ordering::Relaxed);
         shared.snapshot.store(ticks, shared.counters.read());
@@ -117,15 +129,26 @@ fn write_entries(shared: &Shared) {
                     skipped,
                     culprit,
                     late_us,
-                } => overruns.add(sequence, skipped, culprit, late_us),
-                Entry::ModeChanged { from, to, fault, alarm } => log_mode(from, to, fault, alarm),
+                } => recurring.take_late(sequence, skipped, culprit, late_us),
+                Entry::HostPaused { pause_ns, evidence } => recurring.take_pause(pause_ns, evidence),
+                Entry::RateChanged { configured_hz, held_hz } => recurring.take_rate(configured_hz, held_hz),
+                Entry::ModeChanged {
+                    from,
+                    to,
+                    fault: Fault::HostPaused,
+                    pause_ns,
+                    ..
+                } if to == Mode::Fault => log_host_paused(from, pause_ns),
+                Entry::ModeChanged {
+                    from, to, fault, alarm, ..
+                } => log_mode(from, to, fault, alarm),
                 Entry::PortLost => {
                     tracing::error!("the serial port is gone: plug it in again, then `wormd command reset`")
                 }
                 Entry::PortBack => tracing::info!("the serial port is open again"),
             }
         }
-        overruns.log_now_and_then(is_over);
+        recurring.log_what_is_due(is_over);
         let dropped = shared.dropped.swap(0, Ordering::Relaxed);
         if dropped > 0 {
             tracing::warn!(
@@ -140,6 +163,17 @@ fn write_entries(shared: &Shared) {
     }
 }
 
+fn log_host_paused(from: Mode, pause_ns: u64) {
+    tracing::error!(
+        "the worm was stopped while {from}: {} is longer than the servo's watchdog waits; `wormd command reset` goes on, \
+         control.resume_after_pause does so by itself, and `wormd check` says what keeps the computer from pausing",
+        format_args!(
+            "host-paused, the computer did not run the controller for {} ms, which",
+            pause_ns / 1_000_000
+        )
+    );
+}
+
 fn log_mode(from: Mode, to: Mode, fault: Fault, alarm: u32) {
     if to == Mode::Fault {
         let alarm = crate::message::AlarmKind::try_from(alarm).map_or("", crate::message::AlarmKind::name);
@@ -149,39 +183,109 @@ fn log_mode(from: Mode, to: Mode, fault: Fault, alarm: u32) {
     }
 }
 
-/// Overruns come in swarms when a machine is busy; one line a second tells of all of them.
+/// Ticks that ended late.
 #[derive(Default)]
-struct Overruns {
-    count: u64,
+struct LateTicks {
+    ticks: u64,
     skipped: u64,
     worst_us: u32,
-    last: Option<(u64, Culprit)>,
-    quiet_polls: u32,
+    worst: Option<(u64, Culprit)>,
 }
 
-impl Overruns {
-    fn add(&mut self, sequence: u64, skipped: u64, culprit: Culprit, late_us: u32) {
-        self.count += 1;
-        self.skipped += skipped;
-        if late_us >= self.worst_us {
-            self.worst_us = late_us;
-            self.last = Some((sequence, culprit));
+impl LateTicks {
+    fn log(&self) {
+        let (tick, culprit) = self.worst.unwrap_or((0, Culprit::None));
+        tracing::warn!(
+            ticks = self.ticks,
+            deadlines_missed = self.skipped,
+            worst_late_us = self.worst_us,
+            worst_tick = tick,
+            %culprit,
+            "ticks ended late"
+        );
+    }
+}
+
+/// Pauses of the computer, and what the kernel has counted in them.
+#[derive(Default)]
+struct Pauses {
+    count: u64,
+    total_ms: f64,
+    longest_ms: f64,
+    stolen_ms: f64,
+    waited_ms: f64,
+}
+
+impl Pauses {
+    fn log(&self) {
+        tracing::warn!(
+            pauses = self.count,
+            total_ms = self.total_ms.round(),
+            longest_ms = self.longest_ms.round(),
+            stolen_by_host_ms = self.stolen_ms.round(),
+            waited_for_cpu_ms = self.waited_ms.round(),
+            "host-paused: the computer did not run the controller for a while; no device is blamed for it"
+        );
+    }
+}
+
+/// What recurs, each kind summed by itself.
+#[derive(Default)]
+struct Recurring {
+    late: Summed<LateTicks>,
+    pauses: Summed<Pauses>,
+    changes_of_rate: Summed<(u64, f64)>,
+    told_of_rate: bool,
+}
+
+impl Recurring {
+    fn take_late(&mut self, sequence: u64, skipped: u64, culprit: Culprit, late_us: u32) {
+        self.late.add(|late| {
+            late.ticks += 1;
+            late.skipped += skipped;
+            if late_us >= late.worst_us {
+                late.worst_us = late_us;
+                late.worst = Some((sequence, culprit));
+            }
+        });
+    }
+
+    fn take_pause(&mut self, pause_ns: u64, evidence: Counts) {
+        let ms = |ns: u64| ns as f64 * 1e-6;
+        self.pauses.add(|pauses| {
+            pauses.count += 1;
+            pauses.total_ms += ms(pause_ns);
+            pauses.longest_ms = pauses.longest_ms.max(ms(pause_ns));
+            pauses.stolen_ms += ms(evidence.stolen_ns);
+            pauses.waited_ms += ms(evidence.waited_ns);
+        });
+    }
+
+    /// One line says what the computer holds and what to set; that it comes and goes is summed.
+    fn take_rate(&mut self, configured_hz: f64, held_hz: f64) {
+        if std::mem::replace(&mut self.told_of_rate, true) {
+            self.changes_of_rate.add(|(count, newest_hz)| {
+                *count += 1;
+                *newest_hz = held_hz;
+            });
+        } else {
+            tracing::warn!(
+                "this computer, or its link, does not hold {configured_hz:.0} Hz: the loop goes on at a steady {held_hz:.0} Hz; set \
+                 control.rate_hz = {held_hz:.0}, or give the loop real-time priority and a CPU of its own (`wormd check` says how)"
+            );
         }
     }
 
-    fn log_now_and_then(&mut self, is_over: bool) {
-        self.quiet_polls += 1;
-        let a_second_has_passed = self.quiet_polls >= 50;
-        if let (Some((tick, culprit)), true) = (self.last, a_second_has_passed || is_over) {
-            tracing::warn!(
-                ticks = self.count,
-                deadlines_missed = self.skipped,
-                worst_late_us = self.worst_us,
-                worst_tick = tick,
-                %culprit,
-                "ticks ended late"
-            );
-            *self = Self::default();
+    fn log_what_is_due(&mut self, is_over: bool) {
+        let now_ns = monotonic_ns();
+        if let Some(late) = self.late.take_due(now_ns, is_over) {
+            late.log();
+        }
+        if let Some(pauses) = self.pauses.take_due(now_ns, is_over) {
+            pauses.log();
+        }
+        if let Some((changes, newest_hz)) = self.changes_of_rate.take_due(now_ns, is_over) {
+            tracing::info!(changes, newest_hz, "the loop's rate was adapted again");
         }
     }
 }

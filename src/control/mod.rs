@@ -3,11 +3,13 @@
 //!
 //! In the order in which one tick runs:
 //!
-//! 1. [`Schedule`] says when the tick is due; the loop in [`run()`] sleeps until then.
+//! 1. [`Schedule`] says when the tick is due; the loop in [`run()`] sleeps until then. `rate` slows it down where the computer cannot
+//!    hold the configured rate.
 //! 2. The link exchanges the goal velocity for readings.
 //! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](crate::message::State), the next
-//!    goal and, rarely, a [`Service`]. It knows the limits (`safety`), the ramps (`ramp`) and how readings become
-//!    messages (`intake`); it takes time as an argument, so all of it is tested in virtual time.
+//!    goal and, rarely, a [`Service`]. It knows the limits (`safety`), the ramps (`ramp`), how readings become
+//!    messages (`intake`), and which part of the time the loop was there at all (`presence`, `resume`); it takes time as an
+//!    argument, so all of it is tested in virtual time.
 //! 4. The loop publishes, wakes who listens, carries out a service if one is due, and finishes the tick on the schedule. A tick
 //!    that was late gets its culprit, by what the kernel has counted (`evidence`); what there is to log goes to the `journal`.
 
@@ -16,7 +18,10 @@ mod drive;
 mod evidence;
 mod intake;
 mod journal;
+mod presence;
 mod ramp;
+mod rate;
+mod resume;
 mod run;
 mod safety;
 mod schedule;

@@ -33,6 +33,10 @@ impl Ramp {
         self.velocity_rad_s
     }
 
+    pub(super) fn target_rad_s(&self) -> f64 {
+        self.target_rad_s
+    }
+
     pub(super) fn direction_of_target(&self) -> f64 {
         if self.target_rad_s < 0.0 { -1.0 } else { 1.0 }
     }

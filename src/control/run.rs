@@ -5,6 +5,8 @@ use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
 use super::drive::Drive;
 use super::evidence::{Counts, Parts, find_culprit};
 use super::journal::{Entry, Journal};
+use super::presence::{Looks, SHORTEST_PAUSE_NS, absent_ns};
+use super::rate::RateKeeper;
 use super::schedule::Schedule;
 use crate::config::Config;
 use crate::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
@@ -105,10 +107,18 @@ pub fn run(
         journal,
         controller: Controller::new(config),
         schedule: Schedule::new(config.control.rate_hz, monotonic_ns()),
+        rate: RateKeeper::new(
+            config.control.rate_hz,
+            slowest_rate_hz(config),
+            config.control.adapt_rate,
+        ),
+        configured_hz: config.control.rate_hz,
         bus_wait_share: config.control.bus_wait_share,
         alarms: [Alarm::NONE; ALARMS_PER_TICK],
         last: None,
         publish_ns: 0,
+        work_ns: 0,
+        host_pauses: 0,
         unpublished: 0,
         ticks: 0,
         was_gone: false,
@@ -121,17 +131,31 @@ pub fn run(
     })
 }
 
+/// The slowest rate that the loop may fall back to: it still sees every sample of the tracker, and silences in time.
+fn slowest_rate_hz(config: &Config) -> f64 {
+    let shortest_s = config
+        .control
+        .link_timeout_s
+        .min(f64::from(config.servo.watchdog_ms) * 1e-3);
+    (2.0 * config.tracker.rate_hz).max(5.0 / shortest_s)
+}
+
 struct Loop {
     ports: Ports,
     journal: Journal,
     controller: Controller,
     schedule: Schedule,
+    rate: RateKeeper,
+    configured_hz: f64,
     bus_wait_share: f64,
     alarms: [Alarm; ALARMS_PER_TICK],
     /// What the last tick decided.
     last: Option<Outputs>,
     /// What the last tick's publishing took.
     publish_ns: u64,
+    /// What the last tick took behind its exchange, without a service.
+    work_ns: u64,
+    host_pauses: u64,
     unpublished: u64,
     ticks: u64,
     was_gone: bool,
@@ -168,6 +192,16 @@ impl Loop {
         );
         self.note_port(drive.is_gone());
         let exchanged = monotonic_ns();
+        let absent_ns = absent_ns(
+            &Looks {
+                deadline,
+                woken,
+                bus_allowed,
+                exchanged,
+                work_before: self.work_ns,
+            },
+            self.schedule.period_ns(),
+        );
 
         let served = self
             .last
@@ -180,6 +214,8 @@ impl Loop {
         let (command, responder) = split(self.ports.commands.take());
         let inputs = Inputs {
             now_ns: exchanged,
+            absent_ns,
+            lost_exchanges: outcome.lost,
             servo: outcome.servo.as_ref().ok(),
             tracker: outcome.tracker.as_ref().ok(),
             command,
@@ -217,6 +253,8 @@ impl Loop {
                 notified,
             },
             served.is_some(),
+            outputs.host_paused_ns,
+            outcome.late,
         );
         self.last = Some(outputs);
         self.ticks += 1;
@@ -243,8 +281,13 @@ impl Loop {
     fn note_mode(&self, from: Mode, outputs: &Outputs) {
         let to = self.controller.mode();
         if from != to {
-            let (fault, alarm) = (self.controller.fault(), outputs.state.fault_alarm);
-            self.journal.note(Entry::ModeChanged { from, to, fault, alarm });
+            self.journal.note(Entry::ModeChanged {
+                from,
+                to,
+                fault: self.controller.fault(),
+                alarm: outputs.state.fault_alarm,
+                pause_ns: self.controller.pause_of_fault_ns(),
+            });
         }
     }
 
@@ -254,7 +297,8 @@ impl Loop {
 
     /// Ends the tick on the schedule and publishes where its time went. A tick in which a service was carried out has
     /// paused on purpose, while the worm stood: it is no overrun.
-    fn finish(&mut self, times: Times, served: bool) {
+    fn finish(&mut self, times: Times, served: bool, host_paused_ns: u64, late_answer: bool) {
+        let period_ns = self.schedule.period_ns();
         let skipped = if served {
             self.schedule.finish_pause(monotonic_ns());
             0
@@ -264,8 +308,23 @@ impl Loop {
         let (culprit, evidence) = if skipped == 0 {
             (Culprit::None, Counts::default())
         } else {
-            self.explain_late_tick(&times, skipped)
+            self.explain_late_tick(&times)
         };
+        if host_paused_ns > 0 {
+            self.host_pauses += 1;
+            self.journal.note(Entry::HostPaused {
+                pause_ns: host_paused_ns,
+                evidence,
+            });
+        } else if skipped > 0 {
+            let late_us = (times.notified - times.deadline) / 1000;
+            self.journal.note(Entry::Overrun {
+                sequence: self.ticks,
+                skipped,
+                culprit,
+                late_us: u32::try_from(late_us).unwrap_or(u32::MAX),
+            });
+        }
         let timing = Timing {
             sequence: self.ticks,
             deadline_ns: times.deadline,
@@ -277,6 +336,9 @@ impl Loop {
             waited_ns: evidence.waited_ns,
             stolen_ns: evidence.stolen_ns,
             overruns: self.schedule.skipped(),
+            period_ns,
+            host_paused_ns,
+            host_pauses: self.host_pauses,
             overrun: u32::from(skipped > 0),
             culprit: culprit.code(),
             minor_faults: u32::try_from(evidence.minor_faults).unwrap_or(u32::MAX),
@@ -284,11 +346,23 @@ impl Loop {
         };
         let published = self.ports.timing.publish(&timing);
         self.count_unpublished(published);
-        self.publish_ns = monotonic_ns() - times.notified + times.published - times.computed;
+        let end = monotonic_ns();
+        self.publish_ns = end - times.notified + times.published - times.computed;
+        self.work_ns = end - times.resumed;
+        // What a pause has cost says nothing about the rate; the tick behind it is the first that does.
+        let is_paused = host_paused_ns > 0 || self.work_ns >= SHORTEST_PAUSE_NS;
+        let (skipped, late_answer) = if is_paused { (0, false) } else { (skipped, late_answer) };
+        if let Some(divider) = self.rate.take(skipped, late_answer) {
+            self.schedule.slow_down(divider);
+            self.journal.note(Entry::RateChanged {
+                configured_hz: self.configured_hz,
+                held_hz: self.configured_hz / divider as f64,
+            });
+        }
     }
 
-    /// Finds who made a tick late that cost `skipped` deadlines, and has it logged.
-    fn explain_late_tick(&self, times: &Times, skipped: u64) -> (Culprit, Counts) {
+    /// Finds who made a tick late.
+    fn explain_late_tick(&self, times: &Times) -> (Culprit, Counts) {
         let evidence = self.journal.evidence(self.ticks);
         let parts = Parts {
             wake: times.woken - times.deadline,
@@ -297,15 +371,7 @@ impl Loop {
             compute: times.computed - times.resumed,
             publish: times.notified - times.computed,
         };
-        let culprit = find_culprit(&parts, &evidence);
-        let late_us = (times.notified - times.deadline) / 1000;
-        self.journal.note(Entry::Overrun {
-            sequence: self.ticks,
-            skipped,
-            culprit,
-            late_us: u32::try_from(late_us).unwrap_or(u32::MAX),
-        });
-        (culprit, evidence)
+        (find_culprit(&parts, &evidence), evidence)
     }
 }
 

@@ -1,4 +1,6 @@
 //! Limits and patience: which readings, or whose silence, stop the worm.
+//!
+//! Every time here is of the loop's own clock (`presence`): a pause of the computer is nobody's silence.
 
 use super::intake::Intake;
 use crate::config::{Config, Limits};
@@ -18,6 +20,7 @@ pub(super) struct Safety {
     link_timeout_ns: u64,
     tracker_timeout_ns: u64,
     estimator_timeout_ns: u64,
+    watchdog_ns: u64,
     require_estimator: bool,
     over_current_since_ns: Option<u64>,
     voltage_v: Option<f64>,
@@ -30,6 +33,8 @@ pub(super) struct Watched<'a> {
     pub(super) servo: Option<&'a ServoReading>,
     pub(super) intake: &'a Intake,
     pub(super) estimate_seen_ns: Option<u64>,
+    /// How long the computer paused since the servo answered before, ns.
+    pub(super) paused_ns: u64,
     /// When torque came on: silences are counted from then at the earliest.
     pub(super) armed_ns: u64,
     /// When crawling began, while the worm crawls.
@@ -47,6 +52,7 @@ impl Safety {
             link_timeout_ns: seconds_to_ns(config.control.link_timeout_s),
             tracker_timeout_ns: seconds_to_ns(config.control.tracker_timeout_s),
             estimator_timeout_ns: seconds_to_ns(config.control.estimator_timeout_s),
+            watchdog_ns: u64::from(config.servo.watchdog_ms) * 1_000_000,
             require_estimator: config.control.require_estimator,
             over_current_since_ns: None,
             voltage_v: None,
@@ -85,7 +91,13 @@ impl Safety {
             return Some(Fault::ServoHardware);
         }
         if servo.watchdog == WATCHDOG_TRIPPED {
-            return Some(Fault::WatchdogTripped);
+            // The silence that tripped it was the computer's own where most of it was a pause.
+            let by_pause = 2 * watched.paused_ns >= self.watchdog_ns;
+            return Some(if by_pause {
+                Fault::HostPaused
+            } else {
+                Fault::WatchdogTripped
+            });
         }
         // The watchdog was set when torque came on; zero is what a servo reads that has started anew since.
         if servo.watchdog == 0 {

@@ -4,7 +4,8 @@
 /// are counted and never made up for, so ticks never bunch.
 #[derive(Debug, Clone, Copy)]
 pub struct Schedule {
-    period_ns: u64,
+    configured_ns: u64,
+    period_ns: u64, // a multiple of it
     deadline_ns: u64,
     skipped: u64,
 }
@@ -14,6 +15,7 @@ impl Schedule {
     pub fn new(rate_hz: f64, now_ns: u64) -> Self {
         let period_ns = (1e9 / rate_hz).round() as u64;
         Self {
+            configured_ns: period_ns,
             period_ns,
             deadline_ns: now_ns + period_ns,
             skipped: 0,
@@ -33,6 +35,11 @@ impl Schedule {
     /// Deadlines that passed without a tick since the start.
     pub fn skipped(&self) -> u64 {
         self.skipped
+    }
+
+    /// From the next deadline on, time between deadlines is the configured one times `divider`.
+    pub fn slow_down(&mut self, divider: u64) {
+        self.period_ns = self.configured_ns * divider.max(1);
     }
 
     /// Ends a tick at `now_ns` and gives the number of deadlines that it cost. The next deadline is then the first one of
@@ -83,5 +90,9 @@ mod tests {
             (11, 61_000_000),
             "a pause costs nothing"
         );
+        schedule.slow_down(4);
+        assert_eq!((schedule.finish(61_100_000), schedule.deadline_ns()), (0, 65_000_000));
+        schedule.slow_down(1);
+        assert_eq!((schedule.finish(65_100_000), schedule.deadline_ns()), (0, 66_000_000));
     }
 }

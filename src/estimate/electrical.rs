@@ -1,4 +1,5 @@
-//! Electrical energy into the motor and heat in its winding, by the trapezoidal rule over time stamps.
+//! Electrical energy into the motor and heat in its winding, by the trapezoidal rule over the time that the motor lived through
+//! (`lived`).
 //!
 //! Only readings of their own tick count; between two of them power is taken to run in a straight line. Over more than
 //! [`LONGEST_GAP_S`] without a reading nothing is counted, and the standard error grows by what a steady power would
@@ -55,7 +56,7 @@ impl Energies {
 
 #[derive(Debug, Clone, Copy)]
 struct Reading {
-    time_ns: u64,
+    lived_ns: u64,
     power_w: f64,
     copper_w: f64,
     current_a: f64, // duty × current, what a volt more would add
@@ -79,12 +80,12 @@ impl Electrical {
         }
     }
 
-    /// Takes up a tick, if its motor readings are its own and make sense.
-    pub(super) fn update(&mut self, state: &State) {
+    /// Takes up a tick at `lived_ns` of the motor's time, if its motor readings are its own and make sense.
+    pub(super) fn update(&mut self, state: &State, lived_ns: u64) {
         let winding_v = state.bus_voltage_v * state.motor_duty;
         let resistance_ohm = self.resistance_at_ohm(state.motor_temperature_c);
         let reading = Reading {
-            time_ns: state.time_ns,
+            lived_ns,
             power_w: winding_v * state.motor_current_a,
             copper_w: state.motor_current_a * state.motor_current_a * resistance_ohm,
             current_a: state.motor_duty * state.motor_current_a,
@@ -94,9 +95,9 @@ impl Electrical {
             return;
         }
         if let Some(last) = self.last.replace(reading)
-            && reading.time_ns > last.time_ns
+            && reading.lived_ns > last.lived_ns
         {
-            let dt = (reading.time_ns - last.time_ns) as f64 * 1e-9;
+            let dt = (reading.lived_ns - last.lived_ns) as f64 * 1e-9;
             let mean = |from: f64, to: f64| 0.5 * (from + to);
             let power_w = mean(last.power_w, reading.power_w);
             if dt <= LONGEST_GAP_S {
@@ -151,20 +152,26 @@ mod tests {
         }
     }
 
+    /// A motor that lives through all of the computer's time.
+    fn take(electrical: &mut Electrical, state: &State) {
+        electrical.update(state, state.time_ns);
+    }
+
     #[test]
     fn lost_and_repeated_readings_do_not_matter_but_a_long_gap_is_left_out() {
         let mut electrical = Electrical::new(2.0);
         for tick in (0..=1000u64).filter(|tick| tick % 7 != 3) {
-            electrical.update(&state(tick * 1_000_000, tick as f64 * 1e-3));
-            electrical.update(&State {
+            take(&mut electrical, &state(tick * 1_000_000, tick as f64 * 1e-3));
+            let repeated = State {
                 motor_is_new: 0,
                 ..state(tick * 1_000_000, 99.0)
-            });
+            };
+            take(&mut electrical, &repeated);
         }
         let total = electrical.total();
         assert!((total.electrical_j - 1.25).abs() < 1e-9, "∫ 2.5 V · t dt");
         assert!((total.copper_j - 2.0 / 3.0).abs() < 1e-5, "∫ 2 Ω · t² dt");
-        electrical.update(&state(2_000_000_000, 1.0));
+        take(&mut electrical, &state(2_000_000_000, 1.0));
         let gap = electrical.total().since(&total);
         assert_eq!(gap.electrical_j, 0.0);
         assert!((gap.sigma_j() - 2.5).abs() < 1e-9);
@@ -175,10 +182,11 @@ mod tests {
         let heat_j = |celsius| {
             let mut electrical = Electrical::new(2.0);
             for time_ns in [0, 50_000_000] {
-                electrical.update(&State {
+                let warm = State {
                     motor_temperature_c: celsius,
                     ..state(time_ns, 1.0)
-                });
+                };
+                take(&mut electrical, &warm);
             }
             electrical.total().copper_j
         };
@@ -190,8 +198,8 @@ mod tests {
     fn readings_that_make_no_sense_are_left_out() {
         let mut electrical = Electrical::new(2.0);
         for current_a in [1.0, f64::NAN, f64::INFINITY, 1.0] {
-            let time_ns = electrical.last.map_or(0, |last| last.time_ns + 10_000_000);
-            electrical.update(&state(time_ns, current_a));
+            let time_ns = electrical.last.map_or(0, |last| last.lived_ns + 10_000_000);
+            take(&mut electrical, &state(time_ns, current_a));
         }
         assert!((electrical.total().electrical_j - 0.025).abs() < 1e-12);
     }

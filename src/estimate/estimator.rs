@@ -9,6 +9,7 @@ use super::electrical::{Electrical, Energies};
 use super::filter::BodyFilter;
 use super::fit::Fit;
 use super::gait::Gait;
+use super::lived::LivedTime;
 use super::mismatch::{Mismatch, ResidualMap};
 use super::prediction::Predictor;
 use super::unknown;
@@ -31,6 +32,7 @@ const GUESSED_BOUND_SHARE: f64 = 0.15;
 #[derive(Debug, Clone, Copy)]
 struct Opened {
     time_s: f64,
+    host_paused_ns: u64,
     electrical: Energies,
     forward_m: [f64; MAX_CELLS],
     backward_m: [f64; MAX_CELLS],
@@ -46,7 +48,9 @@ pub struct Estimator {
     tips: Vec<Tip>, // in forward direction
     filter: BodyFilter,
     contacts: Contacts,
+    lived: LivedTime,
     capture: Capture,
+    host_paused_ns: u64, // as of the last state
     cycles: Cycles,
     electrical: Electrical,
     window: Window,
@@ -90,7 +94,9 @@ impl Estimator {
             tracker_period_s: 1.0 / config.tracker.rate_hz,
             filter: BodyFilter::new(config, gait),
             contacts: Contacts::new(&tips),
+            lived: LivedTime::default(),
             capture: Capture::default(),
+            host_paused_ns: 0,
             cycles: Cycles::new(config.gait.direction.sign() as i32),
             electrical: Electrical::new(config.servo.winding_resistance_ohm),
             window: Window::new(cells),
@@ -105,6 +111,7 @@ impl Estimator {
             predictor,
             opened: Opened {
                 time_s: 0.0,
+                host_paused_ns: 0,
                 electrical: Energies::default(),
                 forward_m: [0.0; MAX_CELLS],
                 backward_m: [0.0; MAX_CELLS],
@@ -142,7 +149,10 @@ impl Estimator {
     pub fn update(&mut self, state: &State) -> Update<'_> {
         let time_s = state.time_ns as f64 * 1e-9;
         self.notice_restart(state, time_s);
-        self.electrical.update(state);
+        let lived_ns = self.lived.update(state);
+        let lived_s = lived_ns as f64 * 1e-9;
+        self.electrical.update(state, lived_ns);
+        self.host_paused_ns = state.host_paused_ns;
         if state.mode != Mode::Crawling.code() {
             self.mismatch.disturb();
         }
@@ -152,10 +162,10 @@ impl Estimator {
         }
         let sampled = state.sample_is_new == 1 && state.phase.is_finite();
         if sampled {
-            self.take_sample(state, time_s);
+            self.take_sample(state, time_s, lived_s);
         }
         if state.phase.is_finite() {
-            self.capture.note_tick(time_s, state.phase);
+            self.capture.note_tick(lived_s, state.phase);
             self.notice_silence(state.phase, time_s);
             self.last = Some((state.sequence, time_s, state.phase));
         } else if let Some((sequence, ..)) = &mut self.last {
@@ -178,6 +188,7 @@ impl Estimator {
             return;
         }
         self.filter.forget();
+        self.lived.forget();
         self.capture.forget();
         self.cycles.forget();
         self.electrical.restart();
@@ -259,6 +270,7 @@ impl Estimator {
     fn open(&mut self, time_s: f64) {
         self.opened = Opened {
             time_s,
+            host_paused_ns: self.host_paused_ns,
             electrical: self.electrical.total(),
             forward_m: *self.contacts.forward_m(),
             backward_m: *self.contacts.backward_m(),
@@ -320,6 +332,7 @@ impl Estimator {
         self.cycle.index = self.cycle_index;
         self.cycle.end_ns = (end_s * 1e9) as u64;
         self.cycle.duration_s = end_s - self.opened.time_s;
+        self.cycle.host_paused_s = self.host_paused_ns.saturating_sub(self.opened.host_paused_ns) as f64 * 1e-9;
         self.cycle.energy_electrical_j = spent.electrical_j;
         self.cycle.energy_copper_j = spent.copper_j;
         self.cycle.energy_electrical_sigma_j = spent.sigma_j();
@@ -401,8 +414,8 @@ impl Estimator {
     }
 
     /// Takes up the tracker sample of a state.
-    fn take_sample(&mut self, state: &State, time_s: f64) {
-        let (captured_s, phase) = self.capture.place(state.sample_time_s, time_s, state.phase);
+    fn take_sample(&mut self, state: &State, time_s: f64, lived_s: f64) {
+        let (captured_s, phase) = self.capture.place(state.sample_time_s, lived_s, state.phase);
         let mut position_m = [f64::NAN; MAX_CELLS];
         for (cell, to) in position_m[..self.cells].iter_mut().enumerate() {
             *to = state

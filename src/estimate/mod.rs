@@ -5,7 +5,7 @@
 //!
 //! # The story
 //! The controller's ticks carry the gait phase, precisely, and now and then a tracker sample, noisy, late and with holes.
-//! `capture` finds the phase at which a sample was taken. `filter` makes of the samples where the cells are *now*, and
+//! `lived` knows how much of the time the motor lived through, `capture` finds the phase at which a sample was taken. `filter` makes of the samples where the cells are *now*, and
 //! throws out what cannot be. `contact` follows the tips on those positions; together they are the `estimate` topic.
 //!
 //! Energies need better positions than a causal filter has, for noise at a sliding tip looks like sliding. So `window`
@@ -43,6 +43,7 @@ mod estimator;
 mod filter;
 mod fit;
 mod gait;
+mod lived;
 pub mod mismatch;
 mod observer;
 mod prediction;
@@ -52,6 +53,7 @@ mod window;
 
 pub(crate) use capture::Capture;
 pub use estimator::Estimator;
+pub(crate) use lived::LivedTime;
 pub use mismatch::{Residual, ResidualMap};
 pub use observer::{Observer, Report};
 pub use update::{EstimatorError, Update};

@@ -35,6 +35,7 @@ pub(super) fn cycle(cells: usize) -> Cycle {
         index: 0,
         end_ns: 0,
         duration_s: f64::NAN,
+        host_paused_s: f64::NAN,
         advance_m: f64::NAN,
         advance_sigma_m: f64::NAN,
         forward_slide_m: NOT_KNOWN,

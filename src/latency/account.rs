@@ -3,10 +3,37 @@
 use super::histogram::Durations;
 use super::timeline::{Tick, WorstTicks};
 use crate::message::{Culprit, Timing};
+use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 
 /// States whose timing, and timings whose state, may be on their way: some seconds at the highest rate.
 const ON_THE_WAY: usize = 65_536;
+
+/// Pauses of the computer: times of 10 ms and more in which it did not run the loop though it had to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct HostPauses {
+    /// How many.
+    pub count: u64,
+    /// How long they were together, s.
+    pub total_s: f64,
+    /// The longest, s.
+    pub longest_s: f64,
+    /// The newest, s.
+    #[serde(skip)]
+    pub newest_s: f64,
+}
+
+impl HostPauses {
+    fn take(&mut self, timing: &Timing) {
+        if timing.host_paused_ns == 0 {
+            return;
+        }
+        self.newest_s = timing.host_paused_ns as f64 * 1e-9;
+        self.count += 1;
+        self.total_s += self.newest_s;
+        self.longest_s = self.longest_s.max(self.newest_s);
+    }
+}
 
 /// What a run of ticks amounts to.
 #[derive(Debug, Clone, Default)]
@@ -35,6 +62,8 @@ pub struct Account {
     pub notify: Durations,
     /// Late ticks by culprit.
     pub culprits: BTreeMap<&'static str, u64>,
+    /// Pauses of the computer.
+    pub host_pauses: HostPauses,
     /// The latest ticks.
     pub worst: WorstTicks,
     last: Option<Timing>,
@@ -46,6 +75,7 @@ impl Account {
     /// Takes the timings of one run of the loop, one after the other. A tick is counted when the next one has told what its
     /// publishing took.
     pub fn take(&mut self, timing: &Timing) {
+        self.host_pauses.take(timing);
         let Some(last) = self.last.replace(*timing) else {
             self.missed_before_last = timing.overruns;
             return;
@@ -152,6 +182,9 @@ mod tests {
             waited_ns: 0,
             stolen_ns: 0,
             overruns,
+            period_ns: 1_000_000,
+            host_paused_ns: 0,
+            host_pauses: 0,
             overrun: u32::from(culprit != Culprit::None),
             culprit: culprit.code(),
             minor_faults: 0,

@@ -21,7 +21,7 @@ pub mod outcome;
 pub mod stress;
 pub mod timeline;
 
-pub use account::{Account, Deliveries};
+pub use account::{Account, Deliveries, HostPauses};
 pub use histogram::{Durations, Percentiles};
 pub use measure::{Measure, ratio};
 pub use outcome::Outcome;

@@ -1,5 +1,6 @@
 //! What a run of the latency benchmark has found. The JSON names are a contract.
 
+use super::account::HostPauses;
 use super::histogram::Durations;
 use super::timeline::WorstTicks;
 use crate::realtime::machine::Setting;
@@ -61,6 +62,8 @@ pub struct Outcome {
     pub alarm_us: Durations,
     /// Late ticks by culprit.
     pub culprits: BTreeMap<&'static str, u64>,
+    /// Pauses of the computer, of which the late ticks are part.
+    pub host_pauses: HostPauses,
     /// The latest ticks, the latest first.
     pub worst_ticks: WorstTicks,
     /// Share of one CPU that the controller took, 0 to 1.
@@ -94,7 +97,7 @@ pub struct RateTrial {
     pub ticks: u64,
     /// Deadlines that passed without a tick.
     pub overruns: u64,
-    /// Ticks in which the servo's answer was missing.
+    /// Ticks in which the servo's answer was missing or too late.
     pub failed_exchanges: u64,
     /// Whether so few were missed that the rate counts as sustained.
     pub sustained: bool,

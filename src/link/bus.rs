@@ -18,8 +18,12 @@ pub struct Bus<P> {
     pub(super) decoder: Decoder,
     pub(super) counters: LinkCounters,
     /// Garbage of the decoder that the counters hold already.
-    garbage_counted: u64,
+    pub(super) garbage_counted: u64,
     writes_are_answered: bool,
+    /// Exchanges to which the servo's answer may still come.
+    pub(super) answers_owed: u32,
+    /// An answer of the servo came in the last exchange, be it to an earlier one.
+    pub(super) was_answered: bool,
     /// Exchanges since a device last said anything.
     pub(super) silent_in_a_row: u32,
 }
@@ -86,6 +90,8 @@ impl<P: Port> Bus<P> {
             counters: LinkCounters::NONE,
             garbage_counted: 0,
             writes_are_answered: true,
+            answers_owed: 0,
+            was_answered: false,
             silent_in_a_row: 0,
         }
     }

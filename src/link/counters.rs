@@ -17,8 +17,10 @@ pub struct LinkCounters {
     pub crc_errors: u64,
     /// Bytes that belonged to no packet.
     pub garbage_bytes: u64,
-    /// Bytes of late answers, thrown away before the next request.
+    /// Bytes of late answers, which came before the next request.
     pub stale_bytes: u64,
+    /// Exchanges in which a late answer stood in for one that did not come in time.
+    pub late_answers: u64,
     /// Exchanges in which one device's data came and the other's did not.
     pub partial_answers: u64,
     /// Exchanges in which the servo reported another goal than the one that was sent.
@@ -92,6 +94,7 @@ impl LinkCounters {
         crc_errors: 0,
         garbage_bytes: 0,
         stale_bytes: 0,
+        late_answers: 0,
         partial_answers: 0,
         goals_not_taken: 0,
         wrong_ids: 0,

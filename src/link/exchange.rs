@@ -5,6 +5,9 @@
 //! level 1): its receipt would collide with the question on a half-duplex line. The receipt is the goal that is read back
 //! with the block.
 //!
+//! An answer that comes only after the wait is over is no answer to the next question, but it is a reading, a tick old and with the
+//! servo's own time in it. It stands in for the next tick's where that fails, so that a slow line is not taken for a silent device.
+//!
 //! | [`ReadPlan`] | question | answers | bytes on the wire with 5 cells |
 //! |---|---|---|---|
 //! | `FastBulk` | one | one, of both devices | 16 + 20 + 96 |
@@ -73,6 +76,10 @@ pub struct ExchangeOutcome {
     /// The servo reports the goal that was sent. If not, though it was read: the goal got lost, is beyond the velocity limit,
     /// or is locked by a latched watchdog; or the answer is a late one to an earlier question.
     pub goal_taken: bool,
+    /// A reading is the late answer to an earlier exchange.
+    pub late: bool,
+    /// Earlier exchanges of which it is known now that the servo's answer never comes.
+    pub lost: u32,
     /// Bytes sent.
     pub sent_bytes: u32,
     /// Bytes received.
@@ -127,16 +134,25 @@ impl ReadFailure {
     }
 }
 
+/// Most bytes of late answers that are looked at: those of a tenth of a second at 1 kHz. What is beyond is thrown away.
+const LATE_LIMIT: usize = 16 * 1024;
+
+/// Questions that may be without an answer before the oldest counts as lost: those of a tenth of a second at 1 kHz.
+const MOST_OWED: u32 = 100;
+
 /// What has been read so far.
 struct Harvest {
     servo: Result<ServoReading, ReadFailure>,
     tracker: Result<TrackerReading, ReadFailure>,
+    /// Whole answers of the servo.
+    servo_answers: u32,
 }
 
 impl Harvest {
     const NOTHING: Self = Self {
         servo: Err(ReadFailure::Silent),
         tracker: Err(ReadFailure::Silent),
+        servo_answers: 0,
     };
 
     /// Takes a block of either device. Whether it was one that was asked for.
@@ -157,6 +173,7 @@ impl Harvest {
             self.servo = block
                 .map(|block| ServoReading::from_block(block, flags.alert))
                 .ok_or(failure);
+            self.servo_answers += u32::from(self.servo.is_ok());
             self.servo == Err(ReadFailure::Malformed)
         } else if id == plan.tracker {
             let of_length = flags.error.is_none() && data.len() == usize::from(plan.spans()[1].length);
@@ -237,6 +254,12 @@ impl<P: Port> Bus<P> {
     pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
         let before = self.counters;
         self.counters.exchanges += 1;
+        let mut late = Harvest::NOTHING;
+        if self.answers_owed > 0 {
+            // A port that fails here fails in the exchange, too.
+            let _ = self.take_late_answers(plan, &mut late);
+        }
+        let lost = self.count_lost(late.servo_answers);
         let mut harvest = Harvest::NOTHING;
         let end = match plan.read {
             ReadPlan::FastBulk | ReadPlan::Bulk => {
@@ -254,6 +277,8 @@ impl<P: Port> Bus<P> {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
         }
         counters.partial_answers += u64::from(harvest.servo.is_ok() != harvest.tracker.is_ok());
+        self.answers_owed = (self.answers_owed + 1).saturating_sub(harvest.servo_answers);
+        self.was_answered = harvest.servo_answers > 0;
         let received_bytes = (counters.received_bytes - before.received_bytes) as u32;
         self.silent_in_a_row = if received_bytes == 0 {
             self.silent_in_a_row.saturating_add(1)
@@ -263,14 +288,57 @@ impl<P: Port> Bus<P> {
         let reported_rad_s = harvest.servo.map(|servo| servo.goal_velocity_rad_s);
         let goal_taken = reported_rad_s.is_ok_and(|found| goal_counts(found) == goal_counts(goal_velocity_rad_s));
         counters.goals_not_taken += u64::from(harvest.servo.is_ok() && !goal_taken);
+        let servo_is_late = harvest.servo.is_err() && late.servo.is_ok();
+        let tracker_is_late = harvest.tracker.is_err() && late.tracker.is_ok();
+        counters.late_answers += u64::from(servo_is_late || tracker_is_late);
         ExchangeOutcome {
             goal_taken,
-            servo: harvest.servo,
-            tracker: harvest.tracker,
+            late: servo_is_late || tracker_is_late,
+            lost,
+            servo: if servo_is_late { late.servo } else { harvest.servo },
+            tracker: if tracker_is_late { late.tracker } else { harvest.tracker },
             sent_bytes: (counters.sent_bytes - before.sent_bytes) as u32,
             received_bytes,
             silent_in_a_row: self.silent_in_a_row,
         }
+    }
+
+    /// How many answers will never come, when `late` of those owed have come late. Answers come in the order of the questions: where
+    /// the servo has answered since and nothing more is on the line, what is still owed got lost.
+    fn count_lost(&mut self, late: u32) -> u32 {
+        self.answers_owed = self.answers_owed.saturating_sub(late);
+        let lost = if self.was_answered && late == 0 {
+            self.answers_owed
+        } else {
+            self.answers_owed.saturating_sub(MOST_OWED)
+        };
+        self.answers_owed -= lost;
+        lost
+    }
+
+    /// Takes what has come since the wait of the exchange before was over, without waiting for more.
+    fn take_late_answers(&mut self, plan: &ExchangePlan, late: &mut Harvest) -> Result<(), PortError> {
+        let mut stale_bytes = 0;
+        while stale_bytes < LATE_LIMIT {
+            let received = self.port.receive(self.decoder.free_space(), Instant::now())?;
+            if received == 0 {
+                break;
+            }
+            stale_bytes += received;
+            self.decoder.commit(received);
+            while let Some(packet) = self.decoder.next_packet() {
+                match packet {
+                    Ok(Packet::Status(status)) => late.take_status(plan, &status, &mut self.counters),
+                    Ok(Packet::FastReply(reply)) => late.take_fast_reply(plan, reply, &mut self.counters),
+                    Ok(Packet::Instruction(_)) | Err(_) => {}
+                }
+            }
+        }
+        self.counters.stale_bytes += stale_bytes as u64;
+        // All of it has been counted: what no packet came of is neither garbage nor once more stale.
+        self.decoder.clear();
+        self.garbage_counted = self.decoder.garbage_bytes();
+        Ok(())
     }
 
     fn exchange_bulk(

@@ -6,13 +6,16 @@ use iceoryx2::prelude::ZeroCopySend;
 
 message! {
     /// One finished gait cycle, with the model's prediction beside the measurement.
-    Cycle = "wormd_cycle_v1", made: end_ns, cells: |cycle| cycle.cell_count, {
+    Cycle = "wormd_cycle_v2", made: end_ns, cells: |cycle| cycle.cell_count, {
         /// Number of the cycle since crawling began, from 0.
         index: u64,
         /// When the cycle ended, ns of `CLOCK_MONOTONIC`.
         end_ns: u64,
         /// How long the cycle took, s.
         duration_s: f64,
+        /// Part of it in which the computer paused and ran no controller, s: 0 in an undisturbed cycle. The energies leave out what
+        /// the worm did not live through.
+        host_paused_s: f64,
         /// Distance travelled: mean over the cells of the net displacement, m.
         advance_m: f64,
         /// Standard error of the advance, m.

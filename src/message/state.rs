@@ -48,12 +48,14 @@ coded_enum! {
         ServoRestarted = 9 => "servo-restarted",
         /// An alarm whose policy is `stop`.
         Alarm = 10 => "alarm",
+        /// The computer did not run the controller for so long that the servo's own bus watchdog stopped the motor.
+        HostPaused = 11 => "host-paused",
     }
 }
 
 message! {
     /// One tick of the controller, published every tick.
-    State = "wormd_state_v1", made: time_ns, cells: |state| state.cell_count, {
+    State = "wormd_state_v2", made: time_ns, cells: |state| state.cell_count, {
         /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
         sequence: u64,
         /// When the tick's exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
@@ -74,6 +76,9 @@ message! {
         bus_voltage_v: f64,
         /// Servo temperature, °C.
         motor_temperature_c: f64,
+        /// When the servo took these readings, s of its own clock (register 120, realtime tick), unwrapped. It stands still
+        /// while the servo does, as a simulated one does whose computer pauses.
+        motor_time_s: f64,
         /// When the newest tracker sample was captured, s of the tracker's own clock, unwrapped.
         sample_time_s: f64,
         /// Cell positions along the canal of the newest tracker sample, m; `NaN` where not seen.
@@ -82,15 +87,18 @@ message! {
         sample: u64,
         /// Tracker samples that came and went between two reads, since the controller started.
         samples_missed: u64,
-        /// Ticks since the controller started in which the servo's answer was missing or unusable.
+        /// Exchanges since the controller started that the servo never answered, or not usably. A late answer is one.
         link_failures: u64,
+        /// Time since the controller started in which the computer did not run it though it had to, ns: the pauses of 10 ms and
+        /// more, summed.
+        host_paused_ns: u64,
         /// How many cells are in use.
         cell_count: u32,
         /// Bit i set: cell i was seen in the newest sample.
         valid_mask: u32,
         /// 1 when the tracker sample is new in this tick, else 0.
         sample_is_new: u32,
-        /// 1 when the motor readings are of this tick, 0 when the last good ones are repeated.
+        /// 1 when the motor readings came in this tick, 0 when the last ones are repeated.
         motor_is_new: u32,
         /// Where the state machine stands: [`Mode`] as a code.
         mode: u32 as Name<Mode>,
@@ -117,11 +125,13 @@ impl State {
             motor_duty: f64::NAN,
             bus_voltage_v: f64::NAN,
             motor_temperature_c: f64::NAN,
+            motor_time_s: f64::NAN,
             sample_time_s: f64::NAN,
             position_m: [f64::NAN; MAX_CELLS],
             sample: 0,
             samples_missed: 0,
             link_failures: 0,
+            host_paused_ns: 0,
             cell_count: cell_count as u32,
             valid_mask: 0,
             sample_is_new: 0,

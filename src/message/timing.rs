@@ -29,7 +29,7 @@ coded_enum! {
 
 message! {
     /// Where the time of one tick went, published every tick.
-    Timing = "wormd_timing_v2", made: deadline_ns, cells: |_| 0, {
+    Timing = "wormd_timing_v3", made: deadline_ns, cells: |_| 0, {
         /// The tick's number, as in [`super::State::sequence`].
         sequence: u64,
         /// The absolute deadline at which the loop asked to be woken, ns of `CLOCK_MONOTONIC`.
@@ -50,6 +50,13 @@ message! {
         stolen_ns: u64,
         /// Ticks skipped since the controller started, because an earlier one ended after their deadline.
         overruns: u64,
+        /// Time between deadlines, ns: the configured one, or a multiple of it on a computer that cannot hold the configured rate.
+        period_ns: u64,
+        /// How long the computer did not run the loop before or in this tick though it had to, ns; 0 below 10 ms, which is
+        /// lateness, not a pause.
+        host_paused_ns: u64,
+        /// Such pauses since the controller started, this one included.
+        host_pauses: u64,
         /// 1 when this tick ended after the next deadline.
         overrun: u32,
         /// [`Culprit`] as a code: what made an overrunning tick late.

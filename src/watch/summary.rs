@@ -3,7 +3,7 @@
 use super::mismatch;
 use super::telemetry::Telemetry;
 use crate::config::Worm;
-use crate::latency::{Percentiles, WorstTicks};
+use crate::latency::{HostPauses, Percentiles, WorstTicks};
 use crate::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Severity};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ pub struct Summary {
     pub samples_lost: u64,
     /// Tracker samples that came and went between two reads.
     pub tracker_samples_missed: u64,
-    /// Ticks in which the servo's answer was missing or unusable.
+    /// Exchanges that the servo never answered, or not usably.
     pub link_failures: u64,
     /// Where the controller stood before the stop at the end.
     pub mode: &'static str,
@@ -45,6 +45,8 @@ pub struct CycleSummary {
     pub index: u64,
     /// Duration, s.
     pub duration_s: f64,
+    /// Part of it in which the computer paused, s; 0 in an undisturbed cycle.
+    pub host_paused_s: f64,
     /// Whether every tip's deformation was known from the start of the cycle.
     pub settled: bool,
     /// Distance travelled, m.
@@ -126,6 +128,10 @@ pub struct TimingSummary {
     pub notify_us: Percentiles,
     /// Late ticks by culprit.
     pub culprits: BTreeMap<&'static str, u64>,
+    /// Rate at the end, Hz: the configured one, or the fraction of it that the computer holds.
+    pub rate_hz: Option<f64>,
+    /// Pauses of the computer.
+    pub host_pauses: HostPauses,
     /// The worst ticks, the worst first.
     pub worst_ticks: WorstTicks,
 }
@@ -158,6 +164,11 @@ impl Summary {
                 publish_us: account.publish.percentiles(),
                 notify_us: account.notify.percentiles(),
                 culprits: account.culprits.clone(),
+                rate_hz: telemetry
+                    .timing
+                    .map(|timing| 1e9 / timing.period_ns as f64)
+                    .filter(|rate_hz| rate_hz.is_finite()),
+                host_pauses: account.host_pauses,
                 worst_ticks: account.worst.clone(),
             },
         }
@@ -175,6 +186,7 @@ impl CycleSummary {
         Self {
             index: cycle.index,
             duration_s: cycle.duration_s,
+            host_paused_s: cycle.host_paused_s,
             settled: cycle.settled != 0,
             advance_m: cycle.advance_m,
             advance_sigma_m: cycle.advance_sigma_m,
@@ -240,6 +252,18 @@ impl fmt::Display for MechanicalEnergy<'_> {
     }
 }
 
+/// What to know of a cycle beside its figures.
+fn remarks(cycle: &CycleSummary) -> String {
+    let mut remarks = String::new();
+    if !cycle.settled {
+        remarks += "  (settling)";
+    }
+    if cycle.host_paused_s > 0.0 {
+        remarks += &format!("  (computer paused {:.2} s)", cycle.host_paused_s);
+    }
+    remarks
+}
+
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
@@ -270,7 +294,7 @@ impl fmt::Display for Summary {
                 cycle.energy_copper_j * 1e3,
                 cycle.energy_friction_inside_j * 1e3,
                 cycle.cot.map_or("-".to_owned(), |cot| format!("{cot:.2}")),
-                if cycle.settled { "" } else { "  (settling)" },
+                remarks(cycle),
             )?;
         }
         if let Some(Some(predicted_m)) = self.cycles.last().map(|cycle| cycle.predicted_advance_m) {
@@ -316,6 +340,16 @@ impl fmt::Display for Summary {
         }
         for (culprit, ticks) in &timing.culprits {
             writeln!(f, "late     {ticks} tick(s), culprit {culprit}")?;
+        }
+        let pauses = timing.host_pauses;
+        if pauses.count > 0 {
+            writeln!(
+                f,
+                "host-paused {} time(s), {:.2} s in all, {:.0} ms at most: the computer did not run the controller",
+                pauses.count,
+                pauses.total_s,
+                pauses.longest_s * 1e3
+            )?;
         }
         if let Some(worst) = timing.worst_ticks.ticks().first().filter(|worst| worst.late) {
             writeln!(

@@ -153,32 +153,53 @@ fn silence_is_an_interval_of_requests() {
 }
 
 #[test]
-fn late_answers_are_thrown_away() {
+fn a_late_answer_stands_in_for_the_next_one_and_is_none_that_was_lost() {
     let late = Faults {
         delay: 1.0,
         delay_by: Duration::from_millis(4),
         ..Faults::NONE
     };
     let mut bus = bus(late, 1);
-    for _ in 0..5 {
-        let outcome = bus.exchange(
-            &plan(ReadPlan::FastBulk),
-            1.0,
-            Instant::now() + Duration::from_millis(1),
+    let mut exchange = |goal_rad_s, wait_ms| {
+        let wait = Duration::from_millis(wait_ms);
+        bus.exchange(&plan(ReadPlan::FastBulk), goal_rad_s, Instant::now() + wait)
+    };
+    for number in 0..5 {
+        let outcome = exchange(f64::from(number), 1);
+        assert_eq!(
+            (outcome.late, outcome.servo.is_ok()),
+            (number > 0, number > 0),
+            "{number}"
         );
-        assert!(outcome.servo.is_err());
+        assert_eq!((outcome.goal_taken, outcome.lost), (false, 0), "{number}");
+        if let Ok(servo) = outcome.servo {
+            let earlier_rad_s = f64::from(number - 1);
+            assert!((servo.goal_velocity_rad_s - earlier_rad_s).abs() < scale::VELOCITY_RAD_S);
+        }
         std::thread::sleep(Duration::from_millis(45));
     }
     bus.port_mut().set_faults(Faults::NONE);
-    assert!(
-        bus.exchange(
-            &plan(ReadPlan::FastBulk),
-            1.0,
-            Instant::now() + Duration::from_millis(50)
-        )
-        .is_complete()
-    );
-    assert_eq!(bus.counters().stale_bytes, 5 * 96);
+    let wait = Instant::now() + Duration::from_millis(50);
+    let outcome = bus.exchange(&plan(ReadPlan::FastBulk), 5.0, wait);
+    assert!(outcome.is_complete() && outcome.goal_taken && !outcome.late && outcome.lost == 0);
+    let counters = bus.counters();
+    assert_eq!((counters.stale_bytes, counters.late_answers), (5 * 96, 4));
+}
+
+#[test]
+fn an_answer_that_never_comes_is_lost_when_the_next_one_has_come() {
+    let silent = Faults {
+        silence: 2..5,
+        ..Faults::NONE
+    };
+    let mut bus = bus(silent, 1);
+    let lost: Vec<u32> = (0..8)
+        .map(|_| {
+            let wait = Instant::now() + Duration::from_millis(2);
+            bus.exchange(&plan(ReadPlan::FastBulk), 1.0, wait).lost
+        })
+        .collect();
+    assert_eq!(lost, [0, 0, 0, 0, 0, 0, 3, 0]);
 }
 
 #[test]

@@ -92,18 +92,18 @@ fn other_files_are_refused_with_what_to_do() {
             &["channel /state: has no channel of a worm, only /tf"],
         ),
         (
-            foreign("/state", "wormd_state_v1", "cdr", "x"),
+            foreign("/state", "wormd_state_v2", "cdr", "x"),
             &[
                 "channel /state: holds messages encoded as 'cdr', not as 'json'",
                 "wormd record",
             ],
         ),
         (
-            foreign("/state", "wormd_state_v2", "json", "{}"),
-            &["channel /state: holds 'wormd_state_v2', and this version of wormd reads 'wormd_state_v1'"],
+            foreign("/state", "wormd_state_v1", "json", "{}"),
+            &["channel /state: holds 'wormd_state_v1', and this version of wormd reads 'wormd_state_v2'"],
         ),
         (
-            foreign("/state", "wormd_state_v1", "json", "{\"sequence\": -1}"),
+            foreign("/state", "wormd_state_v2", "json", "{\"sequence\": -1}"),
             &[
                 "channel /state, message 7: cannot be read: invalid value: integer `-1`",
                 "line 1 column",

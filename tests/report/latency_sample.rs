@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, LogNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wormd::latency::outcome::{Cyclictest, RateTrial};
-use wormd::latency::{Durations, Outcome, Tick, WorstTicks};
+use wormd::latency::{Durations, HostPauses, Outcome, Tick, WorstTicks};
 use wormd::message::Culprit;
 use wormd::realtime::machine::Setting;
 
@@ -39,6 +39,12 @@ pub fn nothing() -> Outcome {
         floor_polled_delivery_us: Durations::default(),
         alarm_us: Durations::default(),
         culprits: Default::default(),
+        host_pauses: HostPauses {
+            count: 3,
+            total_s: 0.0855,
+            longest_s: 0.0512,
+            newest_s: 0.0121,
+        },
         worst_ticks: WorstTicks::default(),
         controller_cpu_share: f64::NAN,
         floor_cpu_share: f64::NAN,

@@ -14,9 +14,9 @@ const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
 const SETTLED_CYCLES: usize = 10;
 const UNEQUAL: &str = "[0.0020, 0.0011, 0.00175, 0.00215]";
 
-type Quantity = (&'static str, fn(&Cycle) -> f64, fn(&Account) -> f64);
+pub type Quantity = (&'static str, fn(&Cycle) -> f64, fn(&Account) -> f64);
 
-const QUANTITIES: [Quantity; 6] = [
+pub const QUANTITIES: [Quantity; 6] = [
     ("loss (11)", |c| c.energy_loss_j, |t| t.loss_j),
     ("net (13)", |c| c.energy_actuator_net_j, |t| t.actuator_net_j),
     (
@@ -80,7 +80,7 @@ fn crawl(config: &Config, cycles: f64) -> (Vec<Cycle>, Vec<Account>) {
     )
 }
 
-fn percent(measured: f64, truth: f64) -> f64 {
+pub fn percent(measured: f64, truth: f64) -> f64 {
     100.0 * (measured / truth - 1.0)
 }
 

@@ -197,14 +197,7 @@ const CASES: &[Case] = &[
         F::None,
     ),
     case(LEVEL, "drop:share=0.02", None, &[], Crawling, F::None),
-    case(
-        LEVEL,
-        "delay:ms=2",
-        Some((LinkFault, 0.2)),
-        &[TrackerFault],
-        Faulty,
-        F::LinkLost,
-    ),
+    case(LEVEL, "delay:ms=2", None, &[], Crawling, F::None),
     case(
         LEVEL,
         "drag:force=0.3",

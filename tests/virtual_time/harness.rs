@@ -1,7 +1,7 @@
 //! One worm with its controller and its estimator, tick by tick, wired as the processes are: what the estimator says in one tick
 //! reaches the controller in the next.
 
-use super::machine::Machine;
+use super::machine::{Exchange, Machine};
 use wormd::config::Config;
 use wormd::control::{Controller, Inputs, Outputs};
 use wormd::estimate::Observer;
@@ -10,6 +10,17 @@ use wormd::message::{Alarm, AlarmKind, Command, CommandKind, Cycle, Fault, Mode,
 /// The estimator's heartbeat while no sample comes, s.
 const HEARTBEAT_S: f64 = 0.1;
 
+/// What a pause keeps from running.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Paused {
+    /// The whole computer: worm, controller and estimator.
+    Computer,
+    Controller,
+    /// The virtual worm, whose world then stands still.
+    Worm,
+    Estimator,
+}
+
 /// The loop around one worm.
 pub struct Session<M> {
     pub machine: M,
@@ -17,6 +28,14 @@ pub struct Session<M> {
     pub observer: Observer,
     period_ns: u64,
     now_ns: u64,
+    /// How long the worm's world has stood still.
+    stood_ns: u64,
+    /// For how long the controller has not run since its last tick.
+    absent_ns: u64,
+    worm_stands_until_ns: u64,
+    estimator_stands_until_ns: u64,
+    /// States that the estimator has not taken yet.
+    waiting: Vec<State>,
     last: Option<Outputs>,
     on_the_way: Vec<Alarm>,
     estimate_on_the_way: bool,
@@ -43,6 +62,11 @@ impl<M: Machine> Session<M> {
             observer: Observer::new(config).expect("a valid configuration"),
             period_ns: (1e9 / rate_hz) as u64,
             now_ns: 1_000_000_000, // what start-up took, and more
+            stood_ns: 0,
+            absent_ns: 0,
+            worm_stands_until_ns: 0,
+            estimator_stands_until_ns: 0,
+            waiting: Vec::new(),
             last: None,
             on_the_way: Vec::new(),
             estimate_on_the_way: false,
@@ -99,20 +123,60 @@ impl<M: Machine> Session<M> {
         }
     }
 
+    /// Lets a part of it pause for so long, beginning now.
+    pub fn pause(&mut self, paused: Paused, ms: u64) {
+        let pause_ns = ms * 1_000_000;
+        match paused {
+            Paused::Computer => {
+                self.stood_ns += pause_ns;
+                self.absent_ns += pause_ns;
+                self.now_ns += pause_ns;
+            }
+            Paused::Controller => {
+                self.absent_ns += pause_ns;
+                self.now_ns += pause_ns;
+            }
+            Paused::Worm => self.worm_stands_until_ns = self.now_ns + pause_ns,
+            Paused::Estimator => self.estimator_stands_until_ns = self.now_ns + pause_ns,
+        }
+    }
+
+    /// Time in the worm's world, s.
+    fn world_s(&self) -> f64 {
+        (self.now_ns - self.stood_ns) as f64 * 1e-9
+    }
+
+    /// One exchange with a worm whose world goes on; one that stands still answers nothing until it goes on.
+    fn exchange(&mut self) -> Exchange {
+        let goal_counts = self.last.map_or(0, |last| last.goal_counts);
+        if self.now_ns < self.worm_stands_until_ns {
+            self.stood_ns += self.period_ns;
+            return Exchange {
+                servo: None,
+                tracker: None,
+                lost: 0,
+            };
+        }
+        let world_s = self.world_s();
+        self.machine.exchange(goal_counts, world_s)
+    }
+
     /// One tick, in the order of `control::run`.
     pub fn tick(&mut self, command: Option<Command>) -> Tick {
         self.now_ns += self.period_ns;
-        let goal_counts = self.last.map_or(0, |last| last.goal_counts);
-        let exchange = self.machine.exchange(goal_counts, self.now_s());
+        let exchange = self.exchange();
         let now_ns = self.now_ns;
         let service = self.last.and_then(|last| last.service);
-        let served = service.map(|service| self.machine.serve(service, self.now_s()));
+        let world_s = self.world_s();
+        let served = service.map(|service| self.machine.serve(service, world_s));
         if let Some(served) = &served {
             // A service pauses the schedule.
-            self.now_ns = self.now_ns.max((served.ended_s * 1e9) as u64);
+            self.now_ns = self.now_ns.max((served.ended_s * 1e9) as u64 + self.stood_ns);
         }
         let outputs = self.controller.tick(&Inputs {
             now_ns,
+            absent_ns: std::mem::take(&mut self.absent_ns),
+            lost_exchanges: exchange.lost,
             servo: exchange.servo.as_ref(),
             tracker: exchange.tracker.as_ref(),
             command,
@@ -123,7 +187,14 @@ impl<M: Machine> Session<M> {
             hardware_error: served.and_then(|served| served.hardware_error),
         });
         self.last = Some(outputs);
-        self.estimate(&outputs.state);
+        self.on_the_way.clear();
+        self.estimate_on_the_way = false;
+        self.waiting.push(outputs.state);
+        if self.now_ns >= self.estimator_stands_until_ns {
+            for state in std::mem::take(&mut self.waiting) {
+                self.estimate(&state);
+            }
+        }
         Tick {
             state: outputs.state,
             goal_counts: outputs.goal_counts,
@@ -135,13 +206,12 @@ impl<M: Machine> Session<M> {
 
     fn estimate(&mut self, state: &State) {
         let report = self.observer.update(state);
-        self.on_the_way.clear();
         self.on_the_way.extend_from_slice(&report.alarms);
         self.raised
             .extend(report.alarms.iter().filter(|alarm| alarm.raised == 1));
         let beats = state.time_ns.saturating_sub(self.spoken_ns) as f64 * 1e-9 >= HEARTBEAT_S;
-        self.estimate_on_the_way = report.estimate.is_some() || beats;
-        if self.estimate_on_the_way {
+        if report.estimate.is_some() || beats {
+            self.estimate_on_the_way = true;
             self.spoken_ns = state.time_ns;
         }
         if let (Some(cycles), Some(cycle)) = (&mut self.cycles, report.cycle) {

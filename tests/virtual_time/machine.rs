@@ -13,6 +13,8 @@ use wormd::link::{Bus, ExchangePlan, LinkSettings, Port, PortError, ServoReading
 pub struct Exchange {
     pub servo: Option<ServoReading>,
     pub tracker: Option<TrackerReading>,
+    /// Earlier exchanges whose answer never comes.
+    pub lost: u32,
 }
 
 /// What became of a service, what the servo's hardware error register said, and when it was over.
@@ -142,6 +144,7 @@ impl Machine for Wired {
         Exchange {
             servo: outcome.servo.ok(),
             tracker: outcome.tracker.ok(),
+            lost: outcome.lost,
         }
     }
 
@@ -218,6 +221,7 @@ impl Machine for Bare {
         Exchange {
             servo: Some(servo),
             tracker: Some(*self.plant.capture()),
+            lost: 0,
         }
     }
 

@@ -5,6 +5,7 @@
 //! - `stall`: a hard stall is told and the goal is 0 within 100 ms; how near a sound worm comes to the threshold.
 //! - `faults`: what each fault of the virtual worm brings about, by when, and nothing else.
 //! - `mismatch`: which worms the model does not explain, and that those of the file and a few per cent off are quiet.
+//! - `pauses`: a computer that pauses, in whole or in part, is no fault of the worm's and costs no cycle its energies.
 //! - `hours`: healthy worms on many kinds of journeys, and no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
 //!
 //! Everything is seeded; a failure names its seed.
@@ -15,4 +16,5 @@ mod harness;
 mod hours;
 mod machine;
 mod mismatch;
+mod pauses;
 mod stall;

@@ -70,7 +70,7 @@ fn try_rate(rate_hz: f64, hub: &Hub, end: &AtomicBool) -> Result<RateTrial, Fail
     let mut timings = hub.subscriber::<Timing>().map_err(Failure::failed)?;
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
     let mut account = Account::default();
-    let mut failures: Option<(u64, u64)> = None; // exchanges that had failed when the trial began, and now
+    let mut unanswered = 0; // in time: a late answer shows a rate that is too high
     let begun = Instant::now();
     while begun.elapsed() < SETTLING + TRIAL && !end.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
@@ -80,15 +80,11 @@ fn try_rate(rate_hz: f64, hub: &Hub, end: &AtomicBool) -> Result<RateTrial, Fail
                 account.take(&timing);
             }
         }
-        if let Some(state) = states.latest().map_err(Failure::failed)?
-            && settled
-        {
-            let first = failures.map_or(state.link_failures, |(first, _)| first);
-            failures = Some((first, state.link_failures));
+        while let Some(state) = states.next().map_err(Failure::failed)? {
+            unanswered += u64::from(settled && state.motor_is_new == 0);
         }
     }
-    let failed = failures.map_or(0, |(first, last)| last - first);
-    Ok(RateTrial::new(rate_hz, &account, failed))
+    Ok(RateTrial::new(rate_hz, &account, unanswered))
 }
 
 impl RateTrial {

@@ -118,7 +118,20 @@ fn culprits(outcome: &Outcome) -> String {
             meaning(culprit).to_owned(),
         ]
     }));
-    aligned(&rows, 1, 1)
+    aligned(&rows, 1, 1) + &host_pauses(outcome)
+}
+
+fn host_pauses(outcome: &Outcome) -> String {
+    let pauses = outcome.host_pauses;
+    if pauses.count == 0 {
+        return String::new();
+    }
+    format!(
+        "\nhost-paused: the computer did not run the loop for 10 ms or more {} time(s), {:.2} s in all, {:.0} ms at most",
+        pauses.count,
+        pauses.total_s,
+        pauses.longest_s * 1e3
+    )
 }
 
 fn worst_ticks(outcome: &Outcome) -> String {

@@ -92,6 +92,7 @@ pub(super) fn outcome(bench: &Bench, findings: Findings, trouble: Option<&Failur
         floor_polled_delivery_us: findings.floor_polled_delivery,
         alarm_us: findings.alarm,
         culprits: account.culprits,
+        host_pauses: account.host_pauses,
         worst_ticks: account.worst,
         controller_cpu_share,
         floor_cpu_share: floor.cpu_share,

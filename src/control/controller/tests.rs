@@ -9,6 +9,7 @@ const MS: u64 = 1_000_000;
 struct Rig {
     controller: Controller,
     now_ns: u64,
+    absent_ns: u64,
     servo: ServoReading,
     tracker: TrackerReading,
     goal_counts: i32,
@@ -29,6 +30,7 @@ impl Rig {
         Self {
             controller: Controller::new(&config),
             now_ns: 1_000 * MS,
+            absent_ns: 0,
             servo: ServoReading {
                 watchdog: 5,
                 goal_velocity_rad_s: 0.0,
@@ -97,6 +99,8 @@ impl Rig {
         let alarm = self.alarm.take();
         let outputs = self.controller.tick(&Inputs {
             now_ns: self.now_ns,
+            absent_ns: std::mem::take(&mut self.absent_ns),
+            lost_exchanges: 0,
             servo: self.servo_answers.then_some(&self.servo),
             tracker: self.servo_answers.then_some(&self.tracker),
             command,
@@ -116,6 +120,15 @@ impl Rig {
         for _ in 0..ms {
             self.tick(None);
         }
+    }
+
+    /// The computer does not run the loop for so long, and nobody answers in the first tick behind it.
+    fn pause(&mut self, ms: u64) {
+        self.now_ns += ms * MS;
+        self.absent_ns = ms * MS;
+        let answers = std::mem::replace(&mut self.servo_answers, false);
+        self.tick(None);
+        self.servo_answers = answers;
     }
 
     fn command(&mut self, kind: CommandKind, cycles_per_s: f64) -> Verdict {
@@ -330,6 +343,158 @@ fn a_reset_forgets_what_the_servo_said_before_it() {
             (rig.mode(), rig.controller.fault()),
             (Mode::Armed, Fault::None),
             "row {index}"
+        );
+    }
+}
+
+#[test]
+fn a_pause_of_the_computer_is_nobody_s_silence() {
+    let mut rig = Rig::crawling("");
+    for pause_ms in [300, 20, 90, 600, 300] {
+        rig.pause(pause_ms);
+        rig.run(5);
+        assert_eq!(rig.mode(), Mode::Crawling, "after {pause_ms} ms");
+    }
+    let state = rig.tick(None).state;
+    assert_eq!(state.host_paused_ns, 1310 * MS);
+    // What is silent besides is still told in its time, and only the computer's own time is left out.
+    rig.servo_answers = false;
+    rig.run(50);
+    rig.pause(300);
+    rig.run(45);
+    assert_eq!(rig.mode(), Mode::Crawling, "96 ms of silence while the loop was there");
+    rig.run(10);
+    assert_eq!(rig.controller.fault(), Fault::LinkLost);
+}
+
+#[test]
+fn a_ramp_goes_on_after_a_pause_where_it_was() {
+    let mut rig = Rig::new("");
+    rig.run(10);
+    rig.command(CommandKind::Arm, 0.0);
+    rig.run(2);
+    rig.command(CommandKind::Crawl, 0.0);
+    rig.run(100);
+    let before = rig.goal_counts;
+    rig.pause(300);
+    let after = rig.goal_counts;
+    assert!((0..=2).contains(&(after - before)), "from {before} to {after} counts");
+}
+
+#[test]
+fn a_pause_that_outlasts_the_watchdog_is_told_as_what_it_was() {
+    for (pause_ms, fault) in [
+        (150, Fault::HostPaused),
+        (50, Fault::HostPaused),
+        (40, Fault::WatchdogTripped),
+    ] {
+        let mut rig = Rig::crawling("");
+        rig.pause(pause_ms);
+        rig.servo.watchdog = 0xFF;
+        rig.run(1);
+        assert_eq!(
+            (rig.mode(), rig.controller.fault()),
+            (Mode::Fault, fault),
+            "{pause_ms} ms"
+        );
+        if fault == Fault::HostPaused {
+            assert_eq!(rig.controller.pause_of_fault_ns(), pause_ms * MS);
+        }
+    }
+}
+
+/// Lets a pause trip the watchdog, and two seconds pass in which the servo can be prepared anew.
+fn trip(rig: &mut Rig, meanwhile: impl Fn(&mut Rig)) {
+    rig.pause(150);
+    rig.servo.watchdog = 0xFF;
+    rig.run(10);
+    assert_eq!(rig.controller.fault(), Fault::HostPaused);
+    rig.servo.watchdog = 5;
+    meanwhile(rig);
+    rig.run(2_000);
+}
+
+#[test]
+fn the_worm_crawls_on_by_itself_only_where_that_is_safe() {
+    const RESUME: &str = "[control]\nresume_after_pause = true\n";
+    type Meanwhile = fn(&mut Rig);
+    let table: [(&str, &str, Meanwhile, Mode); 7] = [
+        ("nothing else is wrong", RESUME, |_| {}, Mode::Crawling),
+        ("it is not allowed", "", |_| {}, Mode::Fault),
+        (
+            "an alarm stands that stops the worm",
+            RESUME,
+            |rig| rig.raise(AlarmKind::JammedCell),
+            Mode::Fault,
+        ),
+        (
+            "an alarm stands that only warns",
+            RESUME,
+            |rig| rig.raise(AlarmKind::EnergyOverBudget),
+            Mode::Crawling,
+        ),
+        (
+            "the servo is silent",
+            RESUME,
+            |rig| rig.servo_answers = false,
+            Mode::Fault,
+        ),
+        (
+            "the tracker is silent",
+            RESUME,
+            |rig| rig.tracker_runs = false,
+            Mode::Fault,
+        ),
+        (
+            "a person decides",
+            RESUME,
+            |rig| {
+                rig.command(CommandKind::Stop, 0.0);
+            },
+            Mode::Fault,
+        ),
+    ];
+    for (what, toml, meanwhile, mode) in table {
+        let mut rig = Rig::crawling(toml);
+        let speed = rig.goal_counts;
+        trip(&mut rig, meanwhile);
+        assert_eq!(rig.mode(), mode, "{what}");
+        if mode == Mode::Crawling {
+            assert!((rig.goal_counts - speed).abs() <= 1, "{what}: as fast as before");
+        }
+    }
+    let mut rig = Rig::crawling(RESUME);
+    for _ in 0..3 {
+        trip(&mut rig, |_| {});
+        assert_eq!(rig.mode(), Mode::Crawling);
+    }
+    trip(&mut rig, |_| {});
+    assert_eq!(rig.mode(), Mode::Fault, "not a fourth time within a minute");
+}
+
+#[test]
+fn the_servo_s_clock_is_unwrapped_and_survives_a_restart() {
+    let mut rig = Rig::new("");
+    rig.run(5);
+    assert!(
+        rig.tick(None).state.motor_time_s.is_nan(),
+        "a register that never counts is no clock"
+    );
+    // (time that passes, register; the servo's time; all ms)
+    for (passes, register, expected) in [
+        (1, 32_766, 1),
+        (3, 1, 4),
+        (300, 3, 6),
+        (8, 311, 314),
+        (1000, 7, 1314),
+        (40_000, 7_239, 41_314),
+    ] {
+        rig.now_ns += (passes - 1) * MS;
+        rig.servo.realtime_tick_ms = register;
+        let time_s = rig.tick(None).state.motor_time_s;
+        assert!(
+            (time_s - expected as f64 * 1e-3).abs() < 1e-9,
+            "{time_s} s at register {register}"
         );
     }
 }

@@ -1,8 +1,8 @@
 //! Link fault: the servo does not answer, or answers badly.
 //!
-//! Failed exchanges over a sliding half second, as a share of the exchanges that fit into it. Counters are compared, so
-//! states that the estimator did not receive are counted all the same. The controller's own verdict, link lost,
-//! raises the alarm at once.
+//! Failed exchanges over a sliding half second in which the computer did not pause, as a share of the exchanges in it. Counters are
+//! compared, so states that the estimator did not receive are counted all the same. An answer that comes late is none that failed:
+//! that is a busy computer, and `timing` tells it. The controller's own verdict, link lost, raises the alarm at once.
 
 use super::latch::{Finding, Reading, Verdict};
 use super::motion::Moment;
@@ -13,6 +13,8 @@ use crate::message::{Fault, Severity, State};
 const WINDOW_S: f64 = 0.5;
 /// Parts of the window; the oldest part falls out as a whole.
 const PARTS: usize = 10;
+/// Least share of the configured rate at which the loop ticks: see `control.adapt_rate`.
+const LEAST_RATE_SHARE: f64 = 0.125;
 
 #[derive(Debug, Clone)]
 pub(super) struct LinkFault {
@@ -20,7 +22,8 @@ pub(super) struct LinkFault {
     exchanges_in_window: f64,
     parts: [(u64, u64); PARTS], // ticks and failures
     part: usize,
-    part_began_ns: u64,
+    part_s: f64,              // length of the present part so far
+    filled_s: f64,            // since the first state, up to the window
     last: Option<(u64, u64)>, // sequence and failures of the last state
     since_ns: u64,
 }
@@ -32,35 +35,34 @@ impl LinkFault {
             exchanges_in_window: (config.control.rate_hz * WINDOW_S).max(1.0),
             parts: [(0, 0); PARTS],
             part: 0,
-            part_began_ns: 0,
+            part_s: 0.0,
+            filled_s: 0.0,
             last: None,
             since_ns: 0,
         }
     }
 
     pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
-        let part_ns = (WINDOW_S * 1e9) as u64 / PARTS as u64;
-        let passed = moment.now_ns.saturating_sub(self.part_began_ns) / part_ns;
-        for _ in 0..passed.min(PARTS as u64) {
-            self.part = (self.part + 1) % PARTS;
-            self.parts[self.part] = (0, 0);
-        }
-        self.part_began_ns += passed * part_ns;
-        let failed_now = u64::from(state.motor_is_new == 0);
+        self.advance_window(moment.present_s);
         let (ticks, failures) = match self.last {
             Some((sequence, failures)) => (
                 state.sequence.saturating_sub(sequence),
-                state.link_failures.saturating_sub(failures).max(failed_now),
+                state.link_failures.saturating_sub(failures),
             ),
-            None => (1, failed_now),
+            None => (1, 0),
         };
         self.last = Some((state.sequence, state.link_failures));
         let part = &mut self.parts[self.part];
         part.0 = part.0.saturating_add(ticks);
-        part.1 = part.1.saturating_add(failures.min(ticks));
+        part.1 = part.1.saturating_add(failures);
         let ticks: f64 = self.parts.iter().map(|part| part.0 as f64).sum();
         let failures: f64 = self.parts.iter().map(|part| part.1 as f64).sum();
-        let share = failures / ticks.max(self.exchanges_in_window);
+        let least_ticks = if self.filled_s < WINDOW_S {
+            1.0
+        } else {
+            LEAST_RATE_SHARE
+        } * self.exchanges_in_window;
+        let share = failures / ticks.max(least_ticks);
         if failures == 0.0 {
             self.since_ns = moment.now_ns;
         }
@@ -80,5 +82,20 @@ impl LinkFault {
             cell: None,
             severity: if lost { Severity::Critical } else { Severity::Warning },
         })
+    }
+
+    fn advance_window(&mut self, present_s: f64) {
+        let longest_part_s = WINDOW_S / PARTS as f64;
+        self.filled_s = (self.filled_s + present_s).min(WINDOW_S);
+        self.part_s += present_s;
+        for _ in 0..PARTS {
+            if self.part_s < longest_part_s {
+                return;
+            }
+            self.part_s -= longest_part_s;
+            self.part = (self.part + 1) % PARTS;
+            self.parts[self.part] = (0, 0);
+        }
+        self.part_s = 0.0;
     }
 }

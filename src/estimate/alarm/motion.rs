@@ -4,6 +4,7 @@
 //! cam turned by hand is seen for what it is.
 
 use crate::config::Config;
+use crate::estimate::LivedTime;
 use crate::message::{Mode, State};
 
 /// Goal velocity of one count, turns/s: 0.229 rev/min (XL330-M288 e-manual, register 104).
@@ -32,6 +33,11 @@ pub(super) struct Moment {
     pub now_ns: u64,
     /// Since the previous tick, s; 0 in the first one and after a restart.
     pub step_s: f64,
+    /// The part of it in which the computer did not pause, s: in which the devices could have been heard.
+    pub present_s: f64,
+    /// What the motor lived through since its last reading before this tick, s: less than has passed where it stood still with its
+    /// computer.
+    pub lived_s: f64,
     /// The controller began anew: its sequence went back.
     pub restarted: bool,
     /// Gait phase, cycles; `None` before it was read.
@@ -60,6 +66,9 @@ pub(super) struct Moment {
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     last: Option<(u64, u64)>, // sequence and time of the last tick
+    lived: LivedTime,
+    read_ns: Option<u64>, // lived time of the last motor reading
+    host_paused_ns: u64,
     phase: Option<f64>,
     rest_phase: f64,
     rest_s: f64,
@@ -76,6 +85,9 @@ impl Motion {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             last: None,
+            lived: LivedTime::default(),
+            read_ns: None,
+            host_paused_ns: 0,
             phase: None,
             rest_phase: f64::NAN,
             rest_s: 0.0,
@@ -99,6 +111,16 @@ impl Motion {
         }
         .min(LONGEST_STEP_S);
         self.last = Some((state.sequence, state.time_ns));
+        let lived_ns = self.lived.update(state);
+        let seconds_since = |then_ns: u64, now_ns: u64| now_ns.saturating_sub(then_ns) as f64 * 1e-9;
+        let lived_s = self.read_ns.map_or(0.0, |read_ns| seconds_since(read_ns, lived_ns));
+        if state.motor_is_new == 1 {
+            self.read_ns = Some(lived_ns);
+        }
+        let paused_s = seconds_since(
+            std::mem::replace(&mut self.host_paused_ns, state.host_paused_ns),
+            state.host_paused_ns,
+        );
         let mode = Mode::try_from(state.mode).ok();
         let crawling = mode == Some(Mode::Crawling);
         let torque = matches!(
@@ -120,6 +142,8 @@ impl Motion {
         Moment {
             now_ns: state.time_ns,
             step_s,
+            present_s: (step_s - paused_s).max(0.0),
+            lived_s,
             restarted,
             phase: self.phase,
             phase_is_new,

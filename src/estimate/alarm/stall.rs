@@ -9,7 +9,7 @@
 //! commanded travel **at any speed**; a cam that turns a little too slowly by a share e settles at e · `memory`, so up
 //! to 20 % too slow is not a stall. What a sound servo lags behind does not count: a rising command is followed with the
 //! time constant [`SERVO_LAG_S`] and a falling one at once, whichever asks for less, and half a count of the goal
-//! register is the servo's own rounding.
+//! register is the servo's own rounding. Time is what the motor lived through: a simulated one stands still in a pause of its computer.
 //!
 //! While the commanded speed changes, twice the threshold is needed, unless the current says the motor works hard: the
 //! current only corroborates, the encoder decides.
@@ -84,6 +84,7 @@ impl MotorStall {
         };
         self.follow_command(moment);
         if moment.phase_is_new {
+            self.leave_out_standstill(moment);
             self.follow_cam(phase, moment);
         }
         if self.uncommanded_s >= SETTLED_S {
@@ -151,6 +152,14 @@ impl MotorStall {
         }
         self.commanded += self.reference * moment.step_s;
         self.gap_s += moment.step_s;
+    }
+
+    /// A servo that stood still with its computer was commanded nothing meanwhile.
+    fn leave_out_standstill(&mut self, moment: &Moment) {
+        if moment.lived_s < self.gap_s {
+            self.commanded *= moment.lived_s / self.gap_s;
+            self.gap_s = moment.lived_s;
+        }
     }
 
     fn follow_cam(&mut self, phase: f64, moment: &Moment) {

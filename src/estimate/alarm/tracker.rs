@@ -1,6 +1,6 @@
 //! Tracker fault: no samples, many lost, or a cell that is not seen.
 //!
-//! Over a sliding two seconds: the share of samples that did not arrive (missed between two reads, or never sent), and for
+//! Over a sliding two seconds in which the computer did not pause: the share of samples that did not arrive (missed between two reads, or never sent), and for
 //! each cell the share of arrived samples in which it was not seen; the worst of them is watched. A cell is named when all
 //! others are below half the threshold. No sample at all for the controller's tracker timeout raises the alarm at once,
 //! and so does the controller's own verdict that the tracker is stale.
@@ -34,7 +34,7 @@ pub(super) struct TrackerFault {
     cells: usize,
     parts: [Counts; PARTS],
     part: usize,
-    part_began_ns: Option<u64>,
+    part_ns: u64,  // length of the present part so far
     whole: Counts, // sum of the parts
     filled_s: f64,
     silent_s: f64,
@@ -51,7 +51,7 @@ impl TrackerFault {
             cells: config.worm.cells.min(MAX_CELLS),
             parts: [Counts::default(); PARTS],
             part: 0,
-            part_began_ns: None,
+            part_ns: 0,
             whole: Counts::default(),
             filled_s: 0.0,
             silent_s: 0.0,
@@ -87,8 +87,8 @@ impl TrackerFault {
 
     fn advance_window(&mut self, moment: &Moment) {
         let part_ns = (WINDOW_S * 1e9) as u64 / PARTS as u64;
-        let began_ns = *self.part_began_ns.get_or_insert(moment.now_ns);
-        let passed = moment.now_ns.saturating_sub(began_ns) / part_ns;
+        self.part_ns += (moment.present_s * 1e9) as u64;
+        let passed = self.part_ns / part_ns;
         for _ in 0..passed.min(PARTS as u64) {
             self.part = (self.part + 1) % PARTS;
             let gone = std::mem::take(&mut self.parts[self.part]);
@@ -98,9 +98,9 @@ impl TrackerFault {
                 self.whole.unseen[cell] -= gone.unseen[cell];
             }
         }
-        self.part_began_ns = Some(began_ns + passed * part_ns);
-        self.filled_s += moment.step_s;
-        self.silent_s += moment.step_s;
+        self.part_ns -= passed * part_ns;
+        self.filled_s += moment.present_s;
+        self.silent_s += moment.present_s;
     }
 
     fn count(&mut self, state: &State) {

@@ -285,21 +285,3 @@ fn a_late_camera_shows_what_was() {
         assert!((late_m[capture] - expected_m).abs() < 1e-9, "capture {capture}");
     }
 }
-
-/// A test of the machine as a whole runs a hundred hours; it can only do so when the plant is fast.
-#[test]
-fn plant_is_fast() {
-    let mut plant = crawl(&Config::default(), GAIT_RAD_PER_S, 1.0);
-    let began = std::time::Instant::now();
-    let steps = 1_000_000;
-    for _ in 0..steps {
-        plant.step().expect("a worm");
-    }
-    let per_s = f64::from(steps) / began.elapsed().as_secs_f64();
-    println!(
-        "{:.2} million steps/s, {:.0} times real time",
-        per_s * 1e-6,
-        per_s * plant.step_s()
-    );
-    assert!(per_s > 2e5, "{per_s} steps/s");
-}

@@ -2,11 +2,17 @@
 //!
 //! The loop sleeps until bytes come, an answer is due or a little time has passed; then the plant catches up with the
 //! clock. It never spins. Plant and devices know of none of this.
+//!
+//! A real worm does not stop when a computer does. But this one lives on the computer that drives it, and when that computer
+//! pauses, because it is busy or its host is, neither the controller nor this process can tell how the other fared. So the world's
+//! clock follows real time as long as this process runs in time, and a gap in which it did not is no time at all, for
+//! the physics as for the servo's bus watchdog.
 
 use super::devices::{Devices, DevicesError};
 use super::options::Options;
 use super::pty::{Pty, PtyError};
 use crate::config::Config;
+use crate::logging::Summed;
 use crate::model::WormError;
 use crate::realtime::monotonic_ns;
 use nix::errno::Errno;
@@ -27,9 +33,9 @@ const SLEEP_IDLE: Duration = Duration::from_millis(10);
 const IDLE_AFTER: Duration = Duration::from_millis(100);
 /// After so long without a byte the peer is taken for gone.
 const GONE_AFTER: Duration = Duration::from_secs(1);
-/// Longest stretch that the plant catches up at once. When this process could not run for longer, the simulated world has
-/// stood still instead: otherwise the bus watchdog would count a silence that was ours, not the controller's.
-const LONGEST_CATCH_UP: Duration = Duration::from_millis(50);
+/// A look that comes later than planned by no more than this was late, and the world catches up; beyond it this process did not
+/// run, and the world has stood still. It is half of the shortest bus watchdog.
+const LATEST_LOOK: Duration = Duration::from_millis(10);
 
 /// Why the virtual worm cannot run, or had to end.
 #[derive(Debug, thiserror::Error)]
@@ -92,20 +98,18 @@ impl Server {
     /// [`ServerError::Line`] when the pseudo-terminal fails.
     pub fn run(mut self, stop: &AtomicBool) -> Result<Devices, ServerError> {
         let failed = |doing| move |source| ServerError::Line { doing, source };
-        let began = Instant::now();
-        let began_ns = monotonic_ns();
-        let mut skipped = Duration::ZERO; // of the clock, while the world stood still
-        let mut advanced = Duration::ZERO;
+        let mut clock = WorldClock::started();
+        let mut standstills = Summed::default();
         let mut heard = Duration::ZERO;
         let mut peer_gone = true;
         let mut incoming = [0; 4096];
         let mut outgoing = Vec::with_capacity(4096);
         while !stop.load(Ordering::Relaxed) {
-            let busy = advanced.saturating_sub(heard) < IDLE_AFTER;
+            let busy = clock.world.saturating_sub(heard) < IDLE_AFTER;
             let mut sleep = if busy { SLEEP_BUSY } else { SLEEP_IDLE };
             if let Some(due_s) = self.devices.next_due_s() {
-                let due = Duration::from_secs_f64(due_s.max(0.0)) + skipped;
-                sleep = sleep.min(due.saturating_sub(began.elapsed()));
+                let due = Duration::from_secs_f64(due_s.max(0.0));
+                sleep = sleep.min(due.saturating_sub(clock.world));
             }
             let mut fds = [PollFd::new(self.pty.master(), PollFlags::POLLIN)];
             match ppoll(&mut fds, Some(TimeSpec::from_duration(sleep)), None) {
@@ -113,14 +117,13 @@ impl Server {
                 Err(errno) => return Err(failed("wait")(errno.into())),
             }
             let count = self.pty.read(&mut incoming).map_err(failed("receive"))?;
-            let mut now = began.elapsed().saturating_sub(skipped);
-            let missing = now.saturating_sub(advanced + LONGEST_CATCH_UP);
-            if missing > Duration::ZERO {
-                tracing::warn!("the virtual worm could not run in time: its world stood still for {missing:?}");
-                skipped += missing;
-                now -= missing;
+            if let Some(stood_still) = clock.advance(Instant::now(), sleep) {
+                standstills.add(|standstills: &mut Standstills| standstills.take(stood_still));
             }
-            advanced = now;
+            if let Some(standstills) = standstills.take_due(monotonic_ns(), false) {
+                standstills.log();
+            }
+            let now = clock.world;
             let now_s = now.as_secs_f64();
             if count > 0 {
                 heard = now;
@@ -134,8 +137,8 @@ impl Server {
             if self.devices.crawl_began_ns.is_none()
                 && let Some(crawl_s) = self.devices.crawl_began_s()
             {
-                let crawl = Duration::from_secs_f64(crawl_s) + skipped;
-                self.devices.crawl_began_ns = Some(began_ns + crawl.as_nanos() as u64);
+                let since_then = now.saturating_sub(Duration::from_secs_f64(crawl_s));
+                self.devices.crawl_began_ns = Some(monotonic_ns() - since_then.as_nanos() as u64);
             }
             outgoing.clear();
             self.devices.take_due(now_s, &mut outgoing);
@@ -145,12 +148,67 @@ impl Server {
                 self.pty.forget_exclusive();
             }
         }
+        if let Some(standstills) = standstills.take_due(monotonic_ns(), true) {
+            standstills.log();
+        }
         Ok(self.devices)
     }
 
     /// Bytes at another baud rate are noise, which no device understands.
     fn peer_speaks_our_baud(&self) -> io::Result<bool> {
         Ok(!self.strict_baud || self.pty.peer_baud()? == self.devices.baud())
+    }
+}
+
+/// The world's clock: real time, without the gaps in which this process did not run.
+struct WorldClock {
+    looked: Instant,
+    world: Duration,
+}
+
+impl WorldClock {
+    fn started() -> Self {
+        Self {
+            looked: Instant::now(),
+            world: Duration::ZERO,
+        }
+    }
+
+    /// Looks at the clock again, `planned` after the last time. How long the world has stood still in between, if it has.
+    fn advance(&mut self, now: Instant, planned: Duration) -> Option<Duration> {
+        let gap = now - std::mem::replace(&mut self.looked, now);
+        let late = gap.saturating_sub(planned);
+        if late <= LATEST_LOOK {
+            self.world += gap;
+            return None;
+        }
+        self.world += planned;
+        Some(late)
+    }
+}
+
+/// Gaps that were left out, summed.
+#[derive(Debug, Default)]
+struct Standstills {
+    count: u64,
+    total: Duration,
+    longest: Duration,
+}
+
+impl Standstills {
+    fn take(&mut self, stood_still: Duration) {
+        self.count += 1;
+        self.total += stood_still;
+        self.longest = self.longest.max(stood_still);
+    }
+
+    fn log(&self) {
+        tracing::warn!(
+            pauses = self.count,
+            total_ms = self.total.as_millis() as u64,
+            longest_ms = self.longest.as_millis() as u64,
+            "host-paused: the computer did not run the virtual worm for a while, and its world stood still"
+        );
     }
 }
 
@@ -219,6 +277,34 @@ impl Drop for VirtualWorm {
         if let Some(thread) = self.thread.take() {
             // Whoever drops it does not ask how it ended.
             let _ended = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_in_which_it_did_not_run_is_no_time() {
+        let ms = Duration::from_millis;
+        let mut clock = WorldClock::started();
+        let began = clock.looked;
+        // (when it looks, what was planned, the world's time then, how long it stood still; ms)
+        for (at, planned, world, stood_still) in [
+            (1, 1, 1, None),
+            (9, 1, 9, None),
+            (20, 1, 20, None),
+            (320, 1, 21, Some(299)),
+            (330, 10, 31, None),
+            (420, 10, 41, Some(80)),
+        ] {
+            assert_eq!(
+                clock.advance(began + ms(at), ms(planned)),
+                stood_still.map(ms),
+                "at {at} ms"
+            );
+            assert_eq!(clock.world, ms(world), "at {at} ms");
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::channel::Channel;
 use super::log::nothing;
 use super::scan::scan;
-use crate::estimate::Capture;
+use crate::estimate::{Capture, LivedTime};
 use crate::message::{JsonMessage, State};
 use crate::recording::{Motor, Recording, RecordingError};
 use std::path::Path;
@@ -63,7 +63,7 @@ const BEFORE_FIRST_S: f64 = 1e-3;
 /// One new sample, with the motor as it was in the tick that brought it.
 struct Sample {
     time_s: f64,
-    captured_s: f64, // by the controller's clock
+    captured_s: f64, // of the time that the motor lived through
     state: State,
 }
 
@@ -73,8 +73,9 @@ struct Stretch {
     first_tick: u64,
     last_tick: u64,
     last_sample: u64,
+    lived: LivedTime,
     capture: Capture,
-    /// Time and phase of each tick that read the motor.
+    /// Lived time and phase of each tick that read the motor.
     phases: Vec<(f64, f64)>,
     samples: Vec<Sample>,
     /// New samples without a time, or with one that does not grow.
@@ -88,6 +89,7 @@ impl Stretch {
             first_tick: state.sequence,
             last_tick: state.sequence,
             last_sample: state.sample,
+            lived: LivedTime::default(),
             capture: Capture::default(),
             phases: Vec::new(),
             samples: Vec::new(),
@@ -105,7 +107,7 @@ impl Stretch {
     fn take(&mut self, state: &State) {
         let is_repeated = state.sequence == self.last_tick && state.sequence != self.first_tick;
         (self.last_tick, self.last_sample) = (state.sequence, state.sample);
-        let time_s = state.time_ns as f64 * 1e-9;
+        let time_s = self.lived.update(state) as f64 * 1e-9;
         if state.sample_is_new == 1 && !is_repeated {
             let (captured_s, _) = self.capture.place(state.sample_time_s, time_s, state.phase);
             let before_s = self.samples.last().map_or(f64::NEG_INFINITY, |sample| sample.time_s);
@@ -128,7 +130,7 @@ impl Stretch {
         }
     }
 
-    /// The gait phase at a time of the controller's clock; `NaN` too far from any motor reading.
+    /// The gait phase at a lived time; `NaN` too far from any motor reading.
     fn phase_at(&self, at_s: f64) -> f64 {
         let next = self.phases.partition_point(|(time_s, _)| *time_s < at_s);
         let Some(&(after_s, after)) = self.phases.get(next) else {

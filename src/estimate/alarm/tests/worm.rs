@@ -383,6 +383,7 @@ pub fn blank_cycle(cells: usize) -> Cycle {
         index: 0,
         end_ns: 0,
         duration_s: 0.0,
+        host_paused_s: 0.0,
         advance_m: 0.0,
         advance_sigma_m: 1e-5,
         forward_slide_m: [0.0; MAX_CELLS],

@@ -1,0 +1,132 @@
+//! Which part of the time the loop was there to hear a device.
+//!
+//! A computer that is busy, or whose host takes its CPUs away, does not run the loop for a while. That time is the computer's:
+//! nobody was asked in it, and nobody could have been heard. So every silence, be it the servo's, the tracker's or the
+//! estimator's, is measured on a clock that stands still meanwhile. Where the computer is quiet this clock is the computer's own.
+
+/// An absence of this length is a pause of the computer, an event of its own; below it the tick was merely late. Ten times what a
+/// loaded computer without a real-time kernel takes to run a woken thread, and half of the shortest bus watchdog, ns.
+pub(super) const SHORTEST_PAUSE_NS: u64 = 10_000_000;
+
+/// What one tick found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Passed {
+    /// Time on the loop's own clock, ns.
+    pub present_ns: u64,
+    /// By how much it has grown since the tick before, ns.
+    pub step_ns: u64,
+    /// The pause of the computer that ended in this tick, ns; 0 where there was none.
+    pub pause_ns: u64,
+}
+
+/// The loop's own clock, and the pauses that it left out.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Presence {
+    last_ns: Option<u64>,
+    present_ns: u64,
+    paused_ns: u64,
+}
+
+impl Presence {
+    /// Takes a tick at `now_ns` of the computer's clock, in or before which the loop was kept from running for `absent_ns`.
+    pub(super) fn advance(&mut self, now_ns: u64, absent_ns: u64) -> Passed {
+        let elapsed_ns = self.last_ns.map_or(0, |last_ns| now_ns.saturating_sub(last_ns));
+        if self.last_ns.replace(now_ns).is_none() {
+            self.present_ns = now_ns;
+        }
+        let absent_ns = absent_ns.min(elapsed_ns);
+        let step_ns = elapsed_ns - absent_ns;
+        self.present_ns += step_ns;
+        let pause_ns = if absent_ns >= SHORTEST_PAUSE_NS { absent_ns } else { 0 };
+        self.paused_ns += pause_ns;
+        Passed {
+            present_ns: self.present_ns,
+            step_ns,
+            pause_ns,
+        }
+    }
+
+    /// All pauses so far, ns.
+    pub(super) fn paused_ns(&self) -> u64 {
+        self.paused_ns
+    }
+}
+
+/// When a tick looked at the computer's clock, as far as the loop's absence shows there, ns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Looks {
+    /// The tick's deadline, and when it really began.
+    pub deadline: u64,
+    pub woken: u64,
+    /// How long the exchange may wait, and when it ended.
+    pub bus_allowed: u64,
+    pub exchanged: u64,
+    /// What the tick before took from the end of its exchange to its own end.
+    pub work_before: u64,
+}
+
+/// How long the loop was kept from running between the end of the exchange before and the end of this one, in whole periods:
+/// what is less has cost no tick.
+pub(super) fn absent_ns(looks: &Looks, period_ns: u64) -> u64 {
+    let woken_late = looks.woken.saturating_sub(looks.deadline);
+    let answered_late = (looks.exchanged - looks.woken).saturating_sub(looks.bus_allowed);
+    let whole_periods = |ns: u64| ns / period_ns * period_ns;
+    // The work of the tick before may have run past this one's deadline, which the schedule then moved on.
+    whole_periods(woken_late + answered_late) + whole_periods(looks.work_before)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn the_clock_stands_still_while_the_computer_does() {
+        let mut presence = Presence::default();
+        // (computer's clock, absence; the loop's clock, pause; all ms)
+        let table = [
+            (1000, 0, 1000, 0),
+            (1001, 0, 1001, 0),
+            (1006, 4, 1002, 0),
+            (1307, 300, 1003, 300),
+            (1317, 10, 1003, 10),
+            // An absence cannot be longer than the time that has passed.
+            (1318, 50, 1003, 1),
+        ];
+        for (now, absent, present, pause) in table {
+            let passed = presence.advance(now * MS, absent * MS);
+            assert_eq!(passed.present_ns, present * MS, "at {now} ms");
+            let expected = if pause >= 10 { pause * MS } else { 0 };
+            assert_eq!(passed.pause_ns, expected, "at {now} ms");
+        }
+        assert_eq!(presence.paused_ns(), 310 * MS);
+    }
+
+    #[test]
+    fn only_what_the_loop_could_not_help_is_absence() {
+        let looks = |woken_us: u64, bus_us: u64, work_before_us: u64| Looks {
+            deadline: 5_000_000,
+            woken: 5_000_000 + woken_us * 1_000,
+            bus_allowed: 700_000,
+            exchanged: 5_000_000 + (woken_us + bus_us) * 1_000,
+            work_before: work_before_us * 1_000,
+        };
+        // (woken late, exchange, work before in µs; absence in ms)
+        for (woken, bus, work_before, absent) in [
+            (50, 90, 20, 0),
+            (900, 690, 20, 0),
+            (60, 700, 20, 0),
+            (1_100, 300, 20, 1),
+            (80_300, 90, 20, 80),
+            (60, 300_700, 20, 300),
+            (60, 90, 45_000, 45),
+        ] {
+            assert_eq!(
+                absent_ns(&looks(woken, bus, work_before), MS),
+                absent * MS,
+                "{woken} {bus} {work_before}"
+            );
+        }
+    }
+}
