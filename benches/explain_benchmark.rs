@@ -1,9 +1,10 @@
 //! How well the search names what is hidden: every case of a split, and the score table.
 //!
 //! ```text
-//! cargo bench --bench explain_benchmark -- --split development|test [--only EFFECT] [--cases N] [--csv FILE]
+//! cargo bench --bench explain_benchmark -- --split development|test|search [--only EFFECT] [--cases N] [--csv FILE]
 //! ```
-//! Without `--split` a few cases of the development split are run. `WORMD_CASES` scales how many there are of each kind.
+//! Without `--split` a few cases of the development split are run; `search` are those that `tests/explain_search.rs` runs in small.
+//! `WORMD_CASES` scales how many there are of each kind.
 
 #[path = "../tests/hidden/mod.rs"]
 mod hidden;
@@ -29,8 +30,8 @@ const FEW: usize = 4;
 #[derive(Debug, Parser)]
 #[command(about = "Runs the search for the missing effect on campaigns in which one is hidden, and scores it.")]
 struct Order {
-    /// Which cases: development or test; absent: a few of development.
-    #[arg(long, value_parser = |name: &str| Split::named(name).ok_or("must be development or test"))]
+    /// Which cases: development, test or search; absent: a few of development.
+    #[arg(long, value_parser = |name: &str| Split::named(name).ok_or("must be development, test or search"))]
     split: Option<Split>,
     /// Only these: an effect, clean, outside, pair or twin.
     #[arg(long, value_parser = |name: &str| Case::words().find(|word| *word == name).ok_or("must be an effect, clean, outside, pair or twin"))]

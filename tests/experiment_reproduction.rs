@@ -4,6 +4,7 @@
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 
 /// The largest tip deformations of section 3.2.3, mm.
 const BOUNDS_MM: [f64; 4] = [2.0, 1.1, 1.75, 2.15];
@@ -48,6 +49,15 @@ fn simulated(folder: &Path, slope_deg: f64) -> String {
     ]);
     file
 }
+
+/// The worm analysed on every slope by itself, once for all tests that look at it.
+static ALONE: LazyLock<[Value; 3]> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    ADVANCE_MM.map(|(slope_deg, _)| {
+        let file = simulated(folder.path(), slope_deg);
+        json(&wormd(&["analyze", &file, "--slope", &slope_deg.to_string(), "--json"]))
+    })
+});
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("not JSON: {error}\n{text}"))
@@ -139,18 +149,15 @@ fn assert_bounds(found: &Value, tolerance_m: f64) {
 
 #[test]
 fn each_slope_gives_the_worm_back() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    for (slope_deg, advance_mm) in ADVANCE_MM {
-        let file = simulated(folder.path(), slope_deg);
-        let found = json(&wormd(&["analyze", &file, "--slope", &slope_deg.to_string(), "--json"]));
+    for (found, (slope_deg, advance_mm)) in ALONE.iter().zip(ADVANCE_MM) {
         println!(
             "{slope_deg}°: bounds {} m, advance {} m, mass {} kg",
-            at(&found, "/max_deformation_m"),
-            at(&found, "/mean/advance_m"),
-            at(&found, "/mass_estimate_kg")
+            at(found, "/max_deformation_m"),
+            at(found, "/mean/advance_m"),
+            at(found, "/mass_estimate_kg")
         );
-        assert_bounds(&found, 0.05e-3);
-        assert_like_the_paper(&found, slope_deg, advance_mm);
+        assert_bounds(found, 0.05e-3);
+        assert_like_the_paper(found, slope_deg, advance_mm);
     }
 }
 
@@ -181,9 +188,8 @@ fn a_campaign_gives_one_worm_back() {
 /// The fields of an analysis, as scripts read them.
 #[test]
 fn an_analysis_prints_the_contracted_fields() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let file = simulated(folder.path(), 30.0);
-    let found = json(&wormd(&["analyze", &file, "--slope", "30", "--json"]));
+    let found = &ALONE[1];
+    assert_eq!(number(found, "/slope_deg"), 30.0);
     let values = [
         "advance_m",
         "forward_slide_m",
@@ -233,18 +239,18 @@ fn an_analysis_prints_the_contracted_fields() {
         ("/cycles/0", &["index", "start_s", "duration_s", "settled"]),
     ];
     for (place, names) in fields {
-        let object = at(&found, place).as_object().expect("an object");
+        let object = at(found, place).as_object().expect("an object");
         for name in names {
             assert!(object.contains_key(*name), "{place}/{name} is missing");
         }
     }
     for place in ["/std", "/theory/identified", "/theory/nominal", "/cycles/0"] {
-        let object = at(&found, place).as_object().expect("an object");
+        let object = at(found, place).as_object().expect("an object");
         assert!(
             values.iter().all(|name| object.contains_key(*name)),
             "{place} lacks figures"
         );
     }
-    assert_eq!(at(&found, "/paper_search/candidates"), 2401);
+    assert_eq!(at(found, "/paper_search/candidates"), 2401);
     assert!(found.get("series").is_none(), "the series are no part of the JSON");
 }

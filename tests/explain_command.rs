@@ -196,7 +196,7 @@ fn a_recording_that_may_not_be_read_is_refused() {
 #[test]
 fn one_recording_is_explained_and_everything_is_kept() {
     let desk = Desk::new();
-    let recording = desk.simulate("level.csv", "0", &["--cycles", "6", "--rest", "0.3"]);
+    let recording = desk.simulate("level.csv", "0", &["--cycles", "6", "--rest", "0.3", "--rate", "60"]);
     let dir = desk.path("deep/found");
     let out = dir.to_str().expect("plain");
     let output = explain(&recording, &["--slope", "0", "--out", out, "--json"]);
@@ -279,7 +279,7 @@ fn the_written_back_model_agrees_with_the_campaign_it_comes_from() {
 #[test]
 fn what_goes_wrong_late_loses_nothing() {
     let desk = Desk::new();
-    let recording = desk.simulate("level.csv", "0", &["--cycles", "6"]);
+    let recording = desk.simulate("level.csv", "0", &["--cycles", "6", "--rate", "60"]);
     let short = desk.simulate("short.csv", "0", &["--cycles", "1.2"]);
     let dir = desk.path("found");
     let out = dir.to_str().expect("plain");

@@ -7,12 +7,12 @@ mod hidden;
 
 use hidden::CELLS;
 use hidden::body::Worm;
-use hidden::campaign::{HiddenCampaign, Kind, Twin, Wanted, draw};
+use hidden::campaign::{HiddenCampaign, Kind, Size, Twin, Wanted, draw_sized};
 use hidden::effect::{Band, Effect};
 use hidden::flaws::{Flaws, Patch};
 use hidden::make::Make;
 use hidden::repeat::Condition;
-use hidden::scene::{Played, Scene};
+use hidden::scene::{Played, STEP_S, Scene};
 use hidden::split::{Split, split};
 use hidden::visible::advances_m;
 
@@ -53,7 +53,9 @@ fn slow_advance_of_m(worm: &Worm, slope_deg: f64) -> f64 {
     let scene = Scene {
         warm_up_cycles: 1.9,
         cycles: 1.2,
-        ..Scene::ideal(slope_deg, 40.0)
+        // Nothing swings here, so coarser steps do.
+        step_s: 2.0 * STEP_S,
+        ..Scene::ideal(slope_deg, 20.0)
     };
     advances_m(&scene.play(worm).expect("the worm holds"))[0]
 }
@@ -238,7 +240,7 @@ fn clamps_that_give_on_a_slope_are_weaker_clamps_there() {
 #[test]
 fn a_campaign_is_what_its_seed_says() {
     let wanted = Wanted::Single(Effect::PadCreep, Band::UPPER_HALF);
-    let [one, same] = [5, 5].map(|seed| draw(wanted, seed));
+    let [one, same] = [5, 5].map(|seed| draw_sized(wanted, seed, Size::SMALL));
     let bits = |campaign: &HiddenCampaign| -> Vec<u64> {
         let positions = campaign
             .recordings
@@ -253,9 +255,9 @@ fn a_campaign_is_what_its_seed_says() {
         "strong creep can be seen: {:?}",
         one.visible
     );
-    assert_ne!(bits(&one), bits(&draw(wanted, 6)));
+    assert_ne!(bits(&one), bits(&draw_sized(wanted, 6, Size::SMALL)));
 
-    let clean = draw(Wanted::Clean, 5);
+    let clean = draw_sized(Wanted::Clean, 5, Size::SMALL);
     assert_eq!(
         (clean.truth.len(), clean.visible.advance_m, clean.visible.within_cycle_m),
         (0, 0.0, 0.0)
@@ -265,13 +267,13 @@ fn a_campaign_is_what_its_seed_says() {
         let lost = seen.iter().filter(|m| m.is_nan()).count() as f64 / seen.len() as f64;
         assert!((0.005..0.015).contains(&lost), "{lost} of the positions are lost");
     }
-    let late = draw(Wanted::Single(Effect::SensorLatency, Band::WHOLE), 8);
+    let late = draw_sized(Wanted::Single(Effect::SensorLatency, Band::WHOLE), 8, Size::SMALL);
     assert!(late.recordings.iter().all(|recording| recording.gait_phase.is_some()));
 }
 
 #[test]
 fn one_more_run_is_of_the_same_worm() {
-    let campaign = draw(Wanted::Twin(Twin::Payload), 3);
+    let campaign = draw_sized(Wanted::Twin(Twin::Payload), 3, Size::SMALL);
     let usual = campaign.usual(0.0);
     let run = |condition: Condition| {
         campaign
@@ -291,8 +293,8 @@ fn one_more_run_is_of_the_same_worm() {
     });
     let lasts_s = |recording: &wormd::recording::Recording| recording.time_s[recording.samples() - 1];
     assert!((lasts_s(&slow) - 30.0).abs() < 2.0, "{} s", lasts_s(&slow));
-    // Eleven rests lie between twelve cycles, and half a second at most before and after them.
-    assert!((lasts_s(&dwelling) - lasts_s(&run(usual)) - 11.0).abs() < 1.5);
+    // Five rests lie between six cycles, and half a second at most before and after them.
+    assert!((lasts_s(&dwelling) - lasts_s(&run(usual)) - 5.0).abs() < 1.5);
     let first_m = |recording: &wormd::recording::Recording| recording.position_m[0][..20].iter().sum::<f64>() / 20.0;
     assert!((first_m(&shifted) - 0.1).abs() < 1e-3);
 }

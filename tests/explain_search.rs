@@ -1,18 +1,40 @@
-//! The search itself on a few campaigns with something hidden in them, each drawn from a seed that no split uses. The score over
-//! many is `cargo bench --bench explain_benchmark`.
+//! The search itself on a few small campaigns with something hidden in them, each drawn from a seed that the splits to tune and to
+//! score on do not use. The same ones in full size are `cargo bench --bench explain_benchmark -- --split search`, and the score over
+//! many is that of the splits `development` and `test`.
 
 #[path = "hidden/mod.rs"]
 mod hidden;
 
-use hidden::campaign::{Twin, Wanted, draw};
+use hidden::campaign::{HiddenCampaign, Size, Twin, Wanted, draw_sized};
 use hidden::effect::{Band, Effect};
 use hidden::library::Library;
-use hidden::verdict::{Judgement, Verdict, judge};
+use hidden::repeat::ExtraRun;
+use hidden::split::{Case, SEARCH_SEED, Split, split};
+use hidden::verdict::{Answer, Explainer, Judgement, Verdict, judge};
 
-const SEED: u64 = 501;
+/// The library's own search, asked once: whether the run that it proposes settles an ambiguous answer is for the bench.
+struct Once;
+
+impl Explainer for Once {
+    fn explain(&self, campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<Answer, String> {
+        if extra.is_empty() {
+            Library.explain(campaign, extra)
+        } else {
+            Err("nothing is asked twice".to_owned())
+        }
+    }
+}
 
 fn judged(wanted: Wanted) -> Judgement {
-    let judgement = judge(&draw(wanted, SEED), &Library);
+    let case = Case {
+        wanted,
+        seed: SEARCH_SEED,
+    };
+    assert!(
+        split(Split::Search, 1.0).contains(&case),
+        "the bench has every case in full size"
+    );
+    let judgement = judge(&draw_sized(case.wanted, case.seed, Size::SMALL), &Once);
     println!("{}", judgement.line());
     judgement
 }

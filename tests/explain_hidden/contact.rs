@@ -151,7 +151,7 @@ fn a_clean_worm_is_clean_under_every_law() {
             println!("{} at {slope_deg}°, slow: {:+.2} %", name(&contact), 1e2 * change);
             assert!(change.abs() < 0.0125, "at {slope_deg}°, slow: {change} of {contact:?}");
         }
-        for contact in contacts() {
+        for contact in one_of_each() {
             let change = (advance_m(&worm(contact, 0.3), slope_deg) - rigid_m) / level_m;
             assert!(
                 change.abs() < 0.01,
@@ -186,11 +186,11 @@ fn half_the_time_step_changes_nothing_that_counts() {
         for slope_deg in [0.0, 30.0] {
             let advance_m = |step_s: f64| {
                 let scene = Scene {
-                    cycles: 4.0,
+                    cycles: 3.0,
                     step_s,
                     ..Scene::ideal(slope_deg, 2.5)
                 };
-                advances_m(&scene.play(&worm).expect("the worm holds"))[3]
+                advances_m(&scene.play(&worm).expect("the worm holds"))[2]
             };
             let ratio = advance_m(0.5 * STEP_S) / advance_m(STEP_S);
             assert!(

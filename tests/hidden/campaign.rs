@@ -18,10 +18,34 @@ const LEAST_ADVANCE_M: f64 = 0.5e-3;
 const LEAST_IN_A_CYCLE_M: f64 = 0.2e-3;
 /// Worms thrown before the ranges are to blame.
 const MOST_THROWS: u64 = 200;
-/// Gait cycles in a run.
-const CYCLES: f64 = 12.0;
 /// Standard deviation of a slope about what is stated, degrees.
 pub const SLOPE_SIGMA_DEG: f64 = 0.1;
+
+/// How much is recorded of a worm: what a search takes goes with the number of samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Size {
+    /// Runs, each on a steeper slope than the one before, the first on the level.
+    pub runs: usize,
+    /// Gait cycles in each run.
+    pub cycles: f64,
+    /// Pictures that the camera takes in a second.
+    pub rate_hz: f64,
+}
+
+impl Size {
+    /// What the score is told of.
+    pub const FULL: Self = Self {
+        runs: 3,
+        cycles: 12.0,
+        rate_hz: 120.0,
+    };
+    /// The least that the search can work on: several slopes, and cycles enough to tell scatter from cause.
+    pub const SMALL: Self = Self {
+        runs: 2,
+        cycles: 6.0,
+        rate_hz: 60.0,
+    };
+}
 
 /// What a campaign is to test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -112,8 +136,16 @@ pub struct HiddenCampaign {
 /// # Panics
 /// When no worm crawls, which is the ranges' fault.
 pub fn draw(wanted: Wanted, seed: u64) -> HiddenCampaign {
+    draw_sized(wanted, seed, Size::FULL)
+}
+
+/// The same of another size: the same dice, so the same worm where it crawls at either size.
+///
+/// # Panics
+/// When no worm crawls, which is the ranges' fault.
+pub fn draw_sized(wanted: Wanted, seed: u64, size: Size) -> HiddenCampaign {
     (0..MOST_THROWS)
-        .find_map(|throw| thrown(wanted, seed, throw))
+        .find_map(|throw| thrown(wanted, seed, throw, size))
         .unwrap_or_else(|| panic!("no worm crawls with {wanted:?} in it, seed {seed}"))
 }
 
@@ -123,12 +155,13 @@ pub fn table4() -> [(f64, f64); 3] {
     [(0.0, 7.18e-3), (30.0, 3.76e-3), (45.0, 2.08e-3)]
 }
 
-fn thrown(wanted: Wanted, seed: u64, throw: u64) -> Option<HiddenCampaign> {
+fn thrown(wanted: Wanted, seed: u64, throw: u64, size: Size) -> Option<HiddenCampaign> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(MOST_THROWS).wrapping_add(throw));
     let config = Config::default();
     let cycle_s = config.gait.cycle_s;
     let make = Make::draw(&mut rng);
-    let eyes = Eyes::draw(&mut rng);
+    let mut eyes = Eyes::draw(&mut rng);
+    eyes.camera.rate_hz = size.rate_hz;
     let under_way = rng.random_range(0..3) == 0;
     let phase_is_recorded = rng.random::<bool>();
     let steepest_deg = if rng.random::<bool>() { 45.0 } else { 40.0 };
@@ -143,14 +176,17 @@ fn thrown(wanted: Wanted, seed: u64, throw: u64) -> Option<HiddenCampaign> {
             drive: make.motor.drive(cycle_s, &mut rng),
             eyes: eyes.clone(),
             warm_up_cycles,
-            cycles: CYCLES,
+            cycles: size.cycles,
             dwell_s: 0.0,
-            jump_at_cycle: [f64::INFINITY, 0.5 * CYCLES, f64::NEG_INFINITY][run],
+            jump_at_cycle: [f64::INFINITY, 0.5 * size.cycles, f64::NEG_INFINITY][run],
             with_phase: phase_is_recorded,
             seed: rng.random(),
             step_s: STEP_S,
         })
         .collect();
+
+    // All are thrown, so that the same dice are left for what is hidden.
+    scenes.truncate(size.runs);
 
     let mut flaws = Flaws::default();
     let mut stranger = None;

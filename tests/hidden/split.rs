@@ -1,16 +1,22 @@
-//! Which cases are run: a development split to tune on and a sealed test split, from disjoint ranges of seeds.
+//! Which cases are run: a development split to tune on and a sealed test split, from disjoint ranges of seeds, and the few that
+//! the tests of the search run in small.
 
 use super::campaign::{HiddenCampaign, Twin, Wanted, draw};
 use super::effect::{Band, Effect};
 
-/// One of the two sets of cases.
+/// One of the sets of cases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
     /// To tune thresholds on.
     Development,
     /// To be run once they are frozen.
     Test,
+    /// What `tests/explain_search.rs` runs in small.
+    Search,
 }
+
+/// The seed of every case of [`Split::Search`]: in no range of the others.
+pub const SEARCH_SEED: u64 = 501;
 
 impl Split {
     /// Below the first seed.
@@ -18,6 +24,7 @@ impl Split {
         match self {
             Self::Development => 41_300_000,
             Self::Test => 73_900_000,
+            Self::Search => SEARCH_SEED,
         }
     }
 
@@ -26,6 +33,7 @@ impl Split {
         match name {
             "development" => Some(Self::Development),
             "test" => Some(Self::Test),
+            "search" => Some(Self::Search),
             _ => None,
         }
     }
@@ -68,8 +76,19 @@ const OUTSIDE: usize = 18;
 const PAIRS: usize = 12;
 const TWINS: usize = 6;
 
-/// The cases of a split. `scale` multiplies how many there are of each kind; a case has the same seed at any scale.
+/// The cases of a split. `scale` multiplies how many there are of each kind; a case has the same seed at any scale. Those of the
+/// tests are the same few at any scale.
 pub fn split(split: Split, scale: f64) -> Vec<Case> {
+    if split == Split::Search {
+        let wanted = [
+            Wanted::Clean,
+            Wanted::Single(Effect::UnequalClamping, Band::UPPER_HALF),
+            Wanted::Twin(Twin::ConstantDrag),
+            Wanted::Outside(5),
+        ];
+        let seed = split.base();
+        return wanted.map(|wanted| Case { wanted, seed }).to_vec();
+    }
     let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     let seed = |group: usize, number: usize| split.base() + 1000 * group as u64 + number as u64;
     let mut cases = Vec::new();

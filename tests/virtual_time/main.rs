@@ -7,6 +7,7 @@
 //! - `mismatch`: which worms the model does not explain, and that those of the file and a few per cent off are quiet.
 //! - `pauses`: a computer that pauses, in whole or in part, is no fault of the worm's and costs no cycle its energies.
 //! - `hours`: healthy worms on many kinds of journeys, and no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
+//!   With it, `mismatch` tries all of its sound worms, else half of them.
 //!
 //! Everything is seeded; a failure names its seed.
 

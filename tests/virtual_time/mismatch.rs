@@ -104,16 +104,18 @@ fn is_raised(session: &Session<Wired>) -> bool {
     session.observer.latest().raised_mask >> AlarmKind::ModelMismatch.code() & 1 == 1
 }
 
+/// Half of the worms; with the environment variable `WORMD_HOURS` all of them.
 #[test]
 fn a_sound_worm_raises_no_mismatch() {
     let mut wrongs = String::new();
+    let all = std::env::var_os("WORMD_HOURS").is_some();
     for (index, (bounds_mm, slope_deg)) in [EQUAL, PAPER]
         .iter()
         .flat_map(|&bounds| SLOPES_DEG.map(|slope| (bounds, slope)))
         .enumerate()
     {
         let file = World::of(bounds_mm, slope_deg);
-        for (what, world, faults) in [
+        let changes = [
             ("as the file has it", file, &[][..]),
             ("0.3 mm of noise", file, &["noise:m=0.0003@0"]),
             ("unseen positions", file, &["dropout:share=0.1@0"]),
@@ -125,7 +127,12 @@ fn a_sound_worm_raises_no_mismatch() {
             ("stiffness -3 %", file.stiffness(0.97), &[]),
             ("cell 2 +5 %", file.friction(1.05, Some(1)), &[]),
             ("cell 3 -5 %", file.friction(0.95, Some(2)), &[]),
-        ] {
+        ];
+        for (number, (what, world, faults)) in changes.into_iter().enumerate() {
+            // Equal and unequal cells take turns, so that each change still meets every slope.
+            if !all && (index / SLOPES_DEG.len() + index + number) % 2 == 1 {
+                continue;
+            }
             let mut session = crawling(&file, &world, faults, 1 + index as u64);
             session.run_s(LONG_CYCLES * CYCLE_S, |_| {});
             if !session.raised.is_empty() {
