@@ -4,6 +4,8 @@
 //! nobody was asked in it, and nobody could have been heard. So every silence, be it the servo's, the tracker's or the
 //! estimator's, is measured on a clock that stands still meanwhile. Where the computer is quiet this clock is the computer's own.
 
+use crate::config::Config;
+
 /// An absence of this length is a pause of the computer, an event of its own; below it the tick was merely late. Ten times what a
 /// loaded computer without a real-time kernel takes to run a woken thread, and half of the shortest bus watchdog, ns.
 pub(super) const SHORTEST_PAUSE_NS: u64 = 10_000_000;
@@ -49,6 +51,44 @@ impl Presence {
     /// All pauses so far, ns.
     pub(super) fn paused_ns(&self) -> u64 {
         self.paused_ns
+    }
+}
+
+/// After so long without an answer it is looked whether all CPUs of the computer run, ns.
+const DOUBT_AFTER_NS: u64 = 20_000_000;
+
+/// A servo that does not answer: is it silent, or is the computer?
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Silence {
+    silent_ns: u64,
+    uncharged_ns: u64,
+    most_uncharged_ns: u64,
+}
+
+impl Silence {
+    /// No silence yet. Whatever the computer does, a servo is not excused for longer than twice the time after which its link
+    /// counts as lost.
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            silent_ns: 0,
+            uncharged_ns: 0,
+            most_uncharged_ns: (2e9 * config.control.link_timeout_s) as u64,
+        }
+    }
+
+    /// How much of a tick of `period_ns` is not to be charged to the servo. `all_cpus_run` tells whether the last look at the CPUs is over,
+    /// and begins the next; it is asked only where somebody is silent.
+    pub(super) fn uncharged_ns(&mut self, period_ns: u64, answered: bool, all_cpus_run: impl FnOnce() -> bool) -> u64 {
+        if answered {
+            (self.silent_ns, self.uncharged_ns) = (0, 0);
+            return 0;
+        }
+        self.silent_ns += period_ns;
+        if self.silent_ns < DOUBT_AFTER_NS || all_cpus_run() || self.uncharged_ns >= self.most_uncharged_ns {
+            return 0;
+        }
+        self.uncharged_ns += period_ns;
+        period_ns
     }
 }
 
@@ -101,6 +141,21 @@ mod tests {
             assert_eq!(passed.pause_ns, expected, "at {now} ms");
         }
         assert_eq!(presence.paused_ns(), 310 * MS);
+    }
+
+    #[test]
+    fn a_servo_is_not_charged_with_a_cpu_that_is_away_but_not_excused_for_ever() {
+        let mut silence = Silence::new(&Config::default());
+        let mut uncharged_ms = |ticks: u32, answered: bool, all_cpus_run: bool| -> u64 {
+            let uncharged = (0..ticks).map(|_| silence.uncharged_ns(MS, answered, || all_cpus_run));
+            uncharged.sum::<u64>() / MS
+        };
+        assert_eq!(uncharged_ms(19, false, false), 0, "nobody has looked yet");
+        assert_eq!(uncharged_ms(100, false, true), 0, "a computer that runs");
+        assert_eq!(uncharged_ms(60, false, false), 60, "a CPU is away");
+        assert_eq!(uncharged_ms(500, false, false), 140, "twice link_timeout_s in all");
+        assert_eq!(uncharged_ms(1, true, false), 0);
+        assert_eq!(uncharged_ms(100, false, false), 81, "an answer begins it anew");
     }
 
     #[test]

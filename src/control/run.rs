@@ -5,12 +5,12 @@ use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
 use super::drive::Drive;
 use super::evidence::{Counts, Parts, find_culprit};
 use super::journal::{Entry, Journal};
-use super::presence::{Looks, SHORTEST_PAUSE_NS, absent_ns};
+use super::presence::{Looks, SHORTEST_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
 use super::schedule::Schedule;
 use crate::config::Config;
 use crate::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
-use crate::realtime::{self, Grant, monotonic_ns};
+use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
 use crate::topics::{
     AnswerError, CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher,
     Responder, RoleLock, Subscriber,
@@ -24,6 +24,9 @@ const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
 /// Even a tick that was woken late gives the bus this share of a period to answer.
 const LEAST_BUS_SHARE: f64 = 0.3;
 
+/// The witness runs so far below the loop: never in its way, and above all that could keep a device's answer back.
+const WITNESS_BELOW_LOOP: u8 = 5;
+
 /// Stack that is made ready before the first tick, bytes: many times what a tick uses.
 const STACK_BYTES: usize = 256 * 1024;
 
@@ -33,9 +36,9 @@ pub enum RunError {
     /// A topic cannot be used.
     #[error(transparent)]
     Topic(#[from] PortError),
-    /// The logging thread cannot be started.
-    #[error("the logging thread cannot be started: {0}")]
-    Journal(std::io::Error),
+    /// A thread beside the loop cannot be started.
+    #[error("a thread beside the loop cannot be started: {0}")]
+    Thread(std::io::Error),
 }
 
 /// The loop's ends of the topics.
@@ -98,13 +101,17 @@ pub fn run(
     ready: impl FnOnce(&[Grant]),
 ) -> Result<Ending, RunError> {
     let ports = Ports::open(hub, role)?;
-    let journal = Journal::start().map_err(RunError::Journal)?;
+    let journal = Journal::start().map_err(RunError::Thread)?;
+    let witness_priority = config.realtime.priority.saturating_sub(WITNESS_BELOW_LOOP);
+    let witness = CpuWitness::start(witness_priority).map_err(RunError::Thread)?;
     let grants = realtime::request(&config.realtime, 0);
     prefault_stack();
     ready(&grants);
     let mut tick_loop = Loop {
         ports,
         journal,
+        witness,
+        silence: Silence::new(config),
         controller: Controller::new(config),
         schedule: Schedule::new(config.control.rate_hz, monotonic_ns()),
         rate: RateKeeper::new(
@@ -143,6 +150,8 @@ fn slowest_rate_hz(config: &Config) -> f64 {
 struct Loop {
     ports: Ports,
     journal: Journal,
+    witness: CpuWitness,
+    silence: Silence,
     controller: Controller,
     schedule: Schedule,
     rate: RateKeeper,
@@ -201,7 +210,7 @@ impl Loop {
                 work_before: self.work_ns,
             },
             self.schedule.period_ns(),
-        );
+        ) + self.unanswerable_ns(outcome.servo.is_ok(), drive.is_gone());
 
         let served = self
             .last
@@ -262,6 +271,15 @@ impl Loop {
         outputs.finished
     }
 
+    /// How much of this tick a silent servo is not to be charged with: all of it while a CPU of this computer does not run, which the
+    /// answer may be waiting for.
+    fn unanswerable_ns(&mut self, answered: bool, is_gone: bool) -> u64 {
+        let period_ns = self.schedule.period_ns();
+        let witness = &self.witness;
+        self.silence
+            .uncharged_ns(period_ns, answered || is_gone, || witness.ask())
+    }
+
     /// How long the devices may take for their answer, ns.
     fn bus_allowed_ns(&self, deadline: u64, woken: u64) -> u64 {
         let period_ns = self.schedule.period_ns() as f64;
@@ -316,7 +334,8 @@ impl Loop {
                 pause_ns: host_paused_ns,
                 evidence,
             });
-        } else if skipped > 0 {
+        } else if skipped > 0 && times.notified - times.resumed < SHORTEST_PAUSE_NS {
+            // A pause in the middle of the tick's own work shows, as what it is, in the next one.
             let late_us = (times.notified - times.deadline) / 1000;
             self.journal.note(Entry::Overrun {
                 sequence: self.ticks,

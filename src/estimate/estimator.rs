@@ -332,7 +332,7 @@ impl Estimator {
         self.cycle.index = self.cycle_index;
         self.cycle.end_ns = (end_s * 1e9) as u64;
         self.cycle.duration_s = end_s - self.opened.time_s;
-        self.cycle.host_paused_s = self.host_paused_ns.saturating_sub(self.opened.host_paused_ns) as f64 * 1e-9;
+        self.cycle.host_paused_s = self.host_paused_ns.saturating_sub(self.opened.host_paused_ns) as f64 / 1e9;
         self.cycle.energy_electrical_j = spent.electrical_j;
         self.cycle.energy_copper_j = spent.copper_j;
         self.cycle.energy_electrical_sigma_j = spent.sigma_j();

@@ -21,16 +21,20 @@ pub struct HostPauses {
     /// The newest, s.
     #[serde(skip)]
     pub newest_s: f64,
+    #[serde(skip)]
+    total_ns: u64,
 }
 
 impl HostPauses {
-    fn take(&mut self, timing: &Timing) {
-        if timing.host_paused_ns == 0 {
+    /// Adds a pause; nothing for a tick without one, whose pause is 0.
+    pub fn add(&mut self, pause_ns: u64) {
+        if pause_ns == 0 {
             return;
         }
-        self.newest_s = timing.host_paused_ns as f64 * 1e-9;
+        self.newest_s = pause_ns as f64 / 1e9;
         self.count += 1;
-        self.total_s += self.newest_s;
+        self.total_ns += pause_ns;
+        self.total_s = self.total_ns as f64 / 1e9;
         self.longest_s = self.longest_s.max(self.newest_s);
     }
 }
@@ -75,7 +79,7 @@ impl Account {
     /// Takes the timings of one run of the loop, one after the other. A tick is counted when the next one has told what its
     /// publishing took.
     pub fn take(&mut self, timing: &Timing) {
-        self.host_pauses.take(timing);
+        self.host_pauses.add(timing.host_paused_ns);
         let Some(last) = self.last.replace(*timing) else {
             self.missed_before_last = timing.overruns;
             return;

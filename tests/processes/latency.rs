@@ -29,7 +29,7 @@ fn check_duration(outcome: &Value, name: &str) -> f64 {
 
 #[test]
 fn a_run_tells_everything_and_adds_up() {
-    let worm = Worm::new("lat");
+    let worm = Worm::on_a_steady_computer("lat");
     let page = tempfile::tempdir().expect("a temporary folder");
     let out = page.path().to_string_lossy().into_owned();
     let arguments = [
@@ -107,7 +107,7 @@ fn a_run_tells_everything_and_adds_up() {
 
 #[test]
 fn what_cannot_be_had_is_said_and_the_rest_is_measured() {
-    let worm = Worm::new("lat2");
+    let worm = Worm::on_a_steady_computer("lat2");
     let arguments = [
         "latency",
         "--json",
@@ -129,7 +129,7 @@ fn what_cannot_be_had_is_said_and_the_rest_is_measured() {
     assert_eq!(outcome["alarm_us"], Value::Null, "no stall fits into a second");
 
     // A port that another controller has: the machine's own limit is told all the same.
-    let busy = Worm::new("lat3");
+    let busy = Worm::on_a_steady_computer("lat3");
     let _devices = busy.virtual_worm(&[]);
     let _bus = busy.bus();
     let port = busy.port();

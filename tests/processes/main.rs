@@ -1,13 +1,17 @@
-//! The three processes of a worm for real: real pseudo-terminal, real topics, real signals.
+//! The three processes of a worm for real: real pseudo-terminal, real topics, real signals. They pause together for 20 to 300 ms about
+//! once a second, but in the tests of the latency benchmark, which measures the computer.
 //!
 //! These tests wait for conditions with a generous bound; they assert what happens, never how fast a shared machine is.
 
 mod explaining;
+#[path = "../host_pauses/mod.rs"]
+mod host_pauses;
 mod latency;
 mod leaving;
 mod recording;
 mod worm;
 
+use host_pauses::Pause;
 use std::time::Duration;
 use worm::{Process, Worm, late_ticks, soon, wait_for};
 use wormd::link::servo::{WATCHDOG_LATCHED, register};
@@ -16,36 +20,51 @@ use wormd::message::{AlarmKind, CommandKind, Fault, Mode, Verdict};
 /// Longest wait for anything that a worm does.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-#[test]
-fn the_main_job_crawls_counts_and_leaves_nothing_behind() {
-    let worm = Worm::new("main");
-    let output = worm.wormd(&["up", "--json", "--duration", "9"]).output();
+/// Nothing of a gait cycle, nor of a tick, gets lost in a pause; and a healthy worm has no fault and no alarm in one.
+fn assert_main_job(worm: &Worm) {
+    let output = worm.wormd(&["up", "--json", "--duration", "12"]).output();
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}\n{error}", output.status);
     let summary: serde_json::Value =
         serde_json::from_slice(&output.stdout).expect("standard output is one JSON object");
     let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
 
-    let ticks = number(&summary["ticks"]) + number(&summary["overruns"]);
-    assert!(
-        (8_900.0..12_000.0).contains(&ticks),
-        "9 s at 1 kHz are about 9000 ticks: {ticks}"
-    );
     assert_eq!(summary["samples_lost"], 0);
     assert_eq!(
         (&summary["mode"], &summary["fault"]),
         (&"crawling".into(), &"none".into())
     );
     assert_eq!(summary["alarms"], serde_json::json!([]), "no alarm on a healthy worm");
+    let timing = &summary["timing"];
+    let (duration_s, paused_s) = (
+        number(&summary["duration_s"]),
+        number(&timing["host_pauses"]["total_s"]),
+    );
+    let deadlines = number(&summary["ticks"]) + number(&summary["overruns"]);
+    let least_hz = number(&timing["rate_hz"]).min(1000.0);
+    assert!(
+        (0.97 * least_hz * duration_s..1030.0 * duration_s).contains(&deadlines),
+        "{duration_s} s at {least_hz} Hz have {deadlines} deadlines"
+    );
 
     let cycles = summary["cycles"].as_array().expect("a list");
-    assert!((3..=4).contains(&cycles.len()), "9 s of 2.5 s cycles: {}", cycles.len());
+    let most_cycles = duration_s / 2.5;
+    assert!(
+        (most_cycles - paused_s / 2.5 - 1.5..=most_cycles).contains(&(cycles.len() as f64)),
+        "{} cycles of 2.5 s in {duration_s} s, {paused_s} s of them paused",
+        cycles.len()
+    );
     for cycle in cycles.iter().filter(|cycle| cycle["settled"] == true) {
         let (advance_mm, loss_mj) = (number(&cycle["advance_m"]) * 1e3, number(&cycle["energy_loss_j"]) * 1e3);
         assert!((advance_mm - 6.833).abs() < 0.25, "advance {advance_mm} mm");
         assert!(
-            (loss_mj / 46.88 - 1.0).abs() < 0.06,
+            (loss_mj / 46.88 - 1.0).abs() < 0.03,
             "energy {loss_mj} mJ, with 1 % scatter of the friction"
+        );
+        let electrical_mj = number(&cycle["energy_electrical_j"]) * 1e3;
+        assert!(
+            (electrical_mj / 650.0 - 1.0).abs() < 0.03,
+            "electrical {electrical_mj} mJ"
         );
         let parts = ["energy_copper_j", "energy_friction_inside_j", "energy_actuator_net_j"];
         let sum: f64 = parts.iter().map(|part| number(&cycle[part])).sum();
@@ -55,14 +74,29 @@ fn the_main_job_crawls_counts_and_leaves_nothing_behind() {
         );
         assert_eq!(cycle["forward_slide_m"].as_array().map(Vec::len), Some(4));
     }
-    let timing = &summary["timing"];
+    let marked_s: f64 = cycles.iter().map(|cycle| number(&cycle["host_paused_s"])).sum();
+    assert!(
+        (0.0..=paused_s + 1e-9).contains(&marked_s),
+        "cycles are marked with {marked_s} s of {paused_s} s of pauses"
+    );
     assert_eq!(timing["worst_ticks"].as_array().map(Vec::len), Some(10));
     let late = late_ticks(&timing["culprits"]);
     assert!(
         late <= number(&summary["overruns"]),
         "a late tick costs a deadline at least: {timing}"
     );
+    assert!(worm.pauses() > 0, "it was tried");
     assert_eq!(worm.residue(), Vec::<String>::new());
+}
+
+#[test]
+fn the_main_job_crawls_counts_and_leaves_nothing_behind() {
+    assert_main_job(&Worm::new("main"));
+}
+
+#[test]
+fn the_main_job_goes_on_when_one_process_pauses_alone() {
+    assert_main_job(&Worm::with_pauses("alone", Pause::OneOf(20..60)));
 }
 
 #[test]

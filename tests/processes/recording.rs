@@ -29,7 +29,7 @@ fn the_main_job_records_what_replays_to_the_same_results() {
             "up",
             "--json",
             "--duration",
-            "5",
+            "8",
             "--config",
             &config,
             "--record",
@@ -116,7 +116,7 @@ fn only_what_was_asked_for_is_recorded_and_no_file_is_lost() {
     let folder = tempfile::tempdir().expect("a folder");
     let (path, file) = path_in(&folder);
     let record = |more: &[&str]| {
-        let arguments = [&["record", "--duration", "0.5", "--out"], more].concat();
+        let arguments = [&["record", "--duration", "2", "--out"], more].concat();
         let output = worm.wormd(&arguments).output();
         (
             output.status.code(),

@@ -1,13 +1,15 @@
-//! Real processes of a worm, under a name of their own, ended when a test ends.
+//! Real processes of a worm, under a name of their own, ended when a test ends. All of them pause together now and then, as on a
+//! computer that is busy or whose host is.
 
+use super::host_pauses::{HostPauses, Pause};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::io::{BufRead, BufReader, Read};
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
-use std::sync::Mutex;
 use std::sync::mpsc::RecvTimeoutError;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use wormd::config::Config;
 use wormd::link::packet::DeviceId;
@@ -20,7 +22,12 @@ pub struct Worm {
     name: String,
     folder: tempfile::TempDir,
     ears: Mutex<Option<Ears>>,
+    pauses: Option<Arc<HostPauses>>,
 }
+
+/// How long pauses are, and how far apart, ms.
+const PAUSE_MS: std::ops::Range<u64> = 20..300;
+const BETWEEN_PAUSES_MS: std::ops::Range<u64> = 400..1500;
 
 /// Ports of the test itself. They belong to one thread; a test is one.
 struct Ears {
@@ -32,12 +39,28 @@ struct Ears {
 impl Worm {
     /// A worm whose name no other test, nor another run of this test, has.
     pub fn new(name: &str) -> Self {
+        Self::with_pauses(name, Pause::Together(PAUSE_MS))
+    }
+
+    /// The same with other pauses than those of the whole computer.
+    pub fn with_pauses(name: &str, kind: Pause) -> Self {
+        let seed = name.bytes().map(u64::from).sum();
+        println!("{name}: pauses with seed {seed}");
+        Self {
+            pauses: Some(Arc::new(HostPauses::start(vec![kind], BETWEEN_PAUSES_MS, seed))),
+            ..Self::on_a_steady_computer(name)
+        }
+    }
+
+    /// The same without pauses, for what measures the computer.
+    pub fn on_a_steady_computer(name: &str) -> Self {
         let name = format!("{name}-{}", std::process::id() % 100_000);
         let folder = tempfile::tempdir().expect("a temporary folder");
         Self {
             name,
             folder,
             ears: Mutex::new(None),
+            pauses: None,
         }
     }
 
@@ -62,12 +85,12 @@ impl Worm {
     /// `wormd` with these arguments and this worm's name.
     pub fn wormd(&self, arguments: &[&str]) -> Invocation {
         let named = [arguments, &["--name", &self.name]].concat();
-        Invocation::new(&named)
+        Invocation::new(&named, self.pauses.clone())
     }
 
     /// What `wormd replay --json` says of a log.
     pub fn replay(&self, log: &str) -> Output {
-        Invocation::new(&["replay", "--json", log]).output()
+        Invocation::new(&["replay", "--json", log], None).output()
     }
 
     /// The virtual worm, ready.
@@ -75,7 +98,7 @@ impl Worm {
         let port = self.port();
         let mut arguments = vec!["virtual-worm", "--link", &port];
         arguments.extend(more);
-        Invocation::new(&arguments).start()
+        Invocation::new(&arguments, self.pauses.clone()).start()
     }
 
     /// The bus of the virtual worm, for whoever is not the controller.
@@ -120,6 +143,11 @@ impl Worm {
         })
     }
 
+    /// Pauses that were made so far.
+    pub fn pauses(&self) -> u64 {
+        self.pauses.as_ref().map_or(0, |pauses| pauses.made())
+    }
+
     /// Files of this worm that are left in shared memory.
     pub fn residue(&self) -> Vec<String> {
         let mut left: Vec<String> = ["/dev/shm", "/dev/shm/wormd"]
@@ -138,30 +166,29 @@ impl Worm {
 pub struct Invocation {
     command: Command,
     what: String,
+    pauses: Option<Arc<HostPauses>>,
 }
 
 impl Invocation {
-    fn new(arguments: &[&str]) -> Self {
+    fn new(arguments: &[&str], pauses: Option<Arc<HostPauses>>) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wormd"));
         command.args(arguments).stdin(Stdio::null());
         Self {
             command,
             what: arguments.join(" "),
+            pauses,
         }
     }
 
-    /// Runs it to its end, which must come within a minute.
+    /// Runs it to its end, which must come within three minutes: it hangs otherwise, however busy the computer is.
     pub fn output(mut self) -> Output {
-        let mut child = self
-            .command
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the binary starts");
+        self.command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut process = self.spawn();
+        let child = &mut process.child;
         let pid = Pid::from_raw(child.id() as i32);
         let (ended, watch) = std::sync::mpsc::channel::<()>();
         let guard = std::thread::spawn(move || {
-            let hangs = watch.recv_timeout(Duration::from_secs(60)) == Err(RecvTimeoutError::Timeout);
+            let hangs = watch.recv_timeout(Duration::from_secs(180)) == Err(RecvTimeoutError::Timeout);
             if hangs {
                 // The process group is the test's own child alone.
                 let _ = kill(pid, Signal::SIGTERM);
@@ -181,12 +208,12 @@ impl Invocation {
             .expect("is piped")
             .read_to_end(&mut stderr)
             .expect("can be read");
-        let status = child.wait().expect("ends");
+        let status = process.wait();
         drop(ended);
         let hung = guard.join().expect("the guard does not panic");
         assert!(
             !hung,
-            "`{}` did not end within a minute:\n{}",
+            "`{}` did not end within three minutes:\n{}",
             self.what,
             String::from_utf8_lossy(&stderr)
         );
@@ -199,40 +226,49 @@ impl Invocation {
 
     /// Starts it and waits until it says on standard output that it is ready.
     pub fn start(mut self) -> Process {
-        let mut child = self.command.stdout(Stdio::piped()).spawn().expect("the binary starts");
-        let stdout = child.stdout.take().expect("is piped");
+        self.command.stdout(Stdio::piped());
+        let mut process = self.spawn();
+        let stdout = process.child.stdout.take().expect("is piped");
         let mut line = String::new();
         BufReader::new(stdout).read_line(&mut line).expect("can be read");
         assert!(
             !line.is_empty(),
             "`{}` ended before it was ready: {:?}",
             self.what,
-            child.wait()
+            process.wait()
         );
-        Process { child }
+        process
+    }
+
+    fn spawn(&mut self) -> Process {
+        let child = self.command.spawn().expect("the binary starts");
+        if let Some(pauses) = &self.pauses {
+            pauses.processes().push(Pid::from_raw(child.id() as i32));
+        }
+        Process {
+            child,
+            pauses: self.pauses.clone(),
+        }
     }
 
     /// Starts it, and hears nothing of it.
     pub fn start_silent(mut self) -> Process {
-        let command = self.command.stdout(Stdio::null()).stderr(Stdio::null());
-        Process {
-            child: command.spawn().expect("the binary starts"),
-        }
+        self.command.stdout(Stdio::null()).stderr(Stdio::null());
+        self.spawn()
     }
 
     /// Starts it with a terminal of its own.
     pub fn start_in(mut self, terminal: OwnedFd) -> Process {
         let copy = || terminal.try_clone().expect("a descriptor is free");
-        let command = self.command.stdin(copy()).stdout(copy()).stderr(copy());
-        Process {
-            child: command.spawn().expect("the binary starts"),
-        }
+        self.command.stdin(copy()).stdout(copy()).stderr(copy());
+        self.spawn()
     }
 }
 
 /// A running process; dropping it ends it.
 pub struct Process {
     child: Child,
+    pauses: Option<Arc<HostPauses>>,
 }
 
 impl Process {
@@ -243,14 +279,34 @@ impl Process {
     /// kill -9.
     pub fn kill(&mut self) {
         self.child.kill().expect("is alive");
-        self.child.wait().expect("ends");
+        self.wait();
+    }
+
+    /// How it ended, once it has. Nobody may signal its number any more when the system gives it to another process.
+    fn exit_status(&mut self) -> Option<ExitStatus> {
+        let mut paused = self.pauses.as_ref().map(|pauses| pauses.processes());
+        let status = self.child.try_wait().expect("can be waited for");
+        if let (Some(paused), Some(_)) = (&mut paused, status) {
+            let id = self.child.id() as i32;
+            paused.retain(|pid| pid.as_raw() != id);
+        }
+        status
+    }
+
+    fn wait(&mut self) -> ExitStatus {
+        loop {
+            if let Some(status) = self.exit_status() {
+                return status;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
     }
 
     /// Waits until it has ended without being asked to.
     pub fn ends_by_itself(mut self) -> ExitStatus {
         let mut status = None;
         wait_for("an end without being asked", Duration::from_secs(20), || {
-            status = self.child.try_wait().expect("can be waited for");
+            status = self.exit_status();
             status.is_some()
         });
         status.expect("has ended")
@@ -260,7 +316,7 @@ impl Process {
     pub fn end(mut self) {
         self.ask_to_end();
         wait_for("an orderly end", Duration::from_secs(20), || {
-            matches!(self.child.try_wait(), Ok(Some(_)))
+            self.exit_status().is_some()
         });
     }
 
@@ -272,19 +328,19 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        if matches!(self.child.try_wait(), Ok(Some(_))) {
+        if self.exit_status().is_some() {
             return;
         }
         self.ask_to_end();
         let deadline = Instant::now() + Duration::from_secs(5);
         while Instant::now() < deadline {
-            if matches!(self.child.try_wait(), Ok(Some(_))) {
+            if self.exit_status().is_some() {
                 return;
             }
             std::thread::sleep(Duration::from_millis(10));
         }
         let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.wait();
     }
 }
 

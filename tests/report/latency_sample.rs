@@ -39,12 +39,7 @@ pub fn nothing() -> Outcome {
         floor_polled_delivery_us: Durations::default(),
         alarm_us: Durations::default(),
         culprits: Default::default(),
-        host_pauses: HostPauses {
-            count: 3,
-            total_s: 0.0855,
-            longest_s: 0.0512,
-            newest_s: 0.0121,
-        },
+        host_pauses: host_pauses(),
         worst_ticks: WorstTicks::default(),
         controller_cpu_share: f64::NAN,
         floor_cpu_share: f64::NAN,
@@ -212,4 +207,12 @@ fn settings() -> Vec<Setting> {
         remedy: remedy.map(str::to_owned),
     })
     .to_vec()
+}
+
+fn host_pauses() -> HostPauses {
+    let mut pauses = HostPauses::default();
+    for ms in [22, 51, 12] {
+        pauses.add(ms * 1_000_000);
+    }
+    pauses
 }

@@ -280,10 +280,10 @@ slope, fault: alarms and how long after it they came, how it ended
  0° overheat:ambient=90        device-fault 0.98 s, fault (over-temperature)
  0° hardware-error:bits=32     device-fault 0.00 s, fault (servo-hardware)
  0° reboot:off=0.05            link-fault 0.10 s, fault (link-lost)
- 0° drop:share=0.3             link-fault 0.34 s, crawling
- 0° corrupt:share=0.3          link-fault 0.87 s, crawling
+ 0° drop:share=0.3             link-fault 0.33 s, crawling
+ 0° corrupt:share=0.3          link-fault 0.83 s, crawling
  0° drop:share=0.02            crawling
- 0° delay:ms=2                 link-fault 0.10 s, tracker-fault 0.49 s, fault (link-lost)
+ 0° delay:ms=2                 crawling
  0° drag:force=0.3             model-mismatch 11.24 s, crawling
 ";
 

@@ -34,8 +34,9 @@ pub(super) struct TrackerFault {
     cells: usize,
     parts: [Counts; PARTS],
     part: usize,
-    part_ns: u64,  // length of the present part so far
-    whole: Counts, // sum of the parts
+    unanswered_s: f64, // since the last motor reading
+    part_ns: u64,      // length of the present part so far
+    whole: Counts,     // sum of the parts
     filled_s: f64,
     silent_s: f64,
     last_sample: Option<u64>,
@@ -51,6 +52,7 @@ impl TrackerFault {
             cells: config.worm.cells.min(MAX_CELLS),
             parts: [Counts::default(); PARTS],
             part: 0,
+            unanswered_s: 0.0,
             part_ns: 0,
             whole: Counts::default(),
             filled_s: 0.0,
@@ -87,7 +89,8 @@ impl TrackerFault {
 
     fn advance_window(&mut self, moment: &Moment) {
         let part_ns = (WINDOW_S * 1e9) as u64 / PARTS as u64;
-        self.part_ns += (moment.present_s * 1e9) as u64;
+        let due_s = self.due_s(moment);
+        self.part_ns += (due_s * 1e9) as u64;
         let passed = self.part_ns / part_ns;
         for _ in 0..passed.min(PARTS as u64) {
             self.part = (self.part + 1) % PARTS;
@@ -99,8 +102,18 @@ impl TrackerFault {
             }
         }
         self.part_ns -= passed * part_ns;
-        self.filled_s += moment.present_s;
+        self.filled_s += due_s;
         self.silent_s += moment.present_s;
+    }
+
+    /// The time in which samples were due that has become known with this tick, s. While the servo does not answer it is not known
+    /// whether its line or its computer is silent, and with it the tracker's; where they stood still no sample was due.
+    fn due_s(&mut self, moment: &Moment) -> f64 {
+        self.unanswered_s += moment.present_s;
+        if !moment.phase_is_new {
+            return 0.0;
+        }
+        std::mem::take(&mut self.unanswered_s).min(moment.lived_s)
     }
 
     fn count(&mut self, state: &State) {

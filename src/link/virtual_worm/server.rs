@@ -14,7 +14,7 @@ use super::pty::{Pty, PtyError};
 use crate::config::Config;
 use crate::logging::Summed;
 use crate::model::WormError;
-use crate::realtime::monotonic_ns;
+use crate::realtime::{monotonic_ns, visit_every_cpu};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
@@ -33,6 +33,8 @@ const SLEEP_IDLE: Duration = Duration::from_millis(10);
 const IDLE_AFTER: Duration = Duration::from_millis(100);
 /// After so long without a byte the peer is taken for gone.
 const GONE_AFTER: Duration = Duration::from_secs(1);
+/// After so long without a byte from a controller that talked it is looked whether all CPUs of the computer run.
+const DOUBT_AFTER: Duration = Duration::from_millis(20);
 /// A look that comes later than planned by no more than this was late, and the world catches up; beyond it this process did not
 /// run, and the world has stood still. It is half of the shortest bus watchdog.
 const LATEST_LOOK: Duration = Duration::from_millis(10);
@@ -115,6 +117,12 @@ impl Server {
             match ppoll(&mut fds, Some(TimeSpec::from_duration(sleep)), None) {
                 Ok(_) | Err(Errno::EINTR) => {}
                 Err(errno) => return Err(failed("wait")(errno.into())),
+            }
+            let silent = clock.world.saturating_sub(heard);
+            if !peer_gone && silent > DOUBT_AFTER {
+                // The controller may have its CPU taken away while this process runs on another. Then this comes back late, and
+                // the world stands still for the gap.
+                visit_every_cpu();
             }
             let count = self.pty.read(&mut incoming).map_err(failed("receive"))?;
             if let Some(stood_still) = clock.advance(Instant::now(), sleep) {
