@@ -457,8 +457,10 @@ fn draw_cycles(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {
 
 fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
     let account = &telemetry.account;
+    let held_hz = telemetry.timing.map(|timing| (1e9 / timing.period_ns as f64).round());
+    let rate_hz = held_hz.filter(|hz| hz.is_finite()).unwrap_or(subject.rate_hz);
     let mut lines = vec![
-        Line::raw(format!("{} ticks at {} Hz", telemetry.ticks(), subject.rate_hz)),
+        Line::raw(format!("{} ticks at {rate_hz} Hz", telemetry.ticks())),
         Line::raw(format!(
             "{} overruns, {} link faults",
             telemetry.timing.map_or(0, |timing| timing.overruns),
@@ -475,6 +477,13 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
         lines.push(Line::raw(format!(
             "{name:<8}{:>6.0}{:>8.0}{:>9.0}",
             us.p50, us.p99, us.max
+        )));
+    }
+    let pauses = account.host_pauses;
+    if pauses.count > 0 {
+        lines.push(Line::raw(format!(
+            "{} host pauses, {:.2} s",
+            pauses.count, pauses.total_s
         )));
     }
     if let Some(share) = telemetry

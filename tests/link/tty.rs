@@ -45,13 +45,19 @@ fn bytes_pass_both_ways() {
 fn wait_ends_at_the_deadline() {
     let (_far, _near, path) = pseudo_terminal();
     let (mut tty, _) = Tty::open(Path::new(&path), 1_000_000).expect("open");
-    let start = Instant::now();
-    assert_eq!(tty.receive(&mut [0; 16], start + Duration::from_millis(20)), Ok(0));
-    let waited = start.elapsed();
-    assert!(
-        waited >= Duration::from_millis(20) && waited < Duration::from_millis(500),
-        "{waited:?}"
-    );
+    let waited = shortest_of_a_few(|| {
+        let start = Instant::now();
+        assert_eq!(tty.receive(&mut [0; 16], start + Duration::from_millis(20)), Ok(0));
+        let waited = start.elapsed();
+        assert!(waited >= Duration::from_millis(20), "{waited:?}");
+        waited
+    });
+    assert!(waited < Duration::from_millis(100), "{waited:?}");
+}
+
+/// What something takes on a computer that does not pause just then.
+fn shortest_of_a_few(attempt: impl FnMut() -> Duration) -> Duration {
+    std::iter::repeat_with(attempt).take(5).min().unwrap_or_default()
 }
 
 #[test]
@@ -89,10 +95,13 @@ fn far_end_that_closes_is_told_from_silence() {
 fn port_that_takes_no_bytes_does_not_hold_the_loop() {
     let (_far, _near, path) = pseudo_terminal();
     let (mut tty, _) = Tty::open(Path::new(&path), 1_000_000).expect("open");
-    let start = Instant::now();
-    let sent = tty.send(&vec![0; 1 << 20], start + Duration::from_millis(30));
-    assert_eq!(sent, Err(PortError::SendTimeout));
-    assert!(start.elapsed() < Duration::from_millis(500));
+    let held = shortest_of_a_few(|| {
+        let start = Instant::now();
+        let sent = tty.send(&vec![0; 1 << 20], start + Duration::from_millis(30));
+        assert_eq!(sent, Err(PortError::SendTimeout));
+        start.elapsed()
+    });
+    assert!(held < Duration::from_millis(100), "{held:?}");
 }
 
 #[test]

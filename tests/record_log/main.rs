@@ -9,7 +9,7 @@ mod samples;
 
 use sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
 use std::fs;
-use wormd::message::{Estimate, JsonMessage};
+use wormd::message::{Estimate, JsonMessage, State};
 use wormd::recording::mcap::{Channel, Writer, messages};
 
 fn text<T: JsonMessage>(messages: &[T]) -> Vec<u8> {
@@ -57,31 +57,53 @@ fn an_estimate_that_rests_on_nothing_takes_the_time_of_its_log() {
     assert_eq!(message.log_time, origin().begun_ns);
 }
 
+/// A log of one message, number 7, that another program wrote.
+fn foreign(topic: &str, type_name: &str, encoding: &str, message: &str) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let options = mcap::WriteOptions::new().compression(None);
+    let mut writer = options.create(&mut bytes).expect("memory takes all");
+    let schema = writer.add_schema(type_name, "jsonschema", b"{}").expect("a schema");
+    let channel = writer
+        .add_channel(schema, topic, encoding, &Default::default())
+        .expect("a channel");
+    let header = mcap::records::MessageHeader {
+        channel_id: channel,
+        sequence: 7,
+        log_time: 1,
+        publish_time: 1,
+    };
+    writer
+        .write_to_known_channel(&header, message.as_bytes())
+        .expect("a message");
+    writer.finish().expect("memory takes all");
+    drop(writer);
+    bytes.into_inner()
+}
+
+#[test]
+fn states_of_an_older_version_are_read_without_what_they_lack() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("worm.mcap");
+    let state = crawl(0.1).states[0];
+    let mut object: serde_json::Map<_, _> = serde_json::from_slice(&text(&[state])).expect("JSON");
+    for member in ["motor_time_s", "host_paused_ns"] {
+        object.remove(member).expect("is new");
+    }
+    let older = serde_json::Value::from(object).to_string();
+    fs::write(&path, foreign("/state", "wormd_state_v1", "json", &older)).expect("can be written");
+    let read = messages(&path).expect("a log").states;
+    let expected = State {
+        motor_time_s: f64::NAN,
+        host_paused_ns: 0,
+        ..state
+    };
+    assert_eq!(text(&read), text(&[expected]));
+}
+
 #[test]
 fn other_files_are_refused_with_what_to_do() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("worm.mcap");
-    let foreign = |topic: &str, type_name: &str, encoding: &str, message: &str| {
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        let options = mcap::WriteOptions::new().compression(None);
-        let mut writer = options.create(&mut bytes).expect("memory takes all");
-        let schema = writer.add_schema(type_name, "jsonschema", b"{}").expect("a schema");
-        let channel = writer
-            .add_channel(schema, topic, encoding, &Default::default())
-            .expect("a channel");
-        let header = mcap::records::MessageHeader {
-            channel_id: channel,
-            sequence: 7,
-            log_time: 1,
-            publish_time: 1,
-        };
-        writer
-            .write_to_known_channel(&header, message.as_bytes())
-            .expect("a message");
-        writer.finish().expect("memory takes all");
-        drop(writer);
-        bytes.into_inner()
-    };
     for (bytes, parts) in [
         (Vec::new(), &["cut off after 0 bytes"][..]),
         (b"time_s,x1_m\n0,0\n".to_vec(), &["is no MCAP file"]),
@@ -99,8 +121,8 @@ fn other_files_are_refused_with_what_to_do() {
             ],
         ),
         (
-            foreign("/state", "wormd_state_v1", "json", "{}"),
-            &["channel /state: holds 'wormd_state_v1', and this version of wormd reads 'wormd_state_v2'"],
+            foreign("/state", "wormd_state_v9", "json", "{}"),
+            &["channel /state: holds 'wormd_state_v9', and this version of wormd reads 'wormd_state_v2'"],
         ),
         (
             foreign("/state", "wormd_state_v2", "json", "{\"sequence\": -1}"),

@@ -192,12 +192,18 @@ fn forward(log: &Log) {
 fn cycle_line(cycle: &Cycle) -> String {
     let head = format!("cycle {:>4}: advance {:6.2} mm, ", cycle.index, cycle.advance_m * 1e3);
     let electrical = format!("{:.1} mJ electrical", cycle.energy_electrical_j * 1e3);
-    let settling = if cycle.settled == 0 { " (settling)" } else { "" };
+    let mut remarks = String::new();
+    if cycle.settled == 0 {
+        remarks += " (settling)";
+    }
+    if cycle.host_paused_s > 0.0 {
+        remarks += &format!(" (computer paused {:.2} s)", cycle.host_paused_s);
+    }
     if !cycle.energy_loss_sigma_j.is_finite() {
-        return format!("{head}{electrical}{settling}");
+        return format!("{head}{electrical}{remarks}");
     }
     format!(
-        "{head}energy {:6.2} ± {:.2} mJ by losses, {:6.2} mJ by the actuator, {electrical}{settling}",
+        "{head}energy {:6.2} ± {:.2} mJ by losses, {:6.2} mJ by the actuator, {electrical}{remarks}",
         cycle.energy_loss_j * 1e3,
         cycle.energy_loss_sigma_j * 1e3,
         cycle.energy_actuator_net_j * 1e3,

@@ -21,6 +21,7 @@
 mod channel;
 mod compare;
 mod log;
+mod older;
 mod replay;
 mod samples;
 mod scan;

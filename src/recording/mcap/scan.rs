@@ -5,6 +5,7 @@
 //! (lz4 goes by blocks of 64 kB) is taken too, up to the last whole message, and a warning tells of it.
 
 use super::channel::{CONFIG_ATTACHMENT, Channel, MESSAGE_ENCODING, METADATA};
+use super::older::{completed, lacking_members};
 use crate::recording::RecordingError;
 use ::mcap::records::{Channel as FileChannel, Record, op};
 use ::mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -146,8 +147,8 @@ struct Scanner<'a, F> {
     path: &'a Path,
     take: F,
     schemas: HashMap<u16, String>,
-    /// The channels of the file by their numbers; none for those that are not a worm's.
-    channels: HashMap<u16, Option<Channel>>,
+    /// The channels of the file by their numbers, with what their messages lack; none for those that are not a worm's.
+    channels: HashMap<u16, Option<(Channel, Option<&'static str>)>>,
     foreign: Vec<String>,
     contents: Contents,
     count: u64,
@@ -207,8 +208,10 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
                     .channels
                     .get(&header.channel_id)
                     .ok_or(McapError::UnknownChannel(header.sequence, header.channel_id))?;
-                let Some(channel) = *channel else { return Ok(()) };
-                (self.take)(channel, &data).map_err(|error| {
+                let Some((channel, lacking)) = *channel else {
+                    return Ok(());
+                };
+                (self.take)(channel, &completed(&data, lacking)).map_err(|error| {
                     let place = format!("channel {}, message {}", channel.topic(), header.sequence);
                     let remedy = "the file was not written by wormd, or was changed: record it again";
                     Trouble::Refused(refusal(
@@ -259,13 +262,16 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
                 "holds messages encoded as '{}', not as '{MESSAGE_ENCODING}'",
                 channel.message_encoding
             )
+        } else if let Some(lacking) = lacking_members(known, schema) {
+            self.channels.insert(channel.id, Some((known, Some(lacking))));
+            return Ok(());
         } else if schema != known.type_name() {
             format!(
                 "holds '{schema}', and this version of wormd reads '{}'",
                 known.type_name()
             )
         } else {
-            self.channels.insert(channel.id, Some(known));
+            self.channels.insert(channel.id, Some((known, None)));
             return Ok(());
         };
         let writer = self.contents.metadata.get("wormd_version");
