@@ -96,6 +96,7 @@ struct Run {
     succeeded: bool,
     log: String,
     pauses: u64,
+    duration_s: u32,
 }
 
 fn run(arguments: &Arguments, scenario: Option<char>, number: u32) -> Run {
@@ -125,15 +126,20 @@ fn run(arguments: &Arguments, scenario: Option<char>, number: u32) -> Run {
         succeeded: output.status.success(),
         log: String::from_utf8_lossy(&output.stderr).into_owned(),
         pauses: pauses.map_or(0, |pauses| pauses.made()),
+        duration_s: arguments.duration,
     }
 }
 
-/// An energy of each settled cycle, J.
-fn energies(summary: &Value, name: &str) -> Vec<f64> {
+/// An energy of each settled cycle, J, but of one that ended while the worm was already being stopped: braking costs copper heat.
+fn energies(summary: &Value, name: &str, duration_s: u32) -> Vec<f64> {
     let cycles = summary["cycles"].as_array().map_or(&[][..], Vec::as_slice);
+    let mut ended_s = 0.0;
     cycles
         .iter()
-        .filter(|cycle| cycle["settled"] == true)
+        .filter(|cycle| {
+            ended_s += cycle["duration_s"].as_f64().unwrap_or(f64::NAN);
+            cycle["settled"] == true && ended_s < f64::from(duration_s) - 0.1
+        })
         .map(|cycle| cycle[name].as_f64().unwrap_or(f64::NAN))
         .collect()
 }
@@ -147,7 +153,7 @@ impl Run {
     /// The largest deviation of any energy of a settled cycle from the undisturbed ones.
     fn farthest(&self, undisturbed: &[f64]) -> f64 {
         let deviations = ENERGIES.iter().zip(undisturbed).flat_map(|(name, reference_j)| {
-            energies(&self.summary, name)
+            energies(&self.summary, name, self.duration_s)
                 .into_iter()
                 .map(move |energy_j| (energy_j / reference_j - 1.0).abs())
         });
@@ -181,7 +187,7 @@ impl Run {
             format!("{} samples lost", summary["samples_lost"]),
         );
         expect(
-            !energies(summary, ENERGIES[0]).is_empty(),
+            !energies(summary, ENERGIES[0], self.duration_s).is_empty(),
             "no settled cycle".to_owned(),
         );
         let farthest = self.farthest(undisturbed);
@@ -193,7 +199,7 @@ impl Run {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let quiet = run(&arguments, None, 0);
-    let undisturbed = ENERGIES.map(|name| median(energies(&quiet.summary, name)));
+    let undisturbed = ENERGIES.map(|name| median(energies(&quiet.summary, name, quiet.duration_s)));
     println!(
         "undisturbed: {} ticks, {} overruns, host_pauses {}; medians in mJ: {}",
         quiet.summary["ticks"],

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 /// What a tick is given.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
-    /// When the exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
+    /// When the exchange with the bus ended, and the service behind it if there was one, ns of `CLOCK_MONOTONIC`.
     pub now_ns: u64,
     /// For how long since the tick before the loop could not run though it had to, ns: nobody can be blamed for silence then.
     pub absent_ns: u64,

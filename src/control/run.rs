@@ -222,7 +222,8 @@ impl Loop {
         let estimate_arrived = matches!(self.ports.estimates.latest(), Ok(Some(_)));
         let (command, responder) = split(self.ports.commands.take());
         let inputs = Inputs {
-            now_ns: exchanged,
+            // A service takes long, and nobody was asked for a reading meanwhile: silences begin behind it.
+            now_ns: resumed,
             absent_ns,
             lost_exchanges: outcome.lost,
             servo: outcome.servo.as_ref().ok(),
