@@ -165,6 +165,7 @@ impl<M: Machine> Session<M> {
     pub fn tick(&mut self, command: Option<Command>) -> Tick {
         self.now_ns += self.period_ns;
         let exchange = self.exchange();
+        let now_ns = self.now_ns;
         let service = self.last.and_then(|last| last.service);
         let world_s = self.world_s();
         let served = service.map(|service| self.machine.serve(service, world_s));
@@ -173,7 +174,7 @@ impl<M: Machine> Session<M> {
             self.now_ns = self.now_ns.max((served.ended_s * 1e9) as u64 + self.stood_ns);
         }
         let outputs = self.controller.tick(&Inputs {
-            now_ns: self.now_ns,
+            now_ns,
             absent_ns: std::mem::take(&mut self.absent_ns),
             lost_exchanges: exchange.lost,
             servo: exchange.servo.as_ref(),
