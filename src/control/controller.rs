@@ -117,7 +117,8 @@ pub struct Controller {
     mode: Mode,
     fault: Fault,
     fault_alarm: Option<AlarmKind>,
-    /// How long the computer paused since the servo's last answer, ns; kept as it was when a fault was latched.
+    /// How long the computer has paused since the servo last answered in a tick without a pause, ns; kept as it was when a fault was
+    /// latched.
     paused_unanswered_ns: u64,
     resume: Resume,
     /// Cam angle that a hold keeps; unset while the ramp still runs out.
@@ -213,7 +214,8 @@ impl Controller {
         if self.has_torque() {
             self.check_safety(inputs, now_ns, dt_s);
         }
-        if self.mode != Mode::Fault && inputs.servo.is_some() {
+        // What is read in the tick of the pause itself may have been said before it.
+        if self.mode != Mode::Fault && inputs.servo.is_some() && pause_ns == 0 {
             self.paused_unanswered_ns = 0;
         }
         for alarm in inputs.alarms {

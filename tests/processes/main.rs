@@ -126,8 +126,7 @@ struct Crawling {
 
 impl Crawling {
     fn start(name: &str) -> Self {
-        let worm = Worm::new(name);
-        Self::start_again(worm)
+        Self::start_again(Worm::new(name))
     }
 
     fn start_again(worm: Worm) -> Self {
@@ -232,6 +231,22 @@ fn a_pulled_cable_is_a_lost_link_until_it_is_back() {
             .is_some_and(|state| state.mode == Mode::Armed.code())
     });
     crawling.restart().worm.order(CommandKind::Stop);
+}
+
+#[test]
+fn a_controller_that_pauses_for_longer_than_the_watchdog_waits_blames_neither_servo_nor_link() {
+    let crawling = Crawling::start_again(Worm::on_a_steady_computer("pause-c"));
+    // The computer as a whole may pause at the same time; then the servo has waited less.
+    wait_for("the servo's watchdog stops the motor", PATIENCE, || {
+        crawling.controller.pause(Duration::from_millis(250));
+        std::thread::sleep(Duration::from_millis(50));
+        crawling.fault() != Some(Fault::None)
+    });
+    assert_eq!(crawling.fault(), Some(Fault::HostPaused));
+    let paused_ns = crawling.worm.state().map_or(0, |state| state.host_paused_ns);
+    assert!(paused_ns > 200_000_000, "{paused_ns} ns of pauses are counted");
+    assert_eq!(crawling.worm.order(CommandKind::Reset), Verdict::Accepted);
+    crawling.wait_for_mode(Mode::Armed);
 }
 
 #[test]

@@ -276,6 +276,14 @@ impl Process {
         self.child.id()
     }
 
+    /// Does not run for so long.
+    pub fn pause(&self, pause: Duration) {
+        let pid = Pid::from_raw(self.child.id() as i32);
+        kill(pid, Signal::SIGSTOP).expect("is alive");
+        std::thread::sleep(pause);
+        kill(pid, Signal::SIGCONT).expect("is alive");
+    }
+
     /// kill -9.
     pub fn kill(&mut self) {
         self.child.kill().expect("is alive");

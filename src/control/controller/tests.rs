@@ -401,6 +401,14 @@ fn a_pause_that_outlasts_the_watchdog_is_told_as_what_it_was() {
             assert_eq!(rig.controller.pause_of_fault_ns(), pause_ms * MS);
         }
     }
+    // An answer from before the pause, read behind it, knows of nothing yet.
+    let mut rig = Rig::crawling("");
+    rig.now_ns += 150 * MS;
+    rig.absent_ns = 150 * MS;
+    rig.run(1);
+    rig.servo.watchdog = 0xFF;
+    rig.run(1);
+    assert_eq!(rig.controller.fault(), Fault::HostPaused);
 }
 
 /// Lets a pause trip the watchdog, and two seconds pass in which the servo can be prepared anew.
