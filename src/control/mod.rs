@@ -29,4 +29,4 @@ mod schedule;
 pub use controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
 pub use drive::{Drive, DriveError, link_settings};
 pub use run::{Ending, RunError, run};
-pub use schedule::Schedule;
+pub use schedule::{Schedule, bus_allowed_ns};

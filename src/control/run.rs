@@ -7,7 +7,7 @@ use super::evidence::{Counts, Parts, find_culprit};
 use super::journal::{Entry, Journal};
 use super::presence::{Looks, SHORTEST_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
-use super::schedule::Schedule;
+use super::schedule::{Schedule, bus_allowed_ns};
 use crate::config::Config;
 use crate::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
 use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
@@ -20,9 +20,6 @@ use std::time::{Duration, Instant};
 
 /// Alarm changes that one tick takes at most; more wait for the next tick.
 const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
-
-/// Even a tick that was woken late gives the bus this share of a period to answer.
-const LEAST_BUS_SHARE: f64 = 0.3;
 
 /// The witness runs so far below the loop: never in its way, and above all that could keep a device's answer back.
 const WITNESS_BELOW_LOOP: u8 = 5;
@@ -194,7 +191,7 @@ impl Loop {
         }
         let woken = monotonic_ns();
 
-        let bus_allowed = self.bus_allowed_ns(deadline, woken);
+        let bus_allowed = bus_allowed_ns(self.bus_wait_share, self.schedule.period_ns(), woken - deadline);
         let outcome = drive.exchange(
             self.last.map_or(0, |last| last.goal_counts),
             Instant::now() + Duration::from_nanos(bus_allowed),
@@ -279,14 +276,6 @@ impl Loop {
         let witness = &self.witness;
         self.silence
             .uncharged_ns(period_ns, answered || is_gone, || witness.ask())
-    }
-
-    /// How long the devices may take for their answer, ns.
-    fn bus_allowed_ns(&self, deadline: u64, woken: u64) -> u64 {
-        let period_ns = self.schedule.period_ns() as f64;
-        let share_ns = (self.bus_wait_share * period_ns) as u64;
-        let least_ns = (LEAST_BUS_SHARE * period_ns) as u64;
-        (deadline + share_ns).saturating_sub(woken).max(least_ns)
     }
 
     fn note_port(&mut self, is_gone: bool) {

@@ -39,6 +39,18 @@ impl HostPauses {
     }
 }
 
+impl std::fmt::Display for HostPauses {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "host-paused {} time(s), {:.2} s in all, {:.0} ms at most: the computer did not run the loop",
+            self.count,
+            self.total_s,
+            self.longest_s * 1e3
+        )
+    }
+}
+
 /// What a run of ticks amounts to.
 #[derive(Debug, Clone, Default)]
 pub struct Account {

@@ -9,7 +9,7 @@ mod summary;
 mod telemetry;
 pub mod view;
 
-pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, Summary, TimingSummary};
+pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, Summary, TimingSummary, remarks};
 pub use telemetry::Telemetry;
 
 #[cfg(test)]

@@ -252,14 +252,14 @@ impl fmt::Display for MechanicalEnergy<'_> {
     }
 }
 
-/// What to know of a cycle beside its figures.
-fn remarks(cycle: &CycleSummary) -> String {
+/// What to know of a gait cycle beside its figures, to be set behind them.
+pub fn remarks(settled: bool, host_paused_s: f64) -> String {
     let mut remarks = String::new();
-    if !cycle.settled {
-        remarks += "  (settling)";
+    if !settled {
+        remarks += " (settling)";
     }
-    if cycle.host_paused_s > 0.0 {
-        remarks += &format!("  (computer paused {:.2} s)", cycle.host_paused_s);
+    if host_paused_s > 0.0 {
+        remarks += &format!(" (computer paused {host_paused_s:.2} s)");
     }
     remarks
 }
@@ -294,7 +294,7 @@ impl fmt::Display for Summary {
                 cycle.energy_copper_j * 1e3,
                 cycle.energy_friction_inside_j * 1e3,
                 cycle.cot.map_or("-".to_owned(), |cot| format!("{cot:.2}")),
-                remarks(cycle),
+                remarks(cycle.settled, cycle.host_paused_s),
             )?;
         }
         if let Some(Some(predicted_m)) = self.cycles.last().map(|cycle| cycle.predicted_advance_m) {
@@ -343,13 +343,7 @@ impl fmt::Display for Summary {
         }
         let pauses = timing.host_pauses;
         if pauses.count > 0 {
-            writeln!(
-                f,
-                "host-paused {} time(s), {:.2} s in all, {:.0} ms at most: the computer did not run the controller",
-                pauses.count,
-                pauses.total_s,
-                pauses.longest_s * 1e3
-            )?;
+            writeln!(f, "{pauses}")?;
         }
         if let Some(worst) = timing.worst_ticks.ticks().first().filter(|worst| worst.late) {
             writeln!(

@@ -6,9 +6,10 @@ use super::measure::{Findings, LOOK};
 use crate::command::Failure;
 use crate::command::children::Log;
 use crate::command::progress::Progress;
+use crate::control::bus_allowed_ns;
 use crate::latency::Account;
 use crate::latency::outcome::RateTrial;
-use crate::message::{State, Timing};
+use crate::message::Timing;
 use crate::topics::Hub;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -55,7 +56,7 @@ pub(super) fn search(
             break;
         }
         house.restart_controller(bench, rate_hz, log, end)?;
-        let trial = try_rate(rate_hz, hub, end)?;
+        let trial = try_rate(rate_hz, bench.config.control.bus_wait_share, hub, end)?;
         if trial.sustained {
             kept = rate_hz;
         } else {
@@ -66,11 +67,10 @@ pub(super) fn search(
     Ok(())
 }
 
-fn try_rate(rate_hz: f64, hub: &Hub, end: &AtomicBool) -> Result<RateTrial, Failure> {
+fn try_rate(rate_hz: f64, bus_wait_share: f64, hub: &Hub, end: &AtomicBool) -> Result<RateTrial, Failure> {
     let mut timings = hub.subscriber::<Timing>().map_err(Failure::failed)?;
-    let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
     let mut account = Account::default();
-    let mut unanswered = 0; // in time: a late answer shows a rate that is too high
+    let mut unanswered = 0; // in time: answers that come late show a rate that is too high
     let begun = Instant::now();
     while begun.elapsed() < SETTLING + TRIAL && !end.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
@@ -78,10 +78,9 @@ fn try_rate(rate_hz: f64, hub: &Hub, end: &AtomicBool) -> Result<RateTrial, Fail
         while let Some(timing) = timings.next().map_err(Failure::failed)? {
             if settled {
                 account.take(&timing);
+                let allowed_ns = bus_allowed_ns(bus_wait_share, timing.period_ns, timing.wake_lateness_ns);
+                unanswered += u64::from(timing.bus_ns >= allowed_ns);
             }
-        }
-        while let Some(state) = states.next().map_err(Failure::failed)? {
-            unanswered += u64::from(settled && state.motor_is_new == 0);
         }
     }
     Ok(RateTrial::new(rate_hz, &account, unanswered))

@@ -122,16 +122,10 @@ fn culprits(outcome: &Outcome) -> String {
 }
 
 fn host_pauses(outcome: &Outcome) -> String {
-    let pauses = outcome.host_pauses;
-    if pauses.count == 0 {
-        return String::new();
+    match outcome.host_pauses {
+        pauses if pauses.count > 0 => format!("\n{pauses}"),
+        _ => String::new(),
     }
-    format!(
-        "\nhost-paused: the computer did not run the loop for 10 ms or more {} time(s), {:.2} s in all, {:.0} ms at most",
-        pauses.count,
-        pauses.total_s,
-        pauses.longest_s * 1e3
-    )
 }
 
 fn worst_ticks(outcome: &Outcome) -> String {

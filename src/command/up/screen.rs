@@ -5,7 +5,7 @@ use crate::command::{Failure, print};
 use crate::config::{Config, Direction};
 use crate::message::{Alarm, AlarmKind, Cycle};
 use crate::watch::view::{self, Subject};
-use crate::watch::{Telemetry, mismatch};
+use crate::watch::{Telemetry, mismatch, remarks};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use ratatui::DefaultTerminal;
@@ -192,13 +192,7 @@ fn forward(log: &Log) {
 fn cycle_line(cycle: &Cycle) -> String {
     let head = format!("cycle {:>4}: advance {:6.2} mm, ", cycle.index, cycle.advance_m * 1e3);
     let electrical = format!("{:.1} mJ electrical", cycle.energy_electrical_j * 1e3);
-    let mut remarks = String::new();
-    if cycle.settled == 0 {
-        remarks += " (settling)";
-    }
-    if cycle.host_paused_s > 0.0 {
-        remarks += &format!(" (computer paused {:.2} s)", cycle.host_paused_s);
-    }
+    let remarks = remarks(cycle.settled != 0, cycle.host_paused_s);
     if !cycle.energy_loss_sigma_j.is_finite() {
         return format!("{head}{electrical}{remarks}");
     }

@@ -77,12 +77,7 @@ pub(super) fn add_culprits(page: &mut Page, outcome: &Outcome) {
     table.rows = rows.collect();
     let pauses = outcome.host_pauses;
     if pauses.count > 0 {
-        table.note = Some(format!(
-            "host-paused: the computer did not run the loop for 10 ms or more {} time(s), {:.2} s in all, {:.0} ms at most.",
-            pauses.count,
-            pauses.total_s,
-            pauses.longest_s * 1e3
-        ));
+        table.note = Some(format!("{pauses}."));
     }
     page.table(&table);
 }
