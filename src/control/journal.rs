@@ -134,11 +134,11 @@ fn write_entries(shared: &Shared) {
                 Entry::RateChanged { configured_hz, held_hz } => recurring.take_rate(configured_hz, held_hz),
                 Entry::ModeChanged {
                     from,
-                    to,
+                    to: Mode::Fault,
                     fault: Fault::HostPaused,
                     pause_ns,
                     ..
-                } if to == Mode::Fault => log_host_paused(from, pause_ns),
+                } => log_host_paused(from, pause_ns),
                 Entry::ModeChanged {
                     from, to, fault, alarm, ..
                 } => log_mode(from, to, fault, alarm),
