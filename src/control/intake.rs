@@ -105,7 +105,7 @@ impl Intake {
     }
 
     /// Unwraps the servo's clock. Where it cannot have gone on as it reads, because the servo restarted or was silent for longer than
-    /// its counter reaches, this computer's clock tells how long it was away.
+    /// its counter reaches, this computer's clock says how long it was away.
     fn follow_servo_clock(&mut self, now_ns: u64, tick_ms: u16) {
         let Some(last) = self.servo_clock else {
             self.servo_clock = Some(ServoClock {

@@ -37,7 +37,7 @@ impl Bench {
         let (given, text) = args.worm.load_with_text()?;
         let mut text: DocumentMut = text.unwrap_or_default().parse().map_err(Failure::unusable)?;
         let is_virtual = given.port.is_none();
-        // A loop that slowed down would be measured at another rate than the one that is asked for.
+        // A loop that slowed down would be measured at another rate than the one given.
         set(&mut text, "control", "adapt_rate", value(false));
         if let Some(rate_hz) = args.rate {
             set(&mut text, "control", "rate_hz", value(rate_hz));
