@@ -2,11 +2,11 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use wormd::MAX_CELLS;
-use wormd::config::Config;
+use worm_estimator::config::Config;
+use worm_estimator::message::{Command, CommandKind};
+use worm_physics::MAX_CELLS;
 use wormd::control::{Controller, Inputs, Service, ServiceOutcome};
 use wormd::link::{ServoReading, TrackerReading};
-use wormd::message::{Command, CommandKind};
 
 const READING: ServoReading = ServoReading {
     watchdog: 5,

@@ -16,8 +16,7 @@
 //! A run is good when it ends without fault or alarm, lost no sample, and each settled cycle's energies are within 3 % of what they are
 //! without pauses: the median of an undisturbed run that is made first. Exit status 1 when one was not good.
 
-#[path = "../tests/host_pauses/mod.rs"]
-mod host_pauses;
+use testkit::process_pauses as host_pauses;
 
 use clap::Parser;
 use host_pauses::{HostPauses, Pause};

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use wormd::link::packet::{
+use dynamixel_bus::packet::{
     Decoder, DeviceId, FastReplyWriter, FastSegment, Instruction, InstructionPacket, MAX_PACKET_LEN, Packet, ReadSpan,
     ReadSpans, Recipient, StatusFlags,
 };

@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::time::Duration;
-use wormd::message::{State, Timing};
+use worm_estimator::message::{State, Timing};
 use wormd::topics::{Controller, Hub, Instance, RoleLock};
 
 fn topics(criterion: &mut Criterion) {

@@ -52,23 +52,11 @@
 //! - SI units stand in the names: `stroke_m`, `energy_j`. People read millimetres, millijoules and degrees.
 //! - Faults are injected by a wrapper, never by an `if` in the product.
 
-/// Most cells a worm can have: fixed-size topics and control tables are laid out for this many.
-pub const MAX_CELLS: usize = 16;
-
 pub mod command;
-pub mod config;
 pub mod control;
-pub mod estimate;
-pub mod experiment;
-pub mod explain;
-pub mod identify;
 pub mod latency;
 pub mod link;
 pub mod logging;
-pub mod message;
-pub mod model;
 pub mod realtime;
-pub mod recording;
-pub mod report;
 pub mod topics;
 pub mod watch;

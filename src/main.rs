@@ -35,10 +35,13 @@ enum Subcommands {
     /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
     Study(command::study::StudyArgs),
     /// The paper's experiment on a recording: tip deformations, slides, energy, figures
+    #[cfg(feature = "analysis")]
     Analyze(command::analyze::AnalyzeArgs),
     /// Where model and recordings disagree, and which physical effect the model misses
+    #[cfg(feature = "analysis")]
     Explain(command::explain::ExplainArgs),
     /// A recording from the model: what motion capture would have seen
+    #[cfg(feature = "analysis")]
     Simulate(command::simulate::SimulateArgs),
     /// The loop's own latency, from deadline to alarm, against what this computer can do at best
     Latency(command::latency::LatencyArgs),
@@ -85,8 +88,11 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
+        #[cfg(feature = "analysis")]
         Subcommands::Analyze(args) => command::analyze::run(&args),
+        #[cfg(feature = "analysis")]
         Subcommands::Explain(args) => command::explain::run(&args),
+        #[cfg(feature = "analysis")]
         Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Latency(args) => command::latency::run(&args, verbose),
         Subcommands::LatencyFloor(args) => command::latency::run_floor(&args),

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use wormd::config::Config;
+use worm_estimator::config::Config;
 use wormd::control::{self, Drive, Ending, link_settings};
 use wormd::link::virtual_worm::{Options, VirtualWorm};
 use wormd::topics::{Controller, Hub, Instance, RoleLock};

@@ -5,11 +5,11 @@ mod text;
 use super::material::{READING, SourceArgs};
 use super::progress::Progress;
 use super::{Failure, log_line, print};
-use crate::experiment::{Analysis, analyze};
-use crate::report;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use worm_analysis::experiment::{Analysis, analyze};
+use worm_analysis::report;
 
 /// Arguments of `wormd analyze`.
 #[derive(Debug, Args)]

@@ -1,7 +1,6 @@
 //! `wormd check`: what stands between this computer, this configuration and a crawling worm.
 
 use super::{Failure, WormArgs, print};
-use crate::config::{Config, Realtime};
 use crate::control::{Drive, link_settings};
 use crate::realtime::machine::{self, Setting};
 use crate::realtime::{self, InForce};
@@ -9,6 +8,7 @@ use crate::topics::{Hub, Instance};
 use clap::Args;
 use serde::Serialize;
 use std::path::Path;
+use worm_estimator::config::{Config, Realtime};
 
 /// Arguments of `wormd check`.
 #[derive(Debug, Args)]
@@ -243,7 +243,7 @@ fn check_port(config: &Config, report: &mut Report) {
                 ),
             );
             for finding in findings {
-                let level = if finding.mended { Level::Good } else { Level::Warning };
+                let level = if finding.corrected { Level::Good } else { Level::Warning };
                 report.note(level, "port", finding.what, finding.remedy);
             }
         }

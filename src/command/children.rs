@@ -145,9 +145,9 @@ impl Child {
             .unwrap_or_else(|| format!("ended at once, {status}"));
         let text = format!("{}: {last_words}", self.role);
         Err(if status.code() == Some(2) {
-            Failure::Unusable(text)
+            Failure::unusable(text)
         } else {
-            Failure::Failed(text)
+            Failure::failed(text)
         })
     }
 

@@ -32,7 +32,7 @@ pub fn run(args: &ControlArgs) -> Result<(), Failure> {
     let settings = link_settings(&config, port.baud).map_err(Failure::unusable)?;
     let (mut drive, prepared, findings) = Drive::open(Path::new(&port.path), settings).map_err(Failure::unusable)?;
     for finding in &findings {
-        if finding.mended {
+        if finding.corrected {
             tracing::info!("{}: {} ({})", port.path, finding.what, finding.remedy);
         } else {
             tracing::warn!("{}: {}: {}", port.path, finding.what, finding.remedy);

@@ -2,12 +2,12 @@
 
 use super::Failure;
 use super::order::give;
-use crate::config::Config;
-use crate::message::{Alarm, CommandKind, Cycle, Estimate, Mode, State, Timing};
 use crate::topics::{CommandClient, Hub, Subscriber};
 use crate::watch::Telemetry;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Mode, State, Timing};
 
 /// How long the worm may take to reach a mode that it was commanded into, beside the time of the ramp.
 pub(super) const MODE_PATIENCE: Duration = Duration::from_secs(5);

@@ -1,14 +1,14 @@
 //! `wormd estimate`: the estimator alone, beside a running controller.
 
 use super::{Failure, WormArgs, end_on_signal, print, report_grants};
-use crate::config::Config;
-use crate::estimate::{Observer, Report};
-use crate::message::{Alarm, Cycle, Estimate, State};
 use crate::realtime::{self, Grant};
 use crate::topics::{Estimator, Hub, Instance, Notifier, PortError, PublishError, Publisher, RoleLock};
 use clap::Args;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::estimate::{Observer, Report};
+use worm_estimator::message::{Alarm, Cycle, Estimate, State};
 
 /// How long the estimator sleeps at most while the controller wakes it with no state, and so how late it knows at most should
 /// an event ever get lost.

@@ -11,13 +11,13 @@ mod text;
 use super::material::{Material, READING, SourceArgs};
 use super::progress::Progress;
 use super::{Failure, WormArgs, log_line, print};
-use crate::config::Config;
-use crate::experiment::Progress as Step;
-use crate::explain::{Answer, Options, explain, explain_advances, write_back};
-use crate::report;
 use clap::Args;
 use folder::Folder;
 use std::path::{Path, PathBuf};
+use worm_analysis::experiment::Progress as Step;
+use worm_analysis::explain::{Answer, Options, explain, explain_advances, write_back};
+use worm_analysis::report;
+use worm_estimator::config::Config;
 
 /// Arguments of `wormd explain`.
 #[derive(Debug, Args)]
@@ -76,7 +76,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
         progress.tell("report", 1.0);
         // First what cannot be drawn again without another search; the page, which can fail for more reasons, is the last.
         folder.write_answer(&answer)?;
-        folder.write_model(model.as_ref().map_err(Failure::failed)?)?;
+        folder.write_model(&model.map_err(Failure::failed)?)?;
         folder.write_page(&answer, &title(&source))
     });
     drop(progress);

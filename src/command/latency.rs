@@ -13,11 +13,13 @@ mod verdict;
 pub use floor::{FloorArgs, run as run_floor};
 
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
-use crate::report;
 use bench::Bench;
 use clap::Args;
+#[cfg(feature = "analysis")]
 use std::path::PathBuf;
 use std::time::Duration;
+#[cfg(feature = "analysis")]
+use worm_analysis::report;
 
 /// Arguments of `wormd latency`.
 #[derive(Debug, Args)]
@@ -49,6 +51,7 @@ pub struct LatencyArgs {
     #[arg(long)]
     json: bool,
     /// Write a page with the histograms and the latest ticks, and all numbers as JSON, into this directory
+    #[cfg(feature = "analysis")]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -60,19 +63,22 @@ pub struct LatencyArgs {
 /// while it measures. What could be measured all the same, the machine's own limit at least, is told before.
 pub fn run(args: &LatencyArgs, verbose: u8) -> Result<(), Failure> {
     let bench = Bench::new(args, verbose)?;
+    #[cfg(feature = "analysis")]
     if let Some(dir) = &args.out {
         // A directory that cannot be written is told now, not after the measurement.
         report::prepare(dir).map_err(Failure::unusable)?;
     }
     let end = end_on_signal()?;
     let (outcome, trouble) = measure::run(&bench, &end)?;
+    #[cfg(feature = "analysis")]
     if let Some(dir) = &args.out {
-        report::latency::write(dir, &outcome).map_err(Failure::failed)?;
+        crate::latency::page::write(dir, &outcome).map_err(Failure::failed)?;
     }
     if args.json {
         print::line(serde_json::to_string(&outcome).map_err(Failure::failed)?)?;
     } else {
         print::line(outcome.to_string().trim_end())?;
+        #[cfg(feature = "analysis")]
         if let Some(dir) = &args.out {
             print::line(format_args!("\n{}", dir.join("latency.html").display()))?;
         }

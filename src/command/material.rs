@@ -2,11 +2,11 @@
 
 use super::Failure;
 use super::progress::Progress;
-use crate::config::Config;
-use crate::experiment::Run;
-use crate::recording::{Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, mcap, open_with_progress};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use worm_analysis::experiment::Run;
+use worm_analysis::recording::{Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, open_with_progress};
+use worm_estimator::config::Config;
 
 /// Share of the progress bar that reading takes.
 pub(super) const READING: f64 = 0.3;
@@ -199,7 +199,7 @@ fn stored_config(recording: &Path) -> Result<(Config, Option<String>), Failure> 
     if !has_extension(recording, "mcap") {
         return Ok((Config::default(), None));
     }
-    let log = mcap::without_messages(recording).map_err(Failure::unusable)?;
+    let log = worm_log::without_messages(recording).map_err(Failure::unusable)?;
     Ok((log.config()?, log.config))
 }
 

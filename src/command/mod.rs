@@ -1,20 +1,25 @@
 //! One file per subcommand: arguments in, one library call, exit code out.
 
+#[cfg(feature = "analysis")]
 pub mod analyze;
 pub mod check;
 mod children;
+#[cfg(feature = "analysis")]
 mod columns;
 pub mod control;
 mod ears;
 pub mod estimate;
+#[cfg(feature = "analysis")]
 pub mod explain;
 pub mod latency;
+#[cfg(feature = "analysis")]
 mod material;
 pub mod order;
 mod print;
 mod progress;
 pub mod record;
 pub mod replay;
+#[cfg(feature = "analysis")]
 pub mod simulate;
 pub mod study;
 pub mod up;
@@ -22,34 +27,37 @@ pub mod virtual_worm;
 
 pub use print::log_line;
 
-use crate::config::{Config, ConfigError};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
+use worm_estimator::config::{Config, ConfigError};
+
+/// What lies behind a [`Failure`]: an error with its own sources, or a sentence.
+type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// Why a subcommand did not do what it was asked to, and with which exit status it ends.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// Arguments, configuration or input cannot be used: exit status 2.
-    #[error("{0}")]
-    Unusable(String),
+    #[error(transparent)]
+    Unusable(Cause),
     /// It failed while running: exit status 1.
-    #[error("{0}")]
-    Failed(String),
+    #[error(transparent)]
+    Failed(Cause),
 }
 
 impl Failure {
     /// Arguments, configuration or input cannot be used, because of `cause`.
-    pub fn unusable(cause: impl std::fmt::Display) -> Self {
-        Self::Unusable(cause.to_string())
+    pub fn unusable(cause: impl Into<Cause>) -> Self {
+        Self::Unusable(cause.into())
     }
 
     /// It failed while running, because of `cause`.
-    pub fn failed(cause: impl std::fmt::Display) -> Self {
-        Self::Failed(cause.to_string())
+    pub fn failed(cause: impl Into<Cause>) -> Self {
+        Self::Failed(cause.into())
     }
 
     /// The exit status.
@@ -106,7 +114,7 @@ impl WormArgs {
             let path = path.to_string_lossy().into_owned();
             match &mut config.port {
                 Some(port) => port.path = path,
-                None => config.port = Some(crate::config::Port::at(path)),
+                None => config.port = Some(worm_estimator::config::Port::at(path)),
             }
         }
         let problems = config.problems();
@@ -167,6 +175,7 @@ pub fn end_on_signal() -> Result<Arc<AtomicBool>, Failure> {
 ///
 /// # Errors
 /// When the operating system refuses the handlers.
+#[cfg(feature = "analysis")]
 fn end_on_signal_until() -> Result<(Arc<AtomicBool>, Arc<AtomicBool>), Failure> {
     let over = Arc::new(AtomicBool::new(false));
     for signal in ending_signals() {

@@ -1,10 +1,10 @@
 //! `wormd command`: a command to a running controller.
 
 use super::{Failure, WormArgs, print};
-use crate::message::{Command, CommandKind, Fault, Mode, Reply, Verdict};
 use crate::topics::{CommandClient, Hub, Instance};
 use clap::{Args, ValueEnum};
 use std::time::Duration;
+use worm_estimator::message::{Command, CommandKind, Fault, Mode, Reply, Verdict};
 
 /// How long the controller may take to answer: a reset prepares the servo anew, which takes a while on a slow bus.
 const PATIENCE: Duration = Duration::from_secs(2);

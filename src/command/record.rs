@@ -6,9 +6,6 @@
 mod desk;
 
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
-use crate::config::Config;
-use crate::message::{Alarm, Cycle, Estimate, State, Timing};
-use crate::recording::mcap::{Channel, Logged, Origin};
 use crate::topics::{Hub, Instance, Subscriber, Topic};
 use clap::Args;
 use desk::{Batch, Desk};
@@ -16,6 +13,9 @@ use nix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
+use worm_log::{Channel, Logged, Origin};
 
 /// How often the topics are emptied. At 1 kHz the fullest holds a second.
 pub(super) const LOOK: Duration = Duration::from_millis(20);
@@ -94,6 +94,10 @@ pub(super) struct Heard {
     /// How many messages.
     pub messages: usize,
     /// The newest state among them.
+    #[cfg_attr(
+        not(feature = "analysis"),
+        expect(dead_code, reason = "`explain --live` alone looks at it")
+    )]
     pub state: Option<State>,
 }
 

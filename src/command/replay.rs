@@ -1,10 +1,10 @@
 //! `wormd replay`: a log through the estimator once more, and whether it comes to the same results.
 
 use super::{Failure, print};
-use crate::config::Config;
-use crate::recording::mcap::{Comparison, compare, messages, replay};
 use clap::Args;
 use std::path::PathBuf;
+use worm_estimator::config::Config;
+use worm_log::{Comparison, compare, messages, replay};
 
 /// Arguments of `wormd replay`.
 #[derive(Debug, Args)]

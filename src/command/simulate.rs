@@ -1,13 +1,13 @@
 //! `wormd simulate`: a recording from the model.
 
 use super::{Failure, log_line};
-use crate::config::{Config, ConfigError, Effect};
-use crate::experiment::{Simulation, SimulationError, simulate};
-use crate::recording::{Recording, mcap, write_csv};
 use clap::Args;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use worm_analysis::experiment::{Simulation, SimulationError, simulate};
+use worm_analysis::recording::{Recording, mcap, write_csv};
+use worm_estimator::config::{Config, ConfigError, Effect};
 
 /// Arguments of `wormd simulate`.
 #[derive(Debug, Args)]

@@ -1,10 +1,9 @@
 //! `wormd study`: Tables 1 and 2 of the paper for any design, with every `[[effect]]`.
 
 use super::{Failure, WormArgs, print};
-use crate::model::Worm;
-use crate::model::effect::Setting;
-use crate::model::study::{Battery, Row, Study, Tables, study};
 use clap::Args;
+use worm_physics::Worm;
+use worm_physics::study::{Battery, Row, Study, Tables, study};
 
 /// Arguments of `wormd study`.
 #[derive(Debug, Args)]
@@ -48,7 +47,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     }
     let rows = study(&Study {
         base: &base,
-        effects: &Setting::configured(&config).map_err(Failure::unusable)?,
+        effects: &config.effect_settings().map_err(Failure::unusable)?,
         cells: &args.cells,
         slopes_deg: &args.slopes,
         cycle_s: config.gait.cycle_s,

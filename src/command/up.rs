@@ -6,8 +6,6 @@ use super::children::{Child, Log, START_PATIENCE};
 use super::ears::{Ears, MODE_PATIENCE};
 use super::order::give;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
-use crate::config::Config;
-use crate::message::{AlarmKind, CommandKind, Fault, Mode};
 use crate::topics::{CommandClient, Hub, Instance, RoleLock, Supervisor};
 use crate::watch::{Summary, Telemetry};
 use clap::Args;
@@ -16,6 +14,8 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
 
 /// How often topics are read and the picture is painted.
 const FRAME: Duration = Duration::from_millis(50);
@@ -235,7 +235,7 @@ fn crawl(
     ears.start_crawling(&client, config, &mut telemetry, end, || {
         processes.find_ended().is_some()
     })
-    .map_err(|failure| processes.find_ended().map_or(failure, Failure::Failed))?;
+    .map_err(|failure| processes.find_ended().map_or(failure, Failure::failed))?;
     let begun = Instant::now();
     let mut trouble = None;
     while !end.load(Ordering::Relaxed) && args.duration.is_none_or(|duration| begun.elapsed() < duration) {

@@ -1,12 +1,12 @@
 //! `wormd virtual-worm`: the simulated devices on a pseudo-terminal.
 
 use super::{Failure, end_on_signal, print, report_grants};
-use crate::config::Config;
 use crate::link::servo::BAUD_RATES;
 use crate::link::virtual_worm::{Fault, Options, PortLink, Report, Server, ServerError};
 use crate::realtime;
 use std::io;
 use std::path::{Path, PathBuf};
+use worm_estimator::config::Config;
 
 /// The devices run so far below the loop's priority: a real servo answers however busy the computer is, and so must this one.
 const PRIORITY_BELOW_LOOP: u8 = 10;

@@ -5,10 +5,10 @@ use super::presence::{Passed, Presence};
 use super::ramp::{CountRounding, Ramp};
 use super::resume::Resume;
 use super::safety::{Safety, Watched};
-use crate::config::{Config, Policy};
 use crate::link::{ServoReading, TrackerReading};
-use crate::message::{Alarm, AlarmKind, Command, CommandKind, Fault, Mode, Reply, State, Verdict};
 use std::f64::consts::TAU;
+use worm_estimator::config::{Config, Policy};
+use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, Fault, Mode, Reply, State, Verdict};
 
 /// What a tick is given.
 #[derive(Debug, Clone, Copy)]

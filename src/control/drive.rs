@@ -1,16 +1,16 @@
 //! The port and what is on it, as the loop uses it: exchanges, and the services that take longer than a tick.
 
 use super::Service;
-use crate::config::{Config, ReadMode as ConfiguredRead};
-use crate::link::packet::DeviceId;
 use crate::link::servo::scale;
 use crate::link::{
-    Bus, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, OpenError, OperationError, Prepared,
-    ReadMode, ReadPlan, StartupError, Tty, prepare,
+    ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, OpenError, OperationError, Prepared, ReadMode,
+    ReadPlan, StartupError, Tty, WormBus, prepare,
 };
+use dynamixel_bus::packet::DeviceId;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use worm_estimator::config::{Config, ReadMode as ConfiguredRead};
 
 /// Why the worm's devices cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +73,7 @@ pub fn link_settings(config: &Config, baud: u32) -> Result<LinkSettings, DriveEr
 pub struct Drive {
     path: PathBuf,
     settings: LinkSettings,
-    bus: Bus<Tty>,
+    bus: WormBus<Tty>,
     plan: ExchangePlan,
     is_gone: bool,
 }
@@ -85,7 +85,7 @@ impl Drive {
     /// [`DriveError`], whose text names port, device and remedy.
     pub fn open(path: &Path, settings: LinkSettings) -> Result<(Self, Prepared, Vec<Finding>), DriveError> {
         let (port, mut findings) = Tty::open(path, settings.baud)?;
-        let mut bus = Bus::new(port);
+        let mut bus = WormBus::new(port);
         let prepared = prepare(&mut bus, &settings, &mut findings).map_err(|source| DriveError::Startup {
             path: path.to_owned(),
             source,
@@ -137,7 +137,7 @@ impl Drive {
     fn arm(&mut self) -> Result<(), DriveError> {
         if self.is_gone {
             let (port, _) = Tty::open(&self.path, self.settings.baud)?;
-            self.bus = Bus::new(port);
+            self.bus = WormBus::new(port);
             self.is_gone = false;
         }
         if self.hardware_errors().is_ok_and(|bits| bits != 0) {

@@ -4,10 +4,10 @@
 //! milliseconds, and the loop reads them in a late tick alone: what was counted in between happened in that tick, or in the few
 //! before it. For waiting, which no tick is quite free of, the usual share of those few is taken off.
 
-use crate::message::Culprit;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::sync::atomic::{AtomicU64, Ordering};
+use worm_estimator::message::Culprit;
 
 /// Lengths of the kernel's steps of stolen time, ns: `USER_HZ` is 100 on every Linux that wormd runs on.
 const STOLEN_STEP_NS: u64 = 10_000_000;

@@ -1,9 +1,9 @@
 //! From device readings to the [`State`] message: units of the cam, unwrapped counters, freshness.
 
-use crate::config::Config;
 use crate::link::{ServoReading, TrackerReading};
-use crate::message::State;
 use std::f64::consts::TAU;
+use worm_estimator::config::Config;
+use worm_estimator::message::State;
 
 /// How the servo's shaft and the cam relate.
 #[derive(Debug, Clone, Copy)]

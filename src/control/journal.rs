@@ -3,13 +3,13 @@
 
 use super::evidence::{Counters, Counts, Snapshot};
 use crate::logging::Summed;
-use crate::message::{Culprit, Fault, Mode};
 use crate::realtime::monotonic_ns;
 use crossbeam::queue::ArrayQueue;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use worm_estimator::message::{Culprit, Fault, Mode};
 
 /// Entries that may wait; more are dropped and counted.
 const CAPACITY: usize = 256;
@@ -176,7 +176,8 @@ fn log_host_paused(from: Mode, pause_ns: u64) {
 
 fn log_mode(from: Mode, to: Mode, fault: Fault, alarm: u32) {
     if to == Mode::Fault {
-        let alarm = crate::message::AlarmKind::try_from(alarm).map_or("", crate::message::AlarmKind::name);
+        let alarm =
+            worm_estimator::message::AlarmKind::try_from(alarm).map_or("", worm_estimator::message::AlarmKind::name);
         tracing::error!(%fault, alarm, "the worm was stopped while {from}: mend the cause, then `wormd command reset`");
     } else {
         tracing::info!("{from} -> {to}");

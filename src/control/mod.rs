@@ -6,7 +6,7 @@
 //! 1. [`Schedule`] says when the tick is due; the loop in [`run()`] sleeps until then. `rate` slows it down where the computer cannot
 //!    hold the configured rate.
 //! 2. The link exchanges the goal velocity for readings.
-//! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](crate::message::State), the next
+//! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](worm_estimator::message::State), the next
 //!    goal and, rarely, a [`Service`]. It knows the limits (`safety`), the ramps (`ramp`), how readings become
 //!    messages (`intake`), and which part of the time the loop was there at all (`presence`, `resume`); it takes time as an
 //!    argument, so all of it is tested in virtual time.

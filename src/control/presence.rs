@@ -4,7 +4,7 @@
 //! nobody was asked in it, and nobody could have been heard. So every silence, be it the servo's, the tracker's or the
 //! estimator's, is measured on a clock that stands still meanwhile. Where the computer is quiet this clock is the computer's own.
 
-use crate::config::Config;
+use worm_estimator::config::Config;
 
 /// An absence of this length is a pause of the computer, an event of its own; below it the tick was merely late. Ten times what a
 /// loaded computer without a real-time kernel takes to run a woken thread, and half of the shortest bus watchdog, ns.

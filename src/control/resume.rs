@@ -10,8 +10,8 @@
 //!
 //! Any command, and the end of the process, come before it.
 
-use crate::config::{Config, Policy};
-use crate::message::{Alarm, AlarmKind};
+use worm_estimator::config::{Config, Policy};
+use worm_estimator::message::{Alarm, AlarmKind};
 
 /// How long the computer must have gone on without a pause, ns.
 const SETTLED_NS: u64 = 1_000_000_000;

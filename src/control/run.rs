@@ -8,8 +8,6 @@ use super::journal::{Entry, Journal};
 use super::presence::{Looks, SHORTEST_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
 use super::schedule::{Schedule, bus_allowed_ns};
-use crate::config::Config;
-use crate::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
 use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
 use crate::topics::{
     AnswerError, CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher,
@@ -17,6 +15,8 @@ use crate::topics::{
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
 
 /// Alarm changes that one tick takes at most; more wait for the next tick.
 const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
@@ -403,8 +403,8 @@ fn serve(drive: &mut Drive, service: Service) -> (ServiceOutcome, Option<u8>) {
 }
 
 fn split(
-    taken: Result<Option<(crate::message::Command, Responder)>, AnswerError>,
-) -> (Option<crate::message::Command>, Option<Responder>) {
+    taken: Result<Option<(worm_estimator::message::Command, Responder)>, AnswerError>,
+) -> (Option<worm_estimator::message::Command>, Option<Responder>) {
     match taken {
         Ok(Some((command, responder))) => (Some(command), Some(responder)),
         // Requests that cannot be read are requests that nobody answers; their sender is told by its time-out.

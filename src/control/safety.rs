@@ -3,9 +3,9 @@
 //! Every time here is of the loop's own clock (`presence`): a pause of the computer is nobody's silence.
 
 use super::intake::Intake;
-use crate::config::{Config, Limits};
 use crate::link::ServoReading;
-use crate::message::Fault;
+use worm_estimator::config::{Config, Limits};
+use worm_estimator::message::Fault;
 
 /// What the bus watchdog register reads after it has stopped the motor (XL330-M288 e-manual, register 98).
 const WATCHDOG_TRIPPED: u8 = 0xFF;

@@ -2,9 +2,9 @@
 
 use super::histogram::Durations;
 use super::timeline::{Tick, WorstTicks};
-use crate::message::{Culprit, Timing};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
+use worm_estimator::message::{Culprit, Timing};
 
 /// States whose timing, and timings whose state, may be on their way: some seconds at the highest rate.
 const ON_THE_WAY: usize = 65_536;

@@ -1,7 +1,6 @@
 //! The least that iceoryx2 can do: one publisher and one subscriber of the state's size, with an event, and nothing of wormd's
 //! around them. What delivery costs wormd is held against it.
 
-use crate::message::State;
 use crate::realtime::monotonic_ns;
 use crate::topics::Instance;
 use iceoryx2::port::listener::Listener;
@@ -12,6 +11,7 @@ use iceoryx2::prelude::{Node, NodeBuilder, SignalHandlingMode, ipc};
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use std::fmt::Debug;
 use std::time::Duration;
+use worm_estimator::message::State;
 
 /// Values that a subscriber may be behind.
 const BUFFER: usize = 64;
@@ -88,7 +88,7 @@ impl Bare {
                 .notifier_builder()
                 .create()
                 .map_err(BareError::of("create the notifier"))?,
-            value: State::unknown(crate::MAX_CELLS),
+            value: State::unknown(worm_physics::MAX_CELLS),
         })
     }
 

@@ -1,7 +1,7 @@
 //! What it means that a tick was late for this reason or another.
 
 use super::outcome::Outcome;
-use crate::message::Culprit;
+use worm_estimator::message::Culprit;
 
 /// What a culprit is to blame for, in one sentence.
 pub fn meaning(culprit: Culprit) -> &'static str {

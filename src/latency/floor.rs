@@ -3,7 +3,6 @@
 
 use super::bare::{Bare, BareError};
 use super::histogram::Durations;
-use crate::config::Realtime;
 use crate::control::Schedule;
 use crate::realtime::{self, Grant, monotonic_ns};
 use serde::{Deserialize, Serialize};
@@ -12,6 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use worm_estimator::config::Realtime;
 
 /// How long the listener sleeps at most, and with it the time until an end is noticed.
 const LONGEST_SLEEP: Duration = Duration::from_millis(20);

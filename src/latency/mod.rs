@@ -18,6 +18,8 @@ pub mod floor;
 pub mod histogram;
 pub mod measure;
 pub mod outcome;
+#[cfg(feature = "analysis")]
+pub mod page;
 pub mod stress;
 pub mod timeline;
 

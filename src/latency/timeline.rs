@@ -1,7 +1,7 @@
 //! One tick as its parts on the clock, and the latest ticks of a run.
 
-use crate::message::{Culprit, Timing};
 use serde::Serialize;
+use worm_estimator::message::{Culprit, Timing};
 
 /// One tick, complete: where its time went, and who made it late.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

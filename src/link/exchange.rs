@@ -16,12 +16,13 @@
 
 use std::time::Instant;
 
-use super::bus::WaitEnd;
-use super::packet::{
+use super::{
+    LinkCounters, Port, PortError, ServoReading, TrackerReading, TransactionError, WaitEnd, WormBus, servo, tracker,
+};
+use dynamixel_bus::packet::{
     DeviceId, FastReply, Instruction, InstructionPacket, Packet, ReadSpan, ReadSpans, Recipient, SegmentError,
     StatusError, StatusFlags, StatusPacket,
 };
-use super::{Bus, LinkCounters, Port, PortError, ServoReading, TrackerReading, TransactionError, servo, tracker};
 
 /// How the two blocks are read in each tick, as it is configured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -51,7 +52,7 @@ pub struct ExchangePlan {
     pub servo: DeviceId,
     /// The tracker.
     pub tracker: DeviceId,
-    /// Cells to read of the tracker, at most [`MAX_CELLS`](crate::MAX_CELLS).
+    /// Cells to read of the tracker, at most [`MAX_CELLS`](worm_physics::MAX_CELLS).
     pub cells: usize,
     /// How they are read.
     pub read: ReadPlan,
@@ -246,18 +247,22 @@ impl Harvest {
     }
 }
 
-impl<P: Port> Bus<P> {
+impl<P: Port> WormBus<P> {
     /// Sends the goal velocity and reads both devices' blocks, until both have come or `deadline` has passed.
     ///
     /// Allocates nothing, and waits nowhere but on the port. What one device says is used though the other is silent. With
     /// [`ReadPlan::Separate`] the servo has half of the time, so that its silence does not cost the tracker's answer.
     pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
-        let before = self.counters;
-        self.counters.exchanges += 1;
+        let before = self.bus.counters();
+        self.bus.counters_mut().exchanges += 1;
         let mut late = Harvest::NOTHING;
         if self.answers_owed > 0 {
             // A port that fails here fails in the exchange, too.
-            let _ = self.take_late_answers(plan, &mut late);
+            let _ = self.bus.take_late_packets(LATE_LIMIT, |packet, counters| match packet {
+                Packet::Status(status) => late.take_status(plan, &status, counters),
+                Packet::FastReply(reply) => late.take_fast_reply(plan, reply, counters),
+                Packet::Instruction(_) => {}
+            });
         }
         let lost = self.count_lost(late.servo_answers);
         let mut harvest = Harvest::NOTHING;
@@ -272,7 +277,7 @@ impl<P: Port> Bus<P> {
             harvest.fail(plan, plan.servo, failure);
             harvest.fail(plan, plan.tracker, failure);
         }
-        let counters = &mut self.counters;
+        let counters = self.bus.counters_mut();
         for failure in [harvest.servo.err(), harvest.tracker.err()] {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
         }
@@ -316,31 +321,6 @@ impl<P: Port> Bus<P> {
         lost
     }
 
-    /// Takes what has come since the wait of the exchange before was over, without waiting for more.
-    fn take_late_answers(&mut self, plan: &ExchangePlan, late: &mut Harvest) -> Result<(), PortError> {
-        let mut stale_bytes = 0;
-        while stale_bytes < LATE_LIMIT {
-            let received = self.port.receive(self.decoder.free_space(), Instant::now())?;
-            if received == 0 {
-                break;
-            }
-            stale_bytes += received;
-            self.decoder.commit(received);
-            while let Some(packet) = self.decoder.next_packet() {
-                match packet {
-                    Ok(Packet::Status(status)) => late.take_status(plan, &status, &mut self.counters),
-                    Ok(Packet::FastReply(reply)) => late.take_fast_reply(plan, reply, &mut self.counters),
-                    Ok(Packet::Instruction(_)) | Err(_) => {}
-                }
-            }
-        }
-        self.counters.stale_bytes += stale_bytes as u64;
-        // All of it has been counted: what no packet came of is neither garbage nor once more stale.
-        self.decoder.clear();
-        self.garbage_counted = self.decoder.garbage_bytes();
-        Ok(())
-    }
-
     fn exchange_bulk(
         &mut self,
         plan: &ExchangePlan,
@@ -364,8 +344,8 @@ impl<P: Port> Bus<P> {
                 instruction,
             },
         ];
-        self.send_packets(&request, deadline)?;
-        let end = self.receive_until(deadline, |packet, counters| {
+        self.bus.send_packets(&request, deadline)?;
+        let end = self.bus.receive_until(deadline, |packet, counters| {
             match packet {
                 Packet::Status(status) => harvest.take_status(plan, &status, counters),
                 Packet::FastReply(reply) => {
@@ -377,8 +357,9 @@ impl<P: Port> Bus<P> {
             harvest.is_answered()
         })?;
         if let WaitEnd::DeadlinePassed { damaged } = end {
-            if fast && let Some(reply) = self.decoder.unfinished_fast_reply() {
-                harvest.take_fast_reply(plan, reply, &mut self.counters);
+            if fast {
+                self.bus
+                    .take_unfinished_fast_reply(|reply, counters| harvest.take_fast_reply(plan, reply, counters));
             }
             harvest.blame_damage(damaged);
         }
@@ -396,9 +377,10 @@ impl<P: Port> Bus<P> {
         let now = Instant::now();
         let servo_deadline = now + deadline.saturating_duration_since(now) / 2;
         let [servo_span, tracker_span] = plan.spans();
-        self.send_packets(&[goal_write(plan.servo, &goal), read_of(servo_span)], servo_deadline)?;
+        self.bus
+            .send_packets(&[goal_write(plan.servo, &goal), read_of(servo_span)], servo_deadline)?;
         self.receive_answer(plan, plan.servo, servo_deadline, harvest)?;
-        self.send_packets(&[read_of(tracker_span)], deadline)?;
+        self.bus.send_packets(&[read_of(tracker_span)], deadline)?;
         self.receive_answer(plan, plan.tracker, deadline, harvest)
     }
 
@@ -410,7 +392,7 @@ impl<P: Port> Bus<P> {
         deadline: Instant,
         harvest: &mut Harvest,
     ) -> Result<(), TransactionError> {
-        let end = self.receive_until(deadline, |packet, counters| {
+        let end = self.bus.receive_until(deadline, |packet, counters| {
             if let Packet::Status(status) = packet {
                 harvest.take_status(plan, &status, counters);
             }

@@ -11,21 +11,21 @@
 //!    wrong by kind ([`LinkCounters`]).
 //! 5. [`prepare`] makes a worm ready at start-up: right devices, right settings, motor at rest, watchdog set. What it finds
 //!    out of order it mends and tells ([`Finding`]), or refuses with a reason ([`StartupError`]).
-//! 6. [`Bus::exchange`] is what each tick does then: one write with the goal velocity and the question for both devices'
+//! 6. [`WormBus::exchange`] is what each tick does then: one write with the goal velocity and the question for both devices'
 //!    blocks, then the answers until the deadline. It allocates nothing, logs nothing, and uses a partial answer for what it
 //!    holds.
-//! 7. [`Bus::set_torque`], [`Bus::stop_motor`], [`Bus::rearm_watchdog`] and [`Bus::reboot_servo`] are what a controller
+//! 7. [`WormBus::set_torque`], [`WormBus::stop_motor`], [`WormBus::rearm_watchdog`] and [`WormBus::reboot_servo`] are what a controller
 //!    does between ticks; each change is read back.
 //! 8. [`virtual_worm`] is the other end of the line: the same devices, simulated on a pseudo-terminal.
 //!
 //! ```no_run
 //! use std::path::Path;
 //! use std::time::{Duration, Instant};
-//! use wormd::link::{Bus, LinkSettings, Tty, prepare};
+//! use wormd::link::{LinkSettings, Tty, WormBus, prepare};
 //!
 //! # fn run(settings: LinkSettings) -> Result<(), Box<dyn std::error::Error>> {
 //! let (tty, mut findings) = Tty::open(Path::new("/dev/ttyUSB0"), settings.baud)?;
-//! let mut bus = Bus::new(tty);
+//! let mut bus = WormBus::new(tty);
 //! let worm = prepare(&mut bus, &settings, &mut findings)?;
 //! bus.set_torque(worm.plan.servo, true)?;
 //! let outcome = bus.exchange(&worm.plan, 2.5, Instant::now() + Duration::from_millis(3));
@@ -42,31 +42,21 @@
 //! the last word. When the goal has changed meanwhile, [`ExchangeOutcome::goal_taken`] gives it away; the tracker's sample
 //! counter may, too.
 
-mod bus;
-mod counters;
 mod exchange;
-mod fault_injector;
-mod finding;
-mod latency_timer;
 mod operations;
-pub mod packet;
-mod port;
-mod register;
 pub mod servo;
 mod startup;
 pub mod tracker;
-mod tty;
 pub mod virtual_worm;
+mod worm_bus;
 
-pub use bus::{Bus, Identity, TransactionError};
-pub use counters::{LinkCounters, RefusalCounters};
+pub use dynamixel_bus::{
+    Bus, FaultInjector, Faults, Finding, Identity, LinkCounters, OpenError, Port, PortError, RefusalCounters, Register,
+    TransactionError, Tty, WaitEnd, packet,
+};
 pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPlan};
-pub use fault_injector::{FaultInjector, Faults};
-pub use finding::Finding;
 pub use operations::OperationError;
-pub use port::{Port, PortError};
-pub use register::Register;
 pub use servo::ServoReading;
 pub use startup::{LinkSettings, Prepared, StartupError, prepare};
 pub use tracker::{NoTrackerBlock, TrackerReading};
-pub use tty::{OpenError, Tty};
+pub use worm_bus::WormBus;

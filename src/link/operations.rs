@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::packet::DeviceId;
 use super::servo::{HardwareErrors, WATCHDOG_LATCHED, register, scale};
-use super::{Bus, Port, Register, TransactionError};
+use super::{Port, Register, TransactionError, WormBus};
 
 /// How long a device has to answer: more than 16 ms in an FTDI adapter and 14 bytes at 9600 baud both ways.
 pub(super) const REPLY_TIME: Duration = Duration::from_millis(60);
@@ -46,7 +46,7 @@ pub enum OperationError {
     NotBack(DeviceId),
 }
 
-impl<P: Port> Bus<P> {
+impl<P: Port> WormBus<P> {
     /// Switches torque on or off.
     ///
     /// # Errors

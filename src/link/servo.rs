@@ -6,8 +6,8 @@
 //!
 //! Source: ROBOTIS e-manual, "XL330-M288", control table of EEPROM and RAM area.
 
-use super::register::Block;
-use crate::link::packet::ReadSpan;
+use dynamixel_bus::Block;
+use dynamixel_bus::packet::ReadSpan;
 
 /// Registers of the control table. Those below 64 are EEPROM: they can be written only while torque is off.
 pub mod register {
@@ -259,7 +259,7 @@ mod tests {
     #[test]
     fn reading_from_a_block_byte_for_byte() {
         let mut bytes = [0; BLOCK_LEN];
-        let mut put = |register: super::super::Register, value: &[u8]| {
+        let mut put = |register: dynamixel_bus::Register, value: &[u8]| {
             let from = usize::from(register.address - BLOCK_ADDRESS);
             bytes[from..from + usize::from(register.size)].copy_from_slice(value);
         };

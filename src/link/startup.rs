@@ -15,8 +15,8 @@ use super::operations::{OperationError, REPLY_TIME};
 use super::packet::DeviceId;
 use super::servo::{self, HardwareErrors, WATCHDOG_LATCHED, register, scale};
 use super::{
-    Bus, ExchangeOutcome, ExchangePlan, Finding, Identity, Port, PortError, ReadMode, ReadPlan, Register, ServoReading,
-    TrackerReading, TransactionError, tracker,
+    ExchangeOutcome, ExchangePlan, Finding, Identity, Port, PortError, ReadMode, ReadPlan, Register, ServoReading,
+    TrackerReading, TransactionError, WormBus, tracker,
 };
 
 /// Status return level at which only pings and reads are answered.
@@ -47,7 +47,7 @@ pub struct LinkSettings {
     pub tracker_id: DeviceId,
     /// The tracker's model number, [`tracker::MODEL`] by default.
     pub tracker_model: u16,
-    /// Cells of the worm, 1 to [`MAX_CELLS`](crate::MAX_CELLS).
+    /// Cells of the worm, 1 to [`MAX_CELLS`](worm_physics::MAX_CELLS).
     pub cells: usize,
     /// How the devices are read in each tick.
     pub read: ReadMode,
@@ -164,7 +164,7 @@ pub enum StartupError {
 /// # Errors
 /// [`StartupError`]: the worm must not be run.
 pub fn prepare<P: Port>(
-    bus: &mut Bus<P>,
+    bus: &mut WormBus<P>,
     settings: &LinkSettings,
     findings: &mut Vec<Finding>,
 ) -> Result<Prepared, StartupError> {
@@ -203,7 +203,7 @@ pub fn prepare<P: Port>(
     })
 }
 
-fn identify_servo<P: Port>(bus: &mut Bus<P>, settings: &LinkSettings) -> Result<Identity, StartupError> {
+fn identify_servo<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<Identity, StartupError> {
     let found = identify(bus, settings, "servo", settings.servo_id, settings.servo_model);
     let Err(StartupError::Silent { .. }) = found else {
         return found;
@@ -235,7 +235,7 @@ fn identify_servo<P: Port>(bus: &mut Bus<P>, settings: &LinkSettings) -> Result<
 }
 
 fn identify<P: Port>(
-    bus: &mut Bus<P>,
+    bus: &mut WormBus<P>,
     settings: &LinkSettings,
     device: &'static str,
     id: DeviceId,
@@ -260,7 +260,7 @@ fn identify<P: Port>(
 }
 
 /// For an error: who answers a broadcast ping.
-fn who_is_there<P: Port>(bus: &mut Bus<P>) -> String {
+fn who_is_there<P: Port>(bus: &mut WormBus<P>) -> String {
     let mut present = Vec::new();
     let listened = bus.broadcast_ping(Instant::now() + 4 * REPLY_TIME, |id, who| {
         present.push(format!("{id} (model {})", who.model))
@@ -284,7 +284,7 @@ fn warn_of_lame_watchdog(servo: Identity, findings: &mut Vec<Finding>) {
 }
 
 /// Sets the status return level, whatever it is now.
-fn set_status_level<P: Port>(bus: &mut Bus<P>, servo: DeviceId, level: u32) -> Result<(), StartupError> {
+fn set_status_level<P: Port>(bus: &mut WormBus<P>, servo: DeviceId, level: u32) -> Result<(), StartupError> {
     let register = register::STATUS_RETURN_LEVEL;
     for _ in 0..STATUS_LEVEL_ATTEMPTS {
         // Whether this write is answered depends on the level before. A receipt is let pass by, lest the next question
@@ -310,16 +310,16 @@ fn set_status_level<P: Port>(bus: &mut Bus<P>, servo: DeviceId, level: u32) -> R
 }
 
 /// Switches torque off and clears the watchdog, which lock settings and goal.
-fn unlock<P: Port>(bus: &mut Bus<P>, servo: DeviceId, findings: &mut Vec<Finding>) -> Result<(), StartupError> {
+fn unlock<P: Port>(bus: &mut WormBus<P>, servo: DeviceId, findings: &mut Vec<Finding>) -> Result<(), StartupError> {
     if bus.register(servo, register::TORQUE_ENABLE)? != 0 {
-        findings.push(Finding::mended(
+        findings.push(Finding::corrected(
             "torque was on: an earlier controller ended without an orderly stop",
             "torque off",
         ));
     }
     bus.set_torque(servo, false)?;
     if bus.register(servo, register::BUS_WATCHDOG)? == u32::from(WATCHDOG_LATCHED) {
-        findings.push(Finding::mended(
+        findings.push(Finding::corrected(
             "the bus watchdog had stopped the motor: the computer fell silent while torque was on",
             "cleared",
         ));
@@ -328,7 +328,11 @@ fn unlock<P: Port>(bus: &mut Bus<P>, servo: DeviceId, findings: &mut Vec<Finding
     Ok(())
 }
 
-fn set_up<P: Port>(bus: &mut Bus<P>, settings: &LinkSettings, findings: &mut Vec<Finding>) -> Result<(), StartupError> {
+fn set_up<P: Port>(
+    bus: &mut WormBus<P>,
+    settings: &LinkSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<(), StartupError> {
     let counts = |register: Register, value: f64, unit: f64| {
         let counts = (value / unit).round();
         let greatest = 256f64.powi(i32::from(register.size)) - 1.0;
@@ -365,14 +369,14 @@ fn set_up<P: Port>(bus: &mut Bus<P>, settings: &LinkSettings, findings: &mut Vec
             } else {
                 format!("{register} of the servo was {found}")
             };
-            findings.push(Finding::mended(what, format!("set to {wanted}")));
+            findings.push(Finding::corrected(what, format!("set to {wanted}")));
         }
     }
     Ok(())
 }
 
 fn choose_read_plan<P: Port>(
-    bus: &mut Bus<P>,
+    bus: &mut WormBus<P>,
     settings: &LinkSettings,
     findings: &mut Vec<Finding>,
 ) -> Result<(ExchangePlan, ServoReading, TrackerReading), StartupError> {
@@ -395,7 +399,7 @@ fn choose_read_plan<P: Port>(
             let outcome = bus.exchange(&plan, 0.0, Instant::now() + REPLY_TIME);
             if let (Ok(servo_reading), Ok(tracker_reading)) = (outcome.servo, outcome.tracker) {
                 if candidates.len() > 1 && read != ReadPlan::FastBulk {
-                    findings.push(Finding::mended(
+                    findings.push(Finding::corrected(
                         "servo and tracker do not both know the fast bulk read, so ticks take longer on the wire",
                         format!("read mode {read:?}"),
                     ));

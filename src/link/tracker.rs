@@ -17,8 +17,8 @@
 //! (`DYNAMIXEL::Slave`), whose registers 0, 6 and 7 are the same.
 
 use super::packet::{DeviceId, ReadSpan};
-use super::register::Block;
-use crate::MAX_CELLS;
+use dynamixel_bus::Block;
+use worm_physics::MAX_CELLS;
 
 /// Registers of the control table.
 pub mod register {

@@ -1,12 +1,12 @@
 //! What a process really has, read back from the kernel: not what it asked for, and whoever asked for it.
 
 use super::cpus;
-use crate::config::Realtime;
 use nix::sched::CpuSet;
 use nix::unistd::Pid;
 use serde::Serialize;
 use std::fmt;
 use std::io;
+use worm_estimator::config::Realtime;
 
 /// How the kernel chooses when a thread runs (man page sched(7)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -1,11 +1,11 @@
 //! What a process asks of the operating system, and the answer to each request.
 
 use super::{InForce, cpus};
-use crate::config::Realtime;
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 use std::fmt;
 use std::io;
+use worm_estimator::config::Realtime;
 
 /// One request to the operating system and its outcome.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -5,7 +5,6 @@ use super::instance::Instance;
 use super::role::{Controller, RoleLock};
 use super::services::{Ipc, MAX_READERS, MAX_WRITERS, Services};
 use super::start::Presence;
-use crate::message::{Command, Reply};
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::client::Client;
@@ -17,6 +16,7 @@ use std::fmt::{self, Debug};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
+use worm_estimator::message::{Command, Reply};
 
 /// How often a client looks for its answer.
 const POLL: Duration = Duration::from_micros(500);

@@ -1,12 +1,12 @@
 //! One worm's namespace on this computer.
 
-use crate::config::Config;
 use iceoryx2::prelude::{Config as IoxConfig, FileName, Path as IoxPath, SemanticString};
 use std::fs::{DirBuilder, Permissions};
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use worm_estimator::config::Config;
 
 /// Longest path of a unix socket, bytes, without the closing zero.
 const SOCKET_PATH_MAX: usize = 107;

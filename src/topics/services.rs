@@ -2,10 +2,10 @@
 
 use super::instance::Instance;
 use super::topic::Topic;
-use crate::message::{Alarm, Command, Cycle, Estimate, Reply, State, Timing};
 use iceoryx2::prelude::{CallbackProgression, Node, NodeBuilder, NodeState, ServiceName, SignalHandlingMode, ipc};
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use std::fmt::Debug;
+use worm_estimator::message::{Alarm, Command, Cycle, Estimate, Reply, State, Timing};
 
 /// The iceoryx2 flavour in use: between processes, ports bound to their thread.
 pub type Ipc = ipc::Service;

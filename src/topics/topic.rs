@@ -2,9 +2,9 @@
 
 use super::role::{Controller, Estimator, Role};
 use super::services::{EventService, Services, TopicService};
-use crate::message::{Alarm, Cycle, Estimate, State, Timing};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
+use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
 
 /// A message that is published on a topic of its own.
 pub trait Topic: sealed::Carried {

@@ -1,6 +1,6 @@
 //! How a model mismatch is told to people: which cell, in whose step, where in the gait, and how much.
 
-use crate::message::{Alarm, AlarmKind};
+use worm_estimator::message::{Alarm, AlarmKind};
 
 /// Where in the gait a model mismatch shows: phase, 0 to 1, and the cell that steps there, from 1. None for other alarms.
 pub(super) fn place_of(alarm: &Alarm, step_order: &[usize]) -> Option<(f64, usize)> {

@@ -2,12 +2,12 @@
 
 use super::mismatch;
 use super::telemetry::Telemetry;
-use crate::config::Worm;
 use crate::latency::{HostPauses, Percentiles, WorstTicks};
-use crate::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Severity};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
+use worm_estimator::config::Worm;
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Severity};
 
 /// A run in numbers.
 #[derive(Debug, Clone, Serialize)]
@@ -181,7 +181,7 @@ fn seconds_since(start_ns: u64, time_ns: u64) -> f64 {
 
 impl CycleSummary {
     fn new(cycle: &Cycle) -> Self {
-        let cells = (cycle.cell_count as usize).min(crate::MAX_CELLS);
+        let cells = (cycle.cell_count as usize).min(worm_physics::MAX_CELLS);
         let known = |value: f64| value.is_finite().then_some(value);
         Self {
             index: cycle.index,

@@ -1,7 +1,7 @@
 //! The messages of one worm, gathered.
 
 use crate::latency::Account;
-use crate::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
 
 /// Everything that a watcher has heard so far.
 #[derive(Debug, Clone, Default)]

@@ -1,12 +1,12 @@
 use super::view::{Subject, draw};
 use super::*;
-use crate::MAX_CELLS;
-use crate::config::Worm as WormConfig;
-use crate::message::{Alarm, AlarmKind, Cycle, Estimate, Mode, Severity, State, Timing};
-use crate::model::{Motion, Outcome, Worm, steady_cycle};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use std::collections::VecDeque;
+use worm_estimator::config::Worm as WormConfig;
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Mode, Severity, State, Timing};
+use worm_physics::MAX_CELLS;
+use worm_physics::{Motion, Outcome, Worm, steady_cycle};
 
 /// What a watcher has heard of the paper's worm after `phase` gait cycles, by the model.
 fn heard(phase: f64) -> Telemetry {

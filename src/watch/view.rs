@@ -2,13 +2,13 @@
 
 use super::mismatch;
 use super::telemetry::Telemetry;
-use crate::message::{Alarm, AlarmKind, Cycle, Estimate, Fault, Mode, Severity};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Cell as TableCell, Paragraph, Row, Table};
 use std::collections::VecDeque;
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Fault, Mode, Severity};
 
 /// What the picture needs to know of the worm beside its telemetry.
 #[derive(Debug, Clone)]
@@ -33,7 +33,7 @@ pub struct Subject {
 pub fn draw(frame: &mut Frame<'_>, subject: &Subject, telemetry: &Telemetry, log: &VecDeque<String>) {
     let cells = telemetry
         .estimate
-        .map_or(4, |estimate| estimate.cell_count.min(crate::MAX_CELLS as u32)) as u16;
+        .map_or(4, |estimate| estimate.cell_count.min(worm_physics::MAX_CELLS as u32)) as u16;
     let heights = Heights::of(frame.area().height, cells);
     let [head, canal, middle, bottom, messages] = Layout::vertical([
         Constraint::Length(1),
@@ -282,7 +282,7 @@ fn ruler_labels(columns: usize, start_m: f64, width_m: f64, label_mm: i64) -> St
 }
 
 fn known_positions(estimate: &Estimate) -> Vec<(usize, f64)> {
-    let cells = (estimate.cell_count as usize).min(crate::MAX_CELLS);
+    let cells = (estimate.cell_count as usize).min(worm_physics::MAX_CELLS);
     (0..cells)
         .map(|cell| (cell, estimate.position_m[cell]))
         .filter(|(_, x_m)| x_m.is_finite())

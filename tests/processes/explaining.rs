@@ -2,9 +2,9 @@
 
 use super::Crawling;
 use super::worm::Worm;
-use wormd::config::Config;
-use wormd::message::{CommandKind, Mode, Verdict};
-use wormd::recording::mcap::messages;
+use worm_estimator::config::Config;
+use worm_estimator::message::{CommandKind, Mode, Verdict};
+use worm_log::messages;
 
 #[test]
 fn the_crawling_worm_is_recorded_and_explained() {

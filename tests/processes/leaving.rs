@@ -11,7 +11,7 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use wormd::message::Mode;
+use worm_estimator::message::Mode;
 
 #[test]
 fn a_reader_that_leaves_stops_the_worm() {

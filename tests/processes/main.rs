@@ -4,18 +4,16 @@
 //! These tests wait for conditions with a generous bound; they assert what happens, never how fast a shared machine is.
 
 mod explaining;
-#[path = "../host_pauses/mod.rs"]
-mod host_pauses;
 mod latency;
 mod leaving;
 mod recording;
 mod worm;
 
-use host_pauses::Pause;
 use std::time::Duration;
+use testkit::process_pauses::Pause;
 use worm::{Process, Worm, late_ticks, soon, wait_for};
+use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode, Verdict};
 use wormd::link::servo::{WATCHDOG_LATCHED, register};
-use wormd::message::{AlarmKind, CommandKind, Fault, Mode, Verdict};
 
 /// Longest wait for anything that a worm does.
 const PATIENCE: Duration = Duration::from_secs(20);

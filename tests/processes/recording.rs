@@ -3,7 +3,8 @@
 use super::worm::{Worm, wait_for};
 use super::{Crawling, PATIENCE};
 use std::path::{Path, PathBuf};
-use wormd::recording::mcap::{messages, read};
+use worm_analysis::recording::mcap::read;
+use worm_log::messages;
 
 /// A gait fast enough for some cycles in a few seconds.
 const FAST: &str = "[gait]\ncycle_s = 1.25\n";

@@ -1,7 +1,7 @@
 //! Real processes of a worm, under a name of their own, ended when a test ends. All of them pause together now and then, as on a
 //! computer that is busy or whose host is.
 
-use super::host_pauses::{HostPauses, Pause};
+use dynamixel_bus::packet::DeviceId;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::io::{BufRead, BufReader, Read};
@@ -11,10 +11,10 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use wormd::config::Config;
-use wormd::link::packet::DeviceId;
-use wormd::link::{Bus, Tty};
-use wormd::message::{Command as Order, CommandKind, State, Verdict};
+use testkit::process_pauses::{HostPauses, Pause};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Command as Order, CommandKind, State, Verdict};
+use wormd::link::{Tty, WormBus};
 use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
 
 /// One worm on this computer, with a folder for its files.
@@ -102,9 +102,9 @@ impl Worm {
     }
 
     /// The bus of the virtual worm, for whoever is not the controller.
-    pub fn bus(&self) -> (Bus<Tty>, DeviceId) {
+    pub fn bus(&self) -> (WormBus<Tty>, DeviceId) {
         let (port, _) = Tty::open(&PathBuf::from(self.port()), 1_000_000).expect("the port is free");
-        (Bus::new(port), DeviceId::new(1).expect("1 is an ID"))
+        (WormBus::new(port), DeviceId::new(1).expect("1 is an ID"))
     }
 
     fn with_ears<T>(&self, act: impl FnOnce(&mut Ears) -> T) -> T {

@@ -6,9 +6,9 @@
 use super::harness::{Session, config};
 use super::machine::{Machine, Wired};
 use std::fmt::Write;
-use wormd::config::Config;
+use worm_estimator::config::Config;
+use worm_estimator::message::Cycle;
 use wormd::link::virtual_worm::{Account, Options};
-use wormd::message::Cycle;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
 const SETTLED_CYCLES: usize = 10;

@@ -3,8 +3,8 @@
 use super::harness::{Session, config};
 use super::machine::{Machine, Wired};
 use std::fmt::Write;
+use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
 use wormd::link::virtual_worm::Options;
-use wormd::message::{AlarmKind, CommandKind, Fault, Mode};
 
 /// When the fault begins, s since the crawl began: the alarms have calibrated on three cycles of 2.5 s.
 const BEGINS_S: f64 = 16.3;

@@ -2,10 +2,10 @@
 //! reaches the controller in the next.
 
 use super::machine::{Exchange, Machine};
-use wormd::config::Config;
+use worm_estimator::config::Config;
+use worm_estimator::estimate::Observer;
+use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, Cycle, Fault, Mode, State, Verdict};
 use wormd::control::{Controller, Inputs, Outputs};
-use wormd::estimate::Observer;
-use wormd::message::{Alarm, AlarmKind, Command, CommandKind, Cycle, Fault, Mode, State, Verdict};
 
 /// The estimator's heartbeat while no sample comes, s.
 const HEARTBEAT_S: f64 = 0.1;

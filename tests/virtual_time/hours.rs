@@ -11,9 +11,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-use wormd::config::Config;
+use worm_estimator::config::Config;
+use worm_estimator::message::{AlarmKind, CommandKind, Mode};
 use wormd::link::virtual_worm::Options;
-use wormd::message::{AlarmKind, CommandKind, Mode};
 
 const RATE_HZ: f64 = 250.0;
 const STEP_S: f64 = 2e-3;

@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
-use wormd::config::Config;
+use worm_estimator::config::Config;
 use wormd::control::{Service, ServiceOutcome, link_settings};
 use wormd::link::servo::scale;
 use wormd::link::virtual_worm::motor::{Drive, Gains};
 use wormd::link::virtual_worm::{Devices, Options, Plant};
-use wormd::link::{Bus, ExchangePlan, LinkSettings, Port, PortError, ServoReading, TrackerReading, prepare};
+use wormd::link::{ExchangePlan, LinkSettings, Port, PortError, ServoReading, TrackerReading, WormBus, prepare};
 
 /// What one exchange brought.
 pub struct Exchange {
@@ -87,7 +87,7 @@ impl Port for Wire {
 
 /// The virtual worm behind the real codec: every goal and every reading are packets.
 pub struct Wired {
-    bus: Bus<Wire>,
+    bus: WormBus<Wire>,
     settings: LinkSettings,
     plan: ExchangePlan,
 }
@@ -95,7 +95,7 @@ pub struct Wired {
 impl Wired {
     pub fn new(config: &Config, options: &Options) -> Self {
         let devices = Devices::new(config, options).expect("a worm that can be simulated");
-        let mut bus = Bus::new(Wire {
+        let mut bus = WormBus::new(Wire {
             devices,
             now_s: 0.0,
             patience_s: SERVICE_PATIENCE_S,

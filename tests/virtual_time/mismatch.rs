@@ -5,8 +5,8 @@
 use super::harness::{Session, config};
 use super::machine::Wired;
 use std::fmt::Write;
+use worm_estimator::message::{Alarm, AlarmKind, CommandKind};
 use wormd::link::virtual_worm::Options;
-use wormd::message::{Alarm, AlarmKind, CommandKind};
 
 const RATE_HZ: f64 = 250.0;
 const CYCLE_S: f64 = 2.5;

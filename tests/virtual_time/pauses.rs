@@ -8,8 +8,8 @@ use super::harness::{Paused, Session, config};
 use super::machine::{Machine, Wired};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
 use wormd::link::virtual_worm::Options;
-use wormd::message::{AlarmKind, CommandKind, Fault, Mode};
 
 /// How near the energies of a settled cycle come to the virtual worm's own ledger, %.
 const NEAR_PERCENT: f64 = 3.0;

@@ -3,8 +3,8 @@
 use super::harness::{Session, config};
 use super::machine::Wired;
 use std::fmt::Write;
+use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
 use wormd::link::virtual_worm::Options;
-use wormd::message::{AlarmKind, CommandKind, Fault, Mode};
 
 /// From the block of the cam to the tick in which the goal is 0.
 const PROMISED_MS: f64 = 100.0;

@@ -1,8 +1,8 @@
 //! What a person reads in the terminal: the tips, then a cycle in figures, one column for each recording.
 
 use crate::command::columns::{Row, aligned};
-use crate::experiment::{Analysis, CycleValues, TheoryCycle};
-use crate::report::number::{NONE, count, fixed, mean, with_error};
+use worm_analysis::experiment::{Analysis, CycleValues, TheoryCycle};
+use worm_estimator::number::{NONE, count, fixed, mean, with_error};
 
 /// Everything found, in millimetres and millijoules.
 pub(super) fn text(analyses: &[Analysis]) -> String {

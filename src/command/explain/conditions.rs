@@ -1,10 +1,10 @@
 //! Whether what is stated of a recording can be true of it, before a long search starts from it.
 
 use crate::command::Failure;
-use crate::config::Config;
-use crate::experiment::Run;
-use crate::identify::{Gait, Prior, gait};
-use crate::model::Worm;
+use worm_analysis::experiment::Run;
+use worm_analysis::identify::{Gait, Prior, gait};
+use worm_estimator::config::Config;
+use worm_physics::Worm;
 
 /// How far the mean cycle time may be from the stated one, as a share.
 const CYCLE_SHARE: f64 = 0.2;

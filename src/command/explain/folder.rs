@@ -1,14 +1,14 @@
 //! The folder that an explanation is kept in. Files of an earlier one are replaced, each at once; other files are left alone.
 
 use crate::command::Failure;
-use crate::experiment::Run;
-use crate::explain::Answer;
-use crate::explain::write_back::{self, ModelText};
-use crate::report;
 use serde::Serialize;
 use serde_json::json;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
+use worm_analysis::experiment::Run;
+use worm_analysis::explain::Answer;
+use worm_analysis::explain::write_back::{self, ModelText};
+use worm_analysis::report;
 
 /// A folder that can be written in.
 pub(super) struct Folder(PathBuf);

@@ -4,13 +4,13 @@ use crate::command::material::READING;
 use crate::command::progress::Progress;
 use crate::command::record::{LOOK, Recorder};
 use crate::command::{Failure, end_on_signal_until};
-use crate::config::Config;
-use crate::message::{Fault, Mode, State};
-use crate::recording::mcap::Channel;
 use crate::topics::{Controller, Hub, Instance, RoleLock};
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Fault, Mode, State};
+use worm_log::Channel;
 
 /// How long a worm may be silent before it counts as gone. Its controller speaks in every tick.
 const PATIENCE: Duration = Duration::from_secs(2);

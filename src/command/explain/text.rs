@@ -1,10 +1,10 @@
 //! What a person reads in the terminal: the verdict, the effects, how the gap shrinks, what to try next.
 
 use crate::command::columns::{Row, aligned};
-use crate::explain::Answer;
-use crate::explain::answer::{Calibrated, NamedEffect, NextExperiment, Place, Remainder, RunSummary, Stage};
-use crate::model::effect;
-use crate::report::number::{NONE, fixed};
+use worm_analysis::explain::Answer;
+use worm_analysis::explain::answer::{Calibrated, NamedEffect, NextExperiment, Place, Remainder, RunSummary, Stage};
+use worm_estimator::number::{NONE, fixed};
+use worm_physics::effect;
 
 /// Places that are listed; the page has all.
 const PLACES: usize = 5;
@@ -238,8 +238,8 @@ fn quantity(value: f64, sigma: f64, unit: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explain::answer::{Figures, FoundParameter, Prediction};
-    use crate::explain::{Answer, Verdict};
+    use worm_analysis::explain::answer::{Figures, FoundParameter, Prediction};
+    use worm_analysis::explain::{Answer, Verdict};
 
     fn named(name: &str, parameter: (&str, f64, f64, &str)) -> NamedEffect {
         let (parameter, value, sigma, unit) = parameter;

@@ -2,11 +2,11 @@
 
 use super::LatencyArgs;
 use crate::command::Failure;
-use crate::config::Config;
-use crate::message::AlarmKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
+use worm_estimator::config::Config;
+use worm_estimator::message::AlarmKind;
 
 /// The cam of the virtual worm is blocked for the first time so long after it began to crawl, s.
 const FIRST_STALL_S: f64 = 2.0;

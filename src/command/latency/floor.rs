@@ -2,7 +2,6 @@
 
 use crate::command::children::{Child, Log, START_PATIENCE};
 use crate::command::{Failure, end_on_signal, print};
-use crate::config::Config;
 use crate::latency::bare::Bare;
 use crate::latency::floor::{self, FloorOutcome, FloorPlan};
 use crate::topics::Instance;
@@ -11,6 +10,7 @@ use nix::sched::{CpuSet, sched_setaffinity};
 use nix::unistd::Pid;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use worm_estimator::config::Config;
 
 /// Arguments of the hidden subcommand `wormd latency-floor`.
 #[derive(Debug, Args)]

@@ -5,8 +5,6 @@ use super::bench::{Bench, ConfigFile};
 use crate::command::children::{Child, Log, START_PATIENCE};
 use crate::command::estimate::{self, PRIORITY_BELOW_LOOP};
 use crate::command::{Failure, print};
-use crate::config::Realtime;
-use crate::message::{Alarm, AlarmKind, State};
 use crate::realtime::{self, Grant, monotonic_ns};
 use crate::topics::{Estimator, Hub, Instance, RoleLock, Supervisor};
 use crossbeam::channel::{Receiver, Sender, bounded};
@@ -17,6 +15,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use worm_estimator::config::Realtime;
+use worm_estimator::message::{Alarm, AlarmKind, State};
 
 /// Notes that may wait to be taken; more are dropped. The measuring loop takes them every few milliseconds.
 pub(super) const NOTES: usize = 65_536;

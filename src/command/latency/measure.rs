@@ -14,7 +14,6 @@ use crate::latency::floor::{BareListener, FloorOutcome, FloorPlan};
 use crate::latency::outcome::{Cyclictest, RateTrial};
 use crate::latency::stress::Stress;
 use crate::latency::{Account, Deliveries, Durations, Outcome};
-use crate::message::Timing;
 use crate::realtime::{InForce, monotonic_ns};
 use crate::topics::{Hub, Instance, Subscriber};
 use crate::watch::Telemetry;
@@ -22,6 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use worm_estimator::message::Timing;
 
 /// How often what the loop tells is taken: as seldom as the topic's buffer allows at any rate, for every wake of this process may
 /// interrupt the loop.
@@ -110,7 +110,7 @@ fn measure(
         ears.start_crawling(&client, &bench.config, &mut telemetry, end, || {
             house.find_ended().is_some()
         })
-        .map_err(|failure| house.find_ended().map_or(failure, Failure::Failed))?;
+        .map_err(|failure| house.find_ended().map_or(failure, Failure::failed))?;
     } else {
         findings.warnings.push(
             "a real worm is neither made to crawl nor blocked by a benchmark: it stays disarmed, and the way from stall to alarm \

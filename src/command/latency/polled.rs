@@ -4,7 +4,6 @@ use super::house::{NOTES, Received};
 use crate::command::Failure;
 use crate::latency::Durations;
 use crate::latency::bare::Bare;
-use crate::message::State;
 use crate::realtime::monotonic_ns;
 use crate::topics::{Hub, Instance};
 use crossbeam::channel::{Receiver, bounded};
@@ -13,6 +12,7 @@ use nix::unistd::Pid;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use worm_estimator::message::State;
 
 /// Keeps the processes off one CPU that this one may use, and gives that one; none where they would be left without.
 pub(super) fn keep_off(pids: [u32; 2]) -> Option<usize> {

@@ -9,10 +9,10 @@ use crate::command::progress::Progress;
 use crate::control::bus_allowed_ns;
 use crate::latency::Account;
 use crate::latency::outcome::RateTrial;
-use crate::message::Timing;
 use crate::topics::Hub;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use worm_estimator::message::Timing;
 
 /// The highest rate that can be configured, Hz.
 const HIGHEST_HZ: f64 = 10_000.0;

@@ -3,8 +3,8 @@
 use crate::latency::blame::meaning;
 use crate::latency::{Durations, Measure, Outcome, Tick};
 use crate::realtime::machine::Setting;
-use crate::report::number::{NONE, count, fixed, percent, shortest};
 use std::fmt;
+use worm_estimator::number::{NONE, count, fixed, percent, shortest};
 
 /// Columns of the terminal that are used.
 const WIDTH: usize = 120;

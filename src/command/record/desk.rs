@@ -2,14 +2,14 @@
 
 use super::Ears;
 use crate::command::Failure;
-use crate::message::{Alarm, Cycle, Estimate, State, Timing};
-use crate::recording::mcap::{Channel, Logged, Origin, WriteError, Writer};
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
+use worm_log::{Channel, Logged, Origin, WriteError, Writer};
 
 /// How often what was written is made safe from a power loss. At most this is lost, and what the queue holds.
 const SAFE_EVERY: Duration = Duration::from_millis(200);

@@ -2,8 +2,6 @@
 
 use crate::command::children::Log;
 use crate::command::{Failure, print};
-use crate::config::{Config, Direction};
-use crate::message::{Alarm, AlarmKind, Cycle};
 use crate::watch::view::{self, Subject};
 use crate::watch::{Telemetry, mismatch, remarks};
 use nix::errno::Errno;
@@ -13,6 +11,8 @@ use std::collections::VecDeque;
 use std::io::IsTerminal;
 use std::os::fd::AsFd;
 use std::time::Duration;
+use worm_estimator::config::{Config, Direction};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle};
 
 /// Lines of the log that the picture remembers.
 const LOG_LINES: usize = 100;

@@ -49,7 +49,7 @@ impl Rig {
                 capture_time_us: 0,
                 cell_count: 4,
                 valid: 0b1111,
-                positions_m: [0.0; crate::MAX_CELLS],
+                positions_m: [0.0; worm_physics::MAX_CELLS],
             },
             goal_counts: 0,
             service: None,

@@ -2,11 +2,11 @@
 
 use super::test_desk::*;
 use super::{Devices, Options};
-use crate::config::Config;
 use crate::link::Register;
-use crate::link::packet::Instruction;
 use crate::link::servo::{ServoReading, WATCHDOG_LATCHED, register, scale};
 use crate::link::tracker::TrackerReading;
+use dynamixel_bus::packet::Instruction;
+use worm_estimator::config::Config;
 
 #[test]
 fn blocks_of_a_tick_say_what_the_plant_does() {
@@ -159,7 +159,7 @@ fn brownout_loses_torque_goal_watchdog_and_turns() {
 #[test]
 fn empty_battery_silences_the_servo() {
     let mut config = Config::default();
-    config.battery = Some(crate::config::Battery {
+    config.battery = Some(worm_estimator::config::Battery {
         capacity_j: 9000.0,
         full_v: 5.6,
         empty_v: 4.0,

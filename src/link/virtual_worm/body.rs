@@ -1,14 +1,14 @@
-//! The worm's body in its canal, driven by the cam: the motion of [`model`](crate::model) under every `[[effect]]`, with scatter and
+//! The worm's body in its canal, driven by the cam: the motion of [`model`](worm_physics) under every `[[effect]]`, with scatter and
 //! faults.
 
 use super::conditions::PlantConditions;
-use crate::MAX_CELLS;
-use crate::config::Config;
-use crate::model::effect::{Setting, SettingError};
-use crate::model::{Contact, Ledger, Locomotion, Physics, SlidesDown, View, Worm, WormError};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
+use worm_estimator::config::Config;
+use worm_physics::MAX_CELLS;
+use worm_physics::effect::{Setting, SettingError};
+use worm_physics::{Contact, Ledger, Locomotion, Physics, SlidesDown, View, Worm, WormError};
 
 /// A tip's friction scatters by no more than this many standard deviations, and never to nothing.
 const SCATTER_LIMIT: f64 = 4.0;
@@ -67,7 +67,7 @@ impl Body {
             .rev()
             .map(|behind| behind as f64 * config.worm.cell_spacing_m)
             .collect();
-        let effects = Setting::configured(config)?;
+        let effects = config.effect_settings()?;
         let physics = Physics::of(nominal.clone()).with(&effects);
         let relief_n = relief_n(&physics);
         Ok(Self {

@@ -8,12 +8,12 @@ use super::options::Options;
 use super::plant::{DEFAULT_STEP_S, Plant};
 use super::servo::Servo;
 use super::tracker::Tracker;
-use crate::config::Config;
-use crate::link::packet::{
+use dynamixel_bus::packet::{
     DecodeError, DeviceId, FastReplyWriter, FastSegment, Instruction, InstructionPacket, MAX_PACKET_LEN,
     MalformedInstruction, Packet, ReadSpan, Recipient, ResetScope, StatusError, StatusFlags, StatusPacket,
 };
-use crate::model::WormError;
+use worm_estimator::config::Config;
+use worm_physics::WormError;
 
 /// How often faults and the servo's supervision are looked at, s.
 const SLICE_S: f64 = 1e-3;

@@ -3,7 +3,7 @@
 //! A fault is never an `if` in the plant or in a device. It changes one of these values; plant, devices and wire take them
 //! as they take any other parameter, and [`Conditions::default`] is a world without faults.
 
-use crate::MAX_CELLS;
+use worm_physics::MAX_CELLS;
 
 /// Everything that a fault can change.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -3,7 +3,7 @@
 //! Source of the rules: ROBOTIS e-manual, "DYNAMIXEL Protocol 2.0", "Status Packet, Error", and "Control Table, Area".
 
 use crate::link::Register;
-use crate::link::packet::StatusError;
+use dynamixel_bus::packet::StatusError;
 
 /// Where a register lives, which says who may write it and what a restart does to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,10 +11,10 @@ use super::body::BodyError;
 use super::bus::Bus;
 use super::options::Options;
 use super::plant::Plant;
-use crate::config::Config;
-use crate::link::packet::Decoder;
 use crate::link::servo::BAUD_RATES;
-use crate::model::WormError;
+use dynamixel_bus::packet::Decoder;
+use worm_estimator::config::Config;
+use worm_physics::WormError;
 
 /// A packet whose end does not come within this time is given up, s.
 const IDLE_S: f64 = 5e-3;

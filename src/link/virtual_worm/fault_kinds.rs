@@ -1,8 +1,8 @@
 //! The table of faults: grammar, help text and effect of each in one row. A new fault is a new row.
 
 use super::conditions::Conditions;
-use crate::MAX_CELLS;
 use std::fmt::Write as _;
+use worm_physics::MAX_CELLS;
 
 /// Friction inside at which nothing turns: 0.05 N m becomes 5 kN m.
 pub(super) const BLOCKED: f64 = 1e5;

@@ -1,6 +1,6 @@
 use super::super::fault_kinds::BLOCKED;
 use super::*;
-use crate::MAX_CELLS;
+use worm_physics::MAX_CELLS;
 
 fn parse(text: &str) -> Fault {
     text.parse()

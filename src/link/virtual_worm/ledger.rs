@@ -1,9 +1,9 @@
 //! The truth about energy and way, as no estimator can know it: kept by the plant, told at the end.
 
 use super::motor::StepEnergy;
-use crate::model;
 use serde::Serialize;
 use std::collections::VecDeque;
+use worm_physics as model;
 
 /// Cycles that are kept one by one; older ones are in the total only. More than two days of crawling.
 const KEPT_CYCLES: usize = 100_000;

@@ -13,7 +13,7 @@
 //! stays at rest until its torque exceeds the dry friction.
 
 use super::supply::Supply;
-use crate::config::Config;
+use worm_estimator::config::Config;
 
 /// What the servo's bridge limits the current to, A: the largest that its registers can say (XL330-M288, register 38).
 /// The register itself bounds the current in current modes only.

@@ -11,12 +11,12 @@ use super::ledger::{Account, Standing, TruthLedger};
 use super::motor::{Drive, Gains, Motor};
 use super::sight::Camera;
 use super::supply::Supply;
-use crate::config::Config;
 use crate::link::TrackerReading;
-use crate::model::WormError;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use std::f64::consts::TAU;
+use worm_estimator::config::Config;
+use worm_physics::WormError;
 
 /// Length of a step unless asked otherwise, s. An answer is at most this old, and the cam turns by less than a count of
 /// the servo's encoder in it.

@@ -1,8 +1,8 @@
 use super::*;
-use crate::MAX_CELLS;
-use crate::config::PerCell;
 use crate::link::virtual_worm::sight::CLOCK_DRIFT;
-use crate::model::{Physics, steady_cycle_of};
+use worm_estimator::config::PerCell;
+use worm_physics::MAX_CELLS;
+use worm_physics::{Physics, steady_cycle_of};
 
 /// Gains as the servo's defaults make them.
 const GAINS: Gains = Gains {
@@ -179,7 +179,7 @@ fn effects_act_on_the_body() {
         ("unequal-clamping", vec![("friction_factor", 0.6)]),
     ] {
         let mut config = smooth();
-        config.effect.push(crate::config::Effect {
+        config.effect.push(worm_estimator::config::Effect {
             name: name.to_owned(),
             cell: (name == "unequal-clamping").then_some(2),
             parameters: parameters
@@ -210,7 +210,7 @@ fn effects_act_on_the_body() {
 fn a_body_worn_down_slides() {
     let mut config = smooth();
     config.canal.slope_deg = 40.0;
-    config.effect.push(crate::config::Effect {
+    config.effect.push(worm_estimator::config::Effect {
         name: "wear".to_owned(),
         cell: None,
         parameters: [("loss_per_cycle".to_owned(), 0.15)].into(),
@@ -258,7 +258,7 @@ fn a_late_camera_shows_what_was() {
     let film = |captures_late: f64| {
         let mut config = smooth();
         config.virtual_worm.noise_m = 0.0;
-        config.effect.push(crate::config::Effect {
+        config.effect.push(worm_estimator::config::Effect {
             name: "sensor-latency".to_owned(),
             cell: None,
             parameters: [(

@@ -2,12 +2,12 @@
 
 use super::test_desk::*;
 use crate::link::Register;
-use crate::link::packet::{
+use crate::link::servo::register;
+use crate::link::tracker;
+use dynamixel_bus::packet::{
     BackupAction, Decoder, Instruction, InstructionPacket, MAX_PACKET_LEN, Packet, ReadSpan, ReadSpans, Recipient,
     ResetScope, SyncWrites,
 };
-use crate::link::servo::register;
-use crate::link::tracker;
 
 #[test]
 fn pings_are_answered_in_the_order_of_the_ids() {

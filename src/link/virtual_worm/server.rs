@@ -11,9 +11,7 @@
 use super::devices::{Devices, DevicesError};
 use super::options::Options;
 use super::pty::{Pty, PtyError};
-use crate::config::Config;
 use crate::logging::Summed;
-use crate::model::WormError;
 use crate::realtime::{monotonic_ns, visit_every_cpu};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
@@ -24,6 +22,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_physics::WormError;
 
 /// Longest sleep while a controller talks.
 const SLEEP_BUSY: Duration = Duration::from_millis(1);
@@ -223,7 +223,7 @@ impl Standstills {
 /// Simulated devices that run in a thread of this process, for tests and benchmarks.
 ///
 /// ```no_run
-/// use wormd::config::Config;
+/// use worm_estimator::config::Config;
 /// use wormd::link::virtual_worm::{Options, VirtualWorm};
 ///
 /// # fn run() -> Result<(), Box<dyn std::error::Error>> {

@@ -15,11 +15,11 @@ use super::control_table::{Area, ControlTable, Entry};
 use super::motor::{Drive, Gains};
 use super::plant::Plant;
 use super::servo_table::*;
-use crate::config::Config;
-use crate::link::packet::{BackupAction, DeviceId, ResetScope, StatusError};
 use crate::link::servo::register::*;
 use crate::link::servo::{BAUD_RATES, HardwareErrors, VELOCITY_MODE, WATCHDOG_LATCHED, scale};
+use dynamixel_bus::packet::{BackupAction, DeviceId, ResetScope, StatusError};
 use std::f64::consts::TAU;
+use worm_estimator::config::Config;
 
 /// Silence of a servo that starts, s.
 const BOOT_S: f64 = 0.1;

@@ -1,13 +1,13 @@
 //! What the tracker captures: positions with noise, now and then a cell unseen or older than its time stamp, on a clock of its own.
 
 use super::conditions::Sight;
-use crate::MAX_CELLS;
-use crate::config::Config;
 use crate::link::TrackerReading;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::Rng;
 use std::collections::VecDeque;
+use worm_estimator::config::Config;
+use worm_physics::MAX_CELLS;
 
 /// The tracker's clock runs fast by this share: an ordinary crystal.
 pub(super) const CLOCK_DRIFT: f64 = 30e-6;

@@ -1,6 +1,6 @@
 //! What feeds the servo: a battery whose voltage falls as it empties, or a bench supply.
 
-use crate::config::Config;
+use worm_estimator::config::Config;
 
 /// Volts on the bus never fall below this in the equations, so that power over voltage stays finite.
 const LEAST_BUS_V: f64 = 0.1;
@@ -103,7 +103,7 @@ impl Supply {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Battery;
+    use worm_estimator::config::Battery;
 
     fn on_battery() -> Supply {
         Supply::new(&Config {

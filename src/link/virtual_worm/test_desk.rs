@@ -1,10 +1,10 @@
 //! What the tests of the devices share: a controller in virtual time.
 
 use super::{Devices, Options};
-use crate::config::Config;
 use crate::link::Register;
-use crate::link::packet::{Decoder, DeviceId, Instruction, InstructionPacket, MAX_PACKET_LEN, Packet, Recipient};
 use crate::link::servo::register;
+use dynamixel_bus::packet::{Decoder, DeviceId, Instruction, InstructionPacket, MAX_PACKET_LEN, Packet, Recipient};
+use worm_estimator::config::Config;
 
 /// A controller in virtual time.
 pub(super) struct Desk {

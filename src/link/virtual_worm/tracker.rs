@@ -2,10 +2,10 @@
 
 use super::control_table::{Area, ControlTable, Entry, eeprom, read_only};
 use super::plant::Plant;
-use crate::config::Config;
-use crate::link::packet::{DeviceId, ResetScope, StatusError};
 use crate::link::tracker::register::{FIRMWARE_VERSION, ID, MODEL_NUMBER};
 use crate::link::tracker::{BLOCK_ADDRESS, DEFAULT_ID, MAX_BLOCK_LEN, MODEL};
+use dynamixel_bus::packet::{DeviceId, ResetScope, StatusError};
+use worm_estimator::config::Config;
 
 /// Firmware version.
 const FIRMWARE: i64 = 1;

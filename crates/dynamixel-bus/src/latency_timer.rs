@@ -1,0 +1,101 @@
+//! USB adapters that collect bytes before they hand them on.
+//!
+//! An FTDI chip (U2D2, most cheap adapters) waits 16 ms for more bytes unless told otherwise: four ticks of a 250 Hz loop.
+//! The flag `ASYNC_LOW_LATENCY` makes its driver set 1 ms. Whether that worked is read from sysfs. Other ports, and
+//! pseudo-terminals, have no such timer.
+
+use std::os::fd::{AsRawFd, BorrowedFd};
+use std::path::Path;
+
+use super::Finding;
+
+/// `struct serial_struct` of `linux/serial.h`.
+#[repr(C)]
+struct SerialStruct {
+    kind: libc::c_int,
+    line: libc::c_int,
+    port: libc::c_uint,
+    irq: libc::c_int,
+    flags: libc::c_int,
+    xmit_fifo_size: libc::c_int,
+    custom_divisor: libc::c_int,
+    baud_base: libc::c_int,
+    close_delay: libc::c_ushort,
+    io_type: libc::c_char,
+    reserved: [libc::c_char; 1],
+    hub6: libc::c_int,
+    closing_wait: libc::c_ushort,
+    closing_wait2: libc::c_ushort,
+    iomem_base: *mut libc::c_uchar,
+    iomem_reg_shift: libc::c_ushort,
+    port_high: libc::c_uint,
+    iomap_base: libc::c_ulong,
+}
+
+/// `ASYNC_LOW_LATENCY` of `linux/tty_flags.h`.
+const LOW_LATENCY: libc::c_int = 1 << 13;
+
+/// Longest collecting that goes unremarked, in ms.
+const TOLERATED_MS: u32 = 1;
+
+/// Switches collecting off where there is any; says so when there was, or when it could not be.
+pub(super) fn mend(port: BorrowedFd<'_>, path: &Path) -> Option<Finding> {
+    let before_ms = latency_timer_ms(path);
+    let asked = ask_for_low_latency(port);
+    // A port without a timer has nothing to mend, whatever it answers to the ioctl.
+    let before_ms = before_ms.filter(|&timer_ms| timer_ms > TOLERATED_MS)?;
+    let after_ms = latency_timer_ms(path).unwrap_or(before_ms);
+    let what = format!(
+        "{}: the USB adapter holds bytes back for up to {before_ms} ms",
+        path.display()
+    );
+    if after_ms <= TOLERATED_MS {
+        return Some(Finding::corrected(
+            what,
+            format!("low latency asked for, now {after_ms} ms"),
+        ));
+    }
+    let refusal = asked
+        .err()
+        .map(|error| format!(" (the driver refused: {error})"))
+        .unwrap_or_default();
+    let file = format!(
+        "/sys/class/tty/{}/device/latency_timer",
+        device_name(path).unwrap_or_default()
+    );
+    Some(Finding::open(
+        what,
+        format!("as root: echo 1 > {file}, or a udev rule that does so{refusal}"),
+    ))
+}
+
+fn ask_for_low_latency(port: BorrowedFd<'_>) -> std::io::Result<()> {
+    let mut settings = std::mem::MaybeUninit::<SerialStruct>::zeroed();
+    // SAFETY: the descriptor is open; TIOCGSERIAL fills in a `serial_struct`, which `SerialStruct` is laid out as.
+    if unsafe { libc::ioctl(port.as_raw_fd(), libc::TIOCGSERIAL, settings.as_mut_ptr()) } != 0 {
+        return Err(std::io::Error::last_os_error());
+    }
+    // SAFETY: every field is an integer or a raw pointer, for which zero bytes are valid too.
+    let mut settings = unsafe { settings.assume_init() };
+    if settings.flags & LOW_LATENCY != 0 {
+        return Ok(());
+    }
+    settings.flags |= LOW_LATENCY;
+    // SAFETY: the descriptor is open; TIOCSSERIAL only reads the `serial_struct`.
+    if unsafe { libc::ioctl(port.as_raw_fd(), libc::TIOCSSERIAL, &raw const settings) } != 0 {
+        return Err(std::io::Error::last_os_error());
+    }
+    Ok(())
+}
+
+/// The timer as sysfs tells it; nothing for ports that have none.
+fn latency_timer_ms(path: &Path) -> Option<u32> {
+    let file = format!("/sys/class/tty/{}/device/latency_timer", device_name(path)?);
+    std::fs::read_to_string(file).ok()?.trim().parse().ok()
+}
+
+/// `ttyUSB0` for `/dev/serial/by-id/…`.
+fn device_name(path: &Path) -> Option<String> {
+    let device = path.canonicalize().ok()?;
+    Some(device.file_name()?.to_str()?.to_owned())
+}

@@ -1,0 +1,286 @@
+//! One run: a worm, its motor, and the camera.
+
+use super::CELLS;
+use super::body::{Moment, Motion, Place, Worm};
+use super::camera::{Camera, Watch};
+use super::drive::Drive;
+use super::tip::contact::between;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::path::PathBuf;
+use worm_analysis::recording::Recording;
+
+/// Time step of the integrator, s: below a hundredth of the fastest swing of a body on its tips.
+pub const STEP_S: f64 = 100e-6;
+/// Speed of the body beyond which the tips have lost it, m/s: several times what any gait here gives it.
+const LOST_M_S: f64 = 0.5;
+/// Time after which a motor that never gets on is given up, in mean cycles for each cycle wanted.
+const PATIENCE: f64 = 10.0;
+
+/// The tips did not hold the worm, or the motor did not turn its cam.
+#[derive(Debug)]
+pub struct Lost;
+
+/// The noise of a camera.
+#[derive(Debug, Clone)]
+pub struct Eyes {
+    pub camera: Camera,
+    /// Standard deviation of the part of the noise that lasts, m.
+    pub drift_m: f64,
+    /// How long it lasts, s.
+    pub drift_s: f64,
+}
+
+impl Eyes {
+    /// A camera that sees everything as it is.
+    pub fn perfect() -> Self {
+        Self {
+            camera: Camera::perfect(),
+            drift_m: 0.0,
+            drift_s: 0.05,
+        }
+    }
+
+    /// A camera as one finds them.
+    pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
+        Self {
+            camera: Camera {
+                noise_m: between(0.03e-3, 0.15e-3, rng),
+                ..Camera::default()
+            },
+            drift_m: between(0.01e-3, 0.05e-3, rng),
+            drift_s: between(0.02, 0.2, rng),
+        }
+    }
+}
+
+/// How one run is made.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    pub place: Place,
+    pub drive: Drive,
+    pub eyes: Eyes,
+    /// Gait cycles, not necessarily whole, before the camera is switched on; none: it sees the worm laid down.
+    pub warm_up_cycles: f64,
+    /// Gait cycles in the recording.
+    pub cycles: f64,
+    /// Rest after each whole cycle, s.
+    pub dwell_s: f64,
+    /// Cycle of the recording from which on a jump of the friction is there; infinite: never.
+    pub jump_at_cycle: f64,
+    /// Whether the cam's phase is recorded.
+    pub with_phase: bool,
+    pub seed: u64,
+    /// Time step of the integrator, s.
+    pub step_s: f64,
+}
+
+/// A run as it was recorded and as it was.
+#[derive(Debug, Clone)]
+pub struct Played {
+    pub recording: Recording,
+    /// Phase at each sample, cycles, recorded or not.
+    pub phase: Vec<f64>,
+    /// Positions as a perfect camera of the same scale and latency would give them, m: `[cell][sample]`.
+    pub position_m: Vec<Vec<f64>>,
+}
+
+impl Scene {
+    /// Twelve cycles of an even motor before a perfect camera, from rest.
+    pub fn ideal(slope_deg: f64, cycle_s: f64) -> Self {
+        Self {
+            place: Place {
+                slope_deg,
+                payload_kg: 0.0,
+                start_m: 0.0,
+            },
+            drive: Drive::even(cycle_s),
+            eyes: Eyes::perfect(),
+            warm_up_cycles: 0.0,
+            cycles: 12.0,
+            dwell_s: 0.0,
+            jump_at_cycle: f64::INFINITY,
+            with_phase: true,
+            seed: 1,
+            step_s: STEP_S,
+        }
+    }
+
+    /// Plays the run.
+    ///
+    /// # Errors
+    /// [`Lost`] when the worm does not hold on the slope or the motor never gets on.
+    pub fn play(&self, worm: &Worm) -> Result<Played, Lost> {
+        let from_phase = self.drive.first_phase + self.warm_up_cycles;
+        let to_phase = from_phase + self.cycles;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+        let scatter = worm.make.scatter_over(to_phase.ceil() as usize + 2, &mut rng);
+        let mut motion = Motion::laid_down(worm, self.place, self.drive.first_phase, self.step_s);
+        let mut cam = Turning::new(self);
+        // Without a warm-up the camera runs while the worm rests before its first step.
+        while cam.phase < from_phase {
+            if self.warm_up_cycles == 0.0 {
+                break;
+            }
+            self.step(&mut motion, &mut cam, worm, &scatter, from_phase)?;
+        }
+        motion.begin();
+
+        let rate_hz = self.eyes.camera.rate_hz;
+        let (origin_s, latency_s) = (motion.time_s(), worm.flaws.latency_s);
+        let mut film = Film::new(self, worm.flaws.scale);
+        // Positions are those of so long ago, so they are taken from the origin on and the phase so much later.
+        while cam.phase < to_phase || film.phase.len() < film.position_m[0].len() {
+            let begun_s = motion.time_s() - origin_s;
+            let (before_m, before) = (motion.position_m, cam.phase);
+            let going = cam.phase < to_phase;
+            self.step(&mut motion, &mut cam, worm, &scatter, from_phase)?;
+            let ended_s = motion.time_s() - origin_s;
+            let share_at = |time_s: f64| (time_s - begun_s) / (ended_s - begun_s);
+            while going && film.position_m[0].len() as f64 / rate_hz < ended_s {
+                let share = share_at(film.position_m[0].len() as f64 / rate_hz);
+                film.see(std::array::from_fn(|cell| {
+                    before_m[cell] + share * (motion.position_m[cell] - before_m[cell])
+                }));
+            }
+            while latency_s + film.phase.len() as f64 / rate_hz < ended_s {
+                let share = share_at(latency_s + film.phase.len() as f64 / rate_hz);
+                film.phase.push(before + share * (cam.phase - before));
+            }
+        }
+        Ok(film.develop(self))
+    }
+
+    /// One time step by the midpoint rule.
+    fn step(
+        &self,
+        motion: &mut Motion,
+        cam: &mut Turning,
+        worm: &Worm,
+        scatter: &[Vec<f64>],
+        from_phase: f64,
+    ) -> Result<(), Lost> {
+        let droop = if worm.flaws.slowdown_per_n > 0.0 {
+            1.0 / (1.0 + worm.flaws.slowdown_per_n * motion.actuator_n(cam.phase).max(0.0))
+        } else {
+            1.0
+        };
+        cam.turn(motion.time_s(), self.step_s, droop);
+        let cycle = (cam.phase - self.drive.first_phase).max(0.0) as usize;
+        let factors = std::array::from_fn(|cell| scatter[cell][cycle.min(scatter[cell].len() - 1)]);
+        let cycles = cam.phase - from_phase;
+        motion.step(Moment {
+            phase: cam.phase,
+            cycles,
+            scatter: &factors,
+            jumped: cycles >= self.jump_at_cycle,
+        });
+        let patience_s = PATIENCE * (self.warm_up_cycles + self.cycles + 2.0) * (self.drive.cycle_s + self.dwell_s);
+        let holds = motion.translation_m_s.abs() < LOST_M_S && motion.time_s() < patience_s;
+        if holds { Ok(()) } else { Err(Lost) }
+    }
+}
+
+/// The cam as the motor turns it.
+struct Turning<'a> {
+    drive: &'a Drive,
+    dwell_s: f64,
+    phase: f64,
+    rest_until_s: f64,
+}
+
+impl<'a> Turning<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        Self {
+            drive: &scene.drive,
+            dwell_s: scene.dwell_s,
+            phase: scene.drive.first_phase,
+            rest_until_s: 0.0,
+        }
+    }
+
+    fn turn(&mut self, time_s: f64, step_s: f64, droop: f64) {
+        if time_s < self.rest_until_s {
+            return;
+        }
+        let half_s = 0.5 * step_s;
+        let midway = self.phase + half_s * droop * self.drive.speed(self.phase, time_s, CELLS);
+        let next = self.phase + step_s * droop * self.drive.speed(midway, time_s + half_s, CELLS);
+        let whole = self.phase.floor() + 1.0;
+        if self.dwell_s > 0.0 && next >= whole {
+            self.phase = whole;
+            self.rest_until_s = time_s + self.dwell_s;
+        } else {
+            self.phase = next;
+        }
+    }
+}
+
+/// What the camera takes.
+struct Film {
+    watch: Watch,
+    rng: Xoshiro256PlusPlus,
+    /// What is left of a lasting error after one sample, and what is new in it, m.
+    lasting: (f64, f64),
+    error_m: [f64; CELLS],
+    scale: f64,
+    phase: Vec<f64>,
+    position_m: Vec<Vec<f64>>,
+    seen_m: Vec<Vec<f64>>,
+}
+
+impl Film {
+    fn new(scene: &Scene, scale: f64) -> Self {
+        let eyes = &scene.eyes;
+        let kept = (-1.0 / (eyes.camera.rate_hz * eyes.drift_s)).exp();
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(!scene.seed);
+        let error_m = std::array::from_fn(|_| eyes.drift_m * normal(&mut rng));
+        Self {
+            watch: Watch::new(eyes.camera.clone(), CELLS, scene.seed.rotate_left(32)),
+            rng,
+            lasting: (kept, eyes.drift_m * (1.0 - kept * kept).sqrt()),
+            error_m,
+            scale,
+            phase: Vec::new(),
+            position_m: vec![Vec::new(); CELLS],
+            seen_m: vec![Vec::new(); CELLS],
+        }
+    }
+
+    fn see(&mut self, position_m: [f64; CELLS]) {
+        let time_s = self.watch.next_s();
+        for (cell, position_m) in position_m.into_iter().enumerate() {
+            let (kept, fresh_m) = self.lasting;
+            let measured_m = self.scale * position_m;
+            self.error_m[cell] = kept * self.error_m[cell] + fresh_m * normal(&mut self.rng);
+            self.position_m[cell].push(measured_m);
+            self.seen_m[cell].push(self.watch.see(cell, time_s, measured_m + self.error_m[cell]));
+        }
+    }
+
+    fn develop(mut self, scene: &Scene) -> Played {
+        let samples = self.seen_m[0].len();
+        self.phase.truncate(samples);
+        let recording = Recording {
+            source: PathBuf::from(format!("seed{}at{}deg", scene.seed, scene.place.slope_deg)),
+            cell_names: (1..=CELLS).map(|cell| format!("x{cell}_m")).collect(),
+            time_s: (0..samples)
+                .map(|sample| sample as f64 / scene.eyes.camera.rate_hz)
+                .collect(),
+            position_m: self.seen_m,
+            gait_phase: scene.with_phase.then(|| self.phase.clone()),
+            motor: None,
+            warnings: Vec::new(),
+        };
+        Played {
+            recording,
+            phase: self.phase,
+            position_m: self.position_m,
+        }
+    }
+}
+
+fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    StandardNormal.sample(rng)
+}

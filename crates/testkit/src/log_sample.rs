@@ -1,0 +1,162 @@
+//! A crawl as the topics would tell it, and logs of it.
+
+use crate::crawl::{Crawl, Scene, config_of, paper_worm};
+use std::cell::RefCell;
+use std::io::Write;
+use std::path::Path;
+use std::rc::Rc;
+use std::time::{Duration, UNIX_EPOCH};
+use worm_estimator::config::Config;
+use worm_estimator::estimate::Observer;
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
+use worm_log::{Log, Logged, Origin, Writer};
+
+pub const ORIGIN_CONFIG: &str = "[worm]\nname = \"tester\"\n";
+
+/// What the processes of a worm would have said.
+#[derive(Default)]
+pub struct Told {
+    pub config: Config,
+    pub states: Vec<State>,
+    pub timings: Vec<Timing>,
+    pub estimates: Vec<Estimate>,
+    pub cycles: Vec<Cycle>,
+    pub alarms: Vec<Alarm>,
+}
+
+impl Told {
+    /// The same, as a log.
+    pub fn log(self) -> Log {
+        Log {
+            states: self.states,
+            estimates: self.estimates,
+            cycles: self.cycles,
+            alarms: self.alarms,
+            ..Log::default()
+        }
+    }
+}
+
+/// A crawl with an estimator from the first state on.
+pub fn crawl(seconds: f64) -> Told {
+    crawl_with_late_estimator(seconds, 0)
+}
+
+/// A crawl whose estimator was started so many states after the controller, and now and then sends a heartbeat.
+pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Told {
+    let scene = Scene {
+        cycles_per_s: 0.5,
+        ..Scene::default()
+    };
+    let worm = paper_worm(0.0, true);
+    let config = config_of(&worm, &scene);
+    let mut observer = Observer::new(&config).expect("a valid configuration");
+    let mut crawl = Crawl::new(worm, scene);
+    let mut told = Told::default();
+    for tick in 0..(seconds * crawl.scene.tick_hz) as usize {
+        let state = crawl.tick();
+        told.states.push(state);
+        told.timings.push(Timing {
+            sequence: state.sequence,
+            deadline_ns: state.time_ns - 100_000,
+            wake_lateness_ns: 30_000 + tick as u64 % 977,
+            bus_ns: u64::MAX,
+            compute_ns: 1_000,
+            publish_ns: 2_000,
+            notify_ns: 0,
+            waited_ns: 0,
+            stolen_ns: 0,
+            overruns: 0,
+            period_ns: 1_000_000,
+            host_paused_ns: 0,
+            host_pauses: 0,
+            overrun: 0,
+            culprit: 0,
+            minor_faults: 0,
+            major_faults: 0,
+        });
+        if tick < late {
+            continue;
+        }
+        let report = observer.update(&state);
+        told.alarms.extend(report.alarms.iter());
+        told.cycles.extend(report.cycle);
+        told.estimates.extend(report.estimate);
+        if tick % 100 == 99 {
+            told.estimates.push(Estimate {
+                // A heartbeat shows the alarms as they are by then.
+                armed_mask: 1 << AlarmKind::LinkFault.code(),
+                ..observer.latest()
+            });
+        }
+    }
+    told.config = config;
+    told
+}
+
+pub fn origin() -> Origin {
+    Origin {
+        worm: "tester".to_owned(),
+        cells: 4,
+        config: Some(ORIGIN_CONFIG.to_owned()),
+        begun: UNIX_EPOCH + Duration::from_millis(1500),
+        begun_ns: 900_000_000,
+    }
+}
+
+/// Writes a crawl as a log.
+pub fn write_log(path: &Path, told: &Told) {
+    let file = std::fs::File::create(path).expect("can be made");
+    let mut writer = Writer::new(file, path, &origin()).expect("there is room");
+    fn all<T: Logged>(writer: &mut Writer<std::fs::File>, messages: &[T]) {
+        for message in messages {
+            writer.write(message).expect("there is room");
+        }
+    }
+    all(&mut writer, &told.states);
+    all(&mut writer, &told.timings);
+    all(&mut writer, &told.estimates);
+    all(&mut writer, &told.cycles);
+    all(&mut writer, &told.alarms);
+    writer.finish().expect("there is room");
+}
+
+/// Memory that a log is written to, with room for so many bytes.
+#[derive(Clone)]
+pub struct Sink {
+    bytes: Rc<RefCell<Vec<u8>>>,
+    room: usize,
+}
+
+impl Default for Sink {
+    fn default() -> Self {
+        Self::with_room(usize::MAX)
+    }
+}
+
+impl Sink {
+    pub fn with_room(room: usize) -> Self {
+        let bytes = Rc::default();
+        Self { bytes, room }
+    }
+
+    pub fn bytes(&self) -> Vec<u8> {
+        self.bytes.borrow().clone()
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let mut held = self.bytes.borrow_mut();
+        let taken = bytes.len().min(self.room - held.len());
+        if taken == 0 && !bytes.is_empty() {
+            return Err(std::io::ErrorKind::StorageFull.into());
+        }
+        held.extend_from_slice(&bytes[..taken]);
+        Ok(taken)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,109 @@
+//! How well the search names what is hidden: every case of a split, and the score table.
+//!
+//! ```text
+//! cargo bench --bench explain_benchmark -- --split development|test|search [--only EFFECT] [--cases N] [--csv FILE]
+//! ```
+//! Without `--split` a few cases of the development split are run; `search` are those that `tests/explain_search.rs` runs in small.
+//! `WORMD_CASES` scales how many there are of each kind.
+
+use clap::Parser;
+use std::fs::File;
+use std::panic;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Instant;
+use testkit::hidden_effects::library::Library;
+use testkit::hidden_effects::split::{Case, Split, scale_wanted, split};
+use testkit::hidden_effects::table::Table;
+use testkit::hidden_effects::verdict::{Judgement, judge};
+
+/// Threads that explain cases side by side.
+const THREADS: usize = 2;
+/// Cases that are run when no split is asked for.
+const FEW: usize = 4;
+
+#[derive(Debug, Parser)]
+#[command(about = "Runs the search for the missing effect on campaigns in which one is hidden, and scores it.")]
+struct Order {
+    /// Which cases: development, test or search; absent: a few of development.
+    #[arg(long, value_parser = |name: &str| Split::named(name).ok_or("must be development, test or search"))]
+    split: Option<Split>,
+    /// Only these: an effect, clean, outside, pair or twin.
+    #[arg(long, value_parser = |name: &str| Case::words().find(|word| *word == name).ok_or("must be an effect, clean, outside, pair or twin"))]
+    only: Option<&'static str>,
+    /// At most so many cases, spread evenly over the split.
+    #[arg(long)]
+    cases: Option<usize>,
+    /// Writes a row for every case to this file.
+    #[arg(long)]
+    csv: Option<PathBuf>,
+    /// What `cargo bench` says of itself.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn main() -> ExitCode {
+    let order = Order::parse();
+    let mut cases = split(order.split.unwrap_or(Split::Development), scale_wanted());
+    if let Some(only) = order.only {
+        cases.retain(|case| case.what() == only);
+    }
+    let few = order.split.is_none().then_some(FEW);
+    if let Some(most) = order.cases.or(few) {
+        cases = spread(&cases, most);
+    }
+    let judgements = judge_all(&cases);
+    println!("\n{}", Table(&judgements));
+    let Some(path) = &order.csv else {
+        return ExitCode::SUCCESS;
+    };
+    let written = File::create(path)
+        .map_err(csv::Error::from)
+        .and_then(|file| Table(&judgements).write_csv(file));
+    match written {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!(
+                "{}: cannot be written: {problem}: name a file in a folder that is there",
+                path.display()
+            );
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// So many cases, as far from each other as they can be.
+fn spread(cases: &[Case], most: usize) -> Vec<Case> {
+    let count = most.min(cases.len());
+    (0..count).map(|place| cases[place * cases.len() / count]).collect()
+}
+
+/// Judges every case, in the order given, and prints a line for each as it comes.
+fn judge_all(cases: &[Case]) -> Vec<Judgement> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(case) = cases.get(number) else {
+                return done;
+            };
+            let begun = Instant::now();
+            let campaign = case.draw();
+            let judgement = judge(&campaign, &Library);
+            let seconds = begun.elapsed().as_secs_f64();
+            println!("{:>3}/{} {} {seconds:.1} s", number + 1, cases.len(), judgement.line());
+            done.push((number, judgement));
+        }
+    };
+    let mut all: Vec<(usize, Judgement)> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..THREADS).map(|_| scope.spawn(work)).collect();
+        let done = workers.into_iter().map(|worker| worker.join());
+        done.flat_map(|done| done.unwrap_or_else(|cause| panic::resume_unwind(cause)))
+            .collect()
+    });
+    all.sort_by_key(|(number, _)| *number);
+    all.into_iter().map(|(_, judgement)| judgement).collect()
+}

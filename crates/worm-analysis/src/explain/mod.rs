@@ -1,0 +1,55 @@
+//! Where model and data disagree, which effect is missing, and what to try next.
+//!
+//! # The story
+//! A model that is wrong in one place can be made to look right by being a little wrong everywhere, so the search begins by
+//! recalibrating it: friction, stiffness, stroke and the like are fitted within what is honestly not known of them. What is then
+//! left is the gap. Each effect of the library ([`worm_physics::effect`]) is tried on it; the best are fitted to the end and
+//! compared by what they say of data that they were not fitted to. An effect is named only where it does more than the best of
+//! the whole library would by chance, and where what it leaves is noise; what explains the data equally well stays in the answer,
+//! with everything that no positions could tell from it, and with the experiment that would decide.
+//!
+//! Pure: recordings in, an [`Answer`] out; knows of no files. The same input and seed give the same answer.
+//!
+//! # The map, in reading order
+//! - [`answer`]: what comes out, the JSON contract.
+//! - `search`: the steps, one after the other.
+//! - `observed`: the recordings as the search sees them; `noise`: how well the worm repeats itself.
+//! - `parameter`: what may be turned, with priors; `predict`: what a hypothesis says of every sample;
+//!   `misread`: where the phase was read off overlapping steps; `fit`: least squares; `leap`:
+//!   from one valley of it to another.
+//! - `screen`: the whole library at a glance; `droop`: the one effect that shows in time alone.
+//! - `held_out`: data left out; `judge`: the rules of the judgement.
+//! - `localise`: where the gap is; `period`: whether it comes back; `gap`: how it shrinks; `propose`: the next experiment; `words`: the answer in words.
+//! - `advances`: the same where only advances per cycle are known.
+//! - `assemble`: all of it put together; [`write_back`]: the model's file with the answer in it.
+
+mod advances;
+pub mod answer;
+mod assemble;
+mod droop;
+mod error;
+mod fit;
+#[cfg(test)]
+mod fixture;
+mod gap;
+mod held_out;
+mod judge;
+mod leap;
+mod localise;
+mod misread;
+mod noise;
+mod observed;
+mod parameter;
+mod period;
+mod predict;
+mod propose;
+mod screen;
+mod search;
+mod words;
+pub mod write_back;
+
+pub use crate::experiment::Run;
+pub use advances::explain_advances;
+pub use answer::{Answer, Verdict};
+pub use error::ExplainError;
+pub use search::{Options, explain};

@@ -1,0 +1,233 @@
+//! The recordings as the search sees them: which sample is in which phase, which count, and how noisy they are.
+
+use super::error::ExplainError;
+use crate::experiment::Run;
+use crate::identify::clean::leave_out_outliers;
+use crate::identify::{Gait, Prior, gait};
+use worm_estimator::config::Config;
+
+/// Cycles at the start that do not count where the worm was not seen laid down: the tips' state is not known there.
+const FORGOTTEN_CYCLES: f64 = 2.0;
+/// Whole cycles that must count in a run.
+pub(super) const LEAST_CYCLES: usize = 3;
+/// Phase, cycles, within which of a whole step a recording must begin to show a worm laid down.
+const AT_BEGIN: f64 = 0.02;
+/// Way, as a share of the stroke, that a cell falls behind the others over a recording from which it is worth a second look.
+const FALLS_BEHIND: f64 = 0.05;
+/// How far the stroke seen may be from the configured one, as a factor.
+const STROKE_FACTOR: f64 = 2.0;
+/// Time at rest before the first step that counts, s, and the time a worm just laid down sinks into its tips.
+const REST_S: f64 = 0.1;
+const SINKING_S: f64 = 0.05;
+/// Phase gone through from which the worm counts as moving, cycles.
+const MOVES: f64 = 0.005;
+
+/// One recording, prepared.
+#[derive(Debug, Clone)]
+pub(super) struct Observed<'a> {
+    pub run: Run<'a>,
+    /// Gait phase at each sample, cycles.
+    pub phase: Vec<f64>,
+    pub phase_recorded: bool,
+    /// Cells in the order in which they step.
+    pub step_order: Vec<usize>,
+    /// Positions without outliers, m: `[cell][sample]`; `NaN` where not seen.
+    pub position_m: Vec<Vec<f64>>,
+    /// Where the cells were at the first sample, m.
+    pub first_m: Vec<f64>,
+    /// Standard deviation of the white part of one position, m.
+    pub noise_m: f64,
+    /// The recording may show a worm that was laid down.
+    pub may_be_laid_down: bool,
+    /// The worm is taken for one laid down.
+    pub laid_down: bool,
+    /// First sample that counts.
+    pub counts_from: usize,
+    pub cycle_s: f64,
+}
+
+impl<'a> Observed<'a> {
+    pub fn new(run: Run<'a>, config: &Config) -> Result<Self, ExplainError> {
+        let recording = run.recording;
+        let name = || recording.source.display().to_string();
+        if !(-90.0..=90.0).contains(&run.slope_deg) {
+            return Err(ExplainError::Slope {
+                recording: name(),
+                slope_deg: run.slope_deg,
+            });
+        }
+        if recording.cells() != config.worm.cells {
+            return Err(ExplainError::Cells {
+                recording: name(),
+                found: recording.cells(),
+                configured: config.worm.cells,
+            });
+        }
+        let gait = find_gait(run, config).map_err(|source| ExplainError::Gait {
+            recording: name(),
+            source,
+        })?;
+        let factor = gait.stroke_m / config.worm.stroke_m;
+        if !(1.0 / STROKE_FACTOR..=STROKE_FACTOR).contains(&factor) {
+            return Err(ExplainError::Stroke {
+                recording: name(),
+                seen_m: gait.stroke_m,
+                configured_m: config.worm.stroke_m,
+            });
+        }
+        let filled_m = recording.filled();
+        let mut position_m = recording.position_m.clone();
+        let noise_m = crate::identify::clean::noise_by_differences(&position_m).max(1e-7);
+        for (series, filled) in position_m.iter_mut().zip(&filled_m) {
+            leave_out_outliers(series, filled, noise_m);
+        }
+        let first_m = filled_m
+            .iter()
+            .map(|series| series.iter().copied().find(|at_m| at_m.is_finite()).unwrap_or(0.0))
+            .collect();
+        let steps = gait.phase[0] * recording.cells() as f64;
+        let may_be_laid_down = (steps - steps.round()).abs() < AT_BEGIN * recording.cells() as f64;
+        let last = gait.phase.len() - 1;
+        let mut observed = Self {
+            cycle_s: (recording.time_s[last] - recording.time_s[0]) / (gait.phase[last] - gait.phase[0]),
+            run,
+            phase_recorded: recording.gait_phase.is_some(),
+            step_order: gait.step_order,
+            phase: gait.phase,
+            position_m,
+            first_m,
+            noise_m,
+            may_be_laid_down,
+            laid_down: false,
+            counts_from: 0,
+        };
+        observed.assume_laid_down(false);
+        if observed.whole_cycles() < LEAST_CYCLES {
+            return Err(ExplainError::TooShort {
+                recording: name(),
+                cycles: observed.whole_cycles(),
+                needed: LEAST_CYCLES,
+            });
+        }
+        Ok(observed)
+    }
+
+    pub fn cells(&self) -> usize {
+        self.position_m.len()
+    }
+
+    pub fn samples(&self) -> usize {
+        self.phase.len()
+    }
+
+    /// Takes the worm for one that was laid down at the start, or for one in the middle of its crawl.
+    pub fn assume_laid_down(&mut self, laid_down: bool) {
+        self.laid_down = laid_down;
+        let first = self.phase[0];
+        self.counts_from = if laid_down {
+            let moves = self.phase.partition_point(|&phase| phase < first + MOVES);
+            let time_s = &self.run.recording.time_s;
+            let from_s = (time_s[moves.min(time_s.len() - 1)] - REST_S).max(time_s[0] + SINKING_S);
+            time_s.partition_point(|&at_s| at_s < from_s)
+        } else {
+            self.phase.partition_point(|&phase| phase < first + FORGOTTEN_CYCLES)
+        };
+    }
+
+    /// First sample from which the crawl is settled: what the worm repeats is measured from here on.
+    pub fn settled_from(&self) -> usize {
+        let first = self.phase[0];
+        let forgotten = if self.laid_down { 1.0 } else { FORGOTTEN_CYCLES };
+        self.phase
+            .partition_point(|&phase| phase < first + forgotten)
+            .max(self.counts_from)
+    }
+
+    /// Whole cycles that count.
+    pub fn whole_cycles(&self) -> usize {
+        let from = self.phase.get(self.settled_from()).copied().unwrap_or(f64::INFINITY);
+        (self.phase[self.samples() - 1] - from).max(0.0).floor() as usize
+    }
+
+    /// The cell whose step a sample is in.
+    pub fn stepping(&self, sample: usize) -> usize {
+        let cells = self.cells() as f64;
+        let step = (self.phase[sample] * cells).floor().rem_euclid(cells);
+        self.step_order[step as usize]
+    }
+}
+
+/// The gait, also of a worm one of whose cells falls behind the others cycle by cycle.
+fn find_gait(run: Run<'_>, config: &Config) -> Result<Gait, gait::GaitError> {
+    let recording = run.recording;
+    let step_order = config.worm.step_order_from_zero();
+    let find = |position_m: &[Vec<f64>], filled_m: &[Vec<f64>]| {
+        let prior = Prior {
+            step_order: &step_order,
+            phase: recording.gait_phase.as_deref(),
+        };
+        gait::find(&recording.time_s, position_m, filled_m, prior)
+    };
+    let filled_m = recording.filled();
+    let found = find(&recording.position_m, &filled_m);
+    // Against what clock the falling behind is measured first: the phase where there is one, else time.
+    let clock: Vec<f64> = match (&found, &recording.gait_phase) {
+        (Ok(gait), _) => gait.phase.clone(),
+        (Err(_), Some(phase)) => phase.clone(),
+        (Err(_), None) => recording
+            .time_s
+            .iter()
+            .map(|time_s| time_s / config.gait.cycle_s)
+            .collect(),
+    };
+    let behind_m = falling_behind_m(&filled_m, &clock);
+    let cycles = clock[clock.len() - 1] - clock[0];
+    let farthest_m = behind_m.iter().fold(0.0, |most: f64, rate| most.max(rate.abs())) * cycles;
+    if farthest_m < FALLS_BEHIND * config.worm.stroke_m {
+        return found;
+    }
+    let straighten = |series: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let with_rate = series.iter().zip(&behind_m);
+        with_rate
+            .map(|(series, rate)| {
+                series
+                    .iter()
+                    .zip(&clock)
+                    .map(|(at_m, cycle)| at_m - rate * cycle)
+                    .collect()
+            })
+            .collect()
+    };
+    find(&straighten(&recording.position_m), &straighten(&filled_m)).or(found)
+}
+
+/// What each cell gains on the mean of all in a cycle, m: the median over all pairs of samples a cycle apart.
+fn falling_behind_m(filled_m: &[Vec<f64>], clock: &[f64]) -> Vec<f64> {
+    let mut gains_m: Vec<Vec<f64>> = vec![Vec::new(); filled_m.len()];
+    let mut after = 0;
+    for sample in 0..clock.len() {
+        while after < clock.len() && clock[after] < clock[sample] + 1.0 {
+            after += 1;
+        }
+        if after == clock.len() {
+            break;
+        }
+        let gain_m: Vec<f64> = filled_m.iter().map(|series| series[after] - series[sample]).collect();
+        let mean_m = gain_m.iter().sum::<f64>() / gain_m.len() as f64;
+        if mean_m.is_finite() {
+            for (gains_m, gain_m) in gains_m.iter_mut().zip(gain_m) {
+                gains_m.push(gain_m - mean_m);
+            }
+        }
+    }
+    gains_m
+        .into_iter()
+        .map(|mut gains_m| {
+            if gains_m.is_empty() {
+                return 0.0;
+            }
+            let middle = gains_m.len() / 2;
+            *gains_m.select_nth_unstable_by(middle, f64::total_cmp).1
+        })
+        .collect()
+}

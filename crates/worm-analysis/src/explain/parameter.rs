@@ -1,0 +1,184 @@
+//! What the search may turn: nuisances within their priors, and the parameters of effects.
+//!
+//! Recalibration hides effects: with friction, stiffness and stroke free to follow the data, much of an effect disappears into them. So
+//! they are free, within what is honestly not known of a worm that was built and measured with care, and what is left after them
+//! is the gap. The priors are normal about the believed value and end at a limit; a value that lies at its limit is told.
+
+use worm_physics::Worm;
+use worm_physics::effect::{Effect, Parameter};
+
+/// What a nuisance is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Nuisance {
+    /// Logarithm of a factor on the friction of all tips.
+    Friction,
+    /// Logarithm of a factor on the stiffness of all pads.
+    Stiffness,
+    /// Logarithm of a factor on the stroke.
+    Stroke,
+    /// Logarithm of a factor on one tip's friction.
+    FrictionOf(usize),
+    /// Logarithm of a factor on one pad's stiffness.
+    StiffnessOf(usize),
+    /// Logarithm of a factor on one cell's stroke.
+    StrokeOf(usize),
+    /// Error of one run's slope, degrees.
+    SlopeOf(usize),
+    /// Age of the positions against the recorded phase, s.
+    Clock,
+    /// Logarithm of the damping ratio of the body on its tips.
+    Damping,
+    /// Stiffness of the pads over that of the bristles that their tips hold on by.
+    Presliding,
+    /// Share of a step in which a cell comes to speed.
+    Rounding,
+    /// Resistance of the contacts to each cell's velocity, N s/m.
+    Viscosity,
+}
+
+/// A quantity that is free in a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Free {
+    pub what: What,
+    /// Mean of its prior.
+    pub centre: f64,
+    /// Standard deviation of its prior; infinite for none.
+    pub sigma: f64,
+    pub least: f64,
+    pub most: f64,
+    /// Step of numerical derivatives.
+    pub step: f64,
+}
+
+/// What a free quantity is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum What {
+    Nuisance(Nuisance),
+    /// A parameter of the effect in this place of the hypothesis.
+    Effect {
+        place: usize,
+        parameter: usize,
+    },
+}
+
+/// Prior of a nuisance: standard deviation, distance of the limits from the centre, step of derivatives.
+const FRICTION: (f64, f64, f64) = (0.15, 0.5, 2e-3);
+const STIFFNESS: (f64, f64, f64) = (0.05, 0.1, 4e-3);
+const STROKE: (f64, f64, f64) = (0.01, 0.03, 5e-4);
+const FRICTION_OF: (f64, f64, f64) = (0.025, 0.1, 4e-3);
+const STIFFNESS_OF: (f64, f64, f64) = (0.02, 0.08, 4e-3);
+const STROKE_OF: (f64, f64, f64) = (5e-4, 2e-3, 2e-4);
+const SLOPE_OF_DEG: (f64, f64, f64) = (0.15, 0.6, 0.05);
+const CLOCK_S: (f64, f64, f64) = (1e-3, 3e-3, 5e-4);
+/// Of the presliding: centre, standard deviation, least, most, step.
+const PRESLIDING: (f64, f64, f64, f64, f64) = (0.02, 0.015, 1e-3, 0.08, 2e-3);
+/// Of the cam's rounding, as of the presliding: no cam has sharp corners.
+const ROUNDING: (f64, f64, f64, f64, f64) = (0.05, 0.05, 0.0, 0.3, 5e-3);
+/// Of the viscosity, as of the presliding: no contact is quite dry. At the paper's speed 1 N s/m is 18 mN, of some 2 N of friction.
+const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 0.5, 0.0, 4.0, 0.1);
+/// Logarithm of the damping ratio: centre, standard deviation, limits' distance, step.
+const DAMPING: (f64, f64, f64, f64) = (-0.9, 1.0, 2.2, 0.1);
+
+/// Standard deviation of the prior of an effect's severity, in notable changes: 3° of slope, 0.4 N of drag, 0.4 of one cell's
+/// friction.
+const SEVERE: f64 = 20.0;
+
+impl Nuisance {
+    /// The nuisances of a campaign.
+    pub fn all(cells: usize, runs: usize, phase_recorded: bool) -> Vec<Free> {
+        let mut all = vec![
+            Self::Friction.free(FRICTION),
+            Self::Stiffness.free(STIFFNESS),
+            Self::Stroke.free(STROKE),
+        ];
+        for cell in 0..cells {
+            all.push(Self::FrictionOf(cell).free(FRICTION_OF));
+            all.push(Self::StiffnessOf(cell).free(STIFFNESS_OF));
+            all.push(Self::StrokeOf(cell).free(STROKE_OF));
+        }
+        all.extend((0..runs).map(|run| Self::SlopeOf(run).free(SLOPE_OF_DEG)));
+        if phase_recorded {
+            all.push(Self::Clock.free(CLOCK_S));
+            all.push(Self::Rounding.free_within(ROUNDING));
+        }
+        let (centre, sigma, reach, step) = DAMPING;
+        all.push(Free {
+            centre,
+            least: centre - reach,
+            most: centre + reach,
+            ..Self::Damping.free((sigma, reach, step))
+        });
+        all.push(Self::Presliding.free_within(PRESLIDING));
+        all.push(Self::Viscosity.free_within(VISCOSITY));
+        all
+    }
+
+    fn free(self, (sigma, reach, step): (f64, f64, f64)) -> Free {
+        Free {
+            what: What::Nuisance(self),
+            centre: 0.0,
+            sigma,
+            least: -reach,
+            most: reach,
+            step,
+        }
+    }
+
+    fn free_within(self, (centre, sigma, least, most, step): (f64, f64, f64, f64, f64)) -> Free {
+        Free {
+            centre,
+            least,
+            most,
+            ..self.free((sigma, most, step))
+        }
+    }
+
+    /// Puts its value into the worm of a run, where it concerns the worm.
+    pub fn apply(self, value: f64, run: usize, worm: &mut Worm) {
+        match self {
+            Self::Friction => worm.scale_friction(None, value.exp()),
+            Self::Stiffness => worm.scale_stiffness(None, value.exp()),
+            Self::Stroke => worm.scale_stroke(None, value.exp()),
+            Self::FrictionOf(cell) => worm.scale_friction(Some(cell), value.exp()),
+            Self::StiffnessOf(cell) => worm.scale_stiffness(Some(cell), value.exp()),
+            Self::StrokeOf(cell) => worm.scale_stroke(Some(cell), value.exp()),
+            Self::SlopeOf(of) if of == run => worm.tilt_rad(value.to_radians()),
+            Self::SlopeOf(_) | Self::Clock | Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity => {}
+        }
+    }
+}
+
+impl Free {
+    /// A parameter of an effect: no prior but its range, but for the first one, its severity. That is drawn to neutral weakly: data
+    /// that know nothing of it obey, so what only the data left out would show is not kept when they are left out.
+    pub fn of_effect(place: usize, number: usize, parameter: &Parameter) -> Self {
+        Self {
+            what: What::Effect {
+                place,
+                parameter: number,
+            },
+            centre: parameter.neutral,
+            sigma: if number == 0 {
+                SEVERE * parameter.notable
+            } else {
+                f64::INFINITY
+            },
+            least: parameter.least,
+            most: parameter.most,
+            step: 0.2 * parameter.notable,
+        }
+    }
+}
+
+/// An effect supposed to act, for one cell or for all that it concerns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Supposed {
+    pub effect: &'static Effect,
+    pub cell: Option<usize>,
+}
+
+impl PartialEq for Supposed {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect.name == other.effect.name && self.cell == other.cell
+    }
+}

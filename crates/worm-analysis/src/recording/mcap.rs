@@ -1,0 +1,197 @@
+//! The tracker samples of a log as a recording, and a recording as a log.
+
+mod write;
+
+pub use write::write;
+
+use super::{Motor, Recording};
+use std::path::Path;
+use worm_estimator::estimate::{Capture, LivedTime};
+use worm_estimator::message::{JsonMessage, State};
+use worm_log::{Channel, ReadError, nothing, scan};
+
+/// Reads a log's states as a recording: one sample for each new sample of the tracker.
+///
+/// Time is that of the tracker's own clock. The gait phase is that at the capture, between the motor readings before and after
+/// it: a tick whose reading failed repeats an old phase, and says nothing. Where the controller was started anew, its clocks and counts begin anew too, so only the longest stretch is taken.
+///
+/// # Errors
+/// [`ReadError`] when the file cannot be read, is no log of a worm, is of another version, or has no samples.
+pub fn read(path: &Path) -> Result<Recording, ReadError> {
+    let mut stretches: Vec<Stretch> = Vec::new();
+    let contents = scan(path, |channel, text| {
+        if channel != Channel::State {
+            return Ok(());
+        }
+        let state = State::read_json(text)?;
+        match stretches.last_mut() {
+            Some(stretch) if stretch.goes_on_with(&state) => stretch.take(&state),
+            _ => stretches.push(Stretch::begin(&state)),
+        }
+        Ok(())
+    })?;
+    let mut warnings = contents.warnings;
+    let count = stretches.len();
+    let longest = stretches.into_iter().max_by_key(|stretch| stretch.samples.len());
+    let longest = longest.filter(|stretch| !stretch.samples.is_empty()).ok_or_else(|| {
+        let (problem, remedy) = if count == 0 {
+            ("holds no message", "record the topic `state`")
+        } else {
+            (
+                "holds no sample of the tracker",
+                "record a worm whose tracker works: `wormd check` tells",
+            )
+        };
+        nothing(path, problem, remedy)
+    })?;
+    if longest.cells < 2 {
+        let problem = format!("is of {} cell, and a worm has at least 2", longest.cells);
+        return Err(nothing(path, &problem, "record a worm"));
+    }
+    if count > 1 {
+        warnings.push(format!(
+            "the controller was started {count} times: only the longest stretch is taken, from tick {} on",
+            longest.first_tick
+        ));
+    }
+    Ok(longest.into_recording(path, warnings))
+}
+
+/// Farthest that a capture may be from a motor reading for its gait phase to be known, s.
+const FARTHEST_S: f64 = 0.1;
+/// How long before the first motor reading a capture still has its phase, s: what the comparison of the clocks leaves.
+const BEFORE_FIRST_S: f64 = 1e-3;
+
+/// One new sample, with the motor as it was in the tick that brought it.
+struct Sample {
+    time_s: f64,
+    captured_s: f64, // of the time that the motor lived through
+    state: State,
+}
+
+/// The states of one run of the controller.
+struct Stretch {
+    cells: usize,
+    first_tick: u64,
+    last_tick: u64,
+    last_sample: u64,
+    lived: LivedTime,
+    capture: Capture,
+    /// Lived time and phase of each tick that read the motor.
+    phases: Vec<(f64, f64)>,
+    samples: Vec<Sample>,
+    /// New samples without a time, or with one that does not grow.
+    without_time: usize,
+}
+
+impl Stretch {
+    fn begin(state: &State) -> Self {
+        let mut stretch = Self {
+            cells: state.cell_count as usize,
+            first_tick: state.sequence,
+            last_tick: state.sequence,
+            last_sample: state.sample,
+            lived: LivedTime::default(),
+            capture: Capture::default(),
+            phases: Vec::new(),
+            samples: Vec::new(),
+            without_time: 0,
+        };
+        stretch.take(state);
+        stretch
+    }
+
+    /// A tick that is there twice is no new beginning.
+    fn goes_on_with(&self, state: &State) -> bool {
+        state.sequence >= self.last_tick && state.sample >= self.last_sample && state.cell_count as usize == self.cells
+    }
+
+    fn take(&mut self, state: &State) {
+        let is_repeated = state.sequence == self.last_tick && state.sequence != self.first_tick;
+        (self.last_tick, self.last_sample) = (state.sequence, state.sample);
+        let time_s = self.lived.update(state) as f64 * 1e-9;
+        if state.sample_is_new == 1 && !is_repeated {
+            let (captured_s, _) = self.capture.place(state.sample_time_s, time_s, state.phase);
+            let before_s = self.samples.last().map_or(f64::NEG_INFINITY, |sample| sample.time_s);
+            if state.sample_time_s.is_finite() && state.sample_time_s > before_s {
+                let (time_s, state) = (state.sample_time_s, *state);
+                self.samples.push(Sample {
+                    time_s,
+                    captured_s,
+                    state,
+                });
+            } else {
+                self.without_time += 1;
+            }
+        }
+        // A log made from a recording without motor has a phase of its own.
+        let is_read = state.motor_is_new == 1 || state.motor_angle_rad.is_nan();
+        let is_later = self.phases.last().is_none_or(|(last_s, _)| time_s > *last_s);
+        if state.phase.is_finite() && is_read && is_later {
+            self.phases.push((time_s, state.phase));
+        }
+    }
+
+    /// The gait phase at a lived time; `NaN` too far from any motor reading.
+    fn phase_at(&self, at_s: f64) -> f64 {
+        let next = self.phases.partition_point(|(time_s, _)| *time_s < at_s);
+        let Some(&(after_s, after)) = self.phases.get(next) else {
+            return f64::NAN;
+        };
+        match next.checked_sub(1).and_then(|before| self.phases.get(before)) {
+            Some((before_s, before)) if (after_s - at_s).min(at_s - before_s) <= FARTHEST_S => {
+                after - (after - before) * (after_s - at_s) / (after_s - before_s)
+            }
+            None if after_s - at_s <= BEFORE_FIRST_S => after,
+            _ => f64::NAN,
+        }
+    }
+
+    fn into_recording(mut self, path: &Path, mut warnings: Vec<String>) -> Recording {
+        if self.without_time > 0 {
+            let count = self.without_time;
+            warnings.push(format!(
+                "{count} samples are left out: their time is missing or does not grow"
+            ));
+        }
+        let mut phase: Vec<f64> = self
+            .samples
+            .iter()
+            .map(|sample| self.phase_at(sample.captured_s))
+            .collect();
+        let with_phase = phase.iter().filter(|phase| phase.is_finite()).count();
+        if 0 < with_phase && with_phase < self.samples.len() {
+            let count = self.samples.len() - with_phase;
+            warnings.push(format!("{count} samples are left out: the gait phase was not known"));
+            let mut known = phase.iter().map(|phase| phase.is_finite());
+            self.samples.retain(|_| known.next().unwrap_or(false));
+            phase.retain(|phase| phase.is_finite());
+        }
+        let missed = self.samples.last().map_or(0, |sample| sample.state.samples_missed);
+        if missed > 0 {
+            warnings.push(format!("the controller missed {missed} samples of the tracker"));
+        }
+        let has_motor = self.samples.iter().any(|sample| sample.state.motor_is_new == 1);
+        let of_each = |value: fn(&State) -> f64| self.samples.iter().map(|sample| value(&sample.state)).collect();
+        let seen = |cell: usize| {
+            let samples = self.samples.iter();
+            samples
+                .map(|sample| sample.state.position_of(cell).unwrap_or(f64::NAN))
+                .collect()
+        };
+        Recording {
+            source: path.to_owned(),
+            cell_names: (1..=self.cells).map(|cell| format!("x{cell}_m")).collect(),
+            time_s: self.samples.iter().map(|sample| sample.time_s).collect(),
+            position_m: (0..self.cells).map(seen).collect(),
+            gait_phase: (with_phase > 0).then_some(phase),
+            motor: has_motor.then(|| Motor {
+                angle_rad: of_each(|state| state.motor_angle_rad),
+                velocity_rad_s: of_each(|state| state.motor_velocity_rad_s),
+                current_a: of_each(|state| state.motor_current_a),
+                voltage_v: of_each(|state| state.bus_voltage_v),
+            }),
+            warnings,
+        }
+    }
+}

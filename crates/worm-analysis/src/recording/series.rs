@@ -1,0 +1,102 @@
+//! The recording itself: series over time that belong together.
+
+use std::path::PathBuf;
+use worm_physics::MAX_CELLS;
+
+/// Motor state over time, one value for each sample; `NaN` where not known.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Motor {
+    /// Cam angle, rad.
+    pub angle_rad: Vec<f64>,
+    /// Cam velocity, rad/s.
+    pub velocity_rad_s: Vec<f64>,
+    /// Current in the winding, A.
+    pub current_a: Vec<f64>,
+    /// Bus voltage, V.
+    pub voltage_v: Vec<f64>,
+}
+
+impl Motor {
+    /// What the four series are called in a file, in the order of [`series`](Self::series).
+    pub const COLUMNS: [&'static str; 4] = [
+        "motor_angle_rad",
+        "motor_velocity_rad_s",
+        "motor_current_a",
+        "bus_voltage_v",
+    ];
+
+    /// The four series, in the order of [`COLUMNS`](Self::COLUMNS).
+    pub fn series(&self) -> [&Vec<f64>; 4] {
+        [&self.angle_rad, &self.velocity_rad_s, &self.current_a, &self.voltage_v]
+    }
+
+    /// The four series to change, in the order of [`COLUMNS`](Self::COLUMNS).
+    pub(super) fn series_mut(&mut self) -> [&mut Vec<f64>; 4] {
+        [
+            &mut self.angle_rad,
+            &mut self.velocity_rad_s,
+            &mut self.current_a,
+            &mut self.voltage_v,
+        ]
+    }
+}
+
+/// Cell positions over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Where it comes from, as people and errors call it.
+    pub source: PathBuf,
+    /// What each cell is called there: `x1_m`, a marker's name. Cell 1 first.
+    pub cell_names: Vec<String>,
+    /// Time of each sample, s, strictly increasing.
+    pub time_s: Vec<f64>,
+    /// Position along the canal, growing up the canal, m: `position_m[cell][sample]`; `NaN` where not seen.
+    pub position_m: Vec<Vec<f64>>,
+    /// Gait cycles done, unwrapped, for each sample, where it was recorded; finite.
+    pub gait_phase: Option<Vec<f64>>,
+    /// Motor state, where it was recorded.
+    pub motor: Option<Motor>,
+    /// What the reader found remarkable: ignored columns, markers left out, a cut-off end.
+    pub warnings: Vec<String>,
+}
+
+impl Recording {
+    /// Number of cells, 2 to [`MAX_CELLS`].
+    pub fn cells(&self) -> usize {
+        debug_assert!(self.position_m.len() <= MAX_CELLS, "readers refuse more");
+        self.position_m.len()
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// A cell as errors and warnings call it; `cell` counts from 0.
+    pub(crate) fn name_of(&self, cell: usize) -> String {
+        match self.cell_names.get(cell) {
+            Some(name) => format!("cell {} ({name})", cell + 1),
+            None => format!("cell {}", cell + 1),
+        }
+    }
+
+    /// Keeps only the samples from `from_s` to `to_s`.
+    pub(super) fn cut(&mut self, from_s: Option<f64>, to_s: Option<f64>) {
+        let begin = from_s.map_or(0, |from_s| self.time_s.partition_point(|&time_s| time_s < from_s));
+        let end = to_s.map_or(self.samples(), |to_s| {
+            self.time_s.partition_point(|&time_s| time_s <= to_s)
+        });
+        let keep = |series: &mut Vec<f64>| {
+            series.truncate(end);
+            series.drain(..begin.min(series.len()));
+        };
+        keep(&mut self.time_s);
+        self.position_m.iter_mut().for_each(keep);
+        if let Some(phase) = &mut self.gait_phase {
+            keep(phase);
+        }
+        if let Some(motor) = &mut self.motor {
+            motor.series_mut().into_iter().for_each(keep);
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! Recordings as CSV: one row for each sample, SI units named in the header.
+//!
+//! `time_s` and `x1_m` … `xn_m` must be there, `gait_phase` and the motor's columns may. Columns come in any order, unknown
+//! ones are passed over with a warning, lines that begin with `#` are comments, and an empty field or `nan` was not seen.
+
+use super::series::{Motor, Recording};
+use super::text::Text;
+use csv::ByteRecord;
+use std::io::Read;
+use std::path::Path;
+use worm_log::ReadError;
+use worm_physics::MAX_CELLS;
+
+/// Longest piece of a file that is shown in an error.
+const SHOWN: usize = 32;
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Column {
+    Time,
+    /// A cell, counted from 0.
+    Cell(usize),
+    Phase,
+    /// An index into [`Motor::COLUMNS`].
+    Motor(usize),
+    Unknown,
+}
+
+/// Reads all rows. Whether they make sense together is for others to check.
+///
+/// # Errors
+/// [`ReadError`] with line and column for a header or a row that is not as it must be.
+pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording, ReadError> {
+    let mut rows = Rows {
+        path,
+        reader: csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .from_reader(text),
+        names: Vec::new(),
+        columns: Vec::new(),
+    };
+    let mut record = ByteRecord::new();
+    if !rows.next(&mut record)? {
+        let remedy = "give a file with a header row and samples";
+        return Err(ReadError::whole(path, "holds nothing but comments", remedy));
+    }
+    let mut recording = rows.take_header(&record)?;
+    let mut values = vec![f64::NAN; rows.columns.len()];
+    let mut line = 0;
+    while rows.next(&mut record)? {
+        line = rows.line();
+        let last_s = recording.time_s.last().copied();
+        if let Err(error) = rows.parse(&record, last_s, &mut values) {
+            let is_short = record.len() < rows.columns.len();
+            let is_last = !rows.next(&mut record)?;
+            if is_last && (is_short || rows.reader.get_ref().is_unterminated()) {
+                let cut_off =
+                    format!("line {line}: the file is cut off in this line; the whole samples before it are used");
+                recording.warnings.push(cut_off);
+                return Ok(recording);
+            }
+            return Err(error);
+        }
+        for (column, value) in rows.columns.iter().zip(&values) {
+            match (column, &mut recording) {
+                (Column::Time, recording) => recording.time_s.push(*value),
+                (Column::Cell(cell), recording) => recording.position_m[*cell].push(*value),
+                (
+                    Column::Phase,
+                    Recording {
+                        gait_phase: Some(phase),
+                        ..
+                    },
+                ) => phase.push(*value),
+                (Column::Motor(index), Recording { motor: Some(motor), .. }) => motor.series_mut()[*index].push(*value),
+                _ => {}
+            }
+        }
+    }
+    if line > 0 && rows.reader.get_ref().is_unterminated() {
+        let note =
+            format!("line {line}: the file ends without a line end and may be cut off; this line is used as it is");
+        recording.warnings.push(note);
+    }
+    if let Some(motor) = &mut recording.motor {
+        let samples = recording.time_s.len();
+        motor
+            .series_mut()
+            .into_iter()
+            .for_each(|series| series.resize(samples, f64::NAN));
+    }
+    Ok(recording)
+}
+
+struct Rows<'p, R> {
+    path: &'p Path,
+    reader: csv::Reader<R>,
+    names: Vec<String>,
+    columns: Vec<Column>,
+}
+
+impl<R: Read> Rows<'_, R> {
+    fn next(&mut self, record: &mut ByteRecord) -> Result<bool, ReadError> {
+        self.reader.read_byte_record(record).map_err(|error| {
+            let remedy = "is the disk or the share still there?";
+            ReadError::at(
+                self.path,
+                format!("line {}", self.line() + 1),
+                error.to_string(),
+                remedy,
+            )
+        })
+    }
+
+    /// The line that was read last, from 1. The text hands every line over with its end, so the reader stands behind it.
+    fn line(&self) -> u64 {
+        self.reader.position().line().saturating_sub(1)
+    }
+
+    fn place(&self, index: usize) -> String {
+        let name = self
+            .names
+            .get(index)
+            .map(|name| format!(" ({name})"))
+            .unwrap_or_default();
+        format!("line {}, column {}{name}", self.line(), index + 1)
+    }
+
+    fn refuse<T>(&self, index: usize, problem: impl Into<String>, remedy: impl Into<String>) -> Result<T, ReadError> {
+        Err(ReadError::at(self.path, self.place(index), problem, remedy))
+    }
+
+    fn refuse_line<T>(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Result<T, ReadError> {
+        Err(ReadError::at(
+            self.path,
+            format!("line {}", self.line()),
+            problem,
+            remedy,
+        ))
+    }
+
+    /// Understands the header row; the recording has its series, all of them empty.
+    fn take_header(&mut self, header: &ByteRecord) -> Result<Recording, ReadError> {
+        let names: Vec<String> = header
+            .iter()
+            .map(|name| String::from_utf8_lossy(name).trim().to_owned())
+            .collect();
+        if let [only] = names.as_slice()
+            && only.contains([';', '\t'])
+        {
+            return self.refuse_line(
+                "the columns are separated by semicolons or tabs",
+                "separate them by commas, with a point in numbers",
+            );
+        }
+        let mut warnings = Vec::new();
+        for (index, name) in names.iter().enumerate() {
+            let column = column_of(name);
+            if let Some(unit) = foreign_unit(name) {
+                return self.refuse(
+                    index,
+                    format!("the column {} {unit}", shown(name)),
+                    "convert positions to metres and name the columns x1_m, x2_m, …",
+                );
+            }
+            match self.columns.iter().position(|&other| other == column) {
+                _ if column == Column::Unknown => warnings.push(format!(
+                    "column {} ({}) is not known and not used",
+                    index + 1,
+                    shown(name)
+                )),
+                Some(first) => {
+                    return self.refuse(
+                        index,
+                        format!("{name} is there twice, first as column {}", first + 1),
+                        "keep one of them",
+                    );
+                }
+                None => {}
+            }
+            self.columns.push(column);
+        }
+        if names.iter().all(|name| name.parse::<f64>().is_ok()) {
+            return self.refuse_line(
+                "the header row is missing: the first row holds numbers",
+                "name the columns: time_s,x1_m,x2_m,…",
+            );
+        }
+        if !self.columns.contains(&Column::Time) {
+            return self.refuse_line(
+                format!(
+                    "there is no column time_s; the columns are {}",
+                    shown(&names.join(", "))
+                ),
+                "name the column of times time_s, in seconds",
+            );
+        }
+        let cells = self.count_cells(&names)?;
+        self.names = names;
+        Ok(Recording {
+            source: self.path.to_path_buf(),
+            cell_names: (1..=cells).map(|cell| format!("x{cell}_m")).collect(),
+            time_s: Vec::new(),
+            position_m: vec![Vec::new(); cells],
+            gait_phase: self.columns.contains(&Column::Phase).then(Vec::new),
+            motor: self
+                .columns
+                .iter()
+                .any(|column| matches!(column, Column::Motor(_)))
+                .then(Motor::default),
+            warnings,
+        })
+    }
+
+    /// The cells must be numbered from 1 without a hole.
+    fn count_cells(&self, names: &[String]) -> Result<usize, ReadError> {
+        let mut numbers: Vec<usize> = self
+            .columns
+            .iter()
+            .filter_map(|column| match column {
+                Column::Cell(cell) => Some(cell + 1),
+                _ => None,
+            })
+            .collect();
+        numbers.sort_unstable();
+        let missing = (1..).zip(&numbers).find(|(expected, number)| expected != *number);
+        let remedy = "name the cells' columns x1_m, x2_m, … without a hole, cell 1 leads";
+        match (numbers.last(), missing) {
+            (None, _) => self.refuse_line(
+                format!("there is no column x1_m; the columns are {}", shown(&names.join(", "))),
+                remedy,
+            ),
+            (Some(last), Some((expected, _))) => {
+                self.refuse_line(format!("x{expected}_m is missing, but there is x{last}_m"), remedy)
+            }
+            (Some(1), None) => self.refuse_line("there is only one cell, x1_m", "a worm has at least 2 cells"),
+            (Some(&last), None) if last > MAX_CELLS => self.refuse_line(
+                format!("there are {last} cells"),
+                format!("at most {MAX_CELLS} are handled"),
+            ),
+            (Some(&last), None) => Ok(last),
+        }
+    }
+
+    /// Understands one row.
+    fn parse(&self, record: &ByteRecord, last_s: Option<f64>, values: &mut [f64]) -> Result<(), ReadError> {
+        if record.len() < values.len() {
+            return self.refuse(
+                record.len(),
+                format!("the row ends after {} of {} fields", record.len(), values.len()),
+                "complete the row or take it out",
+            );
+        }
+        if let Some((index, extra)) = record
+            .iter()
+            .enumerate()
+            .skip(values.len())
+            .find(|(_, extra)| !extra.trim_ascii().is_empty())
+        {
+            return self.refuse(
+                index,
+                format!(
+                    "the row has more fields than the header, such as {}",
+                    shown(&String::from_utf8_lossy(extra))
+                ),
+                "separate fields by commas and write numbers with a point",
+            );
+        }
+        for (index, (field, column)) in record.iter().zip(&self.columns).enumerate() {
+            if *column == Column::Unknown {
+                continue;
+            }
+            let value = match parse_field(field) {
+                Some(value) if !value.is_infinite() => value,
+                Some(value) => {
+                    return self.refuse(
+                        index,
+                        format!("{value} is no measurement"),
+                        "leave the field empty where nothing was seen",
+                    );
+                }
+                None => {
+                    let text = shown(&String::from_utf8_lossy(field));
+                    return self.refuse(
+                        index,
+                        format!("{text} is not a number"),
+                        "write a number with a point, or leave the field empty where nothing was seen",
+                    );
+                }
+            };
+            if *column == Column::Time {
+                if value.is_nan() {
+                    return self.refuse(index, "there is no time", "give each sample its time");
+                }
+                if let Some(last_s) = last_s.filter(|&last_s| value <= last_s) {
+                    let what = if value < last_s { "runs back" } else { "stands still" };
+                    return self.refuse(
+                        index,
+                        format!("time {what}: {value} s after {last_s} s"),
+                        "sort the samples by time and keep one for each",
+                    );
+                }
+            }
+            values[index] = value;
+        }
+        Ok(())
+    }
+}
+
+fn column_of(name: &str) -> Column {
+    if name == "time_s" {
+        return Column::Time;
+    }
+    if name == "gait_phase" {
+        return Column::Phase;
+    }
+    if let Some(index) = Motor::COLUMNS.iter().position(|column| *column == name) {
+        return Column::Motor(index);
+    }
+    match cell_number(name) {
+        Some((cell, "_m")) => Column::Cell(cell - 1),
+        _ => Column::Unknown,
+    }
+}
+
+/// Takes `x12_m` apart into 12 and `_m`.
+fn cell_number(name: &str) -> Option<(usize, &str)> {
+    let rest = name.strip_prefix('x')?;
+    let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+    let (number, unit) = rest.split_at(digits);
+    let cell = number
+        .parse()
+        .ok()
+        .filter(|&cell| cell > 0 && !number.starts_with('0'))?;
+    Some((cell, unit))
+}
+
+/// What is wrong with a column that evidently holds a cell's positions, but not in metres.
+fn foreign_unit(name: &str) -> Option<&'static str> {
+    match cell_number(&name.to_ascii_lowercase())?.1 {
+        "_mm" | " (mm)" | " [mm]" | "mm" => Some("is in millimetres"),
+        "_cm" | " (cm)" | " [cm]" | "cm" => Some("is in centimetres"),
+        "_um" | "_µm" => Some("is in micrometres"),
+        "" => Some("names no unit"),
+        _ => None,
+    }
+}
+
+/// A number, or `NaN` for what was not seen; `None` for anything else.
+fn parse_field(field: &[u8]) -> Option<f64> {
+    match std::str::from_utf8(field).ok()?.trim() {
+        "" => Some(f64::NAN),
+        text => text.parse().ok(),
+    }
+}
+
+/// A piece of a file in quotes, cut where it is long or not for a terminal.
+pub(super) fn shown(text: &str) -> String {
+    let mut piece: String = text.chars().filter(|c| !c.is_control()).take(SHOWN).collect();
+    if piece.len() < text.len() {
+        piece.push('…');
+    }
+    format!("\"{piece}\"")
+}

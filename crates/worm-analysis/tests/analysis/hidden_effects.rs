@@ -1,0 +1,314 @@
+//! The maker of hidden effects, judged before it judges others.
+
+mod contact;
+
+use testkit::hidden_effects::CELLS;
+use testkit::hidden_effects::body::Worm;
+use testkit::hidden_effects::campaign::{HiddenCampaign, Kind, Size, Twin, Wanted, draw_sized};
+use testkit::hidden_effects::effect::{Band, Effect};
+use testkit::hidden_effects::flaws::{Flaws, Patch};
+use testkit::hidden_effects::make::Make;
+use testkit::hidden_effects::repeat::Condition;
+use testkit::hidden_effects::scene::{Played, STEP_S, Scene};
+use testkit::hidden_effects::split::{Split, split};
+use testkit::hidden_effects::visible::advances_m;
+
+/// A change of the advance smaller than this counts as none, m.
+const NO_CHANGE_M: f64 = 0.1e-3;
+
+fn worm(flaws: Flaws) -> Worm {
+    Worm {
+        make: Make::nominal(),
+        flaws,
+        stranger: None,
+    }
+}
+
+/// Mean advance of the settled cycles of a usual run, m.
+fn advance_m(worm: &Worm, slope_deg: f64) -> f64 {
+    let scene = Scene {
+        cycles: 8.0,
+        ..Scene::ideal(slope_deg, 2.5)
+    };
+    let played = scene.play(worm).expect("the worm holds");
+    let advances_m = advances_m(&played);
+    let settled_m = &advances_m[2..];
+    settled_m.iter().sum::<f64>() / settled_m.len() as f64
+}
+
+/// Advance of a settled cycle so slow that dynamics are not seen, on tips that do not give before they slide, m.
+fn slow_advance_m(flaws: Flaws, slope_deg: f64) -> f64 {
+    let make = Make {
+        damping_ratio: 1.0,
+        ..Make::nominal()
+    };
+    slow_advance_of_m(&Worm { make, ..worm(flaws) }, slope_deg)
+}
+
+/// The same of any worm, m.
+fn slow_advance_of_m(worm: &Worm, slope_deg: f64) -> f64 {
+    let scene = Scene {
+        warm_up_cycles: 1.9,
+        cycles: 1.2,
+        // Nothing swings here, so coarser steps do.
+        step_s: 2.0 * STEP_S,
+        ..Scene::ideal(slope_deg, 20.0)
+    };
+    advances_m(&scene.play(worm).expect("the worm holds"))[0]
+}
+
+/// A flaw of the second cell alone.
+fn second(factor: f64) -> [f64; CELLS] {
+    [1.0, factor, 1.0, 1.0]
+}
+
+#[test]
+fn slow_and_stiff_it_gives_the_figures_of_another_simulation() {
+    let identified_m = [2.0e-3, 1.1e-3, 1.75e-3, 2.15e-3];
+    let clamps = Flaws {
+        friction_factor: identified_m.map(|m| m / 1.75e-3),
+        ..Flaws::default()
+    };
+    let pads = Flaws {
+        stiffness_factor: identified_m.map(|m| 1.75e-3 / m),
+        ..Flaws::default()
+    };
+    let table = [
+        ("equal cells", Flaws::default(), [6.833, 4.611, 2.072]),
+        ("identified, as clamp forces", clamps, [6.356, 3.333, 1.379]),
+        ("identified, as stiffnesses", pads, [6.71, 4.35, 2.07]),
+    ];
+    for (worm, flaws, expected_mm) in table {
+        for (slope_deg, expected_mm) in [0.0, 30.0, 45.0].into_iter().zip(expected_mm) {
+            let advance_mm = 1e3 * slow_advance_m(flaws.clone(), slope_deg);
+            println!("{worm} at {slope_deg}°: {advance_mm:.3} mm of {expected_mm} mm");
+            assert!(
+                (advance_mm / expected_mm - 1.0).abs() < 0.01,
+                "{worm} at {slope_deg}°: {advance_mm:.3} mm should be {expected_mm} mm"
+            );
+        }
+    }
+}
+
+#[test]
+fn every_effect_changes_the_advance_in_its_own_sense() {
+    let flaw = Flaws::default;
+    #[rustfmt::skip]
+    // Effect, what is wrong, and whether the advance on the level and on a slope grows or shrinks.
+    let table = [
+        // Lower friction spoils less of the stroke on the level, and holds less on a slope.
+        ("unequal-clamping", Flaws { friction_factor: second(0.4), ..flaw() }, [0, -1]),
+        ("unequal-clamping", Flaws { friction_factor: second(1.6), ..flaw() }, [-1, -1]),
+        ("unequal-stiffness", Flaws { stiffness_factor: second(0.4), ..flaw() }, [-1, -1]),
+        ("unequal-stiffness", Flaws { stiffness_factor: second(1.6), ..flaw() }, [1, 1]),
+        ("directional-friction", Flaws { backward_over_forward: 0.8, ..flaw() }, [-1, -1]),
+        ("directional-friction", Flaws { backward_over_forward: 1.6, ..flaw() }, [0, 1]),
+        ("breakaway-friction", Flaws { static_over_kinetic: 1.8, ..flaw() }, [0, 1]),
+        ("pad-hardening", Flaws { hardening: 1.5, ..flaw() }, [1, 1]),
+        ("pad-creep", Flaws { creep_share: 1.0, creep_s: 0.5, ..flaw() }, [1, 1]),
+        ("pad-hysteresis", Flaws { yielding_share: 0.5, ..flaw() }, [-1, -1]),
+        ("viscous-drag", Flaws { drag_n_s_per_m: 20.0, ..flaw() }, [-1, -1]),
+        ("constant-drag", Flaws { force_n: 0.5, ..flaw() }, [-1, -1]),
+        ("payload", Flaws { mass_kg: 0.08, ..flaw() }, [0, -1]),
+        ("slope-error", Flaws { angle_deg: 4.0, ..flaw() }, [-1, -1]),
+        ("slope-error", Flaws { angle_deg: -4.0, ..flaw() }, [1, 1]),
+        ("tether-drag", Flaws { tether_n_per_m: 10.0, ..flaw() }, [-1, -1]),
+        ("lost-stroke", Flaws { stroke_factor: second(0.88), ..flaw() }, [-1, -1]),
+        ("lost-stroke", Flaws { stroke_factor: [0.88; CELLS], ..flaw() }, [-1, -1]),
+        ("actuator-compliance", Flaws { compliance_m_per_n: 2e-4, ..flaw() }, [-1, -1]),
+        ("backlash", Flaws { play_m: 1e-3, ..flaw() }, [-1, -1]),
+        ("step-overlap", Flaws { overlap: 0.2, ..flaw() }, [-1, -1]),
+        ("slick-patch", Flaws { patch: Some(Patch { from_m: -0.05, length_m: 0.02, friction_factor: 0.3 }), ..flaw() }, [0, -1]),
+        // On 30° a tenth less friction spoils as much less as it holds less: the worm is near its best friction there.
+        ("wear", Flaws { loss_per_cycle: 0.02, ..flaw() }, [1, 0]),
+        ("motor-droop", Flaws { slowdown_per_n: 0.3, ..flaw() }, [0, 0]),
+        ("sensor-scale", Flaws { scale: 1.1, ..flaw() }, [1, 1]),
+        ("sensor-scale", Flaws { scale: 0.9, ..flaw() }, [-1, -1]),
+        ("sensor-latency", Flaws { latency_s: 0.06, ..flaw() }, [0, 0]),
+        ("slope-clamping", Flaws { slope_sensitivity: 0.6, ..flaw() }, [0, 0]),
+    ];
+    let usual = worm(flaw());
+    let slopes_deg = [0.0, 30.0];
+    let honest_m = slopes_deg.map(|slope_deg| advance_m(&usual, slope_deg));
+    for (name, flaws, expected) in &table {
+        assert!(Effect::named(name).is_some(), "the library has no effect {name}");
+        let flawed = Worm {
+            flaws: flaws.clone(),
+            ..usual.clone()
+        };
+        for ((slope_deg, honest_m), &expected) in slopes_deg.into_iter().zip(honest_m).zip(expected) {
+            let change_m = advance_m(&flawed, slope_deg) - honest_m;
+            let sense = if change_m.abs() < NO_CHANGE_M {
+                0
+            } else {
+                change_m.signum() as i32
+            };
+            println!("{name} at {slope_deg}°: {:+.3} mm", 1e3 * change_m);
+            assert_eq!(sense, expected, "{name} at {slope_deg}°: {:+.3} mm", 1e3 * change_m);
+        }
+    }
+    for effect in Effect::ALL {
+        assert!(
+            table.iter().any(|row| row.0 == effect.name()),
+            "{} is not tried",
+            effect.name()
+        );
+    }
+}
+
+#[test]
+fn what_shifts_time_and_no_place_shifts_time() {
+    let play = |flaws: Flaws| -> Played {
+        let scene = Scene {
+            cycles: 3.0,
+            ..Scene::ideal(30.0, 2.5)
+        };
+        scene.play(&worm(flaws)).expect("the worm holds")
+    };
+    let honest = play(Flaws::default());
+    let droop = play(Flaws {
+        slowdown_per_n: 0.3,
+        ..Flaws::default()
+    });
+    // The stepping cell's force goes from −1.7 to +1.7 N, and only what is above 0 slows the cam down.
+    let slower = droop.recording.samples() as f64 / honest.recording.samples() as f64;
+    assert!((1.1..1.5).contains(&slower), "three cycles take {slower} times as long");
+
+    // Six samples late: the position that was seen is the one of six samples ago, and the phase is that of now.
+    let late = play(Flaws {
+        latency_s: 6.0 / 120.0,
+        ..Flaws::default()
+    });
+    for sample in (0..honest.recording.samples() - 6).step_by(7) {
+        assert!((late.position_m[2][sample] - honest.position_m[2][sample]).abs() < 1e-9);
+        assert!((late.phase[sample] - honest.phase[sample + 6]).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn exact_twins_move_alike() {
+    let flaw = Flaws::default;
+    // Four tips of 1.715 N that hold 0.8 as much backward are four of 0.9 as much both ways and 0.4 of one tip's friction.
+    let drag_n = 0.4 * Make::nominal().friction_n[0];
+    #[rustfmt::skip]
+    let table = [
+        (
+            Flaws { backward_over_forward: 0.8, ..flaw() },
+            Flaws { friction_factor: [0.9; CELLS], force_n: drag_n, ..flaw() },
+        ),
+        (
+            Flaws { mass_kg: 0.111, ..flaw() },
+            Flaws { friction_factor: [0.75; CELLS], stiffness_factor: [0.75; CELLS], ..flaw() },
+        ),
+        (
+            Flaws { scale: 0.9, ..flaw() },
+            Flaws { stroke_factor: [0.9; CELLS], friction_factor: [0.9; CELLS], mass_kg: -0.0333, ..flaw() },
+        ),
+    ];
+    for (one, other) in table {
+        for slope_deg in [0.0, 30.0] {
+            let [one_m, other_m] = [&one, &other].map(|flaws| slow_advance_m(flaws.clone(), slope_deg));
+            assert!(
+                (one_m - other_m).abs() < 0.01e-3,
+                "at {slope_deg}°: {one_m} m and {other_m} m of {one:?} and {other:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn clamps_that_give_on_a_slope_are_weaker_clamps_there() {
+    let giving = |slope_deg: f64| {
+        let flaws = Flaws {
+            slope_sensitivity: 0.6,
+            ..Flaws::default()
+        };
+        slow_advance_m(flaws, slope_deg)
+    };
+    for slope_deg in [0.0, 45.0_f64] {
+        let weaker = Flaws {
+            friction_factor: [1.0 - 0.6 * (1.0 - slope_deg.to_radians().cos()); CELLS],
+            ..Flaws::default()
+        };
+        assert!((giving(slope_deg) - slow_advance_m(weaker, slope_deg)).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_campaign_is_what_its_seed_says() {
+    let wanted = Wanted::Single(Effect::PadCreep, Band::UPPER_HALF);
+    let [one, same] = [5, 5].map(|seed| draw_sized(wanted, seed, Size::SMALL));
+    let bits = |campaign: &HiddenCampaign| -> Vec<u64> {
+        let positions = campaign
+            .recordings
+            .iter()
+            .flat_map(|recording| recording.position_m.concat());
+        positions.map(f64::to_bits).collect()
+    };
+    assert_eq!(one.truth, same.truth);
+    assert_eq!(bits(&one), bits(&same), "the same dice fall the same way");
+    assert!(
+        one.visible.advance_m > 0.1e-3,
+        "strong creep can be seen: {:?}",
+        one.visible
+    );
+    assert_ne!(bits(&one), bits(&draw_sized(wanted, 6, Size::SMALL)));
+
+    let clean = draw_sized(Wanted::Clean, 5, Size::SMALL);
+    assert_eq!(
+        (clean.truth.len(), clean.visible.advance_m, clean.visible.within_cycle_m),
+        (0, 0.0, 0.0)
+    );
+    for recording in &clean.recordings {
+        let seen = recording.position_m.concat();
+        let lost = seen.iter().filter(|m| m.is_nan()).count() as f64 / seen.len() as f64;
+        assert!((0.005..0.015).contains(&lost), "{lost} of the positions are lost");
+    }
+    let late = draw_sized(Wanted::Single(Effect::SensorLatency, Band::WHOLE), 8, Size::SMALL);
+    assert!(late.recordings.iter().all(|recording| recording.gait_phase.is_some()));
+}
+
+#[test]
+fn one_more_run_is_of_the_same_worm() {
+    let campaign = draw_sized(Wanted::Twin(Twin::Payload), 3, Size::SMALL);
+    let usual = campaign.usual(0.0);
+    let run = |condition: Condition| {
+        campaign
+            .repeat(condition, 1)
+            .expect("the worm crawls on the level")
+            .recording
+    };
+    let slow = run(Condition {
+        cycle_s: 5.0,
+        cycles: 6.0,
+        ..usual
+    });
+    let dwelling = run(Condition { dwell_s: 1.0, ..usual });
+    let shifted = run(Condition {
+        start_shift_m: 0.1,
+        ..usual
+    });
+    let lasts_s = |recording: &worm_analysis::recording::Recording| recording.time_s[recording.samples() - 1];
+    assert!((lasts_s(&slow) - 30.0).abs() < 2.0, "{} s", lasts_s(&slow));
+    // Five rests lie between six cycles, and half a second at most before and after them.
+    assert!((lasts_s(&dwelling) - lasts_s(&run(usual)) - 5.0).abs() < 1.5);
+    let first_m =
+        |recording: &worm_analysis::recording::Recording| recording.position_m[0][..20].iter().sum::<f64>() / 20.0;
+    assert!((first_m(&shifted) - 0.1).abs() < 1e-3);
+}
+
+#[test]
+fn the_splits_are_whole_and_apart() {
+    let [development, test] = [Split::Development, Split::Test].map(|which| split(which, 1.0));
+    assert_eq!(development.len(), 22 * 4 + 24 + 18 + 12 + 6);
+    assert_eq!(development.len(), test.len());
+    let mut seeds: Vec<u64> = development.iter().chain(&test).map(|case| case.seed).collect();
+    seeds.sort_unstable();
+    seeds.dedup();
+    assert_eq!(seeds.len(), 2 * development.len(), "no two cases share a seed");
+    let of = |kind: Kind| development.iter().filter(|case| case.wanted.kind() == kind).count();
+    assert_eq!(
+        [Kind::Clean, Kind::Single, Kind::Outside, Kind::Pair, Kind::Twin].map(of),
+        [24, 88, 18, 12, 6]
+    );
+}

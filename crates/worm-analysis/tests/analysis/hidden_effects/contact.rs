@@ -1,0 +1,202 @@
+//! Every friction law that a worm's tips may be given.
+
+use super::{advance_m, slow_advance_of_m};
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use testkit::hidden_effects::body::Worm;
+use testkit::hidden_effects::flaws::Flaws;
+use testkit::hidden_effects::make::Make;
+use testkit::hidden_effects::scene::{STEP_S, Scene};
+use testkit::hidden_effects::tip::contact::{Contact, Law};
+use testkit::hidden_effects::tip::dahl::Dahl;
+use testkit::hidden_effects::tip::fall::Fall;
+use testkit::hidden_effects::tip::{Limits, Pad, Tip};
+use testkit::hidden_effects::visible::advances_m;
+
+/// Contacts as they are thrown: so many that each law and both falls are among them.
+fn contacts() -> Vec<Contact> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    (0..24).map(|_| Contact::draw(&mut rng)).collect()
+}
+
+/// What is told of a contact when it fails.
+fn name(contact: &Contact) -> &'static str {
+    match contact.law {
+        Law::Lugre(_) => "lugre",
+        Law::ElastoPlastic(_) => "elasto-plastic",
+        Law::Dahl(Dahl { .. }) => "dahl",
+        Law::Coulomb(_) => "coulomb",
+    }
+}
+
+/// The first contact of each law, the two knees of Dahl's counted as two, with each fall.
+fn one_of_each() -> Vec<Contact> {
+    let kind = |contact: &Contact| {
+        let knee = match contact.law {
+            Law::Dahl(Dahl { knee }) => Some(knee),
+            _ => None,
+        };
+        (name(contact), knee, matches!(contact.fall, Fall::Speed { .. }))
+    };
+    let mut each: Vec<Contact> = Vec::new();
+    for contact in contacts() {
+        if each.iter().all(|other| kind(other) != kind(&contact)) {
+            each.push(contact);
+        }
+    }
+    each
+}
+
+const LIMIT_N: f64 = 1.715;
+
+/// The nominal pad on a contact.
+fn pad(contact: Contact, static_over_kinetic: f64) -> Pad {
+    Pad {
+        stiffness_n_per_m: 980.0,
+        damping_n_s_per_m: 5.0,
+        hardening: 0.0,
+        creep_share: 0.0,
+        creep_s: 1.0,
+        yielding_share: 0.0,
+        yielding_m: 1.75e-3,
+        bristle_n_per_m: LIMIT_N / contact.presliding_m,
+        contact,
+        static_over_kinetic,
+    }
+}
+
+const LIMITS: Limits = Limits {
+    forward_n: LIMIT_N,
+    backward_n: LIMIT_N,
+};
+
+#[test]
+fn every_law_is_thrown() {
+    let mut seen: Vec<_> = one_of_each().iter().map(name).collect();
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen, ["coulomb", "dahl", "elasto-plastic", "lugre"]);
+    let falls_with_speed = |contact: &Contact| matches!(contact.fall, Fall::Speed { .. });
+    assert!(contacts().iter().any(falls_with_speed) && !contacts().iter().all(falls_with_speed));
+}
+
+/// A tip loaded to nine tenths of its limit stays for as long as a run lasts.
+#[test]
+fn a_resting_tip_does_not_creep() {
+    for contact in contacts() {
+        let pad = pad(contact, contact.static_over_kinetic);
+        for sign in [1.0, -1.0] {
+            let mut tip = Tip::laid_down(0.0);
+            let mut rest = |cell_m_s: f64, lasts_s: f64| {
+                for _ in 0..(lasts_s / STEP_S) as usize {
+                    tip.follow(sign * cell_m_s * STEP_S, STEP_S, &pad, LIMITS);
+                }
+                tip.place_m
+            };
+            rest(0.9 * LIMIT_N / pad.stiffness_n_per_m / 0.2, 0.2);
+            let settled_m = rest(0.0, 0.5);
+            let crept_m = (rest(0.0, 30.0) - settled_m).abs();
+            assert!(crept_m < 2e-6, "{} crept {crept_m} m: {contact:?}", name(&contact));
+        }
+    }
+}
+
+/// A cell that is drawn along as in a step first feels the static bound, then the kinetic one; the severity is their ratio.
+#[test]
+fn the_static_bound_stands_above_the_kinetic_one() {
+    for contact in contacts() {
+        for ratio in [1.0, 1.05, 1.3, 1.8] {
+            let pad = pad(contact, ratio);
+            let mut tip = Tip::laid_down(0.0);
+            let cell_m_s = 18e-3;
+            let mut most_n: f64 = 0.0;
+            for _ in 0..(2.0 / STEP_S) as usize {
+                tip.follow(cell_m_s * STEP_S, STEP_S, &pad, LIMITS);
+                most_n = most_n.max(tip.force_n);
+            }
+            let told = format!(
+                "{}, ratio {ratio}: {most_n} N, then {} N: {contact:?}",
+                name(&contact),
+                tip.force_n
+            );
+            // Beside it stand the viscous part and, while the bristle bends, its damper.
+            let excess = most_n / LIMIT_N - 1.0;
+            assert!(excess < 1.02 * (ratio - 1.0) + 0.01, "{told}");
+            // The faster a contact is loaded and the rounder its knee, the less of a small excess is felt.
+            assert!(excess > 0.4 * (ratio - 1.0) - 1e-3, "{told}");
+            let slides_n = tip.force_n / LIMIT_N - 1.0;
+            assert!((-0.01..0.01).contains(&slides_n), "{told}");
+        }
+    }
+}
+
+/// The law on its own is none of the effects: the worm crawls as on rigid tips.
+#[test]
+fn a_clean_worm_is_clean_under_every_law() {
+    let worm = |contact: Contact, damping_ratio: f64| Worm {
+        make: Make {
+            contact,
+            damping_ratio,
+            ..Make::nominal()
+        },
+        flaws: Flaws::default(),
+        stranger: None,
+    };
+    let level_m = advance_m(&worm(Contact::rigid(), 0.3), 0.0);
+    for slope_deg in [0.0, 30.0, 45.0] {
+        let slow_m = slow_advance_of_m(&worm(Contact::rigid(), 1.0), slope_deg);
+        let rigid_m = advance_m(&worm(Contact::rigid(), 0.3), slope_deg);
+        for contact in one_of_each() {
+            let change = slow_advance_of_m(&worm(contact, 1.0), slope_deg) / slow_m - 1.0;
+            println!("{} at {slope_deg}°, slow: {:+.2} %", name(&contact), 1e2 * change);
+            assert!(change.abs() < 0.0125, "at {slope_deg}°, slow: {change} of {contact:?}");
+        }
+        for contact in one_of_each() {
+            let change = (advance_m(&worm(contact, 0.3), slope_deg) - rigid_m) / level_m;
+            assert!(
+                change.abs() < 0.01,
+                "at {slope_deg}°: {change} of the level's advance, {contact:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn half_the_time_step_changes_nothing_that_counts() {
+    for contact in one_of_each() {
+        let worm = Worm {
+            make: Make {
+                contact,
+                damping_ratio: 0.1,
+                rounding: 0.002,
+                ..Make::nominal()
+            },
+            flaws: Flaws {
+                static_over_kinetic: 1.3,
+                hardening: 0.5,
+                creep_share: 0.3,
+                yielding_share: 0.2,
+                compliance_m_per_n: 3e-4,
+                drag_n_s_per_m: 5.0,
+                play_m: 0.3e-3,
+                ..Flaws::default()
+            },
+            stranger: None,
+        };
+        for slope_deg in [0.0, 30.0] {
+            let advance_m = |step_s: f64| {
+                let scene = Scene {
+                    cycles: 3.0,
+                    step_s,
+                    ..Scene::ideal(slope_deg, 2.5)
+                };
+                advances_m(&scene.play(&worm).expect("the worm holds"))[2]
+            };
+            let ratio = advance_m(0.5 * STEP_S) / advance_m(STEP_S);
+            assert!(
+                (ratio - 1.0).abs() < 0.005,
+                "at {slope_deg}° the advance changes by a factor {ratio}: {contact:?}"
+            );
+        }
+    }
+}

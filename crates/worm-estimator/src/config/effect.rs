@@ -1,0 +1,110 @@
+//! Effects that the model has beyond the paper's theory: `[[effect]]`.
+
+use super::check::Checker;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::str::FromStr;
+use worm_physics::MAX_CELLS;
+use worm_physics::effect::{Setting, SettingError};
+
+/// An effect switched on, as the file has it.
+///
+/// Obeyed by `simulate`, `study`, the virtual worm, the theory in `analyze` and the predicted values of the estimator's cycles. What
+/// follows the tips in measured positions, in the estimator and in the identification, knows the paper's contact law alone.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Effect {
+    /// Its name in the library.
+    pub name: String,
+    /// The cell that it concerns, from 1, where one is meant.
+    #[serde(default)]
+    pub cell: Option<usize>,
+    /// Its parameters by name.
+    #[serde(flatten)]
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// Why a text is no effect.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EffectTextError {
+    /// Something is not NAME:PARAM=VALUE.
+    #[error(
+        "'{part}' is no part of an effect: give NAME:PARAM=VALUE[,PARAM=VALUE][,cell=K], such as constant-drag:force_n=0.2"
+    )]
+    Form {
+        /// What is wrong.
+        part: String,
+    },
+    /// A value that is no number.
+    #[error("{parameter} = '{value}' is no number")]
+    Number {
+        /// The parameter.
+        parameter: String,
+        /// What was given.
+        value: String,
+    },
+    /// A cell that is no whole number.
+    #[error("cell = '{0}' is no cell: cells count from 1")]
+    Cell(String),
+    /// Something is given twice.
+    #[error("{0} is given twice: give each parameter once")]
+    Twice(String),
+    /// There is no such effect, or it cannot be like that.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+}
+
+impl FromStr for Effect {
+    type Err = EffectTextError;
+
+    /// An effect as the command line has it: `NAME:PARAM=VALUE[,PARAM=VALUE][,cell=K]`.
+    fn from_str(text: &str) -> Result<Self, EffectTextError> {
+        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        let form = |part: &str| EffectTextError::Form { part: part.to_owned() };
+        if name.trim().is_empty() {
+            return Err(form(text));
+        }
+        let mut effect = Self {
+            name: name.trim().to_owned(),
+            cell: None,
+            parameters: BTreeMap::new(),
+        };
+        for part in rest.split(',').filter(|_| !rest.trim().is_empty()) {
+            let (parameter, value) = part.split_once('=').ok_or_else(|| form(part))?;
+            let (parameter, value) = (parameter.trim(), value.trim());
+            let is_new = if parameter == "cell" {
+                let cell = value.parse().map_err(|_| EffectTextError::Cell(value.to_owned()))?;
+                effect.cell.replace(cell).is_none()
+            } else {
+                let number = value.parse().map_err(|_| EffectTextError::Number {
+                    parameter: parameter.to_owned(),
+                    value: value.to_owned(),
+                })?;
+                effect.parameters.insert(parameter.to_owned(), number).is_none()
+            };
+            if !is_new {
+                return Err(EffectTextError::Twice(parameter.to_owned()));
+            }
+        }
+        // How many cells the worm has is known later; what no worm can have is told here.
+        effect.setting(MAX_CELLS)?;
+        Ok(effect)
+    }
+}
+
+impl Effect {
+    /// The effect as the model takes it.
+    ///
+    /// # Errors
+    /// [`SettingError`] for a name, a parameter, a value or a cell that cannot be.
+    pub fn setting(&self, cells: usize) -> Result<Setting, SettingError> {
+        // A cell 0 becomes one beyond the last, which is refused by name.
+        let cell = self.cell.map(|cell| cell.wrapping_sub(1));
+        Setting::by_names(&self.name, cell, &self.parameters, cells)
+    }
+
+    pub(super) fn check(&self, cells: usize, checker: &mut Checker) {
+        if let Err(error) = self.setting(cells) {
+            checker.require(false, "effect", format!("\"{}\"", self.name), error);
+        }
+    }
+}

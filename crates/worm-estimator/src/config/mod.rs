@@ -1,0 +1,196 @@
+//! What a worm is and how it is run: one TOML file, every key with its unit and range, checked once and then trusted.
+//!
+//! [`Config::load`] reads a file, refuses unknown keys and values out of range (all of them at once, each with its
+//! remedy) and gives a [`Config`] that the rest of the house takes at its word. Every key has a default, the worm of
+//! Zarrouk, Sharf and Shoham 2016; `config/worm.toml` spells all of them out with meaning, unit and range, and a test
+//! holds it against the defaults. [`Config::advice`] names settings that are legal but foolish.
+
+mod advice;
+mod alarms;
+mod check;
+mod effect;
+mod machine;
+mod physics;
+mod virtual_worm;
+mod worm;
+
+pub use advice::Advice;
+pub use alarms::{AlarmConfig, Alarms, Policy};
+pub use check::{ConfigError, Problem};
+pub use effect::{Effect, EffectTextError};
+pub use machine::{Battery, Control, Estimator, Limits, Port, ReadMode, Realtime, Servo, Topics, Tracker};
+pub use physics::PhysicsError;
+pub use virtual_worm::VirtualWorm;
+pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
+
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The whole configuration. Values from [`Config::load`] and [`Config::from_toml`] are checked.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// The robot's body.
+    pub worm: Worm,
+    /// What the model has beyond the paper's theory; [`Effect`] says who obeys it.
+    pub effect: Vec<Effect>,
+    /// The canal that it crawls in.
+    pub canal: Canal,
+    /// How it crawls.
+    pub gait: Gait,
+    /// The serial port; absent: the virtual worm.
+    pub port: Option<Port>,
+    /// The servo that turns the cam.
+    pub servo: Servo,
+    /// The device that measures cell positions.
+    pub tracker: Tracker,
+    /// The control loop.
+    pub control: Control,
+    /// Limits at which the controller stops by itself.
+    pub limits: Limits,
+    /// The estimator.
+    pub estimator: Estimator,
+    /// What each alarm watches for and what is done about it.
+    pub alarms: Alarms,
+    /// The battery; absent: no account is kept.
+    pub battery: Option<Battery>,
+    /// What the loop asks of the operating system.
+    pub realtime: Realtime,
+    /// Where the shared-memory topics live.
+    pub topics: Topics,
+    /// The simulated devices.
+    pub virtual_worm: VirtualWorm,
+}
+
+impl Config {
+    /// `config/worm.toml`: every key with its meaning, and the defaults as values.
+    pub const COMMENTED: &'static str = include_str!("../../../../config/worm.toml");
+
+    /// Reads and checks a configuration file.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when the file cannot be read, is not TOML, has an unknown key or a value out of range; its text
+    /// names file, line or key, and the remedy.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        Ok(Self::load_with_text(path)?.0)
+    }
+
+    /// As [`Config::load`], with the text of the file: what a log keeps of it.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn load_with_text(path: &Path) -> Result<(Self, String), ConfigError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+            file: path.to_path_buf(),
+            source,
+        })?;
+        Ok((Self::from_toml(&text, path)?, text))
+    }
+
+    /// Reads and checks a configuration that is already in memory; `file` is what errors call it.
+    ///
+    /// # Errors
+    /// As [`Config::load`], but for reading the file.
+    pub fn from_toml(text: &str, file: &Path) -> Result<Self, ConfigError> {
+        let config: Self = toml::from_str(text).map_err(|error| check::syntax(text, file, &error))?;
+        let problems = config.problems();
+        if problems.is_empty() {
+            Ok(config)
+        } else {
+            Err(ConfigError::Values {
+                file: PathBuf::from(file),
+                problems,
+            })
+        }
+    }
+
+    /// Every value that is out of range or contradicts another.
+    pub fn problems(&self) -> Vec<Problem> {
+        let mut checker = check::Checker::default();
+        self.worm.check(&mut checker);
+        for effect in &self.effect {
+            effect.check(self.worm.cells, &mut checker);
+        }
+        self.canal.check(&mut checker);
+        self.gait.check(&mut checker);
+        if let Some(port) = &self.port {
+            port.check(&mut checker);
+        }
+        self.servo.check(&mut checker);
+        self.tracker.check(self.servo.id, &mut checker);
+        self.control.check(&mut checker);
+        self.limits.check(&mut checker);
+        self.estimator.check(&mut checker);
+        self.alarms.check(&mut checker);
+        if let Some(battery) = &self.battery {
+            battery.check(&mut checker);
+        }
+        self.realtime.check(&mut checker);
+        self.topics.check(&self.worm.name, &mut checker);
+        self.virtual_worm.check(self.worm.cells, &mut checker);
+        if checker.problems.is_empty() {
+            self.check_together(&mut checker);
+        }
+        checker.problems
+    }
+
+    /// Values that are in range each, and cannot work together.
+    fn check_together(&self, checker: &mut check::Checker) {
+        let cam_rev_per_min = 60.0 / self.gait.cycle_s;
+        checker.require(
+            cam_rev_per_min <= self.servo.velocity_limit_rev_per_min,
+            "gait.cycle_s",
+            self.gait.cycle_s,
+            format!(
+                "is {cam_rev_per_min:.1} rev/min, beyond servo.velocity_limit_rev_per_min = {}",
+                self.servo.velocity_limit_rev_per_min
+            ),
+        );
+        let tick_s = 1.0 / self.control.rate_hz;
+        let sample_s = 1.0 / self.tracker.rate_hz;
+        for (key, value, patience_s, period_s, periods) in [
+            (
+                "servo.watchdog_ms",
+                f64::from(self.servo.watchdog_ms),
+                f64::from(self.servo.watchdog_ms) * 1e-3,
+                tick_s,
+                "ticks at control.rate_hz",
+            ),
+            (
+                "control.link_timeout_s",
+                self.control.link_timeout_s,
+                self.control.link_timeout_s,
+                tick_s,
+                "ticks at control.rate_hz",
+            ),
+            (
+                "control.tracker_timeout_s",
+                self.control.tracker_timeout_s,
+                self.control.tracker_timeout_s,
+                sample_s.max(tick_s),
+                "samples at tracker.rate_hz",
+            ),
+        ] {
+            let least_s = 2.0 * period_s;
+            checker.require(
+                patience_s >= least_s,
+                key,
+                value,
+                format!("must be at least two {periods} ({least_s:.3} s), or the worm stops without need"),
+            );
+        }
+    }
+
+    /// Settings that are legal but foolish, each with what would be better.
+    pub fn advice(&self) -> Vec<Advice> {
+        advice::advise(self)
+    }
+
+    /// Cam speed of the configured gait, gait cycles per second, signed by the direction.
+    pub fn gait_cycles_per_s(&self) -> f64 {
+        self.gait.direction.sign() / self.gait.cycle_s
+    }
+}
+
+#[cfg(test)]
+mod tests;

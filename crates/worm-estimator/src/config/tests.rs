@@ -1,0 +1,220 @@
+use super::*;
+use std::collections::BTreeMap;
+use worm_physics::effect::LIBRARY;
+
+fn file() -> &'static Path {
+    Path::new("worm.toml")
+}
+
+/// The commented file is the documentation of the defaults: it must say what they are.
+#[test]
+fn the_commented_file_is_the_defaults() {
+    assert_eq!(
+        Config::from_toml(Config::COMMENTED, file()).expect("config/worm.toml is valid"),
+        Config::default()
+    );
+}
+
+/// The keys that the commented file leaves commented out must be right as well.
+#[test]
+fn the_commented_out_keys_are_accepted() {
+    let text: String = Config::COMMENTED
+        .lines()
+        .map(|line| match line.strip_prefix("# ") {
+            Some(rest) if rest.starts_with('[') || rest.split(' ').nth(1) == Some("=") => format!("{rest}\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let config = Config::from_toml(&text, file()).expect("every commented-out key is valid");
+    assert_eq!(
+        config.port.as_ref().map(|port| port.path.as_str()),
+        Some("/dev/ttyUSB0")
+    );
+    assert!(config.battery.is_some() && config.realtime.cpu.is_some());
+    assert!(config.virtual_worm.max_deformation_m.is_some());
+    assert_eq!(config.effect.len(), 2);
+}
+
+/// A line of the commented file for each effect of the library, with its parameters and what they may be.
+#[test]
+fn the_commented_file_tells_every_effect() {
+    let mut told = String::new();
+    let mut effects = BTreeMap::new();
+    for line in Config::COMMENTED.lines() {
+        if let Some(line) = line.strip_prefix("#     ") {
+            if let Some((name, _)) = line.split_once(' ').filter(|(name, _)| !name.is_empty()) {
+                told = name.to_owned();
+            }
+            let text: &mut String = effects.entry(told.clone()).or_default();
+            text.push_str(line);
+            text.push('\n');
+        }
+    }
+    assert_eq!(effects.len(), LIBRARY.len(), "{:?}", effects.keys());
+    for effect in LIBRARY {
+        let text = &effects[effect.name];
+        for parameter in effect.parameters {
+            let range = format!("{} to {}", parameter.least, parameter.most);
+            assert!(
+                text.contains(parameter.name) && text.contains(&range),
+                "{}: {range}: {text}",
+                effect.name
+            );
+        }
+    }
+}
+
+#[test]
+fn an_effect_is_read_from_the_command_line() {
+    let drag: Effect = "constant-drag:force_n=-0.2".parse().expect("an effect");
+    assert_eq!(
+        (drag.name.as_str(), drag.cell, drag.parameters["force_n"]),
+        ("constant-drag", None, -0.2)
+    );
+    let clamp: Effect = "unequal-clamping: cell=3, friction_factor=7e-1"
+        .parse()
+        .expect("an effect");
+    assert_eq!((clamp.cell, clamp.parameters["friction_factor"]), (Some(3), 0.7));
+    assert_eq!(clamp.parameters.len(), 1);
+    for (text, expected) in [
+        ("", "'' is no part of an effect: give NAME:PARAM=VALUE"),
+        (":force_n=1", "is no part of an effect"),
+        (
+            "gremlins:force_n=1",
+            "there is no effect `gremlins`: the library has unequal-clamping, ",
+        ),
+        ("constant-drag", "effect `constant-drag` needs `force_n`"),
+        ("constant-drag:", "effect `constant-drag` needs `force_n`"),
+        ("constant-drag:force_n", "'force_n' is no part of an effect"),
+        ("constant-drag:force_n=1,", "'' is no part of an effect"),
+        ("constant-drag:force_n=much", "force_n = 'much' is no number"),
+        ("constant-drag:force_n=1,force_n=2", "force_n is given twice"),
+        ("constant-drag:force=1", "has no parameter `force`: it has force_n"),
+        ("constant-drag:force_n=100", "force_n = 100: must be from -4 to 4 N"),
+        ("constant-drag:force_n=nan", "force_n = NaN: must be from -4 to 4 N"),
+        (
+            "constant-drag:force_n=1,cell=2",
+            "concerns the whole worm: leave `cell` out",
+        ),
+        ("unequal-clamping:friction_factor=0.7", "say which `cell` it concerns"),
+        ("unequal-clamping:friction_factor=0.7,cell=-1", "cell = '-1' is no cell"),
+        ("unequal-clamping:friction_factor=0.7,cell=0", "give 1 to 16"),
+        ("unequal-clamping:friction_factor=0.7,cell=17", "cell 17 of 16"),
+    ] {
+        let error = text.parse::<Effect>().expect_err(text).to_string();
+        assert!(
+            error.contains(expected),
+            "for {text:?}\n  expected … {expected}\n  got      {error}"
+        );
+    }
+}
+
+#[test]
+fn bad_values_are_named_with_file_place_and_remedy() {
+    let table = [
+        ("[worm]\nlegs = 4\n", "worm.toml:2:1: unknown field `legs`"),
+        ("[worm\n", "worm.toml:1:6: "),
+        ("[worm]\ncells = \"four\"\n", "worm.toml:2:9: invalid type"),
+        (
+            "[worm]\ncells = 1\nstep_order = [1]\n",
+            "worm.toml: worm.cells = 1: must be from 2 to 16 cells",
+        ),
+        (
+            "[worm]\nname = \"../x\"\n",
+            "worm.toml: worm.name = \"../x\": must be 1 to 16 of a-z",
+        ),
+        (
+            "[worm]\nmass_kg = nan\n",
+            "worm.toml: worm.mass_kg = NaN: must be from 0.001 to 100 kg",
+        ),
+        (
+            "[worm]\nstep_order = [1, 2, 3, 3]\n",
+            "worm.step_order = [1, 2, 3, 3]: must name each cell from 1 to 4 once",
+        ),
+        (
+            "[worm]\nmax_deformation_m = [0.002, 0.001]\n",
+            "worm.max_deformation_m = a list of 2: give one value, or one for each of the 4 cells",
+        ),
+        (
+            "[worm]\nstiffness_n_per_m = [980.0, 980.0, 0.0, 980.0]\n",
+            "worm.stiffness_n_per_m[3] = 0: must be from 1",
+        ),
+        (
+            "[port]\npath = \"/dev/ttyUSB0\"\nbaud = 12345\n",
+            "port.baud = 12345: must be one of [9600, 57600",
+        ),
+        (
+            "[servo]\nwatchdog_ms = 30\n",
+            "servo.watchdog_ms = 30: must be a multiple of 20 ms",
+        ),
+        ("[tracker]\nid = 1\n", "tracker.id = 1: must differ from servo.id"),
+        (
+            "[alarms]\njammed_cell = { policy = \"panic\", threshold = 0.5 }\n",
+            "worm.toml:2:26: unknown variant `panic`",
+        ),
+        (
+            "[alarms]\njammed_cell = { policy = \"stop\", threshold = 5.0 }\n",
+            "alarms.jammed_cell.threshold = 5: must be",
+        ),
+        (
+            "[gait]\ncycle_s = 0.5\n",
+            "gait.cycle_s = 0.5: is 120.0 rev/min, beyond servo.velocity_limit_rev_per_min = 60",
+        ),
+        (
+            "[control]\nrate_hz = 10.0\n",
+            "servo.watchdog_ms = 100: must be at least two ticks at control.rate_hz (0.200 s)",
+        ),
+        (
+            "[tracker]\nrate_hz = 20.0\n[control]\ntracker_timeout_s = 0.02\n",
+            "control.tracker_timeout_s = 0.02: must be at least two samples",
+        ),
+        (
+            "[topics]\nroot = \"relative\"\n",
+            "topics.root = \"relative\": must be an absolute path",
+        ),
+        (
+            "[[effect]]\nname = \"gremlins\"\nforce_n = 0.2\n",
+            "worm.toml: effect = \"gremlins\": there is no effect `gremlins`: the library has unequal-clamping, ",
+        ),
+        (
+            "[[effect]]\nname = \"constant-drag\"\nforce = 0.2\n",
+            "effect = \"constant-drag\": effect `constant-drag` has no parameter `force`: it has force_n",
+        ),
+        (
+            "[[effect]]\nname = \"constant-drag\"\nforce_n = \"much\"\n",
+            "worm.toml:1:1: invalid type: string \"much\", expected f64",
+        ),
+        ("[[effect]]\nforce_n = 0.2\n", "worm.toml:1:1: missing field `name`"),
+        (
+            "[[effect]]\nname = \"unequal-clamping\"\nfriction_factor = 0.7\ncell = 5\n",
+            "effect `unequal-clamping`: cell 5 of 4: give 1 to 4",
+        ),
+        (
+            "[[effect]]\nname = \"unequal-clamping\"\nfriction_factor = 0.7\ncell = 0\n",
+            "effect `unequal-clamping`: cell 0 of 4: give 1 to 4",
+        ),
+    ];
+    for (text, expected) in table {
+        let error = Config::from_toml(text, file()).expect_err(text).to_string();
+        assert!(
+            error.contains(expected),
+            "for {text:?}\n  expected … {expected}\n  got      {error}"
+        );
+    }
+}
+
+#[test]
+fn all_problems_are_told_at_once() {
+    let error = Config::from_toml("[worm]\nmass_kg = 0.0\n[gait]\ncycle_s = 0.0\n", file()).expect_err("two problems");
+    assert_eq!(error.to_string().lines().count(), 2, "{error}");
+}
+
+#[test]
+fn foolish_settings_are_advised_against() {
+    assert_eq!(Config::default().advice(), []);
+    let foolish =
+        "[port]\npath = \"/dev/ttyUSB0\"\nbaud = 57600\n[servo]\nwatchdog_ms = 20\n[control]\nrate_hz = 200.0\n";
+    let config = Config::from_toml(foolish, file()).expect("legal");
+    let keys: Vec<_> = config.advice().iter().map(|advice| advice.key).collect();
+    assert_eq!(keys, ["port.baud", "servo.watchdog_ms"]);
+}

@@ -1,0 +1,275 @@
+//! The alarms: what is wrong with the worm, since when, and by how much.
+//!
+//! [`Watch::update`] takes every state, with the estimate that a new tracker sample gave and the cycle that ended, and
+//! gives back the alarms that were raised or cleared. It owns no clock: time is [`State::time_ns`]. It allocates nothing.
+//!
+//! Read in this order: `motion` tells what the cam does and `sample` which positions to trust; each detector (`stall`,
+//! `jam`, `stride` with `progress` and `sliding`, `page` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`)
+//! tells in its head how it decides; `latch` turns what they find into one "raised" and one "cleared".
+//!
+//! **Calibration.** What is usual is learned on the first `estimator.calibration_cycles` good cycles, in the gait's phase:
+//! extensions and energy for the present speed and direction, advance and retraction for each direction. Where a
+//! gross fault shows without calibration (a cell that does not move, a worm that does not advance, a long slide) the alarm
+//! watches from the start with a wide threshold; where it does not (energy) it is unarmed until then, and
+//! [`Watch::armed_mask`] says so. Cycles in which something was wrong never serve as examples.
+//!
+//! **Clearing.** An alarm is cleared when its condition was clearly over for a while. Stall, jam and lack of progress
+//! exist only while the worm is asked to move: they also clear two seconds after it no longer is, so that a reset of the
+//! fault that they caused is possible. Energy, battery and model mismatch keep their alarm through pauses.
+//!
+//! **Restart.** When the controller's sequence goes back everything raised is cleared and learned anew, except the charge of
+//! the battery, which did not change.
+
+mod battery;
+mod changes;
+mod device;
+mod energy;
+mod jam;
+mod latch;
+mod link;
+mod mismatch;
+mod motion;
+mod page;
+mod progress;
+mod sample;
+mod sliding;
+mod stall;
+mod stride;
+mod tracker;
+
+#[cfg(test)]
+mod tests;
+
+pub use changes::AlarmChanges;
+
+use crate::config::Config;
+use crate::estimate::ResidualMap;
+use crate::message::{AlarmKind, Cycle, Estimate, State};
+use latch::{Finding, Latch, Patience};
+use motion::{Moment, Motion};
+use sample::Sight;
+use worm_physics::MAX_CELLS;
+
+/// What there is to see in one tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Observation<'a> {
+    /// The controller's state, every tick.
+    pub state: &'a State,
+    /// What the estimator knows, when a new tracker sample came.
+    pub estimate: Option<&'a Estimate>,
+    /// The gait cycle that ended, if one did.
+    pub cycle: Option<&'a Cycle>,
+    /// What the model does not explain, as of now.
+    pub residuals: Option<&'a ResidualMap>,
+}
+
+/// Watches one worm for everything that [`AlarmKind`] names.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    cells: usize,
+    fresh: Detectors, // as they are before the first tick
+    detectors: Detectors,
+    battery: battery::BatteryLow,
+    latches: [Latch; KINDS],
+    armed_mask: u32,
+    next_sequence: u64,
+}
+
+const KINDS: usize = AlarmKind::ALL.len();
+
+/// A finding of a position detector is too old when no sample came for this long, s.
+const STALE_S: f64 = 0.5;
+
+/// Everything that begins anew when the controller does.
+#[derive(Debug, Clone)]
+struct Detectors {
+    motion: Motion,
+    sight: Sight,
+    strides: stride::Strides,
+    stall: stall::MotorStall,
+    jam: jam::JammedCell,
+    progress: progress::NoProgress,
+    sliding: sliding::SlidingDown,
+    energy: energy::EnergyOverBudget,
+    link: link::LinkFault,
+    tracker: tracker::TrackerFault,
+    device: device::DeviceFault,
+    mismatch: mismatch::ModelMismatch,
+    by_position: [Finding; 3], // jam, progress, sliding, as of the last sample
+    sample_age_s: f64,
+}
+
+impl Watch {
+    /// A watch for a worm of a checked configuration, before its first tick.
+    pub fn new(config: &Config) -> Self {
+        let detectors = Detectors {
+            motion: Motion::new(config),
+            sight: Sight::new(),
+            strides: stride::Strides::new(),
+            stall: stall::MotorStall::new(config),
+            jam: jam::JammedCell::new(config),
+            progress: progress::NoProgress::new(config),
+            sliding: sliding::SlidingDown::new(config),
+            energy: energy::EnergyOverBudget::new(config),
+            link: link::LinkFault::new(config),
+            tracker: tracker::TrackerFault::new(config),
+            device: device::DeviceFault::new(config),
+            mismatch: mismatch::ModelMismatch::new(config),
+            by_position: [Finding::Blind; 3],
+            sample_age_s: 0.0,
+        };
+        Self {
+            cells: config.worm.cells.min(MAX_CELLS),
+            fresh: detectors.clone(),
+            detectors,
+            battery: battery::BatteryLow::new(config),
+            latches: std::array::from_fn(|index| {
+                let kind = AlarmKind::ALL[index];
+                Latch::new(kind, patience_of(kind))
+            }),
+            armed_mask: 0,
+            next_sequence: 0,
+        }
+    }
+
+    /// Takes one tick and tells which alarms it raised or cleared.
+    pub fn update(&mut self, observation: &Observation<'_>) -> AlarmChanges {
+        let state = observation.state;
+        let mut changes = AlarmChanges::none();
+        let mut moment = self.detectors.motion.update(state);
+        if moment.restarted {
+            for latch in &mut self.latches {
+                if let Some(alarm) = latch.reset(moment.now_ns, state.phase) {
+                    changes.push(alarm, &mut self.next_sequence);
+                }
+            }
+            self.detectors.clone_from(&self.fresh);
+            moment = self.detectors.motion.update(state);
+        }
+        let sound = self.is_sound();
+        let findings = self.findings(&moment, observation, sound);
+        self.armed_mask = 0;
+        for (finding, latch) in findings.iter().zip(&mut self.latches) {
+            self.armed_mask |= u32::from(finding.watches()) << latch.kind().code();
+            let phase = match latch.kind() {
+                AlarmKind::ModelMismatch => self.detectors.mismatch.phase_before(state.phase),
+                _ => state.phase,
+            };
+            if let Some(alarm) = latch.update(moment.now_ns, phase, finding) {
+                changes.push(alarm, &mut self.next_sequence);
+            }
+        }
+        changes
+    }
+
+    /// Bit k set: the alarm with code k watches.
+    pub const fn armed_mask(&self) -> u32 {
+        self.armed_mask
+    }
+
+    /// Bit k set: the alarm with code k is raised.
+    pub fn raised_mask(&self) -> u32 {
+        self.latches
+            .iter()
+            .map(|latch| u32::from(latch.is_raised()) << latch.kind().code())
+            .sum()
+    }
+
+    /// Whether no alarm stands that makes a cycle no example of how the worm crawls.
+    pub fn is_sound(&self) -> bool {
+        [
+            AlarmKind::MotorStall,
+            AlarmKind::JammedCell,
+            AlarmKind::NoProgress,
+            AlarmKind::SlidingDown,
+            AlarmKind::TrackerFault,
+        ]
+        .iter()
+        .all(|kind| !self.is_raised(*kind))
+    }
+
+    /// Charge left in the battery, 0 to 1; `NaN` without a battery or before its voltage was read.
+    pub const fn battery_share(&self) -> f64 {
+        self.battery.share()
+    }
+
+    fn is_raised(&self, kind: AlarmKind) -> bool {
+        self.latches[kind as usize].is_raised()
+    }
+
+    /// What every detector finds, in the order of [`AlarmKind::ALL`].
+    fn findings(&mut self, moment: &Moment, observation: &Observation<'_>, sound: bool) -> [Finding; KINDS] {
+        let Observation {
+            state,
+            estimate,
+            cycle,
+            residuals,
+        } = *observation;
+        let detectors = &mut self.detectors;
+        detectors.sight.follow(state, self.cells);
+        if let Some(cycle) = cycle {
+            detectors.progress.note_cycle(cycle);
+            self.battery.note_cycle(moment, cycle);
+        }
+        match estimate {
+            Some(estimate) => {
+                let positions = detectors.sight.positions(estimate, self.cells);
+                self.battery.note_positions(&positions);
+                detectors.sample_age_s = 0.0;
+                detectors.by_position = detectors.judge_positions(moment, &positions, sound);
+            }
+            None => {
+                detectors.sample_age_s += moment.step_s;
+                if detectors.sample_age_s > STALE_S {
+                    detectors.by_position = [Finding::Blind; 3];
+                }
+            }
+        }
+        let [jam, progress, sliding] = detectors.by_position;
+        [
+            detectors.stall.update(moment, state),
+            jam,
+            progress,
+            sliding,
+            detectors.energy.update(moment, cycle, sound),
+            self.battery.update(moment, state),
+            detectors.link.update(moment, state),
+            detectors.tracker.update(moment, state),
+            detectors.device.update(moment, state),
+            detectors.mismatch.update(moment, residuals),
+        ]
+    }
+}
+
+impl Detectors {
+    fn judge_positions(&mut self, moment: &Moment, positions: &sample::Positions, sound: bool) -> [Finding; 3] {
+        let stride = self.strides.update(moment, positions);
+        let progress = self.progress.update(moment, &self.strides, stride.as_ref(), sound);
+        let usual_m = self.progress.usual_m(moment.direction);
+        [
+            self.jam.update(moment, positions),
+            progress,
+            self.sliding.update(moment, positions, &self.strides, usual_m, sound),
+        ]
+    }
+}
+
+/// How long each condition must hold, and be over. Where `raise_after_ns` is 0 the detector itself confirms.
+const fn patience_of(kind: AlarmKind) -> Patience {
+    let (raise_after_s, clear_after_s) = match kind {
+        AlarmKind::MotorStall => (0.0, 2.0),
+        AlarmKind::JammedCell => (0.0, 2.0),
+        AlarmKind::NoProgress => (0.0, 2.0),
+        AlarmKind::SlidingDown => (0.0, 0.0),
+        AlarmKind::EnergyOverBudget => (0.0, 0.0),
+        AlarmKind::BatteryLow => (5.0, 10.0),
+        AlarmKind::LinkFault => (0.0, 1.0),
+        AlarmKind::TrackerFault => (0.0, 2.0),
+        AlarmKind::DeviceFault => (0.0, 2.0),
+        AlarmKind::ModelMismatch => (0.0, 0.0),
+    };
+    Patience {
+        raise_after_ns: (raise_after_s * 1e9) as u64,
+        clear_after_ns: (clear_after_s * 1e9) as u64,
+    }
+}

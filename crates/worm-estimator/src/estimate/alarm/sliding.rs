@@ -1,0 +1,263 @@
+//! Sliding down: the worm moves down the canal.
+//!
+//! "Down" is where gravity pulls; on the level it is against the crawling direction. The excess over what is usual is
+//! compared with `threshold`, in metres, in one of three ways:
+//!
+//! - **at rest** (cam still, in any mode, with or without torque): median displacement of the cells since rest began;
+//! - **crawling up or on the level**: how far the worm is below its highest point, less the retraction that is usual at
+//!   this gait phase (calibrated, before that half a stroke);
+//! - **crawling down**: way down in the last cycle (see [`super::stride`]) less the usual way per cycle; before it is
+//!   calibrated, and just after a reversal, a whole stroke, which is the most that a gait can gain.
+//!
+//! It clears when the worm has not sunk further for a while, and then watches anew from there.
+
+use super::latch::{Finding, Reading, Verdict};
+use super::motion::Moment;
+use super::sample::Positions;
+use super::stride::{BINS, Strides};
+use crate::config::Config;
+use crate::message::Severity;
+use worm_physics::MAX_CELLS;
+
+/// Slopes flatter than this count as level, degrees.
+const LEVEL_DEG: f64 = 0.5;
+/// Weight of the newest sample in the smoothed positions: five samples, some 40 ms.
+const SMOOTHING: f64 = 0.2;
+/// Samples in a row beyond the threshold.
+const CONFIRMATIONS: u32 = 4;
+/// A movement within this many standard deviations of the mean position is noise.
+const NOISE_SIGMAS: f64 = 4.0;
+/// Part of the threshold by which the worm must sink further to count as still sliding.
+const FURTHER_SHARE: f64 = 0.25;
+/// The slide is over after this long without sinking further, s …
+const OVER_S: f64 = 2.0;
+/// … and, while crawling, after this many cycles.
+const OVER_CYCLES: f64 = 1.2;
+
+/// The usual retraction at each phase of a cycle, m below the highest point.
+#[derive(Debug, Clone, Copy)]
+struct Retraction {
+    sum_m: [f64; BINS],
+    count: [u32; BINS],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Manner {
+    Resting,
+    Climbing,
+    Descending,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct SlidingDown {
+    threshold_m: f64,
+    stroke_m: f64,
+    slope_sign: f64, // +1 uphill along the canal, −1 downhill, 0 level
+    calibration_cycles: u32,
+    smoothed: Positions,
+    manner: Option<Manner>,
+    reversals: u32,
+    anchor: Positions, // where the present manner began
+    anchor_phase: f64,
+    height_m: f64, // way up since then, summed sample by sample
+    highest_m: f64,
+    last: Positions,
+    retraction: Retraction,
+    beyond: u32,
+    lowest_excess_m: f64, // the largest excess while the alarm's condition holds
+    sunk_ns: u64,         // when it last grew
+    since_ns: u64,
+    sliding: bool,
+}
+
+impl SlidingDown {
+    pub(super) fn new(config: &Config) -> Self {
+        let slope_deg = config.canal.slope_deg;
+        let noise_m = NOISE_SIGMAS * config.tracker.noise_m / (config.worm.cells as f64).sqrt();
+        Self {
+            threshold_m: config.alarms.sliding_down.threshold.max(noise_m),
+            stroke_m: config.worm.stroke_m,
+            slope_sign: if slope_deg.abs() < LEVEL_DEG {
+                0.0
+            } else {
+                slope_deg.signum()
+            },
+            calibration_cycles: config.estimator.calibration_cycles,
+            smoothed: Positions::NONE,
+            manner: None,
+            reversals: 0,
+            anchor: Positions::NONE,
+            anchor_phase: 0.0,
+            height_m: 0.0,
+            highest_m: 0.0,
+            last: Positions::NONE,
+            retraction: Retraction {
+                sum_m: [0.0; BINS],
+                count: [0; BINS],
+            },
+            beyond: 0,
+            lowest_excess_m: 0.0,
+            sunk_ns: 0,
+            since_ns: 0,
+            sliding: false,
+        }
+    }
+
+    /// Takes a sample. `usual_m` is the calibrated advance per cycle in the present direction, `sound` tells that nothing
+    /// else is wrong, so that the cycle may serve for calibration.
+    pub(super) fn update(
+        &mut self,
+        moment: &Moment,
+        positions: &Positions,
+        strides: &Strides,
+        usual_m: Option<f64>,
+        sound: bool,
+    ) -> Finding {
+        self.smooth(positions);
+        let up = if self.slope_sign == 0.0 {
+            moment.direction
+        } else {
+            self.slope_sign
+        };
+        let manner = if moment.still || moment.phase.is_none() {
+            Manner::Resting
+        } else if up == moment.direction {
+            Manner::Climbing
+        } else {
+            Manner::Descending
+        };
+        if self.manner != Some(manner) || self.reversals != moment.reversals {
+            self.manner = Some(manner);
+            self.reversals = moment.reversals;
+            self.start_here(moment);
+        }
+        self.height_m += positions.moved_since(&self.last).unwrap_or(0.0) * up;
+        self.last = *positions;
+        if self.height_m > self.highest_m {
+            self.highest_m = self.height_m;
+        }
+        let excess_m = match manner {
+            Manner::Resting => self.rested(up),
+            Manner::Climbing => Some(self.climbed(moment, strides, usual_m.is_some(), sound)),
+            Manner::Descending => self.descended(moment, positions, strides, usual_m),
+        };
+        match excess_m {
+            Some(excess_m) if positions.mask != 0 => Finding::Seen(self.judge(moment, excess_m)),
+            _ => Finding::Blind,
+        }
+    }
+
+    fn smooth(&mut self, positions: &Positions) {
+        for cell in 0..MAX_CELLS {
+            let weight = if self.smoothed.has(cell) { SMOOTHING } else { 1.0 };
+            let before = if self.smoothed.has(cell) {
+                self.smoothed.metres[cell]
+            } else {
+                0.0
+            };
+            if positions.has(cell) {
+                self.smoothed.metres[cell] = before + weight * (positions.metres[cell] - before);
+            }
+        }
+        self.smoothed.mask = positions.mask;
+    }
+
+    fn start_here(&mut self, moment: &Moment) {
+        self.anchor = self.smoothed;
+        self.anchor_phase = moment.phase.unwrap_or(0.0);
+        self.height_m = 0.0;
+        self.highest_m = 0.0;
+        self.beyond = 0;
+        self.lowest_excess_m = 0.0;
+        self.sunk_ns = moment.now_ns;
+    }
+
+    fn rested(&mut self, up: f64) -> Option<f64> {
+        // Cells that come into sight during the rest join where they are first seen.
+        let moved_m = self.smoothed.median_moved_since(&self.anchor);
+        if moved_m.is_none() {
+            self.anchor = self.smoothed;
+        }
+        moved_m.map(|metres| -metres * up)
+    }
+
+    fn climbed(&mut self, moment: &Moment, strides: &Strides, usual_is_known: bool, sound: bool) -> f64 {
+        let below_m = self.highest_m - self.height_m;
+        let phase = moment.phase.unwrap_or(0.0);
+        let bin = ((phase.rem_euclid(1.0) * BINS as f64) as usize).min(BINS - 1);
+        let Retraction { sum_m, count } = &mut self.retraction;
+        let examples_wanted = !usual_is_known || count[bin] < self.calibration_cycles;
+        if sound && examples_wanted && strides.is_exemplary() && below_m < 0.5 * self.stroke_m {
+            sum_m[bin] += below_m;
+            count[bin] += 1;
+        }
+        let usual_m = if usual_is_known && count[bin] > 0 {
+            sum_m[bin] / f64::from(count[bin])
+        } else {
+            0.5 * self.stroke_m
+        };
+        below_m - usual_m
+    }
+
+    fn descended(
+        &mut self,
+        moment: &Moment,
+        positions: &Positions,
+        strides: &Strides,
+        usual_m: Option<f64>,
+    ) -> Option<f64> {
+        let phase = moment.phase?;
+        if let Some(way_m) = strides.advance_until(moment, positions) {
+            let usual_m = usual_m.filter(|_| strides.is_settled());
+            return Some(way_m - usual_m.unwrap_or(self.stroke_m));
+        }
+        // No sample of one cycle ago: what was gained since the descent began, while that is less than a cycle ago.
+        if (phase - self.anchor_phase).abs() > 1.0 {
+            self.start_here(moment);
+        }
+        Some(-self.height_m - self.stroke_m)
+    }
+
+    fn judge(&mut self, moment: &Moment, excess_m: f64) -> Reading {
+        if excess_m > self.threshold_m {
+            self.beyond += 1;
+        } else {
+            self.beyond = 0;
+            if excess_m < FURTHER_SHARE * self.threshold_m && !self.sliding {
+                self.since_ns = moment.now_ns;
+            }
+        }
+        if self.beyond >= CONFIRMATIONS && !self.sliding {
+            self.sliding = true;
+            self.lowest_excess_m = excess_m;
+            self.sunk_ns = moment.now_ns;
+        }
+        let mut verdict = if self.sliding { Verdict::Bad } else { Verdict::Good };
+        if self.sliding {
+            if excess_m > self.lowest_excess_m + FURTHER_SHARE * self.threshold_m {
+                self.lowest_excess_m = excess_m;
+                self.sunk_ns = moment.now_ns;
+            }
+            let cycle_s = match self.manner {
+                Some(Manner::Resting) | None => 0.0,
+                Some(_) => (OVER_CYCLES / moment.regime_cycles_per_s.abs().max(1e-3)).min(600.0),
+            };
+            let quiet_s = moment.now_ns.saturating_sub(self.sunk_ns) as f64 * 1e-9;
+            let falls_on = self.manner == Some(Manner::Descending) && self.beyond > 0;
+            if quiet_s > OVER_S.max(cycle_s) && !falls_on {
+                self.sliding = false;
+                self.start_here(moment);
+                self.since_ns = moment.now_ns;
+                verdict = Verdict::Good;
+            }
+        }
+        Reading {
+            value: excess_m,
+            threshold: self.threshold_m,
+            verdict,
+            since_ns: self.since_ns,
+            cell: None,
+            severity: Severity::Critical,
+        }
+    }
+}

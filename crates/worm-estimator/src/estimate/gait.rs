@@ -1,0 +1,46 @@
+//! Which cell steps when.
+
+use crate::config::Worm;
+use worm_physics::MAX_CELLS;
+
+/// The order of the cells, for steps counted from phase 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Gait {
+    cells: usize,
+    order: [usize; MAX_CELLS],
+}
+
+impl Gait {
+    pub(super) fn new(worm: &Worm) -> Self {
+        let mut order = [0; MAX_CELLS];
+        order[..worm.cells].copy_from_slice(&worm.step_order_from_zero());
+        Self {
+            cells: worm.cells,
+            order,
+        }
+    }
+
+    /// The gait as seen along the crawl: run in reverse (−1) it is seen from the other end, so that it too runs forward.
+    pub(super) fn seen_along(mut self, direction: i32) -> Self {
+        if direction < 0 {
+            self.order[..self.cells].reverse();
+        }
+        self
+    }
+
+    pub(super) fn cells(&self) -> usize {
+        self.cells
+    }
+
+    /// The cell whose turn a step is; steps may be negative.
+    pub(super) fn cell_of_step(&self, step: i64) -> usize {
+        self.order[step.rem_euclid(self.cells as i64) as usize]
+    }
+
+    /// Which step of a cycle is a cell's own.
+    pub(super) fn step_of_cell(&self, cell: usize) -> usize {
+        (0..self.cells)
+            .find(|&step| self.order[step] == cell)
+            .unwrap_or(self.cells)
+    }
+}

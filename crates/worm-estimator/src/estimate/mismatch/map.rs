@@ -1,0 +1,278 @@
+//! The map and the test on it.
+//!
+//! The test asks whether an entry is larger than a threshold, not whether it is other than 0: no model is exact, and in the long run
+//! every deviation is significant. For each entry, and for the advance of the whole worm over a cycle, which adds up
+//! what is too small in every bin, the excess over the threshold is divided by the standard error. With Student's distribution
+//! and Bonferroni's share for each of the family's members, the chance that any of them is beyond while none truly is stays below
+//! [`FALSE_SHARE`], whatever hangs together with what.
+
+use super::BINS;
+use super::shadow::{ALLOWANCES, Part, Shadow};
+use super::tally::{Known, Tally};
+use worm_physics::MAX_CELLS;
+
+/// Chance of the whole family to be beyond by chance, at one look.
+const FALSE_SHARE: f64 = 0.05;
+/// Standard errors by which another cell than the stepping one must stand out to be named for what all show.
+const STANDS_OUT_SIGMAS: f64 = 4.0;
+
+/// Mean residual over the last cycles for each cell, step and phase bin: measured less modelled way.
+#[derive(Debug, Clone)]
+pub struct ResidualMap {
+    cells: usize,
+    direction: i32,
+    stepping: [usize; MAX_CELLS],
+    tallies: Vec<Tally>, // [step][bin][cell]
+    advance: Tally,
+    effects_m: [Vec<f64>; ALLOWANCES.len()], // of whole units of the allowed deviations
+    allowed_m: Vec<f64>,                     // their best fit
+    allowed_advance_m: f64,
+    pooled: f64, // variance of one value, m²
+    revision: u64,
+}
+
+/// One entry of the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// The cell whose way it is, from 0.
+    pub cell: usize,
+    /// The cell whose step it is, from 0.
+    pub stepping_cell: usize,
+    /// Phase bin of the step, 0 to [`BINS`] − 1, counted along the crawl.
+    pub bin: usize,
+    /// Gait phase of the middle of the bin, 0 to 1, as the cam turns.
+    pub phase: f64,
+    /// Mean over the cycles of measured less modelled way in the bin, along the crawl, m.
+    pub mean_m: f64,
+    /// The same without what the allowed deviations of stroke and stiffness explain, m.
+    pub unexplained_m: f64,
+    /// Standard error of the two, from the scatter over the cycles, m.
+    pub sigma_m: f64,
+}
+
+impl Residual {
+    /// What is unexplained, in standard errors; signed.
+    pub fn significance(&self) -> f64 {
+        self.unexplained_m / self.sigma_m
+    }
+}
+
+/// The most significant thing that the model does not explain, and where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unexplained {
+    /// The entry that shows it best.
+    pub at: Residual,
+    /// How much way is unexplained, in that bin or in the advance of a whole cycle, m a cycle.
+    pub excess_m: f64,
+    /// The same in its standard errors.
+    pub significance: f64,
+    /// Whether it is beyond the threshold with the confidence of the whole family.
+    pub is_significant: bool,
+    /// Whether nothing in the map is beyond the threshold, certain or not.
+    pub is_within: bool,
+}
+
+impl ResidualMap {
+    pub(super) fn new(cells: usize) -> Self {
+        let size = cells * BINS * cells;
+        Self {
+            cells,
+            direction: 1,
+            stepping: [0; MAX_CELLS],
+            tallies: vec![Tally::default(); size],
+            advance: Tally::default(),
+            effects_m: std::array::from_fn(|_| vec![0.0; size]),
+            allowed_m: vec![0.0; size],
+            allowed_advance_m: 0.0,
+            pooled: 0.0,
+            revision: 0,
+        }
+    }
+
+    /// Forgets everything; what deviations would do is asked of the model.
+    pub(super) fn clear(&mut self, direction: i32, shadow: &Shadow) {
+        self.direction = direction;
+        for (step, cell) in self.stepping[..self.cells].iter_mut().enumerate() {
+            *cell = shadow.stepping_cell(step);
+        }
+        self.tallies.fill(Tally::default());
+        self.advance = Tally::default();
+        for (effect_m, allowance) in self.effects_m.iter_mut().zip(&ALLOWANCES) {
+            shadow.effect_of(allowance, effect_m);
+        }
+        self.allowed_m.fill(0.0);
+        self.allowed_advance_m = 0.0;
+        self.revision += 1;
+    }
+
+    /// Adds one cycle: an increment for each entry, `NaN` where it was not seen.
+    pub(super) fn add(&mut self, increments_m: &[f64]) {
+        for (tally, &increment_m) in self.tallies.iter_mut().zip(increments_m) {
+            tally.add(increment_m);
+        }
+        self.advance.add(increments_m.iter().sum::<f64>() / self.cells as f64);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for variance in self.tallies.iter().filter_map(Tally::variance) {
+            sum += variance;
+            count += 1.0;
+        }
+        self.pooled = if count > 0.0 { sum / count } else { 0.0 };
+        self.allow();
+        self.revision += 1;
+    }
+
+    /// Fits the allowed deviations by least squares, each to what it shows in by itself, and up to its limit.
+    fn allow(&mut self) {
+        self.allowed_m.fill(0.0);
+        for (effect_m, allowance) in self.effects_m.iter().zip(&ALLOWANCES) {
+            let (mut moment, mut square) = (0.0, 0.0);
+            for bin in 0..self.cells * BINS {
+                let of = |value: &dyn Fn(usize) -> f64| self.seen_in(allowance.shows_in, bin, value);
+                let left_m = of(&|index| {
+                    let known = self.tallies[index].known(self.pooled);
+                    known.map_or(f64::NAN, |known| known.mean - self.allowed_m[index])
+                });
+                let effect_m = of(&|index| effect_m[index]);
+                if left_m.is_finite() {
+                    moment += effect_m * left_m;
+                    square += effect_m * effect_m;
+                }
+            }
+            if square > 0.0 {
+                let share = (moment / square).clamp(-allowance.most, allowance.most);
+                for (allowed_m, effect_m) in self.allowed_m.iter_mut().zip(effect_m) {
+                    *allowed_m += share * effect_m;
+                }
+            }
+        }
+        self.allowed_advance_m = self.allowed_m.iter().sum::<f64>() / self.cells as f64;
+    }
+
+    /// What a quantity of the entries of a bin comes to in the body, or in the extension of the stepping cell.
+    fn seen_in(&self, part: Part, bin: usize, of: &dyn Fn(usize) -> f64) -> f64 {
+        let stepping = self.stepping[bin / BINS];
+        let others = (0..self.cells).filter(|&cell| cell != stepping);
+        let body = others.map(|cell| of(bin * self.cells + cell)).sum::<f64>() / (self.cells - 1) as f64;
+        match part {
+            Part::Body => body,
+            Part::Extension => of(bin * self.cells + stepping) - body,
+        }
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.cells
+    }
+
+    /// The direction of the crawl that the map is of: +1 forward, −1 backward.
+    pub fn direction(&self) -> i32 {
+        self.direction
+    }
+
+    /// Grows with every change of the map.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    pub(super) fn size(&self) -> usize {
+        self.tallies.len()
+    }
+
+    /// Every entry that rests on enough cycles, in the order of steps, bins and cells.
+    pub fn entries(&self) -> impl Iterator<Item = Residual> + '_ {
+        (0..self.size()).filter_map(|index| self.entry(index).map(|(residual, _)| residual))
+    }
+
+    fn entry(&self, index: usize) -> Option<(Residual, Known)> {
+        let known = self.tallies[index].known(self.pooled)?;
+        let (bin_of_cycle, cell) = (index / self.cells, index % self.cells);
+        let along = (bin_of_cycle as f64 + 0.5) / (self.cells * BINS) as f64;
+        let residual = Residual {
+            cell,
+            stepping_cell: self.stepping[bin_of_cycle / BINS],
+            bin: bin_of_cycle % BINS,
+            phase: if self.direction < 0 { 1.0 - along } else { along },
+            mean_m: known.mean,
+            unexplained_m: known.mean - self.allowed_m[index],
+            sigma_m: known.sigma,
+        };
+        Some((residual, known))
+    }
+
+    /// The most significant thing that is unexplained against a threshold, m a cycle; none before there are enough cycles.
+    pub fn unexplained(&self, threshold_m: f64) -> Option<Unexplained> {
+        let advance = self.advance.known(self.pooled)?;
+        let advance_m = advance.mean - self.allowed_advance_m;
+        // Half the tail of the normal distribution beyond z is below exp(−z²/2)/2.
+        let limit = (2.0 * ((self.size() + 1) as f64 / FALSE_SHARE).ln()).sqrt();
+        let mut worst: Option<(f64, usize, Residual)> = None;
+        let mut is_within = advance_m.abs() <= threshold_m;
+        for index in 0..self.size() {
+            let Some((residual, known)) = self.entry(index) else {
+                continue;
+            };
+            is_within &= residual.unexplained_m.abs() <= threshold_m;
+            // Beyond the threshold first; within it, the nearest to it.
+            let rank = known.beyond(residual.unexplained_m, threshold_m);
+            let larger = |(most, _, than): &(f64, usize, Residual)| {
+                rank > *most || (rank == *most && residual.significance().abs() > than.significance().abs())
+            };
+            if worst.as_ref().is_none_or(larger) {
+                worst = Some((rank, index, residual));
+            }
+        }
+        let (rank, index, _) = worst?;
+        let advance_rank = advance.beyond(advance_m, threshold_m);
+        if advance_rank > rank {
+            let at = self.carrier_of(advance_m)?;
+            return Some(Unexplained {
+                at,
+                excess_m: advance_m,
+                significance: advance_m / advance.sigma,
+                is_significant: advance_rank > limit,
+                is_within,
+            });
+        }
+        let at = self.named(index / self.cells)?;
+        Some(Unexplained {
+            at,
+            excess_m: at.unexplained_m,
+            significance: at.significance(),
+            is_significant: rank > limit,
+            is_within,
+        })
+    }
+
+    /// The entry of the bin that contributes most to an excess of the advance.
+    fn carrier_of(&self, advance_m: f64) -> Option<Residual> {
+        let way_m = |bin: usize| -> f64 {
+            let cells = bin * self.cells..(bin + 1) * self.cells;
+            let known = cells.filter_map(|index| self.entry(index));
+            known
+                .map(|(residual, _)| residual.unexplained_m * advance_m.signum())
+                .sum()
+        };
+        let bins = (0..self.cells * BINS).map(|bin| (bin, way_m(bin)));
+        let (bin, _) = bins.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+        self.named(bin)
+    }
+
+    /// The entry of a bin that is to be named: that of the stepping cell, for a body that gives way moves all of them and the
+    /// stepping cell's tip is what it holds against; or another, when it clearly stands out.
+    fn named(&self, bin: usize) -> Option<Residual> {
+        let stepping = self
+            .entry(bin * self.cells + self.stepping[bin / BINS])
+            .map(|entry| entry.0);
+        let entries = (bin * self.cells..(bin + 1) * self.cells).filter_map(|index| self.entry(index));
+        let size = |residual: &Residual| residual.unexplained_m.abs();
+        let largest = entries
+            .map(|entry| entry.0)
+            .max_by(|one, other| size(one).total_cmp(&size(other)))?;
+        match stepping {
+            Some(own) if size(&largest) - size(&own) <= STANDS_OUT_SIGMAS * largest.sigma_m.hypot(own.sigma_m) => {
+                Some(own)
+            }
+            _ => Some(largest),
+        }
+    }
+}

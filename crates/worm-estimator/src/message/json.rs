@@ -1,0 +1,311 @@
+//! How a message is written as JSON: one object with a member for each field, which reads back to the last bit.
+//!
+//! JSON has no word for some values, so these rules hold, and the schema of each type tells them:
+//! - a number that is not known (`NaN`) is `null`; an infinite one is `"Infinity"` or `"-Infinity"`;
+//! - a list over cells ends with the last cell in use; behind it, a message that was read holds `NaN`;
+//! - a coded value is its name, or the bare code where this version knows no name; `u32::MAX` for "none" is `null`.
+//!
+//! Schemas name one plain type for each member, though `null` may stand in its place: viewers such as Foxglove refuse
+//! unions of types.
+
+use serde::de::{DeserializeOwned, Error, SeqAccess, Unexpected, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Value, json};
+use std::fmt;
+use std::marker::PhantomData;
+use worm_physics::MAX_CELLS;
+
+/// A message that has a form as JSON.
+pub trait JsonMessage: Copy {
+    /// Name and version of the type, the same as on its topic.
+    const TYPE_NAME: &'static str;
+
+    /// When it was made, ns of `CLOCK_MONOTONIC`; 0 when it rests on nothing yet.
+    fn made_ns(&self) -> u64;
+
+    /// Appends the message to `out` as one JSON object.
+    ///
+    /// # Errors
+    /// None that `out` does not make: every value of every field can be written.
+    fn write_json(&self, out: &mut Vec<u8>) -> serde_json::Result<()>;
+
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// With line and column, when it is no JSON, or a member is missing, unknown, or no value of its field.
+    fn read_json(text: &[u8]) -> serde_json::Result<Self>;
+
+    /// The JSON Schema of the type.
+    fn schema() -> Value;
+}
+
+/// What stands in the JSON for a field of type `T`.
+pub(super) trait Form<T>: Serialize + DeserializeOwned {
+    /// The form of `value` in a message of so many cells.
+    fn of(value: T, cells: usize) -> Self;
+    /// The value itself.
+    fn value(&self) -> T;
+    /// The type, as JSON Schema names it.
+    fn schema() -> Value;
+    /// For how many cells it has values, where it is a list over cells.
+    fn cells(&self) -> Option<usize> {
+        None
+    }
+}
+
+/// A field type that has only one form.
+pub(super) trait Plain: Sized {
+    type Form: Form<Self>;
+}
+
+macro_rules! whole_numbers {
+    ($($type:ty)+) => {$(
+        impl Plain for $type { type Form = Self; }
+        impl Form<$type> for $type {
+            fn of(value: $type, _: usize) -> Self { value }
+            fn value(&self) -> $type { *self }
+            fn schema() -> Value { json!({"type": "integer"}) }
+        }
+    )+};
+}
+whole_numbers! { u64 u32 i32 }
+
+/// A number, known or not.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Number(f64);
+
+impl Plain for f64 {
+    type Form = Number;
+}
+
+impl Form<f64> for Number {
+    fn of(value: f64, _: usize) -> Self {
+        Self(value)
+    }
+
+    fn value(&self) -> f64 {
+        self.0
+    }
+
+    fn schema() -> Value {
+        json!({"type": "number"})
+    }
+}
+
+impl Serialize for Number {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0.is_finite() {
+            serializer.serialize_f64(self.0)
+        } else if self.0.is_nan() {
+            serializer.serialize_unit()
+        } else {
+            serializer.serialize_str(if self.0 > 0.0 { "Infinity" } else { "-Infinity" })
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Numbers;
+        impl Visitor<'_> for Numbers {
+            type Value = Number;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, null, \"Infinity\" or \"-Infinity\"")
+            }
+
+            fn visit_f64<E: Error>(self, value: f64) -> Result<Number, E> {
+                Ok(Number(value))
+            }
+
+            fn visit_u64<E: Error>(self, value: u64) -> Result<Number, E> {
+                Ok(Number(value as f64))
+            }
+
+            fn visit_i64<E: Error>(self, value: i64) -> Result<Number, E> {
+                Ok(Number(value as f64))
+            }
+
+            fn visit_unit<E: Error>(self) -> Result<Number, E> {
+                Ok(Number(f64::NAN))
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Number, E> {
+                match text {
+                    "Infinity" => Ok(Number(f64::INFINITY)),
+                    "-Infinity" => Ok(Number(f64::NEG_INFINITY)),
+                    _ => Err(E::invalid_value(Unexpected::Str(text), &self)),
+                }
+            }
+        }
+        deserializer.deserialize_any(Numbers)
+    }
+}
+
+/// A number for each cell in use.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PerCell {
+    values: [f64; MAX_CELLS],
+    cells: usize,
+}
+
+impl Plain for [f64; MAX_CELLS] {
+    type Form = PerCell;
+}
+
+impl Form<[f64; MAX_CELLS]> for PerCell {
+    fn of(values: [f64; MAX_CELLS], cells: usize) -> Self {
+        let cells = cells.min(MAX_CELLS);
+        Self { values, cells }
+    }
+
+    fn value(&self) -> [f64; MAX_CELLS] {
+        self.values
+    }
+
+    fn schema() -> Value {
+        json!({"type": "array", "items": {"type": "number"}, "maxItems": MAX_CELLS})
+    }
+
+    fn cells(&self) -> Option<usize> {
+        Some(self.cells)
+    }
+}
+
+impl Serialize for PerCell {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.values[..self.cells].iter().map(|&value| Number(value)))
+    }
+}
+
+impl<'de> Deserialize<'de> for PerCell {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Lists;
+        impl<'de> Visitor<'de> for Lists {
+            type Value = PerCell;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "a list of at most {MAX_CELLS} numbers")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<PerCell, A::Error> {
+                let (mut values, mut cells) = ([f64::NAN; MAX_CELLS], 0);
+                while let Some(Number(value)) = list.next_element()? {
+                    *values
+                        .get_mut(cells)
+                        .ok_or_else(|| A::Error::invalid_length(cells + 1, &self))? = value;
+                    cells += 1;
+                }
+                Ok(PerCell { values, cells })
+            }
+        }
+        deserializer.deserialize_seq(Lists)
+    }
+}
+
+/// An enumeration that crosses topics as a code and stands in JSON by its name.
+pub(super) trait Coded: Copy + TryFrom<u32> + 'static {
+    const WHAT: &'static str;
+    const VALUES: &'static [Self];
+    fn name_of(self) -> &'static str;
+    fn code_of(self) -> u32;
+}
+
+/// A code, by its name.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Name<T>(u32, PhantomData<T>);
+
+impl<T: Coded> Form<u32> for Name<T> {
+    fn of(code: u32, _: usize) -> Self {
+        Self(code, PhantomData)
+    }
+
+    fn value(&self) -> u32 {
+        self.0
+    }
+
+    fn schema() -> Value {
+        let names: Vec<_> = T::VALUES.iter().map(|&value| value.name_of()).collect();
+        json!({"type": "string", "enum": names})
+    }
+}
+
+impl<T: Coded> Serialize for Name<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match T::try_from(self.0) {
+            Ok(value) => serializer.serialize_str(value.name_of()),
+            Err(_) => serializer.serialize_u32(self.0),
+        }
+    }
+}
+
+impl<'de, T: Coded> Deserialize<'de> for Name<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Names<T>(PhantomData<T>);
+        impl<T: Coded> Visitor<'_> for Names<T> {
+            type Value = Name<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "the name or code of a {}", T::WHAT)
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Name<T>, E> {
+                let named = T::VALUES.iter().find(|value| value.name_of() == text);
+                let value = named.ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))?;
+                Ok(Name(value.code_of(), PhantomData))
+            }
+
+            fn visit_u64<E: Error>(self, code: u64) -> Result<Name<T>, E> {
+                let code = u32::try_from(code).map_err(|_| E::invalid_value(Unexpected::Unsigned(code), &self))?;
+                Ok(Name(code, PhantomData))
+            }
+        }
+        deserializer.deserialize_any(Names(PhantomData))
+    }
+}
+
+/// A code or an index, or `null` for `u32::MAX`.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(super) struct OrNone<F>(Option<F>);
+
+impl<F: Form<u32>> Form<u32> for OrNone<F> {
+    fn of(value: u32, cells: usize) -> Self {
+        Self((value != u32::MAX).then(|| F::of(value, cells)))
+    }
+
+    fn value(&self) -> u32 {
+        self.0.as_ref().map_or(u32::MAX, F::value)
+    }
+
+    fn schema() -> Value {
+        F::schema()
+    }
+}
+
+/// Reads a member that must be there: serde takes one that is missing for `null`, where `null` is allowed.
+pub(super) fn present<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+    T::deserialize(deserializer)
+}
+
+/// One member of a schema.
+pub(super) fn member(name: &str, documentation: &str, mut schema: Value) -> Value {
+    schema["title"] = name.replace('_', " ").into();
+    schema["description"] = prose(documentation).into();
+    schema
+}
+
+/// Documentation without the marks of rustdoc, and of codes, which are names here.
+pub(super) fn prose(documentation: &str) -> String {
+    ["[`", "`]", "`", "super::", "Self::", " as a code"]
+        .iter()
+        .fold(documentation.trim().to_owned(), |text, mark| text.replace(mark, ""))
+}
+
+/// The error for a list whose length is not the number of cells.
+pub(super) fn wrong_length(name: &str, length: usize, cells: usize) -> serde_json::Error {
+    serde_json::Error::custom(format!("{name} has {length} values for {cells} cells"))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,4 @@
+//! The estimator on worms whose truth is known.
+
+mod accuracy;
+mod behaviour;

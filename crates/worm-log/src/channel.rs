@@ -1,0 +1,75 @@
+//! The channels of a log.
+
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+
+/// How messages are encoded, as MCAP names it.
+pub(super) const MESSAGE_ENCODING: &str = "json";
+/// How their schemas are, as MCAP names it.
+pub(super) const SCHEMA_ENCODING: &str = "jsonschema";
+/// The metadata record and the attachment of a log.
+pub(super) const METADATA: &str = "wormd";
+pub(super) const CONFIG_ATTACHMENT: &str = "worm.toml";
+
+/// A message that has a channel in a log.
+pub trait Logged: JsonMessage {
+    /// Its channel.
+    const CHANNEL: Channel;
+}
+
+macro_rules! channels {
+    ($($message:ident = $topic:literal,)+) => {
+        /// A channel of a log, named after the topic that it holds.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Channel {
+            $(
+                #[doc = concat!("The [`", stringify!($message), "`]s.")]
+                $message,
+            )+
+        }
+
+        impl Channel {
+            /// Every channel.
+            pub const ALL: &'static [Self] = &[$(Self::$message),+];
+
+            /// The name of its topic.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$message => $topic,)+ }
+            }
+
+            /// Name and version of the type of its messages.
+            pub const fn type_name(self) -> &'static str {
+                match self { $(Self::$message => <$message as JsonMessage>::TYPE_NAME,)+ }
+            }
+
+            /// The JSON Schema of its messages.
+            pub fn schema(self) -> serde_json::Value {
+                match self { $(Self::$message => <$message as JsonMessage>::schema(),)+ }
+            }
+        }
+
+        $(impl Logged for $message {
+            const CHANNEL: Channel = Channel::$message;
+        })+
+    };
+}
+
+channels! {
+    State = "state",
+    Timing = "timing",
+    Estimate = "estimate",
+    Cycle = "cycle",
+    Alarm = "alarm",
+}
+
+impl Channel {
+    /// The name in a file: `/state`.
+    pub fn topic(self) -> String {
+        format!("/{}", self.name())
+    }
+
+    /// The channel whose topic has this name, with or without the slash.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let name = name.strip_prefix('/').unwrap_or(name);
+        Self::ALL.iter().copied().find(|channel| channel.name() == name)
+    }
+}

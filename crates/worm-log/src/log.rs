@@ -1,0 +1,94 @@
+//! All that a log holds.
+
+use super::channel::Channel;
+use super::scan::{refusal, scan};
+use crate::ReadError;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use worm_estimator::config::{Config, ConfigError};
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+
+/// The messages of a log, by topic, each topic in the order in which it was recorded.
+#[derive(Debug, Clone, Default)]
+pub struct Log {
+    /// The file.
+    pub file: PathBuf,
+    /// What the controller saw and commanded.
+    pub states: Vec<State>,
+    /// Where the ticks' time went.
+    pub timings: Vec<Timing>,
+    /// What the estimator knew, heartbeats among it.
+    pub estimates: Vec<Estimate>,
+    /// The gait cycles that ended.
+    pub cycles: Vec<Cycle>,
+    /// What was raised and cleared.
+    pub alarms: Vec<Alarm>,
+    /// The text of the worm's configuration; none where it ran on defaults.
+    pub config: Option<String>,
+    /// Worm, cells, version, and when the log was begun.
+    pub metadata: BTreeMap<String, String>,
+    /// What the reader found remarkable: a cut-off end, damaged chunks, foreign channels.
+    pub warnings: Vec<String>,
+}
+
+impl Log {
+    /// The worm's configuration as it was when the log was made.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when this version of wormd does not accept it.
+    pub fn config(&self) -> Result<Config, ConfigError> {
+        match &self.config {
+            Some(text) => Config::from_toml(text, &self.file),
+            None => Ok(Config::default()),
+        }
+    }
+}
+
+/// Reads a whole log.
+///
+/// A file that is cut off is read up to its last whole message; `warnings` says so.
+///
+/// # Errors
+/// [`ReadError`] when the file cannot be read, is no log of a worm, or is of another version.
+pub fn messages(path: &Path) -> Result<Log, ReadError> {
+    let mut log = Log {
+        file: path.to_owned(),
+        ..Log::default()
+    };
+    let contents = scan(path, |channel, text| {
+        match channel {
+            Channel::State => log.states.push(State::read_json(text)?),
+            Channel::Timing => log.timings.push(Timing::read_json(text)?),
+            Channel::Estimate => log.estimates.push(Estimate::read_json(text)?),
+            Channel::Cycle => log.cycles.push(Cycle::read_json(text)?),
+            Channel::Alarm => log.alarms.push(Alarm::read_json(text)?),
+        }
+        Ok(())
+    })?;
+    log.config = contents.config;
+    log.metadata = contents.metadata;
+    log.warnings = contents.warnings;
+    Ok(log)
+}
+
+/// Reads a log, but leaves its messages where they are: what it says of itself.
+///
+/// # Errors
+/// As [`messages`].
+pub fn without_messages(path: &Path) -> Result<Log, ReadError> {
+    let contents = scan(path, |_, _| Ok(()))?;
+    Ok(Log {
+        file: path.to_owned(),
+        config: contents.config,
+        metadata: contents.metadata,
+        warnings: contents.warnings,
+        ..Log::default()
+    })
+}
+
+/// The error for a log in which there is nothing to look at.
+#[must_use]
+pub fn nothing(path: &Path, problem: &str, remedy: &str) -> ReadError {
+    let place = format!("channel {}", Channel::State.topic());
+    refusal(path, Some(place), problem.to_owned(), remedy)
+}

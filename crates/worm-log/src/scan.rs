@@ -1,0 +1,352 @@
+//! Reading a log from the front to wherever it ends.
+//!
+//! A file that was not finished has no index, so none is used. Each chunk is checked by its sum before a message of it is
+//! believed. Behind the last whole record may stand the beginning of one more chunk: what of it can be unpacked
+//! (lz4 goes by blocks of 64 kB) is taken too, up to the last whole message, and a warning tells of it.
+
+use super::channel::{CONFIG_ATTACHMENT, Channel, MESSAGE_ENCODING, METADATA};
+use super::older::{completed, lacking_members};
+use crate::ReadError;
+use mcap::records::{Channel as FileChannel, Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{MAGIC, McapError};
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Bytes that a record may have when unpacked; a length beyond it is a broken one.
+const LARGEST_RECORD: usize = 1 << 28;
+/// Bytes of a record before its content: what it is, and its length.
+const RECORD_HEAD: u64 = 9;
+
+/// What a log holds beside its messages, and what was remarkable about it.
+#[derive(Debug, Clone, Default)]
+pub struct Contents {
+    /// Text of the configuration that the worm ran with.
+    pub config: Option<String>,
+    /// The metadata record `wormd`: worm, version, wall-clock time.
+    pub metadata: BTreeMap<String, String>,
+    /// What the reader noticed: a cut-off end, messages of an older version.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a log and hands each of its messages, still as JSON, to `take`, in the order in which they stand in the file.
+///
+/// # Errors
+/// [`ReadError`] when the file cannot be read, is no MCAP, has no channel of a worm, or has one whose messages this
+/// version cannot read; with channel and number where `take` refuses a message.
+pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>) -> Result<Contents, ReadError> {
+    let (mut file, length) = open(path)?;
+    let mut scanner = Scanner::new(path, take);
+    // Where the last whole record ends.
+    let mut at = MAGIC.len() as u64;
+    let framing = LinearReaderOptions::default()
+        .with_emit_chunks(true)
+        .with_record_length_limit(usize::try_from(length).unwrap_or(LARGEST_RECORD).min(LARGEST_RECORD));
+    let mut is_whole = false;
+    let end = each_record(BufReader::new(&file), framing, |opcode, content| {
+        if opcode == op::DATA_END {
+            // What follows is the index.
+            is_whole = true;
+            return Ok(ControlFlow::Break(()));
+        }
+        scanner.take_record(at, opcode, content)?;
+        at += RECORD_HEAD + content.len() as u64;
+        Ok(ControlFlow::Continue(()))
+    });
+    let problem = match end {
+        Ok(()) if is_whole => return scanner.into_contents(),
+        Ok(()) => "it was not finished".to_owned(),
+        Err(Trouble::Broken(error)) => error.to_string(),
+        Err(Trouble::Unreadable(error)) => return Err(unreadable(path, &error)),
+        Err(Trouble::Refused(error)) => return Err(error),
+    };
+    let sure = scanner.count;
+    file.seek(SeekFrom::Start(at))
+        .map_err(|error| unreadable(path, &error))?;
+    let rest = LinearReaderOptions::default().with_record_length_limit(LARGEST_RECORD);
+    let salvaged = each_record(BufReader::new(&file), rest, |opcode, content| {
+        scanner.take_plain(opcode, content)?;
+        Ok(ControlFlow::Continue(()))
+    });
+    if let Err(Trouble::Unreadable(error)) = salvaged {
+        return Err(unreadable(path, &error));
+    }
+    scanner.warn_of_the_end(at, length, &problem, scanner.count - sure);
+    scanner.into_contents()
+}
+
+/// The file behind its first mark, and its length.
+fn open(path: &Path) -> Result<(File, u64), ReadError> {
+    let mut file = File::open(path).map_err(|error| unreadable(path, &error))?;
+    let length = file.metadata().map_err(|error| unreadable(path, &error))?.len();
+    let mut magic = [0; MAGIC.len()];
+    match file.read_exact(&mut magic) {
+        Ok(()) if magic == MAGIC => Ok((file, length)),
+        Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => Err(unreadable(path, &error)),
+        Err(_) if MAGIC.starts_with(&magic[..magic.len().min(length as usize)]) => Err(refusal(
+            path,
+            None,
+            format!("is cut off after {length} bytes, before the first message"),
+            "record it again",
+        )),
+        _ => Err(refusal(
+            path,
+            None,
+            "is no MCAP file, whatever its name says".to_owned(),
+            "give it the extension of what it is",
+        )),
+    }
+}
+
+/// Why reading goes no further.
+enum Trouble {
+    Unreadable(io::Error),
+    Broken(McapError),
+    Refused(ReadError),
+}
+
+impl From<McapError> for Trouble {
+    fn from(error: McapError) -> Self {
+        Self::Broken(error)
+    }
+}
+
+/// Hands on each whole record of `input`, which begins with one.
+fn each_record(
+    mut input: impl Read,
+    options: LinearReaderOptions,
+    mut take: impl FnMut(u8, &[u8]) -> Result<ControlFlow<()>, Trouble>,
+) -> Result<(), Trouble> {
+    let options = options.with_skip_start_magic(true).with_skip_end_magic(true);
+    let mut reader = LinearReader::new_with_options(options);
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let read = loop {
+                    match input.read(reader.insert(wanted)) {
+                        Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                        read => break read.map_err(Trouble::Unreadable)?,
+                    }
+                };
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { opcode, data } => {
+                if take(opcode, data)?.is_break() {
+                    break;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+struct Scanner<'a, F> {
+    path: &'a Path,
+    take: F,
+    schemas: HashMap<u16, String>,
+    /// The channels of the file by their numbers, with what their messages lack; none for those that are not a worm's.
+    channels: HashMap<u16, Option<(Channel, Option<&'static str>)>>,
+    foreign: Vec<String>,
+    contents: Contents,
+    count: u64,
+    latest_ns: u64,
+}
+
+impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
+    fn new(path: &'a Path, take: F) -> Self {
+        Self {
+            path,
+            take,
+            schemas: HashMap::new(),
+            channels: HashMap::new(),
+            foreign: Vec::new(),
+            contents: Contents::default(),
+            count: 0,
+            latest_ns: 0,
+        }
+    }
+
+    /// Takes a whole record that stands at byte `at` of the file. A chunk that is damaged is left out, with a warning.
+    fn take_record(&mut self, at: u64, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
+        if opcode != op::CHUNK {
+            return self.take_plain(opcode, content);
+        }
+        let mut head = [opcode; RECORD_HEAD as usize];
+        head[1..].copy_from_slice(&(content.len() as u64).to_le_bytes());
+        let checked = LinearReaderOptions::default()
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LARGEST_RECORD);
+        let taken = each_record(head.as_slice().chain(content), checked, |opcode, content| {
+            self.take_plain(opcode, content)?;
+            Ok(ControlFlow::Continue(()))
+        });
+        match taken {
+            Err(Trouble::Broken(error)) => {
+                let warning = format!("the chunk at byte {at} is damaged ({error}): its messages are left out");
+                self.contents.warnings.push(warning);
+                Ok(())
+            }
+            taken => taken,
+        }
+    }
+
+    /// Takes a record that is no chunk.
+    fn take_plain(&mut self, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
+        if opcode == op::ATTACHMENT && !is_whole_attachment(content) {
+            return Err(McapError::UnexpectedEof.into());
+        }
+        match ::mcap::parse_record(opcode, content)? {
+            Record::Schema { header, .. } => {
+                self.schemas.insert(header.id, header.name);
+            }
+            Record::Channel(channel) => self.take_channel(channel).map_err(Trouble::Refused)?,
+            Record::Message { header, data } => {
+                let channel = self
+                    .channels
+                    .get(&header.channel_id)
+                    .ok_or(McapError::UnknownChannel(header.sequence, header.channel_id))?;
+                let Some((channel, lacking)) = *channel else {
+                    return Ok(());
+                };
+                (self.take)(channel, &completed(&data, lacking)).map_err(|error| {
+                    let place = format!("channel {}, message {}", channel.topic(), header.sequence);
+                    let remedy = "the file was not written by wormd, or was changed: record it again";
+                    Trouble::Refused(refusal(
+                        self.path,
+                        Some(place),
+                        format!("cannot be read: {error}"),
+                        remedy,
+                    ))
+                })?;
+                self.count += 1;
+                self.latest_ns = self.latest_ns.max(header.log_time);
+            }
+            Record::Metadata(metadata) if metadata.name == METADATA => self.contents.metadata = metadata.metadata,
+            Record::Attachment { header, data, .. } if header.name == CONFIG_ATTACHMENT => {
+                let text = String::from_utf8(data.into_owned()).map_err(|_| {
+                    let place = Some(format!("attachment {CONFIG_ATTACHMENT}"));
+                    Trouble::Refused(refusal(self.path, place, "is no text".to_owned(), "record it again"))
+                })?;
+                self.contents.config = Some(text);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn take_channel(&mut self, channel: FileChannel) -> Result<(), ReadError> {
+        let known = Channel::ALL
+            .iter()
+            .copied()
+            .find(|known| known.topic() == channel.topic);
+        let Some(known) = known else {
+            if self.channels.insert(channel.id, None).is_none() {
+                self.foreign.push(channel.topic);
+            }
+            return Ok(());
+        };
+        let schema = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
+        if known == Channel::Timing && schema != known.type_name() {
+            // Where the loop's time went is of no use to any analysis: a log with timings of an older version is read without.
+            if self.channels.insert(channel.id, None).is_none() {
+                self.foreign
+                    .push(format!("{} ('{schema}', of another version)", channel.topic));
+            }
+            return Ok(());
+        }
+        let problem = if channel.message_encoding != MESSAGE_ENCODING {
+            format!(
+                "holds messages encoded as '{}', not as '{MESSAGE_ENCODING}'",
+                channel.message_encoding
+            )
+        } else if let Some(lacking) = lacking_members(known, schema) {
+            self.channels.insert(channel.id, Some((known, Some(lacking))));
+            return Ok(());
+        } else if schema != known.type_name() {
+            format!(
+                "holds '{schema}', and this version of wormd reads '{}'",
+                known.type_name()
+            )
+        } else {
+            self.channels.insert(channel.id, Some((known, None)));
+            return Ok(());
+        };
+        let writer = self.contents.metadata.get("wormd_version");
+        let remedy = match writer {
+            Some(version) => format!("read it with wormd {version}, which wrote it"),
+            None => "read it with what wrote it; `wormd record` writes logs that wormd reads".to_owned(),
+        };
+        Err(refusal(
+            self.path,
+            Some(format!("channel {}", channel.topic)),
+            problem,
+            &remedy,
+        ))
+    }
+
+    fn warn_of_the_end(&mut self, at: u64, length: u64, problem: &str, salvaged: u64) {
+        let when = if self.count == 0 {
+            String::new()
+        } else {
+            format!(" at t = {:.3} s", self.latest_ns as f64 * 1e-9)
+        };
+        let unfinished = if salvaged == 0 {
+            String::new()
+        } else {
+            format!("; the last {salvaged} of them stand in a chunk that was not finished")
+        };
+        self.contents.warnings.push(format!(
+            "cut off after {} messages{when}: whole up to byte {at} of {length} ({problem}){unfinished}",
+            self.count
+        ));
+    }
+
+    fn into_contents(mut self) -> Result<Contents, ReadError> {
+        if self.channels.values().any(Option::is_some) {
+            if !self.foreign.is_empty() {
+                let ignored = self.foreign.join(", ");
+                self.contents
+                    .warnings
+                    .push(format!("channels that are not a worm's are ignored: {ignored}"));
+            }
+            return Ok(self.contents);
+        }
+        let problem = match self.contents.warnings.last() {
+            Some(warning) if self.foreign.is_empty() => format!("has no channel at all; {warning}"),
+            _ if self.foreign.is_empty() => "has no channel at all".to_owned(),
+            _ => format!("has no channel of a worm, only {}", self.foreign.join(", ")),
+        };
+        let remedy = "give a file that `wormd record` or `wormd up --record` wrote";
+        Err(refusal(self.path, Some("channel /state".to_owned()), problem, remedy))
+    }
+}
+
+/// Whether an attachment has room for all that its lengths announce; `mcap` counts on it.
+fn is_whole_attachment(content: &[u8]) -> bool {
+    fn skip_text(rest: &[u8]) -> Option<&[u8]> {
+        let (length, rest) = rest.split_first_chunk::<4>()?;
+        rest.get(u32::from_le_bytes(*length) as usize..)
+    }
+    let times_skipped = content.get(16..);
+    let data = times_skipped.and_then(skip_text).and_then(skip_text);
+    let behind_length = data.and_then(|data| data.get(8..));
+    behind_length.is_some_and(|rest| rest.len() >= 4)
+}
+
+/// An error that names the file and, where there is one, the place in it.
+pub(super) fn refusal(path: &Path, place: Option<String>, problem: String, remedy: &str) -> ReadError {
+    ReadError {
+        file: path.to_owned(),
+        place,
+        problem,
+        remedy: remedy.to_owned(),
+    }
+}
+
+fn unreadable(path: &Path, error: &io::Error) -> ReadError {
+    let remedy = "check that the file is there and may be read";
+    refusal(path, None, format!("cannot be read: {error}"), remedy)
+}

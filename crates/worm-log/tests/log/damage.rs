@@ -1,0 +1,152 @@
+//! Files that were cut off or damaged.
+
+use std::fs::{self, File};
+use std::path::PathBuf;
+use testkit::log_sample::{Sink, crawl, origin};
+use worm_log::{Log, ReadError, Writer, messages};
+
+/// A log of 40 states, 10 in each chunk: its bytes, and for each chunk where it ends and how many states there are then.
+fn small_log() -> (Vec<u8>, Vec<(usize, usize)>) {
+    let sink = Sink::default();
+    let mut writer = Writer::new(sink.clone(), "small".as_ref(), &origin()).expect("memory takes all");
+    let mut chunks = vec![(sink.bytes().len(), 0)];
+    for (index, state) in crawl(0.04).states.iter().enumerate() {
+        writer.write(state).expect("memory takes all");
+        if index % 10 == 9 {
+            writer.flush().expect("memory takes all");
+            chunks.push((sink.bytes().len(), index + 1));
+        }
+    }
+    writer.finish().expect("memory takes all");
+    (sink.bytes(), chunks)
+}
+
+/// A file that changes, and what is read of it.
+struct Patient {
+    path: PathBuf,
+    _folder: tempfile::TempDir,
+}
+
+impl Patient {
+    fn new(bytes: &[u8]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("worm.mcap");
+        fs::write(&path, bytes).expect("can be written");
+        Self { path, _folder: folder }
+    }
+
+    fn cut(&self, length: usize) -> Result<Log, ReadError> {
+        let file = File::options().write(true).open(&self.path).expect("is there");
+        file.set_len(length as u64).expect("can be cut");
+        messages(&self.path)
+    }
+}
+
+#[test]
+fn a_log_cut_anywhere_gives_all_whole_chunks() {
+    let (bytes, chunks) = small_log();
+    let (data_end, _) = chunks[chunks.len() - 1];
+    let patient = Patient::new(&bytes);
+    for length in (0..bytes.len()).rev() {
+        let whole = chunks.iter().rfind(|(end, _)| *end <= length).map(|&(_, count)| count);
+        let log = patient.cut(length);
+        let count = log.as_ref().map_or(0, |log| log.states.len());
+        assert!(
+            count >= whole.unwrap_or(0),
+            "{count} states of {whole:?} at {length} bytes"
+        );
+        assert!(whole.is_none() || log.is_ok(), "cut at {length}: {log:?}");
+        if let Ok(log) = log {
+            // With 13 bytes of mark behind the data nothing is missing but the index.
+            let is_cut = length < data_end + 13;
+            assert_eq!(
+                log.warnings.len(),
+                usize::from(is_cut),
+                "at {length}: {:?}",
+                log.warnings
+            );
+            let told = log
+                .warnings
+                .iter()
+                .all(|warning| warning.starts_with(&format!("cut off after {count} messages")));
+            assert!(told, "{:?}", log.warnings);
+        }
+    }
+}
+
+#[test]
+fn what_can_be_unpacked_of_the_last_chunk_is_taken() {
+    let sink = Sink::default();
+    let mut writer = Writer::new(sink.clone(), "large".as_ref(), &origin()).expect("memory takes all");
+    let begin = sink.bytes().len();
+    for state in &crawl(1.0).states {
+        writer.write(state).expect("memory takes all");
+    }
+    writer.flush().expect("memory takes all");
+    let end = sink.bytes().len();
+    let patient = Patient::new(&sink.bytes());
+    let log = patient.cut(begin + (end - begin) / 2).expect("a log");
+    assert!(
+        (300..700).contains(&log.states.len()),
+        "{} of 1000 states",
+        log.states.len()
+    );
+    let sequences: Vec<_> = log.states.iter().map(|state| state.sequence).collect();
+    assert!(
+        sequences.iter().copied().eq(1..=sequences.len() as u64),
+        "in their order"
+    );
+    assert!(
+        log.warnings[0].contains("stand in a chunk that was not finished"),
+        "{:?}",
+        log.warnings
+    );
+}
+
+#[test]
+fn a_damaged_byte_costs_its_chunk_and_no_value_is_wrong() {
+    let (bytes, chunks) = small_log();
+    let truth = crawl(0.04).states;
+    for at in (0..bytes.len()).step_by(13) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x15;
+        let patient = Patient::new(&damaged);
+        // Refused or read, but never wrong: each state that comes is one that was written.
+        if let Ok(log) = messages(&patient.path) {
+            for state in &log.states {
+                let written = truth.iter().find(|written| written.sequence == state.sequence);
+                let written = written.unwrap_or_else(|| panic!("byte {at}: tick {} was never written", state.sequence));
+                assert_eq!(format!("{state:?}"), format!("{written:?}"), "byte {at}");
+            }
+        }
+    }
+    // In the middle of what the second chunk packs.
+    let mut damaged = bytes.clone();
+    damaged[(chunks[1].0 + chunks[2].0) / 2] ^= 0x15;
+    let log = messages(&Patient::new(&damaged).path).expect("the rest is there");
+    assert_eq!(log.states.len(), 30);
+    assert!(log.warnings[0].contains("is damaged"), "{:?}", log.warnings);
+}
+
+#[test]
+fn a_full_disk_is_told_and_what_was_written_can_be_read() {
+    let (whole, chunks) = small_log();
+    let sink = Sink::with_room(chunks[2].0 + 100);
+    let mut writer = Writer::new(sink.clone(), "full.mcap".as_ref(), &origin()).expect("there is room yet");
+    let mut outcome = Ok(());
+    for state in &crawl(0.04).states {
+        outcome = outcome.and_then(|()| writer.write(state));
+        if state.sequence % 10 == 0 {
+            outcome = outcome.and_then(|()| writer.flush());
+        }
+    }
+    let error = outcome.expect_err("there is no room").to_string();
+    assert!(
+        error.starts_with("full.mcap: cannot be written: no storage space: make room"),
+        "{error}"
+    );
+    drop(writer);
+    assert_eq!(sink.bytes(), whole[..chunks[2].0 + 100]);
+    let log = messages(&Patient::new(&sink.bytes()).path).expect("a log");
+    assert_eq!(log.states.len(), 20);
+}

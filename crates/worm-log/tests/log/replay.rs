@@ -1,0 +1,107 @@
+//! The same results live and on the log.
+
+use testkit::log_sample::{Told, crawl, crawl_with_late_estimator};
+use worm_log::{Comparison, compare, replay};
+
+fn replayed(told: Told) -> Comparison {
+    let config = told.config.clone();
+    let log = told.log();
+    let replay = replay(&log, &config).expect("a valid configuration");
+    compare(&log, &replay)
+}
+
+#[test]
+fn a_whole_log_comes_out_as_recorded() {
+    // An estimator that is late begins in the middle of a crawl.
+    for late in [0, 3, 1234] {
+        let told = crawl_with_late_estimator(6.5, late);
+        let (states, cycles, alarms) = (told.states.len(), told.cycles.len(), told.alarms.len());
+        assert!(cycles >= 2, "{cycles} cycles");
+        let comparison = replayed(told);
+        assert!(
+            comparison.complete && comparison.is_identical(),
+            "{late}: {comparison:?}"
+        );
+        assert_eq!(
+            (
+                comparison.states,
+                comparison.cycles_compared,
+                comparison.alarms_compared
+            ),
+            (states, cycles, alarms)
+        );
+        let samples = (states - late) * 120 / 1000;
+        assert!(
+            comparison.estimates_compared.abs_diff(samples) <= 1,
+            "no heartbeat is among them: {comparison:?}"
+        );
+    }
+}
+
+#[test]
+fn what_is_missing_is_told() {
+    type Loss = fn(&mut Told);
+    let table: [(&str, Loss, &str); 6] = [
+        (
+            "begins late",
+            |told| told.states = told.states.split_off(1500),
+            "the log begins after the estimator",
+        ),
+        (
+            "a state",
+            |told| told.states.retain(|state| state.sequence != 3000),
+            "1 states are not in the log",
+        ),
+        (
+            "a state that the estimator missed too",
+            |told| {
+                for estimate in told.estimates.iter_mut().skip(300) {
+                    estimate.states_lost = 2;
+                }
+            },
+            "the estimator had not received 2 states",
+        ),
+        (
+            "a cycle",
+            |told| told.cycles.retain(|cycle| cycle.index != 1),
+            "1 cycles came out that are not in the log",
+        ),
+        (
+            "the estimator's first life",
+            |told| {
+                let anew = crawl_with_late_estimator(5.0, 2500);
+                told.estimates.truncate(200);
+                told.estimates.extend(anew.estimates);
+            },
+            "the estimator was started anew at t = 3.5",
+        ),
+        (
+            "all estimates",
+            |told| told.estimates.clear(),
+            "there are no estimates in the log",
+        ),
+    ];
+    for (what, lose, warning) in table {
+        let mut told = crawl(5.0);
+        lose(&mut told);
+        let comparison = replayed(told);
+        assert!(!comparison.complete, "{what}");
+        assert!(
+            comparison.warnings.iter().any(|text| text.contains(warning)),
+            "{what}: {:?}",
+            comparison.warnings
+        );
+    }
+}
+
+#[test]
+fn a_result_that_differs_in_its_last_bit_is_found() {
+    let mut told = crawl(5.0);
+    let estimate = &mut told.estimates[400];
+    estimate.force_n[2] = estimate.force_n[2].next_up();
+    told.cycles[1].cot = f64::NAN;
+    let comparison = replayed(told);
+    assert_eq!(comparison.estimates_identical, comparison.estimates_compared - 1);
+    assert_eq!(comparison.cycles_identical, comparison.cycles_compared - 1);
+    assert!(!comparison.is_identical());
+}

@@ -1,0 +1,136 @@
+//! What a log holds.
+
+use std::fs;
+use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
+use worm_estimator::message::{Estimate, JsonMessage, State};
+use worm_log::{Channel, Writer, messages};
+
+fn text<T: JsonMessage>(messages: &[T]) -> Vec<u8> {
+    let mut text = Vec::new();
+    for message in messages {
+        message.write_json(&mut text).expect("can be written");
+    }
+    text
+}
+
+#[test]
+fn a_log_holds_what_was_written() {
+    let crawl = crawl(5.0);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("worm.mcap");
+    write_log(&path, &crawl);
+    let log = messages(&path).expect("a log");
+    assert_eq!(text(&log.states), text(&crawl.states));
+    assert_eq!(text(&log.timings), text(&crawl.timings));
+    assert_eq!(text(&log.estimates), text(&crawl.estimates));
+    assert_eq!(text(&log.cycles), text(&crawl.cycles));
+    assert_eq!(text(&log.alarms), text(&crawl.alarms));
+    assert!(log.cycles.len() >= 2 && log.estimates.len() > 500);
+    assert_eq!(log.config.as_deref(), Some(ORIGIN_CONFIG));
+    assert_eq!(log.metadata["worm"], "tester");
+    assert_eq!(log.metadata["begun_unix_ns"], "1500000000");
+    assert_eq!(log.warnings, Vec::<String>::new());
+}
+
+#[test]
+fn an_estimate_that_rests_on_nothing_takes_the_time_of_its_log() {
+    let sink = Sink::default();
+    let mut writer = Writer::new(sink.clone(), "x".as_ref(), &origin()).expect("memory takes all");
+    let crawl = crawl(0.1);
+    let nothing = Estimate {
+        time_ns: 0,
+        ..crawl.estimates[0]
+    };
+    writer.write(&nothing).expect("memory takes all");
+    assert_eq!(writer.count(Channel::Estimate), 1);
+    writer.finish().expect("memory takes all");
+    let bytes = sink.bytes();
+    let mut times = mcap::MessageStream::new(&bytes).expect("an MCAP file");
+    let message = times.next().expect("one").expect("whole");
+    assert_eq!(message.log_time, origin().begun_ns);
+}
+
+/// A log of one message, number 7, that another program wrote.
+fn foreign(topic: &str, type_name: &str, encoding: &str, message: &str) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let options = mcap::WriteOptions::new().compression(None);
+    let mut writer = options.create(&mut bytes).expect("memory takes all");
+    let schema = writer.add_schema(type_name, "jsonschema", b"{}").expect("a schema");
+    let channel = writer
+        .add_channel(schema, topic, encoding, &Default::default())
+        .expect("a channel");
+    let header = mcap::records::MessageHeader {
+        channel_id: channel,
+        sequence: 7,
+        log_time: 1,
+        publish_time: 1,
+    };
+    writer
+        .write_to_known_channel(&header, message.as_bytes())
+        .expect("a message");
+    writer.finish().expect("memory takes all");
+    drop(writer);
+    bytes.into_inner()
+}
+
+#[test]
+fn states_of_an_older_version_are_read_without_what_they_lack() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("worm.mcap");
+    let state = crawl(0.1).states[0];
+    let mut object: serde_json::Map<_, _> = serde_json::from_slice(&text(&[state])).expect("JSON");
+    for member in ["motor_time_s", "host_paused_ns"] {
+        object.remove(member).expect("is new");
+    }
+    let older = serde_json::Value::from(object).to_string();
+    fs::write(&path, foreign("/state", "wormd_state_v1", "json", &older)).expect("can be written");
+    let read = messages(&path).expect("a log").states;
+    let expected = State {
+        motor_time_s: f64::NAN,
+        host_paused_ns: 0,
+        ..state
+    };
+    assert_eq!(text(&read), text(&[expected]));
+}
+
+#[test]
+fn other_files_are_refused_with_what_to_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("worm.mcap");
+    for (bytes, parts) in [
+        (Vec::new(), &["cut off after 0 bytes"][..]),
+        (b"time_s,x1_m\n0,0\n".to_vec(), &["is no MCAP file"]),
+        (b"\x89MC".to_vec(), &["cut off after 3 bytes"]),
+        (b"\x89MCAP0\r\n".to_vec(), &["channel /state: has no channel at all"]),
+        (
+            foreign("/tf", "tf", "cdr", "x"),
+            &["channel /state: has no channel of a worm, only /tf"],
+        ),
+        (
+            foreign("/state", "wormd_state_v2", "cdr", "x"),
+            &[
+                "channel /state: holds messages encoded as 'cdr', not as 'json'",
+                "wormd record",
+            ],
+        ),
+        (
+            foreign("/state", "wormd_state_v9", "json", "{}"),
+            &["channel /state: holds 'wormd_state_v9', and this version of wormd reads 'wormd_state_v2'"],
+        ),
+        (
+            foreign("/state", "wormd_state_v2", "json", "{\"sequence\": -1}"),
+            &[
+                "channel /state, message 7: cannot be read: invalid value: integer `-1`",
+                "line 1 column",
+            ],
+        ),
+    ] {
+        fs::write(&path, &bytes).expect("can be written");
+        let error = messages(&path).expect_err(parts[0]).to_string();
+        for part in parts {
+            assert!(error.contains(part), "{part} is not in {error}");
+        }
+    }
+    let error = messages(&folder.path().join("none.mcap")).expect_err("is not there");
+    assert!(error.to_string().contains("check that the file is there"), "{error}");
+}

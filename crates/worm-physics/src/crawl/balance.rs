@@ -1,0 +1,173 @@
+//! The balance of the body within one increment.
+
+use super::{Crawl, Increment};
+use crate::mechanics::Mechanics;
+use crate::pad::{Hold, Loaded, Pad, PadLaw};
+use crate::worm::SlidesDown;
+
+/// Unbalanced force, as a share of what the tips can hold, to which an increment is solved.
+const BALANCE_SHARE: f64 = 1e-9;
+/// Iterations after which an increment ends in any case: halving alone would do by then.
+const MOST_ITERATIONS: usize = 120;
+/// Way of the body in one increment beyond which nothing holds it, m.
+const LOST_M: f64 = 0.5;
+/// Way to which a cell's own way against its drive is solved, m.
+const OWN_WAY_M: f64 = 1e-15;
+/// Width of a bracket that cannot be halved any more, m.
+const NARROW_M: f64 = 1e-16;
+
+/// How far from balance a trial of one increment leaves the body.
+#[derive(Clone, Copy)]
+pub(super) struct Balance {
+    excess_n: f64,
+    slope_n_per_m: f64,
+}
+
+impl Crawl {
+    /// The translation that balances the body, m; every cell's trial is the one at it.
+    pub(super) fn solve(&mut self, mechanics: &Mechanics, increment: &Increment) -> Result<f64, SlidesDown> {
+        let tolerance_n = BALANCE_SHARE * mechanics.full_force_n.max(1e-6);
+        let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
+        // Without mass, the translation nearest to rest is the one meant where several balance.
+        let mut at_m = if increment.inertia_n_per_m > 0.0 {
+            self.rate_m_s * increment.step_s
+        } else {
+            0.0
+        };
+        let mut reach_m = 1e-4;
+        let mut balance = self.try_out(mechanics, increment, at_m);
+        for _ in 0..MOST_ITERATIONS {
+            if balance.excess_n.abs() <= tolerance_n || high_m - low_m < NARROW_M {
+                break;
+            }
+            if balance.excess_n > 0.0 {
+                high_m = at_m;
+            } else {
+                low_m = at_m;
+            }
+            let newton_m = if balance.slope_n_per_m > 0.0 {
+                at_m - balance.excess_n / balance.slope_n_per_m
+            } else {
+                f64::NAN
+            };
+            at_m = if newton_m > low_m && newton_m < high_m {
+                newton_m
+            } else if low_m.is_finite() && high_m.is_finite() {
+                0.5 * (low_m + high_m)
+            } else {
+                reach_m *= 4.0;
+                at_m - balance.excess_n.signum() * reach_m
+            };
+            if at_m.abs() > LOST_M {
+                return Err(self.slides(mechanics));
+            }
+            balance = self.try_out(mechanics, increment, at_m);
+        }
+        Ok(at_m)
+    }
+
+    pub(super) fn slides(&self, mechanics: &Mechanics) -> SlidesDown {
+        let pull_n = mechanics.pull_n + mechanics.laws.tether_n_per_m * self.travelled_m;
+        let held = self.cell[..self.cells].iter().zip(&mechanics.pad);
+        SlidesDown {
+            pull_n,
+            hold_n: held
+                .map(|(cell, law)| cell.trial.friction * if pull_n >= 0.0 { law.backward_n } else { law.forward_n })
+                .sum(),
+        }
+    }
+
+    /// Tries a translation out; every cell's trial is the one at it afterwards.
+    pub(super) fn try_out(&mut self, mechanics: &Mechanics, increment: &Increment, translation_m: f64) -> Balance {
+        let laws = &mechanics.laws;
+        let (damping, drag) = (increment.damping_n_per_m, increment.drag_n_per_m);
+        let (mut excess_n, mut slope_n_per_m) = (mechanics.pull_n, 0.0);
+        // Of the cells' mean: its way, and how much of a way of the body it makes.
+        let (mut mean_shift_m, mut yields) = (0.0, 0.0);
+        for (cell, law) in self.cell[..self.cells].iter_mut().zip(&mechanics.pad) {
+            let trial = &mut cell.trial;
+            let way = Way {
+                law,
+                pad: &cell.pad,
+                relaxing: increment.relaxing,
+                compliance_m_per_n: laws.compliance_m_per_n,
+            };
+            let (shift_m, loaded, gives) = way.load(trial.driven_m + translation_m, &mut trial.hold);
+            (trial.shift_m, trial.loaded) = (shift_m, loaded);
+            let strain_m = loaded.deformation_m - cell.pad.deformation_m;
+            excess_n += loaded.force_n + damping * strain_m + drag * shift_m;
+            // The share of a shift that strains the pad.
+            let damped = damping * (loaded.tangent_n_per_m / law.stiffness_n_per_m).min(1.0);
+            slope_n_per_m += (loaded.tangent_n_per_m + damped + drag) * gives;
+            mean_shift_m += shift_m;
+            yields += gives;
+        }
+        let cells = self.cells as f64;
+        mean_shift_m /= cells;
+        yields /= cells;
+        excess_n += laws.tether_n_per_m * (self.travelled_m + mean_shift_m);
+        slope_n_per_m += laws.tether_n_per_m.max(0.0) * yields;
+        if increment.inertia_n_per_m > 0.0 {
+            excess_n += mechanics.mass_kg * self.acceleration_after(mean_shift_m, increment);
+            slope_n_per_m += increment.inertia_n_per_m * yields;
+        }
+        Balance {
+            excess_n,
+            slope_n_per_m,
+        }
+    }
+
+    /// Acceleration at the end of an increment in which the mean of the cells made a way, by Newmark's method.
+    pub(super) fn acceleration_after(&self, mean_shift_m: f64, increment: &Increment) -> f64 {
+        let step_s = increment.step_s;
+        4.0 / (step_s * step_s) * (mean_shift_m - self.velocity_m_s * step_s) - self.acceleration_m_s2
+    }
+}
+
+/// A cell between its drive and its tip.
+struct Way<'a> {
+    law: &'a PadLaw,
+    pad: &'a Pad,
+    relaxing: f64,
+    compliance_m_per_n: f64,
+}
+
+impl Way<'_> {
+    /// How far the cell moves when its drive moves by `driven_m`, what its tip does, and the slope of the first to the second.
+    #[inline]
+    fn load(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
+        if self.compliance_m_per_n == 0.0 {
+            let loaded = self.law.load(self.pad, driven_m, hold, self.relaxing);
+            return (driven_m, loaded, 1.0);
+        }
+        self.load_yielding(driven_m, hold)
+    }
+
+    /// The cell gives way by C (F − F before): a monotone equation of its own, solved as the body's is.
+    fn load_yielding(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
+        let compliance = self.compliance_m_per_n;
+        let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut shift_m = driven_m / (1.0 + compliance * self.law.stiffness_n_per_m);
+        let mut loaded = self.law.load(self.pad, shift_m, hold, self.relaxing);
+        for _ in 0..MOST_ITERATIONS {
+            let excess_m = shift_m + compliance * (loaded.force_n - self.pad.force_n) - driven_m;
+            if excess_m.abs() <= OWN_WAY_M || high_m - low_m < NARROW_M {
+                break;
+            }
+            if excess_m > 0.0 {
+                high_m = shift_m;
+            } else {
+                low_m = shift_m;
+            }
+            let newton_m = shift_m - excess_m / (1.0 + compliance * loaded.tangent_n_per_m);
+            let is_within = newton_m > low_m && newton_m < high_m;
+            shift_m = if is_within || !(low_m.is_finite() && high_m.is_finite()) {
+                newton_m
+            } else {
+                0.5 * (low_m + high_m)
+            };
+            loaded = self.law.load(self.pad, shift_m, hold, self.relaxing);
+        }
+        (shift_m, loaded, 1.0 / (1.0 + compliance * loaded.tangent_n_per_m))
+    }
+}

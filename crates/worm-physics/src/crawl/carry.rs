@@ -1,0 +1,39 @@
+//! The worm carried along a path that was measured: the tips obey their laws, the body goes where it went.
+
+use super::{Crawl, SHORTEST_S};
+use crate::mechanics::Mechanics;
+
+/// Trials after which the cells' own ways against a yielding drive count as found.
+const MOST_TRIALS: usize = 30;
+/// Way of the body to which they are, m.
+const FOUND_M: f64 = 1e-10;
+
+impl Crawl {
+    /// Carries the worm to a phase that is reached evenly after `duration_s`, the mean of its cells to `mean_m`, balance or not. The
+    /// ledger books what the contacts and the weight take on that path; the actuators' work is then without meaning.
+    pub fn carry_to(&mut self, mechanics: &Mechanics, phase: f64, duration_s: f64, mean_m: f64) {
+        let (from, from_m) = (self.phase, self.mean_position_m());
+        let parts = self.parts(phase, duration_s);
+        for part in 1..=parts as usize {
+            let share = part as f64 / parts;
+            let here_m = from_m + share * (mean_m - from_m);
+            self.carry(mechanics, from + share * (phase - from), duration_s / parts, here_m);
+        }
+    }
+
+    fn carry(&mut self, mechanics: &Mechanics, phase: f64, step_s: f64, mean_m: f64) {
+        let shift_m = mean_m - self.mean_position_m();
+        let increment = self.prepare(mechanics, phase, step_s.max(SHORTEST_S));
+        let mut translation_m = 0.0;
+        for _ in 0..MOST_TRIALS {
+            self.try_out(mechanics, &increment, translation_m);
+            let tried_m: f64 = self.cell[..self.cells].iter().map(|cell| cell.trial.shift_m).sum();
+            let missing_m = shift_m - tried_m / self.cells as f64;
+            if missing_m.abs() < FOUND_M {
+                break;
+            }
+            translation_m += missing_m;
+        }
+        self.take(mechanics, &increment, translation_m, phase);
+    }
+}

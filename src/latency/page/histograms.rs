@@ -1,0 +1,208 @@
+//! Every duration as a histogram over its floor's, both axes logarithmic: one late tick among a million is seen.
+
+use super::words::{NOT_MEASURED, told};
+use crate::latency::{Durations, Outcome};
+use worm_analysis::report::page::{Figure, Key, Mark, Panel};
+use worm_analysis::report::plot::{Axis, BLUE, Colour, DrawError, INK, MUTED, Row, Sheet, Stroke, VERMILION, draw};
+
+const LOOP: Colour = BLUE;
+const FLOOR: Colour = VERMILION;
+/// Opacity of the area, so that the floor's line is seen before it.
+const PALE: f64 = 0.3;
+
+/// Bars over the whole width of a picture.
+const BARS: usize = 90;
+/// Shortest duration that is told apart, µs: what is shorter stands in the first bar.
+const SHORTEST_US: f64 = 0.01;
+/// Where the bars begin: low enough that a single one is seen.
+const FOOT: f64 = 0.5;
+/// The axis of counts reaches at least so far, so that it has a scale.
+const LEAST_TOP: f64 = 100.0;
+
+/// Room that the name of a percentile takes, as a share of the width: one that would stand in another's is left out.
+const NAME: f64 = 0.06;
+
+/// One picture: a duration, and its floor where it has one.
+struct Histogram<'a> {
+    title: &'a str,
+    durations: &'a Durations,
+    floor: Option<&'a Durations>,
+    height: f64,
+    tells_percentiles: bool,
+}
+
+/// The wake lateness over the bare sleeper's.
+pub(super) fn wake(outcome: &Outcome) -> Result<Figure, DrawError> {
+    let histogram = Histogram {
+        title: "wake lateness",
+        durations: &outcome.wake_us,
+        floor: Some(&outcome.floor_wake_us),
+        height: 270.0,
+        tells_percentiles: true,
+    };
+    Ok(Figure {
+        id: "wake",
+        title: "How late the loop runs, and how late a bare sleeper does".to_owned(),
+        keys: keys("bare sleeper, in the same run"),
+        panels: vec![histogram.panel()?],
+        caption: "Where the line follows the edge of the area, the loop is as punctual as the machine lets it be; what the area \
+                  has beyond the line is what the loop adds. Single late ticks far out differ by chance. Both axes are \
+                  logarithmic: the height of a bar of one is seen beside one of a million."
+            .to_owned(),
+    })
+}
+
+/// The parts of a tick, and what comes of it.
+pub(super) fn parts(outcome: &Outcome) -> Result<Figure, DrawError> {
+    let alone = [
+        ("bus exchange", &outcome.bus_us, None),
+        ("computation and publishing", &outcome.own_work_us, None),
+        ("tick period", &outcome.period_us, None),
+        ("waking who listens", &outcome.notify_us, Some(&outcome.floor_notify_us)),
+        (
+            "delivery, woken by the event",
+            &outcome.delivery_us,
+            Some(&outcome.floor_delivery_us),
+        ),
+        (
+            "delivery, never asleep",
+            &outcome.polled_delivery_us,
+            Some(&outcome.floor_polled_delivery_us),
+        ),
+        ("from stall to alarm", &outcome.alarm_us, None),
+    ];
+    // Nobody blocks the cam of a real worm: what is missing there is no gap.
+    let shown = alone
+        .into_iter()
+        .filter(|(_, durations, _)| !durations.is_empty() || !std::ptr::eq(*durations, &outcome.alarm_us));
+    let panels = shown.map(|(title, durations, floor)| {
+        let histogram = Histogram {
+            title,
+            durations,
+            floor,
+            height: 150.0,
+            tells_percentiles: false,
+        };
+        histogram.panel()
+    });
+    Ok(Figure {
+        id: "parts",
+        title: "The parts of a tick, and what comes of it".to_owned(),
+        keys: keys("the same without wormd: bare notifier, bare iceoryx2 pairs"),
+        panels: panels.collect::<Result<_, _>>()?,
+        caption: "Delivery runs from before the state is published until a subscriber has it in hand: the estimator, which sleeps \
+                  until its event wakes it, or one that never sleeps. Each picture has its own axes."
+            .to_owned(),
+    })
+}
+
+fn keys(floor: &str) -> Vec<Key> {
+    vec![Key::new(Mark::Box, LOOP, "wormd"), Key::new(Mark::Line, FLOOR, floor)]
+}
+
+impl Histogram<'_> {
+    fn panel(&self) -> Result<Panel, DrawError> {
+        Ok(Panel {
+            title: self.title.to_owned(),
+            quantity: "how many, by µs, both logarithmic".to_owned(),
+            svg: self.picture()?,
+        })
+    }
+
+    fn picture(&self) -> Result<String, DrawError> {
+        let both = || std::iter::once(self.durations).chain(self.floor);
+        let ends = both().flat_map(Durations::bars).map(|(us, _)| us.max(SHORTEST_US));
+        let (shortest, longest) = ends.fold((f64::INFINITY, 0.0f64), |(low, high), us| (low.min(us), high.max(us)));
+        let x = Axis::logarithmic(shortest, longest);
+        let counts = binned(self.durations, &x);
+        let floor = self.floor.map(|floor| binned(floor, &x)).unwrap_or_default();
+        let most = counts.iter().chain(&floor).copied().max().unwrap_or(0);
+        let sheet = Sheet {
+            description: self.description(),
+            x_label: Some("µs".to_owned()),
+            rows: vec![Row::new(
+                Axis::logarithmic(1.2 * FOOT, LEAST_TOP.max(most as f64)),
+                self.height,
+            )],
+            x,
+        };
+        draw(&sheet, |_, plot| {
+            let x = &sheet.x;
+            if self.durations.is_empty() {
+                plot.words_behind(x.low(), LEAST_TOP.sqrt(), MUTED, NOT_MEASURED)?;
+            }
+            let outline = outline(&counts, x);
+            plot.ribbon(outline.iter().map(|(x, y)| (*x, [FOOT, *y])), LOOP, PALE)?;
+            plot.line(outline, Stroke::new(LOOP, 1.2))?;
+            plot.line(self::outline(&floor, x), Stroke::new(FLOOR, 1.5))?;
+            let percentiles = self.durations.measured().filter(|_| self.tells_percentiles);
+            if let Some(us) = percentiles {
+                let mut named = f64::NEG_INFINITY;
+                for (name, us) in [("p50", us.p50), ("p99", us.p99), ("max", us.max)] {
+                    plot.upright(us, FOOT, sheet.rows[0].y.high(), Stroke::new(INK, 1.0).dashed())?;
+                    if share(us, x) - named > NAME {
+                        plot.name_above(us, INK, name)?;
+                        named = share(us, x);
+                    }
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// What the picture shows, for those who cannot see it.
+    fn description(&self) -> String {
+        let tell = |durations: &Durations| match durations.measured() {
+            Some(us) => format!(
+                "median {}, 99th percentile {}, largest {}",
+                told(us.p50),
+                told(us.p99),
+                told(us.max)
+            ),
+            None => NOT_MEASURED.to_owned(),
+        };
+        let floor = self.floor.map(|floor| format!("; floor: {}", tell(floor)));
+        format!(
+            "Histogram of {}: {}{}",
+            self.title,
+            tell(self.durations),
+            floor.unwrap_or_default()
+        )
+    }
+}
+
+/// Where a bar begins; the last one's end is the beginning of one more.
+fn edge(bar: usize, x: &Axis) -> f64 {
+    x.low() * (x.high() / x.low()).powf(bar as f64 / BARS as f64)
+}
+
+/// Where a duration lies between the ends of the axis.
+fn share(us: f64, x: &Axis) -> f64 {
+    (us.max(x.low()) / x.low()).ln() / (x.high() / x.low()).ln()
+}
+
+/// How many durations are in each bar of the picture.
+fn binned(durations: &Durations, x: &Axis) -> Vec<u64> {
+    let mut counts = vec![0; BARS];
+    for (us, count) in durations.bars() {
+        counts[((share(us, x) * BARS as f64) as usize).min(BARS - 1)] += count;
+    }
+    counts
+}
+
+/// The bars' common outline, from the foot up and down again; broken where there are none.
+fn outline(counts: &[u64], x: &Axis) -> Vec<(f64, f64)> {
+    let mut points = Vec::new();
+    let is_empty = |bar: usize| counts.get(bar).is_none_or(|count| *count == 0);
+    for (bar, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let (from, to) = (edge(bar, x), edge(bar + 1, x));
+        if bar == 0 || is_empty(bar - 1) {
+            points.push((from, FOOT));
+        }
+        points.extend([(from, *count as f64), (to, *count as f64)]);
+        if is_empty(bar + 1) {
+            points.extend([(to, FOOT), (to, f64::NAN)]);
+        }
+    }
+    points
+}

@@ -1,0 +1,43 @@
+//! The bus with a worm's devices on it.
+
+use std::ops::{Deref, DerefMut};
+
+use super::{Bus, Port};
+
+/// A [`Bus`] with a worm's servo and tracker on it: what any bus can do, and the [exchange](Self::exchange) of a tick.
+#[derive(Debug)]
+pub struct WormBus<P> {
+    pub(super) bus: Bus<P>,
+    /// Exchanges to which the servo's answer may still come.
+    pub(super) answers_owed: u32,
+    /// An answer of the servo came in the last exchange, be it to an earlier one.
+    pub(super) was_answered: bool,
+    /// Exchanges since a device last sent anything.
+    pub(super) silent_in_a_row: u32,
+}
+
+impl<P: Port> WormBus<P> {
+    /// The worm's bus on this port.
+    pub const fn new(port: P) -> Self {
+        Self {
+            bus: Bus::new(port),
+            answers_owed: 0,
+            was_answered: false,
+            silent_in_a_row: 0,
+        }
+    }
+}
+
+impl<P> Deref for WormBus<P> {
+    type Target = Bus<P>;
+
+    fn deref(&self) -> &Bus<P> {
+        &self.bus
+    }
+}
+
+impl<P> DerefMut for WormBus<P> {
+    fn deref_mut(&mut self) -> &mut Bus<P> {
+        &mut self.bus
+    }
+}

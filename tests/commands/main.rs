@@ -1,0 +1,12 @@
+//! The commands as a user types them: output, files, exit codes, and what they say of wrong input.
+
+mod advances;
+mod analyze;
+mod command_line;
+mod experiment_reproduction;
+mod explain;
+mod latency_page;
+mod latency_sample;
+mod mcap_python;
+mod simulate;
+mod workspace;

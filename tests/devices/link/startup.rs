@@ -1,0 +1,193 @@
+//! Start-up: what is refused, what is mended, what is said.
+
+use dynamixel_bus::packet::DeviceId;
+use wormd::link::servo::register;
+use wormd::link::{
+    Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError, WormBus, prepare, tracker,
+};
+
+use super::worm::{SERVO, TRACKER, Worm, id};
+
+pub fn settings() -> LinkSettings {
+    LinkSettings {
+        baud: 1_000_000,
+        servo_id: id(SERVO),
+        servo_model: 1200,
+        tracker_id: id(TRACKER),
+        tracker_model: tracker::MODEL,
+        cells: 5,
+        read: ReadMode::Auto,
+        watchdog_ms: 100,
+        current_limit_a: 1.0,
+        velocity_limit_rad_s: 10.0,
+        temperature_limit_c: 70.0,
+    }
+}
+
+fn prepare_worm(worm: &mut Worm, settings: &LinkSettings) -> (Result<Prepared, StartupError>, Vec<Finding>) {
+    let mut findings = Vec::new();
+    let prepared = prepare(&mut WormBus::new(worm), settings, &mut findings);
+    (prepared, findings)
+}
+
+fn said(findings: &[Finding]) -> Vec<String> {
+    findings.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn servo_from_the_factory_is_set_up() {
+    let mut worm = Worm::new(5);
+    let (prepared, findings) = prepare_worm(&mut worm, &settings());
+    let prepared = prepared.expect("prepared");
+    assert_eq!(
+        (prepared.plan.read, prepared.tracker_cells, prepared.servo.firmware),
+        (ReadPlan::FastBulk, 5, 52)
+    );
+    assert!((prepared.servo_reading.position_rad - std::f64::consts::TAU).abs() < 1e-9);
+    assert_eq!(
+        said(&findings),
+        [
+            "the servo waited 500 µs before each answer (mended: set to 0)",
+            "operating mode (register 11) of the servo was 3 (mended: set to 1)",
+            "current limit (register 38) of the servo was 1750 (mended: set to 1000)",
+            "velocity limit (register 44) of the servo was 445 (mended: set to 417)",
+        ]
+    );
+    let registers = [
+        register::STATUS_RETURN_LEVEL,
+        register::BUS_WATCHDOG,
+        register::TORQUE_ENABLE,
+        register::RETURN_DELAY,
+    ];
+    assert_eq!(registers.map(|register| worm.servo(register)), [1, 5, 0, 0]);
+    // The second time there is nothing to mend.
+    let (prepared, findings) = prepare_worm(&mut worm, &settings());
+    assert!(prepared.is_ok());
+    assert_eq!(findings, []);
+}
+
+#[test]
+fn servo_left_alone_by_a_crash_is_brought_to_rest() {
+    let mut worm = Worm::new(5);
+    worm.set_servo(register::TORQUE_ENABLE, 1);
+    worm.set_servo(register::BUS_WATCHDOG, 0xFF);
+    worm.set_servo(register::GOAL_VELOCITY, 105);
+    worm.set_servo(register::STATUS_RETURN_LEVEL, 0);
+    let (prepared, findings) = prepare_worm(&mut worm, &settings());
+    assert!(prepared.is_ok_and(|prepared| !prepared.servo_reading.watchdog_latched()));
+    assert_eq!(
+        said(&findings)[..2],
+        [
+            "torque was on: an earlier controller ended without an orderly stop (mended: torque off)",
+            "the bus watchdog had stopped the motor: the computer fell silent while torque was on (mended: cleared)",
+        ]
+    );
+    assert_eq!(worm.servo(register::GOAL_VELOCITY), 0);
+}
+
+#[test]
+fn read_mode_is_the_fastest_that_both_know() {
+    for (no_fast, no_bulk, read) in [
+        (false, false, ReadPlan::FastBulk),
+        (true, false, ReadPlan::Bulk),
+        (true, true, ReadPlan::Separate),
+    ] {
+        let mut worm = Worm::new(5);
+        (worm.quirks.knows_no_fast_bulk, worm.quirks.knows_no_bulk) = (no_fast, no_bulk);
+        let (prepared, findings) = prepare_worm(&mut worm, &settings());
+        assert_eq!(prepared.map(|prepared| prepared.plan.read), Ok(read));
+        let remarked = findings
+            .iter()
+            .any(|finding| finding.remedy == format!("read mode {read:?}"));
+        assert_eq!(remarked, read != ReadPlan::FastBulk);
+    }
+    let mut worm = Worm::new(5);
+    worm.quirks.knows_no_bulk = true;
+    let always_bulk = LinkSettings {
+        read: ReadMode::Always(ReadPlan::Bulk),
+        ..settings()
+    };
+    assert_eq!(
+        prepare_worm(&mut worm, &always_bulk)
+            .0
+            .expect_err("not readable")
+            .to_string(),
+        "reading both devices at once brings nothing whole: servo no answer by the deadline, tracker no answer by the \
+         deadline; try read mode `separate`"
+    );
+}
+
+#[test]
+fn refusals_say_what_is_wrong_and_what_to_do() {
+    type Spoil = fn(&mut Worm, &mut LinkSettings);
+    let table: [(Spoil, &str); 8] = [
+        (
+            |worm, _| worm.set_servo(register::MODEL_NUMBER, 1020),
+            "servo (ID 1) is of model 1020, the config says 1200: correct servo.id or servo.model_number",
+        ),
+        (
+            |worm, _| worm.put_tracker(tracker::register::MODEL_NUMBER, 7),
+            "tracker (ID 100) is of model 7, the config says 22349: correct tracker.id or tracker.model_number",
+        ),
+        (
+            |worm, _| worm.baud = 57_600,
+            "servo answers at 57600 baud, the config says 1000000: set port.baud to 57600, or register 8 of the servo",
+        ),
+        (
+            |_, settings| settings.servo_id = DeviceId::new(2).expect("a valid ID"),
+            "servo (ID 2) does not answer at 1000000 baud: check power, cable and the ID in the config; these IDs do: \
+             1 (model 1200), 100 (model 22349)",
+        ),
+        (
+            |worm, _| worm.baud = 9,
+            "servo (ID 1) does not answer at 1000000 baud: check power, cable and the ID in the config; nobody does",
+        ),
+        (
+            |worm, _| worm.set_servo(register::HARDWARE_ERROR_STATUS, 0b10_0100),
+            "the servo reports a hardware error: overheating, overload; remove the cause, then reboot the servo (a reset \
+             does so)",
+        ),
+        (
+            |_, settings| settings.cells = 6,
+            "the tracker tracks 5 cells, the config says 6: correct worm.cells, or set up the tracker",
+        ),
+        (
+            |_, settings| settings.current_limit_a = 70.0,
+            "70 is no current limit (register 38) that the servo can hold: correct it in the config",
+        ),
+    ];
+    for (spoil, message) in table {
+        let (mut worm, mut settings) = (Worm::new(5), settings());
+        spoil(&mut worm, &mut settings);
+        let (prepared, _) = prepare_worm(&mut worm, &settings);
+        assert_eq!(prepared.expect_err(message).to_string(), message);
+    }
+}
+
+#[test]
+fn setting_that_is_not_kept_is_refused() {
+    let mut worm = Worm::new(5);
+    worm.quirks.keeps_operating_mode = true;
+    let (prepared, _) = prepare_worm(&mut worm, &settings());
+    let register = register::OPERATING_MODE;
+    let not_kept = OperationError::NotKept {
+        id: id(SERVO),
+        register,
+        wanted: 1,
+        found: 3,
+    };
+    assert_eq!(prepared, Err(StartupError::Operation(not_kept)));
+}
+
+#[test]
+fn firmware_whose_watchdog_does_not_stop_the_motor_is_named() {
+    let mut worm = Worm::new(5);
+    worm.set_servo(register::FIRMWARE_VERSION, 51);
+    let (prepared, findings) = prepare_worm(&mut worm, &settings());
+    assert!(prepared.is_ok());
+    assert!(
+        !findings[0].corrected && findings[0].what.contains("firmware 51"),
+        "{:?}",
+        findings[0]
+    );
+}

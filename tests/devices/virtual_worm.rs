@@ -1,0 +1,167 @@
+//! The virtual worm in real time, as the controller's own link sees it through a pseudo-terminal.
+
+use dynamixel_bus::packet::DeviceId;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use wormd::link::virtual_worm::{Options, VirtualWorm};
+use wormd::link::{LinkSettings, ReadMode, ReadPlan, StartupError, Tty, WormBus, prepare, tracker};
+
+const BAUD: u32 = 1_000_000;
+
+fn spawn(faults: &[&str], baud: Option<u32>) -> VirtualWorm {
+    let faults = faults.iter().map(|text| text.parse().expect("a fault")).collect();
+    let options = Options {
+        faults,
+        baud,
+        ..Options::default()
+    };
+    VirtualWorm::spawn(&Config::default(), &options).expect("a virtual worm")
+}
+
+fn settings() -> LinkSettings {
+    LinkSettings {
+        baud: BAUD,
+        servo_id: DeviceId::new(1).expect("an ID"),
+        servo_model: 1200,
+        tracker_id: DeviceId::new(100).expect("an ID"),
+        tracker_model: tracker::MODEL,
+        cells: 4,
+        read: ReadMode::Auto,
+        watchdog_ms: 100,
+        current_limit_a: 1.0,
+        velocity_limit_rad_s: 6.0,
+        temperature_limit_c: 70.0,
+    }
+}
+
+fn open(path: &Path, baud: u32) -> WormBus<Tty> {
+    WormBus::new(Tty::open(path, baud).expect("a port").0)
+}
+
+/// A controller's whole day: make ready, arm, crawl at 1 kHz, and hold what was seen against the truth.
+#[test]
+fn link_and_virtual_worm_understand_each_other() {
+    let worm = spawn(&[], None);
+    let mut bus = open(worm.path(), BAUD);
+    let mut findings = Vec::new();
+    let prepared = prepare(&mut bus, &settings(), &mut findings).expect("a worm that is ready");
+    assert_eq!(prepared.plan.read, ReadPlan::FastBulk);
+    assert!(findings.iter().all(|finding| finding.corrected), "{findings:?}");
+    bus.set_torque(prepared.plan.servo, true).expect("torque");
+    let mut took_us = Vec::new();
+    let mut lost = 0;
+    let (mut first, mut last) = (None, None);
+    let began = Instant::now();
+    let ticks = 1500;
+    for tick in 0..ticks {
+        let due = began + Duration::from_millis(tick);
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        let asked = Instant::now();
+        let outcome = bus.exchange(&prepared.plan, 2.5, asked + Duration::from_millis(5));
+        took_us.push(asked.elapsed().as_micros());
+        lost += outcome.lost;
+        last = outcome.servo.ok().or(last);
+        first = first.or(last);
+    }
+    took_us.sort_unstable();
+    let share = |share: f64| took_us[(share * (took_us.len() - 1) as f64) as usize];
+    println!(
+        "exchange at 1 kHz: median {} us, 99 % {} us, worst {} us",
+        share(0.5),
+        share(0.99),
+        share(1.0)
+    );
+    assert_eq!(lost, 0, "each question is answered, late at worst");
+    let (began, seen) = (first.expect("a reading"), last.expect("a reading"));
+    let motor_s = f64::from(seen.realtime_tick_ms.wrapping_sub(began.realtime_tick_ms) % 32_768) * 1e-3;
+    let turned_rad = seen.position_rad - began.position_rad;
+    assert!(
+        (turned_rad - 2.5 * motor_s).abs() < 0.2,
+        "{turned_rad} rad in {motor_s} s of the servo's time at 2.5 rad/s"
+    );
+    drop(bus);
+    let devices = worm.stop().expect("it ran");
+    let turned_rad = devices.plant().motor().angle_rad();
+    assert!(
+        (seen.position_rad - turned_rad).abs() < 0.5,
+        "{} of {turned_rad}",
+        seen.position_rad
+    );
+    assert!(devices.report().total.electrical_j > 0.2);
+}
+
+#[test]
+fn peers_may_come_and_go() {
+    let worm = spawn(&[], None);
+    for _ in 0..50 {
+        let mut bus = open(worm.path(), BAUD);
+        prepare(&mut bus, &settings(), &mut Vec::new()).expect("a worm that is ready");
+    }
+    worm.stop().expect("it ran");
+}
+
+#[test]
+fn babble_and_silence_are_survived() {
+    let worm = spawn(&[], None);
+    {
+        let mut file = std::fs::OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(worm.path())
+            .expect("a port");
+        let noise: Vec<u8> = (0..20_000u32).map(|byte| (byte * 7 + byte / 255) as u8).collect();
+        for chunk in noise.chunks(500) {
+            file.write_all(chunk).expect("sent");
+        }
+        // Pings that nobody reads the answers of.
+        let ping = [0xFF, 0xFF, 0xFD, 0, 1, 3, 0, 1, 0x19, 0x4E];
+        for _ in 0..5000 {
+            file.write_all(&ping).expect("sent");
+        }
+        let mut some = [0; 14];
+        file.read_exact(&mut some).expect("answers");
+    }
+    let mut bus = open(worm.path(), BAUD);
+    prepare(&mut bus, &settings(), &mut Vec::new()).expect("a worm that is ready");
+    worm.stop().expect("it ran");
+}
+
+#[test]
+fn strict_baud_rate_is_heard_only_at_that_rate() {
+    let worm = spawn(&[], Some(57_600));
+    let mut bus = open(worm.path(), BAUD);
+    let refused = prepare(&mut bus, &settings(), &mut Vec::new());
+    assert!(
+        matches!(refused, Err(StartupError::OtherBaudRate { found: 57_600, .. })),
+        "{refused:?}"
+    );
+    drop(bus);
+    let mut bus = open(worm.path(), 57_600);
+    let settings = LinkSettings {
+        baud: 57_600,
+        ..settings()
+    };
+    prepare(&mut bus, &settings, &mut Vec::new()).expect("a worm that is ready");
+    drop(bus);
+    worm.stop().expect("it ran");
+}
+
+#[test]
+fn faults_reach_the_link() {
+    let worm = spawn(&["wrong-model:number=1190"], None);
+    let refused = prepare(&mut open(worm.path(), BAUD), &settings(), &mut Vec::new());
+    assert!(
+        matches!(refused, Err(StartupError::WrongModel { found: 1190, .. })),
+        "{refused:?}"
+    );
+    worm.stop().expect("it ran");
+    let worm = spawn(&["silence:device=tracker"], None);
+    let refused = prepare(&mut open(worm.path(), BAUD), &settings(), &mut Vec::new());
+    assert!(
+        matches!(refused, Err(StartupError::Silent { device: "tracker", .. })),
+        "{refused:?}"
+    );
+    worm.stop().expect("it ran");
+}

@@ -1,0 +1,6 @@
+//! The topics in real shared memory: publishing, starting and leaving, readers in Python.
+
+mod home;
+mod publishing;
+mod python;
+mod start;
