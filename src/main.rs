@@ -27,7 +27,7 @@ enum Subcommands {
     /// The simulated devices on a pseudo-terminal
     VirtualWorm(command::virtual_worm::VirtualWormArgs),
     /// A command to a running controller
-    Command(command::order::OrderArgs),
+    Command(command::send_command::SendCommandArgs),
     /// The topics of a worm into a log (MCAP)
     Record(command::record::RecordArgs),
     /// A log through the estimator once more: whether it comes to the same results
@@ -84,7 +84,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Control(args) => command::control::run(&args),
         Subcommands::Estimate(args) => command::estimate::run(&args),
         Subcommands::VirtualWorm(args) => command::virtual_worm::run(&args),
-        Subcommands::Command(args) => command::order::run(&args),
+        Subcommands::Command(args) => command::send_command::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Study(args) => command::study::run(&args),

@@ -2,7 +2,7 @@
 
 mod text;
 
-use super::material::{READING, SourceArgs};
+use super::dataset::{READING, SourceArgs};
 use super::progress::Progress;
 use super::{Failure, log_line, print};
 use clap::Args;
@@ -34,12 +34,12 @@ pub struct AnalyzeArgs {
 /// cannot be written.
 pub fn run(args: &AnalyzeArgs) -> Result<(), Failure> {
     let mut progress = Progress::begin();
-    let material = args.source.read(&args.recording, &mut progress)?;
+    let dataset = args.source.read(&args.recording, &mut progress)?;
     if let Some(dir) = &args.out {
         report::prepare(dir).map_err(Failure::unusable)?;
     }
-    let analyses = analyze(&material.runs(), &material.config, &mut |step| {
-        progress.tell(step.stage, READING + (1.0 - READING) * step.share);
+    let analyses = analyze(&dataset.runs(), &dataset.config, &mut |step| {
+        progress.tell(step.stage, READING + (1.0 - READING) * step.fraction);
     })
     .map_err(Failure::unusable)?;
     let written = args.out.as_deref().map(|dir| {
@@ -59,7 +59,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Failure> {
         log_line(format_args!("{}: look at it in a browser", page.display()));
     }
     if args.json {
-        return print::line(as_json(&args.recording, &analyses, material.is_campaign)?);
+        return print::line(as_json(&args.recording, &analyses, dataset.is_campaign)?);
     }
     print::line(text::text(&analyses))
 }

@@ -8,14 +8,14 @@ mod folder;
 mod live;
 mod text;
 
-use super::material::{Material, READING, SourceArgs};
+use super::dataset::{Dataset, READING, SourceArgs};
 use super::progress::Progress;
 use super::{Failure, WormArgs, log_line, print};
 use clap::Args;
 use folder::Folder;
 use std::path::{Path, PathBuf};
 use worm_analysis::experiment::Progress as Step;
-use worm_analysis::explain::{Answer, Options, explain, explain_advances, write_back};
+use worm_analysis::explain::{Answer, Options, explain, explain_advances, model_update};
 use worm_analysis::report;
 use worm_estimator::config::Config;
 
@@ -55,20 +55,20 @@ pub struct ExplainArgs {
 /// not crawl; [`Failure::Failed`] when the worm stops while it is recorded or a file cannot be written.
 pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let mut progress = Progress::begin();
-    let (source, material) = args.read(&mut progress)?;
+    let (source, dataset) = args.read(&mut progress)?;
     let folder = args.out.as_deref().map(Folder::prepare).transpose()?;
-    let mut answer = match search(&material, args.seed, &mut progress) {
+    let mut answer = match search(&dataset, args.seed, &mut progress) {
         Ok(answer) => answer,
         Err((failure, stage)) => {
             if let Some(folder) = &folder {
                 // The reason why there is no answer is what to tell, whatever becomes of its file.
-                let _ = folder.write_failure(&failure, stage, &material.runs());
+                let _ = folder.write_failure(&failure, stage, &dataset.runs());
             }
             return Err(failure);
         }
     };
-    let believed = material.config_text.as_deref().unwrap_or(Config::COMMENTED);
-    let model = write_back::model(believed, &material.config, &answer);
+    let nominal = dataset.config_text.as_deref().unwrap_or(Config::COMMENTED);
+    let model = model_update::model(nominal, &dataset.config, &answer);
     if let Ok(model) = &model {
         answer.figures.model_diff.clone_from(&model.diff);
     }
@@ -97,7 +97,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
 
 impl ExplainArgs {
     /// What is to be explained, and where it comes from.
-    fn read(&self, progress: &mut Progress) -> Result<(PathBuf, Material), Failure> {
+    fn read(&self, progress: &mut Progress) -> Result<(PathBuf, Dataset), Failure> {
         if let Some(recording) = &self.recording {
             return Ok((recording.clone(), self.source.read_also_advances(recording, progress)?));
         }
@@ -112,24 +112,24 @@ impl ExplainArgs {
         report::prepare(folder).map_err(Failure::unusable)?;
         let log = folder.join("live.mcap");
         live::record(&config, text, self.cycles, &log, progress)?;
-        let material = self.source.read_recording(&log, slope_deg, progress)?;
-        Ok((log, material))
+        let dataset = self.source.read_recording(&log, slope_deg, progress)?;
+        Ok((log, dataset))
     }
 }
 
 /// The answer; or why there is none, and how far the search had come.
-fn search(material: &Material, seed: u64, progress: &mut Progress) -> Result<Answer, (Failure, &'static str)> {
-    let runs = material.runs();
-    conditions::check(&runs, &material.config).map_err(|failure| (failure, "reading"))?;
+fn search(dataset: &Dataset, seed: u64, progress: &mut Progress) -> Result<Answer, (Failure, &'static str)> {
+    let runs = dataset.runs();
+    conditions::check(&runs, &dataset.config).map_err(|failure| (failure, "reading"))?;
     let mut stage = "gait";
     let mut tell = |step: Step| {
         stage = step.stage;
-        progress.tell(stage, READING + (1.0 - READING) * step.share);
+        progress.tell(stage, READING + (1.0 - READING) * step.fraction);
     };
-    let answer = if material.advances.is_empty() {
-        explain(&runs, &material.config, &Options { seed }, &mut tell)
+    let answer = if dataset.advances.is_empty() {
+        explain(&runs, &dataset.config, &Options { seed }, &mut tell)
     } else {
-        explain_advances(&material.advances, &material.config, &mut tell)
+        explain_advances(&dataset.advances, &dataset.config, &mut tell)
     };
     answer.map_err(|error| (Failure::unusable(error), stage))
 }

@@ -3,9 +3,9 @@
 mod bench;
 mod cyclictest;
 mod floor;
-mod house;
+mod testbed;
 mod measure;
-mod polled;
+mod busy_poll;
 mod rates;
 mod text;
 mod verdict;

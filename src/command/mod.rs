@@ -3,18 +3,18 @@
 #[cfg(feature = "analysis")]
 pub mod analyze;
 pub mod check;
-mod children;
+mod child_process;
 #[cfg(feature = "analysis")]
 mod columns;
 pub mod control;
-mod ears;
+mod telemetry_receiver;
 pub mod estimate;
 #[cfg(feature = "analysis")]
 pub mod explain;
 pub mod latency;
 #[cfg(feature = "analysis")]
-mod material;
-pub mod order;
+mod dataset;
+pub mod send_command;
 mod print;
 mod progress;
 pub mod record;

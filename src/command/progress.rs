@@ -46,11 +46,11 @@ impl Progress {
     }
 
     /// Says what is being done, and which share of everything is done.
-    pub fn tell(&mut self, stage: &str, share: f64) {
+    pub fn tell(&mut self, stage: &str, fraction: f64) {
         if self.bar.message() != stage {
             self.bar.set_message(stage.to_owned());
         }
-        self.bar.set_position((share.clamp(0.0, 1.0) * PARTS as f64) as u64);
+        self.bar.set_position((fraction.clamp(0.0, 1.0) * PARTS as f64) as u64);
     }
 }
 

@@ -1,14 +1,14 @@
 //! `wormd record`: the topics of a worm into a log.
 //!
 //! An ordinary subscriber at ordinary priority: the loop does not know of it. One thread takes what the topics hold before
-//! they must forget it, another (`desk`) writes, so that a slow disk delays the log and not the listening.
+//! they must forget it, another (`log_writer`) writes, so that a slow disk delays the log and not the listening.
 
-mod desk;
+mod log_writer;
 
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::topics::{Hub, Instance, Subscriber, Topic};
 use clap::Args;
-use desk::{Batch, Desk};
+use log_writer::{Batch, LogWriter};
 use nix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -85,8 +85,8 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
 
 /// The topics of a worm on their way into a log.
 pub(super) struct Recorder {
-    ears: Ears,
-    desk: Desk,
+    receiver: TelemetryReceiver,
+    writer: LogWriter,
 }
 
 /// What was heard at once.
@@ -123,8 +123,8 @@ impl Recorder {
             begun_ns: Duration::from(now).as_nanos() as u64,
         };
         Ok(Self {
-            ears: Ears::open(&instance, topics)?,
-            desk: Desk::open(out, force, &origin)?,
+            receiver: TelemetryReceiver::open(&instance, topics)?,
+            writer: LogWriter::open(out, force, &origin)?,
         })
     }
 
@@ -133,13 +133,13 @@ impl Recorder {
     /// # Errors
     /// [`Failure::Failed`] when the topics fail or the log cannot be written on.
     pub(super) fn hear(&mut self) -> Result<Heard, Failure> {
-        let batch = self.ears.listen()?;
+        let batch = self.receiver.listen()?;
         let heard = Heard {
             messages: batch.len(),
             state: batch.states.last().copied(),
         };
         if heard.messages > 0 {
-            self.desk.take(batch)?;
+            self.writer.take(batch)?;
         }
         Ok(heard)
     }
@@ -149,7 +149,7 @@ impl Recorder {
     /// # Errors
     /// [`Failure::Failed`] when the file could not be written to its end; what was written before can be read.
     pub(super) fn close(self) -> Result<String, Failure> {
-        self.desk.close(&self.ears)
+        self.writer.close(&self.receiver)
     }
 }
 
@@ -157,7 +157,7 @@ impl Recorder {
 type Ear<T> = Option<Subscriber<T>>;
 
 /// The topics that are recorded.
-struct Ears {
+struct TelemetryReceiver {
     state: Ear<State>,
     timing: Ear<Timing>,
     estimate: Ear<Estimate>,
@@ -165,7 +165,7 @@ struct Ears {
     alarm: Ear<Alarm>,
 }
 
-impl Ears {
+impl TelemetryReceiver {
     fn open(instance: &Instance, topics: &[Channel]) -> Result<Self, Failure> {
         fn ear<T: Topic + Logged>(hub: &Hub, topics: &[Channel]) -> Result<Ear<T>, Failure> {
             let wanted = topics.contains(&T::CHANNEL);

@@ -2,9 +2,9 @@
 
 mod screen;
 
-use super::children::{Child, Log, START_PATIENCE};
-use super::ears::{Ears, MODE_PATIENCE};
-use super::order::give;
+use super::child_process::{Child, Log, START_PATIENCE};
+use super::telemetry_receiver::{TelemetryReceiver, MODE_PATIENCE};
+use super::send_command::give;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::topics::{CommandClient, Hub, Instance, RoleLock, Supervisor};
 use crate::watch::{Summary, Telemetry};
@@ -229,10 +229,10 @@ fn crawl(
 ) -> Result<Run, Failure> {
     let hub = Hub::open(instance).map_err(Failure::failed)?;
     let client = hub.command_client().map_err(Failure::failed)?;
-    let mut ears = Ears::open(&hub)?;
+    let mut receiver = TelemetryReceiver::open(&hub)?;
     let mut telemetry = Telemetry::default();
 
-    ears.start_crawling(&client, config, &mut telemetry, end, || {
+    receiver.start_crawling(&client, config, &mut telemetry, end, || {
         processes.find_ended().is_some()
     })
     .map_err(|failure| processes.find_ended().map_or(failure, Failure::failed))?;
@@ -245,7 +245,7 @@ fn crawl(
         if screen.wait(left) == Wish::Stop {
             break;
         }
-        ears.listen(&mut telemetry);
+        receiver.listen(&mut telemetry);
         trouble = match screen.paint(&telemetry, log) {
             Ok(()) => processes.find_ended(),
             Err(failure) => Some(format!("{failure}; the worm was stopped")),
@@ -254,9 +254,9 @@ fn crawl(
             break;
         }
     }
-    let mode = ears.mode(&mut telemetry);
+    let mode = receiver.mode(&mut telemetry);
     // A dead controller cannot stop the worm; the servo's watchdog has.
-    if processes.controller.exit_status().is_none() && !stop(&client, config, &mut ears, &mut telemetry, processes) {
+    if processes.controller.exit_status().is_none() && !stop(&client, config, &mut receiver, &mut telemetry, processes) {
         trouble.get_or_insert_with(|| "the worm did not say that it has stopped".to_owned());
     }
     if let Err(failure) = screen.paint(&telemetry, log) {
@@ -273,7 +273,7 @@ fn crawl(
 fn stop(
     client: &CommandClient,
     config: &Config,
-    ears: &mut Ears,
+    receiver: &mut TelemetryReceiver,
     telemetry: &mut Telemetry,
     processes: &mut Processes,
 ) -> bool {
@@ -281,7 +281,7 @@ fn stop(
         // A worm in a fault has stopped already and refuses a stop.
         tracing::debug!("{failure}");
     }
-    ears.wait_for(
+    receiver.wait_for(
         telemetry,
         MODE_PATIENCE + ramp(config),
         || processes.controller.exit_status().is_some(),

@@ -1,6 +1,6 @@
 //! The tick: inputs and time in, outputs out. All of the controller's behaviour, none of its I/O.
 
-use super::intake::Intake;
+use super::state_assembler::Intake;
 use super::presence::{Passed, Presence};
 use super::ramp::{CountRounding, Ramp};
 use super::resume::Resume;
@@ -481,8 +481,8 @@ impl Controller {
             }
             return velocity_rad_s;
         };
-        let most_rad_s = self.gait_velocity_rad_s.abs();
-        (self.hold_gain_per_s * (hold_rad - angle_rad)).clamp(-most_rad_s, most_rad_s)
+        let max_rad_s = self.gait_velocity_rad_s.abs();
+        (self.hold_gain_per_s * (hold_rad - angle_rad)).clamp(-max_rad_s, max_rad_s)
     }
 
     fn due_service(&mut self, now_ns: u64) -> Option<Service> {

@@ -1,7 +1,7 @@
 //! What the loop has to tell, without a log call in a tick: entries go through a bounded queue to a thread that logs. The same
 //! thread reads the loop's counters every now and then, for the [evidence](super::evidence) in late ticks.
 
-use super::evidence::{Counters, Counts, Snapshot};
+use super::sched_counters::{Counters, Counts, Snapshot};
 use crate::logging::Summed;
 use crate::realtime::monotonic_ns;
 use crossbeam::queue::ArrayQueue;

@@ -8,15 +8,15 @@
 //! 2. The link exchanges the goal velocity for readings.
 //! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](worm_estimator::message::State), the next
 //!    goal and, rarely, a [`Service`]. It knows the limits (`safety`), the ramps (`ramp`), how readings become
-//!    messages (`intake`), and which part of the time the loop was there at all (`presence`, `resume`); it takes time as an
+//!    messages (`state_assembler`), and which part of the time the loop was there at all (`presence`, `resume`); it takes time as an
 //!    argument, so all of it is tested in virtual time.
 //! 4. The loop publishes, wakes who listens, carries out a service if one is due, and finishes the tick on the schedule. A tick
-//!    that was late gets its culprit, by what the kernel has counted (`evidence`); what there is to log goes to the `journal`.
+//!    that was late gets its culprit, by what the kernel has counted (`sched_counters`); what there is to log goes to the `journal`.
 
 mod controller;
-mod drive;
-mod evidence;
-mod intake;
+mod hardware;
+mod sched_counters;
+mod state_assembler;
 mod journal;
 mod presence;
 mod ramp;
@@ -27,6 +27,6 @@ mod safety;
 mod schedule;
 
 pub use controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
-pub use drive::{Drive, DriveError, link_settings};
+pub use hardware::{Drive, DriveError, link_settings};
 pub use run::{Ending, RunError, run};
 pub use schedule::{Schedule, bus_allowed_ns};

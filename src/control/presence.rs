@@ -62,7 +62,7 @@ const DOUBT_AFTER_NS: u64 = 20_000_000;
 pub(super) struct Silence {
     silent_ns: u64,
     uncharged_ns: u64,
-    most_uncharged_ns: u64,
+    max_uncharged_ns: u64,
 }
 
 impl Silence {
@@ -72,7 +72,7 @@ impl Silence {
         Self {
             silent_ns: 0,
             uncharged_ns: 0,
-            most_uncharged_ns: (2e9 * config.control.link_timeout_s) as u64,
+            max_uncharged_ns: (2e9 * config.control.link_timeout_s) as u64,
         }
     }
 
@@ -84,7 +84,7 @@ impl Silence {
             return 0;
         }
         self.silent_ns += period_ns;
-        if self.silent_ns < DOUBT_AFTER_NS || all_cpus_run() || self.uncharged_ns >= self.most_uncharged_ns {
+        if self.silent_ns < DOUBT_AFTER_NS || all_cpus_run() || self.uncharged_ns >= self.max_uncharged_ns {
             return 0;
         }
         self.uncharged_ns += period_ns;

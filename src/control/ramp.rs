@@ -28,8 +28,8 @@ impl Ramp {
     }
 
     pub(super) fn advance(&mut self, dt_s: f64) -> f64 {
-        let most = self.acceleration_rad_s2 * dt_s;
-        self.velocity_rad_s += (self.target_rad_s - self.velocity_rad_s).clamp(-most, most);
+        let max = self.acceleration_rad_s2 * dt_s;
+        self.velocity_rad_s += (self.target_rad_s - self.velocity_rad_s).clamp(-max, max);
         self.velocity_rad_s
     }
 

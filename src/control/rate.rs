@@ -26,15 +26,15 @@ pub(super) struct RateKeeper {
     deadlines: u64, // in the open window
     missed: u64,
     quiet_windows: u32,
-    patience: u32,
+    timeout: u32,
     is_trial: bool, // this rate is being tried after a slower one
 }
 
 impl RateKeeper {
-    /// Keeps to `rate_hz`, or to a fraction of it that is not below `least_hz`; to `rate_hz` alone where `adapts` is false.
-    pub(super) fn new(rate_hz: f64, least_hz: f64, adapts: bool) -> Self {
+    /// Keeps to `rate_hz`, or to a fraction of it that is not below `min_hz`; to `rate_hz` alone where `adapts` is false.
+    pub(super) fn new(rate_hz: f64, min_hz: f64, adapts: bool) -> Self {
         let mut largest = 1;
-        while adapts && largest < LARGEST_DIVIDER && rate_hz / (2 * largest) as f64 >= least_hz {
+        while adapts && largest < LARGEST_DIVIDER && rate_hz / (2 * largest) as f64 >= min_hz {
             largest *= 2;
         }
         Self {
@@ -43,7 +43,7 @@ impl RateKeeper {
             deadlines: 0,
             missed: 0,
             quiet_windows: 0,
-            patience: FIRST_PATIENCE,
+            timeout: FIRST_PATIENCE,
             is_trial: false,
         }
     }
@@ -55,17 +55,17 @@ impl RateKeeper {
         if self.deadlines * self.divider < WINDOW_TICKS {
             return None;
         }
-        let share = self.missed as f64 / self.deadlines as f64;
+        let fraction = self.missed as f64 / self.deadlines as f64;
         (self.deadlines, self.missed) = (0, 0);
-        if share > TOO_MANY {
+        if fraction > TOO_MANY {
             self.quiet_windows = 0;
             if std::mem::take(&mut self.is_trial) {
-                self.patience = (2 * self.patience).min(LONGEST_PATIENCE);
+                self.timeout = (2 * self.timeout).min(LONGEST_PATIENCE);
             }
             return self.change(2 * self.divider);
         }
-        self.quiet_windows = if share < NEARLY_NONE { self.quiet_windows + 1 } else { 0 };
-        if self.divider == 1 || self.quiet_windows < self.patience {
+        self.quiet_windows = if fraction < NEARLY_NONE { self.quiet_windows + 1 } else { 0 };
+        if self.divider == 1 || self.quiet_windows < self.timeout {
             return None;
         }
         self.quiet_windows = 0;
@@ -111,8 +111,8 @@ mod tests {
     fn a_faster_rate_is_tried_again_and_each_time_later() {
         let mut keeper = RateKeeper::new(1000.0, 240.0, true);
         assert_eq!(run(&mut keeper, 1, 2), Some(2));
-        for patience in [8, 16, 32] {
-            assert_eq!(run(&mut keeper, patience - 1, 0), None);
+        for timeout in [8, 16, 32] {
+            assert_eq!(run(&mut keeper, timeout - 1, 0), None);
             assert_eq!(run(&mut keeper, 1, 0), Some(1));
             assert_eq!(run(&mut keeper, 1, 2), Some(2));
         }

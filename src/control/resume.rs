@@ -6,7 +6,7 @@
 //! - it was crawling, and not on its way back from an alarm;
 //! - no alarm stands that would have it do anything but warn;
 //! - servo and tracker answer, and the computer has not paused for [`SETTLED_NS`];
-//! - it is not the [`MOST_IN_A_ROW`]th time within [`ROW_NS`]: such a computer cannot run a worm.
+//! - it is not the [`MAX_IN_A_ROW`]th time within [`ROW_NS`]: such a computer cannot run a worm.
 //!
 //! Any command, and the end of the process, come before it.
 
@@ -16,7 +16,7 @@ use worm_estimator::message::{Alarm, AlarmKind};
 /// How long the computer must have gone on without a pause, ns.
 const SETTLED_NS: u64 = 1_000_000_000;
 /// So often it crawls on by itself …
-const MOST_IN_A_ROW: usize = 3;
+const MAX_IN_A_ROW: usize = 3;
 /// … within this time, ns.
 const ROW_NS: u64 = 60_000_000_000;
 
@@ -29,7 +29,7 @@ pub(super) struct Resume {
     velocity_rad_s: Option<f64>,
     settled_since_ns: u64,
     asked: bool,
-    begun_ns: [Option<u64>; MOST_IN_A_ROW], // the newest first
+    begun_ns: [Option<u64>; MAX_IN_A_ROW], // the newest first
 }
 
 impl Resume {
@@ -45,7 +45,7 @@ impl Resume {
             velocity_rad_s: None,
             settled_since_ns: 0,
             asked: false,
-            begun_ns: [None; MOST_IN_A_ROW],
+            begun_ns: [None; MAX_IN_A_ROW],
         }
     }
 
@@ -67,7 +67,7 @@ impl Resume {
             .filter(|&&begun_ns| now_ns - begun_ns < ROW_NS)
             .count();
         self.give_up();
-        if self.allowed && in_a_row < MOST_IN_A_ROW {
+        if self.allowed && in_a_row < MAX_IN_A_ROW {
             self.begun_ns.rotate_right(1);
             self.begun_ns[0] = Some(now_ns);
             self.velocity_rad_s = Some(velocity_rad_s);

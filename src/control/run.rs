@@ -2,8 +2,8 @@
 //! [`Controller::tick`]; here is only I/O, and the account of where the time went.
 
 use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
-use super::drive::Drive;
-use super::evidence::{Counts, Parts, find_culprit};
+use super::hardware::Drive;
+use super::sched_counters::{Counts, Parts, find_culprit};
 use super::journal::{Entry, Journal};
 use super::presence::{Looks, SHORTEST_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;

@@ -2,7 +2,7 @@
 //!
 //! Every time here is of the loop's own clock (`presence`): a pause of the computer is nobody's silence.
 
-use super::intake::Intake;
+use super::state_assembler::Intake;
 use crate::link::ServoReading;
 use worm_estimator::config::{Config, Limits};
 use worm_estimator::message::Fault;

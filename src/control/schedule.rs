@@ -1,15 +1,15 @@
 //! Absolute deadlines: when the next tick is due, and which ticks a late one has cost.
 
 /// Even a tick that was woken late gives the bus this share of a period to answer.
-const LEAST_BUS_SHARE: f64 = 0.3;
+const MIN_BUS_SHARE: f64 = 0.3;
 
-/// How long the devices may take for their answer in a tick that was woken so late, ns; `wait_share` of the period where it was not.
-pub fn bus_allowed_ns(wait_share: f64, period_ns: u64, wake_lateness_ns: u64) -> u64 {
+/// How long the devices may take for their answer in a tick that was woken so late, ns; `wait_fraction` of the period where it was not.
+pub fn bus_allowed_ns(wait_fraction: f64, period_ns: u64, wake_lateness_ns: u64) -> u64 {
     let period = period_ns as f64;
-    let least_ns = (LEAST_BUS_SHARE * period) as u64;
-    ((wait_share * period) as u64)
+    let min_ns = (MIN_BUS_SHARE * period) as u64;
+    ((wait_fraction * period) as u64)
         .saturating_sub(wake_lateness_ns)
-        .max(least_ns)
+        .max(min_ns)
 }
 
 /// Deadlines on a fixed grid. A tick that ends after the next deadline costs the deadlines that it missed; they

@@ -1,7 +1,7 @@
 //! The machine's own limit, measured beside the loop: a bare sleeper on absolute deadlines, as `cyclictest` is one, in a process
 //! of its own as the loop is in one; and the [bare pair](super::bare) of iceoryx2 that it feeds.
 
-use super::bare::{Bare, BareError};
+use super::ipc_baseline::{Bare, BareError};
 use super::histogram::Durations;
 use crate::control::Schedule;
 use crate::realtime::{self, Grant, monotonic_ns};

@@ -3,17 +3,17 @@
 //! In reading order:
 //! - [`histogram`]: durations in histograms, and their [`Percentiles`].
 //! - [`timeline`]: one tick as its parts on the clock; [`WorstTicks`], the worst ones of a run.
-//! - [`account`]: what the `timing` topic tells of a run, and how long states took to whoever received them.
-//! - [`bare`] and [`floor`]: what the machine and iceoryx2 can do at best, measured beside the loop.
+//! - [`tick_stats`]: what the `timing` topic tells of a run, and how long states took to whoever received them.
+//! - [`ipc_baseline`] and [`floor`]: what the machine and iceoryx2 can do at best, measured beside the loop.
 //! - [`stress`]: a load beside it.
 //! - [`outcome`]: what a run has found, as JSON shows it; [`measure`]: its durations, each with its name and its floor;
-//!   [`blame`]: what each culprit means.
+//!   [`attribution`]: what each culprit means.
 //!
 //! `wormd latency` puts them together.
 
-pub mod account;
-pub mod bare;
-pub mod blame;
+pub mod tick_stats;
+pub mod ipc_baseline;
+pub mod attribution;
 pub mod floor;
 pub mod histogram;
 pub mod measure;
@@ -23,7 +23,7 @@ pub mod page;
 pub mod stress;
 pub mod timeline;
 
-pub use account::{Account, Deliveries, HostPauses};
+pub use tick_stats::{Account, Deliveries, HostPauses};
 pub use histogram::{Durations, Percentiles};
 pub use measure::{Measure, ratio};
 pub use outcome::Outcome;

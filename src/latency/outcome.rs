@@ -1,6 +1,6 @@
 //! What a run of the latency benchmark has found. The JSON names are a contract.
 
-use super::account::HostPauses;
+use super::tick_stats::HostPauses;
 use super::histogram::Durations;
 use super::timeline::WorstTicks;
 use crate::realtime::machine::Setting;

@@ -139,7 +139,7 @@ impl ReadFailure {
 const LATE_LIMIT: usize = 16 * 1024;
 
 /// Questions that may be without an answer before the oldest counts as lost: those of a tenth of a second at 1 kHz.
-const MOST_OWED: u32 = 100;
+const MAX_OWED: u32 = 100;
 
 /// What has been read so far.
 struct Harvest {
@@ -315,7 +315,7 @@ impl<P: Port> WormBus<P> {
         let lost = if self.was_answered && late == 0 {
             self.answers_owed
         } else {
-            self.answers_owed.saturating_sub(MOST_OWED)
+            self.answers_owed.saturating_sub(MAX_OWED)
         };
         self.answers_owed -= lost;
         lost

@@ -9,12 +9,12 @@
 //! [`monotonic_ns`] and [`sleep_until`] are the clock that all of it is for.
 
 mod cpus;
-mod in_force;
+mod effective;
 pub mod machine;
 mod request;
 mod witness;
 
-pub use in_force::{InForce, Policy};
+pub use effective::{InForce, Policy};
 pub use request::{Grant, Refusal, request};
 pub use witness::{CpuWitness, visit_every_cpu};
 

@@ -2,7 +2,7 @@
 
 use super::instance::Instance;
 use super::lock::{Kind, LockError, LockFile};
-use super::residue;
+use super::stale_resources;
 use std::io;
 use std::marker::PhantomData;
 use std::path::Path;
@@ -109,7 +109,7 @@ impl<R: Role> RoleLock<R> {
     /// The process that has the role now, if any. Does not disturb one that is about to take it.
     pub fn holder(instance: &Instance) -> Option<u32> {
         let path = instance.lock_path(R::NAME);
-        read_pid(&path).filter(|&pid| residue::has_open(pid, &path))
+        read_pid(&path).filter(|&pid| stale_resources::has_open(pid, &path))
     }
 
     pub(super) fn instance(&self) -> &Instance {
@@ -120,7 +120,7 @@ impl<R: Role> RoleLock<R> {
 impl<R: Role> Drop for RoleLock<R> {
     fn drop(&mut self) {
         self.file.remove();
-        residue::remove_folder_if_empty(&self.instance);
+        stale_resources::remove_folder_if_empty(&self.instance);
     }
 }
 

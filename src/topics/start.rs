@@ -2,7 +2,7 @@
 
 use super::instance::Instance;
 use super::lock::{Kind, LockError, LockFile};
-use super::residue::{self, Peer};
+use super::stale_resources::{self, Peer};
 use super::role;
 use super::services::{Refused, Services};
 use std::fmt;
@@ -90,16 +90,16 @@ impl Drop for Presence {
         if !self.lock.try_change(Kind::Exclusive) {
             return;
         }
-        if residue::is_there(&self.instance)
-            && residue::peers(&self.instance).is_empty()
-            && let Err(error) = residue::wipe(&self.instance)
+        if stale_resources::is_there(&self.instance)
+            && stale_resources::peers(&self.instance).is_empty()
+            && let Err(error) = stale_resources::wipe(&self.instance)
         {
             tracing::debug!("{}: {error}", self.instance.folder().display());
         }
         role::remove_abandoned(&self.instance);
         self.lock.remove();
         start.remove();
-        residue::remove_folder_if_empty(&self.instance);
+        stale_resources::remove_folder_if_empty(&self.instance);
     }
 }
 
@@ -109,9 +109,9 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
     let (mut lock, mut alone) = enter(instance, limit)?;
     let mut retried = false;
     loop {
-        alone = alone && (!residue::is_there(instance) || wipe_if_unused(instance)?);
+        alone = alone && (!stale_resources::is_there(instance) || wipe_if_unused(instance)?);
         if !alone {
-            match residue::remove_stillborn(instance) {
+            match stale_resources::remove_stillborn(instance) {
                 Ok(0) => {}
                 Ok(count) => tracing::info!("removed {count} half-made segments of killed processes"),
                 Err(error) => tracing::debug!("looking for half-made segments: {error}"),
@@ -132,7 +132,7 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
             return Err(StartError::Blocked {
                 worm: instance.worm().to_owned(),
                 reason,
-                peers: residue::peers(instance),
+                peers: stale_resources::peers(instance),
             });
         }
         tracing::warn!(
@@ -177,7 +177,7 @@ fn wait_for_lock<T>(
             return Err(StartError::Busy {
                 worm: instance.worm().to_owned(),
                 waited: limit,
-                peers: residue::who_has_open(&path),
+                peers: stale_resources::who_has_open(&path),
             });
         }
         thread::sleep(Duration::from_millis(1));
@@ -186,12 +186,12 @@ fn wait_for_lock<T>(
 
 /// Wipes the instance unless a process that knows nothing of our locks uses it; says whether it did.
 fn wipe_if_unused(instance: &Instance) -> Result<bool, StartError> {
-    let peers = residue::peers(instance);
+    let peers = stale_resources::peers(instance);
     if let Some(peer) = peers.first() {
         tracing::debug!("{peer} reads {}: nothing is wiped", instance.worm());
         return Ok(false);
     }
-    residue::wipe(instance).map_err(|source| StartError::Wipe {
+    stale_resources::wipe(instance).map_err(|source| StartError::Wipe {
         folder: instance.folder().display().to_string(),
         source,
     })?;

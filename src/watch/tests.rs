@@ -68,7 +68,7 @@ fn heard(phase: f64) -> Telemetry {
         energy_electrical_j: 1.0,
         energy_loss_j: ledger.loss_j(),
         max_deformation_m: [0.00175; MAX_CELLS],
-        battery_share: f64::NAN,
+        battery_fraction: f64::NAN,
         cell_count: 4,
         sliding_mask: 0b0010,
         armed_mask: 0b1_1100_0001,

@@ -256,9 +256,9 @@ fn legend() -> Line<'static> {
 /// Millimetres between the labels of a ruler of so many columns: the least that leaves them room.
 fn label_distance_mm(width_m: f64, columns: usize) -> i64 {
     const ROOM: f64 = 10.0;
-    let least_mm = width_m * 1e3 * ROOM / columns as f64;
+    let min_mm = width_m * 1e3 * ROOM / columns as f64;
     let mut distance_mm = 50;
-    while (distance_mm as f64) < least_mm {
+    while (distance_mm as f64) < min_mm {
         distance_mm *= 2;
     }
     distance_mm
@@ -345,10 +345,10 @@ fn number(value: f64, digits: usize) -> String {
 }
 
 /// A bar from −1 to 1 around a middle mark.
-fn bar(share: f64) -> String {
+fn bar(fraction: f64) -> String {
     const HALF: i32 = 8;
-    let end = if share.is_finite() {
-        (share * f64::from(HALF)).round() as i32
+    let end = if fraction.is_finite() {
+        (fraction * f64::from(HALF)).round() as i32
     } else {
         0
     };
@@ -486,12 +486,12 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
             pauses.count, pauses.total_s
         )));
     }
-    if let Some(share) = telemetry
+    if let Some(fraction) = telemetry
         .estimate
-        .map(|estimate| estimate.battery_share)
-        .filter(|share| share.is_finite())
+        .map(|estimate| estimate.battery_fraction)
+        .filter(|fraction| fraction.is_finite())
     {
-        lines.push(Line::raw(format!("battery {:.0} %", share * 100.0)));
+        lines.push(Line::raw(format!("battery {:.0} %", fraction * 100.0)));
     }
     frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(" loop ")), area);
 }

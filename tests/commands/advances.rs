@@ -12,9 +12,9 @@ use worm_physics::{Physics, Worm, effect, steady_cycle_of};
 /// Of what the paper measured, Table 4, three scalars cannot decide anything.
 #[test]
 fn of_the_papers_table_4_none_is_named() {
-    let desk = Workspace::new();
+    let writer = Workspace::new();
     let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/table4/campaign.toml");
-    let dir = desk.path("why");
+    let dir = writer.path("why");
     let (campaign, out) = (campaign.to_str().expect("plain"), dir.to_str().expect("plain"));
     let output = wormd(&["explain", campaign, "--json", "--out", out]);
     assert!(output.status.success(), "{}", said(&output));
@@ -69,8 +69,8 @@ fn of_the_papers_table_4_none_is_named() {
 
 #[test]
 fn what_cannot_be_a_table_of_advances_is_refused() {
-    let desk = Workspace::new();
-    desk.simulate("level.csv", "0", &["--cycles", "6"]);
+    let writer = Workspace::new();
+    writer.simulate("level.csv", "0", &["--cycles", "6"]);
     let recorded = "[[run]]\nrecording = \"level.csv\"\nslope_deg = 0\n";
     let level = "[[run]]\nslope_deg = 0\nadvance_m = 0.0068\nadvance_sigma_m = 0.0001\n";
     let up = |rest: &str| format!("{level}[[run]]\nslope_deg = 30\n{rest}\n");
@@ -136,7 +136,7 @@ fn what_cannot_be_a_table_of_advances_is_refused() {
         ),
     ];
     for (name, text, more, expected) in table {
-        let path = desk.write("campaign.toml", text);
+        let path = writer.write("campaign.toml", text);
         let output = wormd(&[&["explain", path.to_str().expect("plain"), "--json"], *more].concat());
         let said = said(&output);
         assert_eq!(output.status.code(), Some(2), "{name}: {said}");
@@ -145,7 +145,7 @@ fn what_cannot_be_a_table_of_advances_is_refused() {
             assert!(said.contains(part), "{name}: no {part:?} in\n{said}");
         }
     }
-    let path = desk.write("campaign.toml", &up("advance_m = 0.0046\nadvance_sigma_m = 0.0001"));
+    let path = writer.write("campaign.toml", &up("advance_m = 0.0046\nadvance_sigma_m = 0.0001"));
     let output = wormd(&["analyze", path.to_str().expect("plain"), "--json"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(said(&output).contains("wormd explain"), "{}", said(&output));
@@ -194,7 +194,7 @@ fn the_theorys_own_table_agrees() {
         answer
             .calibration
             .iter()
-            .all(|value| (value.found - value.believed).abs() < 0.2 * value.sigma)
+            .all(|value| (value.found - value.nominal).abs() < 0.2 * value.sigma)
     );
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 /// The same CSV with its rows changed; `change` gets row number and fields.
-fn changed(desk: &Workspace, name: &str, from: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf {
+fn changed(writer: &Workspace, name: &str, from: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf {
     let text = std::fs::read_to_string(from).expect("a CSV");
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let mut changed = format!("{}\n", lines.next().expect("a header"));
@@ -16,7 +16,7 @@ fn changed(desk: &Workspace, name: &str, from: &Path, change: impl Fn(usize, &mu
         change(row, &mut fields);
         writeln!(changed, "{}", fields.join(",")).expect("a string");
     }
-    desk.write(name, &changed)
+    writer.write(name, &changed)
 }
 
 fn analyze(recording: &Path, more: &[&str]) -> Output {
@@ -38,17 +38,17 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 #[test]
 fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
-    let desk = Workspace::new();
+    let writer = Workspace::new();
     let level: &[&str] = &["--slope", "0"];
-    let good = desk.simulate("good.csv", "0", &["--cycles", "4", "--positions-only"]);
-    let with_phase = desk.simulate("phase.csv", "0", &["--cycles", "4"]);
-    let six = desk.write("six.toml", "[worm]\ncells = 6\nstep_order = [1, 2, 3, 4, 5, 6]\n");
-    let campaign = desk.write(
+    let good = writer.simulate("good.csv", "0", &["--cycles", "4", "--positions-only"]);
+    let with_phase = writer.simulate("phase.csv", "0", &["--cycles", "4"]);
+    let six = writer.write("six.toml", "[worm]\ncells = 6\nstep_order = [1, 2, 3, 4, 5, 6]\n");
+    let campaign = writer.write(
         "campaign.toml",
         "worm = \"worm.toml\"\n[[run]]\nrecording = \"good.csv\"\nslope_deg = 0.0\n",
     );
-    desk.write("worm.toml", "");
-    let short_log = desk.simulate("log.mcap", "0", &["--cycles", "4"]);
+    writer.write("worm.toml", "");
+    let short_log = writer.simulate("log.mcap", "0", &["--cycles", "4"]);
     let log = std::fs::read(&short_log).expect("a log");
     std::fs::write(&short_log, &log[..log.len() / 5]).expect("it is cut");
 
@@ -88,66 +88,66 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
     let table: &[(PathBuf, &[&str], &[&str])] = &[
         (good.clone(), &[], &["--slope"]),
         (campaign, level, &["campaign", "--slope"]),
-        (desk.path("nowhere.csv"), level, &["nowhere.csv"]),
-        (desk.write("poem.txt", "Of worms I sing\n"), level, &["poem.txt"]),
+        (writer.path("nowhere.csv"), level, &["nowhere.csv"]),
+        (writer.write("poem.txt", "Of worms I sing\n"), level, &["poem.txt"]),
         (
-            desk.write("poem.csv", "Of worms, I sing\n1, 2\n"),
+            writer.write("poem.csv", "Of worms, I sing\n1, 2\n"),
             level,
             &["poem.csv", "time_s"],
         ),
-        (desk.write("empty.csv", ""), level, &["empty.csv"]),
+        (writer.write("empty.csv", ""), level, &["empty.csv"]),
         (
             good.clone(),
             &["--slope", "0", "--config", six.to_str().expect("plain")],
             &["4 cells", "6", "--config"],
         ),
         (
-            changed(&desk, "mm.csv", &good, to_millimetres),
+            changed(&writer, "mm.csv", &good, to_millimetres),
             level,
             &["mm.csv", "millimetres"],
         ),
         (
-            desk.simulate("one.csv", "0", &["--cycles", "1", "--positions-only"]),
+            writer.simulate("one.csv", "0", &["--cycles", "1", "--positions-only"]),
             level,
             &["one.csv", "cycles are too few"],
         ),
         (
-            desk.simulate("one-phase.csv", "0", &["--cycles", "1"]),
+            writer.simulate("one-phase.csv", "0", &["--cycles", "1"]),
             level,
             &["1.0 gait cycles are too few"],
         ),
         (
-            changed(&desk, "still.csv", &good, still),
+            changed(&writer, "still.csv", &good, still),
             level,
             &["still.csv", "no cell moves"],
         ),
         (
-            changed(&desk, "nan.csv", &good, nowhere),
+            changed(&writer, "nan.csv", &good, nowhere),
             level,
             &["nan.csv", "no cell is ever seen"],
         ),
         (
-            changed(&desk, "unseen.csv", &good, third_unseen),
+            changed(&writer, "unseen.csv", &good, third_unseen),
             level,
             &["cell 3", "never seen"],
         ),
         (
-            changed(&desk, "fixed.csv", &good, third_fixed),
+            changed(&writer, "fixed.csv", &good, third_fixed),
             level,
             &["cell 3", "does not step"],
         ),
         (
-            changed(&desk, "back.csv", &good, runs_back),
+            changed(&writer, "back.csv", &good, runs_back),
             level,
             &["back.csv:", "time_s"],
         ),
         (
-            changed(&desk, "mirrored.csv", &good, mirrored),
+            changed(&writer, "mirrored.csv", &good, mirrored),
             level,
             &["crawls backward", "mirror"],
         ),
         (
-            changed(&desk, "degrees.csv", &with_phase, in_degrees),
+            changed(&writer, "degrees.csv", &with_phase, in_degrees),
             level,
             &["phase", "counted in cycles"],
         ),
@@ -185,9 +185,9 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
 
 #[test]
 fn a_folder_for_the_report_that_cannot_be_is_refused() {
-    let desk = Workspace::new();
-    let good = desk.simulate("good.csv", "0", &["--cycles", "4"]);
-    let occupied = desk.write("occupied", "a file, no folder");
+    let writer = Workspace::new();
+    let good = writer.simulate("good.csv", "0", &["--cycles", "4"]);
+    let occupied = writer.write("occupied", "a file, no folder");
     let output = analyze(&good, &["--slope", "0", "--out", occupied.to_str().expect("plain")]);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
     assert!(said(&output).contains("occupied"), "{}", said(&output));
@@ -195,8 +195,8 @@ fn a_folder_for_the_report_that_cannot_be_is_refused() {
 
 #[test]
 fn json_is_one_object_with_the_contracted_keys() {
-    let desk = Workspace::new();
-    let recording = desk.simulate(
+    let writer = Workspace::new();
+    let recording = writer.simulate(
         "up.csv",
         "30",
         &["--cycles", "6", "--positions-only", "--dropout", "0.03"],
@@ -251,9 +251,9 @@ fn json_is_one_object_with_the_contracted_keys() {
 
 #[test]
 fn without_json_there_are_tables_and_with_out_there_is_a_report() {
-    let desk = Workspace::new();
-    let recording = desk.simulate("level.csv", "0", &["--cycles", "4"]);
-    let out = desk.path("report");
+    let writer = Workspace::new();
+    let recording = writer.simulate("level.csv", "0", &["--cycles", "4"]);
+    let out = writer.path("report");
     let output = analyze(&recording, &["--slope", "0", "--out", out.to_str().expect("plain")]);
     assert!(output.status.success(), "{}", said(&output));
     let tables = String::from_utf8_lossy(&output.stdout);
@@ -276,7 +276,7 @@ fn without_json_there_are_tables_and_with_out_there_is_a_report() {
 
 #[test]
 fn the_format_of_a_recording_does_not_change_its_figures() {
-    let desk = Workspace::new();
+    let writer = Workspace::new();
     let more = [
         "--cycles",
         "6",
@@ -285,8 +285,8 @@ fn the_format_of_a_recording_does_not_change_its_figures() {
         "--max-deformation-mm",
         "2,1.1,1.75,2.15",
     ];
-    let csv = json(&desk.simulate("same.csv", "20", &more), &["--slope", "20"]);
-    let log = json(&desk.simulate("same.mcap", "20", &more), &["--slope", "20"]);
+    let csv = json(&writer.simulate("same.csv", "20", &more), &["--slope", "20"]);
+    let log = json(&writer.simulate("same.mcap", "20", &more), &["--slope", "20"]);
     let (of_csv_m, of_log_m) = (numbers(&csv["max_deformation_m"]), numbers(&log["max_deformation_m"]));
     for (of_csv_m, of_log_m) in of_csv_m.iter().zip(&of_log_m) {
         assert!((of_csv_m - of_log_m).abs() < 5e-6, "{of_csv_m} m and {of_log_m} m");
@@ -298,8 +298,8 @@ fn the_format_of_a_recording_does_not_change_its_figures() {
 
 #[test]
 fn from_and_to_cut_the_recording() {
-    let desk = Workspace::new();
-    let recording = desk.simulate("long.csv", "0", &["--cycles", "8"]);
+    let writer = Workspace::new();
+    let recording = writer.simulate("long.csv", "0", &["--cycles", "8"]);
     let cut = json(&recording, &["--slope", "0", "--from", "5", "--to", "15"]);
     assert_eq!(cut["duration_s"], 10.0);
     let cycles = cut["cycles"].as_array().expect("cycles");

@@ -29,31 +29,31 @@ fn campaign(worm: &str, runs: &[(&str, &str)]) -> String {
 
 #[test]
 fn what_cannot_be_explained_is_named_and_ends_with_status_2() {
-    let desk = Workspace::new();
-    desk.simulate("level.csv", "0", &["--cycles", "6"]);
-    desk.simulate("up.csv", "30", &["--cycles", "6", "--positions-only"]);
-    desk.simulate("short.csv", "0", &["--cycles", "1.2"]);
-    desk.write("poem.csv", "Of worms, I sing\n1, 2\n");
-    desk.write("worm.toml", "");
-    desk.write("six.toml", "[worm]\ncells = 6\nstep_order = [1, 2, 3, 4, 5, 6]\n");
+    let writer = Workspace::new();
+    writer.simulate("level.csv", "0", &["--cycles", "6"]);
+    writer.simulate("up.csv", "30", &["--cycles", "6", "--positions-only"]);
+    writer.simulate("short.csv", "0", &["--cycles", "1.2"]);
+    writer.write("poem.csv", "Of worms, I sing\n1, 2\n");
+    writer.write("worm.toml", "");
+    writer.write("six.toml", "[worm]\ncells = 6\nstep_order = [1, 2, 3, 4, 5, 6]\n");
     let effect = |text: &str| format!("[[effect]]\n{text}\n");
-    desk.write("gremlins.toml", &effect("name = \"gremlins\""));
-    desk.write("parameter.toml", &effect("name = \"payload\"\nmass_g = 20"));
-    desk.write(
+    writer.write("gremlins.toml", &effect("name = \"gremlins\""));
+    writer.write("parameter.toml", &effect("name = \"payload\"\nmass_g = 20"));
+    writer.write(
         "cell.toml",
         &effect("name = \"unequal-clamping\"\nfriction_factor = 0.7\ncell = 5"),
     );
     let level = ("level.csv", "slope_deg = 0.0");
-    let written = |name: &str, worm: &str, runs: &[(&str, &str)]| desk.write(name, &campaign(worm, runs));
-    let taken = desk.write("taken", "");
-    let six = desk.path("six.toml");
+    let written = |name: &str, worm: &str, runs: &[(&str, &str)]| writer.write(name, &campaign(worm, runs));
+    let taken = writer.write("taken", "");
+    let six = writer.path("six.toml");
     let six = six.to_str().expect("plain");
     let taken = taken.to_str().expect("plain");
 
     let table: &[(PathBuf, &[&str], &[&str])] = &[
-        (desk.path("nowhere.toml"), &[], &["nowhere.toml", "[[run]]"]),
+        (writer.path("nowhere.toml"), &[], &["nowhere.toml", "[[run]]"]),
         (
-            desk.write("empty.toml", ""),
+            writer.write("empty.toml", ""),
             &[],
             &["empty.toml:1", "no run", "[[run]]"],
         ),
@@ -123,33 +123,33 @@ fn what_cannot_be_explained_is_named_and_ends_with_status_2() {
             &["--slope", "0"],
             &["a campaign says slopes", "--slope"],
         ),
-        (desk.path("level.csv"), &[], &["level.csv", "--slope DEG"]),
+        (writer.path("level.csv"), &[], &["level.csv", "--slope DEG"]),
         (
-            desk.path("gone.csv"),
+            writer.path("gone.csv"),
             &["--slope", "0"],
             &["gone.csv", "cannot be read"],
         ),
-        (desk.path("poem.csv"), &["--slope", "0"], &["poem.csv", "time_s"]),
-        (desk.path("."), &["--slope", "0"], &["is not a file"]),
-        (desk.path("short.csv"), &["--slope", "0"], &["short.csv", "too few"]),
+        (writer.path("poem.csv"), &["--slope", "0"], &["poem.csv", "time_s"]),
+        (writer.path("."), &["--slope", "0"], &["is not a file"]),
+        (writer.path("short.csv"), &["--slope", "0"], &["short.csv", "too few"]),
         (
-            desk.path("level.csv"),
+            writer.path("level.csv"),
             &["--slope", "0", "--config", six],
             &["4 cells", "6", "--config"],
         ),
         (
-            desk.path("level.csv"),
+            writer.path("level.csv"),
             &["--slope", "0", "--out", taken],
             &["taken", "directory"],
         ),
         (
-            desk.path("level.csv"),
+            writer.path("level.csv"),
             &["--slope", "0", "--out", "/proc/nowhere"],
             &["/proc/nowhere", "directory"],
         ),
-        (desk.path("level.csv"), &["--live"], &["--live"]),
-        (desk.path("level.csv"), &["--cycles", "8"], &["--live"]),
-        (desk.path("level.csv"), &["--slope", "0", "--seed", "x"], &["--seed"]),
+        (writer.path("level.csv"), &["--live"], &["--live"]),
+        (writer.path("level.csv"), &["--cycles", "8"], &["--live"]),
+        (writer.path("level.csv"), &["--slope", "0", "--seed", "x"], &["--seed"]),
     ];
     for (input, more, expected) in table {
         let more = [&["--json"], *more].concat();
@@ -181,8 +181,8 @@ fn what_cannot_be_explained_is_named_and_ends_with_status_2() {
 #[test]
 fn a_recording_that_may_not_be_read_is_refused() {
     use std::os::unix::fs::PermissionsExt;
-    let desk = Workspace::new();
-    let recording = desk.write("secret.csv", "time_s,x1_m,x2_m\n");
+    let writer = Workspace::new();
+    let recording = writer.write("secret.csv", "time_s,x1_m,x2_m\n");
     std::fs::set_permissions(&recording, std::fs::Permissions::from_mode(0o000)).expect("it is the test's own");
     let output = explain(&recording, &["--slope", "0", "--json"]);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
@@ -193,9 +193,9 @@ fn a_recording_that_may_not_be_read_is_refused() {
 
 #[test]
 fn one_recording_is_explained_and_everything_is_kept() {
-    let desk = Workspace::new();
-    let recording = desk.simulate("level.csv", "0", &["--cycles", "6", "--rest", "0.3", "--rate", "60"]);
-    let dir = desk.path("deep/found");
+    let writer = Workspace::new();
+    let recording = writer.simulate("level.csv", "0", &["--cycles", "6", "--rest", "0.3", "--rate", "60"]);
+    let dir = writer.path("deep/found");
     let out = dir.to_str().expect("plain");
     let output = explain(&recording, &["--slope", "0", "--out", out, "--json"]);
     assert!(output.status.success(), "{}", said(&output));
@@ -242,11 +242,11 @@ fn one_recording_is_explained_and_everything_is_kept() {
 /// The worm of the recordings grips 4 % harder than believed: after one round, nothing is left to recalibrate.
 #[test]
 fn the_written_back_model_agrees_with_the_campaign_it_comes_from() {
-    let desk = Workspace::new();
+    let writer = Workspace::new();
     let truth = ["--cycles", "8", "--max-deformation-mm", "1.82,1.82,1.82,1.82"];
-    desk.simulate("level.csv", "0", &truth);
-    desk.simulate("up.csv", "30", &truth);
-    desk.write(
+    writer.simulate("level.csv", "0", &truth);
+    writer.simulate("up.csv", "30", &truth);
+    writer.write(
         "worm.toml",
         "# My worm\n[worm]\nmax_deformation_m = 0.00175 # as measured\n",
     );
@@ -255,8 +255,8 @@ fn the_written_back_model_agrees_with_the_campaign_it_comes_from() {
         ("up.csv", "slope_deg = 30.0\ncycle_s = 2.5"),
     ];
     let found_m = |worm: &str, name: &str| {
-        let input = desk.write(&format!("{name}.toml"), &campaign(worm, &runs));
-        let dir = desk.path(name);
+        let input = writer.write(&format!("{name}.toml"), &campaign(worm, &runs));
+        let dir = writer.path(name);
         let output = explain(&input, &["--json", "--out", dir.to_str().expect("plain")]);
         assert!(output.status.success(), "{}", said(&output));
         assert_eq!(object(&output.stdout)["verdict"], "agrees", "{name}");
@@ -276,10 +276,10 @@ fn the_written_back_model_agrees_with_the_campaign_it_comes_from() {
 
 #[test]
 fn what_goes_wrong_late_loses_nothing() {
-    let desk = Workspace::new();
-    let recording = desk.simulate("level.csv", "0", &["--cycles", "6", "--rate", "60"]);
-    let short = desk.simulate("short.csv", "0", &["--cycles", "1.2"]);
-    let dir = desk.path("found");
+    let writer = Workspace::new();
+    let recording = writer.simulate("level.csv", "0", &["--cycles", "6", "--rate", "60"]);
+    let short = writer.simulate("short.csv", "0", &["--cycles", "1.2"]);
+    let dir = writer.path("found");
     let out = dir.to_str().expect("plain");
 
     let output = explain(&short, &["--slope", "0", "--out", out]);
@@ -311,8 +311,8 @@ fn what_goes_wrong_late_loses_nothing() {
 
 #[test]
 fn an_effect_for_a_simulation_is_checked() {
-    let desk = Workspace::new();
-    let out = desk.path("x.csv");
+    let writer = Workspace::new();
+    let out = writer.path("x.csv");
     let out = out.to_str().expect("plain");
     for (effect, expected) in [
         ("gremlins:force_n=1", "the library has unequal-clamping"),

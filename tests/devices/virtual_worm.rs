@@ -66,12 +66,12 @@ fn link_and_virtual_worm_understand_each_other() {
         first = first.or(last);
     }
     took_us.sort_unstable();
-    let share = |share: f64| took_us[(share * (took_us.len() - 1) as f64) as usize];
+    let fraction = |fraction: f64| took_us[(fraction * (took_us.len() - 1) as f64) as usize];
     println!(
         "exchange at 1 kHz: median {} us, 99 % {} us, worst {} us",
-        share(0.5),
-        share(0.99),
-        share(1.0)
+        fraction(0.5),
+        fraction(0.99),
+        fraction(1.0)
     );
     assert_eq!(lost, 0, "each question is answered, late at worst");
     let (began, seen) = (first.expect("a reading"), last.expect("a reading"));

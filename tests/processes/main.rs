@@ -39,16 +39,16 @@ fn assert_main_job(worm: &Worm) {
         number(&timing["host_pauses"]["total_s"]),
     );
     let deadlines = number(&summary["ticks"]) + number(&summary["overruns"]);
-    let least_hz = number(&timing["rate_hz"]).min(1000.0);
+    let min_hz = number(&timing["rate_hz"]).min(1000.0);
     assert!(
-        (0.97 * least_hz * duration_s..1030.0 * duration_s).contains(&deadlines),
-        "{duration_s} s at {least_hz} Hz have {deadlines} deadlines"
+        (0.97 * min_hz * duration_s..1030.0 * duration_s).contains(&deadlines),
+        "{duration_s} s at {min_hz} Hz have {deadlines} deadlines"
     );
 
     let cycles = summary["cycles"].as_array().expect("a list");
-    let most_cycles = duration_s / 2.5;
+    let max_cycles = duration_s / 2.5;
     assert!(
-        (most_cycles - paused_s / 2.5 - 1.5..=most_cycles).contains(&(cycles.len() as f64)),
+        (max_cycles - paused_s / 2.5 - 1.5..=max_cycles).contains(&(cycles.len() as f64)),
         "{} cycles of 2.5 s in {duration_s} s, {paused_s} s of them paused",
         cycles.len()
     );

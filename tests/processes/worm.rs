@@ -21,7 +21,7 @@ use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
 pub struct Worm {
     name: String,
     folder: tempfile::TempDir,
-    ears: Mutex<Option<Ears>>,
+    receiver: Mutex<Option<TelemetryReceiver>>,
     pauses: Option<Arc<HostPauses>>,
 }
 
@@ -30,7 +30,7 @@ const PAUSE_MS: std::ops::Range<u64> = 20..300;
 const BETWEEN_PAUSES_MS: std::ops::Range<u64> = 400..1500;
 
 /// Ports of the test itself. They belong to one thread; a test is one.
-struct Ears {
+struct TelemetryReceiver {
     client: CommandClient,
     states: Subscriber<State>,
     newest: Option<State>,
@@ -59,7 +59,7 @@ impl Worm {
         Self {
             name,
             folder,
-            ears: Mutex::new(None),
+            receiver: Mutex::new(None),
             pauses: None,
         }
     }
@@ -107,17 +107,17 @@ impl Worm {
         (WormBus::new(port), DeviceId::new(1).expect("1 is an ID"))
     }
 
-    fn with_ears<T>(&self, act: impl FnOnce(&mut Ears) -> T) -> T {
-        let mut guard = self.ears.lock().expect("no test thread has panicked");
-        let ears = guard.get_or_insert_with(|| {
+    fn with_ears<T>(&self, act: impl FnOnce(&mut TelemetryReceiver) -> T) -> T {
+        let mut guard = self.receiver.lock().expect("no test thread has panicked");
+        let receiver = guard.get_or_insert_with(|| {
             let hub = Hub::open(&self.instance()).expect("the topics open");
-            Ears {
+            TelemetryReceiver {
                 client: hub.command_client().expect("a client"),
                 states: hub.subscriber().expect("a subscriber"),
                 newest: None,
             }
         });
-        act(ears)
+        act(receiver)
     }
 
     /// Commands the controller.
@@ -128,18 +128,18 @@ impl Worm {
             reserved: 0,
         };
         let reply = self
-            .with_ears(|ears| ears.client.call(order, Duration::from_secs(5)))
+            .with_ears(|receiver| receiver.client.call(order, Duration::from_secs(5)))
             .expect("an answer");
         Verdict::try_from(reply.verdict).expect("a known verdict")
     }
 
     /// The newest state.
     pub fn state(&self) -> Option<State> {
-        self.with_ears(|ears| {
-            if let Some(state) = ears.states.latest().expect("states can be read") {
-                ears.newest = Some(*state);
+        self.with_ears(|receiver| {
+            if let Some(state) = receiver.states.latest().expect("states can be read") {
+                receiver.newest = Some(*state);
             }
-            ears.newest
+            receiver.newest
         })
     }
 
@@ -353,10 +353,10 @@ impl Drop for Process {
 }
 
 /// Waits until a condition holds; a test that waits in vain says for what.
-pub fn wait_for(what: &str, patience: Duration, mut condition: impl FnMut() -> bool) {
+pub fn wait_for(what: &str, timeout: Duration, mut condition: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !condition() {
-        assert!(begun.elapsed() < patience, "waited {patience:?} in vain: {what}");
+        assert!(begun.elapsed() < timeout, "waited {timeout:?} in vain: {what}");
         std::thread::sleep(Duration::from_millis(5));
     }
 }

@@ -60,7 +60,7 @@ fn estimate(state_sequence: u64) -> Estimate {
         energy_electrical_j: 2.5,
         energy_loss_j: 3.5,
         max_deformation_m: [2e-3; MAX_CELLS],
-        battery_share: 0.75,
+        battery_fraction: 0.75,
         cell_count: 4,
         sliding_mask: 5,
         armed_mask: 6,

@@ -79,7 +79,7 @@ fn journey<M: Machine>(
     let toml = Kind::of(number).toml(rate_hz);
     let config = config(&toml);
     let seed = number as u64 + 1;
-    let mut chance = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut session = Session::new(&config, machine(&config, seed), rate_hz);
     let gait = config.gait_cycles_per_s();
     let until_s = session.now_s() + 3600.0 * hours;
@@ -87,14 +87,14 @@ fn journey<M: Machine>(
     let mut log = String::new();
     session.begin();
     while session.now_s() < until_s && session.raised.is_empty() {
-        let what = match chance.random_range(0..6) {
+        let what = match rng.random_range(0..6) {
             0 => {
                 session.command(CommandKind::Hold, 0.0);
                 "hold"
             }
             1 if session.mode() == Mode::Crawling => {
                 session.command(CommandKind::Stop, 0.0);
-                session.run_s(chance.random_range(1.0..8.0), |_| {});
+                session.run_s(rng.random_range(1.0..8.0), |_| {});
                 session.command(CommandKind::Arm, 0.0);
                 "stop"
             }
@@ -103,15 +103,15 @@ fn journey<M: Machine>(
                 "turn"
             }
             3 => {
-                speed = gait.copysign(speed) * chance.random_range(0.6..1.2);
+                speed = gait.copysign(speed) * rng.random_range(0.6..1.2);
                 "speed"
             }
             _ => "on",
         };
-        session.run_s(chance.random_range(0.5..6.0), |_| {});
+        session.run_s(rng.random_range(0.5..6.0), |_| {});
         session.command(CommandKind::Crawl, speed);
         log += &format!("{what} {speed:.3} at {:.1} s; ", session.now_s());
-        let cycles = chance.random_range(0.3..30.0);
+        let cycles = rng.random_range(0.3..30.0);
         session.run_s(cycles / speed.abs(), |_| {});
     }
     let ledger = session.machine.plant().ledger();

@@ -219,8 +219,8 @@ fn a_mismatch_that_is_over_is_cleared() {
     assert!(is_raised(&session), "{:?}", session.raised);
     let map = session.observer.residual_map();
     assert_eq!((map.cells(), map.direction(), map.entries().count()), (4, 1, 64));
-    let way_m: f64 = map.entries().map(|entry| entry.mean_m).sum::<f64>() / 4.0;
-    assert!((way_m + 3.6e-4).abs() < 6e-5, "{way_m} m a cycle");
+    let displacement_m: f64 = map.entries().map(|entry| entry.mean_m).sum::<f64>() / 4.0;
+    assert!((displacement_m + 3.6e-4).abs() < 6e-5, "{displacement_m} m a cycle");
     session.run_s(60.0, |_| {});
     assert!(!is_raised(&session));
     assert_eq!(session.raised.len(), 1);

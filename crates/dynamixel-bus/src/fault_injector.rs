@@ -52,7 +52,7 @@ impl Faults {
 pub struct FaultInjector<P> {
     port: P,
     faults: Faults,
-    chance: Xoshiro256PlusPlus,
+    rng: Xoshiro256PlusPlus,
     requests: u64,
     /// Bytes that this answer may still have, when it is to end early.
     answer_left: Option<usize>,
@@ -70,7 +70,7 @@ impl<P: Port> FaultInjector<P> {
         Self {
             port,
             faults,
-            chance: Xoshiro256PlusPlus::seed_from_u64(seed),
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
             requests: 0,
             answer_left: None,
             answer_delayed: false,
@@ -86,11 +86,11 @@ impl<P: Port> FaultInjector<P> {
     fn happens(&mut self, probability: f64) -> bool {
         // 53 bits are what a float in 0..1 can hold. Nothing is drawn for what cannot happen, so that one more kind of fault
         // does not change the others.
-        probability > 0.0 && ((self.chance.next_u64() >> 11) as f64) < probability * (1u64 << 53) as f64
+        probability > 0.0 && ((self.rng.next_u64() >> 11) as f64) < probability * (1u64 << 53) as f64
     }
 
     fn below(&mut self, bound: u64) -> u64 {
-        self.chance.next_u64() % bound
+        self.rng.next_u64() % bound
     }
 
     /// Lets bytes from the port through, as far as the faults let them.

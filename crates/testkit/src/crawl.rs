@@ -14,7 +14,7 @@ use worm_physics::{Ledger, Motion, Worm};
 pub struct Scene {
     pub seed: u64,
     pub noise_m: f64,
-    pub outlier_share: f64,
+    pub outlier_fraction: f64,
     pub dropout_share: f64,
     pub tracker_hz: f64,
     pub tick_hz: f64,
@@ -29,7 +29,7 @@ impl Default for Scene {
         Self {
             seed: 1,
             noise_m: 3e-4,
-            outlier_share: 0.0,
+            outlier_fraction: 0.0,
             dropout_share: 0.0,
             tracker_hz: 120.0,
             tick_hz: 1000.0,
@@ -122,9 +122,9 @@ impl Crawl {
         let swing_hz = 1.3;
         let swing_s = self.scene.ripple * (1.0 - (TAU * swing_hz * self.crawled_s).cos()) / (TAU * swing_hz);
         let phase = self.scene.cycles_per_s * (self.crawled_s + swing_s);
-        let sense = self.scene.cycles_per_s.signum();
-        let next_whole = sense * self.milestones.len() as f64;
-        if sense * phase >= sense * next_whole {
+        let sign = self.scene.cycles_per_s.signum();
+        let next_whole = sign * self.milestones.len() as f64;
+        if sign * phase >= sign * next_whole {
             self.motion.advance_to(&self.worm, next_whole).expect("the worm holds");
             self.milestones.push(Milestone {
                 ledger: self.motion.ledger().clone(),
@@ -144,7 +144,7 @@ impl Crawl {
         for (cell, position_m) in self.motion.positions_m().iter().enumerate() {
             let noise: f64 = StandardNormal.sample(&mut self.rng);
             let (seen, outlier) = (self.rng.random::<f64>(), self.rng.random::<f64>());
-            let off_m = if outlier < self.scene.outlier_share {
+            let off_m = if outlier < self.scene.outlier_fraction {
                 let off_m = 2e-3 + 6e-3 * self.rng.random::<f64>();
                 if self.rng.random::<f64>() < 0.5 { off_m } else { -off_m }
             } else {

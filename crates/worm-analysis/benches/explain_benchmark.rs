@@ -51,8 +51,8 @@ fn main() -> ExitCode {
         cases.retain(|case| case.what() == only);
     }
     let few = order.split.is_none().then_some(FEW);
-    if let Some(most) = order.cases.or(few) {
-        cases = spread(&cases, most);
+    if let Some(max) = order.cases.or(few) {
+        cases = spread(&cases, max);
     }
     let judgements = judge_all(&cases);
     println!("\n{}", Table(&judgements));
@@ -75,8 +75,8 @@ fn main() -> ExitCode {
 }
 
 /// So many cases, as far from each other as they can be.
-fn spread(cases: &[Case], most: usize) -> Vec<Case> {
-    let count = most.min(cases.len());
+fn spread(cases: &[Case], max: usize) -> Vec<Case> {
+    let count = max.min(cases.len());
     (0..count).map(|place| cases[place * cases.len() / count]).collect()
 }
 

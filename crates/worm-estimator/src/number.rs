@@ -7,7 +7,7 @@ pub const NONE: &str = "—";
 const MORE_DECIMALS: usize = 1;
 
 /// Most values that a sentence lists.
-const MOST_LISTED: usize = 6;
+const MAX_LISTED: usize = 6;
 
 /// A value with a fixed number of decimals and a true minus sign; [`NONE`] where it is not finite.
 pub fn fixed(value: f64, decimals: usize) -> String {
@@ -68,18 +68,18 @@ pub fn significant(value: f64, digits: usize) -> String {
 }
 
 /// Most decimals that anything is shown with.
-const MOST_DECIMALS: f64 = 6.0;
+const MAX_DECIMALS: f64 = 6.0;
 
 fn decimals_for(value: f64, digits: usize) -> usize {
     if value == 0.0 || !value.is_finite() {
         return digits.saturating_sub(1);
     }
-    (digits as f64 - 1.0 - value.abs().log10().floor()).clamp(0.0, MOST_DECIMALS) as usize
+    (digits as f64 - 1.0 - value.abs().log10().floor()).clamp(0.0, MAX_DECIMALS) as usize
 }
 
 /// A share as a percentage; near 0 and 100 % it shows which side it is on.
-pub fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
+pub fn percent(fraction: f64) -> String {
+    let percent = 100.0 * fraction;
     match percent {
         _ if 0.0 < percent && percent < 0.1 => "<0.1 %".to_owned(),
         _ if 99.9 < percent && percent < 100.0 => ">99.9 %".to_owned(),
@@ -101,7 +101,7 @@ pub fn in_words(parts: &[String]) -> String {
 /// A few values in words, all of them: `1.90, 1.04 mm`; the range of many: `1.04 to 2.15 mm`.
 pub fn list_or_range(values: &[f64], decimals: usize, unit: &str) -> String {
     let listed = |values: &[f64]| values.iter().map(|value| fixed(*value, decimals)).collect::<Vec<_>>();
-    if values.len() <= MOST_LISTED {
+    if values.len() <= MAX_LISTED {
         return format!("{} {unit}", listed(values).join(", "));
     }
     let finite = || values.iter().copied().filter(|value| value.is_finite());
@@ -170,11 +170,11 @@ mod tests {
 
     #[test]
     fn a_share_says_whether_anything_is_missing() {
-        let shares = [0.0, 1e-5, 0.004, 0.5, -0.2, 0.996, 0.99999, 1.0, 1.3, f64::NAN];
+        let fractions = [0.0, 1e-5, 0.004, 0.5, -0.2, 0.996, 0.99999, 1.0, 1.3, f64::NAN];
         let texts = [
             "0.0 %", "<0.1 %", "0.4 %", "50 %", "−20 %", "99.6 %", ">99.9 %", "100 %", "130 %", NONE,
         ];
-        assert_eq!(shares.map(percent), texts);
+        assert_eq!(fractions.map(percent), texts);
     }
 
     #[test]

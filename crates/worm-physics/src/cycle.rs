@@ -7,17 +7,17 @@ use super::worm::{SlidesDown, Worm};
 use crate::MAX_CELLS;
 
 /// Change of any deformation over a cycle, as a share of the stroke, below which the crawl counts as periodic.
-const PERIODIC_SHARE: f64 = 1e-12;
+const PERIODIC_FRACTION: f64 = 1e-12;
 /// Cycles after which the search for the periodic crawl ends in any case.
 const MAX_CYCLES: u32 = 10_000;
-/// As [`PERIODIC_SHARE`], for the incremental motion, whose increments do not end where the events are.
-const NEARLY_PERIODIC_SHARE: f64 = 1e-7;
+/// As [`PERIODIC_FRACTION`], for the incremental motion, whose increments do not end where the events are.
+const NEARLY_PERIODIC_FRACTION: f64 = 1e-7;
 /// As [`MAX_CYCLES`], for the incremental motion.
 const MAX_INCREMENTAL_CYCLES: u32 = 1000;
 /// Cycles from rest after which the cycle of a crawl that never becomes periodic is taken: as many as a recording has.
 pub const CYCLES_BEFORE: u32 = 10;
 /// Advance, as a share of the stroke, up to which the worm counts as standing still: well above rounding.
-const STANDSTILL_SHARE: f64 = 1e-9;
+const STANDSTILL_FRACTION: f64 = 1e-9;
 
 /// What becomes of a worm that keeps stepping.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,11 +80,11 @@ pub struct Cycle {
 impl Cycle {
     /// Whether the worm ends the cycle further back than it began, by more than rounding.
     pub fn slips_back(&self, worm: &Worm) -> bool {
-        self.advance_m < -STANDSTILL_SHARE * worm.stroke_m()
+        self.advance_m < -STANDSTILL_FRACTION * worm.stroke_m()
     }
 
     fn new(worm: &Worm, advance_m: f64, account: &Ledger, cycles_to_steady: u32, closure_m: f64) -> Self {
-        let progresses = advance_m > STANDSTILL_SHARE * worm.stroke_m();
+        let progresses = advance_m > STANDSTILL_FRACTION * worm.stroke_m();
         let positive_j = account.actuator_positive_j;
         let energy_per_distance_j_per_m = progresses.then(|| positive_j / advance_m);
         let weight_n = worm.weight_n();
@@ -138,9 +138,9 @@ pub fn steady_cycle_of(physics: &Physics, cycle_s: f64) -> Outcome {
 fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<Cycle, SlidesDown> {
     let worm = &physics.worm;
     let mut motion = Locomotion::at_rest(physics, &[0.0; MAX_CELLS][..worm.cells()])?;
-    let (share, most_cycles) = match (motion.is_exact(), physics.laws.are_periodic()) {
-        (true, _) => (PERIODIC_SHARE, MAX_CYCLES),
-        (false, true) => (NEARLY_PERIODIC_SHARE, MAX_INCREMENTAL_CYCLES),
+    let (fraction, max_cycles) = match (motion.is_exact(), physics.laws.are_periodic()) {
+        (true, _) => (PERIODIC_FRACTION, MAX_CYCLES),
+        (false, true) => (NEARLY_PERIODIC_FRACTION, MAX_INCREMENTAL_CYCLES),
         (false, false) => (0.0, CYCLES_BEFORE),
     };
     let mut cycles = 0;
@@ -150,8 +150,8 @@ fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<Cycle, Slides
         let closure_m = (0..worm.cells())
             .map(|cell| (motion.deformation_m(cell) - before.deformation_m(cell)).abs())
             .fold(0.0, f64::max);
-        let is_closed = physics.laws.are_periodic() && closure_m <= share * worm.stroke_m();
-        if is_closed || cycles == most_cycles {
+        let is_closed = physics.laws.are_periodic() && closure_m <= fraction * worm.stroke_m();
+        if is_closed || cycles == max_cycles {
             let advance_m = motion.mean_position_m() - before.mean_position_m();
             let account = motion.ledger().since(before.ledger());
             return Ok(Cycle::new(worm, advance_m, &account, cycles, closure_m));

@@ -66,8 +66,8 @@ impl Ledger {
     /// Adds the work of an actuator force that runs in a straight line while the cell extends by `extension_m`.
     pub fn add_actuator_work(&mut self, force_before_n: f64, force_after_n: f64, extension_m: f64) {
         self.actuator_net_j += 0.5 * (force_before_n + force_after_n) * extension_m;
-        let sense = extension_m.signum();
-        let (before, after) = (force_before_n * sense, force_after_n * sense);
+        let sign = extension_m.signum();
+        let (before, after) = (force_before_n * sign, force_after_n * sign);
         let (low, high) = (before.min(after), before.max(after));
         // Mean over the piece of max(force, 0), with the crossing at the share high/(high − low) of it.
         let positive_mean = if low >= 0.0 {

@@ -114,19 +114,19 @@ impl Mechanics {
             turns += 1.0;
             steps -= cells;
         }
-        let share = self.rounded((steps / (1.0 + overlap)).min(1.0));
+        let fraction = self.rounded((steps / (1.0 + overlap)).min(1.0));
         let play_m = self.laws.play_m.min(stroke_m);
-        turns * (stroke_m - play_m) + (stroke_m * share - play_m).max(0.0)
+        turns * (stroke_m - play_m) + (stroke_m * fraction - play_m).max(0.0)
     }
 
     /// How fast the drive moves a cell in the body, m for each cycle of phase.
     pub(super) fn drive_slope_m(&self, cell: usize, cam: &Cam) -> f64 {
         let cells = self.worm.cells() as f64;
         let steps = (cam.steps - self.place_of[cell] as f64 + self.laws.overlap).rem_euclid(cells);
-        let share = steps / (1.0 + self.laws.overlap);
+        let fraction = steps / (1.0 + self.laws.overlap);
         let stroke_m = self.worm.stroke_of_m(cell);
-        if share < 1.0 && stroke_m * self.rounded(share) >= self.laws.play_m {
-            stroke_m * self.speed(share) * cells / (1.0 + self.laws.overlap)
+        if fraction < 1.0 && stroke_m * self.rounded(fraction) >= self.laws.play_m {
+            stroke_m * self.speed(fraction) * cells / (1.0 + self.laws.overlap)
         } else {
             0.0
         }
@@ -135,24 +135,24 @@ impl Mechanics {
     /// How far a step is done after a share of its time: evenly, but for the corners of the cam, where the cell gains its speed and
     /// loses it evenly over the rounding's share of the step.
     #[inline]
-    fn rounded(&self, share: f64) -> f64 {
+    fn rounded(&self, fraction: f64) -> f64 {
         let rounding = self.laws.rounding;
         if rounding == 0.0 {
-            return share;
+            return fraction;
         }
-        let from_end = share.min(1.0 - share);
+        let from_end = fraction.min(1.0 - fraction);
         let near = if from_end < rounding {
             0.5 * from_end * from_end / rounding
         } else {
             from_end - 0.5 * rounding
         } / (1.0 - rounding);
-        if share < 0.5 { near } else { 1.0 - near }
+        if fraction < 0.5 { near } else { 1.0 - near }
     }
 
     /// Speed over the mean one of the step, after a share of its time.
-    fn speed(&self, share: f64) -> f64 {
+    fn speed(&self, fraction: f64) -> f64 {
         let rounding = self.laws.rounding;
-        let from_end = share.min(1.0 - share);
+        let from_end = fraction.min(1.0 - fraction);
         if from_end < rounding {
             from_end / rounding / (1.0 - rounding)
         } else {
@@ -170,8 +170,8 @@ impl Mechanics {
         if laws.patch.friction_factor != 1.0 {
             let patch = &laws.patch;
             let inside_m = (tip_m - patch.from_m).min(patch.from_m + patch.length_m - tip_m);
-            let share = (0.5 + inside_m / PATCH_EDGE_M).clamp(0.0, 1.0);
-            friction *= 1.0 + share * (patch.friction_factor - 1.0);
+            let fraction = (0.5 + inside_m / PATCH_EDGE_M).clamp(0.0, 1.0);
+            friction *= 1.0 + fraction * (patch.friction_factor - 1.0);
         }
         friction
     }

@@ -19,10 +19,10 @@ use super::worm::{SlidesDown, Worm};
 use crate::MAX_CELLS;
 
 /// Distance from a bound, as a share of bounds and stroke, that counts as none.
-const ARRIVAL_SHARE: f64 = 1e-12;
+const ARRIVAL_FRACTION: f64 = 1e-12;
 /// Unbalanced force, as a share of what the contacts could exert, that counts as none. It is well below the arrival share
 /// so that restoring the balance does not lift a sliding contact off its bound.
-const BALANCE_SHARE: f64 = 1e-14;
+const BALANCE_FRACTION: f64 = 1e-14;
 
 /// Largest phase, cycles: beyond it f64 does not resolve a piece of a step.
 const MAX_PHASE: f64 = 1e12;
@@ -147,14 +147,14 @@ impl Motion {
         // Each pass takes one more contact to its bound or restores the balance.
         for _ in 0..=self.cells {
             let excess_n = self.unbalanced_force_n(worm);
-            if excess_n.abs() <= BALANCE_SHARE * full_force_n {
+            if excess_n.abs() <= BALANCE_FRACTION * full_force_n {
                 break;
             }
-            let sense = -excess_n.signum();
+            let sign = -excess_n.signum();
             let mut stiffness_n_per_m = 0.0;
             let mut nearest_m = f64::INFINITY;
             for cell in 0..self.cells {
-                let room_m = self.settle_at_bound(worm, cell, sense);
+                let room_m = self.settle_at_bound(worm, cell, sign);
                 if room_m > 0.0 {
                     stiffness_n_per_m += worm.contacts()[cell].stiffness_n_per_m;
                     nearest_m = nearest_m.min(room_m);
@@ -163,7 +163,7 @@ impl Motion {
             if stiffness_n_per_m == 0.0 {
                 break; // All tips slide and the rest of the excess is rounding, for the hold was checked.
             }
-            let shift_m = sense * nearest_m.min(excess_n.abs() / stiffness_n_per_m);
+            let shift_m = sign * nearest_m.min(excess_n.abs() / stiffness_n_per_m);
             spent_j += (0..self.cells)
                 .map(|cell| self.displace(worm, cell, shift_m))
                 .sum::<f64>();
@@ -269,11 +269,11 @@ impl Motion {
 
     /// Runs a part of one cell's step, in steps, negative in reverse, from event to event.
     fn extend(&mut self, worm: &Worm, stepping: usize, steps: f64) {
-        let sense = steps.signum();
+        let sign = steps.signum();
         let extension_per_step_m = worm.stroke_of_m(stepping);
         let mut left = steps.abs();
         while left > 0.0 {
-            let stepping_room_m = self.settle_at_bound(worm, stepping, sense);
+            let stepping_room_m = self.settle_at_bound(worm, stepping, sign);
             let stepping_stiffness_n_per_m = if stepping_room_m > 0.0 {
                 worm.contacts()[stepping].stiffness_n_per_m
             } else {
@@ -282,14 +282,14 @@ impl Motion {
             let mut others_stiffness_n_per_m = 0.0;
             let mut others_room_m = f64::INFINITY;
             for cell in (0..self.cells).filter(|&cell| cell != stepping) {
-                let room_m = self.settle_at_bound(worm, cell, -sense);
+                let room_m = self.settle_at_bound(worm, cell, -sign);
                 if room_m > 0.0 {
                     others_stiffness_n_per_m += worm.contacts()[cell].stiffness_n_per_m;
                     others_room_m = others_room_m.min(room_m);
                 }
             }
             let loading_n_per_m = stepping_stiffness_n_per_m + others_stiffness_n_per_m;
-            let (stepping_share, others_share) = if loading_n_per_m > 0.0 {
+            let (stepping_fraction, others_fraction) = if loading_n_per_m > 0.0 {
                 (
                     others_stiffness_n_per_m / loading_n_per_m,
                     stepping_stiffness_n_per_m / loading_n_per_m,
@@ -299,26 +299,26 @@ impl Motion {
             };
             let mut piece = left;
             if stepping_stiffness_n_per_m > 0.0 {
-                piece = piece.min(steps_to_go(stepping_room_m, stepping_share * extension_per_step_m));
+                piece = piece.min(steps_to_go(stepping_room_m, stepping_fraction * extension_per_step_m));
             }
             if others_stiffness_n_per_m > 0.0 {
-                piece = piece.min(steps_to_go(others_room_m, others_share * extension_per_step_m));
+                piece = piece.min(steps_to_go(others_room_m, others_fraction * extension_per_step_m));
             }
-            self.run_piece(worm, stepping, sense * piece, stepping_share, others_share);
+            self.run_piece(worm, stepping, sign * piece, stepping_fraction, others_fraction);
             left -= piece;
         }
     }
 
     /// Runs a piece without events: the stepping cell takes its share of the extension, the others theirs backward.
-    fn run_piece(&mut self, worm: &Worm, stepping: usize, steps: f64, stepping_share: f64, others_share: f64) {
+    fn run_piece(&mut self, worm: &Worm, stepping: usize, steps: f64, stepping_fraction: f64, others_fraction: f64) {
         let extension_m = steps * worm.stroke_of_m(stepping);
         let force_before_n = self.extending_force_n(worm, stepping);
         let deformation_before_m: f64 = self.deformations_m().iter().sum();
         for cell in 0..self.cells {
             let shift_m = if cell == stepping {
-                stepping_share
+                stepping_fraction
             } else {
-                -others_share
+                -others_fraction
             } * extension_m;
             self.displace(worm, cell, shift_m);
         }
@@ -332,15 +332,15 @@ impl Motion {
 
     /// How far a cell can still load when it moves in the given sense, m; 0 once it slides. A contact within rounding of
     /// its bound is put on it.
-    fn settle_at_bound(&mut self, worm: &Worm, cell: usize, sense: f64) -> f64 {
+    fn settle_at_bound(&mut self, worm: &Worm, cell: usize, sign: f64) -> f64 {
         let contact = &worm.contacts()[cell];
-        let bound_m = if sense > 0.0 {
+        let bound_m = if sign > 0.0 {
             contact.forward_bound_m
         } else {
             -contact.backward_bound_m
         };
-        let room_m = sense * (bound_m - self.deformation_m[cell]);
-        if room_m > ARRIVAL_SHARE * (contact.range_m() + worm.stroke_m()) {
+        let room_m = sign * (bound_m - self.deformation_m[cell]);
+        if room_m > ARRIVAL_FRACTION * (contact.range_m() + worm.stroke_m()) {
             room_m
         } else {
             self.deformation_m[cell] = bound_m;

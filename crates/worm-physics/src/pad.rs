@@ -9,13 +9,13 @@
 /// Yielding elements of a pad: enough that the curve of their sum shows no corners in positions.
 pub(super) const ELEMENTS: usize = 4;
 /// Force, as a share of a tip's friction, to which a curved law is inverted.
-const INVERSION_SHARE: f64 = 1e-12;
+const INVERSION_FRACTION: f64 = 1e-12;
 /// Share of a cell's shift to which a curved pad on bristles is solved.
-const STRAIN_SHARE: f64 = 1e-9;
+const STRAIN_FRACTION: f64 = 1e-9;
 /// Share of its friction from which a tip on bristles counts as sliding.
 const SLIDES_FROM: f64 = 0.98;
 /// Iterations after which an inversion ends in any case: halving alone would do by then.
-const MOST_ITERATIONS: usize = 80;
+const MAX_ITERATIONS: usize = 80;
 
 /// What one cell's tip is made of.
 #[derive(Debug, Clone, Copy, Default)]
@@ -48,13 +48,13 @@ pub(super) struct Pad {
 /// What a tip can hold in one increment.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Hold {
-    least_n: f64,
-    most_n: f64,
+    min_n: f64,
+    max_n: f64,
     // Deformation and force before the cell moves, and deformations under the limits, once they were asked for: all hang on the
     // tip's state alone, not on the shift.
     still: Option<(f64, f64)>,
-    least_m: Option<f64>,
-    most_m: Option<f64>,
+    min_m: Option<f64>,
+    max_m: Option<f64>,
 }
 
 /// A tip after a shift of its cell.
@@ -82,11 +82,11 @@ impl PadLaw {
             limit *= 1.0 + (self.static_over_kinetic - 1.0) * (1.0 - slipped);
         }
         Hold {
-            least_n: -self.backward_n * limit,
-            most_n: self.forward_n * limit,
+            min_n: -self.backward_n * limit,
+            max_n: self.forward_n * limit,
             still: None,
-            least_m: None,
-            most_m: None,
+            min_m: None,
+            max_m: None,
         }
     }
 
@@ -102,16 +102,16 @@ impl PadLaw {
         } else {
             self.force(pad, reach_m, relaxing)
         };
-        let (force_n, deformation_m) = if reach_n > hold.most_n {
+        let (force_n, deformation_m) = if reach_n > hold.max_n {
             let at_m = hold
-                .most_m
-                .get_or_insert_with(|| self.invert(pad, hold.most_n, relaxing));
-            (hold.most_n, at_m.min(reach_m))
-        } else if reach_n < hold.least_n {
+                .max_m
+                .get_or_insert_with(|| self.invert(pad, hold.max_n, relaxing));
+            (hold.max_n, at_m.min(reach_m))
+        } else if reach_n < hold.min_n {
             let at_m = hold
-                .least_m
-                .get_or_insert_with(|| self.invert(pad, hold.least_n, relaxing));
-            (hold.least_n, at_m.max(reach_m))
+                .min_m
+                .get_or_insert_with(|| self.invert(pad, hold.min_n, relaxing));
+            (hold.min_n, at_m.max(reach_m))
         } else {
             return Loaded {
                 deformation_m: reach_m,
@@ -127,7 +127,7 @@ impl PadLaw {
             force_n,
             slide_m,
             tangent_n_per_m: 0.0,
-            sliding: sense_of(slide_m),
+            sliding: sign_of(slide_m),
         }
     }
 
@@ -139,21 +139,21 @@ impl PadLaw {
     fn load_bristles(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, relaxing: f64) -> Loaded {
         let (still_m, still_n) = *hold
             .still
-            .get_or_insert_with(|| self.still(pad, hold.least_n, hold.most_n, relaxing));
-        let limit_n = if shift_m > 0.0 { hold.most_n } else { hold.least_n };
+            .get_or_insert_with(|| self.still(pad, hold.min_n, hold.max_n, relaxing));
+        let limit_n = if shift_m > 0.0 { hold.max_n } else { hold.min_n };
         let is_linear = self.is_linear();
         let slope = if is_linear {
             self.stiffness_n_per_m
         } else {
             self.force(pad, still_m, relaxing).1
         };
-        let share = self.presliding * slope / self.stiffness_n_per_m;
+        let fraction = self.presliding * slope / self.stiffness_n_per_m;
         let left = (1.0 - still_n / limit_n).max(0.0);
-        let linear = share - left + shift_m * slope / limit_n;
-        let root = (linear * linear + 4.0 * left * share).sqrt();
+        let linear = fraction - left + shift_m * slope / limit_n;
+        let root = (linear * linear + 4.0 * left * fraction).sqrt();
         // The form of the root that does not cancel.
         let after = if linear > 0.0 {
-            2.0 * left * share / (linear + root)
+            2.0 * left * fraction / (linear + root)
         } else {
             0.5 * (root - linear)
         };
@@ -179,7 +179,7 @@ impl PadLaw {
             slide_m: pad.deformation_m + shift_m - deformation_m,
             tangent_n_per_m,
             sliding: if force_n / limit_n > SLIDES_FROM {
-                sense_of(shift_m)
+                sign_of(shift_m)
             } else {
                 0
             },
@@ -188,13 +188,13 @@ impl PadLaw {
 
     /// Deformation and force of a tip before its cell moves: the creeping branch relaxes even where nothing moves, and what is
     /// held beyond the friction, as after breaking away, is let go.
-    fn still(&self, pad: &Pad, least_n: f64, most_n: f64, relaxing: f64) -> (f64, f64) {
+    fn still(&self, pad: &Pad, min_n: f64, max_n: f64, relaxing: f64) -> (f64, f64) {
         let still_n = if self.is_linear() {
             pad.force_n
         } else {
             self.force(pad, pad.deformation_m, relaxing).0
         };
-        let held_n = still_n.clamp(least_n, most_n);
+        let held_n = still_n.clamp(min_n, max_n);
         if held_n == still_n {
             (pad.deformation_m, still_n)
         } else {
@@ -223,11 +223,11 @@ impl PadLaw {
         loop {
             let (force_n, slope) = self.force(pad, still_m + strain_m, relaxing);
             let left = 1.0 - force_n / limit_n;
-            let share = self.presliding * slope / self.stiffness_n_per_m;
-            let excess_m = strain_m * (left + share) - shift_m * left;
-            let steepness = left + share + (shift_m - strain_m) * slope / limit_n;
+            let fraction = self.presliding * slope / self.stiffness_n_per_m;
+            let excess_m = strain_m * (left + fraction) - shift_m * left;
+            let steepness = left + fraction + (shift_m - strain_m) * slope / limit_n;
             tries += 1;
-            if excess_m.abs() <= STRAIN_SHARE * shift_m.abs() || tries == MOST_ITERATIONS {
+            if excess_m.abs() <= STRAIN_FRACTION * shift_m.abs() || tries == MAX_ITERATIONS {
                 return (strain_m, force_n, slope * left / steepness);
             }
             strain_m = bracket.next_m(strain_m, excess_m, steepness);
@@ -313,10 +313,10 @@ impl PadLaw {
             low_m: at_m - 2.0 * far_m,
             high_m: at_m + 2.0 * far_m,
         };
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let (force_n, slope) = self.force(pad, at_m, relaxing);
             let excess_n = force_n - target_n;
-            if excess_n.abs() <= INVERSION_SHARE * scale_n {
+            if excess_n.abs() <= INVERSION_FRACTION * scale_n {
                 break;
             }
             at_m = bracket.next_m(at_m, excess_n, slope);
@@ -348,10 +348,10 @@ impl Bracket {
     }
 }
 
-fn sense_of(way_m: f64) -> i8 {
-    if way_m > 0.0 {
+fn sign_of(displacement_m: f64) -> i8 {
+    if displacement_m > 0.0 {
         1
-    } else if way_m < 0.0 {
+    } else if displacement_m < 0.0 {
         -1
     } else {
         0

@@ -202,7 +202,7 @@ impl Physics {
     }
 
     /// The motor's speed against a force of the stepping cell, as a share of its speed without.
-    pub fn speed_share(&self, actuator_force_n: f64) -> f64 {
+    pub fn speed_fraction(&self, actuator_force_n: f64) -> f64 {
         1.0 / (1.0 + self.slowdown_per_n * actuator_force_n.max(0.0))
     }
 }

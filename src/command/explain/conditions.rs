@@ -7,7 +7,7 @@ use worm_estimator::config::Config;
 use worm_physics::Worm;
 
 /// How far the mean cycle time may be from the stated one, as a share.
-const CYCLE_SHARE: f64 = 0.2;
+const CYCLE_FRACTION: f64 = 0.2;
 
 /// A worm that would slide down with this much more friction than is believed did not crawl there.
 const MORE_FRICTION: f64 = 1.5;
@@ -17,10 +17,10 @@ const MORE_FRICTION: f64 = 1.5;
 /// # Errors
 /// [`Failure::Unusable`] names the recording, what is stated and what is seen.
 pub(super) fn check(runs: &[Run<'_>], config: &Config) -> Result<(), Failure> {
-    let believed = Worm::try_from(config).map_err(Failure::unusable)?;
+    let nominal = Worm::try_from(config).map_err(Failure::unusable)?;
     for run in runs {
         check_cycle(run, config)?;
-        check_payload(run, &believed)?;
+        check_payload(run, &nominal)?;
     }
     Ok(())
 }
@@ -35,7 +35,7 @@ fn check_cycle(run: &Run<'_>, config: &Config) -> Result<(), Failure> {
     };
     // Without a gait the search has more to say.
     let gait = gait::find(&recording.time_s, &recording.position_m, &recording.filled(), prior).ok();
-    let contradicts = |seen_s: f64| (seen_s - stated_s).abs() > CYCLE_SHARE * stated_s;
+    let contradicts = |seen_s: f64| (seen_s - stated_s).abs() > CYCLE_FRACTION * stated_s;
     match gait.and_then(|gait| cycle_s(&gait, &recording.time_s)) {
         // Where the worm rests between the cycles, its cam's turn may be stated, or the whole.
         Some([seen_s, turning_s]) if contradicts(seen_s) && contradicts(turning_s) => Err(Failure::unusable(format!(
@@ -65,20 +65,20 @@ fn cycle_s(gait: &Gait, time_s: &[f64]) -> Option<[f64; 2]> {
     Some([(ended_s(last)? - begun_s(first)?) / (last - first), middle_s * cells])
 }
 
-fn check_payload(run: &Run<'_>, believed: &Worm) -> Result<(), Failure> {
+fn check_payload(run: &Run<'_>, nominal: &Worm) -> Result<(), Failure> {
     if run.payload_kg <= 0.0 {
         return Ok(());
     }
-    let contacts = believed.contacts().iter();
+    let contacts = nominal.contacts().iter();
     let bounds_m: Vec<f64> = contacts
         .map(|contact| MORE_FRICTION * contact.forward_bound_m)
         .collect();
     let on_the_slope = |mass_kg: f64| {
-        let worm = believed.clone().with_max_deformations_m(&bounds_m)?;
+        let worm = nominal.clone().with_max_deformations_m(&bounds_m)?;
         worm.with_mass_kg(mass_kg)?.with_slope_rad(run.slope_deg.to_radians())
     };
-    let loaded = on_the_slope(believed.mass_kg() + run.payload_kg).map_err(Failure::unusable)?;
-    let unloaded = on_the_slope(believed.mass_kg()).map_err(Failure::unusable)?;
+    let loaded = on_the_slope(nominal.mass_kg() + run.payload_kg).map_err(Failure::unusable)?;
+    let unloaded = on_the_slope(nominal.mass_kg()).map_err(Failure::unusable)?;
     if loaded.check_hold().is_err() && unloaded.check_hold().is_ok() {
         return Err(Failure::unusable(format!(
             "{}: with a payload of {} kg at {}° the worm could not even hold itself, yet the recording shows a crawl: give the \

@@ -7,7 +7,7 @@ use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 use worm_analysis::experiment::Run;
 use worm_analysis::explain::Answer;
-use worm_analysis::explain::write_back::{self, ModelText};
+use worm_analysis::explain::model_update::{self, ModelText};
 use worm_analysis::report;
 
 /// A folder that can be written in.
@@ -45,7 +45,7 @@ impl Folder {
 
     /// `model.toml` and `model.diff`.
     pub(super) fn write_model(&self, model: &ModelText) -> Result<(), Failure> {
-        self.write(write_back::FILE, &model.text)?;
+        self.write(model_update::FILE, &model.text)?;
         self.write("model.diff", &model.unified)
     }
 
@@ -74,7 +74,7 @@ impl Display for Folder {
         write!(
             f,
             "{folder}/report.html: look at it in a browser; the model is {folder}/{}, what is new in it {folder}/model.diff",
-            write_back::FILE
+            model_update::FILE
         )
     }
 }

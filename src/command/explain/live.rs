@@ -1,6 +1,6 @@
 //! `wormd explain --live`: the running worm is recorded first.
 
-use crate::command::material::READING;
+use crate::command::dataset::READING;
 use crate::command::progress::Progress;
 use crate::command::record::{LOOK, Recorder};
 use crate::command::{Failure, end_on_signal_until};
@@ -51,7 +51,7 @@ pub(super) fn record(
         }
         std::thread::sleep(LOOK);
         done = recorder.hear().and_then(|heard| watch.see(heard.state.as_ref(), log));
-        progress.tell("recording the worm", READING * watch.share());
+        progress.tell("recording the worm", READING * watch.fraction());
     }
     recorder.close()?;
     // Nothing more needs an orderly end, and a search may take long.
@@ -121,7 +121,7 @@ impl<'a> Watch<'a> {
         1.0 + self.cycles + MARGIN_CYCLES
     }
 
-    fn share(&self) -> f64 {
+    fn fraction(&self) -> f64 {
         self.made() / self.wanted()
     }
 

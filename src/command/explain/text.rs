@@ -9,7 +9,7 @@ use worm_physics::effect;
 /// Places that are listed; the page has all.
 const PLACES: usize = 5;
 /// Most decimals of a value; what has a smaller error is told with fewer digits than it could be.
-const MOST_DECIMALS: f64 = 6.0;
+const MAX_DECIMALS: f64 = 6.0;
 
 /// The whole answer in words and tables.
 pub(super) fn text(answer: &Answer) -> String {
@@ -163,7 +163,7 @@ fn calibration(calibration: &[Calibrated]) -> Vec<Row> {
         let limit = if calibrated.at_limit { " (at its limit)" } else { "" };
         vec![
             format!("  {}{limit}", calibrated.name),
-            quantity(calibrated.believed, f64::NAN, calibrated.unit),
+            quantity(calibrated.nominal, f64::NAN, calibrated.unit),
             quantity(calibrated.found, calibrated.sigma, calibrated.unit),
         ]
     }));
@@ -221,7 +221,7 @@ fn quantity(value: f64, sigma: f64, unit: &str) -> String {
     if !value.is_finite() {
         return NONE.to_owned();
     }
-    let decimals = |digits: f64, of: f64| (digits - 1.0 - of.log10().floor()).clamp(0.0, MOST_DECIMALS) as usize;
+    let decimals = |digits: f64, of: f64| (digits - 1.0 - of.log10().floor()).clamp(0.0, MAX_DECIMALS) as usize;
     if sigma.is_normal() {
         let decimals = decimals(2.0, sigma);
         return format!("{} ± {}{unit}", fixed(value, decimals), fixed(sigma, decimals));
@@ -308,7 +308,7 @@ mod tests {
             }),
             calibration: vec![Calibrated {
                 name: "stroke".to_owned(),
-                believed: 0.0115,
+                nominal: 0.0115,
                 found: 0.011_43,
                 sigma: 4e-6,
                 unit: "m",

@@ -1,8 +1,8 @@
 //! The bare sleeper as a process: a subcommand that is for `wormd latency` alone, and not shown in the help.
 
-use crate::command::children::{Child, Log, START_PATIENCE};
+use crate::command::child_process::{Child, Log, START_PATIENCE};
 use crate::command::{Failure, end_on_signal, print};
-use crate::latency::bare::Bare;
+use crate::latency::ipc_baseline::Bare;
 use crate::latency::floor::{self, FloorOutcome, FloorPlan};
 use crate::topics::Instance;
 use clap::Args;

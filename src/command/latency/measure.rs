@@ -2,14 +2,14 @@
 
 use super::bench::Bench;
 use super::floor::Floor;
-use super::house::{House, estimator_realtime};
-use super::polled::{self, Polling};
+use super::testbed::{Testbed, estimator_realtime};
+use super::busy_poll::{self, Polling};
 use super::{cyclictest, rates, verdict};
-use crate::command::children::Log;
-use crate::command::ears::Ears;
+use crate::command::child_process::Log;
+use crate::command::telemetry_receiver::TelemetryReceiver;
 use crate::command::progress::Progress;
 use crate::command::{Failure, print};
-use crate::latency::bare::Bare;
+use crate::latency::ipc_baseline::Bare;
 use crate::latency::floor::{BareListener, FloorOutcome, FloorPlan};
 use crate::latency::outcome::{Cyclictest, RateTrial};
 use crate::latency::stress::Stress;
@@ -37,7 +37,7 @@ const FLOOR_START: Duration = Duration::from_millis(500);
 const STARTING: Stage = ("starting", 0.0, 0.0);
 
 /// Share of the duration in which subscribers that never sleep are looked at, within bounds.
-const POLLED_SHARE: f64 = 0.25;
+const POLLED_FRACTION: f64 = 0.25;
 const POLLED_LEAST: Duration = Duration::from_secs(1);
 const POLLED_MOST: Duration = Duration::from_secs(5);
 
@@ -95,8 +95,8 @@ fn measure(
             })?),
             false => None,
         };
-    let mut house = match House::start(bench, instance, log, end) {
-        Ok(house) => house,
+    let mut testbed = match Testbed::start(bench, instance, log, end) {
+        Ok(testbed) => testbed,
         Err(failure) => {
             measure_floor_alone(bench, instance.folder(), log, end, findings, &mut progress)?;
             return Err(failure);
@@ -104,13 +104,13 @@ fn measure(
     };
     if bench.config.port.is_none() {
         // Gone before it is measured: every subscriber costs the publisher something.
-        let mut ears = Ears::open(&hub)?;
+        let mut receiver = TelemetryReceiver::open(&hub)?;
         let mut telemetry = Telemetry::default();
         let client = hub.command_client().map_err(Failure::failed)?;
-        ears.start_crawling(&client, &bench.config, &mut telemetry, end, || {
-            house.find_ended().is_some()
+        receiver.start_crawling(&client, &bench.config, &mut telemetry, end, || {
+            testbed.find_ended().is_some()
         })
-        .map_err(|failure| house.find_ended().map_or(failure, Failure::failed))?;
+        .map_err(|failure| testbed.find_ended().map_or(failure, Failure::failed))?;
     } else {
         findings.warnings.push(
             "a real worm is neither made to crawl nor blocked by a benchmark: it stays disarmed, and the way from stall to alarm \
@@ -118,12 +118,12 @@ fn measure(
                 .to_owned(),
         );
     }
-    findings.in_force = InForce::of_process(house.controller.id()).ok();
+    findings.in_force = InForce::of_process(testbed.controller.id()).ok();
     let run = Run {
         bench,
         log,
         end,
-        house: &mut house,
+        testbed: &mut testbed,
         bare: &bare,
         findings,
         progress: &mut progress,
@@ -139,10 +139,10 @@ fn measure(
         }
     }
     if outcome.is_ok() && bench.searches_rates && !end.load(Ordering::Relaxed) {
-        outcome = rates::search(bench, &mut house, &hub, log, end, findings, &mut progress);
+        outcome = rates::search(bench, &mut testbed, &hub, log, end, findings, &mut progress);
     }
-    let alarms: Vec<u64> = house.stall_alarms.try_iter().collect();
-    if let Some(crawl_began_ns) = house.end() {
+    let alarms: Vec<u64> = testbed.stall_alarms.try_iter().collect();
+    if let Some(crawl_began_ns) = testbed.end() {
         findings.alarm = alarm_latencies(&bench.stalls_s(), crawl_began_ns, &alarms);
     }
     outcome
@@ -153,7 +153,7 @@ struct Run<'r> {
     bench: &'r Bench,
     log: &'r Log,
     end: &'r AtomicBool,
-    house: &'r mut House,
+    testbed: &'r mut Testbed,
     bare: &'r Arc<Bare>,
     findings: &'r mut Findings,
     progress: &'r mut Progress,
@@ -172,10 +172,10 @@ impl Run<'_> {
         let bare_listener = BareListener::start(self.bare, estimator_realtime(&self.bench.config.realtime))
             .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))?;
         let plan = floor_plan(self.bench, self.deadline_ns, self.bench.duration);
-        let mut floor = Floor::start(self.house.config(), &plan, self.log, self.end)?;
+        let mut floor = Floor::start(self.testbed.config(), &plan, self.log, self.end)?;
         let left = Duration::from_nanos(plan.from_ns.saturating_sub(monotonic_ns()));
         self.go_on(STARTING, left, |_, _| {})?;
-        self.house.heard.try_iter().for_each(drop);
+        self.testbed.heard.try_iter().for_each(drop);
         bare_listener.count(true);
         let measured = self.measure_loop(&mut floor);
         bare_listener.count(false);
@@ -187,27 +187,27 @@ impl Run<'_> {
 
     fn measure_loop(&mut self, floor: &mut Floor) -> Result<(), Failure> {
         let (mut account, mut deliveries) = (Account::default(), Deliveries::default());
-        let (begun, cpu_before) = (Instant::now(), self.house.cpu_ns());
+        let (begun, cpu_before) = (Instant::now(), self.testbed.cpu_ns());
         let outcome = self.go_on(
             ("measuring the loop", 0.0, 0.6),
             self.bench.duration,
-            |house, timings| {
+            |testbed, timings| {
                 for timing in timings {
                     account.take(timing);
                     deliveries.take(timing);
                 }
-                for (sequence, received_ns) in house.heard.try_iter() {
+                for (sequence, received_ns) in testbed.heard.try_iter() {
                     deliveries.received(sequence, received_ns);
                 }
-                floor.follow(house.controller.id());
+                floor.follow(testbed.controller.id());
             },
         );
-        let cpu = self.house.cpu_ns();
+        let cpu = self.testbed.cpu_ns();
         let findings = &mut self.findings;
         findings.measured_s = begun.elapsed().as_secs_f64();
-        let share = |before: u64, after: u64| after.saturating_sub(before) as f64 * 1e-9 / findings.measured_s;
-        findings.controller_cpu_share = share(cpu_before.0, cpu.0);
-        findings.estimator_cpu_share = share(cpu_before.1, cpu.1);
+        let fraction = |before: u64, after: u64| after.saturating_sub(before) as f64 * 1e-9 / findings.measured_s;
+        findings.controller_cpu_share = fraction(cpu_before.0, cpu.0);
+        findings.estimator_cpu_share = fraction(cpu_before.1, cpu.1);
         findings.account = account;
         findings.delivery = deliveries.durations;
         outcome
@@ -218,7 +218,7 @@ impl Run<'_> {
     fn look_at_busy_subscribers(&mut self, floor_pid: u32) -> Result<(), Failure> {
         let cpu = match self.bench.load {
             true => Err("under load they have no CPU of their own"),
-            false => polled::keep_off([self.house.controller.id(), floor_pid])
+            false => busy_poll::keep_off([self.testbed.controller.id(), floor_pid])
                 .ok_or("they need a CPU of their own, beside that of the loop"),
         };
         let cpu = match cpu {
@@ -232,9 +232,9 @@ impl Run<'_> {
         let duration = self
             .bench
             .duration
-            .mul_f64(POLLED_SHARE)
+            .mul_f64(POLLED_FRACTION)
             .clamp(POLLED_LEAST, POLLED_MOST);
-        let polling = Polling::start(&self.house.instance, self.bare, cpu)?;
+        let polling = Polling::start(&self.testbed.instance, self.bare, cpu)?;
         let mut deliveries = Deliveries::default();
         let outcome = self.go_on(("measuring busy subscribers", 0.6, 0.8), duration, |_, timings| {
             timings.iter().for_each(|timing| deliveries.take(timing));
@@ -253,7 +253,7 @@ impl Run<'_> {
         &mut self,
         (stage, from, to): Stage,
         duration: Duration,
-        mut look: impl FnMut(&House, &[Timing]),
+        mut look: impl FnMut(&Testbed, &[Timing]),
     ) -> Result<(), Failure> {
         let begun = Instant::now();
         let mut timings = Vec::new();
@@ -264,10 +264,10 @@ impl Run<'_> {
                 timings.push(*timing);
             }
             self.deadline_ns = timings.last().map_or(self.deadline_ns, |timing| timing.deadline_ns);
-            look(self.house, &timings);
-            let share = begun.elapsed().div_duration_f64(duration);
-            self.progress.tell(stage, from + share * (to - from));
-            if let Some(how) = self.house.find_ended() {
+            look(self.testbed, &timings);
+            let fraction = begun.elapsed().div_duration_f64(duration);
+            self.progress.tell(stage, from + fraction * (to - from));
+            if let Some(how) = self.testbed.find_ended() {
                 return Err(Failure::failed(format!("{how}; what was measured before it is told")));
             }
         }

@@ -1,10 +1,10 @@
 //! Which rate can be kept: the controller is run at one rate after the other, each for a short while.
 
 use super::bench::Bench;
-use super::house::House;
+use super::testbed::Testbed;
 use super::measure::{Findings, LOOK};
 use crate::command::Failure;
-use crate::command::children::Log;
+use crate::command::child_process::Log;
 use crate::command::progress::Progress;
 use crate::control::bus_allowed_ns;
 use crate::latency::Account;
@@ -18,7 +18,7 @@ use worm_estimator::message::Timing;
 const HIGHEST_HZ: f64 = 10_000.0;
 
 /// A rate counts as kept when at most this share of its deadlines is missed, and this share of its exchanges fails.
-pub(super) const MISSED_SHARE: f64 = 0.01;
+pub(super) const MISSED_FRACTION: f64 = 0.01;
 
 /// How long a rate is tried, after it has come to rest.
 const TRIAL: Duration = Duration::from_secs(1);
@@ -31,7 +31,7 @@ const TRIALS: usize = 6;
 /// kept.
 pub(super) fn search(
     bench: &Bench,
-    house: &mut House,
+    testbed: &mut Testbed,
     hub: &Hub,
     log: &Log,
     end: &AtomicBool,
@@ -55,7 +55,7 @@ pub(super) fn search(
         if rate_hz <= kept || rate_hz >= missed {
             break;
         }
-        house.restart_controller(bench, rate_hz, log, end)?;
+        testbed.restart_controller(bench, rate_hz, log, end)?;
         let trial = try_rate(rate_hz, bench.config.control.bus_wait_share, hub, end)?;
         if trial.sustained {
             kept = rate_hz;
@@ -89,7 +89,7 @@ fn try_rate(rate_hz: f64, bus_wait_share: f64, hub: &Hub, end: &AtomicBool) -> R
 impl RateTrial {
     fn new(rate_hz: f64, account: &Account, failed_exchanges: u64) -> Self {
         let (ticks, overruns) = (account.ticks, account.overruns);
-        let allowed = ((ticks + overruns) as f64 * MISSED_SHARE).ceil() as u64;
+        let allowed = ((ticks + overruns) as f64 * MISSED_FRACTION).ceil() as u64;
         Self {
             rate_hz,
             ticks,

@@ -1,6 +1,6 @@
 //! An outcome as the terminal shows it: at most 120 columns, numbers under each other, units in the heads.
 
-use crate::latency::blame::meaning;
+use crate::latency::attribution::meaning;
 use crate::latency::{Durations, Measure, Outcome, Tick};
 use crate::realtime::machine::Setting;
 use std::fmt;
@@ -33,7 +33,7 @@ impl fmt::Display for Outcome {
 fn run(outcome: &Outcome) -> String {
     let load = if outcome.load { "under load" } else { "without load" };
     let memory = if outcome.memory_locked { "locked" } else { "not locked" };
-    let share = |share: f64| match percent(share) {
+    let fraction = |fraction: f64| match percent(fraction) {
         none if none == NONE => NOT_MEASURED.to_owned(),
         told => told,
     };
@@ -53,9 +53,9 @@ fn run(outcome: &Outcome) -> String {
         shortest(outcome.rate_hz),
         shortest(outcome.duration_s),
         outcome.scheduler,
-        share(outcome.controller_cpu_share),
-        share(outcome.floor_cpu_share),
-        share(outcome.estimator_cpu_share),
+        fraction(outcome.controller_cpu_share),
+        fraction(outcome.floor_cpu_share),
+        fraction(outcome.estimator_cpu_share),
     )
 }
 

@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use super::measure::Findings;
-use super::rates::MISSED_SHARE;
+use super::rates::MISSED_FRACTION;
 use crate::command::Failure;
 use crate::latency::{Outcome, Percentiles, ratio};
 use crate::realtime::{InForce, machine};
@@ -29,7 +29,7 @@ pub(super) fn outcome(bench: &Bench, findings: Findings, trouble: Option<&Failur
             account.ticks
         ));
     }
-    if account.overruns as f64 > MISSED_SHARE * deadlines as f64 {
+    if account.overruns as f64 > MISSED_FRACTION * deadlines as f64 {
         warnings.push(format!(
             "{} Hz is not met: {:.1} % of the deadlines were missed; try a lower --rate",
             bench.config.control.rate_hz,
@@ -56,10 +56,10 @@ pub(super) fn outcome(bench: &Bench, findings: Findings, trouble: Option<&Failur
         settings.insert(0, in_force_setting(in_force, &refused));
     }
     // A share of nothing is not known.
-    let share = |share: f64| if findings.measured_s > 0.0 { share } else { f64::NAN };
+    let fraction = |fraction: f64| if findings.measured_s > 0.0 { fraction } else { f64::NAN };
     let (controller_cpu_share, estimator_cpu_share) = (
-        share(findings.controller_cpu_share),
-        share(findings.estimator_cpu_share),
+        fraction(findings.controller_cpu_share),
+        fraction(findings.estimator_cpu_share),
     );
     let Findings { account, floor, .. } = findings;
     Outcome {

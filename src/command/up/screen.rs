@@ -1,6 +1,6 @@
 //! What `wormd up` shows while the worm crawls: the moving picture, plain lines, or nothing but the log.
 
-use crate::command::children::Log;
+use crate::command::child_process::Log;
 use crate::command::{Failure, print};
 use crate::watch::view::{self, Subject};
 use crate::watch::{Telemetry, mismatch, remarks};

@@ -519,14 +519,14 @@ fn alarms_do_what_the_configuration_says() {
         rig.run(4000);
         assert_eq!(rig.mode(), mode, "{policy}");
         let turns = (rig.servo.position_rad - at_rad) / TAU;
-        let (least, most) = match policy {
+        let (min, max) = match policy {
             "warn" => (1.59, 1.61),
             "hold" => (0.0, 0.06),
             "back-off" => (-1.06, -0.99),
             _ => (0.0, 0.001),
         };
         assert!(
-            (least..=most).contains(&turns),
+            (min..=max).contains(&turns),
             "{policy}: the cam went on by {turns} turns"
         );
     }
@@ -535,14 +535,14 @@ fn alarms_do_what_the_configuration_says() {
 #[test]
 fn an_end_waits_for_the_motor_but_not_for_ever() {
     // (servo answers, services fail, longest wait in ms)
-    for (servo_answers, services_fail, most_ms) in [(true, false, 400), (false, true, 2500), (true, true, 2500)] {
+    for (servo_answers, services_fail, max_ms) in [(true, false, 400), (false, true, 2500), (true, true, 2500)] {
         let mut rig = Rig::crawling("");
         rig.servo_answers = servo_answers;
         rig.services_fail = services_fail;
         rig.end = true;
         let ticks = (0..10_000).take_while(|_| !rig.tick(None).finished).count();
         assert!(
-            ticks < most_ms,
+            ticks < max_ms,
             "{ticks} ms with servo_answers {servo_answers}, services_fail {services_fail}"
         );
     }

@@ -17,7 +17,7 @@ const SHORTEST_US: f64 = 0.01;
 /// Where the bars begin: low enough that a single one is seen.
 const FOOT: f64 = 0.5;
 /// The axis of counts reaches at least so far, so that it has a scale.
-const LEAST_TOP: f64 = 100.0;
+const MIN_TOP: f64 = 100.0;
 
 /// Room that the name of a percentile takes, as a share of the width: one that would stand in another's is left out.
 const NAME: f64 = 0.06;
@@ -116,12 +116,12 @@ impl Histogram<'_> {
         let x = Axis::logarithmic(shortest, longest);
         let counts = binned(self.durations, &x);
         let floor = self.floor.map(|floor| binned(floor, &x)).unwrap_or_default();
-        let most = counts.iter().chain(&floor).copied().max().unwrap_or(0);
+        let max = counts.iter().chain(&floor).copied().max().unwrap_or(0);
         let sheet = Sheet {
             description: self.description(),
             x_label: Some("µs".to_owned()),
             rows: vec![Row::new(
-                Axis::logarithmic(1.2 * FOOT, LEAST_TOP.max(most as f64)),
+                Axis::logarithmic(1.2 * FOOT, MIN_TOP.max(max as f64)),
                 self.height,
             )],
             x,
@@ -129,7 +129,7 @@ impl Histogram<'_> {
         draw(&sheet, |_, plot| {
             let x = &sheet.x;
             if self.durations.is_empty() {
-                plot.words_behind(x.low(), LEAST_TOP.sqrt(), MUTED, NOT_MEASURED)?;
+                plot.words_behind(x.low(), MIN_TOP.sqrt(), MUTED, NOT_MEASURED)?;
             }
             let outline = outline(&counts, x);
             plot.ribbon(outline.iter().map(|(x, y)| (*x, [FOOT, *y])), LOOP, PALE)?;
@@ -140,9 +140,9 @@ impl Histogram<'_> {
                 let mut named = f64::NEG_INFINITY;
                 for (name, us) in [("p50", us.p50), ("p99", us.p99), ("max", us.max)] {
                     plot.upright(us, FOOT, sheet.rows[0].y.high(), Stroke::new(INK, 1.0).dashed())?;
-                    if share(us, x) - named > NAME {
+                    if fraction(us, x) - named > NAME {
                         plot.name_above(us, INK, name)?;
-                        named = share(us, x);
+                        named = fraction(us, x);
                     }
                 }
             }
@@ -177,7 +177,7 @@ fn edge(bar: usize, x: &Axis) -> f64 {
 }
 
 /// Where a duration lies between the ends of the axis.
-fn share(us: f64, x: &Axis) -> f64 {
+fn fraction(us: f64, x: &Axis) -> f64 {
     (us.max(x.low()) / x.low()).ln() / (x.high() / x.low()).ln()
 }
 
@@ -185,7 +185,7 @@ fn share(us: f64, x: &Axis) -> f64 {
 fn binned(durations: &Durations, x: &Axis) -> Vec<u64> {
     let mut counts = vec![0; BARS];
     for (us, count) in durations.bars() {
-        counts[((share(us, x) * BARS as f64) as usize).min(BARS - 1)] += count;
+        counts[((fraction(us, x) * BARS as f64) as usize).min(BARS - 1)] += count;
     }
     counts
 }

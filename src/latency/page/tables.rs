@@ -1,7 +1,7 @@
 //! The tables: all numbers, the culprits, the rates that were tried, and what was in force.
 
 use super::words::{NOT_MEASURED, times, us};
-use crate::latency::blame::meaning;
+use crate::latency::attribution::meaning;
 use crate::latency::{Durations, Outcome};
 use worm_analysis::report::page::Page;
 use worm_analysis::report::table::Table;

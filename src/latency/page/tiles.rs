@@ -90,12 +90,12 @@ fn tick_tiles(outcome: &Outcome) -> Vec<Tile> {
 }
 
 fn controller_cpu(outcome: &Outcome) -> Tile {
-    let share = outcome.controller_cpu_share;
-    let text = percent(share);
+    let fraction = outcome.controller_cpu_share;
+    let text = percent(fraction);
     if text == NONE {
         return not_measured("controller's CPU");
     }
-    let (dot, verdict) = judged(share, CPU_AIM, &percent(CPU_AIM));
+    let (dot, verdict) = judged(fraction, CPU_AIM, &percent(CPU_AIM));
     let floor = match percent(outcome.floor_cpu_share) {
         none if none == NONE => String::new(),
         floor => format!("; the bare sleeper takes {floor}"),

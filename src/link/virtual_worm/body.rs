@@ -88,10 +88,10 @@ impl Body {
     ///
     /// # Errors
     /// [`WormError`] never for a checked configuration.
-    pub fn scatter(&mut self, chance: &mut Xoshiro256PlusPlus) -> Result<(), WormError> {
+    pub fn scatter(&mut self, rng: &mut Xoshiro256PlusPlus) -> Result<(), WormError> {
         if self.scatter_share > 0.0 {
             for factor in &mut self.scatter[..self.nominal.cells()] {
-                let normal: f64 = StandardNormal.sample(chance);
+                let normal: f64 = StandardNormal.sample(rng);
                 *factor = (1.0 + self.scatter_share * normal.clamp(-SCATTER_LIMIT, SCATTER_LIMIT)).max(0.05);
             }
             self.take_up()?;
@@ -170,8 +170,8 @@ impl Body {
     }
 
     /// Share of its speed that the motor is left under its present load.
-    pub fn speed_share(&self, sense: f64) -> f64 {
-        self.physics.speed_share(sense * self.motion.actuator_force_n())
+    pub fn speed_fraction(&self, sign: f64) -> f64 {
+        self.physics.speed_fraction(sign * self.motion.actuator_force_n())
     }
 
     /// What lengths look like to the tracker.

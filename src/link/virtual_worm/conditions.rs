@@ -90,9 +90,9 @@ pub struct WireConditions {
     /// Nothing comes from the tracker, and nothing reaches it.
     pub tracker_silent: bool,
     /// Share of answers that are lost.
-    pub drop_share: f64,
+    pub drop_fraction: f64,
     /// Share of answers with a flipped bit.
-    pub corrupt_share: f64,
+    pub corrupt_fraction: f64,
     /// How much later answers come, s.
     pub delay_s: f64,
 }

@@ -22,7 +22,7 @@ pub(super) struct Entry {
     pub(super) register: Register,
     pub(super) area: Area,
     pub(super) initial: i64,
-    pub(super) least: i64, // below 0: the register is signed
+    pub(super) min: i64, // below 0: the register is signed
     pub(super) greatest: i64,
 }
 
@@ -32,29 +32,29 @@ pub(super) const fn read_only(register: Register, initial: i64) -> Entry {
         register,
         area: Area::ReadOnly,
         initial,
-        least: i32::MIN as i64,
+        min: i32::MIN as i64,
         greatest: i32::MAX as i64,
     }
 }
 
 /// A register that is kept over a restart.
-pub(super) const fn eeprom(register: Register, initial: i64, least: i64, greatest: i64) -> Entry {
+pub(super) const fn eeprom(register: Register, initial: i64, min: i64, greatest: i64) -> Entry {
     Entry {
         register,
         area: Area::Eeprom,
         initial,
-        least,
+        min,
         greatest,
     }
 }
 
 /// A register that a restart resets.
-pub(super) const fn ram(register: Register, initial: i64, least: i64, greatest: i64) -> Entry {
+pub(super) const fn ram(register: Register, initial: i64, min: i64, greatest: i64) -> Entry {
     Entry {
         register,
         area: Area::Ram,
         initial,
-        least,
+        min,
         greatest,
     }
 }
@@ -167,12 +167,12 @@ impl ControlTable {
             let (value, behind) = rest
                 .split_at_checked(usize::from(entry.register.size))
                 .ok_or(StatusError::DataLength)?;
-            let value = if entry.least < 0 {
+            let value = if entry.min < 0 {
                 i64::from(read_signed(value))
             } else {
                 i64::from(read_unsigned(value))
             };
-            if !(entry.least..=entry.greatest).contains(&value) {
+            if !(entry.min..=entry.greatest).contains(&value) {
                 return Err(StatusError::DataRange);
             }
             writes.push((entry, value));

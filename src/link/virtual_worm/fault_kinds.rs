@@ -44,7 +44,7 @@ const fn number(name: &'static str, from: f64, to: f64, unit: &'static str, defa
     }
 }
 
-const fn share(default: Option<f64>) -> Parameter {
+const fn fraction(default: Option<f64>) -> Parameter {
     number("share", 0.0, 1.0, "", default)
 }
 
@@ -97,7 +97,7 @@ pub(super) const KINDS: &[Kind] = &[
     kind(
         "jam",
         "a cell extends by no more than this share of its stroke",
-        &[CELL, share(Some(0.0))],
+        &[CELL, fraction(Some(0.0))],
         |c, v| {
             for cell in cells(v[0]) {
                 c.plant.stroke_scale[cell] = v[1];
@@ -175,16 +175,16 @@ pub(super) const KINDS: &[Kind] = &[
     kind(
         "drop",
         "a share of the answers is lost",
-        &[share(Some(0.05))],
+        &[fraction(Some(0.05))],
         |c, v| {
-            c.wire.drop_share = v[0];
+            c.wire.drop_fraction = v[0];
         },
     ),
     kind(
         "corrupt",
         "a share of the answers has a flipped bit",
-        &[share(Some(0.05))],
-        |c, v| c.wire.corrupt_share = v[0],
+        &[fraction(Some(0.05))],
+        |c, v| c.wire.corrupt_fraction = v[0],
     ),
     kind(
         "delay",
@@ -223,7 +223,7 @@ pub(super) const KINDS: &[Kind] = &[
     kind(
         "dropout",
         "the tracker misses a share of the positions",
-        &[share(Some(0.3))],
+        &[fraction(Some(0.3))],
         |c, v| c.sight.dropout_share = Some(v[0]),
     ),
     kind(

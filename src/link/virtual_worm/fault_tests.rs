@@ -38,8 +38,8 @@ fn every_kind_changes_what_it_says() {
     assert_eq!((sag.supply_drop_v, sag.supply_extra_ohm), (1.0, 2.0));
     assert!(conditions_of("silence:device=servo").wire.servo_silent);
     assert!(conditions_of("silence:device=tracker").wire.tracker_silent);
-    assert_eq!(conditions_of("drop:share=0.5").wire.drop_share, 0.5);
-    assert_eq!(conditions_of("corrupt").wire.corrupt_share, 0.05);
+    assert_eq!(conditions_of("drop:share=0.5").wire.drop_fraction, 0.5);
+    assert_eq!(conditions_of("corrupt").wire.corrupt_fraction, 0.05);
     assert_eq!(conditions_of("delay:ms=5").wire.delay_s, 0.005);
     assert!(conditions_of("reboot").servo.unpowered);
     assert_eq!(conditions_of("overheat:ambient=80").plant.heated_to_c, Some(80.0));

@@ -1,7 +1,7 @@
 //! The line back to the controller: answers wait there until they are due, and some are lost, damaged or late.
 
 use super::conditions::WireConditions;
-use super::sight::draw;
+use super::camera::draw;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 #[derive(Debug, Clone)]
 pub(super) struct Line {
     conditions: WireConditions,
-    chance: Xoshiro256PlusPlus,
+    rng: Xoshiro256PlusPlus,
     waiting: VecDeque<(f64, Vec<u8>)>, // due times never fall
 }
 
@@ -18,7 +18,7 @@ impl Line {
     pub(super) fn new(seed: u64) -> Self {
         Self {
             conditions: WireConditions::default(),
-            chance: Xoshiro256PlusPlus::seed_from_u64(seed),
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
             waiting: VecDeque::new(),
         }
     }
@@ -29,11 +29,11 @@ impl Line {
 
     /// Puts an answer on the line that leaves its device at `at_s`.
     pub(super) fn put(&mut self, mut answer: Vec<u8>, at_s: f64) {
-        if self.happens(self.conditions.drop_share) {
+        if self.happens(self.conditions.drop_fraction) {
             return;
         }
-        if self.happens(self.conditions.corrupt_share) && !answer.is_empty() {
-            let bit = (draw(&mut self.chance) * answer.len() as f64 * 8.0) as usize;
+        if self.happens(self.conditions.corrupt_fraction) && !answer.is_empty() {
+            let bit = (draw(&mut self.rng) * answer.len() as f64 * 8.0) as usize;
             answer[bit / 8] ^= 1 << (bit % 8);
         }
         // A line keeps the order: what was put on it earlier comes first, even when the delay got shorter meanwhile.
@@ -63,9 +63,9 @@ impl Line {
         self.waiting.clear();
     }
 
-    fn happens(&mut self, share: f64) -> bool {
+    fn happens(&mut self, fraction: f64) -> bool {
         // Nothing is drawn for what cannot happen, so that one more kind of fault does not change the others.
-        share > 0.0 && draw(&mut self.chance) < share
+        fraction > 0.0 && draw(&mut self.rng) < fraction
     }
 }
 

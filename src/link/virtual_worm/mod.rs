@@ -4,7 +4,7 @@
 //! From the physics out to the port:
 //!
 //! 1. A [`supply`] feeds a [`motor`], solved exactly within each step; the motor turns the cam of a [`body`], the
-//!    quasi-static motion of [`model`](worm_physics) under every `[[effect]]`, with friction that scatters from cycle to cycle; a camera ([`sight`])
+//!    quasi-static motion of [`model`](worm_physics) under every `[[effect]]`, with friction that scatters from cycle to cycle; a camera ([`camera`])
 //!    sees the cells. [`Plant`] steps them together and keeps the [`ledger`] of where the energy went. No clock, no I/O.
 //! 2. `servo` and `tracker` are the devices: control tables with the manual's access rules, modes, watchdog, shutdown.
 //!    [`Devices`] puts both on a bus: bytes and a time in, bytes out. Still no clock.
@@ -39,7 +39,7 @@ mod report;
 mod server;
 mod servo;
 mod servo_table;
-pub mod sight;
+pub mod camera;
 pub mod supply;
 mod tracker;
 
@@ -48,7 +48,7 @@ mod behaviour_tests;
 #[cfg(test)]
 mod protocol_tests;
 #[cfg(test)]
-mod test_desk;
+mod device_harness;
 
 pub use devices::{Devices, DevicesError};
 pub use fault::{Fault, FaultError};

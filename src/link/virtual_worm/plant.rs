@@ -9,7 +9,7 @@ use super::body::{Body, BodyError};
 use super::conditions::{PlantConditions, Sight};
 use super::ledger::{Account, Standing, TruthLedger};
 use super::motor::{Drive, Gains, Motor};
-use super::sight::Camera;
+use super::camera::Camera;
 use super::supply::Supply;
 use crate::link::TrackerReading;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -37,7 +37,7 @@ pub struct Plant {
     cycle_began_at: f64, // phase, a whole number
     owed_j: f64,         // work of the body that the motor could not give yet
     ledger: TruthLedger,
-    chance: Xoshiro256PlusPlus,
+    rng: Xoshiro256PlusPlus,
 }
 
 impl Plant {
@@ -54,10 +54,10 @@ impl Plant {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn with_step(config: &Config, seed: Option<u64>, step_s: f64) -> Result<Self, BodyError> {
-        let mut chance = Xoshiro256PlusPlus::seed_from_u64(seed.unwrap_or(config.virtual_worm.seed));
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.unwrap_or(config.virtual_worm.seed));
         let mut body = Body::new(config)?;
-        body.scatter(&mut chance)?;
-        let camera = Camera::new(config, &mut chance);
+        body.scatter(&mut rng)?;
+        let camera = Camera::new(config, &mut rng);
         let ledger = TruthLedger::new(body.cells(), &standing(0.0, &body));
         Ok(Self {
             step_s,
@@ -77,7 +77,7 @@ impl Plant {
             cycle_began_at: 0.0,
             owed_j: 0.0,
             ledger,
-            chance,
+            rng,
         })
     }
 
@@ -104,7 +104,7 @@ impl Plant {
         if let Some(charge) = conditions.battery_charge
             && self.conditions.battery_charge != Some(charge)
         {
-            self.supply.set_charge_share(charge);
+            self.supply.set_charge_fraction(charge);
         }
         self.camera.set_conditions(sight);
         self.conditions = conditions.clone();
@@ -131,7 +131,7 @@ impl Plant {
     pub fn step(&mut self) -> Result<(), WormError> {
         let load_n_m = self.body.torque_n_m();
         let drive = match self.drive {
-            Drive::Velocity(rad_per_s) => Drive::Velocity(rad_per_s * self.body.speed_share(rad_per_s.signum())),
+            Drive::Velocity(rad_per_s) => Drive::Velocity(rad_per_s * self.body.speed_fraction(rad_per_s.signum())),
             other => other,
         };
         let before_j = self.motor.kinetic_j();
@@ -144,12 +144,12 @@ impl Plant {
         let mut left_s = self.step_s;
         if (phase - self.cycle_began_at).abs() >= 1.0 {
             let boundary = self.cycle_began_at + (phase - self.cycle_began_at).signum();
-            let share = (boundary - self.body.phase()) / (phase - self.body.phase());
-            work_j += self.body.advance_to(boundary, share * self.step_s)?;
-            left_s -= share * self.step_s;
+            let fraction = (boundary - self.body.phase()) / (phase - self.body.phase());
+            work_j += self.body.advance_to(boundary, fraction * self.step_s)?;
+            left_s -= fraction * self.step_s;
             self.cycle_began_at = boundary;
             self.ledger.close_cycle(&standing(self.time_s(), &self.body));
-            self.body.scatter(&mut self.chance)?;
+            self.body.scatter(&mut self.rng)?;
         }
         work_j += self.body.advance_to(phase, left_s)?;
         let missing_j = energy.load_j - work_j + self.owed_j;
@@ -162,7 +162,7 @@ impl Plant {
             let view = self.body.view();
             let mut seen_m = self.body.positions_m();
             seen_m.iter_mut().for_each(|position_m| *position_m *= view.scale);
-            self.camera.capture(&seen_m, view.latency_s, &mut self.chance);
+            self.camera.capture(&seen_m, view.latency_s, &mut self.rng);
         }
         Ok(())
     }

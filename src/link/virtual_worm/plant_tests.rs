@@ -1,5 +1,5 @@
 use super::*;
-use crate::link::virtual_worm::sight::CLOCK_DRIFT;
+use crate::link::virtual_worm::camera::CLOCK_DRIFT;
 use worm_estimator::config::PerCell;
 use worm_physics::MAX_CELLS;
 use worm_physics::{Physics, steady_cycle_of};
@@ -27,11 +27,11 @@ fn crawl(config: &Config, velocity_rad_per_s: f64, seconds: f64) -> Plant {
     plant
 }
 
-/// `share` is what may be missing: a cycle ends within a step, a total at its end.
-fn assert_closes(account: &Account, share: f64) {
+/// `fraction` is what may be missing: a cycle ends within a step, a total at its end.
+fn assert_closes(account: &Account, fraction: f64) {
     let gone_j = account.copper_j + account.friction_inside_j + account.actuator_net_j + account.kinetic_j;
     assert!(
-        (account.electrical_j - gone_j).abs() <= share * account.electrical_j,
+        (account.electrical_j - gone_j).abs() <= fraction * account.electrical_j,
         "electrical {} J, accounted for {gone_j} J",
         account.electrical_j
     );

@@ -44,7 +44,7 @@ pub(super) struct Servo {
     table: ControlTable,
     backup: Option<Vec<u8>>,
     registered: Option<(u16, Vec<u8>)>,
-    sense: f64, // +1 where positive is forward, −1 where it is not
+    sign: f64, // +1 where positive is forward, −1 where it is not
     home_counts: f64,
     turn_base_counts: f64, // whole turns that were forgotten at a start
     conditions: ServoConditions,
@@ -70,7 +70,7 @@ impl Servo {
             table,
             backup: None,
             registered: None,
-            sense: if config.servo.positive_is_forward { 1.0 } else { -1.0 },
+            sign: if config.servo.positive_is_forward { 1.0 } else { -1.0 },
             home_counts: f64::from(config.servo.home_position),
             turn_base_counts: 0.0,
             conditions: ServoConditions::default(),
@@ -205,17 +205,17 @@ impl Servo {
     }
 
     /// +1 where positive counts are forward, with the drive mode's reverse bit.
-    fn sense(&self) -> f64 {
+    fn sign(&self) -> f64 {
         if self.table.get(DRIVE_MODE) & 1 == 1 {
-            -self.sense
+            -self.sign
         } else {
-            self.sense
+            self.sign
         }
     }
 
     /// Position without homing offset for a cam angle.
     fn raw_counts(&self, cam_rad: f64) -> f64 {
-        self.home_counts + self.sense() * cam_rad / TAU * TURN - self.turn_base_counts
+        self.home_counts + self.sign() * cam_rad / TAU * TURN - self.turn_base_counts
     }
 
     fn position_counts(&self, plant: &Plant) -> i32 {
@@ -225,7 +225,7 @@ impl Servo {
 
     fn cam_angle_rad(&self, position_counts: f64) -> f64 {
         let offset = f64::from(self.table.signed(HOMING_OFFSET));
-        (position_counts - offset + self.turn_base_counts - self.home_counts) * self.sense() / TURN * TAU
+        (position_counts - offset + self.turn_base_counts - self.home_counts) * self.sign() / TURN * TAU
     }
 
     /// Only the angle within a turn survives a start.
@@ -264,9 +264,9 @@ impl Servo {
         let drive = if !self.torque_on() {
             Drive::Off
         } else if mode == VELOCITY_MODE {
-            Drive::Velocity(self.sense() * f64::from(self.table.signed(GOAL_VELOCITY)) * scale::VELOCITY_RAD_S)
+            Drive::Velocity(self.sign() * f64::from(self.table.signed(GOAL_VELOCITY)) * scale::VELOCITY_RAD_S)
         } else if mode == PWM_MODE {
-            Drive::Duty((self.sense() * goal_duty).clamp(-1.0, 1.0))
+            Drive::Duty((self.sign() * goal_duty).clamp(-1.0, 1.0))
         } else {
             let profile = match self.table.get(PROFILE_VELOCITY) {
                 0 => self.table.get(VELOCITY_LIMIT),
@@ -295,8 +295,8 @@ impl Servo {
 
     fn refresh(&mut self, plant: &Plant, now_s: f64) {
         let motor = plant.motor();
-        let sense = self.sense();
-        let velocity = scale::velocity_counts(sense * motor.velocity_rad_per_s());
+        let sign = self.sign();
+        let velocity = scale::velocity_counts(sign * motor.velocity_rad_per_s());
         let counts = |value: f64, unit: f64| (value / unit).round() as i64;
         let moving = velocity.unsigned_abs() > self.table.get(MOVING_THRESHOLD);
         let position = i64::from(self.position_counts(plant));
@@ -304,8 +304,8 @@ impl Servo {
         for (register, value) in [
             (REALTIME_TICK, (now_s * 1e3) as i64 % 32_768),
             (MOVING, i64::from(moving)),
-            (PRESENT_PWM, counts(sense * motor.duty(), scale::DUTY)),
-            (PRESENT_CURRENT, counts(sense * motor.current_a(), scale::CURRENT_A)),
+            (PRESENT_PWM, counts(sign * motor.duty(), scale::DUTY)),
+            (PRESENT_CURRENT, counts(sign * motor.current_a(), scale::CURRENT_A)),
             (PRESENT_VELOCITY, i64::from(velocity)),
             (PRESENT_POSITION, position),
             (VELOCITY_TRAJECTORY, goal_velocity),

@@ -3,7 +3,7 @@
 use worm_estimator::config::Config;
 
 /// Volts on the bus never fall below this in the equations, so that power over voltage stays finite.
-const LEAST_BUS_V: f64 = 0.1;
+const MIN_BUS_V: f64 = 0.1;
 
 /// A voltage source with inner resistance; with a battery also a finite store.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,9 +56,9 @@ impl Supply {
     }
 
     /// Sets the share of the charge that is left; a bench supply has none to set.
-    pub fn set_charge_share(&mut self, share: f64) {
+    pub fn set_charge_fraction(&mut self, fraction: f64) {
         if self.capacity_j.is_finite() {
-            self.charge_j = self.capacity_j * share.clamp(0.0, 1.0);
+            self.charge_j = self.capacity_j * fraction.clamp(0.0, 1.0);
         }
     }
 
@@ -84,7 +84,7 @@ impl Supply {
     /// the step before, for the power of everything else.
     pub fn bus_v(&self, conductance_s: f64, feedback_a: f64, bus_v: f64) -> f64 {
         let resistance_ohm = self.resistance_ohm + self.extra_ohm;
-        let hotel_a = self.hotel_power_w / bus_v.max(LEAST_BUS_V);
+        let hotel_a = self.hotel_power_w / bus_v.max(MIN_BUS_V);
         let source_v = self.open_circuit_v() + resistance_ohm * (feedback_a - hotel_a);
         (source_v / (1.0 + resistance_ohm * conductance_s)).max(0.0)
     }
@@ -94,7 +94,7 @@ impl Supply {
     pub fn draw(&mut self, motor_j: f64, bus_v: f64, dt_s: f64) {
         if self.capacity_j.is_finite() {
             let bus_j = motor_j + self.hotel_power_w * dt_s;
-            let store_j = bus_j * self.open_circuit_v() / bus_v.max(LEAST_BUS_V);
+            let store_j = bus_j * self.open_circuit_v() / bus_v.max(MIN_BUS_V);
             self.charge_j = (self.charge_j - store_j).clamp(0.0, self.capacity_j);
         }
     }
@@ -123,7 +123,7 @@ mod tests {
     fn voltage_falls_with_charge_and_ends_with_it() {
         let mut supply = on_battery();
         assert!((supply.open_circuit_v() - 5.6).abs() < 1e-12);
-        supply.set_charge_share(0.5);
+        supply.set_charge_fraction(0.5);
         assert!((supply.open_circuit_v() - 4.8).abs() < 1e-12);
         supply.draw(600.0, 4.8, 0.0);
         assert_eq!((supply.charge_share(), supply.open_circuit_v()), (0.0, 0.0));

@@ -8,7 +8,7 @@ use crate::realtime::cpus;
 const WAKE_LATENCY_US: u32 = 50;
 
 /// Least share of the time that must be left to real-time threads: no loop needs more.
-const REALTIME_SHARE: f64 = 0.5;
+const REALTIME_FRACTION: f64 = 0.5;
 
 const RT_KERNEL: &str = "a PREEMPT_RT kernel bounds the worst wake lateness (Debian: `apt install linux-image-rt-amd64`; \
      Ubuntu: `pro enable realtime-kernel`; self-built: CONFIG_PREEMPT_RT); without it, rare late ticks of some milliseconds \
@@ -230,7 +230,7 @@ pub(super) fn throttling(runtime_us: i64, period_us: i64) -> Setting {
         return Setting::good(subject, "off");
     }
     let found = format!("{runtime_us} of each {period_us} µs may be real time");
-    if (runtime_us as f64) < REALTIME_SHARE * period_us as f64 {
+    if (runtime_us as f64) < REALTIME_FRACTION * period_us as f64 {
         Setting::bad(
             subject,
             found,
@@ -249,8 +249,8 @@ pub(super) fn virtual_machine(cpu: Option<usize>, cpuinfo: &str, stat: &str) -> 
     if !flags.split_whitespace().any(|flag| flag == "hypervisor") {
         return Some(Setting::good(subject, "none"));
     }
-    let stolen = stolen_share(cpu, stat).map_or(String::new(), |share| {
-        format!("; so far it took {:.2} % of the time", share * 100.0)
+    let stolen = stolen_fraction(cpu, stat).map_or(String::new(), |fraction| {
+        format!("; so far it took {:.2} % of the time", fraction * 100.0)
     });
     Some(Setting::bad(
         subject,
@@ -264,7 +264,7 @@ pub(super) fn virtual_machine(cpu: Option<usize>, cpuinfo: &str, stat: &str) -> 
 
 /// Share of the time since the start that the host ran something else while the loop's CPU, or any, had work: steal time of
 /// /proc/stat (man page proc_stat(5)).
-fn stolen_share(cpu: Option<usize>, stat: &str) -> Option<f64> {
+fn stolen_fraction(cpu: Option<usize>, stat: &str) -> Option<f64> {
     let name = cpu.map_or("cpu".to_owned(), |cpu| format!("cpu{cpu}"));
     let line = stat
         .lines()

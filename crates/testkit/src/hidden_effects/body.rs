@@ -172,11 +172,11 @@ impl<'a> Motion<'a> {
             .sum();
         self.translation_m_s = (self.momentum_n_s - cell_kg * extended_m / step_s) / self.mass_kg;
         for (cell, extension_m) in extension_m.into_iter().enumerate() {
-            let way_m = extension_m - self.extension_m[cell] + self.translation_m_s * step_s;
+            let displacement_m = extension_m - self.extension_m[cell] + self.translation_m_s * step_s;
             let limits = self.limits(cell, now);
-            self.position_m[cell] += way_m;
-            self.velocity_m_s[cell] = way_m / step_s;
-            self.tips[cell].follow(way_m, step_s, &self.pads[cell], limits);
+            self.position_m[cell] += displacement_m;
+            self.velocity_m_s[cell] = displacement_m / step_s;
+            self.tips[cell].follow(displacement_m, step_s, &self.pads[cell], limits);
         }
         self.extension_m = extension_m;
         self.mean_m = self.position_m.iter().sum::<f64>() / CELLS as f64;

@@ -13,11 +13,11 @@ use worm_analysis::recording::Recording;
 use worm_estimator::config::Config;
 
 /// Least advance of a worm that counts as crawling, m: mean over the cycles of a run.
-const LEAST_ADVANCE_M: f64 = 0.5e-3;
+const MIN_ADVANCE_M: f64 = 0.5e-3;
 /// And of its poorest cycle after the first, m.
-const LEAST_IN_A_CYCLE_M: f64 = 0.2e-3;
+const MIN_IN_A_CYCLE_M: f64 = 0.2e-3;
 /// Worms thrown before the ranges are to blame.
-const MOST_THROWS: u64 = 200;
+const MAX_THROWS: u64 = 200;
 /// Standard deviation of a slope about what is stated, degrees.
 pub const SLOPE_SIGMA_DEG: f64 = 0.1;
 
@@ -144,7 +144,7 @@ pub fn draw(wanted: Wanted, seed: u64) -> HiddenCampaign {
 /// # Panics
 /// When no worm crawls, which is the ranges' fault.
 pub fn draw_sized(wanted: Wanted, seed: u64, size: Size) -> HiddenCampaign {
-    (0..MOST_THROWS)
+    (0..MAX_THROWS)
         .find_map(|throw| thrown(wanted, seed, throw, size))
         .unwrap_or_else(|| panic!("no worm crawls with {wanted:?} in it, seed {seed}"))
 }
@@ -156,7 +156,7 @@ pub fn table4() -> [(f64, f64); 3] {
 }
 
 fn thrown(wanted: Wanted, seed: u64, throw: u64, size: Size) -> Option<HiddenCampaign> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(MOST_THROWS).wrapping_add(throw));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(MAX_THROWS).wrapping_add(throw));
     let config = Config::default();
     let cycle_s = config.gait.cycle_s;
     let make = Make::draw(&mut rng);
@@ -305,8 +305,8 @@ pub fn crawl(worm: &Worm, scene: &Scene) -> Result<Played, Lost> {
     let played = scene.play(worm)?;
     let advances_m = advances_m(&played);
     let mean_m = advances_m.iter().sum::<f64>() / advances_m.len() as f64;
-    let least_m = advances_m.iter().skip(1).copied().fold(f64::INFINITY, f64::min);
-    if mean_m >= LEAST_ADVANCE_M && least_m >= LEAST_IN_A_CYCLE_M {
+    let min_m = advances_m.iter().skip(1).copied().fold(f64::INFINITY, f64::min);
+    if mean_m >= MIN_ADVANCE_M && min_m >= MIN_IN_A_CYCLE_M {
         Ok(played)
     } else {
         Err(Lost)

@@ -44,16 +44,16 @@ impl Band {
 
     /// The `part`-th of `parts` equal parts.
     pub fn part(part: usize, parts: usize) -> Self {
-        let share = |part: usize| part as f64 / parts as f64;
+        let fraction = |part: usize| part as f64 / parts as f64;
         Self {
-            from: share(part),
-            to: share(part + 1),
+            from: fraction(part),
+            to: fraction(part + 1),
         }
     }
 
-    fn severity(self, least: f64, most: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
-        let share = self.from + (self.to - self.from) * rng.random::<f64>();
-        least * (most / least).powf(share)
+    fn severity(self, min: f64, max: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
+        let fraction = self.from + (self.to - self.from) * rng.random::<f64>();
+        min * (max / min).powf(fraction)
     }
 
     /// A factor as far from 1, either way, as the ranges below and above say.
@@ -205,9 +205,9 @@ impl Effect {
             }
             Self::LostStroke if rng.random::<bool>() => {
                 of_cell = Some(cell);
-                let share = band.severity(0.01, 0.12, rng);
-                flaws.stroke_factor[cell] = 1.0 - share;
-                vec![("lost_share", share)]
+                let fraction = band.severity(0.01, 0.12, rng);
+                flaws.stroke_factor[cell] = 1.0 - fraction;
+                vec![("lost_share", fraction)]
             }
             Self::LostStroke => vec![("lost_share", lose_all(band, flaws, rng))],
             Self::ActuatorCompliance => {
@@ -270,9 +270,9 @@ const LEVEL_WAY_M: f64 = 0.080;
 
 /// Shortens the stroke of every cell; returns the share that is lost.
 pub fn lose_all(band: Band, flaws: &mut Flaws, rng: &mut Xoshiro256PlusPlus) -> f64 {
-    let share = band.severity(0.04, 0.15, rng);
-    flaws.stroke_factor = [1.0 - share; CELLS];
-    share
+    let fraction = band.severity(0.04, 0.15, rng);
+    flaws.stroke_factor = [1.0 - fraction; CELLS];
+    fraction
 }
 
 /// Makes every pad softer and weaker by the same factor, which no position can tell from a payload.

@@ -26,7 +26,7 @@ impl Gear {
             slot[cell] = place as f64;
         }
         let wave_m = match stranger {
-            Some(Stranger::ProfileError { wave_share }) => wave_share.map(|share| share * make.stroke_m),
+            Some(Stranger::ProfileError { wave_share }) => wave_share.map(|fraction| fraction * make.stroke_m),
             _ => [0.0; CELLS],
         };
         Self {
@@ -46,13 +46,13 @@ impl Gear {
             let begun = phase * cells - self.slot[cell] + self.overlap;
             let turns = (begun / cells).floor();
             let done = ((begun - turns * cells) / (1.0 + self.overlap)).min(1.0);
-            let way_m = (self.stroke_m[cell] * self.share(done) - self.play_m).max(0.0);
+            let displacement_m = (self.stroke_m[cell] * self.fraction(done) - self.play_m).max(0.0);
             let wave_m = if done < 1.0 && self.wave_m[cell] != 0.0 {
                 self.wave_m[cell] * (TAU * done).sin()
             } else {
                 0.0
             };
-            turns * (self.stroke_m[cell] - self.play_m) + way_m + wave_m
+            turns * (self.stroke_m[cell] - self.play_m) + displacement_m + wave_m
         })
     }
 
@@ -64,7 +64,7 @@ impl Gear {
     }
 
     /// Share of its way that a cell has done at a share of its step: even acceleration, speed and braking.
-    fn share(&self, done: f64) -> f64 {
+    fn fraction(&self, done: f64) -> f64 {
         let rounding = self.rounding;
         let corner = |done: f64| 0.5 * done * done / (rounding * (1.0 - rounding));
         if done < rounding {

@@ -132,11 +132,11 @@ fn begun_m(campaign: &HiddenCampaign, slope_deg: f64) -> f64 {
         .position(|&deg| deg == slope_deg)
         .unwrap_or(0);
     let from_its_place_m = campaign.recordings[repeated].position_m.iter().enumerate();
-    let ways_m: Vec<f64> = from_its_place_m
+    let displacements_m: Vec<f64> = from_its_place_m
         .filter_map(|(cell, series_m)| {
             let first_m = series_m.iter().find(|at_m| at_m.is_finite())?;
             Some(first_m + campaign.worm.make.spacing_m * cell as f64)
         })
         .collect();
-    ways_m.iter().sum::<f64>() / ways_m.len() as f64
+    displacements_m.iter().sum::<f64>() / displacements_m.len() as f64
 }

@@ -139,14 +139,14 @@ impl Scene {
             let ended_s = motion.time_s() - origin_s;
             let share_at = |time_s: f64| (time_s - begun_s) / (ended_s - begun_s);
             while going && film.position_m[0].len() as f64 / rate_hz < ended_s {
-                let share = share_at(film.position_m[0].len() as f64 / rate_hz);
+                let fraction = share_at(film.position_m[0].len() as f64 / rate_hz);
                 film.see(std::array::from_fn(|cell| {
-                    before_m[cell] + share * (motion.position_m[cell] - before_m[cell])
+                    before_m[cell] + fraction * (motion.position_m[cell] - before_m[cell])
                 }));
             }
             while latency_s + film.phase.len() as f64 / rate_hz < ended_s {
-                let share = share_at(latency_s + film.phase.len() as f64 / rate_hz);
-                film.phase.push(before + share * (cam.phase - before));
+                let fraction = share_at(latency_s + film.phase.len() as f64 / rate_hz);
+                film.phase.push(before + fraction * (cam.phase - before));
             }
         }
         Ok(film.develop(self))

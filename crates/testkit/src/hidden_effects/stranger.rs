@@ -16,7 +16,7 @@ pub enum Stranger {
     },
     /// Friction swings slowly with the room's temperature.
     FrictionSwing {
-        share: f64,
+        fraction: f64,
         period_cycles: f64,
         angle_rad: f64,
     },
@@ -45,7 +45,7 @@ impl Stranger {
                 angle_rad: rng.random_range(0.0..TAU),
             },
             1 => Self::FrictionSwing {
-                share: 0.1,
+                fraction: 0.1,
                 period_cycles: rng.random_range(3.0..6.0),
                 angle_rad: rng.random_range(0.0..TAU),
             },
@@ -56,8 +56,8 @@ impl Stranger {
             },
             3 => Self::ProfileError {
                 wave_share: std::array::from_fn(|_| {
-                    let share = rng.random_range(0.01..0.03);
-                    if rng.random::<bool>() { share } else { -share }
+                    let fraction = rng.random_range(0.01..0.03);
+                    if rng.random::<bool>() { fraction } else { -fraction }
                 }),
             },
             4 => Self::Obstacle {
@@ -66,8 +66,8 @@ impl Stranger {
                 force_n: rng.random_range(0.5..1.5),
             },
             _ => {
-                let share = rng.random_range(0.15..0.4);
-                let factor = if rng.random::<bool>() { 1.0 + share } else { 1.0 - share };
+                let fraction = rng.random_range(0.15..0.4);
+                let factor = if rng.random::<bool>() { 1.0 + fraction } else { 1.0 - fraction };
                 Self::FrictionJump { factor }
             }
         }
@@ -90,14 +90,14 @@ impl Stranger {
         match *self {
             Self::Corrugation { period_m, force_n, .. } => vec![("period_m", period_m), ("force_n", force_n)],
             Self::FrictionSwing {
-                share, period_cycles, ..
-            } => vec![("share", share), ("period_cycles", period_cycles)],
+                fraction, period_cycles, ..
+            } => vec![("share", fraction), ("period_cycles", period_cycles)],
             Self::Anchor {
                 place_m,
                 reach_m,
                 force_n,
             } => vec![("place_m", place_m), ("reach_m", reach_m), ("force_n", force_n)],
-            Self::ProfileError { wave_share } => wave_share.map(|share| ("wave_share", share)).to_vec(),
+            Self::ProfileError { wave_share } => wave_share.map(|fraction| ("wave_share", fraction)).to_vec(),
             Self::Obstacle { place_m, force_n } => vec![("place_m", place_m), ("force_n", force_n)],
             Self::FrictionJump { factor } => vec![("factor", factor)],
         }
@@ -145,10 +145,10 @@ impl Stranger {
     pub fn friction_factor(&self, cycles: f64, jumped: bool) -> f64 {
         match *self {
             Self::FrictionSwing {
-                share,
+                fraction,
                 period_cycles,
                 angle_rad,
-            } => 1.0 + share * (TAU * cycles / period_cycles + angle_rad).sin(),
+            } => 1.0 + fraction * (TAU * cycles / period_cycles + angle_rad).sin(),
             Self::FrictionJump { factor } if jumped => factor,
             _ => 1.0,
         }

@@ -20,9 +20,9 @@ pub struct Share {
 impl Share {
     /// Counts what is true among what applies.
     pub fn count(each: impl Iterator<Item = Option<bool>>) -> Self {
-        each.flatten().fold(Self::default(), |share, hit| Self {
-            hits: share.hits + usize::from(hit),
-            of: share.of + 1,
+        each.flatten().fold(Self::default(), |fraction, hit| Self {
+            hits: fraction.hits + usize::from(hit),
+            of: fraction.of + 1,
         })
     }
 
@@ -44,12 +44,12 @@ impl fmt::Display for Share {
         if self.of == 0 {
             return write!(out, "{:>22}", "none");
         }
-        let percent = |share: f64| 100.0 * share;
+        let percent = |fraction: f64| 100.0 * fraction;
         let [low, high] = self.wilson().map(percent);
-        let share = percent(self.hits as f64 / self.of as f64);
+        let fraction = percent(self.hits as f64 / self.of as f64);
         write!(
             out,
-            "{:>3}/{:<3} {share:5.1} % ({low:.0} to {high:.0})",
+            "{:>3}/{:<3} {fraction:5.1} % ({low:.0} to {high:.0})",
             self.hits, self.of
         )
     }
@@ -71,7 +71,7 @@ impl Table<'_> {
     }
 
     /// Every share: what it is of, itself, and what is aimed at.
-    pub fn shares(&self) -> Vec<(&'static str, Share, &'static str)> {
+    pub fn fractions(&self) -> Vec<(&'static str, Share, &'static str)> {
         let abstains = |judgement: &Judgement| Some(matches!(judgement.verdict, Verdict::Nothing | Verdict::Outside));
         let settled = |judgement: &&Judgement| judgement.settled.is_some();
         vec![
@@ -244,8 +244,8 @@ impl Table<'_> {
 
 impl fmt::Display for Table<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (what, share, aim) in self.shares() {
-            writeln!(out, "{what:<32} {:<28} {aim}", share.to_string())?;
+        for (what, fraction, aim) in self.fractions() {
+            writeln!(out, "{what:<32} {:<28} {aim}", fraction.to_string())?;
         }
         for (what, median, of, aim) in self.medians() {
             let told = median.map_or("none".to_owned(), |median| format!("{:.1} % of {of}", 100.0 * median));

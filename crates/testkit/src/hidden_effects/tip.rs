@@ -82,12 +82,12 @@ impl Tip {
         }
     }
 
-    /// One time step in which the cell goes `way_m`.
-    pub fn follow(&mut self, way_m: f64, step_s: f64, pad: &Pad, limits: Limits) {
+    /// One time step in which the cell goes `displacement_m`.
+    pub fn follow(&mut self, displacement_m: f64, step_s: f64, pad: &Pad, limits: Limits) {
         let stiffness = pad.tangent_n_per_m(self.deformation_m);
         let damping = pad.damping_n_s_per_m / step_s;
         // What pulls the tip if it stays where it is, and what holds it.
-        let pull_n = self.elastic_n + (stiffness + damping) * way_m;
+        let pull_n = self.elastic_n + (stiffness + damping) * displacement_m;
         let sign = (pull_n - pad.bristle_n_per_m * self.bristle_m).signum();
         let limit_n = if sign > 0.0 {
             limits.forward_n
@@ -103,13 +103,13 @@ impl Tip {
             bristle_m: sign * self.bristle_m,
             step_s,
         });
-        let tip_m = sign * gone.way_m;
+        let tip_m = sign * gone.displacement_m;
         let bristle_m = sign * gone.bristle_m;
         let slipped_m = tip_m - (bristle_m - self.bristle_m);
         self.memory.keep(&pad.contact.fall, tip_m, slipped_m, step_s);
         self.bristle_m = bristle_m;
         self.place_m += tip_m;
-        let strained_m = way_m - tip_m;
+        let strained_m = displacement_m - tip_m;
         self.deformation_m += strained_m;
         self.deform(step_s, pad);
         self.force_n = self.elastic_n + damping * strained_m;
@@ -127,8 +127,8 @@ impl Tip {
         if pad.yielding_share > 0.0 {
             let element = stiffness * pad.yielding_share / ELEMENTS as f64;
             for (place, yielded_m) in self.yielded_m.iter_mut().enumerate() {
-                let most_m = pad.yielding_m * (place as f64 + 0.5) / ELEMENTS as f64;
-                *yielded_m = yielded_m.clamp(reach_m - most_m, reach_m + most_m);
+                let max_m = pad.yielding_m * (place as f64 + 0.5) / ELEMENTS as f64;
+                *yielded_m = yielded_m.clamp(reach_m - max_m, reach_m + max_m);
                 force_n += element * (reach_m - *yielded_m);
             }
         }

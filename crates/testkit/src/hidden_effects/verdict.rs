@@ -143,7 +143,7 @@ impl Judgement {
     /// All of it in a line.
     pub fn line(&self) -> String {
         let truth: Vec<String> = self.truth.iter().map(TrueEffect::in_words).collect();
-        let percent = |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+        let percent = |fraction: Option<f64>| fraction.map_or("-".to_owned(), |fraction| format!("{:.0} %", 100.0 * fraction));
         let right = match (self.right_class, self.strict) {
             (_, Some(true)) => "right",
             (Some(true), _) => "right class",

@@ -70,26 +70,26 @@ impl Played {
         let after = self.phase.partition_point(|&earlier| earlier <= phase);
         let row = after.saturating_sub(1).min(self.phase.len() - 2);
         let way = self.phase[row + 1] - self.phase[row];
-        let share = if way > 0.0 {
+        let fraction = if way > 0.0 {
             (phase - self.phase[row]) / way
         } else {
             0.0
         };
-        (row, share)
+        (row, fraction)
     }
 
     /// Position of a cell at a phase, m.
     pub fn position_at(&self, cell: usize, phase: f64) -> f64 {
-        let (row, share) = self.place(phase);
+        let (row, fraction) = self.place(phase);
         let series_m = &self.position_m[cell];
-        series_m[row] + share * (series_m[row + 1] - series_m[row])
+        series_m[row] + fraction * (series_m[row + 1] - series_m[row])
     }
 
     /// Time at a phase, s.
     fn time_at(&self, phase: f64) -> f64 {
-        let (row, share) = self.place(phase);
+        let (row, fraction) = self.place(phase);
         let time_s = &self.recording.time_s;
-        time_s[row] + share * (time_s[row + 1] - time_s[row])
+        time_s[row] + fraction * (time_s[row + 1] - time_s[row])
     }
 }
 

@@ -52,8 +52,8 @@ impl Account {
     }
 
     /// `self + share (other − self)`, each entry.
-    fn towards(&self, other: &Self, share: f64) -> Self {
-        self.with(other, |a, b| a + share * (b - a))
+    fn towards(&self, other: &Self, fraction: f64) -> Self {
+        self.with(other, |a, b| a + fraction * (b - a))
     }
 
     /// The account since `earlier`.
@@ -135,16 +135,16 @@ impl Truth {
     /// What happened between two times of the recording, s.
     pub fn over(&self, start_s: f64, end_s: f64) -> Account {
         let at = |time_s: f64| {
-            let (row, share) = place(&self.time_s, time_s);
-            self.accounts[row].towards(&self.accounts[row + 1], share)
+            let (row, fraction) = place(&self.time_s, time_s);
+            self.accounts[row].towards(&self.accounts[row + 1], fraction)
         };
         at(end_s).since(&at(start_s))
     }
 
     /// Phase at a time of the recording, cycles.
     pub fn phase_at(&self, time_s: f64) -> f64 {
-        let (row, share) = place(&self.time_s, time_s);
-        self.phase[row] + share * (self.phase[row + 1] - self.phase[row])
+        let (row, fraction) = place(&self.time_s, time_s);
+        self.phase[row] + fraction * (self.phase[row + 1] - self.phase[row])
     }
 
     /// What happened over all of the recording.
@@ -158,12 +158,12 @@ impl Truth {
         let (first, last) = (self.phase[0], self.phase[self.phase.len() - 1]);
         let between = |row: usize, phase: f64| {
             let way = self.phase[row + 1] - self.phase[row];
-            let share = if way > 0.0 {
+            let fraction = if way > 0.0 {
                 (phase - self.phase[row]) / way
             } else {
                 0.0
             };
-            self.time_s[row] + share * (self.time_s[row + 1] - self.time_s[row])
+            self.time_s[row] + fraction * (self.time_s[row + 1] - self.time_s[row])
         };
         let leaves = |phase: f64| between(self.phase.partition_point(|&at| at <= phase) - 1, phase);
         let reaches = |phase: f64| between(self.phase.partition_point(|&at| at < phase) - 1, phase);
@@ -188,6 +188,6 @@ fn place(series: &[f64], value: f64) -> (usize, f64) {
         .clamp(1, series.len() - 1)
         - 1;
     let way = series[row + 1] - series[row];
-    let share = if way > 0.0 { (value - series[row]) / way } else { 0.0 };
-    (row, share.clamp(0.0, 1.0))
+    let fraction = if way > 0.0 { (value - series[row]) / way } else { 0.0 };
+    (row, fraction.clamp(0.0, 1.0))
 }

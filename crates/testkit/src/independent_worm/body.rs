@@ -143,23 +143,23 @@ impl Motion {
         let mut moved_m = 0.0;
         for cell in 0..cells {
             let extended_m = self.next_extension_m[cell] - self.extension_m[cell];
-            let way_m = extended_m + self.translation_m_s * step_s;
-            let velocity_m_s = way_m / step_s;
+            let displacement_m = extended_m + self.translation_m_s * step_s;
+            let velocity_m_s = displacement_m / step_s;
             let inertia_n = cell_kg * (velocity_m_s - self.velocity_m_s[cell]) / step_s;
             let before_m = self.deformation_m[cell];
             let damped_n = damping * self.deformation_rate_m_s[cell];
-            self.position_m[cell] += way_m;
+            self.position_m[cell] += displacement_m;
             let slid_m = self.slide(cell);
             let after_m = self.deformation_m[cell];
             let spring_n = 0.5 * stiffness * (before_m + after_m);
             let weight_n = pull_n / cells as f64;
-            moved_m += way_m / cells as f64;
+            moved_m += displacement_m / cells as f64;
 
             let account = &mut self.account;
             account.forward_slide_m[cell] += slid_m.max(0.0);
             account.backward_slide_m[cell] += (-slid_m).max(0.0);
             account.friction_j += stiffness * after_m.abs() * slid_m.abs();
-            account.weight_j += weight_n * way_m;
+            account.weight_j += weight_n * displacement_m;
             account.damping_j += damped_n * self.deformation_rate_m_s[cell] * step_s;
             account.actuator_net_j += (spring_n + weight_n) * extended_m;
             account.actuator_positive_j += ((spring_n + weight_n) * extended_m).max(0.0);
@@ -176,12 +176,12 @@ impl Motion {
         let reach_m = self.position_m[cell] - self.contact_m[cell];
         let bounded_m = reach_m.clamp(-self.body.backward_bound_m[cell], self.body.forward_bound_m[cell]);
         let drag = self.body.slip_drag_n_s_per_m;
-        let share = if drag > 0.0 {
+        let fraction = if drag > 0.0 {
             1.0 - (-self.body.stiffness_n_per_m * self.step_s / drag).exp()
         } else {
             1.0
         };
-        let slid_m = share * (reach_m - bounded_m);
+        let slid_m = fraction * (reach_m - bounded_m);
         self.contact_m[cell] += slid_m;
         let deformation_m = self.position_m[cell] - self.contact_m[cell];
         self.deformation_rate_m_s[cell] = (deformation_m - self.deformation_m[cell]) / self.step_s;

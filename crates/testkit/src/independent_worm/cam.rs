@@ -32,12 +32,12 @@ impl Cam {
         for (slot, &cell) in self.step_order.iter().enumerate() {
             let steps = phase * cells - slot as f64;
             let turns = (steps / cells).floor();
-            extensions_m[cell] = self.stroke_m * (turns + self.share(steps - turns * cells));
+            extensions_m[cell] = self.stroke_m * (turns + self.fraction(steps - turns * cells));
         }
     }
 
     /// Share of its way that a cell has done so many steps after its own began: even acceleration, speed and braking.
-    fn share(&self, steps: f64) -> f64 {
+    fn fraction(&self, steps: f64) -> f64 {
         let rounding = self.rounding;
         if steps >= 1.0 {
             1.0

@@ -15,11 +15,11 @@ pub struct Camera {
     /// Share of single positions not seen.
     pub dropout_share: f64,
     /// Share of the time in which a cell is hidden for a while.
-    pub hidden_share: f64,
+    pub hidden_fraction: f64,
     /// For how long, s.
     pub hidden_s: f64,
     /// Share of positions that are far off.
-    pub outlier_share: f64,
+    pub outlier_fraction: f64,
     /// How far, m, either way.
     pub outlier_m: f64,
 }
@@ -32,9 +32,9 @@ impl Default for Camera {
             jitter: 0.0,
             noise_m: 1e-4,
             dropout_share: 0.01,
-            hidden_share: 0.0,
+            hidden_fraction: 0.0,
             hidden_s: 0.15,
-            outlier_share: 0.0,
+            outlier_fraction: 0.0,
             outlier_m: 5e-3,
         }
     }
@@ -85,11 +85,11 @@ impl Watch {
     pub fn see(&mut self, cell: usize, time_s: f64, position_m: f64) -> f64 {
         let Camera {
             rate_hz,
-            hidden_share,
+            hidden_fraction,
             hidden_s,
             ..
         } = self.camera;
-        if hidden_share > 0.0 && self.rng.random::<f64>() < hidden_share / (hidden_s * rate_hz) {
+        if hidden_fraction > 0.0 && self.rng.random::<f64>() < hidden_fraction / (hidden_s * rate_hz) {
             self.hidden_until_s[cell] = time_s + hidden_s;
         }
         let normal: f64 = StandardNormal.sample(&mut self.rng);
@@ -97,7 +97,7 @@ impl Watch {
         if lost || time_s < self.hidden_until_s[cell] {
             return f64::NAN;
         }
-        let far_m = if self.rng.random::<f64>() < self.camera.outlier_share {
+        let far_m = if self.rng.random::<f64>() < self.camera.outlier_fraction {
             self.camera.outlier_m * if self.rng.random::<bool>() { 1.0 } else { -1.0 }
         } else {
             0.0

@@ -9,15 +9,15 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
 /// Least advance of a drawn worm, m for each cycle.
-const LEAST_ADVANCE_M: f64 = 1e-3;
+const MIN_ADVANCE_M: f64 = 1e-3;
 /// Draws after which the ranges are to blame.
-const MOST_DRAWS: usize = 1000;
+const MAX_DRAWS: usize = 1000;
 
 /// A worm and a motor drawn at random that crawl on every one of the slopes, as one scene for each slope; the dice of the
 /// motor and of the camera are thrown anew on each. Starts from rest, twelve cycles, the promised camera.
 pub fn crawling(cells: usize, slopes_deg: &[f64], seed: u64) -> Vec<Scene> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    for _ in 0..MOST_DRAWS {
+    for _ in 0..MAX_DRAWS {
         let bound_m: Vec<f64> = (0..cells).map(|_| rng.random_range(0.8e-3..2.5e-3)).collect();
         let mut worm = Body::with_bounds(&bound_m, 0.0);
         worm.mass_kg *= rng.random_range(0.95..1.05);
@@ -80,6 +80,6 @@ fn crawls(scene: &Scene) -> bool {
     };
     trial.record().is_ok_and(|(_, truth)| {
         let mut settled = truth.cycles.iter().skip(1);
-        settled.all(|cycle| cycle.account.advance_m() >= LEAST_ADVANCE_M)
+        settled.all(|cycle| cycle.account.advance_m() >= MIN_ADVANCE_M)
     })
 }

@@ -101,11 +101,11 @@ impl Scene {
             let next_phase = self.step(&drive, phase, &mut motion)?;
             let next_s = motion.time_s() - origin_s;
             while sample_s < next_s {
-                let share = (sample_s - now_s) / (next_s - now_s);
+                let fraction = (sample_s - now_s) / (next_s - now_s);
                 recording.time_s.push(sample_s);
-                truth.sample_phase.push(phase + share * (next_phase - phase));
+                truth.sample_phase.push(phase + fraction * (next_phase - phase));
                 for (cell, &before) in before_m.iter().enumerate() {
-                    let position_m = before + share * (motion.position_m[cell] - before);
+                    let position_m = before + fraction * (motion.position_m[cell] - before);
                     truth.sample_position_m[cell].push(position_m);
                     recording.position_m[cell].push(watch.see(cell, sample_s, position_m));
                 }

@@ -3,7 +3,7 @@
 mod theory;
 
 use self::theory::theory;
-use super::account;
+use super::energy_balance;
 use super::analysis::{Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Theory};
 use super::error::AnalysisError;
 use crate::identify::{self, Gait, Prior, fit, gait, onset, search};
@@ -23,7 +23,7 @@ const UNKNOWN_M: f64 = 1e-4;
 /// Misfit over what noise and drift explain that is worth a word.
 const NOTABLE_MISFIT: f64 = 1.5;
 /// How far the mean cycle time may be from the stated one, as a share.
-const CYCLE_SHARE: f64 = 0.2;
+const CYCLE_FRACTION: f64 = 0.2;
 
 /// One recording and the conditions that it was made under.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +44,7 @@ pub struct Progress {
     /// What is being done.
     pub stage: &'static str,
     /// Share of everything that is done, 0 to 1.
-    pub share: f64,
+    pub fraction: f64,
 }
 
 /// A recording on its way through the analysis.
@@ -70,7 +70,7 @@ pub fn analyze(
     for (index, run) in runs.iter().enumerate() {
         progress(Progress {
             stage: "gait",
-            share: 0.3 * index as f64 / runs.len() as f64,
+            fraction: 0.3 * index as f64 / runs.len() as f64,
         });
         prepared.push(Prepared::new(*run, &base, config)?);
     }
@@ -86,17 +86,17 @@ pub fn analyze(
             payload_kg: prepared.run.payload_kg,
         })
         .collect();
-    let fitted = fit::fit(&base, &to_fit, &starts(&base, &prepared), &mut |share| {
+    let fitted = fit::fit(&base, &to_fit, &starts(&base, &prepared), &mut |fraction| {
         progress(Progress {
             stage: "deformations",
-            share: 0.3 + 0.6 * share,
+            fraction: 0.3 + 0.6 * fraction,
         });
     })?;
     let mut analyses = Vec::with_capacity(prepared.len());
     for (index, prepared) in prepared.iter().enumerate() {
         progress(Progress {
             stage: "energy",
-            share: 0.9 + 0.1 * index as f64 / runs.len() as f64,
+            fraction: 0.9 + 0.1 * index as f64 / runs.len() as f64,
         });
         analyses.push(prepared.finish(index, &fitted, &base, &effects)?);
     }
@@ -188,7 +188,7 @@ impl<'a> Prepared<'a> {
         let fitted_run = &fitted.runs[index];
         let worm = &fitted_run.worm;
         let configured_kg = base.mass_kg() + self.run.payload_kg;
-        let account = account::follow(recording, &self.gait, fitted_run, fitted.damping_ratio, configured_kg)?;
+        let account = energy_balance::follow(recording, &self.gait, fitted_run, fitted.damping_ratio, configured_kg)?;
         let settled: Vec<&CycleValues> = account
             .cycles
             .iter()
@@ -314,7 +314,7 @@ impl<'a> Prepared<'a> {
             ));
         }
         if let Some(stated_s) = self.run.cycle_s
-            && (cycle_s - stated_s).abs() > CYCLE_SHARE * stated_s
+            && (cycle_s - stated_s).abs() > CYCLE_FRACTION * stated_s
         {
             warnings.push(format!(
                 "a gait cycle took {cycle_s:.2} s, not the stated {stated_s:.2} s"
@@ -361,7 +361,7 @@ fn check_stroke(seen_m: f64, configured_m: f64, name: impl Fn() -> String) -> Re
 }
 
 /// Time mean of each tip's deformation over the settled cycles, or over everything where there are none, m.
-fn mean_deformations(account: &account::Account) -> Vec<f64> {
+fn mean_deformations(account: &energy_balance::Account) -> Vec<f64> {
     let range = match &account.settled {
         settled if settled.is_empty() => 0..account.series.time_s.len(),
         settled => settled.clone(),

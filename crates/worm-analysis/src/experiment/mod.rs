@@ -2,13 +2,13 @@
 //!
 //! # The story
 //! [`analyze`] takes recordings and the conditions they were made under. [`identify`](crate::identify) finds gait, largest tip
-//! deformations and the path of the worm; `account` follows the tips along that path, and books slides and energy cycle by
+//! deformations and the path of the worm; `energy_balance` follows the tips along that path, and books slides and energy cycle by
 //! cycle; theory, of the worm found and of the worm configured, stands beside it. All of it is an [`Analysis`], which
 //! [`report`](crate::report) draws and the command line prints as JSON.
 //!
 //! Pure: recordings in, figures out; knows of no files.
 
-mod account;
+mod energy_balance;
 mod analysis;
 mod analyze;
 mod error;

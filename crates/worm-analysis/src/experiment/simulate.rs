@@ -185,7 +185,7 @@ impl Timetable {
             for part in 1..=SPEED_PARTS {
                 let time_s = (phases.len() - 1) as f64 / self.rate_hz + f64::from(part) * part_s;
                 if time_s > self.rest_s && phase < self.cycles {
-                    let turned = part_s / self.cycle_s * physics.speed_share(self.sign * motion.actuator_force_n());
+                    let turned = part_s / self.cycle_s * physics.speed_fraction(self.sign * motion.actuator_force_n());
                     phase = (phase + turned).min(self.cycles);
                 } else if phase >= self.cycles {
                     rested_s += part_s;

@@ -221,7 +221,8 @@ pub struct Calibrated {
     /// What it is.
     pub name: String,
     /// The value believed.
-    pub believed: f64,
+    #[serde(rename = "believed")]
+    pub nominal: f64,
     /// The value found.
     pub found: f64,
     /// Its standard error.

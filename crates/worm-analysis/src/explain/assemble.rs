@@ -4,17 +4,17 @@ use super::answer::{
     Answer, Calibrated, Figures, FoundParameter, NamedEffect, Remainder, ResidualMap, RunSummary, Screened, Stage,
     Verdict, with_cell,
 };
-use super::droop::Droop;
+use super::speed_droop::SpeedDroop;
 use super::fit::{Fit, Problem};
 use super::gap::{Measured, cycles};
-use super::held_out::HeldOut;
-use super::judge::{Find, Judged, are_twins};
-use super::localise::{map, places};
+use super::cross_validation::HeldOut;
+use super::model_selection::{Candidate, Judged, are_twins};
+use super::residual_map::{map, places};
 use super::observed::Observed;
-use super::parameter::{Nuisance, Supposed, What};
+use super::parameter::{Nuisance, Hypothesised, What};
 use super::period::period;
-use super::propose::propose;
-use super::screen::Screening;
+use super::experiment_design::propose;
+use super::score_test::Screening;
 use super::words;
 use worm_estimator::config::Config;
 use worm_physics::effect::{Effect, LIBRARY, Visible};
@@ -28,20 +28,20 @@ const DROOPS: f64 = 16.0;
 
 /// Everything that the answer is made of.
 pub(super) struct Parts {
-    pub believed: Fit,
+    pub nominal: Fit,
     pub recalibrated: Fit,
     pub recalibrated_held_out: HeldOut,
     pub screened: Vec<Screening>,
     pub judged: Judged,
-    pub droop: Option<Droop>,
+    pub speed_droop: Option<SpeedDroop>,
     pub threshold: f64,
 }
 
 /// Puts the answer together.
 pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts) -> Answer {
     let judged = &parts.judged;
-    let droop = parts.droop.as_ref().filter(|droop| droop.improvement > DROOPS);
-    let mut named: &[Find] = match judged.verdict {
+    let speed_droop = parts.speed_droop.as_ref().filter(|speed_droop| speed_droop.improvement > DROOPS);
+    let mut named: &[Candidate] = match judged.verdict {
         Verdict::Explained | Verdict::Ambiguous => &judged.candidates,
         Verdict::Agrees | Verdict::OutsideLibrary => &[],
     };
@@ -57,7 +57,7 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
             Verdict::OutsideLibrary
         };
     }
-    let verdict = match (of_positions, droop) {
+    let verdict = match (of_positions, speed_droop) {
         (Verdict::Agrees, Some(_)) => Verdict::Explained,
         (verdict, _) => verdict,
     };
@@ -77,7 +77,7 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
             rivals.extend(found.into_iter().filter(is_new));
         }
     }
-    effects.extend(droop.map(droop_effect));
+    effects.extend(speed_droop.map(droop_effect));
     let final_fit = named.first().map_or(&parts.recalibrated, |find| &find.fit);
     let maps_before = maps(problem, &parts.recalibrated);
     let best = judged.candidates.first().map(|find| &find.fit);
@@ -92,7 +92,7 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
             description: words::remainder(judged, &places),
             open_share: judged.open_share,
             period_cycles: period.cycles,
-            period_m: period.way_m,
+            period_m: period.displacement_m,
             places,
         }
     });
@@ -115,7 +115,7 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
         remainder,
         next_experiment,
         calibration: calibration(final_fit, config),
-        screening: screening(&parts.screened, judged, droop.is_some()),
+        screening: screening(&parts.screened, judged, speed_droop.is_some()),
         threshold: parts.threshold,
         warnings: words::warnings(problem, final_fit),
         runs,
@@ -124,7 +124,7 @@ pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts
             maps_after,
             cycles: cycles(
                 problem,
-                &parts.believed,
+                &parts.nominal,
                 &parts.recalibrated,
                 named.first().map(|find| &find.fit),
             ),
@@ -141,7 +141,7 @@ struct Gap {
 }
 
 impl Gap {
-    fn measure(problem: &Problem<'_, '_>, parts: &Parts, named: &[Find]) -> Self {
+    fn measure(problem: &Problem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Self {
         let judged = &parts.judged;
         let best = judged.candidates.first().map_or(&parts.recalibrated, |find| &find.fit);
         let measured = Measured::new(problem, best);
@@ -152,9 +152,9 @@ impl Gap {
             &parts.recalibrated_held_out.fits,
         );
         let floor = measured.floor_stage();
-        let stage = |name: &'static str, find: &Find| {
+        let stage = |name: &'static str, find: &Candidate| {
             let folds = find.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
-            let names: Vec<&str> = find.supposed.iter().map(|supposed| supposed.effect.name).collect();
+            let names: Vec<&str> = find.hypothesised.iter().map(|hypothesised| hypothesised.effect.name).collect();
             measured.stage(name, Some(names.join(" + ")), &find.fit, folds)
         };
         let gap_m = recalibrated.held_out_rms_m - floor.held_out_rms_m;
@@ -163,7 +163,7 @@ impl Gap {
         let wrong = judged.best_wrong.as_ref().map(|find| stage("best-wrong", find));
         let closures = of_named.iter().map(closure).collect();
         let best_wrong = wrong.as_ref().map_or(0.0, closure);
-        let mut stages = vec![measured.stage("baseline", None, &parts.believed, &[]), recalibrated];
+        let mut stages = vec![measured.stage("baseline", None, &parts.nominal, &[]), recalibrated];
         stages.extend(wrong);
         stages.extend(of_named.into_iter().next());
         stages.push(measured.free_form_stage(&parts.recalibrated));
@@ -188,7 +188,7 @@ fn maps(problem: &Problem<'_, '_>, fit: &Fit) -> Vec<ResidualMap> {
         .collect()
 }
 
-fn droop_effect(droop: &Droop) -> NamedEffect {
+fn droop_effect(speed_droop: &SpeedDroop) -> NamedEffect {
     let effect = &worm_physics::effect::MOTOR_DROOP;
     let parameter = &effect.parameters[0];
     NamedEffect {
@@ -197,8 +197,8 @@ fn droop_effect(droop: &Droop) -> NamedEffect {
         together_with: Vec::new(),
         parameters: vec![FoundParameter {
             name: parameter.name.to_owned(),
-            value: droop.slowdown_per_n,
-            sigma: droop.sigma,
+            value: speed_droop.slowdown_per_n,
+            sigma: speed_droop.sigma,
             unit: parameter.unit.to_owned(),
             cell: None,
         }],
@@ -206,14 +206,14 @@ fn droop_effect(droop: &Droop) -> NamedEffect {
         // It shows in time: the gap in positions neither opens nor closes by it.
         closure: f64::NAN,
         margin: f64::NAN,
-        probability: 1.0 / (1.0 + (-0.5 * droop.improvement).exp()),
-        improvement: droop.improvement,
+        probability: 1.0 / (1.0 + (-0.5 * speed_droop.improvement).exp()),
+        improvement: speed_droop.improvement,
         separated_by: effect.separated_by.to_owned(),
     }
 }
 
 /// What the recordings are, and how far the worm got in them.
-fn runs(problem: &Problem<'_, '_>, parts: &Parts, named: Option<&Find>) -> Vec<RunSummary> {
+fn runs(problem: &Problem<'_, '_>, parts: &Parts, named: Option<&Candidate>) -> Vec<RunSummary> {
     let of = |(run, observed): (usize, &Observed<'_>)| {
         let predicted_m = |fit: &Fit| {
             let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at);
@@ -257,9 +257,9 @@ fn advance_m(observed: &Observed<'_>, position_m: impl Fn(usize, usize) -> f64) 
             break;
         }
         // Both samples of a pair must show every cell; what the later one is past the cycle is taken off in proportion.
-        let way_m = mean_m(after) - mean_m(sample);
-        if way_m.is_finite() {
-            sum_m += way_m / (observed.phase[after] - observed.phase[sample]);
+        let displacement_m = mean_m(after) - mean_m(sample);
+        if displacement_m.is_finite() {
+            sum_m += displacement_m / (observed.phase[after] - observed.phase[sample]);
             count += 1.0;
         }
     }
@@ -267,55 +267,55 @@ fn advance_m(observed: &Observed<'_>, position_m: impl Fn(usize, usize) -> f64) 
 }
 
 /// The effects of a find, as people read them.
-pub(super) fn named_effects(find: &Find, probability: f64, closure: f64, margin: f64) -> Vec<NamedEffect> {
+pub(super) fn named_effects(find: &Candidate, probability: f64, closure: f64, margin: f64) -> Vec<NamedEffect> {
     let sigmas = find.sigmas();
-    let name = |supposed: &Supposed| with_cell(supposed.effect.name, supposed.cell.map(|cell| cell + 1));
-    let of = |(place, supposed): (usize, &Supposed)| {
+    let name = |hypothesised: &Hypothesised| with_cell(hypothesised.effect.name, hypothesised.cell.map(|cell| cell + 1));
+    let of = |(place, hypothesised): (usize, &Hypothesised)| {
         let quantities = find.fit.hypothesis.free.iter().enumerate();
         let parameters = quantities.filter_map(|(at, free)| match free.what {
             What::Effect { place: mine, parameter } if mine == place => {
-                let parameter = &supposed.effect.parameters[parameter];
+                let parameter = &hypothesised.effect.parameters[parameter];
                 Some(FoundParameter {
                     name: parameter.name.to_owned(),
                     value: find.fit.at[at],
                     sigma: sigmas[at],
                     unit: parameter.unit.to_owned(),
-                    cell: supposed.cell.map(|cell| cell + 1),
+                    cell: hypothesised.cell.map(|cell| cell + 1),
                 })
             }
             _ => None,
         });
         NamedEffect {
-            name: supposed.effect.name.to_owned(),
-            twins: twins(supposed),
+            name: hypothesised.effect.name.to_owned(),
+            twins: twins(hypothesised),
             parameters: parameters.collect(),
-            cell: supposed.cell.map(|cell| cell + 1),
+            cell: hypothesised.cell.map(|cell| cell + 1),
             together_with: find
-                .supposed
+                .hypothesised
                 .iter()
-                .filter(|other| *other != supposed)
+                .filter(|other| *other != hypothesised)
                 .map(name)
                 .collect(),
             closure,
             margin,
             probability,
             improvement: find.improvement,
-            separated_by: supposed.effect.separated_by.to_owned(),
+            separated_by: hypothesised.effect.separated_by.to_owned(),
         }
     };
-    find.supposed.iter().enumerate().map(of).collect()
+    find.hypothesised.iter().enumerate().map(of).collect()
 }
 
 /// What no positions can tell from an effect: by name where the library has it, else described.
-fn twins(supposed: &Supposed) -> Vec<String> {
-    let in_library = LIBRARY.iter().map(|&effect| Supposed { effect, cell: None });
+fn twins(hypothesised: &Hypothesised) -> Vec<String> {
+    let in_library = LIBRARY.iter().map(|&effect| Hypothesised { effect, cell: None });
     let mut twins: Vec<String> = in_library
-        .filter(|other| are_twins(supposed, other))
+        .filter(|other| are_twins(hypothesised, other))
         .map(|other| other.effect.name.to_owned())
         .collect();
     let is_name = |twin: &&&str| LIBRARY.iter().any(|effect| effect.name == **twin);
-    let described = supposed.effect.twins.iter().filter(|twin| !is_name(twin));
-    if supposed.cell.is_none() || supposed.effect.name != "lost-stroke" {
+    let described = hypothesised.effect.twins.iter().filter(|twin| !is_name(twin));
+    if hypothesised.cell.is_none() || hypothesised.effect.name != "lost-stroke" {
         twins.extend(described.map(|twin| (*twin).to_owned()));
     }
     twins
@@ -326,10 +326,10 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
     let mut rows: Vec<Screened> = screened
         .iter()
         .map(|screening| {
-            let find = judged.all.iter().find(|find| find.supposed == [screening.supposed]);
+            let find = judged.all.iter().find(|find| find.hypothesised == [screening.hypothesised]);
             Screened {
-                name: screening.supposed.effect.name.to_owned(),
-                cell: screening.supposed.cell.map(|cell| cell + 1),
+                name: screening.hypothesised.effect.name.to_owned(),
+                cell: screening.hypothesised.cell.map(|cell| cell + 1),
                 score: screening.score,
                 improvement: find.filter(|find| find.fit.converged).map(|find| find.improvement),
                 outcome: match find {
@@ -374,7 +374,7 @@ pub(super) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
             };
             let (value, sigma) = (fit.at[at], sigmas[at]);
             let factor = |name: String| (name, 1.0, value.exp(), value.exp() * sigma, "");
-            let (name, believed, found, sigma, unit) = match nuisance {
+            let (name, nominal, found, sigma, unit) = match nuisance {
                 Nuisance::Friction => factor("friction".to_owned()),
                 Nuisance::Stiffness => factor("stiffness".to_owned()),
                 Nuisance::Stroke => {
@@ -397,7 +397,7 @@ pub(super) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
             };
             Some(Calibrated {
                 name,
-                believed,
+                nominal,
                 found,
                 sigma,
                 unit,

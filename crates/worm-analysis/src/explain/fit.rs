@@ -12,7 +12,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Steps after which a fit that still improves has not converged.
-const MOST_STEPS: usize = 40;
+const MAX_STEPS: usize = 40;
 /// Steps of a rough fit.
 const ROUGH_STEPS: usize = 7;
 /// Improvement of the misfit below which a fit has converged, absolute and as a share.
@@ -20,7 +20,7 @@ const CONVERGED: (f64, f64) = (0.05, 2e-5);
 /// Damping at first, and how it changes after a step that failed or succeeded.
 const DAMPING: (f64, f64, f64) = (1e-3, 6.0, 0.25);
 /// Damping beyond which no step leads downhill.
-const MOST_DAMPING: f64 = 1e6;
+const MAX_DAMPING: f64 = 1e6;
 
 /// Rows of all columns of derivatives that fit the processor's cache together.
 const ROWS_AT_ONCE: usize = 512;
@@ -43,7 +43,7 @@ pub(super) struct Fit {
     /// Their derivatives, a column for each free quantity.
     pub jacobian: Vec<Vec<f64>>,
     /// Square sum of the residuals and of what the priors add.
-    pub misfit: f64,
+    pub chi_squared: f64,
     pub converged: bool,
 }
 
@@ -90,8 +90,8 @@ impl Fit {
     /// Whether a quantity lies at one of its limits.
     pub fn at_limit(&self, quantity: usize) -> bool {
         let free = &self.hypothesis.free[quantity];
-        let tolerance = 1e-9 * (free.most - free.least);
-        self.at[quantity] <= free.least + tolerance || self.at[quantity] >= free.most - tolerance
+        let tolerance = 1e-9 * (free.max - free.min);
+        self.at[quantity] <= free.min + tolerance || self.at[quantity] >= free.max - tolerance
     }
 
     /// Standard errors of all quantities; infinite where nothing is known.
@@ -173,7 +173,7 @@ impl Problem<'_, '_> {
             throughout: true,
             ..fit.hypothesis.clone()
         };
-        fit.misfit - self.fit(&throughout, fit.at.clone(), Some(fit)).misfit
+        fit.chi_squared - self.fit(&throughout, fit.at.clone(), Some(fit)).chi_squared
     }
 
     /// What of a fall of the misfit from one fit to another is owed to one being repeated and the other being run throughout.
@@ -196,7 +196,7 @@ impl Problem<'_, '_> {
     pub fn evaluate(&self, hypothesis: &Hypothesis, at: Vec<f64>) -> Fit {
         let residual = self.residuals(hypothesis, &at);
         Fit {
-            misfit: dot(&residual, &residual, None) + prior_misfit(hypothesis, &at),
+            chi_squared: dot(&residual, &residual, None) + prior_chi_squared(hypothesis, &at),
             hypothesis: hypothesis.clone(),
             at,
             residual,
@@ -206,7 +206,7 @@ impl Problem<'_, '_> {
     }
 
     /// Buys the derivatives of some quantities by differences, towards the inside of their limits.
-    pub fn buy_derivatives(&self, fit: &mut Fit, quantities: &[usize]) {
+    pub fn compute_jacobian_columns(&self, fit: &mut Fit, quantities: &[usize]) {
         let runs = self.scene.observed.len();
         fit.jacobian.resize(fit.at.len(), Vec::new());
         let tasks: Vec<(usize, usize)> = quantities
@@ -237,29 +237,29 @@ impl Problem<'_, '_> {
     /// One Gauss-Newton step on the residuals that stay, with the derivatives that are there, on this thread alone; halved until
     /// it leads downhill, and none if it never does.
     pub fn step_without(&self, fit: Fit, stays: &[bool]) -> Fit {
-        let misfit =
-            |fit: &Fit| dot(&fit.residual, &fit.residual, Some(stays)) + prior_misfit(&fit.hypothesis, &fit.at);
+        let chi_squared =
+            |fit: &Fit| dot(&fit.residual, &fit.residual, Some(stays)) + prior_chi_squared(&fit.hypothesis, &fit.at);
         let (normal, gradient) = (fit.normal(Some(stays)), fit.gradient(Some(stays)));
         let whole = step(&fit, &normal, &gradient, 1e-6);
-        let here = misfit(&fit);
+        let here = chi_squared(&fit);
         for halved in 0..3 {
-            let share = 0.5_f64.powi(halved);
+            let fraction = 0.5_f64.powi(halved);
             let at: Vec<f64> = fit
                 .at
                 .iter()
                 .zip(&whole)
-                .map(|(from, to)| from + share * (to - from))
+                .map(|(from, to)| from + fraction * (to - from))
                 .collect();
             let residual = self.residuals_here(&fit.hypothesis, &at);
             let trial = Fit {
-                misfit: dot(&residual, &residual, None) + prior_misfit(&fit.hypothesis, &at),
+                chi_squared: dot(&residual, &residual, None) + prior_chi_squared(&fit.hypothesis, &at),
                 hypothesis: fit.hypothesis.clone(),
                 at,
                 residual,
                 jacobian: Vec::new(),
                 converged: fit.converged,
             };
-            if misfit(&trial) < here {
+            if chi_squared(&trial) < here {
                 return Fit {
                     jacobian: fit.jacobian,
                     ..trial
@@ -272,7 +272,7 @@ impl Problem<'_, '_> {
     /// Buys the derivatives of all quantities.
     pub fn buy_all_derivatives(&self, fit: &mut Fit) {
         let all: Vec<usize> = (0..fit.at.len()).collect();
-        self.buy_derivatives(fit, &all);
+        self.compute_jacobian_columns(fit, &all);
     }
 
     /// A hypothesis at some values, with derivatives.
@@ -284,7 +284,7 @@ impl Problem<'_, '_> {
 
     /// Fits from some values. Columns of `known`, a fit nearby, serve as first derivatives of the quantities both have.
     pub fn fit(&self, hypothesis: &Hypothesis, at: Vec<f64>, known: Option<&Fit>) -> Fit {
-        self.fit_with(hypothesis, at, known, MOST_STEPS, true)
+        self.fit_with(hypothesis, at, known, MAX_STEPS, true)
     }
 
     /// A few steps of a fit with the derivatives that are there: enough to see what it is worth.
@@ -297,7 +297,7 @@ impl Problem<'_, '_> {
         hypothesis: &Hypothesis,
         at: Vec<f64>,
         known: Option<&Fit>,
-        most_steps: usize,
+        max_steps: usize,
         polishes: bool,
     ) -> Fit {
         let mut fit = self.evaluate(hypothesis, at);
@@ -310,21 +310,21 @@ impl Problem<'_, '_> {
                 fit.jacobian.truncate(known.at.len().min(quantities));
                 let missing: Vec<usize> = (fit.jacobian.len()..quantities).collect();
                 fresh = false;
-                self.buy_derivatives(&mut fit, &missing);
+                self.compute_jacobian_columns(&mut fit, &missing);
             }
-            None => self.buy_derivatives(&mut fit, &all),
+            None => self.compute_jacobian_columns(&mut fit, &all),
         }
         let mut damping = DAMPING.0;
-        for _ in 0..most_steps {
+        for _ in 0..max_steps {
             let (normal, gradient) = (fit.normal(None), fit.gradient(None));
             let mut next = None;
-            while damping < MOST_DAMPING {
+            while damping < MAX_DAMPING {
                 let probe = step(&fit, &normal, &gradient, damping);
                 if probe == fit.at {
                     break;
                 }
                 let trial = self.evaluate(hypothesis, probe);
-                if trial.misfit < fit.misfit {
+                if trial.chi_squared < fit.chi_squared {
                     damping = (damping * DAMPING.2).max(1e-9);
                     next = Some(trial);
                     break;
@@ -334,13 +334,13 @@ impl Problem<'_, '_> {
                     break;
                 }
             }
-            let gained = next.as_ref().map_or(0.0, |next| fit.misfit - next.misfit);
+            let gained = next.as_ref().map_or(0.0, |next| fit.chi_squared - next.chi_squared);
             if let Some(mut next) = next {
                 next.jacobian = std::mem::take(&mut fit.jacobian);
                 broyden(&mut next, &fit.at, &fit.residual);
                 fit = next;
             }
-            if gained < CONVERGED.0 + CONVERGED.1 * fit.misfit {
+            if gained < CONVERGED.0 + CONVERGED.1 * fit.chi_squared {
                 if !polishes {
                     break;
                 }
@@ -348,7 +348,7 @@ impl Problem<'_, '_> {
                     fit.converged = true;
                     break;
                 }
-                self.buy_derivatives(&mut fit, &all);
+                self.compute_jacobian_columns(&mut fit, &all);
                 fresh = true;
                 damping = DAMPING.0;
             } else {
@@ -360,7 +360,7 @@ impl Problem<'_, '_> {
 }
 
 /// What priors add to the misfit.
-pub(super) fn prior_misfit(hypothesis: &Hypothesis, at: &[f64]) -> f64 {
+pub(super) fn prior_chi_squared(hypothesis: &Hypothesis, at: &[f64]) -> f64 {
     let with_value = hypothesis.free.iter().zip(at);
     with_value
         .map(|(free, value)| ((value - free.centre) / free.sigma).powi(2))
@@ -369,7 +369,7 @@ pub(super) fn prior_misfit(hypothesis: &Hypothesis, at: &[f64]) -> f64 {
 
 /// Step of a difference that stays within the limits.
 fn inward(free: &Free, at: f64) -> f64 {
-    if at + free.step <= free.most {
+    if at + free.step <= free.max {
         free.step
     } else {
         -free.step
@@ -405,8 +405,8 @@ fn step(fit: &Fit, normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64)
         let mut any = false;
         for (row, &quantity) in open.iter().enumerate() {
             let to = fit.at[quantity] + right[row];
-            if to < free[quantity].least || to > free[quantity].most {
-                at[quantity] = to.clamp(free[quantity].least, free[quantity].most);
+            if to < free[quantity].min || to > free[quantity].max {
+                at[quantity] = to.clamp(free[quantity].min, free[quantity].max);
                 held[quantity] = true;
                 any = true;
             } else {
@@ -451,10 +451,10 @@ fn broyden(next: &mut Fit, before_at: &[f64], before_residual: &[f64]) {
         }
     }
     for ((column, shift), scale) in next.jacobian.iter_mut().zip(&shift).zip(&scale) {
-        let share = shift / (scale * scale) / length;
-        if share != 0.0 {
+        let fraction = shift / (scale * scale) / length;
+        if fraction != 0.0 {
             for (slope, missed) in column.iter_mut().zip(&missed) {
-                *slope += share * missed;
+                *slope += fraction * missed;
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::fit::{Fit, Problem};
 use super::noise::RunNoise;
 use super::observed::Observed;
-use super::parameter::Supposed;
+use super::parameter::Hypothesised;
 use super::predict::{Hypothesis, Scene, rest};
 use crate::experiment::{Run, Simulation, simulate};
 use crate::recording::Recording;
@@ -85,14 +85,14 @@ pub(super) fn hypothesis(truth: Truth<'_>) -> (Hypothesis, Vec<f64>) {
         return (Hypothesis::default(), Vec::new());
     };
     let effect = named(name).expect("the name is in the library");
-    (Hypothesis::new(&[], &[Supposed { effect, cell }]), values.to_vec())
+    (Hypothesis::new(&[], &[Hypothesised { effect, cell }]), values.to_vec())
 }
 
 pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Scene<'a> {
     let config = Config::default();
     let mut scene = Scene {
         observed: Vec::new(),
-        believed: Vec::new(),
+        nominal: Vec::new(),
     };
     for (recording, &slope_deg) in recordings.iter().zip(&campaign.slopes_deg) {
         let run = Run {
@@ -105,7 +105,7 @@ pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Sce
         observed.assume_laid_down(true);
         let worm = Worm::try_from(&config).expect("the default worm is one");
         let worm = worm.with_slope_rad(slope_deg.to_radians()).expect("a slope");
-        scene.believed.push(Physics::of(worm));
+        scene.nominal.push(Physics::of(worm));
         scene.observed.push(observed);
     }
     scene

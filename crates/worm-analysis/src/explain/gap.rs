@@ -19,7 +19,7 @@ mod mean_cycle;
 
 use super::answer::Stage;
 use super::fit::{Fit, Problem};
-use super::held_out::FitWithout;
+use super::cross_validation::FitWithout;
 use super::observed::Observed;
 use super::predict::{Predicted, rest};
 pub(super) use mean_cycle::cycles;
@@ -144,7 +144,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         let rms = |left: &[Option<Left>]| self.rms(left, |_, _| true);
         let energy_j = |run: usize| {
             let observed = self.observed(run);
-            let beyond_m = free_form::mean_way_m(observed, left[run].as_ref()?);
+            let beyond_m = free_form::mean_displacement_m(observed, left[run].as_ref()?);
             Some(energy::carried(self.problem, run, recalibrated, &beyond_m)?.energy_j(observed))
         };
         Stage {
@@ -270,12 +270,12 @@ fn at_boundaries(observed: &Observed<'_>, cycles: &[Cycle], series: &[f64]) -> V
             let boundary = phase[0] + index as f64;
             let high = phase.partition_point(|&here| here < boundary).clamp(1, phase.len() - 1);
             let width = phase[high] - phase[high - 1];
-            let share = if width > 0.0 {
+            let fraction = if width > 0.0 {
                 (boundary - phase[high - 1]) / width
             } else {
                 1.0
             };
-            series[high - 1] + share * (series[high] - series[high - 1])
+            series[high - 1] + fraction * (series[high] - series[high - 1])
         })
         .collect()
 }

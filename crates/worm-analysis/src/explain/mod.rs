@@ -15,41 +15,41 @@
 //! - `search`: the steps, one after the other.
 //! - `observed`: the recordings as the search sees them; `noise`: how well the worm repeats itself.
 //! - `parameter`: what may be turned, with priors; `predict`: what a hypothesis says of every sample;
-//!   `misread`: where the phase was read off overlapping steps; `fit`: least squares; `leap`:
+//!   `phase_correction`: where the phase was read off overlapping steps; `fit`: least squares; `local_restart`:
 //!   from one valley of it to another.
-//! - `screen`: the whole library at a glance; `droop`: the one effect that shows in time alone.
-//! - `held_out`: data left out; `judge`: the rules of the judgement.
-//! - `localise`: where the gap is; `period`: whether it comes back; `gap`: how it shrinks; `propose`: the next experiment; `words`: the answer in words.
-//! - `advances`: the same where only advances per cycle are known.
-//! - `assemble`: all of it put together; [`write_back`]: the model's file with the answer in it.
+//! - `score_test`: the whole library at a glance; `speed_droop`: the one effect that shows in time alone.
+//! - `cross_validation`: data left out; `model_selection`: the rules of the judgement.
+//! - `residual_map`: where the gap is; `period`: whether it comes back; `gap`: how it shrinks; `experiment_design`: the next experiment; `words`: the answer in words.
+//! - `scalar_data`: the same where only advances per cycle are known.
+//! - `assemble`: all of it put together; [`model_update`]: the model's file with the answer in it.
 
-mod advances;
+mod scalar_data;
 pub mod answer;
 mod assemble;
-mod droop;
+mod speed_droop;
 mod error;
 mod fit;
 #[cfg(test)]
 mod fixture;
 mod gap;
-mod held_out;
-mod judge;
-mod leap;
-mod localise;
-mod misread;
+mod cross_validation;
+mod model_selection;
+mod local_restart;
+mod residual_map;
+mod phase_correction;
 mod noise;
 mod observed;
 mod parameter;
 mod period;
 mod predict;
-mod propose;
-mod screen;
+mod experiment_design;
+mod score_test;
 mod search;
 mod words;
-pub mod write_back;
+pub mod model_update;
 
 pub use crate::experiment::Run;
-pub use advances::explain_advances;
+pub use scalar_data::explain_advances;
 pub use answer::{Answer, Verdict};
 pub use error::ExplainError;
 pub use search::{Options, explain};

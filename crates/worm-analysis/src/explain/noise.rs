@@ -7,7 +7,7 @@
 //! where sums vary more than independent samples would, all weights are smaller by that.
 
 use super::observed::Observed;
-use super::predict::Rest;
+use super::predict::Residual;
 use crate::identify::drift::Drift;
 
 /// Phase bins of a step in the free form.
@@ -35,7 +35,7 @@ pub(super) struct RunNoise {
 
 impl RunNoise {
     /// The noise of a run by what some hypothesis leaves of it.
-    pub fn measure(observed: &Observed<'_>, rest: &Rest) -> Self {
+    pub fn measure(observed: &Observed<'_>, rest: &Residual) -> Self {
         let free = free_form(observed, rest);
         let cells = observed.cells();
         let from = observed.settled_from();
@@ -76,7 +76,7 @@ impl RunNoise {
             .map(|at| DRIFTS.0 * DRIFTS.1.powi(at as i32))
             .map(|per_cycle_m| {
                 let drift = Drift::new(&observed.phase, &shrunk_m2, per_cycle_m * per_cycle_m);
-                (drift.misfit(free.body_m.iter().copied()), per_cycle_m)
+                (drift.chi_squared(free.body_m.iter().copied()), per_cycle_m)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map_or(DRIFTS.0, |best| best.1);
@@ -86,10 +86,10 @@ impl RunNoise {
             / ((observed.phase[observed.samples() - 1] - observed.phase[0]) * cells as f64))
             .round()
             .max(2.0) as usize;
-        let mut surprises = Vec::with_capacity(observed.samples());
-        settled.whiten(free.body_m.iter().copied(), |surprise| surprises.push(surprise));
+        let mut whitened_residuals = Vec::with_capacity(observed.samples());
+        settled.whiten(free.body_m.iter().copied(), |whitened_residual| whitened_residuals.push(whitened_residual));
         let body_scale = 1.0
-            / (lost * sum_variance(&surprises[from..], samples_per_step))
+            / (lost * sum_variance(&whitened_residuals[from..], samples_per_step))
                 .max(1.0)
                 .sqrt();
         let along: f64 = (0..cells)
@@ -140,19 +140,19 @@ impl RunNoise {
     }
 
     /// How much of the misfit of a residual a free form would take away beyond chance.
-    pub fn explainable(&self, observed: &Observed<'_>, rest: &Rest) -> f64 {
+    pub fn explainable(&self, observed: &Observed<'_>, rest: &Residual) -> f64 {
         let from = observed.settled_from() * observed.cells();
-        let misfit = |rest: &Rest| {
+        let chi_squared = |rest: &Residual| {
             let mut squares = 0.0;
             self.settled
-                .whiten(rest.body_m.iter().copied(), |surprise| squares += surprise * surprise);
+                .whiten(rest.body_m.iter().copied(), |whitened_residual| squares += whitened_residual * whitened_residual);
             let relative = rest.relative_m[from..]
                 .iter()
                 .filter(|relative_m| relative_m.is_finite());
             let relative_squares: f64 = relative.map(|relative_m| relative_m * relative_m).sum();
             squares * self.body_scale.powi(2) + relative_squares * self.relative_scale.powi(2)
         };
-        misfit(rest) - misfit(&free_form(observed, rest)) - self.free_quantities
+        chi_squared(rest) - chi_squared(&free_form(observed, rest)) - self.free_quantities
     }
 
     /// Standard deviation that the body's random walk gathers in a cycle, m.
@@ -182,9 +182,9 @@ pub(super) fn bin_of(observed: &Observed<'_>, sample: usize, bins_per_step: usiz
 }
 
 /// What is left when each phase bin may have a way of its own, with an even trend over the cycles.
-fn free_form(observed: &Observed<'_>, rest: &Rest) -> Rest {
+fn free_form(observed: &Observed<'_>, rest: &Residual) -> Residual {
     let cells = observed.cells();
-    let mut free = Rest {
+    let mut free = Residual {
         body_m: flatten(observed, rest.body_m.clone(), true),
         relative_m: rest.relative_m.clone(),
     };
@@ -267,13 +267,13 @@ fn flatten(observed: &Observed<'_>, series: Vec<f64>, runs_on: bool) -> Vec<f64>
         } else {
             (bin + 1).min(bins - 1)
         };
-        let share = if other == bin || middles[other] == middles[bin] {
+        let fraction = if other == bin || middles[other] == middles[bin] {
             0.0
         } else {
             (here - middles[bin]) / (middles[other] - middles[bin])
         };
         let between = if runs_on {
-            shape[bin] + share * (shape[other] - shape[bin])
+            shape[bin] + fraction * (shape[other] - shape[bin])
         } else {
             shape[bin]
         };

@@ -9,7 +9,7 @@ use worm_estimator::config::Config;
 /// Cycles at the start that do not count where the worm was not seen laid down: the tips' state is not known there.
 const FORGOTTEN_CYCLES: f64 = 2.0;
 /// Whole cycles that must count in a run.
-pub(super) const LEAST_CYCLES: usize = 3;
+pub(super) const MIN_CYCLES: usize = 3;
 /// Phase, cycles, within which of a whole step a recording must begin to show a worm laid down.
 const AT_BEGIN: f64 = 0.02;
 /// Way, as a share of the stroke, that a cell falls behind the others over a recording from which it is worth a second look.
@@ -102,11 +102,11 @@ impl<'a> Observed<'a> {
             counts_from: 0,
         };
         observed.assume_laid_down(false);
-        if observed.whole_cycles() < LEAST_CYCLES {
+        if observed.whole_cycles() < MIN_CYCLES {
             return Err(ExplainError::TooShort {
                 recording: name(),
                 cycles: observed.whole_cycles(),
-                needed: LEAST_CYCLES,
+                needed: MIN_CYCLES,
             });
         }
         Ok(observed)
@@ -182,7 +182,7 @@ fn find_gait(run: Run<'_>, config: &Config) -> Result<Gait, gait::GaitError> {
     };
     let behind_m = falling_behind_m(&filled_m, &clock);
     let cycles = clock[clock.len() - 1] - clock[0];
-    let farthest_m = behind_m.iter().fold(0.0, |most: f64, rate| most.max(rate.abs())) * cycles;
+    let farthest_m = behind_m.iter().fold(0.0, |max: f64, rate| max.max(rate.abs())) * cycles;
     if farthest_m < FALLS_BEHIND * config.worm.stroke_m {
         return found;
     }

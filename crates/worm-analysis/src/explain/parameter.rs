@@ -44,8 +44,8 @@ pub(super) struct Free {
     pub centre: f64,
     /// Standard deviation of its prior; infinite for none.
     pub sigma: f64,
-    pub least: f64,
-    pub most: f64,
+    pub min: f64,
+    pub max: f64,
     /// Step of numerical derivatives.
     pub step: f64,
 }
@@ -104,8 +104,8 @@ impl Nuisance {
         let (centre, sigma, reach, step) = DAMPING;
         all.push(Free {
             centre,
-            least: centre - reach,
-            most: centre + reach,
+            min: centre - reach,
+            max: centre + reach,
             ..Self::Damping.free((sigma, reach, step))
         });
         all.push(Self::Presliding.free_within(PRESLIDING));
@@ -118,18 +118,18 @@ impl Nuisance {
             what: What::Nuisance(self),
             centre: 0.0,
             sigma,
-            least: -reach,
-            most: reach,
+            min: -reach,
+            max: reach,
             step,
         }
     }
 
-    fn free_within(self, (centre, sigma, least, most, step): (f64, f64, f64, f64, f64)) -> Free {
+    fn free_within(self, (centre, sigma, min, max, step): (f64, f64, f64, f64, f64)) -> Free {
         Free {
             centre,
-            least,
-            most,
-            ..self.free((sigma, most, step))
+            min,
+            max,
+            ..self.free((sigma, max, step))
         }
     }
 
@@ -163,8 +163,8 @@ impl Free {
             } else {
                 f64::INFINITY
             },
-            least: parameter.least,
-            most: parameter.most,
+            min: parameter.min,
+            max: parameter.max,
             step: 0.2 * parameter.notable,
         }
     }
@@ -172,12 +172,12 @@ impl Free {
 
 /// An effect supposed to act, for one cell or for all that it concerns.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Supposed {
+pub(super) struct Hypothesised {
     pub effect: &'static Effect,
     pub cell: Option<usize>,
 }
 
-impl PartialEq for Supposed {
+impl PartialEq for Hypothesised {
     fn eq(&self, other: &Self) -> bool {
         self.effect.name == other.effect.name && self.cell == other.cell
     }

@@ -15,7 +15,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
 /// Fewest cycles of a run that say anything of a wave.
-const LEAST_CYCLES: usize = 6;
+const MIN_CYCLES: usize = 6;
 /// Shortest period, in cycles and, along the canal, in mean advances of a cycle: places are uneven enough to see below two.
 const SHORTEST: (f64, f64) = (2.0, 0.5);
 /// Frequencies for each that a run can tell from the next.
@@ -31,7 +31,7 @@ pub(super) struct Period {
     /// In time, cycles.
     pub cycles: Option<f64>,
     /// Along the canal, m.
-    pub way_m: Option<f64>,
+    pub displacement_m: Option<f64>,
 }
 
 /// One run's ways, each at a place or time.
@@ -39,7 +39,7 @@ pub(super) struct Period {
 struct Series {
     cycle: Vec<f64>,
     place_m: Vec<f64>,
-    way_m: Vec<f64>, // mean taken out
+    displacement_m: Vec<f64>, // mean taken out
 }
 
 /// The period of what a fit leaves; the clearer one where both in time and along the canal are beyond chance.
@@ -61,15 +61,15 @@ fn period_of(series: &[Series]) -> Period {
     match (by_cycle, by_place) {
         (Some(by_cycle), Some(by_place)) if by_cycle.1 >= by_place.1 => Period {
             cycles: Some(by_cycle.0),
-            way_m: None,
+            displacement_m: None,
         },
         (Some(by_cycle), None) => Period {
             cycles: Some(by_cycle.0),
-            way_m: None,
+            displacement_m: None,
         },
         (_, Some(by_place)) => Period {
             cycles: None,
-            way_m: Some(by_place.0),
+            displacement_m: Some(by_place.0),
         },
         (None, None) => Period::default(),
     }
@@ -101,12 +101,12 @@ fn ways(problem: &Problem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
         if before.2 > 0.0 && after.2 > 0.0 {
             series.cycle.push(cycle as f64);
             series.place_m.push(0.5 * (before.1 / before.2 + after.1 / after.2));
-            series.way_m.push(after.0 / after.2 - before.0 / before.2);
+            series.displacement_m.push(after.0 / after.2 - before.0 / before.2);
         }
     }
-    let mean_m = series.way_m.iter().sum::<f64>() / series.way_m.len() as f64;
-    series.way_m.iter_mut().for_each(|way_m| *way_m -= mean_m);
-    (series.way_m.len() >= LEAST_CYCLES).then_some(series)
+    let mean_m = series.displacement_m.iter().sum::<f64>() / series.displacement_m.len() as f64;
+    series.displacement_m.iter_mut().for_each(|displacement_m| *displacement_m -= mean_m);
+    (series.displacement_m.len() >= MIN_CYCLES).then_some(series)
 }
 
 /// Period and share of the scatter of the wave that takes away most; none where chance does as well.
@@ -120,11 +120,11 @@ fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], longest: f64, sh
         .map(|number| number as f64 * step)
         .collect();
     let best = |ways: &[Vec<f64>]| {
-        let share = |&frequency: &f64| (frequency, share(series, &at, ways, frequency));
-        let shares = frequencies.iter().map(share);
-        shares.fold((0.0, 0.0), |best, one| if one.1 > best.1 { one } else { best })
+        let fraction = |&frequency: &f64| (frequency, fraction(series, &at, ways, frequency));
+        let fractions = frequencies.iter().map(fraction);
+        fractions.fold((0.0, 0.0), |best, one| if one.1 > best.1 { one } else { best })
     };
-    let mut ways: Vec<Vec<f64>> = series.iter().map(|one| one.way_m.clone()).collect();
+    let mut ways: Vec<Vec<f64>> = series.iter().map(|one| one.displacement_m.clone()).collect();
     let found = best(&ways);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let mut as_good = 0;
@@ -139,17 +139,17 @@ fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], longest: f64, sh
 }
 
 /// Share of the square sum of all ways that waves of one frequency take away.
-fn share(series: &[Series], at: &impl Fn(&Series) -> &[f64], ways: &[Vec<f64>], frequency: f64) -> f64 {
+fn fraction(series: &[Series], at: &impl Fn(&Series) -> &[f64], ways: &[Vec<f64>], frequency: f64) -> f64 {
     let (mut whole, mut taken) = (0.0, 0.0);
     for (one, ways) in series.iter().zip(ways) {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
-        for (at, way_m) in at(one).iter().zip(ways) {
+        for (at, displacement_m) in at(one).iter().zip(ways) {
             let (sin, cos) = (TAU * frequency * at).sin_cos();
             let wave = Vector3::new(cos, sin, 1.0);
             normal += wave * wave.transpose();
-            right += wave * *way_m;
-            whole += way_m * way_m;
+            right += wave * *displacement_m;
+            whole += displacement_m * displacement_m;
         }
         taken += normal
             .try_inverse()
@@ -172,10 +172,10 @@ mod tests {
                 let cycle: Vec<f64> = (0..11).map(f64::from).collect();
                 let place_m: Vec<f64> = cycle.iter().map(|cycle| advance_m * cycle).collect();
                 let ways = cycle.iter().zip(&place_m);
-                let mut way_m: Vec<f64> = ways.map(|(&cycle, &m)| wave(cycle, m) + 0.25e-4 * noise()).collect();
-                let mean_m = way_m.iter().sum::<f64>() / 11.0;
-                way_m.iter_mut().for_each(|way_m| *way_m -= mean_m);
-                Series { cycle, place_m, way_m }
+                let mut displacement_m: Vec<f64> = ways.map(|(&cycle, &m)| wave(cycle, m) + 0.25e-4 * noise()).collect();
+                let mean_m = displacement_m.iter().sum::<f64>() / 11.0;
+                displacement_m.iter_mut().for_each(|displacement_m| *displacement_m -= mean_m);
+                Series { cycle, place_m, displacement_m }
             })
             .to_vec()
     }
@@ -194,7 +194,7 @@ mod tests {
             );
             let ribs = period_of(&runs(|_, m| 1e-4 * (TAU * m / 11e-3 + 1.0).sin(), seed));
             assert!(
-                ribs.way_m.is_some_and(|way_m| (way_m - 11e-3).abs() < 0.6e-3),
+                ribs.displacement_m.is_some_and(|displacement_m| (displacement_m - 11e-3).abs() < 0.6e-3),
                 "seed {seed}: {ribs:?}"
             );
         }

@@ -8,10 +8,10 @@
 //! phase had to be found from the positions, what the stepping cell does relative to the others went into it and tells nothing
 //! more: that direction is taken out.
 
-use super::misread::Misread;
+use super::phase_correction::PhaseCorrection;
 use super::noise::RunNoise;
 use super::observed::Observed;
-use super::parameter::{Free, Nuisance, Supposed, What};
+use super::parameter::{Free, Nuisance, Hypothesised, What};
 use worm_physics::effect::Setting;
 use worm_physics::{Crawl, Mechanics, Physics, Worm};
 
@@ -26,7 +26,7 @@ const PARTS_SEEN: usize = 4;
 /// A hypothesis: nuisances and effects, and which quantities are free.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Hypothesis {
-    pub supposed: Vec<Supposed>,
+    pub hypothesised: Vec<Hypothesised>,
     pub free: Vec<Free>,
     /// Every cycle is run, even where the crawl is periodic.
     pub throughout: bool,
@@ -34,14 +34,14 @@ pub(super) struct Hypothesis {
 
 impl Hypothesis {
     /// Nuisances and effects.
-    pub fn new(nuisances: &[Free], supposed: &[Supposed]) -> Self {
+    pub fn new(nuisances: &[Free], hypothesised: &[Hypothesised]) -> Self {
         let mut free = nuisances.to_vec();
-        for (place, supposed) in supposed.iter().enumerate() {
-            let parameters = supposed.effect.parameters.iter().enumerate();
+        for (place, hypothesised) in hypothesised.iter().enumerate() {
+            let parameters = hypothesised.effect.parameters.iter().enumerate();
             free.extend(parameters.map(|(number, parameter)| Free::of_effect(place, number, parameter)));
         }
         Self {
-            supposed: supposed.to_vec(),
+            hypothesised: hypothesised.to_vec(),
             free,
             throughout: false,
         }
@@ -55,19 +55,19 @@ impl Hypothesis {
     /// The effects with these values.
     pub fn settings(&self, at: &[f64]) -> Vec<Setting> {
         let mut values: Vec<Vec<f64>> = self
-            .supposed
+            .hypothesised
             .iter()
-            .map(|supposed| vec![0.0; supposed.effect.parameters.len()])
+            .map(|hypothesised| vec![0.0; hypothesised.effect.parameters.len()])
             .collect();
         for (free, &value) in self.free.iter().zip(at) {
             if let What::Effect { place, parameter } = free.what {
                 values[place][parameter] = value;
             }
         }
-        self.supposed
+        self.hypothesised
             .iter()
             .zip(values)
-            .map(|(supposed, values)| Setting::within(supposed.effect, supposed.cell, &values))
+            .map(|(hypothesised, values)| Setting::within(hypothesised.effect, hypothesised.cell, &values))
             .collect()
     }
 }
@@ -76,7 +76,7 @@ impl Hypothesis {
 pub(super) struct Scene<'a> {
     pub observed: Vec<Observed<'a>>,
     /// The believed physics of each run.
-    pub believed: Vec<Physics>,
+    pub nominal: Vec<Physics>,
 }
 
 /// What a hypothesis says of one run.
@@ -89,7 +89,7 @@ pub(super) struct Predicted {
 impl Scene<'_> {
     /// The physics of a run under a hypothesis, and the damping ratio.
     pub fn physics(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> (Physics, f64) {
-        let mut physics = self.believed[run].clone();
+        let mut physics = self.nominal[run].clone();
         let mut damping = 0.4;
         for (free, &value) in hypothesis.free.iter().zip(at) {
             if let What::Nuisance(nuisance) = free.what {
@@ -142,7 +142,7 @@ pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, 
     // What is seen now happened the latency ago.
     let mut clock = Clock::new(time_s, &observed.phase, physics.view.latency_s);
     if !observed.phase_recorded && physics.laws.overlap > 0.0 {
-        clock.misread = Some(Misread::new(physics.laws.overlap, cells));
+        clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, cells));
     }
     let first_phase = clock.phase_at(0);
     let mut crawl = start(observed, &mechanics, first_phase, damping)?;
@@ -200,13 +200,13 @@ impl CycleSeen {
             .clamp(1, self.phase.len() - 1);
         let low = high - 1;
         let width = self.phase[high] - self.phase[low];
-        let share = if width > 0.0 {
+        let fraction = if width > 0.0 {
             (phase - self.phase[low]) / width
         } else {
             0.0
         };
         let at_m = |seen: usize| self.position_m[seen * cells + cell];
-        at_m(low) + share * (at_m(high) - at_m(low))
+        at_m(low) + fraction * (at_m(high) - at_m(low))
     }
 
     /// Appends the positions at a later phase, as in the cycle that was seen.
@@ -230,7 +230,7 @@ struct Clock<'a> {
     time_s: &'a [f64],
     phase: &'a [f64],
     latency_s: f64,
-    misread: Option<Misread>,
+    phase_correction: Option<PhaseCorrection>,
     after: usize,
 }
 
@@ -240,7 +240,7 @@ impl<'a> Clock<'a> {
             time_s,
             phase,
             latency_s,
-            misread: None,
+            phase_correction: None,
             after: 1,
         }
     }
@@ -248,7 +248,7 @@ impl<'a> Clock<'a> {
     /// For samples asked in order.
     fn phase_at(&mut self, sample: usize) -> f64 {
         let phase = self.recorded_at(sample);
-        self.misread.as_ref().map_or(phase, |misread| misread.mended(phase))
+        self.phase_correction.as_ref().map_or(phase, |phase_correction| phase_correction.mended(phase))
     }
 
     fn recorded_at(&mut self, sample: usize) -> f64 {
@@ -264,15 +264,15 @@ impl<'a> Clock<'a> {
             self.after -= 1;
         }
         let (low, high) = (self.after - 1, self.after);
-        let share = (at_s - self.time_s[low]) / (self.time_s[high] - self.time_s[low]);
+        let fraction = (at_s - self.time_s[low]) / (self.time_s[high] - self.time_s[low]);
         // Before the first sample and after the last, the phase is taken to have gone on as it was.
-        self.phase[low] + share.clamp(-10.0, 11.0) * (self.phase[high] - self.phase[low])
+        self.phase[low] + fraction.clamp(-10.0, 11.0) * (self.phase[high] - self.phase[low])
     }
 }
 
 /// What is left of one run.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Rest {
+pub(super) struct Residual {
     /// The body's part at each sample, m; `NaN` where no cell was seen.
     pub body_m: Vec<f64>,
     /// Each cell's part relative to it, m: `[sample][cell]`, flat; `NaN` where not seen.
@@ -280,7 +280,7 @@ pub(super) struct Rest {
 }
 
 /// What a prediction leaves of a run.
-pub(super) fn rest(observed: &Observed<'_>, predicted: &Predicted) -> Rest {
+pub(super) fn rest(observed: &Observed<'_>, predicted: &Predicted) -> Residual {
     let cells = observed.cells();
     let samples = observed.samples();
     let own_m =
@@ -298,7 +298,7 @@ pub(super) fn rest(observed: &Observed<'_>, predicted: &Predicted) -> Rest {
         }
     }
     place_m.iter_mut().for_each(|place_m| *place_m /= f64::max(whole, 1.0));
-    let mut rest = Rest {
+    let mut rest = Residual {
         body_m: Vec::with_capacity(samples),
         relative_m: Vec::with_capacity(samples * cells),
     };
@@ -324,12 +324,12 @@ pub(super) fn rest(observed: &Observed<'_>, predicted: &Predicted) -> Rest {
 }
 
 /// Appends a run's residuals, each with variance 1 where the hypothesis holds; `counts` says which samples do.
-pub(super) fn residuals(observed: &Observed<'_>, noise: &RunNoise, rest: &Rest, out: &mut Vec<f64>) {
+pub(super) fn residuals(observed: &Observed<'_>, noise: &RunNoise, rest: &Residual, out: &mut Vec<f64>) {
     let from = observed.counts_from;
     let mut at = 0;
-    noise.drift.whiten(rest.body_m.iter().copied(), |surprise| {
+    noise.drift.whiten(rest.body_m.iter().copied(), |whitened_residual| {
         if at >= from {
-            out.push(surprise * noise.body_scale);
+            out.push(whitened_residual * noise.body_scale);
         }
         at += 1;
     });
@@ -350,7 +350,7 @@ pub(super) fn impossible(observed: &Observed<'_>, out: &mut Vec<f64>) {
 }
 
 /// The worm of a run, believed.
-pub(super) fn believed(observed: &Observed<'_>, worm: Worm, payload_kg: f64) -> Worm {
+pub(super) fn nominal(observed: &Observed<'_>, worm: Worm, payload_kg: f64) -> Worm {
     let mut worm = worm
         .with_step_order(&observed.step_order)
         .unwrap_or_else(|_| unreachable!("the gait names every cell once"));

@@ -2,17 +2,17 @@
 
 use super::answer::Answer;
 use super::assemble;
-use super::droop::droop;
+use super::speed_droop::speed_droop;
 use super::error::ExplainError;
 use super::fit::{Fit, Problem};
-use super::held_out;
-use super::judge::{self, Find, Open};
-use super::leap::leap;
+use super::cross_validation;
+use super::model_selection::{self, Candidate, Open};
+use super::local_restart::restart_locally;
 use super::noise::RunNoise;
 use super::observed::Observed;
-use super::parameter::{Nuisance, Supposed, What};
-use super::predict::{Hypothesis, Scene, believed, predict, rest};
-use super::screen::{self, Screening};
+use super::parameter::{Nuisance, Hypothesised, What};
+use super::predict::{Hypothesis, Scene, nominal, predict, rest};
+use super::score_test::{self, Screening};
 use crate::experiment::{Progress, Run};
 use worm_estimator::config::Config;
 use worm_physics::effect::Setting;
@@ -30,11 +30,11 @@ const PAIR_SEEDS: usize = 2;
 const PAIRED: usize = 3;
 const SCREENED_FOR_PAIRS: usize = 8;
 /// Improvement from which it is worth looking for a better valley.
-const LEAST_TO_LEAP: f64 = 10.0;
+const MIN_TO_LEAP: f64 = 10.0;
 /// How much larger an improvement must be than what chance reaches one time in twenty, and how large at least: real pads, cams and
 /// tips leave a little of their own. Chosen on the development split.
 const SAFETY: f64 = 2.5;
-const LEAST_IMPROVEMENT: f64 = 26.0;
+const MIN_IMPROVEMENT: f64 = 26.0;
 
 /// What may be chosen of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +64,7 @@ fn prepare<'a>(runs: &[Run<'a>], config: &Config) -> Result<Scene<'a>, ExplainEr
         .collect::<Result<_, _>>()?;
     let mut scene = Scene {
         observed: Vec::with_capacity(runs.len()),
-        believed: Vec::with_capacity(runs.len()),
+        nominal: Vec::with_capacity(runs.len()),
     };
     for run in runs {
         let mut observed = Observed::new(*run, config)?;
@@ -72,7 +72,7 @@ fn prepare<'a>(runs: &[Run<'a>], config: &Config) -> Result<Scene<'a>, ExplainEr
             same_order(first, &observed)?;
         }
         let worm = Worm::try_from(config)?.with_slope_rad(run.slope_deg.to_radians())?;
-        let physics = Physics::of(believed(&observed, worm, run.payload_kg)).with(&settings);
+        let physics = Physics::of(nominal(&observed, worm, run.payload_kg)).with(&settings);
         if physics.clamped_worm().check_hold().is_err() {
             return Err(ExplainError::SlidesDown {
                 recording: run.recording.source.display().to_string(),
@@ -83,7 +83,7 @@ fn prepare<'a>(runs: &[Run<'a>], config: &Config) -> Result<Scene<'a>, ExplainEr
             judge_start(&mut observed, &physics);
         }
         scene.observed.push(observed);
-        scene.believed.push(physics);
+        scene.nominal.push(physics);
     }
     Ok(scene)
 }
@@ -137,7 +137,7 @@ pub fn explain(
     options: &Options,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Answer, ExplainError> {
-    let mut tell = |stage: &'static str, share: f64| progress(Progress { stage, share });
+    let mut tell = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
     tell("gait", 0.0);
     let scene = prepare(runs, config)?;
     let phase_recorded = scene.observed.iter().any(|observed| observed.phase_recorded);
@@ -145,18 +145,18 @@ pub fn explain(
     let nuisances = Nuisance::all(config.worm.cells, runs.len(), phase_recorded);
     let (problem, recalibrated) = recalibrate(&scene, &Hypothesis::new(&nuisances, &[]))?;
     tell("screening", 0.15);
-    let supposed = screen::hypotheses(config.worm.cells, phase_recorded);
-    let (screened, chance) = screen::screen(&problem, &recalibrated, &supposed, options.seed);
+    let hypothesised = score_test::hypotheses(config.worm.cells, phase_recorded);
+    let (screened, chance) = score_test::screen(&problem, &recalibrated, &hypothesised, options.seed);
     tell("refit", 0.3);
-    let believed = problem.with_derivatives(&recalibrated.hypothesis, recalibrated.hypothesis.neutral());
-    let mut finds = refit(&problem, &recalibrated, &believed, &screened, REFITTED, &mut |share| {
-        tell("refit", 0.3 + 0.35 * share)
+    let nominal = problem.with_derivatives(&recalibrated.hypothesis, recalibrated.hypothesis.neutral());
+    let mut finds = refit(&problem, &recalibrated, &nominal, &screened, REFITTED, &mut |fraction| {
+        tell("refit", 0.3 + 0.35 * fraction)
     });
-    let threshold = (SAFETY * chance).max(LEAST_IMPROVEMENT);
+    let threshold = (SAFETY * chance).max(MIN_IMPROVEMENT);
     tell("held-out selection", 0.65);
-    let folds = held_out::folds(&problem);
-    let recalibrated_held_out = held_out::hold_out(&problem, &recalibrated, &folds);
-    judge::hold_out(&problem, &recalibrated, &mut finds, &folds);
+    let folds = cross_validation::folds(&problem);
+    let recalibrated_held_out = cross_validation::hold_out(&problem, &recalibrated, &folds);
+    model_selection::hold_out(&problem, &recalibrated, &mut finds, &folds);
     tell("pairs", 0.75);
     let open = Open::of(&problem, &recalibrated);
     let mut pairs = Vec::new();
@@ -166,36 +166,36 @@ pub fn explain(
         } else {
             PAIR_SEEDS
         };
-        let seeds = judge::kinds(&finds).into_iter().take(seeds);
-        pairs = pair_up(&problem, &recalibrated, seeds, &supposed, threshold, options.seed);
-        judge::hold_out(&problem, &recalibrated, &mut pairs, &folds);
+        let seeds = model_selection::kinds(&finds).into_iter().take(seeds);
+        pairs = pair_up(&problem, &recalibrated, seeds, &hypothesised, threshold, options.seed);
+        model_selection::hold_out(&problem, &recalibrated, &mut pairs, &folds);
         if let Some(alone) = pairs
             .first()
             .and_then(|pair| alone(&problem, &recalibrated, &finds[0], pair))
         {
             finds[0] = alone;
-            judge::hold_out(&problem, &recalibrated, &mut finds[..1], &folds);
+            model_selection::hold_out(&problem, &recalibrated, &mut finds[..1], &folds);
         }
     }
     tell("judgement", 0.9);
-    let judged = judge::judge(&problem, &open, finds, pairs, threshold, recalibrated_held_out.misfit);
+    let judged = model_selection::judge(&problem, &open, finds, pairs, threshold, recalibrated_held_out.chi_squared);
     let cycles_s: Vec<f64> = runs
         .iter()
         .map(|run| run.cycle_s.unwrap_or(config.gait.cycle_s))
         .collect();
-    let droop = droop(
+    let speed_droop = speed_droop(
         &scene,
         judged.candidates.first().map_or(&recalibrated, |find| &find.fit),
         &cycles_s,
     );
     tell("localisation", 0.93);
     let parts = assemble::Parts {
-        believed,
+        nominal,
         recalibrated,
         recalibrated_held_out,
         screened,
         judged,
-        droop,
+        speed_droop,
         threshold,
     };
     Ok(assemble::assemble(&problem, config, &parts))
@@ -241,61 +241,61 @@ fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(Probl
 fn refit(
     problem: &Problem<'_, '_>,
     base: &Fit,
-    believed: &Fit,
+    nominal: &Fit,
     screened: &[Screening],
-    most: usize,
+    max: usize,
     progress: &mut dyn FnMut(f64),
-) -> Vec<Find> {
-    let effects_from = base.at.len() - screen::effect_quantities(&base.hypothesis);
-    let hypothesis_of = |supposed: Supposed| {
-        let mut all = base.hypothesis.supposed.clone();
-        all.push(supposed);
+) -> Vec<Candidate> {
+    let effects_from = base.at.len() - score_test::effect_quantities(&base.hypothesis);
+    let hypothesis_of = |hypothesised: Hypothesised| {
+        let mut all = base.hypothesis.hypothesised.clone();
+        all.push(hypothesised);
         Hypothesis::new(&base.hypothesis.free[..effects_from], &all)
     };
     let mut rough: Vec<Fit> = Vec::with_capacity(screened.len());
     for (done, screening) in screened.iter().enumerate() {
         progress(0.5 * done as f64 / screened.len() as f64);
-        let hypothesis = hypothesis_of(screening.supposed);
+        let hypothesis = hypothesis_of(screening.hypothesised);
         let about_base = screening.starts.iter().map(|start| (base, start.clone()));
-        let strong = screen::strong(screening.supposed.effect);
-        let about_believed = strong.into_iter().map(|start| (believed, start));
-        let fits = about_base.chain(about_believed).map(|(from, start)| {
+        let strong = score_test::strong(screening.hypothesised.effect);
+        let about_nominal = strong.into_iter().map(|start| (nominal, start));
+        let fits = about_base.chain(about_nominal).map(|(from, start)| {
             let mut at = from.at.clone();
             at.extend(start);
             problem.fit_roughly(&hypothesis, at, from)
         });
-        rough.extend(fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit)));
+        rough.extend(fits.min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared)));
     }
-    rough.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
-    let chosen = choose(rough, base, most);
-    let mut finds: Vec<Find> = Vec::with_capacity(chosen.len());
+    rough.sort_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
+    let chosen = choose(rough, base, max);
+    let mut finds: Vec<Candidate> = Vec::with_capacity(chosen.len());
     for (done, rough) in chosen.iter().enumerate() {
         progress(0.5 + 0.5 * done as f64 / chosen.len() as f64);
         let mut fit = problem.fit(&rough.hypothesis, rough.at.clone(), Some(rough));
-        if base.misfit - fit.misfit > LEAST_TO_LEAP {
-            fit = leap(problem, fit);
+        if base.chi_squared - fit.chi_squared > MIN_TO_LEAP {
+            fit = restart_locally(problem, fit);
         }
-        finds.push(Find::of(problem, base, fit));
+        finds.push(Candidate::of(problem, base, fit));
     }
     finds.sort_by(|a, b| b.improvement.total_cmp(&a.improvement));
     finds
 }
 
 /// The best effects, each with its best cell and, where they come close, the next.
-fn choose(rough: Vec<Fit>, base: &Fit, most: usize) -> Vec<Fit> {
+fn choose(rough: Vec<Fit>, base: &Fit, max: usize) -> Vec<Fit> {
     let mut chosen: Vec<Fit> = Vec::new();
     let name = |fit: &Fit| {
         fit.hypothesis
-            .supposed
+            .hypothesised
             .last()
-            .map_or("", |supposed| supposed.effect.name)
+            .map_or("", |hypothesised| hypothesised.effect.name)
     };
     for fit in rough {
         let same: Vec<&Fit> = chosen.iter().filter(|other| name(other) == name(&fit)).collect();
         let names: std::collections::BTreeSet<&str> = chosen.iter().map(name).collect();
-        let gain = |fit: &Fit| base.misfit - fit.misfit;
+        let gain = |fit: &Fit| base.chi_squared - fit.chi_squared;
         let is_wanted = match same.first() {
-            None => names.len() < most,
+            None => names.len() < max,
             Some(best) => same.len() < CELLS_REFITTED && gain(&fit) > NEXT_CELL * gain(best),
         };
         if is_wanted {
@@ -307,9 +307,9 @@ fn choose(rough: Vec<Fit>, base: &Fit, most: usize) -> Vec<Fit> {
 
 /// A single effect fitted anew from where it lies in a pair, where that is a better fit: what a pair gains may be owed to a better
 /// valley of its first effect, and not to the second.
-fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Find, pair: &Find) -> Option<Find> {
+fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Candidate, pair: &Candidate) -> Option<Candidate> {
     let hypothesis = &single.fit.hypothesis;
-    let place_in_pair = pair.supposed.iter().position(|one| single.supposed == [*one])?;
+    let place_in_pair = pair.hypothesised.iter().position(|one| single.hypothesised == [*one])?;
     let from_pair = |what: What| {
         let what = match what {
             What::Effect { parameter, .. } => What::Effect {
@@ -322,7 +322,7 @@ fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Find, pair: &Fi
         Some(pair.fit.at[place])
     };
     let at: Option<Vec<f64>> = hypothesis.free.iter().map(|free| from_pair(free.what)).collect();
-    let find = Find::of(problem, recalibrated, problem.fit(hypothesis, at?, None));
+    let find = Candidate::of(problem, recalibrated, problem.fit(hypothesis, at?, None));
     (find.improvement > single.improvement).then_some(find)
 }
 
@@ -330,31 +330,31 @@ fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Find, pair: &Fi
 fn pair_up<'f>(
     problem: &Problem<'_, '_>,
     recalibrated: &Fit,
-    seeds: impl Iterator<Item = &'f Find>,
-    supposed: &[Supposed],
+    seeds: impl Iterator<Item = &'f Candidate>,
+    hypothesised: &[Hypothesised],
     threshold: f64,
     seed: u64,
-) -> Vec<Find> {
-    let mut pairs: Vec<Find> = Vec::new();
+) -> Vec<Candidate> {
+    let mut pairs: Vec<Candidate> = Vec::new();
     for first in seeds {
-        let others: Vec<Supposed> = supposed
+        let others: Vec<Hypothesised> = hypothesised
             .iter()
-            .filter(|other| !first.supposed.contains(other) && !judge::are_twins(other, &first.supposed[0]))
+            .filter(|other| !first.hypothesised.contains(other) && !model_selection::are_twins(other, &first.hypothesised[0]))
             .copied()
             .collect();
         let base = problem.with_derivatives(&first.fit.hypothesis, first.fit.at.clone());
         let mut at = first.fit.hypothesis.neutral();
-        let effects_from = at.len() - screen::effect_quantities(&first.fit.hypothesis);
+        let effects_from = at.len() - score_test::effect_quantities(&first.fit.hypothesis);
         at[effects_from..].copy_from_slice(&first.fit.at[effects_from..]);
         let about = problem.with_derivatives(&first.fit.hypothesis, at);
-        let (mut promising, _) = screen::screen(problem, &base, &others, seed);
+        let (mut promising, _) = score_test::screen(problem, &base, &others, seed);
         promising.retain(|screening| screening.score > threshold);
         promising.truncate(SCREENED_FOR_PAIRS);
         for find in refit(problem, &base, &about, &promising, PAIRED, &mut |_| ()) {
-            let find = Find::of(problem, recalibrated, find.fit);
+            let find = Candidate::of(problem, recalibrated, find.fit);
             let is_new = !pairs
                 .iter()
-                .any(|pair| pair.supposed.iter().all(|one| find.supposed.contains(one)));
+                .any(|pair| pair.hypothesised.iter().all(|one| find.hypothesised.contains(one)));
             if is_new {
                 pairs.push(find);
             }

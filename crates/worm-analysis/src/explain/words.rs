@@ -2,7 +2,7 @@
 
 use super::answer::{NamedEffect, Place, Verdict, answers_in_words};
 use super::fit::{Fit, Problem};
-use super::judge::Judged;
+use super::model_selection::Judged;
 use super::parameter::What;
 
 /// The outcome in a sentence or two. `refused` is the share of the held-out gap that the best effect closes where it is too
@@ -38,7 +38,7 @@ pub(super) fn sentence(
             let nearest = judged.candidates.first().map_or_else(
                 || "none that is strong enough to be told keeps what it promises on data left out".to_owned(),
                 |find| {
-                    let names: Vec<&str> = find.supposed.iter().map(|supposed| supposed.effect.name).collect();
+                    let names: Vec<&str> = find.hypothesised.iter().map(|hypothesised| hypothesised.effect.name).collect();
                     let how_near = match refused {
                         Some(closure) => format!(
                             "closes {:.0} % of the gap on cycles that it was not fitted to",

@@ -71,11 +71,11 @@ impl Drift {
     }
 
     /// Twice the negative logarithm of the likelihood of a series, but for a constant.
-    pub fn misfit(&self, series: impl IntoIterator<Item = f64>) -> f64 {
-        let mut misfit = 0.0;
-        self.whiten(series, |surprise| misfit += surprise * surprise);
+    pub fn chi_squared(&self, series: impl IntoIterator<Item = f64>) -> f64 {
+        let mut chi_squared = 0.0;
+        self.whiten(series, |surprise| chi_squared += surprise * surprise);
         let spreads = self.scale.iter().filter(|&&scale| scale > 0.0);
-        misfit - 2.0 * spreads.map(|scale| scale.ln()).sum::<f64>()
+        chi_squared - 2.0 * spreads.map(|scale| scale.ln()).sum::<f64>()
     }
 
     /// The drift in a series, freed of noise, at every sample.
@@ -90,13 +90,13 @@ impl Drift {
         }
         for at in (0..series.len().saturating_sub(1)).rev() {
             let before_m2 = self.left_m2[at];
-            let share = if before_m2.is_finite() {
+            let fraction = if before_m2.is_finite() {
                 before_m2 / (before_m2 + self.step_m2[at + 1])
             } else {
                 1.0
             };
-            if share.is_finite() {
-                drift_m[at] += share * (drift_m[at + 1] - drift_m[at]);
+            if fraction.is_finite() {
+                drift_m[at] += fraction * (drift_m[at + 1] - drift_m[at]);
             }
         }
         drift_m

@@ -18,9 +18,9 @@ const ROUNDS: usize = 4;
 /// What two cells may stand off an even motor, likewise.
 const EVEN: (f64, f64) = (5.0, 0.03);
 /// Least number of whole cycles.
-const LEAST_CYCLES: f64 = 2.0;
+const MIN_CYCLES: f64 = 2.0;
 /// Least number of samples that could show two cycles of two cells.
-const LEAST_SAMPLES: usize = 10;
+const MIN_SAMPLES: usize = 10;
 
 /// Why no gait was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -125,7 +125,7 @@ pub fn find(
     filled_m: &[Vec<f64>],
     prior: Prior<'_>,
 ) -> Result<Gait, GaitError> {
-    if time_s.len() < LEAST_SAMPLES {
+    if time_s.len() < MIN_SAMPLES {
         return Err(GaitError::TooFewSteps { cycles: 0.0 });
     }
     if let Some(cell) = filled_m
@@ -160,7 +160,7 @@ pub fn find(
         return Err(GaitError::Uneven { off_m });
     }
     let cycles = finder.phase[time_s.len() - 1] - finder.phase[0];
-    if cycles.is_nan() || cycles < LEAST_CYCLES {
+    if cycles.is_nan() || cycles < MIN_CYCLES {
         return Err(GaitError::TooFewSteps { cycles });
     }
     Ok(finder.finish())
@@ -225,11 +225,11 @@ impl<'a> Finder<'a> {
         for step in steps {
             let (from, to) = (step.samples.start + offset, step.samples.end + offset);
             let slot = (step.slot + shift) as f64;
-            let at_start = from == offset && step.share < 1.0;
+            let at_start = from == offset && step.fraction < 1.0;
             let (low, high) = if at_start {
-                (1.0 - step.share, 1.0)
+                (1.0 - step.fraction, 1.0)
             } else {
-                (0.0, step.share)
+                (0.0, step.fraction)
             };
             knots.push((self.time_s[from], (slot + low) / cells as f64));
             knots.push((self.time_s[to], (slot + high) / cells as f64));
@@ -289,7 +289,7 @@ fn first_of_order(cyclic: &[usize], configured: &[usize], steps: &[Step]) -> usi
     }
     steps
         .iter()
-        .find(|step| step.share >= 1.0)
+        .find(|step| step.fraction >= 1.0)
         .map_or(cyclic[0], |step| step.cell)
 }
 

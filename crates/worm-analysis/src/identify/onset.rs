@@ -17,7 +17,7 @@ const EARLIEST: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onset {
     /// Share of the step at which the others stop moving back, that is, forward sliding begins.
-    pub share: f64,
+    pub fraction: f64,
     /// How far the others have been pushed back by then, m.
     pub retraction_m: f64,
     /// The first estimate of the largest tip deformation, m: half the way that the cell has made by then.
@@ -61,8 +61,8 @@ fn add(sums: &mut [(f64, f64); PARTS], ways: &[(usize, f64)]) {
     }
     let late: Vec<f64> = ways.iter().filter(|way| way.0 >= PARTS / 2).map(|way| way.1).collect();
     let base_m = late.iter().sum::<f64>() / late.len().max(1) as f64;
-    for &(part, way_m) in ways {
-        sums[part].0 += way_m - base_m;
+    for &(part, displacement_m) in ways {
+        sums[part].0 += displacement_m - base_m;
         sums[part].1 += 1.0;
     }
 }
@@ -84,31 +84,31 @@ fn break_of(sums: &[(f64, f64); PARTS], stroke_m: f64) -> Onset {
         let at = at as f64 / (4 * PARTS) as f64;
         // way = level + slope · min(share − break, 0): linear least squares in level and slope
         let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for &(share, way_m, weight) in &points {
-            let before = (share - at).min(0.0);
+        for &(fraction, displacement_m, weight) in &points {
+            let before = (fraction - at).min(0.0);
             n += weight;
             x += weight * before;
-            y += weight * way_m;
+            y += weight * displacement_m;
             xx += weight * before * before;
-            xy += weight * before * way_m;
-            yy += weight * way_m * way_m;
+            xy += weight * before * displacement_m;
+            yy += weight * displacement_m * displacement_m;
         }
         let spread = xx - x * x / n;
         if spread <= 0.0 || spread.is_nan() {
             continue;
         }
         let slope = (xy - x * y / n) / spread;
-        let misfit = yy - y * y / n - slope * (xy - x * y / n);
-        if misfit < best.0 {
-            best = (misfit, at, slope);
+        let chi_squared = yy - y * y / n - slope * (xy - x * y / n);
+        if chi_squared < best.0 {
+            best = (chi_squared, at, slope);
         }
     }
-    let (_, share, slope_m) = best;
-    let retraction_m = (-slope_m * share).max(0.0);
+    let (_, fraction, slope_m) = best;
+    let retraction_m = (-slope_m * fraction).max(0.0);
     Onset {
-        share,
+        fraction,
         retraction_m,
-        max_deformation_m: (0.5 * (share * stroke_m - retraction_m)).max(1e-3 * stroke_m),
+        max_deformation_m: (0.5 * (fraction * stroke_m - retraction_m)).max(1e-3 * stroke_m),
     }
 }
 

@@ -16,7 +16,7 @@ const SPREAD: (usize, f64) = (3, 1e-4);
 /// Candidates for each cell.
 const CANDIDATES: usize = 2 * SPREAD.0 + 1;
 /// Most cells for which all combinations are tried: 7⁷ are 823,543.
-pub const MOST_CELLS: usize = 7;
+pub const MAX_CELLS: usize = 7;
 /// Smallest candidate, m.
 const SMALLEST_M: f64 = 5e-5;
 
@@ -34,7 +34,7 @@ pub struct Found {
 }
 
 /// Searches around `first_m`. `position_m` has no gaps inside; `stiffness_n_per_m` is one for each cell, `pull_n` is m g sin λ.
-/// None for more cells than [`MOST_CELLS`], or when no whole cycle is left after the first.
+/// None for more cells than [`MAX_CELLS`], or when no whole cycle is left after the first.
 pub fn search(
     position_m: &[Vec<f64>],
     gait: &Gait,
@@ -44,7 +44,7 @@ pub fn search(
 ) -> Option<Found> {
     let cells = position_m.len();
     let range = balance_range(position_m, &gait.phase)?;
-    if cells > MOST_CELLS {
+    if cells > MAX_CELLS {
         return None;
     }
     let ends = step_ends(gait);

@@ -8,19 +8,19 @@ use super::gait::{GaitError, next_slot};
 use std::ops::Range;
 
 /// Share of a cell's swing by which it must come back for a turn to count.
-const TURN_SHARE: f64 = 0.4;
+const TURN_FRACTION: f64 = 0.4;
 /// Share of a cell's swing that a step cut off by an end of the recording must show to count.
-const PARTIAL_SHARE: f64 = 0.3;
+const PARTIAL_FRACTION: f64 = 0.3;
 /// Samples of the running median that takes outliers out before turns are looked for.
 const MEDIAN_SAMPLES: usize = 5;
 /// Share of all steps that may fall out of the order before there is none.
-const DISORDER_SHARE: f64 = 0.1;
+const DISORDER_FRACTION: f64 = 0.1;
 /// What a missing step costs, in steps found: more than half, so that leaving one out is better than missing two.
 const MISSING: f64 = 0.75;
 /// Swing, as a multiple of the noise, below which nothing can be seen to step.
-const LEAST_SWING: f64 = 10.0;
+const MIN_SWING: f64 = 10.0;
 /// Share of a cell's time that it may spend rising: half, and some doubt, would be a crawl in reverse.
-const RISING_SHARE: f64 = 0.55;
+const RISING_FRACTION: f64 = 0.55;
 
 /// A cell is left behind that goes to and fro by less than the first share of what is usual, and away by more than the second.
 const LEFT_BEHIND: (f64, f64) = (0.5, 1.5);
@@ -33,7 +33,7 @@ pub(super) struct Step {
     /// Samples from its beginning to its end; a step that an end of the recording cuts off begins or ends there.
     pub samples: Range<usize>,
     /// Share of a whole step seen: below 1 for one that is cut off.
-    pub share: f64,
+    pub fraction: f64,
     /// Number of the step since the first, counting those that were not seen.
     pub slot: usize,
 }
@@ -50,10 +50,10 @@ pub(super) fn find(
     for (cell, series_m) in relative_m.iter().enumerate() {
         let smooth_m = running_median(series_m, MEDIAN_SAMPLES);
         let swing_m = swing(&smooth_m);
-        if swing_m.is_nan() || swing_m == 0.0 || swing_m < LEAST_SWING * noise_m {
+        if swing_m.is_nan() || swing_m == 0.0 || swing_m < MIN_SWING * noise_m {
             return Err(GaitError::NoStep { cell, swing_m });
         }
-        let turns = turning_points(&smooth_m, TURN_SHARE * swing_m);
+        let turns = turning_points(&smooth_m, TURN_FRACTION * swing_m);
         for pair in turns.windows(2) {
             let (low, high) = (&pair[0], &pair[1]);
             turning += high.sample - low.sample;
@@ -70,10 +70,10 @@ pub(super) fn find(
             ));
         }
     }
-    if rising as f64 > RISING_SHARE * turning as f64 {
+    if rising as f64 > RISING_FRACTION * turning as f64 {
         return Err(GaitError::Backward);
     }
-    steps.retain(|(_, _, share, at_end)| !at_end || *share > PARTIAL_SHARE);
+    steps.retain(|(_, _, fraction, at_end)| !at_end || *fraction > PARTIAL_FRACTION);
     steps.sort_by_key(|(_, samples, ..)| samples.start + samples.end);
     let sequence: Vec<usize> = steps.iter().map(|step| step.0).collect();
     let numbered = cyclic_order(&sequence, position_m.len()).and_then(|mut order| {
@@ -92,20 +92,20 @@ fn left_behind(relative_m: &[Vec<f64>]) -> Option<GaitError> {
         .iter()
         .map(|series_m| {
             let smooth_m = running_median(series_m, MEDIAN_SAMPLES);
-            let way_m = smooth_m.last()? - smooth_m.first()?;
+            let displacement_m = smooth_m.last()? - smooth_m.first()?;
             let last = (smooth_m.len() - 1).max(1) as f64;
             let bent_m: Vec<f64> = (0..)
                 .zip(&smooth_m)
-                .map(|(at, at_m)| at_m - way_m * f64::from(at) / last)
+                .map(|(at, at_m)| at_m - displacement_m * f64::from(at) / last)
                 .collect();
-            Some((way_m.abs(), swing(&bent_m)))
+            Some((displacement_m.abs(), swing(&bent_m)))
         })
         .collect::<Option<_>>()?;
-    let (cell, &(way_m, swing_m)) = ways.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
+    let (cell, &(displacement_m, swing_m)) = ways.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
     let mut swings: Vec<f64> = ways.iter().map(|way| way.1).collect();
     swings.sort_by(f64::total_cmp);
     let usual_m = swings[swings.len() / 2];
-    (swing_m < LEFT_BEHIND.0 * usual_m && way_m > LEFT_BEHIND.1 * usual_m)
+    (swing_m < LEFT_BEHIND.0 * usual_m && displacement_m > LEFT_BEHIND.1 * usual_m)
         .then_some(GaitError::NoStep { cell, swing_m })
 }
 
@@ -116,7 +116,7 @@ fn number(found: &[(usize, Range<usize>, f64, bool)], order: &[usize], time_s: &
     let mut disorder: Vec<usize> = Vec::new();
     let mut expected = 0;
     for at in kept {
-        let (cell, samples, share, at_end) = &found[at];
+        let (cell, samples, fraction, at_end) = &found[at];
         let slot = steps
             .last()
             .map_or(0, |last| next_slot(order, last.slot, last.cell, *cell));
@@ -127,11 +127,11 @@ fn number(found: &[(usize, Range<usize>, f64, bool)], order: &[usize], time_s: &
         steps.push(Step {
             cell: *cell,
             samples: samples.clone(),
-            share: if *at_end { *share } else { 1.0 },
+            fraction: if *at_end { *fraction } else { 1.0 },
             slot,
         });
     }
-    if disorder.len() + found.len() - expected > (DISORDER_SHARE * found.len() as f64) as usize {
+    if disorder.len() + found.len() - expected > (DISORDER_FRACTION * found.len() as f64) as usize {
         let sample = disorder
             .first()
             .copied()
@@ -222,7 +222,7 @@ pub(super) fn running_median(series: &[f64], window: usize) -> Vec<f64> {
 fn swing(series: &[f64]) -> f64 {
     let mut sorted = series.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let rank = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+    let rank = |fraction: f64| sorted[((sorted.len() - 1) as f64 * fraction).round() as usize];
     rank(0.995) - rank(0.005)
 }
 

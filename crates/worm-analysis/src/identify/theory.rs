@@ -61,14 +61,14 @@ impl Swing {
     fn swing(&mut self, step_s: f64) {
         let turn = self.turn_per_s * step_s;
         let fade = (-self.decay_per_s * step_s).exp();
-        let (sine, cosine, sense) = if self.is_overdamped {
+        let (sine, cosine, sign) = if self.is_overdamped {
             (turn.sinh() * fade, turn.cosh() * fade, 1.0)
         } else {
             (turn.sin() * fade, turn.cos() * fade, -1.0)
         };
         let across = (self.velocity_m_s + self.decay_per_s * self.at_m) / self.turn_per_s;
         let at_m = self.at_m * cosine + across * sine;
-        let turned_m_s = (across * cosine + sense * self.at_m * sine) * self.turn_per_s;
+        let turned_m_s = (across * cosine + sign * self.at_m * sine) * self.turn_per_s;
         self.velocity_m_s = turned_m_s - self.decay_per_s * at_m;
         self.at_m = at_m;
     }
@@ -95,7 +95,7 @@ impl<'a> TheoryBody<'a> {
     }
 
     /// Way so far, m: the mean of the cells' positions less what the stroke alone would have made.
-    pub fn way_m(&self) -> f64 {
+    pub fn displacement_m(&self) -> f64 {
         self.mean_m + self.swing.at_m - self.worm.stroke_m() * (self.motion.phase() - self.first_phase)
     }
 
@@ -110,7 +110,7 @@ impl<'a> TheoryBody<'a> {
             self.step(from + (phase - from) * part as f64 / parts, step_s / parts)?;
         }
         self.step(phase, step_s / parts)?;
-        Ok(self.way_m())
+        Ok(self.displacement_m())
     }
 
     fn step(&mut self, phase: f64, step_s: f64) -> Result<(), SlidesDown> {

@@ -15,7 +15,7 @@ const SLOPES_DEG: RangeInclusive<f64> = -90.0..=90.0;
 pub const PAYLOADS_KG: RangeInclusive<f64> = 0.0..=100.0;
 const CYCLES_S: RangeInclusive<f64> = 0.5..=120.0;
 /// The least standard error of an advance that anybody can claim, m.
-const LEAST_SIGMA_M: f64 = 1e-6;
+const MIN_SIGMA_M: f64 = 1e-6;
 
 /// Why a campaign cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -207,7 +207,7 @@ impl Campaign {
         let count = self.runs.len() as f64;
         let mut recordings: Vec<Recording> = Vec::with_capacity(self.runs.len());
         for (number, run) in self.runs.iter().enumerate() {
-            let mut one = |share: f64| progress((number as f64 + share) / count);
+            let mut one = |fraction: f64| progress((number as f64 + fraction) / count);
             let recording = open_with_progress(&run.recording, options, &mut one)?;
             let (first, first_cells) = match recordings.first() {
                 Some(first) => (first.source.clone(), first.cells()),
@@ -296,7 +296,7 @@ impl Reader<'_> {
             payload_kg,
             cycle_s,
             advance_m: self.within("advance_m", advance_m, -stroke_m..=stroke_m, unit)?,
-            sigma_m: self.within("advance_sigma_m", sigma_m, LEAST_SIGMA_M..=stroke_m, unit)?,
+            sigma_m: self.within("advance_sigma_m", sigma_m, MIN_SIGMA_M..=stroke_m, unit)?,
         })
     }
 

@@ -5,7 +5,7 @@
 //!
 //! # The story
 //! [`open`] looks at a file's first bytes and finds its format. A table of this project's own and a log of the worm give
-//! positions along the canal as they are. Motion capture gives markers in space: `canal` finds the canal in their motion,
+//! positions along the canal as they are. Motion capture gives markers in space: `projection` finds the canal in their motion,
 //! leaves out what does not crawl, and tells which marker it took for which cell. Whatever the format, the recording is then
 //! cut to the time that was asked for and looked through: time must run, every cell must be seen without long gaps, something
 //! must move, and lengths must be ones that a worm can have. What is merely remarkable becomes a warning; what would make any
@@ -15,19 +15,19 @@
 //! - `series`: [`Recording`] and [`ReadError`].
 //! - `open`: the format by content, [`OpenOptions`].
 //! - `table`: CSV in; `write`: CSV out.
-//! - `vicon` and `c3d`: motion capture, as `markers` in space; `canal`: from space onto the canal.
+//! - `vicon` and `c3d`: motion capture, as `markers` in space; `projection`: from space onto the canal.
 //! - [`mcap`]: the log of a live worm, in and out, and its replay through the estimator.
-//! - `gaps`: what was not seen; `plausible`: what every recording must satisfy.
+//! - `gaps`: what was not seen; `sanity_check`: what every recording must satisfy.
 //! - `campaign`: several recordings of one worm.
 
 mod c3d;
 mod campaign;
-mod canal;
+mod projection;
 mod gaps;
 mod markers;
 pub mod mcap;
 mod open;
-mod plausible;
+mod sanity_check;
 mod quantile;
 mod series;
 mod table;
@@ -37,7 +37,7 @@ mod write;
 
 pub use campaign::PAYLOADS_KG;
 pub use campaign::{Advance, Campaign, CampaignError, Run};
-pub use canal::{Axis, AxisError};
+pub use projection::{Axis, AxisError};
 pub use open::{OpenOptions, open, open_with_progress};
 pub use series::{Motor, Recording};
 pub use worm_log::ReadError;

@@ -1,9 +1,9 @@
 //! One way in for all formats.
 
-use super::canal::Axis;
+use super::projection::Axis;
 use super::series::Recording;
 use super::text::Text;
-use super::{c3d, canal, mcap, plausible, table, vicon};
+use super::{c3d, mcap, projection, sanity_check, table, vicon};
 use std::fs::File;
 use std::io::{Cursor, Read};
 use std::path::Path;
@@ -45,7 +45,7 @@ impl Default for OpenOptions {
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is damaged, contradicts itself or would leave anything to guess.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, ReadError> {
-    open_with_progress(path, options, &mut |_share| {})
+    open_with_progress(path, options, &mut |_fraction| {})
 }
 
 /// As [`open`], telling `progress` now and then which share of the file was read, 0 to 1.
@@ -77,7 +77,7 @@ pub fn open_with_progress(
     } else {
         0
     };
-    let along_canal = |markers| canal::project(markers, options.axis, path);
+    let along_canal = |markers| projection::project(markers, options.axis, path);
     let format = Format::of(path, &head)?;
     let text = Text::new(Cursor::new(&head[begin..]).chain(&file), metadata.len(), progress);
     let mut recording = match format {
@@ -101,7 +101,7 @@ pub fn open_with_progress(
     if options.from_s.is_some() || options.to_s.is_some() {
         recording.cut(options.from_s, options.to_s);
     }
-    plausible::check(&mut recording, options, whole_s)?;
+    sanity_check::check(&mut recording, options, whole_s)?;
     Ok(recording)
 }
 

@@ -1,16 +1,16 @@
 //! Order statistics of what was seen: they stay put when a marker is lost, swapped or thrown far away.
 
-/// The value below which a `share` of the seen values lies; `NaN` values are not seen. `None` where nothing was seen.
-pub(super) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    quantiles(values, [share]).map(|[value]| value)
+/// The value below which a `fraction` of the seen values lies; `NaN` values are not seen. `None` where nothing was seen.
+pub(super) fn quantile(values: impl IntoIterator<Item = f64>, fraction: f64) -> Option<f64> {
+    quantiles(values, [fraction]).map(|[value]| value)
 }
 
 /// Several quantiles at once, as [`quantile`].
-pub(super) fn quantiles<const N: usize>(values: impl IntoIterator<Item = f64>, shares: [f64; N]) -> Option<[f64; N]> {
+pub(super) fn quantiles<const N: usize>(values: impl IntoIterator<Item = f64>, fractions: [f64; N]) -> Option<[f64; N]> {
     let mut seen: Vec<f64> = values.into_iter().filter(|value| !value.is_nan()).collect();
     let last = seen.len().checked_sub(1)?;
-    Some(shares.map(|share| {
-        let index = (share * last as f64).round() as usize;
+    Some(fractions.map(|fraction| {
+        let index = (fraction * last as f64).round() as usize;
         *seen.select_nth_unstable_by(index.min(last), f64::total_cmp).1
     }))
 }

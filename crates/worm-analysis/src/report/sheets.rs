@@ -103,7 +103,7 @@ impl Column<'_> {
         let text = match self {
             Self::Values(values) => values.get(sample).map(|value| field(*value)),
             Self::Cell(cells) => cells.get(sample).map(|cell| (cell + 1).to_string()),
-            Self::Sense(senses) => senses.get(sample).map(i8::to_string),
+            Self::Sense(signs) => signs.get(sample).map(i8::to_string),
         };
         text.unwrap_or_default()
     }

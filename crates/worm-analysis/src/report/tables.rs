@@ -172,7 +172,7 @@ fn add_against<T: Fn(&TheoryCycle) -> f64>(
 }
 
 /// Most cycles that a table lists: an hour holds more than anyone reads.
-const MOST_CYCLES: usize = 60;
+const MAX_CYCLES: usize = 60;
 
 /// Every cycle of a run.
 pub(super) fn cycles(name: &str, run: &Analysis) -> Table {
@@ -188,7 +188,7 @@ pub(super) fn cycles(name: &str, run: &Analysis) -> Table {
         "(13) positive, mJ",
     ];
     let mut table = Table::new(format!("The cycles at {name}; slides are means over the cells"), head);
-    let (shown, left_out) = run.cycles.split_at(run.cycles.len().min(MOST_CYCLES));
+    let (shown, left_out) = run.cycles.split_at(run.cycles.len().min(MAX_CYCLES));
     for cycle in shown {
         let settled = if cycle.settled { "" } else { " (settling)" };
         let mut row = vec![

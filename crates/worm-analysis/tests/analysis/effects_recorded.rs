@@ -58,8 +58,8 @@ fn a_drooping_motor_takes_longer_under_load() {
     let phases = recording.gait_phase.expect("recorded");
     let passed_s = |phase: f64| {
         let after = phases.iter().position(|at| *at >= phase).expect("it gets there");
-        let share = (phase - phases[after - 1]) / (phases[after] - phases[after - 1]);
-        recording.time_s[after - 1] + share * (recording.time_s[after] - recording.time_s[after - 1])
+        let fraction = (phase - phases[after - 1]) / (phases[after] - phases[after - 1]);
+        recording.time_s[after - 1] + fraction * (recording.time_s[after] - recording.time_s[after - 1])
     };
     let cycle_s = passed_s(2.5) - passed_s(1.5);
     let expected_s = 2.5 * (1.0 + slowdown_per_n * 54.88e-3 / (4.0 * STROKE_M));

@@ -138,13 +138,13 @@ fn every_effect_changes_the_advance_in_its_own_sense() {
         };
         for ((slope_deg, honest_m), &expected) in slopes_deg.into_iter().zip(honest_m).zip(expected) {
             let change_m = advance_m(&flawed, slope_deg) - honest_m;
-            let sense = if change_m.abs() < NO_CHANGE_M {
+            let sign = if change_m.abs() < NO_CHANGE_M {
                 0
             } else {
                 change_m.signum() as i32
             };
             println!("{name} at {slope_deg}°: {:+.3} mm", 1e3 * change_m);
-            assert_eq!(sense, expected, "{name} at {slope_deg}°: {:+.3} mm", 1e3 * change_m);
+            assert_eq!(sign, expected, "{name} at {slope_deg}°: {:+.3} mm", 1e3 * change_m);
         }
     }
     for effect in Effect::ALL {

@@ -314,8 +314,8 @@ fn slow_and_fast_gaits_seen_poorly() {
             rate_hz: 100.0,
             jitter: 0.3,
             dropout_share: 0.03,
-            hidden_share: 0.02,
-            outlier_share: 0.001,
+            hidden_fraction: 0.02,
+            outlier_fraction: 0.001,
             ..Camera::default()
         };
         scene.drive = Drive {

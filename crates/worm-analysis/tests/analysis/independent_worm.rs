@@ -40,11 +40,11 @@ fn play(scene: &Scene) -> Truth {
 }
 
 #[track_caller]
-fn assert_within(share: f64, what: &str, value: f64, expected: f64) {
+fn assert_within(fraction: f64, what: &str, value: f64, expected: f64) {
     assert!(
-        (value / expected - 1.0).abs() <= share,
+        (value / expected - 1.0).abs() <= fraction,
         "{what}: {value} should be {expected} within {} %",
-        100.0 * share
+        100.0 * fraction
     );
 }
 
@@ -192,8 +192,8 @@ fn the_camera_is_as_poor_as_told() {
     scene.camera = Camera {
         jitter: 0.3,
         dropout_share: 0.03,
-        hidden_share: 0.02,
-        outlier_share: 0.01,
+        hidden_fraction: 0.02,
+        outlier_fraction: 0.01,
         ..Camera::default()
     };
     let (recording, truth) = scene.record().expect("the worm holds");
@@ -202,10 +202,10 @@ fn the_camera_is_as_poor_as_told() {
         .zip(truth.sample_position_m.iter().flatten())
         .map(|(seen, truly)| seen - truly)
         .collect();
-    let share = |kind: fn(f64) -> bool| {
+    let fraction = |kind: fn(f64) -> bool| {
         errors_m.iter().filter(|&&error_m| kind(error_m)).count() as f64 / errors_m.len() as f64
     };
-    let (lost, far) = (share(f64::is_nan), share(|error_m| error_m.abs() > 4e-3));
+    let (lost, far) = (fraction(f64::is_nan), fraction(|error_m| error_m.abs() > 4e-3));
     assert!((0.03..0.07).contains(&lost), "{lost} lost");
     assert!((0.005..0.015).contains(&far), "{far} far off");
     let near: Vec<f64> = errors_m.into_iter().filter(|error_m| error_m.abs() < 1e-3).collect();

@@ -76,16 +76,16 @@ fn the_score_tells_right_from_wrong() {
     ];
     // How much is recorded matters neither to who knows nor to who does not look.
     let campaigns = cases.map(|wanted| draw_sized(wanted, 11, Size::SMALL));
-    let shares = |wants_to_know: bool| {
+    let fractions = |wants_to_know: bool| {
         let judgements: Vec<_> = campaigns
             .iter()
             .map(|campaign| judge(campaign, &Oracle { wants_to_know }))
             .collect();
         let table = Table(&judgements);
         println!("{table}");
-        let shares = table.shares();
+        let fractions = table.fractions();
         move |what: &str| {
-            let row = shares
+            let row = fractions
                 .iter()
                 .find(|row| row.0 == what)
                 .expect("the table has such a row");
@@ -106,7 +106,7 @@ fn the_score_tells_right_from_wrong() {
         ("pairs, both right", 1, [1, 0]),
         ("twins reported as twins", 1, [1, 0]),
     ];
-    let [right, wrong] = [shares(true), shares(false)];
+    let [right, wrong] = [fractions(true), fractions(false)];
     for (what, of, [by_right, by_wrong]) in table {
         assert_eq!(right(what), (by_right, of), "{what}, by who knows");
         assert_eq!(wrong(what), (by_wrong, of), "{what}, by who does not");

@@ -389,13 +389,13 @@ impl Default for Topics {
 impl Topics {
     pub(super) fn check(&self, worm_name: &str, checker: &mut Checker) {
         // A service's socket lies in the root and holds the name twice; a socket's path is short.
-        let most = 48_usize.saturating_sub(2 * worm_name.len());
+        let max = 48_usize.saturating_sub(2 * worm_name.len());
         checker.require(
-            self.root.starts_with('/') && self.root.len() <= most,
+            self.root.starts_with('/') && self.root.len() <= max,
             "topics.root",
             format!("\"{}\"", self.root),
             format!(
-                "must be an absolute path of at most {most} characters for a worm of this name (socket paths are short)"
+                "must be an absolute path of at most {max} characters for a worm of this name (socket paths are short)"
             ),
         );
     }

@@ -171,12 +171,12 @@ impl Config {
                 "samples at tracker.rate_hz",
             ),
         ] {
-            let least_s = 2.0 * period_s;
+            let min_s = 2.0 * period_s;
             checker.require(
-                patience_s >= least_s,
+                patience_s >= min_s,
                 key,
                 value,
-                format!("must be at least two {periods} ({least_s:.3} s), or the worm stops without need"),
+                format!("must be at least two {periods} ({min_s:.3} s), or the worm stops without need"),
             );
         }
     }

@@ -54,7 +54,7 @@ fn the_commented_file_tells_every_effect() {
     for effect in LIBRARY {
         let text = &effects[effect.name];
         for parameter in effect.parameters {
-            let range = format!("{} to {}", parameter.least, parameter.most);
+            let range = format!("{} to {}", parameter.min, parameter.max);
             assert!(
                 text.contains(parameter.name) && text.contains(&range),
                 "{}: {range}: {text}",

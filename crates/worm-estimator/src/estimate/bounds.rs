@@ -10,7 +10,7 @@
 //! can be found. A weak pull towards the configured first guess shares that sum out, and the standard errors say how
 //! weakly the single bounds are known. On the level with equal cells this concerns all of them.
 
-use super::account::Tip;
+use super::energy_balance::Tip;
 use super::fit::Fit;
 use super::window::INTERVALS;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};

@@ -14,7 +14,7 @@ const JUMP_S: f64 = 0.2;
 /// The comparison of the two clocks and the tick before.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Capture {
-    least_lag_s: Option<(f64, f64)>, // and when
+    min_lag_s: Option<(f64, f64)>, // and when
     before: Option<(f64, f64)>,      // time and phase of the tick before
 }
 
@@ -46,12 +46,12 @@ impl Capture {
         if !lag_s.is_finite() {
             return 0.0;
         }
-        let least_s = match self.least_lag_s {
-            Some((least_s, since_s)) => (least_s + DRIFT * (time_s - since_s).max(0.0)).min(lag_s),
+        let min_s = match self.min_lag_s {
+            Some((min_s, since_s)) => (min_s + DRIFT * (time_s - since_s).max(0.0)).min(lag_s),
             None => lag_s,
         };
-        let least_s = if lag_s - least_s > JUMP_S { lag_s } else { least_s };
-        self.least_lag_s = Some((least_s, time_s));
-        lag_s - least_s
+        let min_s = if lag_s - min_s > JUMP_S { lag_s } else { min_s };
+        self.min_lag_s = Some((min_s, time_s));
+        lag_s - min_s
     }
 }

@@ -5,7 +5,7 @@
 //! position, and at the end of its own step (1) puts the contact point where that position says, free of peaks. What is
 //! left of the error is taken out at the end of the cycle, when [`fit`](super::fit) has the better contact points.
 
-use super::account::Tip;
+use super::energy_balance::Tip;
 use worm_physics::MAX_CELLS;
 
 /// Contact points, deformations and slides of all tips, along the canal whichever way the worm crawls.
@@ -54,15 +54,15 @@ impl Contacts {
         }
     }
 
-    /// (1): the cell has ended its step, which went `sense`-ward and was `step_m` long; its tip is at its bound.
-    pub(super) fn anchor(&mut self, cell: usize, position_m: f64, sigma_m: f64, step_m: f64, sense: f64) {
+    /// (1): the cell has ended its step, which went `sign`-ward and was `step_m` long; its tip is at its bound.
+    pub(super) fn anchor(&mut self, cell: usize, position_m: f64, sigma_m: f64, step_m: f64, sign: f64) {
         let Tip { bound_m, .. } = self.tips[cell];
-        let anchored_m = position_m - sense * bound_m;
+        let anchored_m = position_m - sign * bound_m;
         if self.contact_m[cell].is_nan() {
-            if sense * step_m > 2.0 * bound_m {
+            if sign * step_m > 2.0 * bound_m {
                 self.contact_m[cell] = anchored_m;
             }
-        } else if sense * (position_m - self.contact_m[cell]) > bound_m - 2.0 * sigma_m {
+        } else if sign * (position_m - self.contact_m[cell]) > bound_m - 2.0 * sigma_m {
             self.shift(cell, anchored_m - self.contact_m[cell]);
         }
     }

@@ -20,7 +20,7 @@ pub(super) enum Event {
     /// A cycle ended at this share of the way from the last phase to this one, and the next began.
     Ends {
         /// 0 to 1.
-        share: f64,
+        fraction: f64,
         /// The phase went through it in one direction.
         whole: bool,
     },
@@ -66,11 +66,11 @@ impl Cycles {
         }
         let done = self.done(phase, start);
         if done >= 1.0 {
-            let share = ((1.0 - self.done(last, start)) / (done - self.done(last, start))).clamp(0.0, 1.0);
+            let fraction = ((1.0 - self.done(last, start)) / (done - self.done(last, start))).clamp(0.0, 1.0);
             let whole = self.whole;
             self.begin(start + i64::from(self.direction), self.direction, done - 1.0);
             self.resting = false;
-            return Event::Ends { share, whole };
+            return Event::Ends { fraction, whole };
         }
         if done < -TREMBLE {
             self.begin(start, -self.direction, -done);
@@ -144,10 +144,10 @@ mod tests {
     fn a_cycle_ends_where_the_phase_is_whole() {
         let mut cycles = Cycles::new(1);
         let events = ends(&mut cycles, &[0.0, 0.3, 0.6, 0.9, 1.1, 1.5, 1.9, 2.0]);
-        let whole = |share| Event::Ends { share, whole: true };
+        let whole = |fraction| Event::Ends { fraction, whole: true };
         assert_eq!(events.len(), 3);
         assert_eq!(events[0], Event::Begins);
-        assert!(matches!(events[1], Event::Ends { share, whole: true } if (share - 0.5).abs() < 1e-9));
+        assert!(matches!(events[1], Event::Ends { fraction, whole: true } if (fraction - 0.5).abs() < 1e-9));
         assert_eq!(events[2], whole(1.0));
     }
 
@@ -166,7 +166,7 @@ mod tests {
         assert_eq!(
             events[1],
             Event::Ends {
-                share: 1.0,
+                fraction: 1.0,
                 whole: false
             }
         );
@@ -176,7 +176,7 @@ mod tests {
             [
                 Event::Begins,
                 Event::Ends {
-                    share: 1.0,
+                    fraction: 1.0,
                     whole: true
                 }
             ]
@@ -191,14 +191,14 @@ mod tests {
         assert_eq!(
             events[1],
             Event::Ends {
-                share: 1.0,
+                fraction: 1.0,
                 whole: false
             }
         );
         assert_eq!(
             events[2],
             Event::Ends {
-                share: 1.0,
+                fraction: 1.0,
                 whole: true
             }
         );

@@ -1,6 +1,6 @@
 //! The estimator: states in, estimates and cycles out.
 
-use super::account::{Account, Accountant, Start, Tip};
+use super::energy_balance::{Account, Accountant, Start, Tip};
 use super::bounds::Identification;
 use super::capture::Capture;
 use super::contact::Contacts;
@@ -26,7 +26,7 @@ const LONGEST_BLIND_STEPS: f64 = 0.5;
 /// Tracker periods that are no silence yet, however far the gait goes in them.
 const SHORTEST_SILENCE_PERIODS: f64 = 2.5;
 /// Standard deviation of largest tip deformations that are only guessed, as a share: that of all of them together.
-const GUESSED_BOUND_SHARE: f64 = 0.15;
+const GUESSED_BOUND_FRACTION: f64 = 0.15;
 
 /// Account of the open cycle.
 #[derive(Debug, Clone, Copy)]
@@ -238,9 +238,9 @@ impl Estimator {
                 self.open(time_s);
                 false
             }
-            Event::Ends { share, whole } => {
+            Event::Ends { fraction, whole } => {
                 let end_s = match self.last {
-                    Some((_, last_s, _)) => last_s + share * (time_s - last_s),
+                    Some((_, last_s, _)) => last_s + fraction * (time_s - last_s),
                     None => time_s,
                 };
                 if whole {
@@ -260,8 +260,8 @@ impl Estimator {
         self.window.clear();
         self.window_whole = true;
         self.mismatch.begin(self.cycles.direction());
-        let sense = f64::from(self.cycles.direction());
-        self.window_contact_m = self.contacts.contact_m().map(|contact_m| sense * contact_m);
+        let sign = f64::from(self.cycles.direction());
+        self.window_contact_m = self.contacts.contact_m().map(|contact_m| sign * contact_m);
         if let Some(identification) = &mut self.identification {
             identification.interrupt();
         }
@@ -281,7 +281,7 @@ impl Estimator {
     /// Closes the open cycle: fit, account, prediction.
     fn close(&mut self, end_s: f64) {
         let direction = self.cycles.direction();
-        let sense = f64::from(direction);
+        let sign = f64::from(direction);
         let gait = self.gait.seen_along(direction);
         let fitted = self.window_whole
             && self.window.samples() as usize >= 2 * self.cells
@@ -292,19 +292,19 @@ impl Estimator {
             let mut tips = [Tip::default(); MAX_CELLS];
             for (to, tip) in tips.iter_mut().zip(&self.tips) {
                 *to = Tip {
-                    weight_n: sense * tip.weight_n,
+                    weight_n: sign * tip.weight_n,
                     ..*tip
                 };
             }
             let tips = &tips[..self.cells];
             let start = Start {
                 contact_m: &self.window_contact_m[..self.cells],
-                resting_m: self.predictor.resting_deformation_m().map(|m| sense * m),
+                resting_m: self.predictor.resting_deformation_m().map(|m| sign * m),
                 laid_down: self.laid_down,
             };
             let account = self.accountant.close(&self.fit, tips, &start);
-            self.describe_motion(&account, sense);
-            self.correct_contacts(&account, sense);
+            self.describe_motion(&account, sign);
+            self.correct_contacts(&account, sign);
             self.window_contact_m = account.contact_at_start_m;
             if self.bounds_are_known() {
                 self.mismatch.take_up(&self.window);
@@ -340,11 +340,11 @@ impl Estimator {
         self.cycle.direction = direction;
     }
 
-    fn describe_motion(&mut self, account: &Account, sense: f64) {
+    fn describe_motion(&mut self, account: &Account, sign: f64) {
         let known = self.bounds_are_known();
-        let (forward_m, backward_m) = account.slides_along_canal_m(sense);
+        let (forward_m, backward_m) = account.slides_along_canal_m(sign);
         let cycle = &mut self.cycle;
-        cycle.advance_m = sense * account.advance_m;
+        cycle.advance_m = sign * account.advance_m;
         cycle.advance_sigma_m = account.advance_sigma_m;
         cycle.forward_slide_m = forward_m;
         cycle.backward_slide_m = backward_m;
@@ -366,7 +366,7 @@ impl Estimator {
             Some(found) if known => found.standard_error(&by_bound),
             Some(_) => {
                 let doubtful = by_bound.iter().zip(&self.tips);
-                GUESSED_BOUND_SHARE * doubtful.map(|(by_bound_n, tip)| by_bound_n * tip.bound_m).sum::<f64>()
+                GUESSED_BOUND_FRACTION * doubtful.map(|(by_bound_n, tip)| by_bound_n * tip.bound_m).sum::<f64>()
             }
         };
         cycle.energy_loss_sigma_j = account.loss_sigma_j.hypot(from_bounds_j);
@@ -374,8 +374,8 @@ impl Estimator {
     }
 
     /// Replaces what the live positions gave for this cycle by what the fit gave.
-    fn correct_contacts(&mut self, account: &Account, sense: f64) {
-        let (slid_forward_m, slid_backward_m) = account.slides_along_canal_m(sense);
+    fn correct_contacts(&mut self, account: &Account, sign: f64) {
+        let (slid_forward_m, slid_backward_m) = account.slides_along_canal_m(sign);
         let mut forward_m = *self.contacts.forward_m();
         let mut backward_m = *self.contacts.backward_m();
         let mut loss_j = self.contacts.loss_j();
@@ -387,7 +387,7 @@ impl Estimator {
                 loss_j += tip.stiffness_n_per_m * tip.bound_m * (slid_forward_m[cell] + slid_backward_m[cell]);
             }
         }
-        let contact_m = account.contact_at_end_m.map(|contact_m| sense * contact_m);
+        let contact_m = account.contact_at_end_m.map(|contact_m| sign * contact_m);
         self.contacts.correct(&contact_m, &forward_m, &backward_m, loss_j);
     }
 
@@ -428,12 +428,12 @@ impl Estimator {
         if believed != 0 {
             self.last_seen = Some((time_s, state.phase));
         }
-        let sense = f64::from(self.cycles.direction());
+        let sign = f64::from(self.cycles.direction());
         for (cell, position_m) in position_m[..self.cells].iter_mut().enumerate() {
             self.contacts
                 .follow(cell, self.filter.position_m(cell), self.filter.sigma_m(cell));
             *position_m = if believed >> cell & 1 == 1 {
-                sense * *position_m
+                sign * *position_m
             } else {
                 f64::NAN
             };
@@ -460,19 +460,19 @@ impl Estimator {
         }
         while let Some(boundary) = self.filter.boundary_before(steps) {
             let (at, since_s) = self.filter.at().unwrap_or((boundary, time_s));
-            let share = if steps == at {
+            let fraction = if steps == at {
                 1.0
             } else {
                 (boundary - at) / (steps - at)
             };
-            self.filter.predict(boundary, since_s + share * (time_s - since_s));
+            self.filter.predict(boundary, since_s + fraction * (time_s - since_s));
             let forward = steps > at;
-            let (cell, sense) = (self.filter.stepping_cell(), if forward { 1.0 } else { -1.0 });
+            let (cell, sign) = (self.filter.stepping_cell(), if forward { 1.0 } else { -1.0 });
             let (position_m, sigma_m) = (self.filter.position_m(cell), self.filter.sigma_m(cell));
             let whole_step = self.entered.0 == if forward { 0.0 } else { 1.0 };
             if whole_step {
                 let step_m = self.filter.lead_m() - self.entered.1;
-                self.contacts.anchor(cell, position_m, sigma_m, step_m, sense);
+                self.contacts.anchor(cell, position_m, sigma_m, step_m, sign);
             }
             self.filter.cross(forward);
             self.enter_step(if forward { 0.0 } else { 1.0 });
@@ -480,8 +480,8 @@ impl Estimator {
         self.filter.predict(steps, time_s);
     }
 
-    fn enter_step(&mut self, share: f64) {
-        self.entered = (share, self.filter.lead_m());
+    fn enter_step(&mut self, fraction: f64) {
+        self.entered = (fraction, self.filter.lead_m());
     }
 
     fn fill_estimate(&mut self, state: &State) {

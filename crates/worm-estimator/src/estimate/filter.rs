@@ -67,7 +67,7 @@ pub(super) struct BodyFilter {
     strokes: [(f64, f64); MAX_CELLS], // mean and variance carried to the cell's next step
     step: i64,
     at: Option<(f64, f64)>, // phase in steps and time of the state
-    sense: f64,             // of the last motion of the phase
+    sign: f64,             // of the last motion of the phase
     jump_m: Option<f64>,    // by which most cells were off in the last sample
 }
 
@@ -88,7 +88,7 @@ impl BodyFilter {
             strokes: [(stroke_m, square(STROKE_SPREAD * stroke_m)); MAX_CELLS],
             step: 0,
             at: None,
-            sense: 0.0,
+            sign: 0.0,
             jump_m: None,
         }
     }
@@ -98,7 +98,7 @@ impl BodyFilter {
         self.at = None;
         self.known = [false; MAX_CELLS];
         self.rejections = [0; MAX_CELLS];
-        self.sense = 0.0;
+        self.sign = 0.0;
         self.jump_m = None;
     }
 
@@ -136,11 +136,11 @@ impl BodyFilter {
         let n = self.gait.cells();
         let (v, s, cell) = (n, n + 1, self.stepping_cell());
         let du = steps - at;
-        if du * self.sense < 0.0 {
+        if du * self.sign < 0.0 {
             self.forget_rate(); // The tips that slid now load, and the other way round.
         }
         if du != 0.0 {
-            self.sense = du.signum();
+            self.sign = du.signum();
         }
         for i in 0..n {
             self.state[i] += self.state[v] * du;

@@ -229,20 +229,20 @@ impl Fit {
 
     /// The unknowns that a cell's position depends on within a piece.
     fn terms(&self, cell: usize, piece: usize) -> ([Term; 6], usize) {
-        let (body, share, first_level) = (2 * piece, self.share(cell, piece), self.level(cell, piece));
+        let (body, fraction, first_level) = (2 * piece, self.fraction(cell, piece), self.level(cell, piece));
         let mut terms = [(0, 0.0, 0.0); 6];
         terms[0] = (body, 1.0, -1.0);
         terms[1] = (body + 2, 0.0, 1.0);
-        let next_share = self.next_share(cell, piece);
+        let next_fraction = self.next_fraction(cell, piece);
         let mut used = 2;
-        if next_share > share {
+        if next_fraction > fraction {
             terms[2] = (body + 1, 1.0, -1.0);
             terms[3] = (body + 3, 0.0, 1.0);
-            terms[4] = (first_level, 1.0 - share, share - next_share);
-            terms[5] = (first_level + 1, share, next_share - share);
+            terms[4] = (first_level, 1.0 - fraction, fraction - next_fraction);
+            terms[5] = (first_level + 1, fraction, next_fraction - fraction);
             used = 6;
         } else {
-            terms[used] = (first_level + usize::from(share == 1.0), 1.0, 0.0);
+            terms[used] = (first_level + usize::from(fraction == 1.0), 1.0, 0.0);
             used += 1;
         }
         (terms, used)
@@ -250,18 +250,18 @@ impl Fit {
 
     /// The unknowns that a cell's position at a knot depends on.
     fn terms_at(&self, cell: usize, knot: usize) -> [(usize, f64); 4] {
-        let (share, level) = (self.share(cell, knot), self.level(cell, knot));
-        let own = f64::from(u8::from(share > 0.0 && share < 1.0));
+        let (fraction, level) = (self.fraction(cell, knot), self.level(cell, knot));
+        let own = f64::from(u8::from(fraction > 0.0 && fraction < 1.0));
         [
             (2 * knot, 1.0),
             (2 * knot + 1, own),
-            (level, 1.0 - share),
-            (level + 1, share),
+            (level, 1.0 - fraction),
+            (level + 1, fraction),
         ]
     }
 
     /// How much of its step in this knot's cycle the cell has done, 0 to 1.
-    fn share(&self, cell: usize, knot: usize) -> f64 {
+    fn fraction(&self, cell: usize, knot: usize) -> f64 {
         let within = knot - self.cycle_of(knot) * self.pieces();
         let done = within
             .saturating_sub(self.step_of_cell[cell] * INTERVALS)
@@ -270,7 +270,7 @@ impl Fit {
     }
 
     /// The share at the knot after, still seen from this knot's cycle.
-    fn next_share(&self, cell: usize, knot: usize) -> f64 {
+    fn next_fraction(&self, cell: usize, knot: usize) -> f64 {
         let within = knot + 1 - self.cycle_of(knot) * self.pieces();
         let done = within
             .saturating_sub(self.step_of_cell[cell] * INTERVALS)
@@ -322,7 +322,7 @@ impl Fit {
                 let terms = self.terms_at(cell, knot);
                 let relative_m: f64 = terms
                     .iter()
-                    .map(|&(unknown, share)| share * self.solution[unknown])
+                    .map(|&(unknown, fraction)| fraction * self.solution[unknown])
                     .sum();
                 self.position_m[knot * self.cells + cell] = self.origin_m + relative_m;
             }
@@ -342,8 +342,8 @@ impl Fit {
 
     /// Adds to a gradient what a derivative by a cell's position at a knot comes to.
     pub(super) fn add_to_gradient(&self, gradient: &mut [f64], cell: usize, knot: usize, derivative: f64) {
-        for (unknown, share) in self.terms_at(cell, knot) {
-            gradient[unknown] += share * derivative;
+        for (unknown, fraction) in self.terms_at(cell, knot) {
+            gradient[unknown] += fraction * derivative;
         }
     }
 

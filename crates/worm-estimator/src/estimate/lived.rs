@@ -10,7 +10,7 @@ use crate::message::State;
 /// How far the two clocks may disagree over one step between readings, ns: each reading is up to a tick and a millisecond old.
 const TOLERANCE_NS: i64 = 2_500_000;
 /// … and by which share of the step: what an oscillator without a crystal is off by.
-const TOLERANCE_SHARE: f64 = 0.03;
+const TOLERANCE_FRACTION: f64 = 0.03;
 /// How long after a gap it may still turn out that a reading was late rather than the motor standing still, ns.
 const LATE_READING_NS: u64 = 50_000_000;
 
@@ -63,7 +63,7 @@ impl LivedTime {
             return;
         }
         let behind_ns = elapsed_ns as i64 - (lived_s * 1e9).round() as i64;
-        let tolerance_ns = TOLERANCE_NS + (TOLERANCE_SHARE * elapsed_ns as f64) as i64;
+        let tolerance_ns = TOLERANCE_NS + (TOLERANCE_FRACTION * elapsed_ns as f64) as i64;
         if behind_ns > tolerance_ns {
             self.stood_ns += behind_ns;
             self.doubtful = Some(Doubt {

@@ -10,7 +10,7 @@
 //!
 //! Energies need better positions than a causal filter has, for noise at a sliding tip looks like sliding. So `window`
 //! keeps the samples of the open gait cycle and the one before, `cycles` tells when a cycle ends, `fit` then lays the
-//! cells' paths through all samples of both (solved by `bordered`), and `account` follows the tips along these paths:
+//! cells' paths through all samples of both (solved by `bordered`), and `energy_balance` follows the tips along these paths:
 //! losses (11, 12), actuator work (13), and the standard error of each. `electrical` adds what the motor took,
 //! `prediction` what the model expects, and that is the `cycle` topic. Where the largest tip deformations are only
 //! guessed, `bounds` finds them on the first cycles.
@@ -20,7 +20,7 @@
 //! A cycle at whose start the tips' contact points were not known (the first from rest, or the first after a silence of the
 //! tracker) is reported with a guess of them, `settled = 0`, and standard errors as large as the guess is doubtful.
 //!
-//! Everything is measured against the canal, along it; inside, `window`, `fit`, `account` and `bounds` see a
+//! Everything is measured against the canal, along it; inside, `window`, `fit`, `energy_balance` and `bounds` see a
 //! backward crawl from its other end, so that it too runs forward.
 //!
 //! The [`alarm`]s watch all of it, each with a threshold that calibrates itself, and [`Observer`] is estimator and alarms
@@ -32,7 +32,7 @@
 
 pub mod alarm;
 
-mod account;
+mod energy_balance;
 mod bordered;
 mod bounds;
 mod capture;

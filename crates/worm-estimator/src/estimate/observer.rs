@@ -72,7 +72,7 @@ impl Observer {
         Estimate {
             armed_mask: self.watch.armed_mask(),
             raised_mask: self.watch.raised_mask(),
-            battery_share: self.watch.battery_share(),
+            battery_fraction: self.watch.battery_fraction(),
             ..estimate
         }
     }

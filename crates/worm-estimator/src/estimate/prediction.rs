@@ -1,6 +1,6 @@
 //! What the model says a cycle should be, beside what was measured.
 
-use super::account::Tip;
+use super::energy_balance::Tip;
 use crate::config::{Config, PhysicsError};
 use worm_physics::MAX_CELLS;
 use worm_physics::effect::Setting;
@@ -86,7 +86,7 @@ impl Predictor {
 
     /// The steady cycle in a direction, calculated when first asked for.
     pub(super) fn cycle(&mut self, direction: i32) -> Prediction {
-        let (kept, sense) = if direction < 0 {
+        let (kept, sign) = if direction < 0 {
             (&mut self.backward, -1.0)
         } else {
             (&mut self.forward, 1.0)
@@ -99,12 +99,12 @@ impl Predictor {
                 physics.with(&self.effects)
             };
             let physics = if direction < 0 { physics.mirrored() } else { physics };
-            predict(&physics, sense, self.cycle_s)
+            predict(&physics, sign, self.cycle_s)
         })
     }
 }
 
-fn predict(physics: &Physics, sense: f64, cycle_s: f64) -> Prediction {
+fn predict(physics: &Physics, sign: f64, cycle_s: f64) -> Prediction {
     let outcome = steady_cycle_of(physics, cycle_s);
     let Some(cycle) = outcome.cycle() else {
         return Prediction {
@@ -116,11 +116,11 @@ fn predict(physics: &Physics, sense: f64, cycle_s: f64) -> Prediction {
         };
     };
     let (mut forward_slide_m, mut backward_slide_m) = (cycle.forward_slide_m, cycle.backward_slide_m);
-    if sense < 0.0 {
+    if sign < 0.0 {
         std::mem::swap(&mut forward_slide_m, &mut backward_slide_m);
     }
     Prediction {
-        advance_m: sense * cycle.advance_m,
+        advance_m: sign * cycle.advance_m,
         energy_loss_j: cycle.energy_loss_j,
         energy_positive_j: cycle.energy_actuator_positive_j,
         forward_slide_m,

@@ -22,7 +22,7 @@ pub(super) fn estimate(cells: usize) -> Estimate {
         energy_electrical_j: 0.0,
         energy_loss_j: 0.0,
         max_deformation_m: NOT_KNOWN,
-        battery_share: f64::NAN,
+        battery_fraction: f64::NAN,
         cell_count: cells as u32,
         sliding_mask: 0,
         armed_mask: 0,

@@ -18,7 +18,7 @@ pub enum EstimatorError {
 /// What became of one state.
 #[derive(Debug, Clone, Copy)]
 pub struct Update<'a> {
-    /// The estimate, when the state brought a tracker sample. `armed_mask`, `raised_mask` and `battery_share` are for the
+    /// The estimate, when the state brought a tracker sample. `armed_mask`, `raised_mask` and `battery_fraction` are for the
     /// alarms to fill: 0, 0 and `NaN`.
     pub estimate: Option<&'a Estimate>,
     /// The gait cycle that ended.

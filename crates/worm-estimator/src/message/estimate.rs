@@ -38,7 +38,7 @@ message! {
         /// Largest tip deformation in use for each cell, m: measured, or identified on the first cycles.
         max_deformation_m: [f64; MAX_CELLS],
         /// Charge left in the battery by the estimator's account, 0 to 1; `NaN` when no battery is configured.
-        battery_share: f64,
+        battery_fraction: f64,
         /// How many cells are in use.
         cell_count: u32,
         /// Bit i set: tip i slides.

@@ -85,7 +85,7 @@ fn energies_and_advance_over_slopes_bounds_and_noise() {
         .lines()
         .take(2)
         .fold(String::new(), |text, line| text + line + "\n");
-    for (noise_m, outlier_share, dropout_share) in [(1e-4, 0.0, 0.0), (3e-4, 0.0, 0.0), (3e-4, 0.05, 0.1)] {
+    for (noise_m, outlier_fraction, dropout_share) in [(1e-4, 0.0, 0.0), (3e-4, 0.0, 0.0), (3e-4, 0.05, 0.1)] {
         for slope_deg in [0.0, 30.0, 45.0] {
             for unequal in [false, true] {
                 let [mut loss, mut net, mut positive, mut advance] = std::array::from_fn(|_| Errors::default());
@@ -93,7 +93,7 @@ fn energies_and_advance_over_slopes_bounds_and_noise() {
                     let scene = Scene {
                         seed,
                         noise_m,
-                        outlier_share,
+                        outlier_fraction,
                         dropout_share,
                         ..Scene::default()
                     };
@@ -129,7 +129,7 @@ fn energies_and_advance_over_slopes_bounds_and_noise() {
                     "{slope_deg:>4}°  {:<7}  {:.1} mm {:>7} % {:>7} % |   {:+.1}  {:.1}  {:>3.0} |   {:+.1}  {:.1}  {:>3.0} |   {:+.1}  {:.1}  {:>3.0} |  {:.2}  {:>3.0}",
                     if unequal { "unequal" } else { "equal" },
                     1e3 * noise_m,
-                    100.0 * outlier_share,
+                    100.0 * outlier_fraction,
                     100.0 * dropout_share,
                     loss.mean(), loss.rms(), loss.covered_percent(),
                     net.mean(), net.rms(), net.covered_percent(),

@@ -78,7 +78,7 @@ fn a_jammed_cell_shows_in_the_measurement() {
     let (mut crawl, mut estimator) = watch(&worm, scene);
     crawl_cycles(&mut crawl, &mut estimator, 10.1);
     crawl.worm = worm.with_stroke_scale(2, 0.4).expect("a share");
-    let mut shortest_share: f64 = 1.0;
+    let mut shortest_fraction: f64 = 1.0;
     let mut lead_at_start_m = f64::NAN;
     let mut cycles = Vec::new();
     for _ in 0..7_500 {
@@ -87,18 +87,18 @@ fn a_jammed_cell_shows_in_the_measurement() {
         cycles.extend(update.cycle.copied());
         let Some(estimate) = update.estimate else { continue };
         // (10): the motion of cell 3, the third to step, against the mean of the others since its step began.
-        let share = (estimate.phase.fract() - 0.5) * 4.0;
+        let fraction = (estimate.phase.fract() - 0.5) * 4.0;
         let x_m = &estimate.position_m;
         let lead_m = x_m[2] - (x_m[0] + x_m[1] + x_m[3]) / 3.0;
-        if share < 0.0 {
+        if fraction < 0.0 {
             lead_at_start_m = lead_m;
-        } else if (0.95..1.0).contains(&share) {
-            shortest_share = shortest_share.min((lead_m - lead_at_start_m) / (0.0115 * share));
+        } else if (0.95..1.0).contains(&fraction) {
+            shortest_fraction = shortest_fraction.min((lead_m - lead_at_start_m) / (0.0115 * fraction));
         }
     }
     assert!(
-        (shortest_share - 0.4).abs() < 0.06,
-        "extension (10) says {shortest_share}"
+        (shortest_fraction - 0.4).abs() < 0.06,
+        "extension (10) says {shortest_fraction}"
     );
     for cycle in cycles.iter().skip(1) {
         let index = cycle.index as usize;
@@ -208,7 +208,7 @@ fn a_restarted_controller_begins_anew_and_totals_stay() {
 #[test]
 fn a_replay_gives_the_same_bits() {
     let scene = Scene {
-        outlier_share: 0.05,
+        outlier_fraction: 0.05,
         dropout_share: 0.1,
         ..Scene::default()
     };

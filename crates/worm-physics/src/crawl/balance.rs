@@ -6,9 +6,9 @@ use crate::pad::{Hold, Loaded, Pad, PadLaw};
 use crate::worm::SlidesDown;
 
 /// Unbalanced force, as a share of what the tips can hold, to which an increment is solved.
-const BALANCE_SHARE: f64 = 1e-9;
+const BALANCE_FRACTION: f64 = 1e-9;
 /// Iterations after which an increment ends in any case: halving alone would do by then.
-const MOST_ITERATIONS: usize = 120;
+const MAX_ITERATIONS: usize = 120;
 /// Way of the body in one increment beyond which nothing holds it, m.
 const LOST_M: f64 = 0.5;
 /// Way to which a cell's own way against its drive is solved, m.
@@ -26,7 +26,7 @@ pub(super) struct Balance {
 impl Crawl {
     /// The translation that balances the body, m; every cell's trial is the one at it.
     pub(super) fn solve(&mut self, mechanics: &Mechanics, increment: &Increment) -> Result<f64, SlidesDown> {
-        let tolerance_n = BALANCE_SHARE * mechanics.full_force_n.max(1e-6);
+        let tolerance_n = BALANCE_FRACTION * mechanics.full_force_n.max(1e-6);
         let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
         // Without mass, the translation nearest to rest is the one meant where several balance.
         let mut at_m = if increment.inertia_n_per_m > 0.0 {
@@ -36,7 +36,7 @@ impl Crawl {
         };
         let mut reach_m = 1e-4;
         let mut balance = self.try_out(mechanics, increment, at_m);
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             if balance.excess_n.abs() <= tolerance_n || high_m - low_m < NARROW_M {
                 break;
             }
@@ -149,7 +149,7 @@ impl Way<'_> {
         let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut shift_m = driven_m / (1.0 + compliance * self.law.stiffness_n_per_m);
         let mut loaded = self.law.load(self.pad, shift_m, hold, self.relaxing);
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let excess_m = shift_m + compliance * (loaded.force_n - self.pad.force_n) - driven_m;
             if excess_m.abs() <= OWN_WAY_M || high_m - low_m < NARROW_M {
                 break;

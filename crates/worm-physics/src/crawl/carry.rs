@@ -4,7 +4,7 @@ use super::{Crawl, SHORTEST_S};
 use crate::mechanics::Mechanics;
 
 /// Trials after which the cells' own ways against a yielding drive count as found.
-const MOST_TRIALS: usize = 30;
+const MAX_TRIALS: usize = 30;
 /// Way of the body to which they are, m.
 const FOUND_M: f64 = 1e-10;
 
@@ -15,9 +15,9 @@ impl Crawl {
         let (from, from_m) = (self.phase, self.mean_position_m());
         let parts = self.parts(phase, duration_s);
         for part in 1..=parts as usize {
-            let share = part as f64 / parts;
-            let here_m = from_m + share * (mean_m - from_m);
-            self.carry(mechanics, from + share * (phase - from), duration_s / parts, here_m);
+            let fraction = part as f64 / parts;
+            let here_m = from_m + fraction * (mean_m - from_m);
+            self.carry(mechanics, from + fraction * (phase - from), duration_s / parts, here_m);
         }
     }
 
@@ -25,7 +25,7 @@ impl Crawl {
         let shift_m = mean_m - self.mean_position_m();
         let increment = self.prepare(mechanics, phase, step_s.max(SHORTEST_S));
         let mut translation_m = 0.0;
-        for _ in 0..MOST_TRIALS {
+        for _ in 0..MAX_TRIALS {
             self.try_out(mechanics, &increment, translation_m);
             let tried_m: f64 = self.cell[..self.cells].iter().map(|cell| cell.trial.shift_m).sum();
             let missing_m = shift_m - tried_m / self.cells as f64;

@@ -112,9 +112,9 @@ pub struct Parameter {
     /// The value at which the effect does nothing; for a parameter of shape, where a search may begin.
     pub neutral: f64,
     /// Smallest value allowed.
-    pub least: f64,
+    pub min: f64,
     /// Largest value allowed.
-    pub most: f64,
+    pub max: f64,
     /// A change of it that is usually just noticed: the scale of searches and derivatives.
     pub notable: f64,
 }
@@ -175,7 +175,7 @@ pub enum SettingError {
         about: &'static str,
     },
     /// A value out of its range.
-    #[error("effect `{effect}`: {parameter} = {value}: must be from {least} to {most} {unit}")]
+    #[error("effect `{effect}`: {parameter} = {value}: must be from {min} to {max} {unit}")]
     OutOfRange {
         /// The effect.
         effect: &'static str,
@@ -184,9 +184,9 @@ pub enum SettingError {
         /// What was given.
         value: f64,
         /// Least value.
-        least: f64,
+        min: f64,
         /// Largest value.
-        most: f64,
+        max: f64,
         /// Its unit.
         unit: &'static str,
     },
@@ -231,13 +231,13 @@ impl Setting {
         assert_eq!(values.len(), effect.parameters.len(), "one value for each parameter");
         effect.check_cell(cell, cells)?;
         for (parameter, &value) in effect.parameters.iter().zip(values) {
-            if !(parameter.least..=parameter.most).contains(&value) {
+            if !(parameter.min..=parameter.max).contains(&value) {
                 return Err(SettingError::OutOfRange {
                     effect: effect.name,
                     parameter: parameter.name,
                     value,
-                    least: parameter.least,
-                    most: parameter.most,
+                    min: parameter.min,
+                    max: parameter.max,
                     unit: parameter.unit,
                 });
             }
@@ -281,7 +281,7 @@ impl Setting {
     pub fn within(effect: &'static Effect, cell: Option<usize>, values: &[f64]) -> Self {
         let mut kept = [0.0; MAX_PARAMETERS];
         for ((kept, parameter), value) in kept.iter_mut().zip(effect.parameters).zip(values) {
-            *kept = value.clamp(parameter.least, parameter.most);
+            *kept = value.clamp(parameter.min, parameter.max);
         }
         Self {
             effect,

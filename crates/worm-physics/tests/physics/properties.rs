@@ -401,13 +401,13 @@ proptest! {
         reverse in any::<bool>(),
     ) {
         let n = cells.len();
-        let sense = if reverse { -1.0 } else { 1.0 };
+        let sign = if reverse { -1.0 } else { 1.0 };
         let friction_n: Vec<f64> = cells.iter().map(|(stiffness_n_per_m, bound_m)| stiffness_n_per_m * bound_m).collect();
         let hold_n: f64 = friction_n.iter().sum();
         // With this pull all tips can slide at once, the stepping cell's one way and the others' the other way.
-        let limit_n = |cell: usize| sense * (hold_n - 2.0 * friction_n[cell]);
+        let limit_n = |cell: usize| sign * (hold_n - 2.0 * friction_n[cell]);
         let pull_n = match pull {
-            Pull::Share(share) => share * hold_n,
+            Pull::Share(fraction) => fraction * hold_n,
             Pull::FromLimit(cell, excess_n) => limit_n(cell.index(n)) + excess_n,
         };
         // Just there the motion jumps from the cell sliding to the others giving way, and anything between is a balance.
@@ -424,9 +424,9 @@ proptest! {
         for step in 0..2 * n {
             let stepping = if reverse { n - 1 - step % n } else { step % n };
             for _ in 0..small_steps {
-                brute.extend(stepping, sense * stroke_m / f64::from(small_steps));
+                brute.extend(stepping, sign * stroke_m / f64::from(small_steps));
             }
-            motion.advance_to(&worm, sense * (step + 1) as f64 / n as f64).expect("it holds");
+            motion.advance_to(&worm, sign * (step + 1) as f64 / n as f64).expect("it holds");
             let difference_m = largest_difference(motion.positions_m(), &brute.positions_m);
             prop_assert!(difference_m <= ROUNDING * stroke_m, "{difference_m} m after step {step}");
         }

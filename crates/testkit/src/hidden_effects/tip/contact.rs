@@ -62,7 +62,7 @@ impl Push {
 #[derive(Debug, Clone, Copy)]
 pub struct Gone {
     /// Way of the tip, m, not negative.
-    pub way_m: f64,
+    pub displacement_m: f64,
     /// The bristle's bend, m.
     pub bristle_m: f64,
 }
@@ -121,7 +121,7 @@ impl Contact {
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
         let (damping_s, drag_s_per_m) = (between(0.1e-3, 1e-3, rng), between(0.005, 0.05, rng));
         // With each law the most presliding that leaves a clean worm clean, m.
-        let (law, most_m) = match rng.random_range(0..5) {
+        let (law, max_m) = match rng.random_range(0..5) {
             0 => {
                 let law = Lugre {
                     damping_s,
@@ -131,7 +131,7 @@ impl Contact {
             }
             1 => {
                 let law = ElastoPlastic {
-                    breakaway_share: between(0.3, 0.9, rng),
+                    breakaway_fraction: between(0.3, 0.9, rng),
                     damping_s,
                     drag_s_per_m,
                 };
@@ -149,7 +149,7 @@ impl Contact {
         };
         Self {
             law,
-            presliding_m: between(0.5e-6, most_m, rng),
+            presliding_m: between(0.5e-6, max_m, rng),
             static_over_kinetic: 1.0 + between(0.0005, 0.002, rng),
             fall: Fall::draw(rng),
         }
@@ -157,6 +157,6 @@ impl Contact {
 }
 
 /// A value from a range, log-uniform.
-pub fn between(least: f64, most: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
-    least * (most / least).powf(rng.random::<f64>())
+pub fn between(min: f64, max: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
+    min * (max / min).powf(rng.random::<f64>())
 }

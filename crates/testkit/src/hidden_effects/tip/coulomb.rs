@@ -21,7 +21,7 @@ impl Coulomb {
         let slack = push.slack_n_per_m + self.drag_s_per_m * push.limit_n / push.step_s;
         let linear = push.limit_n + slack * creep_m - push.pull_n;
         Gone {
-            way_m: positive_root(slack, linear, push.pull_n * creep_m),
+            displacement_m: positive_root(slack, linear, push.pull_n * creep_m),
             bristle_m: 0.0,
         }
     }

@@ -7,7 +7,7 @@ use super::contact::{Gone, Push};
 use super::lugre::yield_at;
 
 /// Newton's steps at most; two are usual.
-const MOST_STEPS: usize = 12;
+const MAX_STEPS: usize = 12;
 /// A correction smaller than this share of the way is the last: what it leaves is of the order of its square.
 const CLOSE: f64 = 1e-4;
 
@@ -36,8 +36,8 @@ impl Dahl {
         }
         let root = lacking.sqrt();
         // What lacks to the limit after a way, as a share of it, and that to the power of the exponent.
-        let after = |way_m: f64| {
-            let half = 0.5 * way_m / reach_m;
+        let after = |displacement_m: f64| {
+            let half = 0.5 * displacement_m / reach_m;
             match self.knee {
                 Knee::Sharp => {
                     let root = (root - half).max(0.0);
@@ -50,19 +50,19 @@ impl Dahl {
             }
         };
         // The force is concave over the way, so Newton's steps from 0 come from below and do not overshoot.
-        let mut way_m = 0.0;
-        for _ in 0..MOST_STEPS {
-            let (lacking, slope) = after(way_m);
-            let held_n = push.limit_n * (1.0 - lacking) + push.slack_n_per_m * way_m;
+        let mut displacement_m = 0.0;
+        for _ in 0..MAX_STEPS {
+            let (lacking, slope) = after(displacement_m);
+            let held_n = push.limit_n * (1.0 - lacking) + push.slack_n_per_m * displacement_m;
             let further_m = (push.pull_n - held_n) / (push.slack_n_per_m + push.bristle_n_per_m * slope);
-            way_m += further_m.max(0.0);
-            if further_m <= CLOSE * way_m {
+            displacement_m += further_m.max(0.0);
+            if further_m <= CLOSE * displacement_m {
                 break;
             }
         }
         Gone {
-            way_m,
-            bristle_m: reach_m * (1.0 - after(way_m).0),
+            displacement_m,
+            bristle_m: reach_m * (1.0 - after(displacement_m).0),
         }
     }
 }

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElastoPlastic {
     /// Breakaway displacement over the bend at which the tip slides.
-    pub breakaway_share: f64,
+    pub breakaway_fraction: f64,
     /// Micro-damping over stiffness, s.
     pub damping_s: f64,
     /// Viscous part over the limit, s/m.
@@ -23,19 +23,19 @@ impl ElastoPlastic {
         let yielding = push.bristle_n_per_m / push.limit_n;
         let elastic = yield_at(push, 0.0, self.damping_s, self.drag_s_per_m);
         let bent = yielding * elastic.bristle_m;
-        if bent <= self.breakaway_share {
+        if bent <= self.breakaway_fraction {
             return elastic;
         }
         // α is taken where an elastic bristle would stand amid that part of the step that is plastic.
-        let amid = 0.5 * (bent + self.breakaway_share.max(yielding * push.bristle_m));
+        let amid = 0.5 * (bent + self.breakaway_fraction.max(yielding * push.bristle_m));
         yield_at(push, self.plastic(amid) * yielding, self.damping_s, self.drag_s_per_m)
     }
 
     /// α at a bend over the one at which the tip slides.
     fn plastic(&self, bent: f64) -> f64 {
-        let share = (bent - self.breakaway_share) / (1.0 - self.breakaway_share);
-        if share < 1.0 {
-            0.5 - 0.5 * (PI * share).cos()
+        let fraction = (bent - self.breakaway_fraction) / (1.0 - self.breakaway_fraction);
+        if fraction < 1.0 {
+            0.5 - 0.5 * (PI * fraction).cos()
         } else {
             1.0
         }

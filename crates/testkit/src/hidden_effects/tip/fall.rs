@@ -78,16 +78,16 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// After a time step in which the tip went `way_m`, `slipped_m` of it beyond its bristle's bend.
-    pub fn keep(&mut self, fall: &Fall, way_m: f64, slipped_m: f64, step_s: f64) {
+    /// After a time step in which the tip went `displacement_m`, `slipped_m` of it beyond its bristle's bend.
+    pub fn keep(&mut self, fall: &Fall, displacement_m: f64, slipped_m: f64, step_s: f64) {
         match *fall {
             Fall::Speed { lag_s, .. } => {
-                self.speed_m_s += (way_m.abs() - self.speed_m_s * step_s) / (lag_s + step_s);
+                self.speed_m_s += (displacement_m.abs() - self.speed_m_s * step_s) / (lag_s + step_s);
             }
             Fall::Way { restored_s, .. } => {
-                let moves = way_m.abs() > REST_M_S * step_s;
+                let moves = displacement_m.abs() > REST_M_S * step_s;
                 self.rested_s = if moves { 0.0 } else { self.rested_s + step_s };
-                if self.rested_s > restored_s || (moves && way_m * self.slid_m < 0.0) {
+                if self.rested_s > restored_s || (moves && displacement_m * self.slid_m < 0.0) {
                     self.slid_m = 0.0;
                 }
                 self.slid_m += slipped_m;

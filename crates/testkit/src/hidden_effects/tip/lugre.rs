@@ -36,15 +36,15 @@ pub fn yield_at(push: &Push, yielding: f64, damping_s: f64, drag_s_per_m: f64) -
     let slack = push.slack_n_per_m + drag_s_per_m * push.limit_n / push.step_s;
     let excess_n = push.excess_n();
     if yielding == 0.0 {
-        let way_m = excess_n / (slack + push.bristle_n_per_m + damping);
-        let bristle_m = push.bristle_m + way_m;
-        return Gone { way_m, bristle_m };
+        let displacement_m = excess_n / (slack + push.bristle_n_per_m + damping);
+        let bristle_m = push.bristle_m + displacement_m;
+        return Gone { displacement_m, bristle_m };
     }
     let linear = slack + push.bristle_n_per_m + damping - yielding * (push.pull_n + damping * push.bristle_m);
-    let way_m = positive_root(yielding * slack, linear, excess_n);
+    let displacement_m = positive_root(yielding * slack, linear, excess_n);
     Gone {
-        way_m,
-        bristle_m: (push.bristle_m + way_m) / (1.0 + yielding * way_m),
+        displacement_m,
+        bristle_m: (push.bristle_m + displacement_m) / (1.0 + yielding * displacement_m),
     }
 }
 

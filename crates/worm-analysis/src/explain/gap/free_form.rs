@@ -14,8 +14,8 @@ const BLOCK: usize = 2;
 /// Bins of a cycle.
 pub(super) fn bins(observed: &Observed<'_>) -> usize {
     let cycles = observed.phase[observed.samples() - 1] - observed.phase[0];
-    let most = observed.samples() as f64 / cycles / SAMPLES_PER_BIN;
-    (BINS_PER_STEP * observed.cells()).min(most as usize).max(1)
+    let max = observed.samples() as f64 / cycles / SAMPLES_PER_BIN;
+    (BINS_PER_STEP * observed.cells()).min(max as usize).max(1)
 }
 
 /// Mean residual of each cell in each bin, m: `[cycle][cell × bins + bin]`; `NaN` where not seen.
@@ -139,13 +139,13 @@ fn between(shape: &[f64], place: f64) -> f64 {
         return shape.first().copied().unwrap_or(f64::NAN);
     }
     let low = (place - 0.5).floor().clamp(0.0, shape.len() as f64 - 2.0) as usize;
-    let share = place - 0.5 - low as f64;
-    shape[low] + share * (shape[low + 1] - shape[low])
+    let fraction = place - 0.5 - low as f64;
+    shape[low] + fraction * (shape[low + 1] - shape[low])
 }
 
 /// The way of the body that the mean residual cycle adds to a model's, at every sample, m: what it gains in each cycle, and what
 /// repeats on it.
-pub(super) fn mean_way_m(observed: &Observed<'_>, left: &Left) -> Vec<f64> {
+pub(super) fn mean_displacement_m(observed: &Observed<'_>, left: &Left) -> Vec<f64> {
     let cells = observed.cells();
     let cycles = settled_cycles(observed);
     let bins = bins(observed);

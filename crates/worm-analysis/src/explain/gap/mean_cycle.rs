@@ -18,7 +18,7 @@ pub(in crate::explain) fn cycles(
 ) -> Vec<CycleSeries> {
     let of_run = |run: usize| {
         let observed = &problem.scene.observed[run];
-        let stroke_m = problem.scene.believed[run].worm.stroke_m();
+        let stroke_m = problem.scene.nominal[run].worm.stroke_m();
         let predict = |fit: &Fit| problem.scene.predict(run, &fit.hypothesis, &fit.at);
         let bins = bins(observed);
         let mut series = CycleSeries {
@@ -32,7 +32,7 @@ pub(in crate::explain) fn cycles(
         let left_m = rest(observed, &by_recalibrated).body_m;
         let modelled_m = mean_of_cells_m(observed, &by_recalibrated);
         let measured_m: Vec<f64> = modelled_m.iter().zip(&left_m).map(|(m, left_m)| m + left_m).collect();
-        let fold = |way_m: &[f64]| Folded::new(observed, way_m, stroke_m, bins);
+        let fold = |displacement_m: &[f64]| Folded::new(observed, displacement_m, stroke_m, bins);
         let fold_model = |fit: Option<&Fit>| {
             let predicted = fit.and_then(predict);
             predicted.map(|predicted| fold(&mean_of_cells_m(observed, &predicted)))
@@ -75,24 +75,24 @@ struct Folded {
 }
 
 impl Folded {
-    fn new(observed: &Observed<'_>, way_m: &[f64], stroke_m: f64, bins: usize) -> Self {
+    fn new(observed: &Observed<'_>, displacement_m: &[f64], stroke_m: f64, bins: usize) -> Self {
         let last = observed.samples() - 1;
         let from = observed.settled_from().min(last);
         let in_bins = |sample: usize| observed.phase[sample] * bins as f64;
         let first = in_bins(from).floor() as i64;
         let count = (in_bins(last).floor() as i64 - first + 1).max(1) as usize;
         let (mut sum_m, mut seen) = (vec![0.0; count], vec![0.0; count]);
-        for (sample, &way_m) in way_m.iter().enumerate().take(last + 1).skip(from) {
+        for (sample, &displacement_m) in displacement_m.iter().enumerate().take(last + 1).skip(from) {
             let bin = usize::try_from(in_bins(sample).floor() as i64 - first)
                 .unwrap_or(0)
                 .min(count - 1);
-            if way_m.is_finite() {
-                sum_m[bin] += way_m - stroke_m * observed.phase[sample];
+            if displacement_m.is_finite() {
+                sum_m[bin] += displacement_m - stroke_m * observed.phase[sample];
                 seen[bin] += 1.0;
             }
         }
         let at_m: Vec<f64> = sum_m.iter().zip(&seen).map(|(sum_m, seen)| sum_m / seen).collect();
-        let mut ways_m: Vec<Vec<f64>> = vec![Vec::new(); bins];
+        let mut displacements_m: Vec<Vec<f64>> = vec![Vec::new(); bins];
         let mut start = (-first).rem_euclid(bins as i64) as usize;
         while start + bins <= count {
             // The cycle starts between two bins; the crawl's first has none before it.
@@ -101,17 +101,17 @@ impl Folded {
             } else {
                 0.5 * (at_m[start - 1] + at_m[start])
             };
-            for (bin, ways_m) in ways_m.iter_mut().enumerate() {
-                let way_m = at_m[start + bin] - edge_m;
-                if way_m.is_finite() {
-                    ways_m.push(way_m);
+            for (bin, displacements_m) in displacements_m.iter_mut().enumerate() {
+                let displacement_m = at_m[start + bin] - edge_m;
+                if displacement_m.is_finite() {
+                    displacements_m.push(displacement_m);
                 }
             }
             start += bins;
         }
         let mean = |values: &Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         Self {
-            scatter_m: ways_m
+            scatter_m: displacements_m
                 .iter()
                 .map(|values| {
                     let mean_m = mean(values);
@@ -119,7 +119,7 @@ impl Folded {
                     (squares / (values.len() as f64 - 1.0).max(1.0)).sqrt()
                 })
                 .collect(),
-            mean_m: ways_m.iter().map(mean).collect(),
+            mean_m: displacements_m.iter().map(mean).collect(),
         }
     }
 }

@@ -47,7 +47,7 @@ fn the_gap_shrinks_to_the_floor_that_noise_and_walk_make() {
             free_form,
             floor,
         } = stages(&recordings, truth);
-        let near = |rms_m: f64, expected_m: f64, share: f64| (rms_m / expected_m - 1.0).abs() < share;
+        let near = |rms_m: f64, expected_m: f64, fraction: f64| (rms_m / expected_m - 1.0).abs() < fraction;
         let told = format!("{truth:?}\n{baseline:?}\n{named:?}\n{free_form:?}\n{floor:?}\nexpected {floor_m}");
         assert!(near(floor.held_out_rms_m, floor_m, 0.03), "{told}");
         assert!(near(named.held_out_rms_m, floor.held_out_rms_m, 0.03), "{told}");

@@ -91,14 +91,14 @@ fn surprises_of_a_walk_are_independent_with_variance_1() {
 fn the_true_drift_is_the_likeliest() {
     for seed in 1..=5 {
         let series = walk(seed);
-        let misfits = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0].map(|factor| {
+        let chi_squareds = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0].map(|factor| {
             (
-                drift(factor * factor * PER_CYCLE_M2).misfit(series.iter().copied()),
+                drift(factor * factor * PER_CYCLE_M2).chi_squared(series.iter().copied()),
                 factor,
             )
         });
-        let least = misfits.iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("candidates");
-        assert_eq!(least.1, 1.0, "seed {seed}: {misfits:?}");
+        let min = chi_squareds.iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("candidates");
+        assert_eq!(min.1, 1.0, "seed {seed}: {chi_squareds:?}");
     }
 }
 

@@ -35,13 +35,13 @@ const DRIFTS: (f64, f64, usize) = (2e-7, 2.0, 14);
 const SYSTEMATIC_M: f64 = 6e-6;
 /// Starting points that are tried at least, and the misfit over what noise and the first drift explain from which no further one
 /// is.
-const LEAST_STARTS: usize = 2;
+const MIN_STARTS: usize = 2;
 const GOOD_RATIO: f64 = 1.2;
 /// Shares of their difference by which two bounds are moved towards each other, how often all pairs are tried, and what way is
 /// worth it, m.
 const SHARES: [f64; 3] = [0.5, 0.25, 0.1];
 const SHARING_ROUNDS: usize = 3;
-const LEAST_MOVE_M: f64 = 5e-5;
+const MIN_MOVE_M: f64 = 5e-5;
 /// Ways by which bounds are moved at each other's expense to see whether the data mind, m.
 const MOVES_M: [f64; 4] = [5e-5, 1e-4, 2e-4, 4e-4];
 /// Times that drift and parameters are found from one another.
@@ -154,13 +154,13 @@ impl<'a> Problem<'a> {
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<(f64, DVector<f64>)> = None;
         for (tried, (_, start)) in starts.into_iter().enumerate() {
-            if tried >= LEAST_STARTS && best.is_some() && self.misfit_ratio() < GOOD_RATIO {
+            if tried >= MIN_STARTS && best.is_some() && self.misfit_ratio() < GOOD_RATIO {
                 break;
             }
             self.set(start);
-            let misfit = self.minimise();
-            if misfit < IMPOSSIBLE * IMPOSSIBLE && best.as_ref().is_none_or(|(least, _)| misfit < *least) {
-                best = Some((misfit, self.parameters.clone()));
+            let chi_squared = self.minimise();
+            if chi_squared < IMPOSSIBLE * IMPOSSIBLE && best.as_ref().is_none_or(|(min, _)| chi_squared < *min) {
+                best = Some((chi_squared, self.parameters.clone()));
             }
         }
         best.map(|(_, parameters)| parameters).ok_or(FitError::NoCrawl)
@@ -217,7 +217,7 @@ impl<'a> Problem<'a> {
                 .map(|at| {
                     let per_cycle_m = DRIFTS.0 * DRIFTS.1.powi(at as i32);
                     let drift = Drift::new(&data.run.gait.phase, &data.variance_m2, per_cycle_m * per_cycle_m);
-                    (drift.misfit(rest_m.iter().copied()), drift)
+                    (drift.chi_squared(rest_m.iter().copied()), drift)
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((_, drift)) = likeliest {
@@ -234,12 +234,12 @@ impl<'a> Problem<'a> {
         let cells = self.cells();
         for (one, other) in (0..SHARING_ROUNDS).flat_map(|_| pairs(cells)) {
             let bounds_m = self.bounds_m(&self.parameters);
-            for share in SHARES {
-                let way_m = share * (bounds_m[other] - bounds_m[one]);
-                if way_m.abs() < LEAST_MOVE_M {
+            for fraction in SHARES {
+                let displacement_m = fraction * (bounds_m[other] - bounds_m[one]);
+                if displacement_m.abs() < MIN_MOVE_M {
                     break;
                 }
-                let probe = self.moved(one, other, way_m);
+                let probe = self.moved(one, other, displacement_m);
                 if self.misfit_at(&probe) < allowed {
                     self.set(probe);
                     break;
@@ -254,30 +254,30 @@ impl<'a> Problem<'a> {
         let bounds_m = self.bounds_m(&self.parameters);
         let mut free_m = vec![0.0_f64; self.cells()];
         for (one, other) in pairs(self.cells()) {
-            for sense in [1.0, -1.0] {
-                for way_m in MOVES_M {
-                    let way_m = sense * way_m;
-                    let possible = bounds_m[one] + way_m > 0.0 && bounds_m[other] - way_m > 0.0;
-                    if !possible || self.misfit_at(&self.moved(one, other, way_m)) >= allowed {
+            for sign in [1.0, -1.0] {
+                for displacement_m in MOVES_M {
+                    let displacement_m = sign * displacement_m;
+                    let possible = bounds_m[one] + displacement_m > 0.0 && bounds_m[other] - displacement_m > 0.0;
+                    if !possible || self.misfit_at(&self.moved(one, other, displacement_m)) >= allowed {
                         break;
                     }
-                    free_m[one] = free_m[one].max(way_m.abs());
-                    free_m[other] = free_m[other].max(way_m.abs());
+                    free_m[one] = free_m[one].max(displacement_m.abs());
+                    free_m[other] = free_m[other].max(displacement_m.abs());
                 }
             }
         }
         free_m
     }
 
-    /// The parameters with one bound larger by `way_m` and another smaller. A tip that never slides backward has a deformation
+    /// The parameters with one bound larger by `displacement_m` and another smaller. A tip that never slides backward has a deformation
     /// larger by as much all the time, from the start.
-    fn moved(&self, one: usize, other: usize, way_m: f64) -> DVector<f64> {
+    fn moved(&self, one: usize, other: usize, displacement_m: f64) -> DVector<f64> {
         let mut moved = self.parameters.clone();
-        for (cell, way_m) in [(one, way_m), (other, -way_m)] {
-            moved[cell] = (self.parameters[cell].exp() + way_m).ln();
+        for (cell, displacement_m) in [(one, displacement_m), (other, -displacement_m)] {
+            moved[cell] = (self.parameters[cell].exp() + displacement_m).ln();
             for run in 0..self.runs.len() {
                 if !self.runs[run].laid_down {
-                    moved[self.first_start(run) + cell] += way_m * 1e3;
+                    moved[self.first_start(run) + cell] += displacement_m * 1e3;
                 }
             }
         }
@@ -341,8 +341,8 @@ impl<'a> Problem<'a> {
             let data = &self.runs[run];
             let mut drift_m = data.drift.smooth(&rest_m);
             let mean_m = drift_m.iter().sum::<f64>() / drift_m.len().max(1) as f64;
-            theory_m.iter_mut().for_each(|way_m| *way_m += mean_m);
-            drift_m.iter_mut().for_each(|way_m| *way_m -= mean_m);
+            theory_m.iter_mut().for_each(|displacement_m| *displacement_m += mean_m);
+            drift_m.iter_mut().for_each(|displacement_m| *displacement_m -= mean_m);
             runs.push(FittedRun {
                 worm: self.worm(run, at)?,
                 start_deformation_m: self.start_m(run, at),

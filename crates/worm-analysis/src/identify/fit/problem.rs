@@ -114,7 +114,7 @@ impl<'a> Problem<'a> {
     /// Way of the body by theory at every sample of a run, m.
     pub(super) fn theory_m(&self, run: usize, at: &DVector<f64>) -> Option<Vec<f64>> {
         let worm = self.worm(run, at).ok()?;
-        self.runs[run].way_m(&worm, &self.start_m(run, at), self.damping_ratio(at))
+        self.runs[run].displacement_m(&worm, &self.start_m(run, at), self.damping_ratio(at))
     }
 
     pub(super) fn start_m(&self, run: usize, at: &DVector<f64>) -> Vec<f64> {

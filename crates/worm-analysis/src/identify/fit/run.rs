@@ -74,15 +74,15 @@ impl<'a> RunData<'a> {
     }
 
     /// Way of the body at every sample, m: the mean of the cells' positions less what the stroke alone would have made.
-    pub(super) fn way_m(&self, worm: &Worm, start_m: &[f64], damping_ratio: f64) -> Option<Vec<f64>> {
+    pub(super) fn displacement_m(&self, worm: &Worm, start_m: &[f64], damping_ratio: f64) -> Option<Vec<f64>> {
         let Run { time_s, gait, .. } = self.run;
         let mut body = TheoryBody::at_rest(worm, gait.phase[0], start_m, damping_ratio);
-        let mut way_m = Vec::with_capacity(time_s.len());
+        let mut displacement_m = Vec::with_capacity(time_s.len());
         for sample in 0..time_s.len() {
             let step_s = time_s[sample] - time_s[sample.saturating_sub(1)];
-            way_m.push(body.go_to(gait.phase[sample], step_s).ok()?);
+            displacement_m.push(body.go_to(gait.phase[sample], step_s).ok()?);
         }
-        Some(way_m)
+        Some(displacement_m)
     }
 }
 

@@ -30,29 +30,29 @@ impl Finder<'_> {
         for slot in [here, here - 1.0, here + 1.0] {
             let stepping = stepping_in(slot);
             let begun = slot / cells as f64 + 1e-12;
-            let way_m = |cell: usize| {
+            let displacement_m = |cell: usize| {
                 self.seen_m[cell][sample] - self.place_m[cell] - self.stroke_m * self.steps_made(cell, begun).round()
             };
             let (mut sum_m, mut squares, mut count) = (0.0, 0.0, 0.0);
-            for way_m in (0..cells)
+            for displacement_m in (0..cells)
                 .filter(|&cell| cell != stepping)
-                .map(way_m)
-                .filter(|way_m| way_m.is_finite())
+                .map(displacement_m)
+                .filter(|displacement_m| displacement_m.is_finite())
             {
-                sum_m += way_m;
-                squares += way_m * way_m;
+                sum_m += displacement_m;
+                squares += displacement_m * displacement_m;
                 count += 1.0;
             }
-            let extension = (way_m(stepping) - sum_m / count) / self.stroke_m;
+            let extension = (displacement_m(stepping) - sum_m / count) / self.stroke_m;
             if count == 0.0 || extension.is_nan() {
                 continue;
             }
-            let share = extension.clamp(0.0, 1.0);
-            let beyond_m = (extension - share) * self.stroke_m;
-            let misfit = squares - sum_m * sum_m / count + beyond_m * beyond_m * count / (count + 1.0);
-            if misfit < best.0 {
+            let fraction = extension.clamp(0.0, 1.0);
+            let beyond_m = (extension - fraction) * self.stroke_m;
+            let chi_squared = squares - sum_m * sum_m / count + beyond_m * beyond_m * count / (count + 1.0);
+            if chi_squared < best.0 {
                 let sigma = self.noise_m * (1.0 + 1.0 / count).sqrt() / (self.stroke_m * cells as f64);
-                best = (misfit, (slot + share) / cells as f64, sigma * sigma);
+                best = (chi_squared, (slot + fraction) / cells as f64, sigma * sigma);
             }
         }
         let believable = best.0 < (MISFIT * self.noise_m).powi(2) * cells as f64;

@@ -1,6 +1,6 @@
 //! A recorded gait phase: what it must be like, and which cell steps in which part of it.
 
-use super::{Finder, GaitError, LEAST_CYCLES};
+use super::{Finder, GaitError, MIN_CYCLES};
 
 /// How far a recorded phase may fall back behind where it has been, cycles, before it counts as running back.
 const BACKWARD: f64 = 0.03;
@@ -34,7 +34,7 @@ impl Finder<'_> {
             });
         }
         let cycles = phase[phase.len() - 1] - phase[0];
-        if cycles < LEAST_CYCLES {
+        if cycles < MIN_CYCLES {
             return Err(GaitError::TooFewSteps { cycles });
         }
         if cycles * cells as f64 > phase.len() as f64 {
@@ -57,12 +57,12 @@ impl Finder<'_> {
                 continue;
             }
             let mean_m = moves.iter().sum::<f64>() / cells as f64;
-            for (rise_m, way_m) in rise_m[part].iter_mut().zip(moves) {
-                *rise_m += way_m - mean_m;
+            for (rise_m, displacement_m) in rise_m[part].iter_mut().zip(moves) {
+                *rise_m += displacement_m - mean_m;
             }
         }
-        let most = |row: &Vec<f64>| (0..cells).max_by(|&a, &b| row[a].total_cmp(&row[b])).unwrap_or(0);
-        let order: Vec<usize> = rise_m.iter().map(most).collect();
+        let max = |row: &Vec<f64>| (0..cells).max_by(|&a, &b| row[a].total_cmp(&row[b])).unwrap_or(0);
+        let order: Vec<usize> = rise_m.iter().map(max).collect();
         for cell in 0..cells {
             if !order.contains(&cell) {
                 return Err(GaitError::Phase(format!(

@@ -17,18 +17,18 @@ const PERIOD_S: f64 = 1.0 / 120.0;
 #[derive(Debug, Clone, Copy)]
 struct Sight {
     dropout_share: f64,
-    outlier_share: f64, // 5 mm off
+    outlier_fraction: f64, // 5 mm off
     pauses: usize,
 }
 
 const GOOD: Sight = Sight {
     dropout_share: 0.0,
-    outlier_share: 0.0,
+    outlier_fraction: 0.0,
     pauses: 0,
 };
 const BAD: Sight = Sight {
     dropout_share: 0.05,
-    outlier_share: 0.005,
+    outlier_fraction: 0.005,
     pauses: 2,
 };
 
@@ -90,7 +90,7 @@ fn crawl(step_order: &[usize], from: f64, cycles: f64, sight: Sight, seed: u64) 
             for (series, true_m) in seen.measured_m.iter_mut().zip(motion.positions_m()) {
                 let noise: f64 = StandardNormal.sample(&mut rng);
                 let mut at_m = true_m + NOISE_M * noise;
-                if rng.random_bool(sight.outlier_share) {
+                if rng.random_bool(sight.outlier_fraction) {
                     at_m += 5e-3;
                 }
                 series.push(if rng.random_bool(sight.dropout_share) {

@@ -26,10 +26,10 @@ fn with_great_damping_the_way_is_quasi_static() {
     let mut off_m = 0.0; // at the end of the cycle before
     for sample in 1..=3000 {
         let phase = 0.3 + f64::from(sample) / 300.0;
-        let way_m = body.go_to(phase, 1.0 / 120.0).expect("it holds");
+        let displacement_m = body.go_to(phase, 1.0 / 120.0).expect("it holds");
         motion.advance_to(&worm, phase).expect("it holds");
         let quasi_static_m = motion.mean_position_m() - worm.stroke_m() * (phase - 0.3);
-        let more_m: f64 = way_m - quasi_static_m - off_m;
+        let more_m: f64 = displacement_m - quasi_static_m - off_m;
         assert!(more_m.abs() < 2e-6, "sample {sample}: off by {more_m} m more");
         if sample % 300 == 0 {
             off_m += more_m;

@@ -32,7 +32,7 @@ fn calibration(calibrated: &[Calibrated]) -> Table {
         table.rows.push(vec![
             value.name.clone(),
             unit.to_owned(),
-            significant(value.believed * factor, 4),
+            significant(value.nominal * factor, 4),
             to_error(value.found * factor, value.sigma * factor),
             change(value),
             if value.at_limit { "at the limit" } else { "yes" }.to_owned(),
@@ -57,7 +57,7 @@ fn calibration(calibrated: &[Calibrated]) -> Table {
 
 /// The change as a share of what was believed; nothing can be said of what was believed to be 0.
 fn change(value: &Calibrated) -> String {
-    let percent = 100.0 * (value.found / value.believed - 1.0);
+    let percent = 100.0 * (value.found / value.nominal - 1.0);
     let sign = if percent > 0.0 { "+" } else { "" };
     match fixed(percent, 1) {
         none if none == NONE => none,

@@ -16,7 +16,7 @@ const HALF_BAR: f64 = 0.32;
 /// Below this an improvement is nothing, and its bar has no length.
 const LEAST: f64 = 1.0;
 /// Most lines that the table of the screening has.
-const MOST_SCREENED: usize = 60;
+const MAX_SCREENED: usize = 60;
 
 pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
     page.paragraph(&why(answer));
@@ -321,7 +321,7 @@ fn library(answer: &Answer) -> Table {
     let head = ["effect", "what became of it", "expected", "improvement"];
     let mut table = Table::new("The whole library, screened", head);
     table.word_columns = 2;
-    for entry in answer.screening.iter().take(MOST_SCREENED) {
+    for entry in answer.screening.iter().take(MAX_SCREENED) {
         table.rows.push(vec![
             with_cell(&entry.name, entry.cell),
             entry.outcome_in_words().to_owned(),
@@ -329,7 +329,7 @@ fn library(answer: &Answer) -> Table {
             fixed(entry.improvement.unwrap_or(f64::NAN), 1),
         ]);
     }
-    let more = match answer.screening.len().saturating_sub(MOST_SCREENED) {
+    let more = match answer.screening.len().saturating_sub(MAX_SCREENED) {
         0 => String::new(),
         more => format!(" {} more in report.json.", count(more, "line")),
     };

@@ -14,7 +14,7 @@ const ROW: f64 = 54.0;
 const HALF_BAR: f64 = 0.24;
 /// How far below its bar the effect of a stage stands, in rows, and the most characters that fit there.
 const BELOW: f64 = 0.4;
-const MOST_CHARACTERS: usize = 60;
+const MAX_CHARACTERS: usize = 60;
 /// Room behind the longest bar for its value, as a share of its length.
 const BEHIND: f64 = 0.2;
 
@@ -198,10 +198,10 @@ fn picture(bars: &[(&Told, &Stage)], floor: Option<&Stage>) -> Result<String, Dr
 }
 
 fn shortened(text: &str) -> String {
-    if text.chars().count() <= MOST_CHARACTERS {
+    if text.chars().count() <= MAX_CHARACTERS {
         return text.to_owned();
     }
-    text.chars().take(MOST_CHARACTERS - 1).chain(['…']).collect()
+    text.chars().take(MAX_CHARACTERS - 1).chain(['…']).collect()
 }
 
 fn table(answer: &Answer) -> Table {

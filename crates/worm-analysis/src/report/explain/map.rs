@@ -20,7 +20,7 @@ const LEAST: f64 = 80.0;
 /// Share of the scale from which a mark on it must be white to be seen.
 const DARK: f64 = 0.7;
 /// Most places that the table lists.
-const MOST_PLACES: usize = 24;
+const MAX_PLACES: usize = 24;
 
 pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
     if answer.is_by_advances() {
@@ -97,8 +97,8 @@ fn figure(answer: &Answer) -> Result<Figure, DrawError> {
 }
 
 fn keys(largest_m: f64) -> Vec<Key> {
-    let step = |share: f64, text: String| Key::new(Mark::Box, diverging(share), text);
-    let mm = |share: f64| fixed(share * largest_m * 1e3, 3);
+    let step = |fraction: f64, text: String| Key::new(Mark::Box, diverging(fraction), text);
+    let mm = |fraction: f64| fixed(fraction * largest_m * 1e3, 3);
     vec![
         step(-1.0, format!("{} mm: behind the model", mm(-1.0))),
         step(-0.5, mm(-0.5)),
@@ -147,16 +147,16 @@ fn paint(plot: &mut Plot<'_, '_, '_>, map: &ResidualMap, cells: usize, largest_m
         let significance = map.significance.get(cell).map_or(&[][..], |list| list);
         for (bin, ends) in edges(&map.phase).into_iter().enumerate() {
             let residual_m = residual_m.get(bin).copied().unwrap_or(f64::NAN);
-            let share = if largest_m > 0.0 {
+            let fraction = if largest_m > 0.0 {
                 residual_m / largest_m
             } else {
                 residual_m
             };
-            let share = if Axis::can_show(residual_m) { share } else { f64::NAN };
-            let colour = if share.is_nan() { LIGHT } else { diverging(share) };
+            let fraction = if Axis::can_show(residual_m) { fraction } else { f64::NAN };
+            let colour = if fraction.is_nan() { LIGHT } else { diverging(fraction) };
             plot.fill(ends, [row - 0.5, row + 0.5], colour, 1.0)?;
             let sigma = significance.get(bin).map_or(0.0, |sigma| sigma.abs());
-            let mark = if share.abs() > DARK { PAPER } else { INK };
+            let mark = if fraction.abs() > DARK { PAPER } else { INK };
             let middle = 0.5 * (ends[0] + ends[1]);
             if sigma >= PLAIN {
                 plot.diamond(middle, row, INK)?;
@@ -261,7 +261,7 @@ pub(super) fn table(places: &[Place]) -> Table {
     ];
     let mut table = Table::new("Where model and data disagree, the clearest first", head);
     table.word_columns = 2;
-    for place in places.iter().take(MOST_PLACES) {
+    for place in places.iter().take(MAX_PLACES) {
         table.rows.push(vec![
             format!("cell {}", place.cell),
             format!("cell {}", place.stepping_cell),
@@ -271,7 +271,7 @@ pub(super) fn table(places: &[Place]) -> Table {
             fixed(place.significance, 1),
         ]);
     }
-    table.note = (places.len() > MOST_PLACES)
-        .then(|| format!("{} more in report.json.", count(places.len() - MOST_PLACES, "place")));
+    table.note = (places.len() > MAX_PLACES)
+        .then(|| format!("{} more in report.json.", count(places.len() - MAX_PLACES, "place")));
     table
 }

@@ -85,7 +85,7 @@ fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[
     let ribbon = |centre: f64, scatter_m: f64| [centre - scatter_m * 1e3, centre + scatter_m * 1e3];
     let scatter = run.scatter_m.iter().map(|scatter_m| scatter_m * 1e3);
     let ways = [&run.measured_m, &run.baseline_m, &run.recalibrated_m, &run.named_m];
-    let ways_mm = ways.into_iter().flatten().map(|way_m| way_m * 1e3);
+    let ways_mm = ways.into_iter().flatten().map(|displacement_m| displacement_m * 1e3);
     let below_mm = residuals.iter().flatten().copied();
     let sheet = Sheet {
         description: format!("The mean cycle at {name}, measured and by each model, and what each is off by"),
@@ -117,9 +117,9 @@ fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[
             }
             return Ok(());
         }
-        let scattered = scattered.map(|((phase, way_m), scatter_m)| (*phase, ribbon(way_m * 1e3, *scatter_m)));
+        let scattered = scattered.map(|((phase, displacement_m), scatter_m)| (*phase, ribbon(displacement_m * 1e3, *scatter_m)));
         plot.ribbon(scattered, MUTED, SCATTER)?;
-        let in_mm = |way_m: &[f64]| at_phases(way_m.iter().map(|way_m| way_m * 1e3).collect());
+        let in_mm = |displacement_m: &[f64]| at_phases(displacement_m.iter().map(|displacement_m| displacement_m * 1e3).collect());
         plot.line(in_mm(&run.measured_m), Stroke::new(MEASURED, MEASURED_WIDTH))?;
         for line in lines(run) {
             plot.line(in_mm(line.values_m), line.stroke)?;

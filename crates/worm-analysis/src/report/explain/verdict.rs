@@ -149,8 +149,8 @@ fn tiles(effect: &NamedEffect) -> Vec<Tile> {
             how: quantity.about.to_owned(),
         }
     });
-    let share = |name: &str, share: f64, how: &str| {
-        let value = percent(share);
+    let fraction = |name: &str, fraction: f64, how: &str| {
+        let value = percent(fraction);
         let (value, unit) = value.strip_suffix(" %").map_or((&*value, ""), |value| (value, "%"));
         Tile {
             name: name.to_owned(),
@@ -160,13 +160,13 @@ fn tiles(effect: &NamedEffect) -> Vec<Tile> {
         }
     };
     let judged = [
-        share("gap closed", effect.closure, "of what recalibration leaves open"),
-        share(
+        fraction("gap closed", effect.closure, "of what recalibration leaves open"),
+        fraction(
             "ahead of the others",
             effect.margin,
             "points of the gap, before the best of another kind",
         ),
-        share("probability", effect.probability, "among the effects of the library"),
+        fraction("probability", effect.probability, "among the effects of the library"),
     ];
     // What was not held against anything is not told as a dash.
     let told = judged.into_iter().filter(|tile| tile.value != NONE);

@@ -202,10 +202,10 @@ fn caption(runs: Runs<'_>) -> String {
         Some(count(settled, "settled cycle"))
     });
     let without = runs.without_theory();
-    let most = most_backward(runs);
+    let max = most_backward(runs);
     format!(
         "After figure 7 of the paper. Slide of a tip per cycle, over {cycles}. In the mean over the cells a tip \
-         slides {measured}; {theory}{without}.{most}"
+         slides {measured}; {theory}{without}.{max}"
     )
 }
 

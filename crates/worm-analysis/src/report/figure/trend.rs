@@ -90,12 +90,12 @@ fn caption(runs: Runs<'_>) -> String {
         ))
     });
     let scatter = runs.tell(|run| {
-        let share = 100.0 * run.std.energy_loss_j / run.mean.energy_loss_j.abs();
-        share.is_finite().then(|| {
-            if share < 0.05 {
+        let fraction = 100.0 * run.std.energy_loss_j / run.mean.energy_loss_j.abs();
+        fraction.is_finite().then(|| {
+            if fraction < 0.05 {
                 "less than 0.1 %".to_owned()
             } else {
-                format!("{} %", fixed(share, 1))
+                format!("{} %", fixed(fraction, 1))
             }
         })
     });

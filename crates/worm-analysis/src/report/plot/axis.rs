@@ -15,7 +15,7 @@ const MARGIN: f64 = 0.05;
 /// Room beyond the largest value of a logarithmic axis, as a share of its decades: what stands behind a bar must fit.
 const ROOM_BEHIND: f64 = 0.16;
 /// Most ticks of a logarithmic axis.
-const MOST_POWERS: usize = 6;
+const MAX_POWERS: usize = 6;
 /// Room beyond the outermost values of a logarithmic axis, as a factor.
 const LOGARITHMIC_MARGIN: f64 = 1.05;
 /// Room behind the end of a logarithmic axis for half of the tick's name there, as a share of its decades.
@@ -94,19 +94,19 @@ impl Axis {
         }
     }
 
-    /// Logarithmic from `least`, a power of ten, to the largest value that can be drawn and some room behind it.
-    pub fn powers_of_ten(least: f64, values: impl IntoIterator<Item = f64>) -> Self {
+    /// Logarithmic from `min`, a power of ten, to the largest value that can be drawn and some room behind it.
+    pub fn powers_of_ten(min: f64, values: impl IntoIterator<Item = f64>) -> Self {
         let drawable = values.into_iter().filter(|value| Self::can_show(*value));
-        let largest = drawable.fold(10.0 * least, f64::max);
-        let decades = (largest / least).log10();
-        let high = least * 10f64.powf(decades * (1.0 + ROOM_BEHIND));
-        let powers = (high / least).log10().floor() as usize;
-        let every = powers / MOST_POWERS + 1;
+        let largest = drawable.fold(10.0 * min, f64::max);
+        let decades = (largest / min).log10();
+        let high = min * 10f64.powf(decades * (1.0 + ROOM_BEHIND));
+        let powers = (high / min).log10().floor() as usize;
+        let every = powers / MAX_POWERS + 1;
         let ticks = (0..=powers).step_by(every);
         Self {
-            low: least,
+            low: min,
             high,
-            ticks: ticks.map(|power| least * 10f64.powi(power as i32)).collect(),
+            ticks: ticks.map(|power| min * 10f64.powi(power as i32)).collect(),
             labels: Labels::Powers,
             is_logarithmic: true,
         }
@@ -114,10 +114,10 @@ impl Axis {
 
     /// Logarithmic around two positive values, out to the next of 1, 2 or 5 times a power of ten, with ticks at the powers of
     /// ten and thousands written as `k`. From 1 to 10 where the values are none that it can hold.
-    pub fn logarithmic(least: f64, largest: f64) -> Self {
-        let can_hold = 0.0 < least && least <= largest && Self::can_show(largest);
+    pub fn logarithmic(min: f64, largest: f64) -> Self {
+        let can_hold = 0.0 < min && min <= largest && Self::can_show(largest);
         let (low, high) = if can_hold {
-            let low = 1.0 / round_step(LOGARITHMIC_MARGIN / least);
+            let low = 1.0 / round_step(LOGARITHMIC_MARGIN / min);
             (low, round_step(LOGARITHMIC_MARGIN * largest))
         } else {
             (1.0, 10.0)
@@ -130,7 +130,7 @@ impl Axis {
             let steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|step| step * power));
             steps.filter(lies_within).collect()
         } else {
-            let every = (tens.len() - 1) / MOST_POWERS + 1;
+            let every = (tens.len() - 1) / MAX_POWERS + 1;
             tens.into_iter().step_by(every).collect()
         };
         Self {
@@ -180,7 +180,7 @@ impl Axis {
     }
 
     /// Where a value lies between its ends, as a share; what a logarithmic axis cannot hold lies at its low end.
-    pub(super) fn share(&self, value: f64) -> f64 {
+    pub(super) fn fraction(&self, value: f64) -> f64 {
         if self.is_logarithmic {
             return (value.max(self.low) / self.low).log10() / (self.high / self.low).log10();
         }
@@ -231,7 +231,7 @@ impl Ranged for Axis {
     type ValueType = f64;
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        (f64::from(limit.0) + self.share(*value) * f64::from(limit.1 - limit.0)).round() as i32
+        (f64::from(limit.0) + self.fraction(*value) * f64::from(limit.1 - limit.0)).round() as i32
     }
 
     fn key_points<Hint: KeyPointHint>(&self, _hint: Hint) -> Vec<f64> {
@@ -295,10 +295,10 @@ mod tests {
             (f64::NAN, 10.0, &["1", "2", "5", "10"]),
             (0.0, f64::INFINITY, &["1", "2", "5", "10"]),
         ];
-        for (least, largest, expected) in table {
-            let axis = Axis::logarithmic(least, largest);
-            assert_eq!(labels(&axis), expected, "{least} to {largest}");
-            assert!(axis.low < axis.high, "{least} to {largest}");
+        for (min, largest, expected) in table {
+            let axis = Axis::logarithmic(min, largest);
+            assert_eq!(labels(&axis), expected, "{min} to {largest}");
+            assert!(axis.low < axis.high, "{min} to {largest}");
         }
     }
 

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::palette::{Colour, GRID, INK, MUTED, PAPER};
 use super::raw::{Raw, TEXT, dots, text_size, text_style};
-use super::thin;
+use super::decimate;
 use plotters::prelude::{
     Cartesian2d, ChartBuilder, ChartContext, Circle, DrawingAreaErrorKind, EmptyElement, LabelAreaPosition,
     PathElement, Polygon, Rectangle, SVGBackend, Text,
@@ -120,8 +120,8 @@ impl Plot<'_, '_, '_> {
     /// [`DrawError`], as all that draws.
     pub fn line(&mut self, points: impl IntoIterator<Item = (f64, f64)>, stroke: Stroke) -> Result<(), DrawError> {
         let columns = (WIDTH - LEFT - RIGHT) as usize;
-        for piece in thin::pieces(points) {
-            let mut piece = thin::thinned(&piece, self.x, columns);
+        for piece in decimate::pieces(points) {
+            let mut piece = decimate::thinned(&piece, self.x, columns);
             if let [alone] = piece[..] {
                 piece.push(alone); // A line from a point to itself has round ends and is seen as a dot.
             }
@@ -171,7 +171,7 @@ impl Plot<'_, '_, '_> {
         colour: Colour,
         radius: f64,
     ) -> Result<(), DrawError> {
-        let pieces = thin::pieces(points);
+        let pieces = decimate::pieces(points);
         let circles = pieces
             .into_iter()
             .flatten()

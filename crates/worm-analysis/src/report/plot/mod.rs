@@ -10,7 +10,7 @@ mod palette;
 mod raw;
 #[cfg(test)]
 mod tests;
-mod thin;
+mod decimate;
 
 pub use axis::Axis;
 pub use canvas::{DrawError, Plot, Row, Sheet, Stroke, draw};

@@ -78,18 +78,18 @@ const ABOVE: [Colour; 4] = [
 ];
 
 /// Diverging colour of a value as a share of the largest, −1 to 1; grey where it is not known.
-pub fn diverging(share: f64) -> Colour {
-    if share.is_nan() {
+pub fn diverging(fraction: f64) -> Colour {
+    if fraction.is_nan() {
         return LIGHT;
     }
-    let stops = if share < 0.0 { BELOW } else { ABOVE };
-    let place = share.abs().min(1.0) * (stops.len() - 1) as f64;
+    let stops = if fraction < 0.0 { BELOW } else { ABOVE };
+    let place = fraction.abs().min(1.0) * (stops.len() - 1) as f64;
     let stop = (place.floor() as usize).min(stops.len() - 2);
     mixed(stops[stop], stops[stop + 1], place - stop as f64)
 }
 
-fn mixed(from: Colour, to: Colour, share: f64) -> Colour {
-    let mix = |from: u8, to: u8| (f64::from(from) + share * (f64::from(to) - f64::from(from))).round() as u8;
+fn mixed(from: Colour, to: Colour, fraction: f64) -> Colour {
+    let mix = |from: u8, to: u8| (f64::from(from) + fraction * (f64::from(to) - f64::from(from))).round() as u8;
     RGBColor(mix(from.0, to.0), mix(from.1, to.1), mix(from.2, to.2))
 }
 

@@ -109,18 +109,18 @@ fn the_static_bound_stands_above_the_kinetic_one() {
             let pad = pad(contact, ratio);
             let mut tip = Tip::laid_down(0.0);
             let cell_m_s = 18e-3;
-            let mut most_n: f64 = 0.0;
+            let mut max_n: f64 = 0.0;
             for _ in 0..(2.0 / STEP_S) as usize {
                 tip.follow(cell_m_s * STEP_S, STEP_S, &pad, LIMITS);
-                most_n = most_n.max(tip.force_n);
+                max_n = max_n.max(tip.force_n);
             }
             let told = format!(
-                "{}, ratio {ratio}: {most_n} N, then {} N: {contact:?}",
+                "{}, ratio {ratio}: {max_n} N, then {} N: {contact:?}",
                 name(&contact),
                 tip.force_n
             );
             // Beside it stand the viscous part and, while the bristle bends, its damper.
-            let excess = most_n / LIMIT_N - 1.0;
+            let excess = max_n / LIMIT_N - 1.0;
             assert!(excess < 1.02 * (ratio - 1.0) + 0.01, "{told}");
             // The faster a contact is loaded and the rounder its knee, the less of a small excess is felt.
             assert!(excess > 0.4 * (ratio - 1.0) - 1e-3, "{told}");

@@ -381,12 +381,12 @@ fn progress_runs_from_nothing_to_the_whole() {
         cycles: 20.0,
         ..crawl()
     });
-    let mut shares = Vec::new();
+    let mut fractions = Vec::new();
     let path = Folder::new();
     let path = path.write("long.csv", as_csv(&long));
-    open_with_progress(&path, &OpenOptions::default(), &mut |share| shares.push(share)).expect("a recording");
+    open_with_progress(&path, &OpenOptions::default(), &mut |fraction| fractions.push(fraction)).expect("a recording");
     assert!(
-        shares.len() > 2 && shares.is_sorted() && shares.iter().all(|share| (0.0..=1.0).contains(share)),
-        "{shares:?}"
+        fractions.len() > 2 && fractions.is_sorted() && fractions.iter().all(|fraction| (0.0..=1.0).contains(fraction)),
+        "{fractions:?}"
     );
 }

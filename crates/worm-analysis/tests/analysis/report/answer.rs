@@ -39,8 +39,8 @@ fn ways(bounds_m: &[f64], slope_deg: f64) -> Ways {
     let mut cell_m = vec![Vec::new(); cells];
     for &phase in &phase {
         motion.advance_to(&worm, 4.0 + phase).expect("a worm that holds");
-        for ((way_m, position_m), start_m) in cell_m.iter_mut().zip(motion.positions_m()).zip(&start_m) {
-            way_m.push(position_m - start_m);
+        for ((displacement_m, position_m), start_m) in cell_m.iter_mut().zip(motion.positions_m()).zip(&start_m) {
+            displacement_m.push(position_m - start_m);
         }
     }
     Ways { phase, cell_m }
@@ -57,7 +57,7 @@ impl Ways {
     /// Mean way of the cells, less what the stroke alone would make.
     fn of_body_m(&self) -> Vec<f64> {
         let cells = self.cell_m.len() as f64;
-        let mean_m = |sample: usize| self.cell_m.iter().map(|way_m| way_m[sample]).sum::<f64>() / cells;
+        let mean_m = |sample: usize| self.cell_m.iter().map(|displacement_m| displacement_m[sample]).sum::<f64>() / cells;
         let samples = self.phase.iter().enumerate();
         samples
             .map(|(sample, phase)| mean_m(sample) - 11.5e-3 * phase)
@@ -68,16 +68,16 @@ impl Ways {
 fn map(measured: &Ways, model: &Ways, slope_deg: f64) -> ResidualMap {
     let cells = measured.cell_m.len();
     let bins = cells * BINS_PER_STEP;
-    let at = |way_m: &[f64], bin: usize| way_m[bin * (way_m.len() - 1) / bins];
+    let at = |displacement_m: &[f64], bin: usize| displacement_m[bin * (displacement_m.len() - 1) / bins];
     let residual_m: Vec<Vec<f64>> = measured
         .cell_m
         .iter()
         .zip(&model.cell_m)
         .map(|(measured_m, model_m)| {
-            let way_m = |bin| at(measured_m, bin) - at(model_m, bin);
+            let displacement_m = |bin| at(measured_m, bin) - at(model_m, bin);
             let wobble_m = |bin: usize| 2e-6 * ((bin * 7919 % 13) as f64 - 6.0);
             (0..bins)
-                .map(|bin| way_m(bin + 1) - way_m(bin) + wobble_m(bin))
+                .map(|bin| displacement_m(bin + 1) - displacement_m(bin) + wobble_m(bin))
                 .collect()
         })
         .collect();
@@ -263,9 +263,9 @@ fn runs(figures: &Figures, is_named: bool) -> Vec<RunSummary> {
 }
 
 fn calibration() -> Vec<Calibrated> {
-    let value = |name: &str, believed, found, sigma, unit, at_limit| Calibrated {
+    let value = |name: &str, nominal, found, sigma, unit, at_limit| Calibrated {
         name: name.to_owned(),
-        believed,
+        nominal,
         found,
         sigma,
         unit,

@@ -23,7 +23,7 @@ fn odd_answers() -> Vec<(&'static str, Answer)> {
     absurd.stages[0].held_out_rms_m = 1e300;
     absurd.screening[0].improvement = Some(f64::NAN);
     absurd.screening[1].score = -3.0;
-    absurd.calibration[0].believed = f64::NAN;
+    absurd.calibration[0].nominal = f64::NAN;
     absurd.figures.maps_before[0].residual_m[1][3] = f64::INFINITY;
     absurd.figures.maps_before[0].significance.truncate(2);
     absurd.figures.maps_before[1].residual_m[2].truncate(5);

@@ -185,7 +185,7 @@ fn the_csv_reads_back_as_the_series() {
     );
     let stepping: Vec<f64> = series.stepping_cell.iter().map(|cell| *cell as f64 + 1.0).collect();
     assert_same("stepping_cell", &columns["stepping_cell"], &stepping);
-    let sliding: Vec<f64> = series.sliding[1].iter().map(|sense| f64::from(*sense)).collect();
+    let sliding: Vec<f64> = series.sliding[1].iter().map(|sign| f64::from(*sign)).collect();
     assert_same("sliding2", &columns["sliding2"], &sliding);
 
     let columns = read_columns(&dir.path().join("cycles.csv"));

@@ -27,7 +27,7 @@ const COST_WEIGHT: f64 = 0.1;
 /// A cycle longer than this many steady ones held the worm for a while: its cost is not that of the way.
 const LONGEST_CYCLE: f64 = 1.5;
 /// The cost is known once the weighted way is this share of the stroke.
-const LEAST_ADVANCE_SHARE: f64 = 0.05;
+const MIN_ADVANCE_SHARE: f64 = 0.05;
 /// The alarm is over when the ratio is above the threshold by this factor.
 const CLEAR_FACTOR: f64 = 1.15;
 /// Ratios above this are reported as this: the worm is at home.
@@ -38,7 +38,7 @@ pub(super) struct BatteryLow {
     battery: Option<Battery>,
     threshold: f64,
     stroke_m: f64,
-    share: f64,
+    fraction: f64,
     known_s: f64, // time with voltage readings
     home: Option<Positions>,
     distance_m: f64,
@@ -53,7 +53,7 @@ impl BatteryLow {
             battery: config.battery.clone(),
             threshold: config.alarms.battery_low.threshold,
             stroke_m: config.worm.stroke_m,
-            share: f64::NAN,
+            fraction: f64::NAN,
             known_s: 0.0,
             home: None,
             distance_m: 0.0,
@@ -64,8 +64,8 @@ impl BatteryLow {
     }
 
     /// Charge left, 0 to 1; `NaN` without a battery or before its voltage was read.
-    pub(super) const fn share(&self) -> f64 {
-        self.share
+    pub(super) const fn fraction(&self) -> f64 {
+        self.fraction
     }
 
     pub(super) fn note_positions(&mut self, positions: &Positions) {
@@ -82,18 +82,18 @@ impl BatteryLow {
 
     pub(super) fn note_cycle(&mut self, moment: &Moment, cycle: &Cycle) {
         let Some(battery) = &self.battery else { return };
-        let way_m = cycle.advance_m.abs();
+        let displacement_m = cycle.advance_m.abs();
         let energy_j = cycle.energy_electrical_j + battery.hotel_power_w * cycle.duration_s;
         let crawled_through = cycle.duration_s * moment.regime_cycles_per_s.abs() <= LONGEST_CYCLE;
-        if crawled_through && way_m <= self.stroke_m && energy_j > 0.0 && energy_j < 1e9 {
+        if crawled_through && displacement_m <= self.stroke_m && energy_j > 0.0 && energy_j < 1e9 {
             self.paid_j += energy_j - COST_WEIGHT * self.paid_j;
-            self.gained_m += way_m - COST_WEIGHT * self.gained_m;
+            self.gained_m += displacement_m - COST_WEIGHT * self.gained_m;
         }
     }
 
     /// Cost of a metre as the last cycles paid it, J/m, once they gained some way.
     fn cost_j_per_m(&self) -> Option<f64> {
-        (self.gained_m >= LEAST_ADVANCE_SHARE * self.stroke_m).then(|| self.paid_j / self.gained_m)
+        (self.gained_m >= MIN_ADVANCE_SHARE * self.stroke_m).then(|| self.paid_j / self.gained_m)
     }
 
     pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
@@ -109,17 +109,17 @@ impl BatteryLow {
             let open_v = volts + amperes * battery.internal_resistance_ohm;
             let by_voltage = ((open_v - battery.empty_v) / (battery.full_v - battery.empty_v)).clamp(0.0, 1.0);
             self.known_s += moment.step_s;
-            if self.share.is_nan() {
-                self.share = by_voltage;
+            if self.fraction.is_nan() {
+                self.fraction = by_voltage;
             }
-            self.share -= drawn_w * moment.step_s / battery.capacity_j;
+            self.fraction -= drawn_w * moment.step_s / battery.capacity_j;
             let weight = moment.step_s / self.known_s.clamp(moment.step_s.max(1e-3), CORRECTION_S);
-            self.share = (self.share + weight * (by_voltage - self.share)).clamp(0.0, 1.0);
+            self.fraction = (self.fraction + weight * (by_voltage - self.fraction)).clamp(0.0, 1.0);
         }
         if self.known_s < USABLE_S {
             return Finding::Blind;
         }
-        let left_j = (self.share - battery.reserve_share) * battery.capacity_j;
+        let left_j = (self.fraction - battery.reserve_share) * battery.capacity_j;
         let home_j = self.distance_m * self.cost_j_per_m().unwrap_or(0.0);
         let ratio = (left_j.max(0.0) / home_j.max(left_j.max(1e-9) / LARGEST_RATIO)).min(LARGEST_RATIO);
         let verdict = if ratio < self.threshold {

@@ -7,14 +7,14 @@
 
 use super::latch::{Finding, Reading, Verdict};
 use super::motion::Moment;
-use super::page::{Level, PageChart};
+use super::cusum::{Level, PageChart};
 use crate::config::Config;
 use crate::message::{Cycle, Severity};
 
 /// Least usual locomotion energy, share of the model's prediction: fewer is a bad calibration, not a good worm.
-const LEAST_OF_PREDICTION: f64 = 0.5;
+const MIN_OF_PREDICTION: f64 = 0.5;
 /// A cycle whose duration is further than this share from the steady one was disturbed.
-const DURATION_SHARE: f64 = 0.1;
+const DURATION_FRACTION: f64 = 0.1;
 
 #[derive(Debug, Clone)]
 pub(super) struct EnergyOverBudget {
@@ -54,7 +54,7 @@ impl EnergyOverBudget {
         self.disturbed |= !moment.steady || !sound;
         if let Some(cycle) = cycle {
             let expected_s = 1.0 / moment.regime_cycles_per_s.abs();
-            let whole = (cycle.duration_s - expected_s).abs() <= DURATION_SHARE * expected_s;
+            let whole = (cycle.duration_s - expected_s).abs() <= DURATION_FRACTION * expected_s;
             if !self.disturbed && whole && cycle.settled == 1 {
                 self.judge(cycle);
             }
@@ -75,7 +75,7 @@ impl EnergyOverBudget {
         let locomotion = self.locomotion.add(
             cycle.energy_loss_j,
             cycle.energy_loss_sigma_j,
-            LEAST_OF_PREDICTION * cycle.predicted_energy_loss_j,
+            MIN_OF_PREDICTION * cycle.predicted_energy_loss_j,
             began_ns,
         );
         if !self.electrical.can_tell() && !self.locomotion.can_tell() {

@@ -27,7 +27,7 @@ const CONFIRMATIONS: u32 = 3;
 /// A shortfall within this many standard deviations of an extension's error is noise …
 const NOISE_SIGMAS: f64 = 5.0;
 /// … but never one beyond this share of the stroke.
-const LARGEST_NOISE_SHARE: f64 = 0.7;
+const LARGEST_NOISE_FRACTION: f64 = 0.7;
 /// Samples over which the error is learned, some 25 steps; it begins at twice what the configuration says.
 const NOISE_MEMORY: f64 = 500.0;
 /// Whole good steps of the cell after which it is free again.
@@ -75,13 +75,13 @@ struct Step {
     seen_from: f64,
     seen_to: f64,
     short: u32,       // samples in a row that fell short
-    worst_share: f64, // largest share missing in the last part of the step
+    worst_fraction: f64, // largest share missing in the last part of the step
     profile: Profile,
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct JammedCell {
-    share: f64,
+    fraction: f64,
     stroke_m: f64,
     noise_m: f64,     // standard deviation of an extension by the configuration
     variance_m2: f64, // of the extensions about their usual, as learned
@@ -107,7 +107,7 @@ impl JammedCell {
         // Two positions of the cell and two means over the others.
         let noise_m = config.tracker.noise_m * (2.0 + 2.0 / (cells.max(2) - 1) as f64).sqrt();
         Self {
-            share: config.alarms.jammed_cell.threshold,
+            fraction: config.alarms.jammed_cell.threshold,
             stroke_m: config.worm.stroke_m,
             noise_m,
             variance_m2: 4.0 * noise_m * noise_m,
@@ -184,7 +184,7 @@ impl JammedCell {
             seen_from: done,
             seen_to: done,
             short: 0,
-            worst_share: 0.0,
+            worst_fraction: 0.0,
             profile: Profile::default(),
         });
     }
@@ -206,20 +206,20 @@ impl JammedCell {
         step.profile.add(done, ratio);
         let (good_steps, profile) = &self.usual[side_of(moment)][step.cell];
         let calibrated = *good_steps >= self.calibration_steps;
-        let (usual_ratio, share) = match profile.ratio(done).filter(|_| calibrated) {
-            Some(ratio) => (ratio, self.share),
-            None => (1.0, 0.5 * (1.0 + self.share)),
+        let (usual_ratio, fraction) = match profile.ratio(done).filter(|_| calibrated) {
+            Some(ratio) => (ratio, self.fraction),
+            None => (1.0, 0.5 * (1.0 + self.fraction)),
         };
-        let missing_share = 1.0 - ratio / usual_ratio.max(0.1);
+        let missing_fraction = 1.0 - ratio / usual_ratio.max(0.1);
         let missing_m = (usual_ratio - ratio) * covered * self.stroke_m;
         let noise_m = NOISE_SIGMAS * self.noise_m.max(self.variance_m2.sqrt());
-        let short = missing_share > share && missing_m > noise_m.min(LARGEST_NOISE_SHARE * usual_ratio * self.stroke_m);
+        let short = missing_fraction > fraction && missing_m > noise_m.min(LARGEST_NOISE_FRACTION * usual_ratio * self.stroke_m);
         if calibrated && !short {
             let error_m = missing_m.clamp(-noise_m, noise_m);
             self.variance_m2 += (error_m * error_m - self.variance_m2) / NOISE_MEMORY;
         }
         step.short = if short { step.short + 1 } else { 0 };
-        step.worst_share = missing_share;
+        step.worst_fraction = missing_fraction;
         if step.short >= CONFIRMATIONS {
             self.jammed = match self.jammed {
                 Some((cell, _)) if cell != step.cell => self.jammed, // the first one stays named
@@ -228,15 +228,15 @@ impl JammedCell {
         }
         let verdict = match self.jammed {
             Some((_, good)) if good < GOOD_STEPS => Verdict::Bad,
-            _ if missing_share < 0.5 * share => Verdict::Good,
+            _ if missing_fraction < 0.5 * fraction => Verdict::Good,
             _ => Verdict::Between,
         };
         let about = self.jammed.map_or(step.cell, |(cell, _)| cell);
         let keeps = |reading: &Reading| about != step.cell && reading.cell == Some(about);
         if self.reading.as_ref().is_none_or(|reading| !keeps(reading)) {
             self.reading = Some(Reading {
-                value: missing_share,
-                threshold: share,
+                value: missing_fraction,
+                threshold: fraction,
                 verdict,
                 since_ns: step.began_ns,
                 cell: Some(about),
@@ -253,20 +253,20 @@ impl JammedCell {
             return;
         }
         let (good_steps, profile) = &mut self.usual[side_of(moment)][step.cell];
-        if *good_steps < self.calibration_steps && step.worst_share < 0.5 * (1.0 + self.share) {
+        if *good_steps < self.calibration_steps && step.worst_fraction < 0.5 * (1.0 + self.fraction) {
             *good_steps += 1;
             profile.merge(&step.profile);
         }
         if let Some((cell, good)) = &mut self.jammed
             && *cell == step.cell
-            && step.worst_share < 0.5 * self.share
+            && step.worst_fraction < 0.5 * self.fraction
         {
             *good += 1;
             if *good >= GOOD_STEPS {
                 self.jammed = None;
                 if let Some(reading) = &mut self.reading {
                     reading.verdict = Verdict::Good;
-                    reading.value = step.worst_share;
+                    reading.value = step.worst_fraction;
                 }
             }
         }

@@ -57,7 +57,7 @@ pub(super) struct Patience {
 #[derive(Debug, Clone)]
 pub(super) struct Latch {
     kind: AlarmKind,
-    patience: Patience,
+    timeout: Patience,
     raised: Option<Reading>,
     watched_from_ns: Option<u64>, // nothing is known from before
     bad_from_ns: Option<u64>,
@@ -65,10 +65,10 @@ pub(super) struct Latch {
 }
 
 impl Latch {
-    pub(super) const fn new(kind: AlarmKind, patience: Patience) -> Self {
+    pub(super) const fn new(kind: AlarmKind, timeout: Patience) -> Self {
         Self {
             kind,
-            patience,
+            timeout,
             raised: None,
             watched_from_ns: None,
             bad_from_ns: None,
@@ -90,7 +90,7 @@ impl Latch {
         match (self.raised, finding) {
             (None, Finding::Seen(reading)) if reading.verdict == Verdict::Bad && is_sound(reading) => {
                 let from_ns = *self.bad_from_ns.get_or_insert(now_ns);
-                (now_ns.saturating_sub(from_ns) >= self.patience.raise_after_ns).then(|| {
+                (now_ns.saturating_sub(from_ns) >= self.timeout.raise_after_ns).then(|| {
                     let reading = Reading {
                         since_ns: reading.since_ns.min(from_ns).max(watched_from_ns),
                         ..*reading
@@ -115,7 +115,7 @@ impl Latch {
                     return None;
                 }
                 let from_ns = *self.over_from_ns.get_or_insert(now_ns);
-                if now_ns.saturating_sub(from_ns) < self.patience.clear_after_ns {
+                if now_ns.saturating_sub(from_ns) < self.timeout.clear_after_ns {
                     return None;
                 }
                 let last = match finding {

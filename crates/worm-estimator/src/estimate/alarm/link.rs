@@ -14,7 +14,7 @@ const WINDOW_S: f64 = 0.5;
 /// Parts of the window; the oldest part falls out as a whole.
 const PARTS: usize = 10;
 /// Least share of the configured rate at which the loop ticks: see `control.adapt_rate`.
-const LEAST_RATE_SHARE: f64 = 0.125;
+const MIN_RATE_SHARE: f64 = 0.125;
 
 #[derive(Debug, Clone)]
 pub(super) struct LinkFault {
@@ -57,25 +57,25 @@ impl LinkFault {
         part.1 = part.1.saturating_add(failures);
         let ticks: f64 = self.parts.iter().map(|part| part.0 as f64).sum();
         let failures: f64 = self.parts.iter().map(|part| part.1 as f64).sum();
-        let least_ticks = if self.filled_s < WINDOW_S {
+        let min_ticks = if self.filled_s < WINDOW_S {
             1.0
         } else {
-            LEAST_RATE_SHARE
+            MIN_RATE_SHARE
         } * self.exchanges_in_window;
-        let share = failures / ticks.max(least_ticks);
+        let fraction = failures / ticks.max(min_ticks);
         if failures == 0.0 {
             self.since_ns = moment.now_ns;
         }
         let lost = state.fault == Fault::LinkLost.code();
-        let verdict = if lost || share > self.threshold {
+        let verdict = if lost || fraction > self.threshold {
             Verdict::Bad
-        } else if share <= 0.5 * self.threshold {
+        } else if fraction <= 0.5 * self.threshold {
             Verdict::Good
         } else {
             Verdict::Between
         };
         Finding::Seen(Reading {
-            value: share,
+            value: fraction,
             threshold: self.threshold,
             verdict,
             since_ns: self.since_ns,

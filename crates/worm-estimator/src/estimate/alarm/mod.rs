@@ -4,7 +4,7 @@
 //! gives back the alarms that were raised or cleared. It owns no clock: time is [`State::time_ns`]. It allocates nothing.
 //!
 //! Read in this order: `motion` tells what the cam does and `sample` which positions to trust; each detector (`stall`,
-//! `jam`, `stride` with `progress` and `sliding`, `page` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`)
+//! `jam`, `stride` with `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`)
 //! tells in its head how it decides; `latch` turns what they find into one "raised" and one "cleared".
 //!
 //! **Calibration.** What is usual is learned on the first `estimator.calibration_cycles` good cycles, in the gait's phase:
@@ -29,7 +29,7 @@ mod latch;
 mod link;
 mod mismatch;
 mod motion;
-mod page;
+mod cusum;
 mod progress;
 mod sample;
 mod sliding;
@@ -189,8 +189,8 @@ impl Watch {
     }
 
     /// Charge left in the battery, 0 to 1; `NaN` without a battery or before its voltage was read.
-    pub const fn battery_share(&self) -> f64 {
-        self.battery.share()
+    pub const fn battery_fraction(&self) -> f64 {
+        self.battery.fraction()
     }
 
     fn is_raised(&self, kind: AlarmKind) -> bool {

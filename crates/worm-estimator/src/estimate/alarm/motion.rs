@@ -19,11 +19,11 @@ const REVERSAL_TURNS: f64 = 0.02;
 /// The commanded speed is steady after this long without a change, s.
 const STEADY_TIME_S: f64 = 0.3;
 /// Changes of the commanded speed below this share are the controller's trimming.
-const STEADY_SHARE: f64 = 0.03;
+const STEADY_FRACTION: f64 = 0.03;
 /// … and so are changes below this part of a register count.
 const STEADY_UNITS: f64 = 0.3;
 /// A steady speed that differs from the regime's by more than this share makes a new regime.
-const REGIME_SHARE: f64 = 0.05;
+const REGIME_FRACTION: f64 = 0.05;
 /// Longest step of time that is integrated, s: beyond it states were lost or the controller paused.
 const LONGEST_STEP_S: f64 = 1.0;
 
@@ -175,7 +175,7 @@ impl Motion {
     }
 
     fn follow_goal(&mut self, goal: f64, crawling: bool, step_s: f64) {
-        let trim = (STEADY_SHARE * self.goal_reference.abs()).max(STEADY_UNITS * GOAL_UNIT_TURNS_PER_S);
+        let trim = (STEADY_FRACTION * self.goal_reference.abs()).max(STEADY_UNITS * GOAL_UNIT_TURNS_PER_S);
         if !crawling || (goal - self.goal_reference).abs() > trim || goal.abs() < 0.5 * GOAL_UNIT_TURNS_PER_S {
             self.goal_reference = goal;
             self.steady_s = 0.0;
@@ -183,7 +183,7 @@ impl Motion {
         }
         self.steady_s += step_s;
         let other =
-            (self.goal_reference - self.regime_cycles_per_s).abs() > REGIME_SHARE * self.regime_cycles_per_s.abs();
+            (self.goal_reference - self.regime_cycles_per_s).abs() > REGIME_FRACTION * self.regime_cycles_per_s.abs();
         if self.steady_s >= STEADY_TIME_S && (other || self.regime == 0) {
             self.regime = self.regime.wrapping_add(1).max(1);
             self.regime_cycles_per_s = self.goal_reference;

@@ -13,7 +13,7 @@ use crate::config::Config;
 use crate::message::{Cycle, Severity};
 
 /// Least advance per cycle that counts as usual, share of the stroke.
-const LEAST_USUAL_SHARE: f64 = 0.05;
+const MIN_USUAL_SHARE: f64 = 0.05;
 /// Part of the threshold share that is asked of the model's prediction.
 const TRUST_IN_MODEL: f64 = 0.5;
 /// Strides in a row below the limit.
@@ -21,13 +21,13 @@ const CONFIRMATIONS: u32 = 2;
 /// A shortfall within this many standard deviations of the usual advance is scatter.
 const SCATTER_SIGMAS: f64 = 5.0;
 /// The condition began when the advance last was above this share of the usual one.
-const ONSET_SHARE: f64 = 0.9;
+const ONSET_FRACTION: f64 = 0.9;
 /// How far above the limit, on the way to the usual advance, the worm must be again.
-const CLEAR_SHARE: f64 = 0.25;
+const CLEAR_FRACTION: f64 = 0.25;
 
 #[derive(Debug, Clone)]
 pub(super) struct NoProgress {
-    share: f64,
+    fraction: f64,
     least_usual_m: f64,
     calibration_cycles: u32,
     usual: [Usual; 2],             // backward, forward
@@ -40,8 +40,8 @@ pub(super) struct NoProgress {
 impl NoProgress {
     pub(super) fn new(config: &Config) -> Self {
         Self {
-            share: config.alarms.no_progress.threshold,
-            least_usual_m: LEAST_USUAL_SHARE * config.worm.stroke_m,
+            fraction: config.alarms.no_progress.threshold,
+            least_usual_m: MIN_USUAL_SHARE * config.worm.stroke_m,
             calibration_cycles: config.estimator.calibration_cycles,
             usual: [Usual::default(); 2],
             predicted_m: [None; 2],
@@ -90,15 +90,15 @@ impl NoProgress {
     fn judge(&mut self, moment: &Moment, strides: &Strides, advance_m: f64, sound: bool) -> Reading {
         let side = usize::from(moment.direction > 0.0);
         let known = self.usual[side].is_known(self.calibration_cycles);
-        let (usual_m, share, scatter_m) = if known {
+        let (usual_m, fraction, scatter_m) = if known {
             let usual = &self.usual[side];
-            (usual.mean_m(), self.share, SCATTER_SIGMAS * usual.sigma_m())
+            (usual.mean_m(), self.fraction, SCATTER_SIGMAS * usual.sigma_m())
         } else {
             let predicted_m = self.predicted_m[side].unwrap_or(0.0);
-            (predicted_m, TRUST_IN_MODEL * self.share, 0.0)
+            (predicted_m, TRUST_IN_MODEL * self.fraction, 0.0)
         };
         let usual_m = usual_m.max(self.least_usual_m);
-        let limit_m = share * usual_m;
+        let limit_m = fraction * usual_m;
         let below = advance_m < limit_m && usual_m - advance_m > scatter_m;
         if below {
             self.below += 1;
@@ -108,12 +108,12 @@ impl NoProgress {
                 self.usual[side].add(advance_m);
             }
         }
-        if advance_m >= ONSET_SHARE * usual_m - scatter_m {
+        if advance_m >= ONSET_FRACTION * usual_m - scatter_m {
             self.since_ns = moment.now_ns;
         }
         let verdict = if self.below >= CONFIRMATIONS {
             Verdict::Bad
-        } else if advance_m > limit_m + CLEAR_SHARE * (usual_m - limit_m) {
+        } else if advance_m > limit_m + CLEAR_FRACTION * (usual_m - limit_m) {
             Verdict::Good
         } else {
             Verdict::Between

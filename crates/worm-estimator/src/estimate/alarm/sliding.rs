@@ -28,7 +28,7 @@ const CONFIRMATIONS: u32 = 4;
 /// A movement within this many standard deviations of the mean position is noise.
 const NOISE_SIGMAS: f64 = 4.0;
 /// Part of the threshold by which the worm must sink further to count as still sliding.
-const FURTHER_SHARE: f64 = 0.25;
+const FURTHER_FRACTION: f64 = 0.25;
 /// The slide is over after this long without sinking further, s …
 const OVER_S: f64 = 2.0;
 /// … and, while crawling, after this many cycles.
@@ -207,9 +207,9 @@ impl SlidingDown {
         usual_m: Option<f64>,
     ) -> Option<f64> {
         let phase = moment.phase?;
-        if let Some(way_m) = strides.advance_until(moment, positions) {
+        if let Some(displacement_m) = strides.advance_until(moment, positions) {
             let usual_m = usual_m.filter(|_| strides.is_settled());
-            return Some(way_m - usual_m.unwrap_or(self.stroke_m));
+            return Some(displacement_m - usual_m.unwrap_or(self.stroke_m));
         }
         // No sample of one cycle ago: what was gained since the descent began, while that is less than a cycle ago.
         if (phase - self.anchor_phase).abs() > 1.0 {
@@ -223,7 +223,7 @@ impl SlidingDown {
             self.beyond += 1;
         } else {
             self.beyond = 0;
-            if excess_m < FURTHER_SHARE * self.threshold_m && !self.sliding {
+            if excess_m < FURTHER_FRACTION * self.threshold_m && !self.sliding {
                 self.since_ns = moment.now_ns;
             }
         }
@@ -234,7 +234,7 @@ impl SlidingDown {
         }
         let mut verdict = if self.sliding { Verdict::Bad } else { Verdict::Good };
         if self.sliding {
-            if excess_m > self.lowest_excess_m + FURTHER_SHARE * self.threshold_m {
+            if excess_m > self.lowest_excess_m + FURTHER_FRACTION * self.threshold_m {
                 self.lowest_excess_m = excess_m;
                 self.sunk_ns = moment.now_ns;
             }

@@ -27,15 +27,15 @@ const SERVO_LAG_S: f64 = 0.04;
 /// what the cam was ahead, confirmation and the way to the motor fit into the rest of a tenth of a second.
 const FULL_SPEED_TURNS_PER_S: f64 = 0.16;
 /// The threshold falls no further than this: eight counts of the encoder.
-const LEAST_TURNS: f64 = 0.002;
+const MIN_TURNS: f64 = 0.002;
 /// How far ahead the cam may count as, in thresholds, so that a fast moment does not hide a stall.
-const MOST_AHEAD: f64 = 0.2;
+const MAX_AHEAD: f64 = 0.2;
 /// Readings in a row beyond the threshold.
 const CONFIRMATIONS: u32 = 3;
 /// The condition began when the lag last passed this share of the threshold.
-const ONSET_SHARE: f64 = 0.2;
+const ONSET_FRACTION: f64 = 0.2;
 /// Share of the servo's current limit from which the motor works hard.
-const HARD_WORK_SHARE: f64 = 0.7;
+const HARD_WORK_FRACTION: f64 = 0.7;
 /// Nothing lags once no motion was commanded for this long, s.
 const SETTLED_S: f64 = 0.2;
 /// Longest pause between readings that is bridged, s; beyond it what was commanded meanwhile is not known.
@@ -63,7 +63,7 @@ impl MotorStall {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             threshold_turns: config.alarms.motor_stall.threshold,
-            hard_work_a: HARD_WORK_SHARE * config.servo.current_limit_a,
+            hard_work_a: HARD_WORK_FRACTION * config.servo.current_limit_a,
             longest_gap_s: LONGEST_GAP_S.max(3.0 / config.control.rate_hz),
             reference: 0.0,
             side: 1.0,
@@ -121,8 +121,8 @@ impl MotorStall {
 
     /// The threshold at a commanded speed, turns.
     fn threshold_at(&self, goal_turns_per_s: f64) -> f64 {
-        let share = (goal_turns_per_s.abs() / FULL_SPEED_TURNS_PER_S).min(1.0);
-        (share * self.threshold_turns).max(LEAST_TURNS.min(self.threshold_turns))
+        let fraction = (goal_turns_per_s.abs() / FULL_SPEED_TURNS_PER_S).min(1.0);
+        (fraction * self.threshold_turns).max(MIN_TURNS.min(self.threshold_turns))
     }
 
     fn follow_command(&mut self, moment: &Moment) {
@@ -169,9 +169,9 @@ impl MotorStall {
         if bridged {
             let forgotten = (self.commanded.abs() / (MEMORY * threshold)).min(1.0);
             self.lag += (self.commanded - travelled) * self.side - self.lag * forgotten;
-            self.lag = self.lag.max(-MOST_AHEAD * threshold);
+            self.lag = self.lag.max(-MAX_AHEAD * threshold);
         }
-        if self.lag <= ONSET_SHARE * threshold {
+        if self.lag <= ONSET_FRACTION * threshold {
             self.since_ns = moment.now_ns;
         }
         self.last_phase = Some(phase);

@@ -16,7 +16,7 @@ const WINDOW_S: f64 = 2.0;
 /// Parts of the window; the oldest part falls out as a whole.
 const PARTS: usize = 20;
 /// Share of the configured rate that counts as complete: a free-running tracker's clock differs, and parts are uneven.
-const COMPLETE_SHARE: f64 = 0.95;
+const COMPLETE_FRACTION: f64 = 0.95;
 
 /// Counts in one part of the window, or in all of them.
 #[derive(Debug, Clone, Copy, Default)]
@@ -66,10 +66,10 @@ impl TrackerFault {
         self.advance_window(moment);
         self.count(state);
         let silent = self.silent_s > self.timeout_s || state.fault == Fault::TrackerStale.code();
-        let (share, cell) = self.worst();
-        let verdict = if silent || share > self.threshold {
+        let (fraction, cell) = self.worst();
+        let verdict = if silent || fraction > self.threshold {
             Verdict::Bad
-        } else if share <= 0.5 * self.threshold {
+        } else if fraction <= 0.5 * self.threshold {
             Verdict::Good
         } else {
             Verdict::Between
@@ -78,7 +78,7 @@ impl TrackerFault {
             self.since_ns = moment.now_ns;
         }
         Finding::Seen(Reading {
-            value: share,
+            value: fraction,
             threshold: self.threshold,
             verdict,
             since_ns: self.since_ns,
@@ -145,7 +145,7 @@ impl TrackerFault {
     /// The largest share, and the cell if it is one cell's alone.
     fn worst(&self) -> (f64, Option<usize>) {
         let window_s = self.filled_s.min(WINDOW_S);
-        let due = COMPLETE_SHARE * self.rate_hz * window_s;
+        let due = COMPLETE_FRACTION * self.rate_hz * window_s;
         let full = self.rate_hz * WINDOW_S;
         // Shares are of a full window, so that the first samples weigh no more than later ones.
         let absent = (due - self.whole.arrived as f64).max(0.0) / full;
@@ -154,10 +154,10 @@ impl TrackerFault {
         let mut ailing = 0;
         for cell in 0..self.cells {
             let looked_at = (self.whole.looked_at as f64).max(0.5 * full);
-            let share = f64::from(self.whole.unseen[cell]) / looked_at;
-            ailing += u32::from(share > 0.5 * self.threshold);
-            if share > worst {
-                worst = share;
+            let fraction = f64::from(self.whole.unseen[cell]) / looked_at;
+            ailing += u32::from(fraction > 0.5 * self.threshold);
+            if fraction > worst {
+                worst = fraction;
                 named = Some(cell);
             }
         }

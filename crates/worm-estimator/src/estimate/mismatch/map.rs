@@ -4,7 +4,7 @@
 //! every deviation is significant. For each entry, and for the advance of the whole worm over a cycle, which adds up
 //! what is too small in every bin, the excess over the threshold is divided by the standard error. With Student's distribution
 //! and Bonferroni's share for each of the family's members, the chance that any of them is beyond while none truly is stays below
-//! [`FALSE_SHARE`], whatever hangs together with what.
+//! [`FALSE_FRACTION`], whatever hangs together with what.
 
 use super::BINS;
 use super::shadow::{ALLOWANCES, Part, Shadow};
@@ -12,7 +12,7 @@ use super::tally::{Known, Tally};
 use worm_physics::MAX_CELLS;
 
 /// Chance of the whole family to be beyond by chance, at one look.
-const FALSE_SHARE: f64 = 0.05;
+const FALSE_FRACTION: f64 = 0.05;
 /// Standard errors by which another cell than the stepping one must stand out to be named for what all show.
 const STANDS_OUT_SIGMAS: f64 = 4.0;
 
@@ -139,9 +139,9 @@ impl ResidualMap {
                 }
             }
             if square > 0.0 {
-                let share = (moment / square).clamp(-allowance.most, allowance.most);
+                let fraction = (moment / square).clamp(-allowance.max, allowance.max);
                 for (allowed_m, effect_m) in self.allowed_m.iter_mut().zip(effect_m) {
-                    *allowed_m += share * effect_m;
+                    *allowed_m += fraction * effect_m;
                 }
             }
         }
@@ -204,7 +204,7 @@ impl ResidualMap {
         let advance = self.advance.known(self.pooled)?;
         let advance_m = advance.mean - self.allowed_advance_m;
         // Half the tail of the normal distribution beyond z is below exp(−z²/2)/2.
-        let limit = (2.0 * ((self.size() + 1) as f64 / FALSE_SHARE).ln()).sqrt();
+        let limit = (2.0 * ((self.size() + 1) as f64 / FALSE_FRACTION).ln()).sqrt();
         let mut worst: Option<(f64, usize, Residual)> = None;
         let mut is_within = advance_m.abs() <= threshold_m;
         for index in 0..self.size() {
@@ -214,8 +214,8 @@ impl ResidualMap {
             is_within &= residual.unexplained_m.abs() <= threshold_m;
             // Beyond the threshold first; within it, the nearest to it.
             let rank = known.beyond(residual.unexplained_m, threshold_m);
-            let larger = |(most, _, than): &(f64, usize, Residual)| {
-                rank > *most || (rank == *most && residual.significance().abs() > than.significance().abs())
+            let larger = |(max, _, than): &(f64, usize, Residual)| {
+                rank > *max || (rank == *max && residual.significance().abs() > than.significance().abs())
             };
             if worst.as_ref().is_none_or(larger) {
                 worst = Some((rank, index, residual));
@@ -245,14 +245,14 @@ impl ResidualMap {
 
     /// The entry of the bin that contributes most to an excess of the advance.
     fn carrier_of(&self, advance_m: f64) -> Option<Residual> {
-        let way_m = |bin: usize| -> f64 {
+        let displacement_m = |bin: usize| -> f64 {
             let cells = bin * self.cells..(bin + 1) * self.cells;
             let known = cells.filter_map(|index| self.entry(index));
             known
                 .map(|(residual, _)| residual.unexplained_m * advance_m.signum())
                 .sum()
         };
-        let bins = (0..self.cells * BINS).map(|bin| (bin, way_m(bin)));
+        let bins = (0..self.cells * BINS).map(|bin| (bin, displacement_m(bin)));
         let (bin, _) = bins.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
         self.named(bin)
     }

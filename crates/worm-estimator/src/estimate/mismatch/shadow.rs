@@ -8,20 +8,20 @@ use worm_physics::{Motion, SlidesDown, Worm, WormError};
 /// Common deviations that are allowed for, each up to a share.
 pub(super) const ALLOWANCES: [Allowance; 2] = [
     Allowance {
-        most: 0.02,
+        max: 0.02,
         shows_in: Part::Extension,
-        deviate: |worm, share| {
-            let stroke_m = worm.stroke_m() * (1.0 + share);
+        deviate: |worm, fraction| {
+            let stroke_m = worm.stroke_m() * (1.0 + fraction);
             worm.with_stroke_m(stroke_m)
         },
     },
     Allowance {
-        most: 0.025,
+        max: 0.025,
         shows_in: Part::Body,
-        deviate: |mut worm, share| {
+        deviate: |mut worm, fraction| {
             for cell in 0..worm.cells() {
                 let mut contact = worm.contact(cell);
-                contact.stiffness_n_per_m *= 1.0 + share;
+                contact.stiffness_n_per_m *= 1.0 + fraction;
                 worm = worm.with_contact(cell, contact)?;
             }
             Ok(worm)
@@ -44,7 +44,7 @@ pub(super) enum Part {
 /// A deviation of the whole worm.
 pub(super) struct Allowance {
     /// How large it may be, as a share.
-    pub(super) most: f64,
+    pub(super) max: f64,
     /// By what it is found.
     pub(super) shows_in: Part,
     deviate: fn(Worm, f64) -> Result<Worm, WormError>,
@@ -128,7 +128,7 @@ impl Shadow {
     pub(super) fn effect_of(&self, allowance: &Allowance, effect_m: &mut [f64]) {
         effect_m.fill(0.0);
         let cells = self.worm().cells();
-        let Ok(deviating) = (allowance.deviate)(self.worm().clone(), allowance.most) else {
+        let Ok(deviating) = (allowance.deviate)(self.worm().clone(), allowance.max) else {
             return;
         };
         let (mut is, mut would_be) = (at_rest(self.worm()), at_rest(&deviating));
@@ -138,7 +138,7 @@ impl Shadow {
             would_be.advance_to(&deviating, phase)?;
             let mut difference_m = [0.0; MAX_CELLS];
             for (cell, to) in difference_m[..cells].iter_mut().enumerate() {
-                *to = (would_be.positions_m()[cell] - is.positions_m()[cell]) / allowance.most;
+                *to = (would_be.positions_m()[cell] - is.positions_m()[cell]) / allowance.max;
             }
             Ok(difference_m)
         };

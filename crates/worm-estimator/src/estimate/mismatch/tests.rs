@@ -117,15 +117,15 @@ fn the_place_is_where_it_is() {
 fn a_small_deviation_of_the_stroke_is_allowed_for() {
     let mut effect_m = vec![0.0; CELLS * BINS * CELLS];
     Shadow::new(&Worm::paper()).effect_of(&ALLOWANCES[0], &mut effect_m);
-    let with_share = |share: f64| {
+    let with_fraction = |fraction: f64| {
         let map = map_of(12, 3, |step, bin, cell| {
-            share * effect_m[(step * BINS + bin) * CELLS + cell]
+            fraction * effect_m[(step * BINS + bin) * CELLS + cell]
         });
         map.unexplained(THRESHOLD_M).expect("enough cycles")
     };
-    let sound = with_share(-0.015);
+    let sound = with_fraction(-0.015);
     assert!(sound.is_within && sound.excess_m.abs() < 5e-5, "{sound:?}");
-    let long = with_share(0.06);
+    let long = with_fraction(0.06);
     // 4 % of 11.5 mm, once a cycle for each cell.
     assert!(long.is_significant && (long.excess_m - 4.6e-4).abs() < 3e-5, "{long:?}");
 }

@@ -8,7 +8,7 @@ use worm_physics::{Contact, Crawl, Ledger, Mechanics, Motion, Physics, Worm};
 /// Positions, deformations and slides, m.
 const SAME_M: f64 = 1e-9;
 /// Energies, as a share of the largest: work is booked in straight lines, so the incremental motion goes in small parts.
-const SAME_SHARE: f64 = 1e-4;
+const SAME_FRACTION: f64 = 1e-4;
 const PARTS_OF_STEP: usize = 1000;
 
 /// Unequal worms on any slope that they hold on, with whatever the exact motion knows.
@@ -74,9 +74,9 @@ proptest! {
         let first_m = vec![0.0; cells];
         let mut exact = Motion::at_rest(&worm, &first_m);
         let mut crawl = Crawl::at_rest(&mechanics, 0.0, &first_m, None).expect("it holds");
-        let sense = if backward { -1.0 } else { 1.0 };
+        let sign = if backward { -1.0 } else { 1.0 };
         for part in 1..=2 * cells * PARTS_OF_STEP {
-            let phase = sense * part as f64 / (cells * PARTS_OF_STEP) as f64;
+            let phase = sign * part as f64 / (cells * PARTS_OF_STEP) as f64;
             exact.advance_to(&worm, phase).expect("it holds");
             crawl.advance_to(&mechanics, phase, 1e-3).expect("it holds");
             if part % (PARTS_OF_STEP / 4) != 0 {
@@ -95,9 +95,9 @@ proptest! {
             }
         }
         let (exact_j, crawl_j) = (energies(exact.ledger()), energies(crawl.ledger()));
-        let largest_j = exact_j.iter().fold(0.0, |most: f64, energy_j| most.max(energy_j.abs()));
+        let largest_j = exact_j.iter().fold(0.0, |max: f64, energy_j| max.max(energy_j.abs()));
         for (exact, crawl) in exact_j.iter().zip(&crawl_j) {
-            prop_assert!((exact - crawl).abs() < SAME_SHARE * largest_j, "{exact_j:?} {crawl_j:?}");
+            prop_assert!((exact - crawl).abs() < SAME_FRACTION * largest_j, "{exact_j:?} {crawl_j:?}");
         }
     }
 }

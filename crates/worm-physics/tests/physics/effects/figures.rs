@@ -217,8 +217,8 @@ fn a_compliant_drive_is_a_softer_pad_to_the_body() {
 /// Each yielding element, of stiffness s k/4 and yield deformation y, makes heat 2 s k y (D − 2y)/4 over a swing D and back.
 #[test]
 fn hysteresis_loses_the_area_of_its_loops() {
-    let share = 0.4;
-    let cycle = with(0.0, &[effect("pad-hysteresis", &[share])]);
+    let fraction = 0.4;
+    let cycle = with(0.0, &[effect("pad-hysteresis", &[fraction])]);
     assert!(
         cycle.backward_slide_m[..4].iter().all(|slide_m| *slide_m < 1e-9),
         "{cycle:?}"
@@ -226,9 +226,9 @@ fn hysteresis_loses_the_area_of_its_loops() {
     let swing_m = 3.0 * (STROKE_M - cycle.advance_m) / 4.0;
     let loop_j: f64 = [0.125, 0.375, 0.625, 0.875]
         .iter()
-        .map(|yield_share| {
-            let yield_m = yield_share * BOUND_M;
-            2.0 * share * STIFFNESS_N_PER_M / 4.0 * yield_m * (swing_m - 2.0 * yield_m).max(0.0)
+        .map(|yield_fraction| {
+            let yield_m = yield_fraction * BOUND_M;
+            2.0 * fraction * STIFFNESS_N_PER_M / 4.0 * yield_m * (swing_m - 2.0 * yield_m).max(0.0)
         })
         .sum();
     let lost_j = cycle.energy_actuator_net_j - cycle.energy_loss_j;

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use worm_physics::{Crawl, Locomotion, Mechanics, Physics};
 
 /// Where the mean of the cells is after two cycles of `cycle_s`, m, in `parts` calls of each of which makes one increment.
-fn way_m(physics: &Physics, damping_ratio: Option<f64>, cycle_s: f64, parts: u32) -> f64 {
+fn displacement_m(physics: &Physics, damping_ratio: Option<f64>, cycle_s: f64, parts: u32) -> f64 {
     let mechanics = Mechanics::new(physics);
     let mut crawl = Crawl::at_rest(&mechanics, 0.0, &[0.12, 0.08, 0.04, 0.0], damping_ratio).expect("it holds");
     for part in 1..=parts {
@@ -27,8 +27,8 @@ fn half_the_increments_make_the_same_way() {
     let level = Physics::of(paper(10.0));
     for damping_ratio in [None, Some(0.1)] {
         let change_m = |physics: &Physics, parts: u32| {
-            let whole_m = way_m(physics, damping_ratio, CYCLE_S, parts);
-            (way_m(physics, damping_ratio, CYCLE_S, 2 * parts) - whole_m).abs() / 2.0
+            let whole_m = displacement_m(physics, damping_ratio, CYCLE_S, parts);
+            (displacement_m(physics, damping_ratio, CYCLE_S, 2 * parts) - whole_m).abs() / 2.0
         };
         for setting in strong() {
             let parts = if setting.effect().name == "breakaway-friction" {
@@ -58,7 +58,7 @@ fn a_slow_gait_knows_no_inertia() {
     still.advance_to(2.0, 1.0).expect("it holds");
     let apart_m = |cycle_s: f64| {
         let parts = (2.0 * cycle_s / 4e-3) as u32;
-        (way_m(&physics, Some(0.1), cycle_s, parts) - still.mean_position_m()).abs()
+        (displacement_m(&physics, Some(0.1), cycle_s, parts) - still.mean_position_m()).abs()
     };
     let (quick_m, slow_m) = (apart_m(2.5), apart_m(100.0));
     // The way lags by what the last swings leave, which falls as the speed does.

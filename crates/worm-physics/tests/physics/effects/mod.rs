@@ -61,7 +61,7 @@ fn strong_value(parameter: &worm_physics::effect::Parameter) -> f64 {
         "length_m" | "time_constant_s" | "slip_m" | "grip_s" => parameter.neutral,
         _ => {
             let strong = 15.0 * parameter.notable;
-            let is_room_above = parameter.neutral + strong <= parameter.most;
+            let is_room_above = parameter.neutral + strong <= parameter.max;
             parameter.neutral + if is_room_above { strong } else { -strong }
         }
     }

@@ -51,11 +51,11 @@ fn values_are_taken_to_their_ends_and_not_beyond() {
                 values[at] = value;
                 Setting::new(effect, neutral.cell(), &values, 4)
             };
-            let width = parameter.most - parameter.least;
-            for value in [parameter.least, parameter.most] {
+            let width = parameter.max - parameter.min;
+            for value in [parameter.min, parameter.max] {
                 assert_eq!(with(value).expect("in range").values()[at], value);
             }
-            for value in [parameter.least - 1e-6 * width, parameter.most + 1e-6 * width, f64::NAN] {
+            for value in [parameter.min - 1e-6 * width, parameter.max + 1e-6 * width, f64::NAN] {
                 let error = with(value).expect_err("out of range").to_string();
                 assert!(
                     error.contains(parameter.name) && error.contains("must be from"),

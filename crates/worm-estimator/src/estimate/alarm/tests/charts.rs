@@ -1,6 +1,6 @@
 //! The energy chart's false alarms and power, over many charts, each calibrated on three values.
 
-use super::super::page::PageChart;
+use super::super::cusum::PageChart;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -31,7 +31,7 @@ fn three_values_of_calibration_give_no_false_alarm_in_thousands() {
 #[test]
 fn the_configured_shift_is_told_within_few_cycles() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(6);
-    for (scatter, shift, most) in [(0.01, 1.2, 3.5), (0.03, 1.2, 5.0), (0.01, 1.4, 2.5), (0.03, 1.4, 2.5)] {
+    for (scatter, shift, max) in [(0.01, 1.2, 3.5), (0.03, 1.2, 5.0), (0.01, 1.4, 2.5), (0.03, 1.4, 2.5)] {
         let mut cycles = 0;
         for _ in 0..500 {
             let mut chart = PageChart::new(0.2, 3);
@@ -47,7 +47,7 @@ fn the_configured_shift_is_told_within_few_cycles() {
         }
         let mean = f64::from(cycles) / 500.0;
         println!("scatter {scatter}, {shift} × usual: {mean:.2} cycles");
-        assert!(mean <= most, "scatter {scatter}, {shift} × usual: {mean} cycles");
+        assert!(mean <= max, "scatter {scatter}, {shift} × usual: {mean} cycles");
     }
 }
 

@@ -124,7 +124,7 @@ fn table() -> Vec<Case> {
                 "cell 2 loses 60 %",
                 |bench| {
                     bench.trouble.jammed = Some(1);
-                    bench.trouble.jam_share = 0.6;
+                    bench.trouble.jam_fraction = 0.6;
                 },
                 JammedCell,
                 0.5,
@@ -486,19 +486,19 @@ fn the_battery_warns_while_the_way_home_is_still_possible() {
     let mut bench = Bench::new(config, 3);
     bench.battery_j = 700.0;
     bench.run(2.0);
-    let share = bench.watch.battery_share();
-    assert!((share - 700.0 / 900.0).abs() < 0.04, "after two seconds: {share}");
+    let fraction = bench.watch.battery_fraction();
+    assert!((fraction - 700.0 / 900.0).abs() < 0.04, "after two seconds: {fraction}");
     bench.command(Mode::Crawling, 0.4);
     while bench.raised().is_empty() && bench.time_s() < 2000.0 {
         bench.run(1.0);
     }
     assert_eq!(bench.raised(), [BatteryLow]);
-    let share = bench.battery_j / 900.0;
+    let fraction = bench.battery_j / 900.0;
     assert!(
-        (bench.watch.battery_share() - share).abs() < 0.03,
-        "{share} {}",
-        bench.watch.battery_share()
+        (bench.watch.battery_fraction() - fraction).abs() < 0.03,
+        "{fraction} {}",
+        bench.watch.battery_fraction()
     );
     // Half of what was above the reserve at the start went into the way out; the other half goes home.
-    assert!((0.38..0.5).contains(&share), "{share}");
+    assert!((0.38..0.5).contains(&fraction), "{fraction}");
 }

@@ -75,8 +75,8 @@ proptest! {
                 mask ^= bit;
             }
             prop_assert_eq!(mask, watch.raised_mask());
-            let share = watch.battery_share();
-            prop_assert!(share.is_nan() || (0.0..=1.0).contains(&share));
+            let fraction = watch.battery_fraction();
+            prop_assert!(fraction.is_nan() || (0.0..=1.0).contains(&fraction));
         }
     }
 }

@@ -26,7 +26,7 @@ pub struct Trouble {
     pub sluggish: f64,
     pub jammed: Option<usize>,
     /// Share of its stroke that the jammed cell loses.
-    pub jam_share: f64,
+    pub jam_fraction: f64,
     pub slipping: bool,
     pub slide_m_per_s: f64,
     pub electrical_factor: f64,
@@ -48,7 +48,7 @@ impl Trouble {
             stalled: false,
             sluggish: 0.0,
             jammed: None,
-            jam_share: 1.0,
+            jam_fraction: 1.0,
             slipping: false,
             slide_m_per_s: 0.0,
             electrical_factor: 1.0,
@@ -176,8 +176,8 @@ impl Bench {
         StandardNormal.sample(&mut self.random)
     }
 
-    fn chance(&mut self, share: f64) -> bool {
-        share > 0.0 && self.random.random::<f64>() < share
+    fn chance(&mut self, fraction: f64) -> bool {
+        fraction > 0.0 && self.random.random::<f64>() < fraction
     }
 
     /// Advance per cycle and retraction per step in a direction, m: between the printed values of Table 1, linear.
@@ -238,7 +238,7 @@ impl Bench {
         let steps = before * cells as f64;
         let cell = self.config.worm.step_order[(steps.floor() as i64).rem_euclid(cells as i64) as usize] - 1;
         let lost = if self.trouble.jammed == Some(cell) {
-            self.trouble.jam_share
+            self.trouble.jam_fraction
         } else {
             0.0
         };
@@ -300,8 +300,8 @@ impl Bench {
             Some(battery) => {
                 let motor_w = self.state.motor_duty * self.state.motor_current_a * 5.0;
                 self.battery_j -= (motor_w + battery.hotel_power_w) * step_s;
-                let share = self.battery_j / battery.capacity_j;
-                let open_v = battery.empty_v + share * (battery.full_v - battery.empty_v);
+                let fraction = self.battery_j / battery.capacity_j;
+                let open_v = battery.empty_v + fraction * (battery.full_v - battery.empty_v);
                 (open_v, battery.internal_resistance_ohm)
             }
         };
@@ -370,7 +370,7 @@ pub fn blank_estimate(cells: usize) -> Estimate {
         energy_electrical_j: 0.0,
         energy_loss_j: 0.0,
         max_deformation_m: [0.00175; MAX_CELLS],
-        battery_share: f64::NAN,
+        battery_fraction: f64::NAN,
         cell_count: cells as u32,
         sliding_mask: 0,
         armed_mask: 0,

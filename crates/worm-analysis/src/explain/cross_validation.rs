@@ -1,0 +1,153 @@
+//! What a hypothesis says of data that it was not fitted to.
+//!
+//! Whole slopes are left out one after the other, and blocks of neighbouring cycles on all slopes. For each the fit is made
+//! anew by Gauss-Newton steps on what remains, and the residuals that it leaves on what was left out are simulated exactly. Every
+//! sample is left out once in each way; the mean over both ways counts.
+//!
+//! # The score
+//! What was left out has conditions of its own that nothing else tells, such as how its slope was off. So the score is twice the
+//! negative logarithm of the probability that the fit gives to the data left out, with all that it does not know: with residuals r
+//! there, derivatives J, and C the covariance that what remains leaves,
+//!
+//! ```text
+//! rᵀ (1 + J C Jᵀ)⁻¹ r + log det (1 + J C Jᵀ) = |r|² − gᵀ N⁻¹ g + log (det N / det C⁻¹),   N = C⁻¹ + Jᵀ J,   g = Jᵀ r
+//! ```
+//! An effect that could have been anything gives little to any outcome, and so pays for its freedom. Added is what the values of the
+//! whole fit cost by their priors: of two hypotheses that say the same of the data, that which need be less extreme is the likelier.
+
+use super::fit::{Fit, Problem, dot, in_parallel, prior_chi_squared};
+use super::observed::Observed;
+use nalgebra::{DMatrix, DVector};
+
+/// Blocks of neighbouring cycles.
+const BLOCKS: usize = 3;
+/// Steps of the fit anew.
+const STEPS: usize = 2;
+
+/// What is left out at once.
+#[derive(Debug, Clone)]
+pub(super) struct Fold {
+    /// For each run and whole cycle since its first sample, whether it is left out.
+    pub left_out: Vec<Vec<bool>>,
+}
+
+/// A fit, and what was left out for it, as [`Fold::left_out`] says.
+pub(super) type FitWithout = (Fit, Vec<Vec<bool>>);
+
+/// A hypothesis on data that it was not fitted to.
+#[derive(Debug, Clone)]
+pub(super) struct HeldOut {
+    /// The score: as a misfit, mean over the ways of leaving out.
+    pub chi_squared: f64,
+    /// The fit anew without each fold.
+    pub fits: Vec<FitWithout>,
+}
+
+impl HeldOut {
+    /// The fits of each way of leaving out: every sample is left out once in each.
+    pub fn ways(&self) -> Vec<&[FitWithout]> {
+        let (slopes, blocks) = self.fits.split_at(self.fits.len().saturating_sub(BLOCKS));
+        [slopes, blocks].into_iter().filter(|way| !way.is_empty()).collect()
+    }
+}
+
+/// Which cycle since the first sample a sample is in.
+pub(super) fn cycle_of(observed: &Observed<'_>, sample: usize) -> usize {
+    (observed.phase[sample] - observed.phase[0]).max(0.0).floor() as usize
+}
+
+/// All folds of a campaign: first the slopes, where there are several, then the blocks of cycles.
+pub(super) fn folds(problem: &Problem<'_, '_>) -> Vec<Fold> {
+    let observed = &problem.scene.observed;
+    let cycles = |observed: &Observed<'_>| cycle_of(observed, observed.samples() - 1) + 1;
+    let mut folds = Vec::new();
+    if observed.len() > 1 {
+        for run in 0..observed.len() {
+            let left_out = observed
+                .iter()
+                .enumerate()
+                .map(|(other, seen)| vec![other == run; cycles(seen)]);
+            folds.push(Fold {
+                left_out: left_out.collect(),
+            });
+        }
+    }
+    for block in 0..BLOCKS {
+        let left_out = observed.iter().map(|seen| {
+            let first = cycle_of(seen, seen.counts_from);
+            let count = cycles(seen);
+            (0..count)
+                .map(|cycle| cycle >= first && (cycle - first) * BLOCKS / (count - first).max(1) == block)
+                .collect()
+        });
+        folds.push(Fold {
+            left_out: left_out.collect(),
+        });
+    }
+    folds
+}
+
+impl Fold {
+    /// For each residual, whether it stays in.
+    fn stays(&self, problem: &Problem<'_, '_>) -> Vec<bool> {
+        let mut stays = Vec::new();
+        for (observed, left_out) in problem.scene.observed.iter().zip(&self.left_out) {
+            let of = |sample: usize| !left_out[cycle_of(observed, sample)];
+            let samples = observed.counts_from..observed.samples();
+            stays.extend(samples.clone().map(of));
+            for sample in samples {
+                stays.extend(std::iter::repeat_n(of(sample), observed.cells()));
+            }
+        }
+        stays
+    }
+}
+
+/// Holds a fitted hypothesis, whose derivatives are there, against every fold.
+pub(super) fn hold_out(problem: &Problem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
+    let anew = in_parallel(folds.len(), |number| {
+        let fold = &folds[number];
+        let stays = fold.stays(problem);
+        let mut without = fit.clone();
+        for _ in 0..STEPS {
+            without = problem.step_without(without, &stays);
+        }
+        let chi_squared = score(&without, &stays);
+        without.jacobian = Vec::new();
+        (chi_squared, (without, fold.left_out.clone()))
+    });
+    let slopes = folds.len() - BLOCKS;
+    let ways = if slopes > 0 { 2.0 } else { 1.0 };
+    HeldOut {
+        chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / ways + prior_chi_squared(&fit.hypothesis, &fit.at),
+        fits: anew.into_iter().map(|(_, without)| without).collect(),
+    }
+}
+
+/// Twice the negative logarithm of the probability, up to a constant that no hypothesis changes, of the data that do not stay.
+fn score(without: &Fit, stays: &[bool]) -> f64 {
+    let left_out: Vec<bool> = stays.iter().map(|stays| !stays).collect();
+    let residual = &without.residual;
+    let chi_squared = dot(residual, residual, Some(&left_out));
+    // What lies at a limit is known as well as it can be.
+    let open: Vec<usize> = (0..without.at.len())
+        .filter(|&quantity| !without.at_limit(quantity))
+        .collect();
+    let (known, whole) = (without.normal(Some(stays)), without.normal(None));
+    let factor = |normal: &DMatrix<f64>| {
+        let mut matrix = DMatrix::from_fn(open.len(), open.len(), |row, column| normal[(open[row], open[column])]);
+        for row in 0..open.len() {
+            matrix[(row, row)] *= 1.0 + 1e-9;
+        }
+        matrix.cholesky()
+    };
+    let (Some(known), Some(whole)) = (factor(&known), factor(&whole)) else {
+        return chi_squared;
+    };
+    let drawn = DVector::from_iterator(
+        open.len(),
+        open.iter()
+            .map(|&quantity| dot(&without.jacobian[quantity], residual, Some(&left_out))),
+    );
+    chi_squared - drawn.dot(&whole.solve(&drawn)) + whole.ln_determinant() - known.ln_determinant()
+}

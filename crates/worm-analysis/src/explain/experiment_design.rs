@@ -1,0 +1,262 @@
+//! The next experiment: which one change of a run would best tell apart what this campaign could not.
+//!
+//! Every change is tried out on paper: the run is simulated under each rival's fitted physics, seen through the noise that the
+//! campaign had, and the rivals' predictions are compared with everything free in them still free (see [`trial`]). What counts is
+//! the distance between the two nearest; more than enough is not better, so a cheaper run that settles it goes before a dearer
+//! one that settles it twice. Where no run tells the rivals apart, a measurement on the bench is proposed.
+
+mod change;
+mod trial;
+
+use super::answer::{NextExperiment, Prediction};
+use super::fit::{Fit, Problem, in_parallel};
+use super::parameter::{Hypothesised, What as Quantity};
+pub(super) use change::SLOPES_DEG;
+use change::{Change, What, changes};
+use trial::{Reach, Said, Trial, blank, plain_distance};
+use worm_physics::effect::Setting;
+
+/// Distance that settles a question, and least distance of a run that is worth it, standard deviations.
+const SETTLES: f64 = 5.0;
+const WORTH_IT: f64 = 3.0;
+/// Changes of one kind that are looked at closely.
+const CLOSE_LOOKS: usize = 2;
+/// Share of the stroke that every rival's worm must advance in a cycle: one that hardly gets on is no experiment.
+pub(super) const MIN_ADVANCE: f64 = 0.05;
+
+/// A change with what it would show.
+struct Weighed {
+    change: Change,
+    separation: f64,
+}
+
+impl Weighed {
+    /// What it is worth for what it costs; more than enough is worth no more.
+    fn worth(&self) -> f64 {
+        self.separation.min(SETTLES) / self.change.what.cost()
+    }
+}
+
+/// The run that best tells apart rivals that were fitted and have their derivatives; none with fewer than two.
+///
+/// `cycle_s` is the usual time of a gait cycle.
+pub(super) fn propose(problem: &Problem<'_, '_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
+    if candidates.len() < 2 {
+        return None;
+    }
+    let changes = changes(problem.scene, cycle_s);
+    let plain = in_parallel(changes.len(), |number| {
+        let blank = blank(problem, &changes[number]);
+        let said = ask_all(&Trial::new(problem, &changes[number], &blank)?, candidates)?;
+        let crawls = |said: &Said| said.advance_m > MIN_ADVANCE * problem.scene.nominal[0].worm.stroke_m();
+        said.iter()
+            .all(crawls)
+            .then(|| nearest(&said, |a, b| plain_distance(&said[a], &said[b])))
+    });
+    let mut possible: Vec<(f64, Change)> = plain
+        .into_iter()
+        .zip(changes)
+        .filter_map(|(distance, change)| Some((distance?, change)))
+        .collect();
+    possible.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut best: Option<Weighed> = None;
+    for what in What::ALL {
+        // The dearer kinds could not be worth more than one that settles it already.
+        if best.as_ref().is_some_and(|best| best.worth() > SETTLES / what.cost()) {
+            break;
+        }
+        let mine = possible.iter().filter(|(_, change)| change.what == what);
+        for &(_, change) in mine.take(CLOSE_LOOKS) {
+            let Some(separation) = separation(problem, candidates, &change) else {
+                continue;
+            };
+            let weighed = Weighed { change, separation };
+            let is_better = best.as_ref().is_none_or(|best| {
+                let order = weighed.worth().total_cmp(&best.worth());
+                order.then(separation.total_cmp(&best.separation)).is_gt()
+            });
+            if is_better {
+                best = Some(weighed);
+            }
+        }
+    }
+    match best.filter(|best| best.separation >= WORTH_IT) {
+        Some(best) => in_answer(problem, candidates, &best),
+        None => on_the_bench(candidates),
+    }
+}
+
+/// What every rival says of a run; none where the worm of one does not hold.
+fn ask_all(trial: &Trial<'_>, candidates: &[&Fit]) -> Option<Vec<Said>> {
+    candidates.iter().map(|rival| trial.ask(rival)).collect()
+}
+
+/// The smallest distance between any two rivals.
+fn nearest(said: &[Said], distance: impl Fn(usize, usize) -> f64) -> f64 {
+    let pairs = (0..said.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+    pairs.map(|(a, b)| distance(a, b)).fold(f64::INFINITY, f64::min)
+}
+
+/// Distance between the two nearest predictions of a run, standard deviations, whichever of the two is true.
+fn separation(problem: &Problem<'_, '_>, candidates: &[&Fit], change: &Change) -> Option<f64> {
+    let blank = blank(problem, change);
+    let trial = Trial::new(problem, change, &blank)?;
+    let said = ask_all(&trial, candidates)?;
+    // What recalibration does hardly depends on the effect beside it, so one rival's derivatives serve all: the quickest one's.
+    let quick = candidates
+        .iter()
+        .position(|rival| trial.is_periodic(rival))
+        .unwrap_or(0);
+    let tasks: Vec<(usize, usize)> = (0..candidates.len())
+        .flat_map(|rival| {
+            Trial::matter(candidates[rival])
+                .into_iter()
+                .map(move |quantity| (rival, quantity))
+        })
+        .filter(|&(rival, quantity)| rival == quick || same(candidates, (rival, quantity), quick).is_none())
+        .collect();
+    let columns = in_parallel(tasks.len(), |task| {
+        let (rival, quantity) = tasks[task];
+        trial.derivative(candidates[rival], &said[rival], quantity)
+    });
+    let column = |rival: usize, quantity: usize| {
+        let bought = tasks.iter().position(|&task| {
+            task == (rival, quantity)
+                || Some(task) == same(candidates, (rival, quantity), quick).map(|same| (quick, same))
+        });
+        bought.map(|task| columns[task].clone())
+    };
+    let reaches: Vec<Reach> = (0..candidates.len())
+        .map(|rival| {
+            let matter = Trial::matter(candidates[rival]);
+            let columns = matter.into_iter().map(|quantity| column(rival, quantity));
+            Reach::new(candidates[rival], columns.collect::<Option<_>>()?)
+        })
+        .collect::<Option<_>>()?;
+    Some(nearest(&said, |a, b| {
+        let by_a = reaches[a].distance(&said[a], &said[b]);
+        by_a.min(reaches[b].distance(&said[a], &said[b]))
+    }))
+}
+
+/// The quantity of one rival that is the same nuisance as a quantity of another.
+fn same(candidates: &[&Fit], (rival, quantity): (usize, usize), other: usize) -> Option<usize> {
+    let what = candidates[rival].hypothesis.free[quantity].what;
+    let others = &candidates[other].hypothesis.free;
+    let is_nuisance = matches!(what, Quantity::Nuisance(_));
+    others.iter().position(|free| is_nuisance && free.what == what)
+}
+
+/// A run as the answer tells it.
+fn in_answer(problem: &Problem<'_, '_>, candidates: &[&Fit], best: &Weighed) -> Option<NextExperiment> {
+    let blank = blank(problem, &best.change);
+    let trial = Trial::new(problem, &best.change, &blank)?;
+    let said = ask_all(&trial, candidates)?;
+    let slope = format!("{}°", best.change.slope_deg).replace('-', "−");
+    let predictions = candidates
+        .iter()
+        .zip(&said)
+        .enumerate()
+        .map(|(number, (rival, mine))| Prediction {
+            effect: name(rival),
+            advance_m: Some(mine.advance_m),
+            description: match number {
+                0 => format!("at {slope}"),
+                _ => format!("at {slope}, {}", beside(&trial, mine, &said[0], &name(candidates[0]))),
+            },
+        });
+    let (change, unit) = best.change.what.name();
+    Some(NextExperiment {
+        change: change.to_owned(),
+        value: Some(best.change.value),
+        unit: unit.to_owned(),
+        slope_deg: Some(best.change.slope_deg),
+        description: best.change.in_words(),
+        predictions: predictions.collect(),
+        separation_sigma: Some(best.separation),
+    })
+}
+
+/// How a prediction differs from the first one: in its advance, and within a cycle.
+fn beside(trial: &Trial<'_>, mine: &Said, first: &Said, first_name: &str) -> String {
+    let farther_m = mine.advance_m - first.advance_m;
+    let phase = trial.phase();
+    let end = phase[phase.len() - 1];
+    let from = phase.partition_point(|&phase| phase < end - 1.0);
+    let cells = mine.predicted.position_m.len() / phase.len();
+    let apart_m = |cell: usize, sample: usize| {
+        let at = sample * cells + cell;
+        mine.predicted.position_m[at] - first.predicted.position_m[at] - farther_m * phase[sample]
+    };
+    let widest_m = (0..cells)
+        .map(|cell| {
+            let apart_m = (from..phase.len()).map(|sample| apart_m(cell, sample));
+            let ends = apart_m.fold((f64::INFINITY, f64::NEG_INFINITY), |ends, m| {
+                (m.min(ends.0), m.max(ends.1))
+            });
+            ends.1 - ends.0
+        })
+        .fold(0.0, f64::max);
+    let than = if farther_m < 0.0 { "less" } else { "more" };
+    format!(
+        "{:.3} mm a cycle {than} than {first_name}, and within a cycle up to {:.3} mm apart from it",
+        farther_m.abs() * 1e3,
+        widest_m * 1e3
+    )
+}
+
+/// A measurement that tells what no crawl does; none where no rival supposes anything.
+fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
+    let hypothesised = candidates.iter().find_map(|rival| rival.hypothesis.hypothesised.first())?;
+    let predictions = candidates.iter().map(|rival| Prediction {
+        effect: name(rival),
+        advance_m: None,
+        description: values(rival),
+    });
+    Some(NextExperiment {
+        change: hypothesised.effect.separated_by.to_owned(),
+        value: None,
+        unit: String::new(),
+        slope_deg: None,
+        description: format!(
+            "No single run of this worm tells these apart. Measure {} directly ({}).",
+            hypothesised.effect.name, hypothesised.effect.separated_by
+        ),
+        predictions: predictions.collect(),
+        separation_sigma: None,
+    })
+}
+
+/// What a rival supposes, by name.
+fn name(rival: &Fit) -> String {
+    let names: Vec<String> = rival.hypothesis.hypothesised.iter().map(name_of).collect();
+    if names.is_empty() {
+        "no effect".to_owned()
+    } else {
+        names.join(" and ")
+    }
+}
+
+fn name_of(hypothesised: &Hypothesised) -> String {
+    match hypothesised.cell {
+        Some(cell) => format!("{} of cell {}", hypothesised.effect.name, cell + 1),
+        None => hypothesised.effect.name.to_owned(),
+    }
+}
+
+/// The values that a rival found.
+fn values(rival: &Fit) -> String {
+    let value = |setting: &Setting| {
+        let with_value = setting.effect().parameters.iter().zip(setting.values());
+        let values = with_value.map(|(parameter, value)| {
+            let text = format!("{} {value:.4} {}", parameter.about, parameter.unit);
+            text.trim_end().to_owned()
+        });
+        values.collect::<Vec<_>>().join(", ")
+    };
+    let settings = rival.hypothesis.settings(&rival.at);
+    settings.iter().map(value).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests;

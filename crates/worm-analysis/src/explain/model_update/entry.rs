@@ -1,0 +1,121 @@
+//! Named effects as `[[effect]]` entries.
+
+use super::figure::Figure;
+use crate::explain::answer::{Answer, FoundParameter, NamedEffect, Verdict};
+use worm_physics::effect::{self, Effect};
+
+/// The entries that an answer adds to the end of a model; empty where nothing was named.
+pub(super) fn entries(answer: &Answer) -> String {
+    if answer.verdict == Verdict::Ambiguous && answer.is_by_advances() {
+        return undecided(answer);
+    }
+    let (heading, rivals) = match answer.verdict {
+        Verdict::Agrees | Verdict::OutsideLibrary => return String::new(),
+        Verdict::Explained if answer.effects.len() > 1 => ("Found by `wormd explain`; these act together.", &[][..]),
+        Verdict::Explained => ("Found by `wormd explain`.", &[][..]),
+        Verdict::Ambiguous => (
+            "Found by `wormd explain`, the likeliest of several that explain the data about as well.",
+            answer.rivals.as_slice(),
+        ),
+    };
+    let mut text = String::new();
+    for effect in &answer.effects {
+        text += &entry(effect, if text.is_empty() { heading } else { "" });
+    }
+    if !rivals.is_empty() && !text.is_empty() {
+        text += "\n# The data do not decide against these. To try one, take its comment signs away and the entry above out.\n";
+    }
+    for rival in rivals {
+        let heading = match &rival.together_with[..] {
+            [] => String::new(),
+            others => format!("Only together with {}.", others.join(" and ")),
+        };
+        text += &entry(rival, &heading).lines().map(commented_out).collect::<String>();
+    }
+    text
+}
+
+/// The candidates of a few advances: none is sure enough to be switched on.
+fn undecided(answer: &Answer) -> String {
+    let candidates = answer.effects.iter().chain(&answer.rivals);
+    let entries = candidates.map(|effect| entry(effect, "").lines().map(commented_out).collect::<String>());
+    let heading = "\n# Found by `wormd explain`: the advances do not decide between these, and each was fitted with a recalibration of its\n\
+                   # own. To try one, take its comment signs away.\n";
+    heading.to_owned() + &entries.collect::<String>()
+}
+
+fn commented_out(line: &str) -> String {
+    match line {
+        "" => "\n".to_owned(),
+        line if line.starts_with('#') => format!("{line}\n"),
+        line => format!("# {line}\n"),
+    }
+}
+
+/// One effect; an entry for each cell where its parameters are those of several.
+fn entry(named: &NamedEffect, heading: &str) -> String {
+    let known = effect::named(&named.name).ok();
+    let mut comments = vec![heading.to_owned()];
+    if let Some(effect) = known {
+        comments.push(format!("{} {}", effect.sentence, effect.formula));
+    }
+    if !named.twins.is_empty() {
+        comments.push(format!(
+            "No cell positions can tell it from: {}.",
+            named.twins.join("; ")
+        ));
+    }
+    if !named.separated_by.is_empty() {
+        comments.push(format!(
+            "What would tell it from its neighbours: {}.",
+            named.separated_by
+        ));
+    }
+    let mut text = String::from("\n");
+    for comment in comments.iter().filter(|comment| !comment.is_empty()) {
+        // A line break within would leave the comment.
+        let line = comment.split_whitespace().collect::<Vec<_>>().join(" ");
+        text += &format!("# {line}\n");
+    }
+    let mut cells: Vec<Option<usize>> = Vec::new();
+    for parameter in &named.parameters {
+        let cell = parameter.cell.or(named.cell);
+        if !cells.contains(&cell) {
+            cells.push(cell);
+        }
+    }
+    for cell in cells {
+        text += "[[effect]]\n";
+        text += &format!("name = \"{}\"\n", named.name);
+        if let Some(cell) = cell {
+            text += &format!("cell = {cell}\n");
+        }
+        let of_cell = |parameter: &&FoundParameter| parameter.cell.or(named.cell) == cell;
+        for parameter in named.parameters.iter().filter(of_cell) {
+            text += &line(parameter, known);
+        }
+    }
+    text
+}
+
+/// One parameter, with its error beside it.
+fn line(parameter: &FoundParameter, effect: Option<&Effect>) -> String {
+    let figure = Figure {
+        value: parameter.value,
+        sigma: parameter.sigma,
+    };
+    let mut digits = figure.digits();
+    let known = effect.and_then(|effect| effect.parameters.iter().find(|known| known.name == parameter.name));
+    if let Some(known) = known {
+        // A value at the end of its range must not be rounded out of it.
+        let allowed = figure.rounded().clamp(known.min, known.max);
+        if allowed != figure.rounded() {
+            digits = format!("{allowed:?}");
+        }
+    }
+    let line = format!("{} = {digits}", parameter.name);
+    match figure.error_digits() {
+        Some(error) => format!("{line} # ± {} {}", error, parameter.unit).trim_end().to_owned() + "\n",
+        None => line + "\n",
+    }
+}

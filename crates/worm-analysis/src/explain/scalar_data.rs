@@ -1,0 +1,253 @@
+//! What a table of advances says, where nobody recorded positions.
+//!
+//! # The story
+//! Often a few scalars are all there is: on this slope the worm advances so much in a cycle. They are worth asking, but they are few,
+//! and with a dozen things that are not quite known of any worm, much explains them. So the model is recalibrated against them within
+//! the same priors as against recordings, and where it then still misses them by more than chance, every effect of the library that
+//! changes the advance of a steady crawl is fitted on top. The answer is the set of all that bring the model within chance, and what
+//! to record to decide between them. A single one is named only where it is alone *and* there are more scalars than
+//! quantities that they have to settle; three scalars never are.
+//!
+//! What needs positions stays empty in the [`Answer`]: the places of disagreement, maps, cycles, and everything held out.
+//!
+//! Pure, like the search of recordings, and deterministic without a seed.
+//!
+//! # The map
+//! - `table`: the scalars, what a hypothesis says of them, and its least-squares fit.
+//! - `model_selection`: chance, the set, the verdict and its words.
+//! - `next`: what to record.
+
+mod model_selection;
+mod next_experiment;
+mod table;
+
+use super::answer::{Answer, Figures, RunSummary, Screened, Stage};
+use super::assemble::{add_unscreened, calibration, named_effects};
+use super::error::ExplainError;
+use super::fit::{Fit, in_parallel};
+use super::model_selection::Candidate;
+use super::parameter::{Free, Nuisance, Hypothesised, What};
+use super::predict::Hypothesis;
+use super::score_test::hypotheses;
+use crate::experiment::Progress;
+use crate::recording::Advance;
+use model_selection::{Judged, Kind};
+use table::Table;
+use worm_estimator::config::Config;
+use worm_physics::effect::Parameter;
+
+/// Fewest advances that say anything of more than the stroke.
+const LEAST: usize = 2;
+/// Severities that are tried out before a fit, in notable changes from nothing to either side, and how many fits then begin from the
+/// most promising.
+const TRIED: [f64; 10] = [0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0];
+const BEGUN: usize = 2;
+/// Misfit that one may promise beyond the most promising.
+const HOPELESS: f64 = 20.0;
+/// An effect that changes no advance by more than this, m, at any of these is not seen in advances.
+const VISIBLE_M: f64 = 1e-6;
+
+/// What an advance is called where a recording has its file's name.
+fn name(advance: &Advance) -> String {
+    format!("the advance measured at {}°", advance.slope_deg).replace('-', "−")
+}
+
+/// Finds which effects the model may miss, by advances alone.
+///
+/// # Errors
+/// [`ExplainError::FewAdvances`] for fewer than two, [`ExplainError::NoSigma`] for a standard error that is none,
+/// [`ExplainError::SlidesDown`] where the configured worm could not have made one, and whatever is wrong with its configuration.
+pub fn explain_advances(
+    advances: &[Advance],
+    config: &Config,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Answer, ExplainError> {
+    let mut tell = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
+    if advances.len() < LEAST {
+        return Err(ExplainError::FewAdvances { found: advances.len() });
+    }
+    tell("recalibration", 0.0);
+    let table = Table::new(advances, config)?;
+    let nuisances = nuisances(config.worm.cells, advances.len());
+    let plain = Hypothesis::new(&nuisances, &[]);
+    let nominal = table.evaluate(&plain, &plain.neutral());
+    let recalibrated = table.fit(&plain, &plain.neutral());
+    tell("refit", 0.1);
+    let hypothesised = hypotheses(config.worm.cells, false);
+    let mut finds: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
+    // A few at a time, so that a person sees how far it is.
+    for some in hypothesised.chunks(8) {
+        finds.extend(in_parallel(some.len(), |number| {
+            refit(&table, &nominal, &recalibrated, some[number])
+        }));
+        tell("refit", 0.1 + 0.8 * finds.len() as f64 / hypothesised.len() as f64);
+    }
+    tell("judgement", 0.9);
+    let screening = screening(&hypothesised, &finds);
+    let judged = model_selection::judge(&table, &recalibrated, finds.into_iter().flatten().collect());
+    Ok(assemble(&table, config, &nominal, &recalibrated, screening, &judged))
+}
+
+/// What of the nuisances an advance knows of: neither the clock nor what damps and softens the first moment of a slide.
+fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
+    let within_a_cycle =
+        |nuisance: Nuisance| matches!(nuisance, Nuisance::Damping | Nuisance::Presliding | Nuisance::Viscosity);
+    let mut all = Nuisance::all(cells, runs, false);
+    all.retain(|free| !matches!(free.what, What::Nuisance(nuisance) if within_a_cycle(nuisance)));
+    all
+}
+
+/// An effect fitted on top of the recalibrated model, from the most promising of many severities; none where advances do not show
+/// it.
+fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hypothesised) -> Option<Candidate> {
+    let hypothesis = Hypothesis::new(&recalibrated.hypothesis.free, &[hypothesised]);
+    let tried = tried(hypothesised.effect.parameters);
+    if !tried
+        .iter()
+        .any(|values| table.shows(&hypothesis, nominal, values, VISIBLE_M))
+    {
+        return None;
+    }
+    let mut promising: Vec<(f64, Vec<f64>)> = tried
+        .iter()
+        .filter_map(|values| table.promise(&hypothesis, nominal, values))
+        .collect();
+    promising.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let should_abort = promising.first()?.0 + HOPELESS;
+    let mut fits: Vec<Fit> = promising
+        .iter()
+        .take(BEGUN)
+        .filter(|(promised, _)| *promised < should_abort)
+        .map(|(_, from)| table.fit(&hypothesis, from))
+        .collect();
+    if fits.iter().all(|fit| fit.chi_squared > recalibrated.chi_squared) {
+        // From nothing: an effect that is free to do nothing never fits worse than none.
+        fits.push(table.fit(&hypothesis, &[&recalibrated.at[..], &tried[0]].concat()));
+    }
+    let fit = fits.into_iter().min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared))?;
+    Some(Candidate {
+        hypothesised: vec![hypothesised],
+        improvement: recalibrated.chi_squared - fit.chi_squared,
+        held_out: None,
+        fit,
+    })
+}
+
+/// Values of an effect's parameters to try, its severity to either side of doing nothing.
+fn tried(parameters: &[Parameter]) -> Vec<Vec<f64>> {
+    let (severity, shape) = (&parameters[0], &parameters[1..]);
+    let sides = TRIED.iter().flat_map(|&notable| [notable, -notable]);
+    let severities = sides
+        .map(|notable| severity.neutral + notable * severity.notable)
+        .filter(|value| (severity.min..=severity.max).contains(value));
+    severities
+        .map(|value| {
+            let mut values = vec![value];
+            values.extend(shape.iter().map(|parameter| parameter.neutral));
+            values
+        })
+        .collect()
+}
+
+/// What became of every hypothesis, best first, and of the effects that were none.
+fn screening(hypothesised: &[Hypothesised], finds: &[Option<Candidate>]) -> Vec<Screened> {
+    let mut rows: Vec<Screened> = hypothesised
+        .iter()
+        .zip(finds)
+        .map(|(hypothesised, find)| Screened {
+            name: hypothesised.effect.name.to_owned(),
+            cell: hypothesised.cell.map(|cell| cell + 1),
+            score: find.as_ref().map_or(0.0, |find| find.improvement),
+            improvement: find
+                .as_ref()
+                .filter(|find| find.fit.converged)
+                .map(|find| find.improvement),
+            outcome: match find {
+                None => "not-visible",
+                Some(find) if find.fit.converged => "refitted",
+                Some(_) => "did-not-converge",
+            },
+        })
+        .collect();
+    rows.sort_by(|a, b| b.score.total_cmp(&a.score));
+    add_unscreened(&mut rows, |_| "not-visible");
+    rows
+}
+
+fn assemble(
+    table: &Table<'_>,
+    config: &Config,
+    nominal: &Fit,
+    recalibrated: &Fit,
+    screening: Vec<Screened>,
+    judged: &Judged,
+) -> Answer {
+    let mut named = judged
+        .set
+        .iter()
+        .zip(&judged.probability)
+        .flat_map(|(kind, &probability)| {
+            let mut named = named_effects(&kind.find, probability, f64::NAN, f64::NAN);
+            // The values are still those of one cell, and say of which.
+            named
+                .iter_mut()
+                .filter(|_| kind.is_any_cell())
+                .for_each(|named| named.cell = None);
+            named
+        });
+    let effects: Vec<_> = named.by_ref().take(1).collect();
+    let rivals: Vec<_> = named.collect();
+    let stage = |stage: &'static str, kind: Option<&Kind>, fit: &Fit| Stage {
+        stage,
+        effect: kind.map(Kind::name),
+        fit_rms_m: f64::NAN,
+        held_out_rms_m: f64::NAN,
+        advance_error_m: table.mean_error_m(fit),
+        energy_error_j: f64::NAN,
+    };
+    let mut stages = vec![
+        stage("baseline", None, nominal),
+        stage("recalibrated", None, recalibrated),
+    ];
+    let wrong = judged.others.first();
+    stages.extend(wrong.map(|kind| stage("best-wrong", Some(kind), &kind.find.fit)));
+    let best = judged.set.first();
+    stages.extend(best.map(|kind| stage("named", Some(kind), &kind.find.fit)));
+    // Where none is named for sure, what goes into the model is what is sure of it.
+    let kept = best
+        .filter(|_| judged.is_proven)
+        .map_or(recalibrated, |kind| &kind.find.fit);
+    let runs = table.advances.iter().enumerate().map(|(run, advance)| RunSummary {
+        recording: name(advance),
+        slope_deg: advance.slope_deg,
+        payload_kg: advance.payload_kg,
+        cycles: 0,
+        cycle_s: advance.cycle_s.unwrap_or(config.gait.cycle_s),
+        phase_recorded: false,
+        laid_down: false,
+        noise_m: f64::NAN,
+        drift_per_cycle_m: f64::NAN,
+        advance_m: [
+            advance.advance_m,
+            table.advance_m(run, recalibrated),
+            best.map_or(f64::NAN, |kind| table.advance_m(run, &kind.find.fit)),
+        ],
+        advance_sigma_m: Some(advance.sigma_m),
+    });
+    Answer {
+        verdict: judged.verdict,
+        sentence: judged.sentence(recalibrated),
+        effects,
+        rivals,
+        r#where: Vec::new(),
+        stages,
+        remainder: judged.remainder(table, recalibrated),
+        next_experiment: next_experiment::propose(table, recalibrated, judged),
+        calibration: calibration(kept, config),
+        screening,
+        threshold: model_selection::chance(table.advances.len()),
+        runs: runs.collect(),
+        warnings: judged.warnings(kept),
+        figures: Figures::default(),
+    }
+}

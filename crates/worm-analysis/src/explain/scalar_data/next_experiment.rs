@@ -1,0 +1,86 @@
+//! What to record, so that positions decide what advances could not.
+//!
+//! Which tips slide and when is in the positions of any run. The slope is the one on which the candidates' advances also lie
+//! farthest apart, so that one run does both.
+
+use super::super::answer::{NextExperiment, Prediction, Verdict};
+use super::super::fit::Fit;
+use super::super::experiment_design::{MIN_ADVANCE, SLOPES_DEG};
+use super::model_selection::Judged;
+use super::table::Table;
+use worm_physics::Cycle;
+
+/// Candidates that are told what they predict.
+const TOLD: usize = 8;
+
+/// The run to record; none where model and advances agree or one effect is named.
+pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) -> Option<NextExperiment> {
+    if matches!(judged.verdict, Verdict::Agrees | Verdict::Explained) {
+        return None;
+    }
+    // Where nothing stands in the set, what comes nearest has its say; and always the model without any effect.
+    let nearest = if judged.set.is_empty() {
+        &judged.others
+    } else {
+        &judged.set
+    };
+    let mut rivals: Vec<(String, &Fit)> = nearest
+        .iter()
+        .take(TOLD)
+        .map(|kind| (kind.name(), &kind.find.fit))
+        .collect();
+    rivals.push(("no effect".to_owned(), recalibrated));
+    let (slope_deg, said) = SLOPES_DEG
+        .into_iter()
+        .filter_map(|slope_deg| Some((slope_deg, ask(table, slope_deg, &rivals)?)))
+        .max_by(|a, b| spread_m(&a.1).total_cmp(&spread_m(&b.1)))?;
+    let cells = table.worm.cells();
+    let predictions = rivals
+        .into_iter()
+        .zip(&said)
+        .map(|((effect, _), (cycle, advance_m))| Prediction {
+            effect,
+            advance_m: Some(*advance_m),
+            description: format!(
+                "tips of cells 1 to {cells} slide back {} mm in a cycle",
+                slides(cycle, cells)
+            ),
+        });
+    let slope = format!("{slope_deg}°").replace('-', "−");
+    Some(NextExperiment {
+        change: "slope_deg".to_owned(),
+        value: Some(slope_deg),
+        unit: "deg".to_owned(),
+        slope_deg: Some(slope_deg),
+        description: format!(
+            "Lay the canal at {slope}, let the worm crawl 12 cycles, and record the positions of all its cells, with the gait phase \
+             if there is one: which cell slides, and when, tells apart what gives the same advance. Record a slope of the table too."
+        ),
+        predictions: predictions.collect(),
+        separation_sigma: None,
+    })
+}
+
+/// What every rival says of a slope; none where one of them hardly gets on, for that is no experiment.
+fn ask(table: &Table<'_>, slope_deg: f64, rivals: &[(String, &Fit)]) -> Option<Vec<(Cycle, f64)>> {
+    let min_m = MIN_ADVANCE * table.worm.stroke_m();
+    let said = rivals.iter().map(|(_, fit)| table.on_slope(slope_deg, fit));
+    said.map(|said| said.filter(|(_, advance_m)| *advance_m > min_m))
+        .collect()
+}
+
+/// Standard deviation of the advances, m.
+fn spread_m(said: &[(Cycle, f64)]) -> f64 {
+    let count = said.len() as f64;
+    let mean_m = said.iter().map(|(_, advance_m)| advance_m).sum::<f64>() / count;
+    let squares = said.iter().map(|(_, advance_m)| (advance_m - mean_m).powi(2));
+    (squares.sum::<f64>() / count).sqrt()
+}
+
+fn slides(cycle: &Cycle, cells: usize) -> String {
+    let slides = cycle.backward_slide_m[..cells].iter();
+    slides
+        .map(|slide_m| format!("{:.2}", slide_m * 1e3))
+        .collect::<Vec<_>>()
+        .join(" / ")
+}
