@@ -33,7 +33,7 @@ enum Level {
 }
 
 #[derive(Debug, Serialize)]
-struct Finding {
+struct CheckItem {
     level: Level,
     /// What was looked at.
     subject: &'static str,
@@ -43,7 +43,7 @@ struct Finding {
     remedy: Option<String>,
 }
 
-impl From<Setting> for Finding {
+impl From<Setting> for CheckItem {
     fn from(setting: Setting) -> Self {
         Self {
             level: if setting.good { Level::Good } else { Level::Warning },
@@ -55,14 +55,14 @@ impl From<Setting> for Finding {
 }
 
 #[derive(Debug, Serialize)]
-struct Report {
+struct CheckReport {
     worm: String,
-    findings: Vec<Finding>,
+    findings: Vec<CheckItem>,
 }
 
-impl Report {
+impl CheckReport {
     fn good(&mut self, subject: &'static str, found: impl Into<String>) {
-        self.findings.push(Finding {
+        self.findings.push(CheckItem {
             level: Level::Good,
             subject,
             found: found.into(),
@@ -71,7 +71,7 @@ impl Report {
     }
 
     fn note(&mut self, level: Level, subject: &'static str, found: impl Into<String>, remedy: impl Into<String>) {
-        self.findings.push(Finding {
+        self.findings.push(CheckItem {
             level,
             subject,
             found: found.into(),
@@ -101,7 +101,7 @@ impl Report {
 /// [`Failure::Unusable`] for a configuration that cannot be used, [`Failure::Failed`] when something keeps the worm from running.
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let config = args.worm.load()?;
-    let mut report = Report {
+    let mut report = CheckReport {
         worm: config.worm.name.clone(),
         findings: Vec::new(),
     };
@@ -133,7 +133,7 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     }
 }
 
-fn check_config(worm: &WormArgs, config: &Config, report: &mut Report) {
+fn check_config(worm: &WormArgs, config: &Config, report: &mut CheckReport) {
     let source = worm
         .config
         .as_ref()
@@ -148,7 +148,7 @@ fn check_config(worm: &WormArgs, config: &Config, report: &mut Report) {
 }
 
 /// Asks for what the loop would ask for, in a thread that ends at once, and reads back what that thread then has.
-fn check_realtime(wanted: &Realtime, report: &mut Report) {
+fn check_realtime(wanted: &Realtime, report: &mut CheckReport) {
     let trial = {
         let wanted = wanted.clone();
         move || (realtime::request(&wanted, 0), InForce::of_this_thread())
@@ -196,7 +196,7 @@ fn check_realtime(wanted: &Realtime, report: &mut Report) {
     }
 }
 
-fn check_topics(config: &Config, report: &mut Report) {
+fn check_topics(config: &Config, report: &mut CheckReport) {
     let root = Path::new(&config.topics.root);
     // What every process of the worm does first. One that runs is not disturbed by one more reader.
     let opened = Instance::of(config)
@@ -222,7 +222,7 @@ fn check_topics(config: &Config, report: &mut Report) {
     }
 }
 
-fn check_port(config: &Config, report: &mut Report) {
+fn check_port(config: &Config, report: &mut CheckReport) {
     let Some(port) = &config.port else {
         report.good("port", "none configured: the virtual worm is used");
         return;

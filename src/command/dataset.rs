@@ -4,7 +4,7 @@ use super::Failure;
 use super::progress::Progress;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use worm_analysis::experiment::Run;
+use worm_analysis::experiment::RecordedRun;
 use worm_analysis::recording::{Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, open_with_progress};
 use worm_estimator::config::Config;
 
@@ -69,10 +69,10 @@ struct Conditions {
 
 impl Dataset {
     /// The recordings with their conditions.
-    pub fn runs(&self) -> Vec<Run<'_>> {
+    pub fn runs(&self) -> Vec<RecordedRun<'_>> {
         let conditioned = self.recordings.iter().zip(&self.conditions);
         conditioned
-            .map(|(recording, conditions)| Run {
+            .map(|(recording, conditions)| RecordedRun {
                 recording,
                 slope_deg: conditions.slope_deg,
                 payload_kg: conditions.payload_kg,
@@ -140,7 +140,9 @@ impl SourceArgs {
         }
         Ok(Dataset {
             recordings: campaign
-                .open_all(&self.options(), &mut |fraction| progress.tell("reading", READING * fraction))
+                .open_all(&self.options(), &mut |fraction| {
+                    progress.tell("reading", READING * fraction)
+                })
                 .map_err(Failure::unusable)?,
             conditions: campaign
                 .runs

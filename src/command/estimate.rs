@@ -7,7 +7,7 @@ use clap::Args;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::estimate::{Observer, Report};
+use worm_estimator::estimate::{Observer, ObserverOutput};
 use worm_estimator::message::{Alarm, Cycle, Estimate, State};
 
 /// How long the estimator sleeps at most while the controller wakes it with no state, and so how late it knows at most should
@@ -102,7 +102,7 @@ impl Voice {
         })
     }
 
-    fn tell(&mut self, report: &Report) -> Result<(), PublishError> {
+    fn tell(&mut self, report: &ObserverOutput) -> Result<(), PublishError> {
         for alarm in report.alarms.iter() {
             self.alarm.publish(alarm)?;
         }

@@ -1,12 +1,12 @@
 //! `wormd latency`: the loop's own latency, end to end, against what this computer can do at best.
 
 mod bench;
+mod busy_poll;
 mod cyclictest;
 mod floor;
-mod testbed;
 mod measure;
-mod busy_poll;
 mod rates;
+mod testbed;
 mod text;
 mod verdict;
 

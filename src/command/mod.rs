@@ -7,21 +7,21 @@ mod child_process;
 #[cfg(feature = "analysis")]
 mod columns;
 pub mod control;
-mod telemetry_receiver;
+#[cfg(feature = "analysis")]
+mod dataset;
 pub mod estimate;
 #[cfg(feature = "analysis")]
 pub mod explain;
 pub mod latency;
-#[cfg(feature = "analysis")]
-mod dataset;
-pub mod send_command;
 mod print;
 mod progress;
 pub mod record;
 pub mod replay;
+pub mod send_command;
 #[cfg(feature = "analysis")]
 pub mod simulate;
 pub mod study;
+mod telemetry_receiver;
 pub mod up;
 pub mod virtual_worm;
 

@@ -4,7 +4,7 @@ use super::{Failure, WormArgs, print};
 use crate::topics::{CommandClient, Hub, Instance};
 use clap::{Args, ValueEnum};
 use std::time::Duration;
-use worm_estimator::message::{Command, CommandKind, Fault, Mode, Reply, Verdict};
+use worm_estimator::message::{Command, CommandKind, CommandOutcome, Fault, Mode, Reply};
 
 /// How long the controller may take to answer: a reset prepares the servo anew, which takes a while on a slow bus.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -77,11 +77,11 @@ pub fn run(args: &SendCommandArgs) -> Result<(), Failure> {
         reserved: 0,
     };
     let reply = client.call(command, PATIENCE).map_err(Failure::failed)?;
-    let verdict = Verdict::try_from(reply.verdict).map_err(Failure::failed)?;
+    let verdict = CommandOutcome::try_from(reply.verdict).map_err(Failure::failed)?;
     if args.json {
         print::line(as_json(kind, verdict, &reply))?;
     }
-    if verdict != Verdict::Accepted {
+    if verdict != CommandOutcome::Accepted {
         return Err(Failure::failed(refusal(kind, verdict, &reply)));
     }
     if !args.json {
@@ -101,8 +101,8 @@ pub(super) fn give(client: &CommandClient, kind: CommandKind) -> Result<(), Fail
         reserved: 0,
     };
     let reply = client.call(command, PATIENCE).map_err(Failure::failed)?;
-    match Verdict::try_from(reply.verdict) {
-        Ok(Verdict::Accepted) => Ok(()),
+    match CommandOutcome::try_from(reply.verdict) {
+        Ok(CommandOutcome::Accepted) => Ok(()),
         Ok(verdict) => Err(Failure::failed(format!(
             "the controller: {}",
             refusal(kind, verdict, &reply)
@@ -119,7 +119,7 @@ fn fault_name(reply: &Reply) -> &'static str {
     Fault::try_from(reply.fault).map_or("unknown", Fault::name)
 }
 
-fn as_json(kind: CommandKind, verdict: Verdict, reply: &Reply) -> serde_json::Value {
+fn as_json(kind: CommandKind, verdict: CommandOutcome, reply: &Reply) -> serde_json::Value {
     serde_json::json!({
         "command": kind.name(),
         "verdict": verdict.name(),
@@ -130,24 +130,26 @@ fn as_json(kind: CommandKind, verdict: Verdict, reply: &Reply) -> serde_json::Va
 }
 
 /// Why the controller refused, and what would be accepted.
-fn refusal(kind: CommandKind, verdict: Verdict, reply: &Reply) -> String {
+fn refusal(kind: CommandKind, verdict: CommandOutcome, reply: &Reply) -> String {
     let mode = mode_name(reply);
     let why = match verdict {
-        Verdict::WrongMode if kind == CommandKind::Reset => format!("there is no fault to leave, the worm is {mode}"),
-        Verdict::WrongMode if mode == "disarmed" => "the worm is disarmed: `wormd command arm` first".to_owned(),
-        Verdict::WrongMode if mode == "fault" => {
+        CommandOutcome::WrongMode if kind == CommandKind::Reset => {
+            format!("there is no fault to leave, the worm is {mode}")
+        }
+        CommandOutcome::WrongMode if mode == "disarmed" => "the worm is disarmed: `wormd command arm` first".to_owned(),
+        CommandOutcome::WrongMode if mode == "fault" => {
             format!(
                 "the worm was stopped ({}): mend the cause, then `wormd command reset`",
                 fault_name(reply)
             )
         }
-        Verdict::WrongMode => format!("not while {mode}"),
-        Verdict::FaultPersists => format!("the cause is still there ({}): mend it first", fault_name(reply)),
-        Verdict::BadSpeed => "the speed is not a number, or beyond servo.velocity_limit_rev_per_min".to_owned(),
-        Verdict::NoEstimator => {
+        CommandOutcome::WrongMode => format!("not while {mode}"),
+        CommandOutcome::FaultPersists => format!("the cause is still there ({}): mend it first", fault_name(reply)),
+        CommandOutcome::BadSpeed => "the speed is not a number, or beyond servo.velocity_limit_rev_per_min".to_owned(),
+        CommandOutcome::NoEstimator => {
             "no estimator is running: start `wormd estimate`, or set control.require_estimator = false".to_owned()
         }
-        Verdict::Unknown | Verdict::Accepted => {
+        CommandOutcome::Unknown | CommandOutcome::Accepted => {
             "this controller does not know the command: is it of another version?".to_owned()
         }
     };

@@ -3,8 +3,8 @@
 mod screen;
 
 use super::child_process::{Child, Log, START_PATIENCE};
-use super::telemetry_receiver::{TelemetryReceiver, MODE_PATIENCE};
 use super::send_command::give;
+use super::telemetry_receiver::{MODE_PATIENCE, TelemetryReceiver};
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::topics::{CommandClient, Hub, Instance, RoleLock, Supervisor};
 use crate::watch::{Summary, Telemetry};
@@ -212,7 +212,7 @@ fn link_path(instance: &Instance) -> PathBuf {
 }
 
 /// What was heard of the worm, where it stood before it was stopped, and what went wrong.
-struct Run {
+struct RunningWorm {
     telemetry: Telemetry,
     mode: Mode,
     trouble: Option<String>,
@@ -226,16 +226,17 @@ fn crawl(
     screen: &mut Screen,
     log: &Log,
     end: &AtomicBool,
-) -> Result<Run, Failure> {
+) -> Result<RunningWorm, Failure> {
     let hub = Hub::open(instance).map_err(Failure::failed)?;
     let client = hub.command_client().map_err(Failure::failed)?;
     let mut receiver = TelemetryReceiver::open(&hub)?;
     let mut telemetry = Telemetry::default();
 
-    receiver.start_crawling(&client, config, &mut telemetry, end, || {
-        processes.find_ended().is_some()
-    })
-    .map_err(|failure| processes.find_ended().map_or(failure, Failure::failed))?;
+    receiver
+        .start_crawling(&client, config, &mut telemetry, end, || {
+            processes.find_ended().is_some()
+        })
+        .map_err(|failure| processes.find_ended().map_or(failure, Failure::failed))?;
     let begun = Instant::now();
     let mut trouble = None;
     while !end.load(Ordering::Relaxed) && args.duration.is_none_or(|duration| begun.elapsed() < duration) {
@@ -256,13 +257,14 @@ fn crawl(
     }
     let mode = receiver.mode(&mut telemetry);
     // A dead controller cannot stop the worm; the servo's watchdog has.
-    if processes.controller.exit_status().is_none() && !stop(&client, config, &mut receiver, &mut telemetry, processes) {
+    if processes.controller.exit_status().is_none() && !stop(&client, config, &mut receiver, &mut telemetry, processes)
+    {
         trouble.get_or_insert_with(|| "the worm did not say that it has stopped".to_owned());
     }
     if let Err(failure) = screen.paint(&telemetry, log) {
         trouble.get_or_insert_with(|| failure.to_string());
     }
-    Ok(Run {
+    Ok(RunningWorm {
         telemetry,
         mode,
         trouble,

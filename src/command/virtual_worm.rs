@@ -2,7 +2,7 @@
 
 use super::{Failure, end_on_signal, print, report_grants};
 use crate::link::servo::BAUD_RATES;
-use crate::link::virtual_worm::{Fault, Options, PortLink, Report, Server, ServerError};
+use crate::link::virtual_worm::{Fault, Options, PortLink, Server, ServerError, VirtualWormReport};
 use crate::realtime;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -86,7 +86,7 @@ fn ledger_trouble(file: &Path, error: &io::Error) -> String {
     )
 }
 
-fn write_ledger(file: &Path, report: &Report) -> Result<(), Failure> {
+fn write_ledger(file: &Path, report: &VirtualWormReport) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(report).map_err(Failure::failed)?;
     std::fs::write(file, text + "\n").map_err(|error| Failure::failed(ledger_trouble(file, &error)))
 }

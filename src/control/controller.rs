@@ -1,14 +1,14 @@
 //! The tick: inputs and time in, outputs out. All of the controller's behaviour, none of its I/O.
 
-use super::state_assembler::Intake;
 use super::presence::{Passed, Presence};
 use super::ramp::{CountRounding, Ramp};
 use super::resume::Resume;
 use super::safety::{Safety, Watched};
+use super::state_assembler::Intake;
 use crate::link::{ServoReading, TrackerReading};
 use std::f64::consts::TAU;
 use worm_estimator::config::{Config, Policy};
-use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, Fault, Mode, Reply, State, Verdict};
+use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Fault, Mode, Reply, State};
 
 /// What a tick is given.
 #[derive(Debug, Clone, Copy)]
@@ -361,7 +361,7 @@ impl Controller {
 
     fn take_command(&mut self, command: &Command, now_ns: u64, servo: Option<&ServoReading>) -> Reply {
         let verdict = match CommandKind::try_from(command.kind) {
-            Err(_) => Verdict::Unknown,
+            Err(_) => CommandOutcome::Unknown,
             Ok(kind) => self.carry_out(kind, command.cycles_per_s, now_ns, servo),
         };
         Reply {
@@ -379,13 +379,13 @@ impl Controller {
         cycles_per_s: f64,
         now_ns: u64,
         servo: Option<&ServoReading>,
-    ) -> Verdict {
+    ) -> CommandOutcome {
         match (kind, self.mode) {
             (CommandKind::Arm, Mode::Disarmed) => {
                 self.pending.get_or_insert(Service::Arm);
-                Verdict::Accepted
+                CommandOutcome::Accepted
             }
-            (CommandKind::Arm, Mode::Armed) => Verdict::Accepted,
+            (CommandKind::Arm, Mode::Armed) => CommandOutcome::Accepted,
             (CommandKind::Crawl, Mode::Armed | Mode::Crawling | Mode::Holding) => {
                 self.begin_crawl(cycles_per_s, now_ns)
             }
@@ -393,43 +393,43 @@ impl Controller {
                 if self.mode != Mode::Holding {
                     self.enter(Mode::Holding, now_ns);
                 }
-                Verdict::Accepted
+                CommandOutcome::Accepted
             }
             (CommandKind::Stop, Mode::Armed | Mode::Crawling | Mode::Holding) => {
                 self.enter(Mode::Stopping, now_ns);
-                Verdict::Accepted
+                CommandOutcome::Accepted
             }
-            (CommandKind::Stop, Mode::Stopping | Mode::Disarmed) => Verdict::Accepted,
+            (CommandKind::Stop, Mode::Stopping | Mode::Disarmed) => CommandOutcome::Accepted,
             (CommandKind::Reset, Mode::Fault) => {
                 if self.safety.persists(self.fault, now_ns, servo, &self.intake) {
-                    Verdict::FaultPersists
+                    CommandOutcome::FaultPersists
                 } else {
                     self.pending.get_or_insert(Service::Arm);
-                    Verdict::Accepted
+                    CommandOutcome::Accepted
                 }
             }
-            _ => Verdict::WrongMode,
+            _ => CommandOutcome::WrongMode,
         }
     }
 
-    fn begin_crawl(&mut self, cycles_per_s: f64, now_ns: u64) -> Verdict {
+    fn begin_crawl(&mut self, cycles_per_s: f64, now_ns: u64) -> CommandOutcome {
         let velocity_rad_s = if cycles_per_s == 0.0 {
             self.gait_velocity_rad_s
         } else {
             cycles_per_s * TAU
         };
         if velocity_rad_s.is_nan() || velocity_rad_s.abs() > self.velocity_limit_rad_s {
-            return Verdict::BadSpeed;
+            return CommandOutcome::BadSpeed;
         }
         if self.require_estimator && self.estimate_seen_ns.is_none() {
-            return Verdict::NoEstimator;
+            return CommandOutcome::NoEstimator;
         }
         if self.mode != Mode::Crawling {
             self.enter(Mode::Crawling, now_ns);
         }
         self.back_off_until_rad = None;
         self.ramp.aim(velocity_rad_s);
-        Verdict::Accepted
+        CommandOutcome::Accepted
     }
 
     fn begin_end(&mut self, now_ns: u64) {

@@ -15,8 +15,6 @@
 
 mod controller;
 mod hardware;
-mod sched_counters;
-mod state_assembler;
 mod journal;
 mod presence;
 mod ramp;
@@ -24,7 +22,9 @@ mod rate;
 mod resume;
 mod run;
 mod safety;
+mod sched_counters;
 mod schedule;
+mod state_assembler;
 
 pub use controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
 pub use hardware::{Drive, DriveError, link_settings};

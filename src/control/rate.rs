@@ -64,7 +64,11 @@ impl RateKeeper {
             }
             return self.change(2 * self.divider);
         }
-        self.quiet_windows = if fraction < NEARLY_NONE { self.quiet_windows + 1 } else { 0 };
+        self.quiet_windows = if fraction < NEARLY_NONE {
+            self.quiet_windows + 1
+        } else {
+            0
+        };
         if self.divider == 1 || self.quiet_windows < self.timeout {
             return None;
         }

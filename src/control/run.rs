@@ -3,10 +3,10 @@
 
 use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
 use super::hardware::Drive;
-use super::sched_counters::{Counts, Parts, find_culprit};
 use super::journal::{Entry, Journal};
 use super::presence::{Looks, SHORTEST_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
+use super::sched_counters::{Counts, Parts, find_culprit};
 use super::schedule::{Schedule, bus_allowed_ns};
 use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
 use crate::topics::{

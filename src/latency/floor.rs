@@ -1,8 +1,8 @@
 //! The machine's own limit, measured beside the loop: a bare sleeper on absolute deadlines, as `cyclictest` is one, in a process
 //! of its own as the loop is in one; and the [bare pair](super::bare) of iceoryx2 that it feeds.
 
-use super::ipc_baseline::{Bare, BareError};
 use super::histogram::Durations;
+use super::ipc_baseline::{Bare, BareError};
 use crate::control::Schedule;
 use crate::realtime::{self, Grant, monotonic_ns};
 use serde::{Deserialize, Serialize};

@@ -11,20 +11,20 @@
 //!
 //! `wormd latency` puts them together.
 
-pub mod tick_stats;
-pub mod ipc_baseline;
 pub mod attribution;
 pub mod floor;
 pub mod histogram;
+pub mod ipc_baseline;
 pub mod measure;
 pub mod outcome;
 #[cfg(feature = "analysis")]
 pub mod page;
 pub mod stress;
+pub mod tick_stats;
 pub mod timeline;
 
-pub use tick_stats::{Account, Deliveries, HostPauses};
 pub use histogram::{Durations, Percentiles};
 pub use measure::{Measure, ratio};
 pub use outcome::Outcome;
+pub use tick_stats::{Deliveries, HostPauses, TickStats};
 pub use timeline::{Tick, WorstTicks};

@@ -1,7 +1,7 @@
 //! What a run of the latency benchmark has found. The JSON names are a contract.
 
-use super::tick_stats::HostPauses;
 use super::histogram::Durations;
+use super::tick_stats::HostPauses;
 use super::timeline::WorstTicks;
 use crate::realtime::machine::Setting;
 use serde::Serialize;

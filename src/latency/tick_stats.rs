@@ -53,7 +53,7 @@ impl std::fmt::Display for HostPauses {
 
 /// What a run of ticks amounts to.
 #[derive(Debug, Clone, Default)]
-pub struct Account {
+pub struct TickStats {
     /// Ticks.
     pub ticks: u64,
     /// Deadlines that passed without a tick.
@@ -87,7 +87,7 @@ pub struct Account {
     missed_before_last: u64,
 }
 
-impl Account {
+impl TickStats {
     /// Takes the timings of one run of the loop, one after the other. A tick is counted when the next one has told what its
     /// publishing took.
     pub fn take(&mut self, timing: &Timing) {
@@ -217,7 +217,7 @@ mod tests {
             timing(10, 7, [50, 100, 1500, 4, 10], 44, Culprit::Compute),
             timing(11, 9, [50, 100, 2, 4, 10], 44, Culprit::None),
         ];
-        let mut account = Account::default();
+        let mut account = TickStats::default();
         timings.iter().for_each(|timing| account.take(timing));
         assert_eq!(
             (account.ticks, account.overruns, account.overruns_of_product),

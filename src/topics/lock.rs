@@ -19,14 +19,14 @@ pub struct LockError {
 
 /// How a lock file is locked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum LockKind {
     /// Together with others that ask for the same.
     Shared,
     /// Alone.
     Exclusive,
 }
 
-impl Kind {
+impl LockKind {
     fn without_waiting(self) -> FlockArg {
         match self {
             Self::Shared => FlockArg::LockSharedNonblock,
@@ -44,7 +44,7 @@ pub(super) struct LockFile {
 
 impl LockFile {
     /// Locks the file at `path`, without waiting; `None` when someone else has it.
-    pub(super) fn try_lock(path: &Path, kind: Kind) -> Result<Option<Self>, LockError> {
+    pub(super) fn try_lock(path: &Path, kind: LockKind) -> Result<Option<Self>, LockError> {
         let failed = |source| LockError {
             file: path.to_path_buf(),
             source,
@@ -73,7 +73,7 @@ impl LockFile {
     }
 
     /// Changes the kind of the lock without waiting; after `false` the lock may be lost.
-    pub(super) fn try_change(&mut self, kind: Kind) -> bool {
+    pub(super) fn try_change(&mut self, kind: LockKind) -> bool {
         self.flock.relock(kind.without_waiting()).is_ok()
     }
 

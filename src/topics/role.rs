@@ -1,7 +1,7 @@
 //! Roles that only one process of a worm can have.
 
 use super::instance::Instance;
-use super::lock::{Kind, LockError, LockFile};
+use super::lock::{LockError, LockFile, LockKind};
 use super::stale_resources;
 use std::io;
 use std::marker::PhantomData;
@@ -81,7 +81,7 @@ impl<R: Role> RoleLock<R> {
         let path = instance.lock_path(R::NAME);
         let begun = Instant::now();
         loop {
-            if let Some(mut file) = LockFile::try_lock(&path, Kind::Exclusive)? {
+            if let Some(mut file) = LockFile::try_lock(&path, LockKind::Exclusive)? {
                 file.write(&format!("{}\n", std::process::id()))?;
                 return Ok(Self {
                     file,
@@ -129,7 +129,7 @@ pub(super) fn remove_abandoned(instance: &Instance) {
     for path in NAMES.iter().map(|name| instance.lock_path(name)) {
         // A lock that somebody holds is not abandoned; and locking makes the file where there is none.
         if path.exists()
-            && let Ok(Some(file)) = LockFile::try_lock(&path, Kind::Exclusive)
+            && let Ok(Some(file)) = LockFile::try_lock(&path, LockKind::Exclusive)
         {
             file.remove();
         }

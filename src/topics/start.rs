@@ -1,10 +1,10 @@
 //! Starting against what killed processes left behind.
 
 use super::instance::Instance;
-use super::lock::{Kind, LockError, LockFile};
-use super::stale_resources::{self, Peer};
+use super::lock::{LockError, LockFile, LockKind};
 use super::role;
 use super::services::{Refused, Services};
+use super::stale_resources::{self, Peer};
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -84,10 +84,10 @@ impl Presence {
 impl Drop for Presence {
     /// The last to leave takes along what is left: empty folders, and what killed peers had.
     fn drop(&mut self) {
-        let Ok(Some(start)) = LockFile::try_lock(&self.instance.lock_path("start"), Kind::Exclusive) else {
+        let Ok(Some(start)) = LockFile::try_lock(&self.instance.lock_path("start"), LockKind::Exclusive) else {
             return;
         };
-        if !self.lock.try_change(Kind::Exclusive) {
+        if !self.lock.try_change(LockKind::Exclusive) {
             return;
         }
         if stale_resources::is_there(&self.instance)
@@ -119,7 +119,7 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
         }
         let reason = match within(limit, instance) {
             Ok(services) => {
-                lock.try_change(Kind::Shared);
+                lock.try_change(LockKind::Shared);
                 drop(start);
                 let instance = instance.clone();
                 return Ok((services, Presence { instance, lock }));
@@ -127,7 +127,7 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
             Err(reason) => reason,
         };
         // Peers may have left meanwhile; once alone, the wipe mends what stood in the way.
-        alone = alone || lock.try_change(Kind::Exclusive);
+        alone = alone || lock.try_change(LockKind::Exclusive);
         if retried || !alone {
             return Err(StartError::Blocked {
                 worm: instance.worm().to_owned(),
@@ -146,17 +146,17 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
 /// Starts go one after another, so that none sees another's half-made files.
 fn wait_for_start_lock(instance: &Instance, limit: Duration) -> Result<LockFile, StartError> {
     wait_for_lock(instance, "start", limit, |path| {
-        LockFile::try_lock(path, Kind::Exclusive)
+        LockFile::try_lock(path, LockKind::Exclusive)
     })
 }
 
 /// Marks this process as present; the second value says whether it is the only one.
 fn enter(instance: &Instance, limit: Duration) -> Result<(LockFile, bool), StartError> {
     wait_for_lock(instance, "presence", limit, |path| {
-        if let Some(lock) = LockFile::try_lock(path, Kind::Exclusive)? {
+        if let Some(lock) = LockFile::try_lock(path, LockKind::Exclusive)? {
             return Ok(Some((lock, true)));
         }
-        Ok(LockFile::try_lock(path, Kind::Shared)?.map(|lock| (lock, false)))
+        Ok(LockFile::try_lock(path, LockKind::Shared)?.map(|lock| (lock, false)))
     })
 }
 

@@ -1,6 +1,6 @@
 //! The messages of one worm, gathered.
 
-use crate::latency::Account;
+use crate::latency::TickStats;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
 
 /// Everything that a watcher has heard so far.
@@ -19,7 +19,7 @@ pub struct Telemetry {
     /// All alarm changes.
     pub alarms: Vec<Alarm>,
     /// Where the ticks' time went, and who made late ones late.
-    pub account: Account,
+    pub account: TickStats,
 }
 
 impl Telemetry {

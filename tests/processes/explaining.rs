@@ -3,7 +3,7 @@
 use super::Crawling;
 use super::worm::Worm;
 use worm_estimator::config::Config;
-use worm_estimator::message::{CommandKind, Mode, Verdict};
+use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
 use worm_log::messages;
 
 #[test]
@@ -44,7 +44,7 @@ fn the_crawling_worm_is_recorded_and_explained() {
     );
     Config::load(&out.join("model.toml")).expect("a model");
 
-    assert_eq!(crawling.worm.order(CommandKind::Hold), Verdict::Accepted);
+    assert_eq!(crawling.worm.order(CommandKind::Hold), CommandOutcome::Accepted);
     crawling.wait_for_mode(Mode::Holding);
     let (code, said, _) = live(&crawling.worm);
     assert_eq!(code, Some(2), "{said}");

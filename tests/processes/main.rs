@@ -12,7 +12,7 @@ mod worm;
 use std::time::Duration;
 use testkit::process_pauses::Pause;
 use worm::{Process, Worm, late_ticks, soon, wait_for};
-use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode, Verdict};
+use worm_estimator::message::{AlarmKind, CommandKind, CommandOutcome, Fault, Mode};
 use wormd::link::servo::{WATCHDOG_LATCHED, register};
 
 /// Longest wait for anything that a worm does.
@@ -142,10 +142,10 @@ impl Crawling {
     }
 
     fn make_crawl(&self) {
-        assert_eq!(self.worm.order(CommandKind::Arm), Verdict::Accepted);
+        assert_eq!(self.worm.order(CommandKind::Arm), CommandOutcome::Accepted);
         self.wait_for_mode(Mode::Armed);
         wait_for("a crawl is accepted", PATIENCE, || {
-            self.worm.order(CommandKind::Crawl) == Verdict::Accepted
+            self.worm.order(CommandKind::Crawl) == CommandOutcome::Accepted
         });
         wait_for("the cam turns", PATIENCE, || {
             self.worm.state().is_some_and(|state| state.motor_velocity_rad_s > 2.0)
@@ -206,10 +206,10 @@ fn a_killed_estimator_stops_the_worm_and_restarts_beside_it() {
             .is_some_and(|state| state.motor_velocity_rad_s == 0.0)
     });
     crawling.estimator = crawling.worm.wormd(&["estimate"]).start();
-    assert_eq!(crawling.worm.order(CommandKind::Reset), Verdict::Accepted);
+    assert_eq!(crawling.worm.order(CommandKind::Reset), CommandOutcome::Accepted);
     crawling.wait_for_mode(Mode::Armed);
     wait_for("a crawl is accepted", PATIENCE, || {
-        crawling.worm.order(CommandKind::Crawl) == Verdict::Accepted
+        crawling.worm.order(CommandKind::Crawl) == CommandOutcome::Accepted
     });
     crawling.wait_for_mode(Mode::Crawling);
 }
@@ -243,7 +243,7 @@ fn a_controller_that_pauses_for_longer_than_the_watchdog_waits_blames_neither_se
     assert_eq!(crawling.fault(), Some(Fault::HostPaused));
     let paused_ns = crawling.worm.state().map_or(0, |state| state.host_paused_ns);
     assert!(paused_ns > 200_000_000, "{paused_ns} ns of pauses are counted");
-    assert_eq!(crawling.worm.order(CommandKind::Reset), Verdict::Accepted);
+    assert_eq!(crawling.worm.order(CommandKind::Reset), CommandOutcome::Accepted);
     crawling.wait_for_mode(Mode::Armed);
 }
 

@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use testkit::process_pauses::{HostPauses, Pause};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Command as Order, CommandKind, State, Verdict};
+use worm_estimator::message::{Command as Order, CommandKind, CommandOutcome, State};
 use wormd::link::{Tty, WormBus};
 use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
 
@@ -121,7 +121,7 @@ impl Worm {
     }
 
     /// Commands the controller.
-    pub fn order(&self, kind: CommandKind) -> Verdict {
+    pub fn order(&self, kind: CommandKind) -> CommandOutcome {
         let order = Order {
             cycles_per_s: 0.0,
             kind: kind.code(),
@@ -130,7 +130,7 @@ impl Worm {
         let reply = self
             .with_ears(|receiver| receiver.client.call(order, Duration::from_secs(5)))
             .expect("an answer");
-        Verdict::try_from(reply.verdict).expect("a known verdict")
+        CommandOutcome::try_from(reply.verdict).expect("a known verdict")
     }
 
     /// The newest state.

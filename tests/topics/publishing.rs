@@ -4,7 +4,7 @@ use super::home::{Home, segments};
 use std::thread;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{
-    Alarm, AlarmKind, Command, CommandKind, Cycle, Estimate, Mode, Reply, Severity, State, Timing, Verdict,
+    Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Estimate, Mode, Reply, Severity, State, Timing,
 };
 use worm_physics::MAX_CELLS;
 use wormd::topics::{
@@ -370,7 +370,7 @@ fn a_command_is_answered_once_and_an_abandoned_one_is_not_carried_out() {
             taken.push(command);
             let reply = Reply {
                 sequence: 9,
-                verdict: Verdict::Accepted.code(),
+                verdict: CommandOutcome::Accepted.code(),
                 mode: Mode::Crawling.code(),
                 fault: 0,
                 reserved: 0,

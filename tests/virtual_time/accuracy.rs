@@ -8,13 +8,13 @@ use super::machine::{Machine, Wired};
 use std::fmt::Write;
 use worm_estimator::config::Config;
 use worm_estimator::message::Cycle;
-use wormd::link::virtual_worm::{Account, Options};
+use wormd::link::virtual_worm::{Options, PlantLedger};
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
 const SETTLED_CYCLES: usize = 10;
 const UNEQUAL: &str = "[0.0020, 0.0011, 0.00175, 0.00215]";
 
-pub type Quantity = (&'static str, fn(&Cycle) -> f64, fn(&Account) -> f64);
+pub type Quantity = (&'static str, fn(&Cycle) -> f64, fn(&PlantLedger) -> f64);
 
 pub const QUANTITIES: [Quantity; 6] = [
     ("loss (11)", |c| c.energy_loss_j, |t| t.loss_j),
@@ -67,7 +67,7 @@ fn worm(slope_deg: i32, deformation: &str, seed: u64) -> Config {
 }
 
 /// Crawls for so many gait cycles and hands over what was measured and what was true.
-fn crawl(config: &Config, cycles: f64) -> (Vec<Cycle>, Vec<Account>) {
+fn crawl(config: &Config, cycles: f64) -> (Vec<Cycle>, Vec<PlantLedger>) {
     let wired = Wired::new(config, &Options::default());
     let mut session = Session::crawling(config, wired, 1000.0);
     session.cycles = Some(Vec::new());

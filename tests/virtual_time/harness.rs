@@ -4,7 +4,7 @@
 use super::machine::{Exchange, Machine};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::Observer;
-use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, Cycle, Fault, Mode, State, Verdict};
+use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, State};
 use wormd::control::{Controller, Inputs, Outputs};
 
 /// The estimator's heartbeat while no sample comes, s.
@@ -50,7 +50,7 @@ pub struct Session<M> {
 pub struct Tick {
     pub state: State,
     pub goal_counts: i32,
-    pub verdict: Option<Verdict>,
+    pub verdict: Option<CommandOutcome>,
 }
 
 impl<M: Machine> Session<M> {
@@ -112,7 +112,12 @@ impl<M: Machine> Session<M> {
             reserved: 0,
         };
         let verdict = self.tick(Some(command)).verdict;
-        assert_eq!(verdict, Some(Verdict::Accepted), "{kind:?} at {} s", self.now_s());
+        assert_eq!(
+            verdict,
+            Some(CommandOutcome::Accepted),
+            "{kind:?} at {} s",
+            self.now_s()
+        );
     }
 
     /// Ticks for so long and shows every tick.
@@ -200,7 +205,7 @@ impl<M: Machine> Session<M> {
             goal_counts: outputs.goal_counts,
             verdict: outputs
                 .reply
-                .map(|reply| Verdict::try_from(reply.verdict).expect("a verdict")),
+                .map(|reply| CommandOutcome::try_from(reply.verdict).expect("a verdict")),
         }
     }
 

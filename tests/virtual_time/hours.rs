@@ -22,7 +22,7 @@ const JOURNEYS: usize = 64;
 
 /// A journey's worm. In 64 journeys every slope meets every cycle time with either noise and either source of the bounds; in
 /// every second of them the tracker misses some positions.
-struct Kind {
+struct FaultKind {
     slope_deg: f64,
     noise_m: f64,
     dropout_share: f64,
@@ -31,7 +31,7 @@ struct Kind {
     identified: bool,
 }
 
-impl Kind {
+impl FaultKind {
     fn of(journey: usize) -> Self {
         let pick = |values: [f64; 4], digit: u32| values[journey / 4usize.pow(digit) % 4];
         Self {
@@ -76,7 +76,7 @@ fn journey<M: Machine>(
     rate_hz: f64,
     machine: impl Fn(&Config, u64) -> M,
 ) -> (f64, Option<String>) {
-    let toml = Kind::of(number).toml(rate_hz);
+    let toml = FaultKind::of(number).toml(rate_hz);
     let config = config(&toml);
     let seed = number as u64 + 1;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);

@@ -2,8 +2,8 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use worm_analysis::experiment::{Run, Simulation, analyze, simulate};
-use worm_analysis::identify::{Gait, Prior, gait, search};
+use worm_analysis::experiment::{RecordedRun, Simulation, analyze, simulate};
+use worm_analysis::identify::{IdentifiedGait, Prior, gait, search};
 use worm_analysis::recording::Recording;
 use worm_estimator::config::Config;
 
@@ -16,7 +16,7 @@ fn recording(simulation: Simulation) -> Recording {
     simulate(&Config::default(), &simulation).expect("the paper's worm crawls")
 }
 
-fn gait_of(recording: &Recording, filled_m: &[Vec<f64>]) -> Gait {
+fn gait_of(recording: &Recording, filled_m: &[Vec<f64>]) -> IdentifiedGait {
     let prior = Prior {
         step_order: &[0, 1, 2, 3],
         phase: recording.gait_phase.as_deref(),
@@ -41,7 +41,7 @@ fn identify(criterion: &mut Criterion) {
         ..Simulation::default()
     });
     let uphill_m = uphill.filled();
-    let run = Run {
+    let run = RecordedRun {
         recording: &uphill,
         slope_deg: 30.0,
         payload_kg: 0.0,

@@ -9,14 +9,14 @@ use super::worm::{SlidesDown, Worm};
 
 /// A worm in motion under its [`Physics`], quasi-static: the exact [`Motion`] while they are piecewise linear, else a [`Crawl`].
 #[derive(Debug, Clone)]
-pub struct Locomotion(Kind);
+pub struct Locomotion(MotionKind);
 
 #[derive(Debug, Clone)]
 #[expect(
     clippy::large_enum_variant,
     reason = "there is one for each worm, and none is ever moved about in a loop"
 )]
-enum Kind {
+enum MotionKind {
     Exact { worm: Worm, motion: Motion },
     Incremental { mechanics: Mechanics, crawl: Crawl },
 }
@@ -34,11 +34,11 @@ impl Locomotion {
             let worm = physics.clamped_worm();
             worm.check_hold()?;
             let motion = Motion::at_rest(&worm, first_positions_m);
-            Kind::Exact { worm, motion }
+            MotionKind::Exact { worm, motion }
         } else {
             let mechanics = Mechanics::new(physics);
             let crawl = Crawl::at_rest(&mechanics, 0.0, first_positions_m, None)?;
-            Kind::Incremental { mechanics, crawl }
+            MotionKind::Incremental { mechanics, crawl }
         }))
     }
 
@@ -52,7 +52,7 @@ impl Locomotion {
     /// When the number of cells is another, or laws that only one of the two motions knows come or go.
     pub fn take_up(&mut self, physics: &Physics) -> Result<(), SlidesDown> {
         match &mut self.0 {
-            Kind::Exact { worm, motion } => {
+            MotionKind::Exact { worm, motion } => {
                 assert!(
                     physics.is_piecewise_linear(),
                     "an exact motion keeps to the paper's laws"
@@ -60,7 +60,7 @@ impl Locomotion {
                 *worm = physics.clamped_worm();
                 motion.rebalance(worm)
             }
-            Kind::Incremental { mechanics, crawl } => {
+            MotionKind::Incremental { mechanics, crawl } => {
                 *mechanics = Mechanics::new(physics);
                 crawl.take_up(mechanics);
                 mechanics.worm.check_hold()
@@ -74,8 +74,8 @@ impl Locomotion {
     /// [`SlidesDown`] when the tips cannot hold the worm.
     pub fn advance_to(&mut self, phase: f64, duration_s: f64) -> Result<(), SlidesDown> {
         match &mut self.0 {
-            Kind::Exact { worm, motion } => motion.advance_to(worm, phase),
-            Kind::Incremental { mechanics, crawl } => crawl.advance_to(mechanics, phase, duration_s),
+            MotionKind::Exact { worm, motion } => motion.advance_to(worm, phase),
+            MotionKind::Incremental { mechanics, crawl } => crawl.advance_to(mechanics, phase, duration_s),
         }
     }
 
@@ -83,88 +83,88 @@ impl Locomotion {
     /// slides down.
     pub fn translate(&mut self, distance_m: f64, duration_s: f64) {
         match &mut self.0 {
-            Kind::Exact { worm, motion } => motion.translate(worm, distance_m),
-            Kind::Incremental { mechanics, crawl } => crawl.translate(mechanics, distance_m, duration_s),
+            MotionKind::Exact { worm, motion } => motion.translate(worm, distance_m),
+            MotionKind::Incremental { mechanics, crawl } => crawl.translate(mechanics, distance_m, duration_s),
         }
     }
 
     /// Whether it is exact: under no law but the paper's.
     pub fn is_exact(&self) -> bool {
-        matches!(self.0, Kind::Exact { .. })
+        matches!(self.0, MotionKind::Exact { .. })
     }
 
     /// The worm as it is now, with what the slope does to its clamps.
     pub fn worm(&self) -> &Worm {
         match &self.0 {
-            Kind::Exact { worm, .. } => worm,
-            Kind::Incremental { mechanics, .. } => mechanics.worm(),
+            MotionKind::Exact { worm, .. } => worm,
+            MotionKind::Incremental { mechanics, .. } => mechanics.worm(),
         }
     }
 
     /// Positions Xᵢ along the canal, m, cell 0 first.
     pub fn positions_m(&self) -> &[f64] {
         match &self.0 {
-            Kind::Exact { motion, .. } => motion.positions_m(),
-            Kind::Incremental { crawl, .. } => crawl.positions_m(),
+            MotionKind::Exact { motion, .. } => motion.positions_m(),
+            MotionKind::Incremental { crawl, .. } => crawl.positions_m(),
         }
     }
 
     /// Mean position of the cells, m.
     pub fn mean_position_m(&self) -> f64 {
         match &self.0 {
-            Kind::Exact { motion, .. } => motion.mean_position_m(),
-            Kind::Incremental { crawl, .. } => crawl.mean_position_m(),
+            MotionKind::Exact { motion, .. } => motion.mean_position_m(),
+            MotionKind::Incremental { crawl, .. } => crawl.mean_position_m(),
         }
     }
 
     /// Deformation δᵢ of a cell's pad, m.
     pub fn deformation_m(&self, cell: usize) -> f64 {
         match &self.0 {
-            Kind::Exact { motion, .. } => motion.deformation_m(cell),
-            Kind::Incremental { crawl, .. } => crawl.deformation_m(cell),
+            MotionKind::Exact { motion, .. } => motion.deformation_m(cell),
+            MotionKind::Incremental { crawl, .. } => crawl.deformation_m(cell),
         }
     }
 
     /// Contact force on a cell's pad, N, positive when the pad is deformed forward.
     pub fn contact_force_n(&self, cell: usize) -> f64 {
         match &self.0 {
-            Kind::Exact { worm, motion } => worm.contact(cell).stiffness_n_per_m * motion.deformation_m(cell),
-            Kind::Incremental { crawl, .. } => crawl.contact_force_n(cell),
+            MotionKind::Exact { worm, motion } => worm.contact(cell).stiffness_n_per_m * motion.deformation_m(cell),
+            MotionKind::Incremental { crawl, .. } => crawl.contact_force_n(cell),
         }
     }
 
     /// Gait phase, cycles, unwrapped.
     pub fn phase(&self) -> f64 {
         match &self.0 {
-            Kind::Exact { motion, .. } => motion.phase(),
-            Kind::Incremental { crawl, .. } => crawl.phase(),
+            MotionKind::Exact { motion, .. } => motion.phase(),
+            MotionKind::Incremental { crawl, .. } => crawl.phase(),
         }
     }
 
     /// The account of energy and slides since the motion began.
     pub fn ledger(&self) -> &Ledger {
         match &self.0 {
-            Kind::Exact { motion, .. } => motion.ledger(),
-            Kind::Incremental { crawl, .. } => crawl.ledger(),
+            MotionKind::Exact { motion, .. } => motion.ledger(),
+            MotionKind::Incremental { crawl, .. } => crawl.ledger(),
         }
     }
 
     /// Force that the stepping cell's actuator exerts, N (13).
     pub fn actuator_force_n(&self) -> f64 {
         match &self.0 {
-            Kind::Exact { worm, motion } => motion.actuator_force_n(worm),
-            Kind::Incremental { mechanics, crawl } => crawl.actuator_force_n(mechanics),
+            MotionKind::Exact { worm, motion } => motion.actuator_force_n(worm),
+            MotionKind::Incremental { mechanics, crawl } => crawl.actuator_force_n(mechanics),
         }
     }
 
     /// Work of the whole drive for each cycle of phase as things stand, J: Σ force × dX/dφ over the cells that step.
     pub fn drive_load_j(&self) -> f64 {
         match &self.0 {
-            Kind::Exact { worm, motion } => {
+            MotionKind::Exact { worm, motion } => {
                 let stroke_m = worm.stroke_of_m(motion.stepping_cell(worm));
                 motion.actuator_force_n(worm) * stroke_m * worm.cells() as f64
             }
-            Kind::Incremental { mechanics, crawl } => crawl.drive_load_j(mechanics),
+            MotionKind::Incremental { mechanics, crawl } => crawl.drive_load_j(mechanics),
         }
     }
 }

@@ -103,14 +103,10 @@ impl PadLaw {
             self.force(pad, reach_m, relaxing)
         };
         let (force_n, deformation_m) = if reach_n > hold.max_n {
-            let at_m = hold
-                .max_m
-                .get_or_insert_with(|| self.invert(pad, hold.max_n, relaxing));
+            let at_m = hold.max_m.get_or_insert_with(|| self.invert(pad, hold.max_n, relaxing));
             (hold.max_n, at_m.min(reach_m))
         } else if reach_n < hold.min_n {
-            let at_m = hold
-                .min_m
-                .get_or_insert_with(|| self.invert(pad, hold.min_n, relaxing));
+            let at_m = hold.min_m.get_or_insert_with(|| self.invert(pad, hold.min_n, relaxing));
             (hold.min_n, at_m.max(reach_m))
         } else {
             return Loaded {

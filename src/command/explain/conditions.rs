@@ -1,8 +1,8 @@
 //! Whether what is stated of a recording can be true of it, before a long search starts from it.
 
 use crate::command::Failure;
-use worm_analysis::experiment::Run;
-use worm_analysis::identify::{Gait, Prior, gait};
+use worm_analysis::experiment::RecordedRun;
+use worm_analysis::identify::{IdentifiedGait, Prior, gait};
 use worm_estimator::config::Config;
 use worm_physics::Worm;
 
@@ -16,7 +16,7 @@ const MORE_FRICTION: f64 = 1.5;
 ///
 /// # Errors
 /// [`Failure::Unusable`] names the recording, what is stated and what is seen.
-pub(super) fn check(runs: &[Run<'_>], config: &Config) -> Result<(), Failure> {
+pub(super) fn check(runs: &[RecordedRun<'_>], config: &Config) -> Result<(), Failure> {
     let nominal = Worm::try_from(config).map_err(Failure::unusable)?;
     for run in runs {
         check_cycle(run, config)?;
@@ -25,7 +25,7 @@ pub(super) fn check(runs: &[Run<'_>], config: &Config) -> Result<(), Failure> {
     Ok(())
 }
 
-fn check_cycle(run: &Run<'_>, config: &Config) -> Result<(), Failure> {
+fn check_cycle(run: &RecordedRun<'_>, config: &Config) -> Result<(), Failure> {
     let (Some(stated_s), recording) = (run.cycle_s, run.recording) else {
         return Ok(());
     };
@@ -49,7 +49,7 @@ fn check_cycle(run: &Run<'_>, config: &Config) -> Result<(), Failure> {
 
 /// Mean time of the whole gait cycles, s, rests before and after them left out, and what it would be if every step took as long as
 /// the middle one of all, so that rests between the cycles are left out, too; none where there is no whole cycle.
-fn cycle_s(gait: &Gait, time_s: &[f64]) -> Option<[f64; 2]> {
+fn cycle_s(gait: &IdentifiedGait, time_s: &[f64]) -> Option<[f64; 2]> {
     let (first, last) = (gait.phase.first()?.ceil(), gait.phase.last()?.floor());
     let begun_s = |phase: f64| time_s.get(gait.phase.partition_point(|at| *at <= phase)).copied();
     let ended_s = |phase: f64| time_s.get(gait.phase.partition_point(|at| *at < phase)).copied();
@@ -65,7 +65,7 @@ fn cycle_s(gait: &Gait, time_s: &[f64]) -> Option<[f64; 2]> {
     Some([(ended_s(last)? - begun_s(first)?) / (last - first), middle_s * cells])
 }
 
-fn check_payload(run: &Run<'_>, nominal: &Worm) -> Result<(), Failure> {
+fn check_payload(run: &RecordedRun<'_>, nominal: &Worm) -> Result<(), Failure> {
     if run.payload_kg <= 0.0 {
         return Ok(());
     }
@@ -103,7 +103,7 @@ mod tests {
             let cycle = (time_s / (turn_s + dwell_s)).floor();
             cycle + ((time_s - cycle * (turn_s + dwell_s)) / turn_s).min(1.0)
         });
-        let gait = Gait {
+        let gait = IdentifiedGait {
             step_order: vec![0, 1, 2, 3],
             phase: phase.collect(),
             phase_sigma: 0.0,

@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::json;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
-use worm_analysis::experiment::Run;
+use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain::Answer;
 use worm_analysis::explain::model_update::{self, ModelText};
 use worm_analysis::report;
@@ -29,8 +29,13 @@ impl Folder {
     }
 
     /// `report.json` where there is no answer: why not, how far the search had come, and what it was made on.
-    pub(super) fn write_failure(&self, failure: &Failure, stage: &str, runs: &[Run<'_>]) -> Result<(), Failure> {
-        let run = |run: &Run<'_>| {
+    pub(super) fn write_failure(
+        &self,
+        failure: &Failure,
+        stage: &str,
+        runs: &[RecordedRun<'_>],
+    ) -> Result<(), Failure> {
+        let run = |run: &RecordedRun<'_>| {
             json!({
                 "recording": run.recording.source.display().to_string(),
                 "slope_deg": run.slope_deg,

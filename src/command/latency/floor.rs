@@ -2,8 +2,8 @@
 
 use crate::command::child_process::{Child, Log, START_PATIENCE};
 use crate::command::{Failure, end_on_signal, print};
-use crate::latency::ipc_baseline::Bare;
 use crate::latency::floor::{self, FloorOutcome, FloorPlan};
+use crate::latency::ipc_baseline::Bare;
 use crate::topics::Instance;
 use clap::Args;
 use nix::sched::{CpuSet, sched_setaffinity};

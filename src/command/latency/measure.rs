@@ -1,19 +1,19 @@
 //! The run itself: start, crawl, measure, look at busy subscribers, try other rates, end.
 
 use super::bench::Bench;
+use super::busy_poll::{self, Polling};
 use super::floor::Floor;
 use super::testbed::{Testbed, estimator_realtime};
-use super::busy_poll::{self, Polling};
 use super::{cyclictest, rates, verdict};
 use crate::command::child_process::Log;
-use crate::command::telemetry_receiver::TelemetryReceiver;
 use crate::command::progress::Progress;
+use crate::command::telemetry_receiver::TelemetryReceiver;
 use crate::command::{Failure, print};
-use crate::latency::ipc_baseline::Bare;
 use crate::latency::floor::{BareListener, FloorOutcome, FloorPlan};
+use crate::latency::ipc_baseline::Bare;
 use crate::latency::outcome::{Cyclictest, RateTrial};
 use crate::latency::stress::Stress;
-use crate::latency::{Account, Deliveries, Durations, Outcome};
+use crate::latency::{Deliveries, Durations, Outcome, TickStats};
 use crate::realtime::{InForce, monotonic_ns};
 use crate::topics::{Hub, Instance, Subscriber};
 use crate::watch::Telemetry;
@@ -47,7 +47,7 @@ const ALARM_WITHIN_NS: u64 = 1_000_000_000;
 /// Everything that was measured.
 #[derive(Default)]
 pub(super) struct Findings {
-    pub(super) account: Account,
+    pub(super) account: TickStats,
     pub(super) floor: FloorOutcome,
     pub(super) floor_delivery: Durations,
     pub(super) delivery: Durations,
@@ -107,10 +107,11 @@ fn measure(
         let mut receiver = TelemetryReceiver::open(&hub)?;
         let mut telemetry = Telemetry::default();
         let client = hub.command_client().map_err(Failure::failed)?;
-        receiver.start_crawling(&client, &bench.config, &mut telemetry, end, || {
-            testbed.find_ended().is_some()
-        })
-        .map_err(|failure| testbed.find_ended().map_or(failure, Failure::failed))?;
+        receiver
+            .start_crawling(&client, &bench.config, &mut telemetry, end, || {
+                testbed.find_ended().is_some()
+            })
+            .map_err(|failure| testbed.find_ended().map_or(failure, Failure::failed))?;
     } else {
         findings.warnings.push(
             "a real worm is neither made to crawl nor blocked by a benchmark: it stays disarmed, and the way from stall to alarm \
@@ -119,7 +120,7 @@ fn measure(
         );
     }
     findings.in_force = InForce::of_process(testbed.controller.id()).ok();
-    let run = Run {
+    let run = Measurement {
         bench,
         log,
         end,
@@ -149,7 +150,7 @@ fn measure(
 }
 
 /// The running measurement.
-struct Run<'r> {
+struct Measurement<'r> {
     bench: &'r Bench,
     log: &'r Log,
     end: &'r AtomicBool,
@@ -165,7 +166,7 @@ struct Run<'r> {
 /// A part of the run for whoever waits for it: its name, and the shares of everything at which it begins and ends.
 type Stage = (&'static str, f64, f64);
 
-impl Run<'_> {
+impl Measurement<'_> {
     /// The loop with the floor beside it, and then subscribers that never sleep.
     fn measure(mut self) -> Result<(), Failure> {
         self.go_on(STARTING, self.bench.settling(), |_, _| {})?;
@@ -186,7 +187,7 @@ impl Run<'_> {
     }
 
     fn measure_loop(&mut self, floor: &mut Floor) -> Result<(), Failure> {
-        let (mut account, mut deliveries) = (Account::default(), Deliveries::default());
+        let (mut account, mut deliveries) = (TickStats::default(), Deliveries::default());
         let (begun, cpu_before) = (Instant::now(), self.testbed.cpu_ns());
         let outcome = self.go_on(
             ("measuring the loop", 0.0, 0.6),

@@ -1,13 +1,13 @@
 //! Which rate can be kept: the controller is run at one rate after the other, each for a short while.
 
 use super::bench::Bench;
-use super::testbed::Testbed;
 use super::measure::{Findings, LOOK};
+use super::testbed::Testbed;
 use crate::command::Failure;
 use crate::command::child_process::Log;
 use crate::command::progress::Progress;
 use crate::control::bus_allowed_ns;
-use crate::latency::Account;
+use crate::latency::TickStats;
 use crate::latency::outcome::RateTrial;
 use crate::topics::Hub;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,7 +69,7 @@ pub(super) fn search(
 
 fn try_rate(rate_hz: f64, bus_wait_share: f64, hub: &Hub, end: &AtomicBool) -> Result<RateTrial, Failure> {
     let mut timings = hub.subscriber::<Timing>().map_err(Failure::failed)?;
-    let mut account = Account::default();
+    let mut account = TickStats::default();
     let mut unanswered = 0; // in time: answers that come late show a rate that is too high
     let begun = Instant::now();
     while begun.elapsed() < SETTLING + TRIAL && !end.load(Ordering::Relaxed) {
@@ -87,7 +87,7 @@ fn try_rate(rate_hz: f64, bus_wait_share: f64, hub: &Hub, end: &AtomicBool) -> R
 }
 
 impl RateTrial {
-    fn new(rate_hz: f64, account: &Account, failed_exchanges: u64) -> Self {
+    fn new(rate_hz: f64, account: &TickStats, failed_exchanges: u64) -> Self {
         let (ticks, overruns) = (account.ticks, account.overruns);
         let allowed = ((ticks + overruns) as f64 * MISSED_FRACTION).ceil() as u64;
         Self {

@@ -70,7 +70,7 @@ impl Rig {
         rig.run(10);
         rig.command(CommandKind::Arm, 0.0);
         rig.run(2);
-        assert_eq!(rig.command(CommandKind::Crawl, 0.0), Verdict::Accepted);
+        assert_eq!(rig.command(CommandKind::Crawl, 0.0), CommandOutcome::Accepted);
         rig.run(500);
         assert_eq!(rig.mode(), Mode::Crawling);
         rig
@@ -131,7 +131,7 @@ impl Rig {
         self.servo_answers = answers;
     }
 
-    fn command(&mut self, kind: CommandKind, cycles_per_s: f64) -> Verdict {
+    fn command(&mut self, kind: CommandKind, cycles_per_s: f64) -> CommandOutcome {
         let reply = self
             .tick(Some(Command {
                 cycles_per_s,
@@ -139,7 +139,7 @@ impl Rig {
                 reserved: 0,
             }))
             .reply;
-        Verdict::try_from(reply.expect("every command is answered").verdict).expect("a known verdict")
+        CommandOutcome::try_from(reply.expect("every command is answered").verdict).expect("a known verdict")
     }
 
     fn raise(&mut self, kind: AlarmKind) {
@@ -196,7 +196,7 @@ fn a_life_from_arming_to_the_end() {
 #[test]
 fn commands_by_mode() {
     use CommandKind::{Arm, Crawl, Hold, Reset, Stop};
-    use Verdict::{Accepted, BadSpeed, NoEstimator, WrongMode};
+    use CommandOutcome::{Accepted, BadSpeed, NoEstimator, WrongMode};
     type Prepare = fn() -> Rig;
     let disarmed: Prepare = || Rig::new("");
     let armed: Prepare = || {
@@ -222,7 +222,7 @@ fn commands_by_mode() {
         rig
     };
     // (from, command, speed, verdict, mode half a second later)
-    let table: [(Prepare, CommandKind, f64, Verdict, Mode); 18] = [
+    let table: [(Prepare, CommandKind, f64, CommandOutcome, Mode); 18] = [
         (disarmed, Arm, 0.0, Accepted, Mode::Armed),
         (disarmed, Crawl, 0.0, WrongMode, Mode::Disarmed),
         (disarmed, Hold, 0.0, WrongMode, Mode::Disarmed),
@@ -310,11 +310,11 @@ fn a_reset_is_refused_while_the_cause_is_there_and_starts_from_the_measured_posi
     let mut rig = Rig::crawling("");
     rig.servo.temperature_c = 80.0;
     rig.run(3);
-    assert_eq!(rig.command(CommandKind::Reset, 0.0), Verdict::FaultPersists);
+    assert_eq!(rig.command(CommandKind::Reset, 0.0), CommandOutcome::FaultPersists);
     rig.servo.temperature_c = 40.0;
     rig.servo.position_rad += 1.0; // the cam was turned meanwhile
     rig.run(1);
-    assert_eq!(rig.command(CommandKind::Reset, 0.0), Verdict::Accepted);
+    assert_eq!(rig.command(CommandKind::Reset, 0.0), CommandOutcome::Accepted);
     rig.run(100);
     assert_eq!(
         (rig.mode(), rig.controller.fault(), rig.goal_counts),
@@ -335,7 +335,11 @@ fn a_reset_forgets_what_the_servo_said_before_it() {
         trouble(&mut rig, true);
         rig.run(100);
         assert_eq!(rig.mode(), Mode::Fault, "row {index}");
-        assert_eq!(rig.command(CommandKind::Reset, 0.0), Verdict::Accepted, "row {index}");
+        assert_eq!(
+            rig.command(CommandKind::Reset, 0.0),
+            CommandOutcome::Accepted,
+            "row {index}"
+        );
         rig.run(1);
         trouble(&mut rig, false);
         rig.run(10);

@@ -205,14 +205,15 @@ fn faults_of_sight_and_identity() {
     assert_eq!(writer.tell(SERVO, Instruction::Ping).1[..2], 1190u16.to_le_bytes());
     writer.wait(0.1);
     assert_eq!(
-        writer.tell(
-            TRACKER,
-            Instruction::Read {
-                address: 137,
-                length: 2
-            }
-        )
-        .1,
+        writer
+            .tell(
+                TRACKER,
+                Instruction::Read {
+                    address: 137,
+                    length: 2
+                }
+            )
+            .1,
         [0b1011, 0]
     );
 }

@@ -91,7 +91,8 @@ impl Camera {
             ((before_s, before_m), Some((after_s, after_m))) if then_s > *before_s => {
                 let fraction = (then_s - before_s) / (after_s - before_s);
                 let both = before_m.iter().zip(after_m);
-                both.map(|(before, after)| before + fraction * (after - before)).collect()
+                both.map(|(before, after)| before + fraction * (after - before))
+                    .collect()
             }
             ((_, before_m), _) => before_m.clone(),
         }

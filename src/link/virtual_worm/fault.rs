@@ -7,7 +7,7 @@
 //! What kinds there are, with which parameters and what effect, stands in one table, `fault_kinds`.
 
 use super::conditions::Conditions;
-use super::fault_kinds::{Domain, KINDS, Kind};
+use super::fault_kinds::{Domain, FaultKind, KINDS};
 use std::fmt::Write as _;
 use std::str::FromStr;
 
@@ -67,7 +67,7 @@ pub enum FaultError {
 /// One fault: what, and when.
 #[derive(Clone)]
 pub struct Fault {
-    kind: &'static Kind,
+    kind: &'static FaultKind,
     values: Vec<f64>, // one for each parameter of the kind
     from_s: Option<f64>,
     until_s: Option<f64>,

@@ -27,7 +27,7 @@ pub(super) struct Parameter {
 }
 
 /// One kind of fault.
-pub(super) struct Kind {
+pub(super) struct FaultKind {
     pub(super) name: &'static str,
     pub(super) meaning: &'static str,
     pub(super) parameters: &'static [Parameter],
@@ -79,8 +79,8 @@ const fn kind(
     meaning: &'static str,
     parameters: &'static [Parameter],
     apply: fn(&mut Conditions, &[f64]),
-) -> Kind {
-    Kind {
+) -> FaultKind {
+    FaultKind {
         name,
         meaning,
         parameters,
@@ -90,7 +90,7 @@ const fn kind(
 }
 
 /// Every kind of fault.
-pub(super) const KINDS: &[Kind] = &[
+pub(super) const KINDS: &[FaultKind] = &[
     kind("stall", "the cam is blocked hard", &[], |c, _| {
         c.plant.inner_friction_scale = BLOCKED;
     }),
@@ -192,7 +192,7 @@ pub(super) const KINDS: &[Kind] = &[
         &[number("ms", 0.0, 10_000.0, "ms", Some(2.0))],
         |c, v| c.wire.delay_s = v[0] * 1e-3,
     ),
-    Kind {
+    FaultKind {
         name: "reboot",
         meaning: "the servo loses power for so long, and with it torque, watchdog and goal",
         parameters: &[number("off", 0.0, 60.0, "s", Some(0.05))],
@@ -244,7 +244,7 @@ pub(super) const KINDS: &[Kind] = &[
     ),
 ];
 
-impl Kind {
+impl FaultKind {
     /// As one would write it with its defaults.
     pub(super) fn usage(&self) -> String {
         let mut usage = self.name.to_owned();

@@ -10,7 +10,7 @@ const KEPT_CYCLES: usize = 100_000;
 
 /// What was spent and gained over a stretch of time. Energies in J, distances in m.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Account {
+pub struct PlantLedger {
     /// Duration, s.
     pub duration_s: f64,
     /// Travelled gait phase, cycles, signed.
@@ -56,7 +56,7 @@ pub struct TruthLedger {
     energy: StepEnergy, // summed over all steps
     at_start: Sums,
     at_cycle_start: Sums,
-    cycles: VecDeque<Account>,
+    cycles: VecDeque<PlantLedger>,
     forgotten_cycles: u64,
 }
 
@@ -99,12 +99,12 @@ impl TruthLedger {
         self.at_cycle_start = now;
     }
 
-    pub(super) fn total(&self, standing: &Standing<'_>) -> Account {
+    pub(super) fn total(&self, standing: &Standing<'_>) -> PlantLedger {
         Sums::of(self.energy, standing).since(&self.at_start, self.cells)
     }
 
     /// The completed cycles that are kept, oldest first.
-    pub fn cycles(&self) -> &VecDeque<Account> {
+    pub fn cycles(&self) -> &VecDeque<PlantLedger> {
         &self.cycles
     }
 
@@ -126,9 +126,9 @@ impl Sums {
         }
     }
 
-    fn since(&self, earlier: &Self, cells: usize) -> Account {
+    fn since(&self, earlier: &Self, cells: usize) -> PlantLedger {
         let model = self.model.since(&earlier.model);
-        Account {
+        PlantLedger {
             duration_s: self.time_s - earlier.time_s,
             cycles: self.phase - earlier.phase,
             advance_m: self.mean_position_m - earlier.mean_position_m,

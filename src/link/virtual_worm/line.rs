@@ -1,7 +1,7 @@
 //! The line back to the controller: answers wait there until they are due, and some are lost, damaged or late.
 
-use super::conditions::WireConditions;
 use super::camera::draw;
+use super::conditions::WireConditions;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;

@@ -24,6 +24,7 @@
 
 pub mod body;
 mod bus;
+pub mod camera;
 pub mod conditions;
 mod control_table;
 mod devices;
@@ -39,22 +40,21 @@ mod report;
 mod server;
 mod servo;
 mod servo_table;
-pub mod camera;
 pub mod supply;
 mod tracker;
 
 #[cfg(test)]
 mod behaviour_tests;
 #[cfg(test)]
-mod protocol_tests;
-#[cfg(test)]
 mod device_harness;
+#[cfg(test)]
+mod protocol_tests;
 
 pub use devices::{Devices, DevicesError};
 pub use fault::{Fault, FaultError};
-pub use ledger::Account;
+pub use ledger::PlantLedger;
 pub use options::Options;
 pub use plant::{DEFAULT_STEP_S, Plant};
 pub use pty::{PortLink, PtyError};
-pub use report::Report;
+pub use report::VirtualWormReport;
 pub use server::{Server, ServerError, VirtualWorm};

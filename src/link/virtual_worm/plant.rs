@@ -6,10 +6,10 @@
 //! change of kinetic energy holds to rounding over any stretch.
 
 use super::body::{Body, BodyError};
-use super::conditions::{PlantConditions, Sight};
-use super::ledger::{Account, Standing, TruthLedger};
-use super::motor::{Drive, Gains, Motor};
 use super::camera::Camera;
+use super::conditions::{PlantConditions, Sight};
+use super::ledger::{PlantLedger, Standing, TruthLedger};
+use super::motor::{Drive, Gains, Motor};
 use super::supply::Supply;
 use crate::link::TrackerReading;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -198,7 +198,7 @@ impl Plant {
     }
 
     /// The account of everything since the beginning.
-    pub fn total(&self) -> Account {
+    pub fn total(&self) -> PlantLedger {
         self.ledger.total(&standing(self.time_s(), &self.body))
     }
 

@@ -28,7 +28,7 @@ fn crawl(config: &Config, velocity_rad_per_s: f64, seconds: f64) -> Plant {
 }
 
 /// `fraction` is what may be missing: a cycle ends within a step, a total at its end.
-fn assert_closes(account: &Account, fraction: f64) {
+fn assert_closes(account: &PlantLedger, fraction: f64) {
     let gone_j = account.copper_j + account.friction_inside_j + account.actuator_net_j + account.kinetic_j;
     assert!(
         (account.electrical_j - gone_j).abs() <= fraction * account.electrical_j,

@@ -69,28 +69,30 @@ fn access_rules() {
         assert_eq!((error, data.len()), (expected, len), "{length} at {address}");
     }
     assert_eq!(
-        writer.tell(
-            TRACKER,
-            Instruction::Write {
-                address: 128,
-                data: &[0]
-            }
-        )
-        .0,
+        writer
+            .tell(
+                TRACKER,
+                Instruction::Write {
+                    address: 128,
+                    data: &[0]
+                }
+            )
+            .0,
         7
     );
     assert_eq!(writer.tell(TRACKER, Instruction::ClearMultiTurn).0, 2);
     // Nothing of a refused write happens.
     let before = writer.read(register::GOAL_VELOCITY);
     assert_eq!(
-        writer.tell(
-            SERVO,
-            Instruction::Write {
-                address: 104,
-                data: &[1, 0, 0, 0, 255, 255, 255, 255]
-            }
-        )
-        .0,
+        writer
+            .tell(
+                SERVO,
+                Instruction::Write {
+                    address: 104,
+                    data: &[1, 0, 0, 0, 255, 255, 255, 255]
+                }
+            )
+            .0,
         4
     );
     assert_eq!(writer.read(register::GOAL_VELOCITY), before);
@@ -137,21 +139,25 @@ fn registered_writes_wait_for_the_action() {
     let mut writer = writer(&[]);
     assert_eq!(writer.tell(SERVO, Instruction::Action).0, 2, "nothing is registered");
     assert_eq!(
-        writer.tell(
-            SERVO,
-            Instruction::RegWrite {
-                address: 65,
-                data: &[1]
-            }
-        )
-        .0,
+        writer
+            .tell(
+                SERVO,
+                Instruction::RegWrite {
+                    address: 65,
+                    data: &[1]
+                }
+            )
+            .0,
         0
     );
     assert_eq!(writer.read(Register::new(69, 1, "registered instruction")), 1);
     assert_eq!(writer.read(Register::new(65, 1, "LED")), 0);
     assert_eq!(writer.ask(254, Instruction::Action), [], "a broadcast is not answered");
     assert_eq!(writer.read(Register::new(65, 1, "LED")), 1);
-    assert_eq!(writer.tell(SERVO, Instruction::RegWrite { address: 0, data: &[1] }).0, 7);
+    assert_eq!(
+        writer.tell(SERVO, Instruction::RegWrite { address: 0, data: &[1] }).0,
+        7
+    );
 }
 
 fn span(device: u8, address: u16, length: u16) -> [u8; 5] {
@@ -218,7 +224,9 @@ fn factory_reset_and_backup() {
     let mut writer = writer(&[]);
     assert_eq!(writer.write(register::VELOCITY_LIMIT, 200), 0);
     assert_eq!(
-        writer.tell(SERVO, Instruction::ControlTableBackup(BackupAction::Store)).0,
+        writer
+            .tell(SERVO, Instruction::ControlTableBackup(BackupAction::Store))
+            .0,
         0
     );
     assert_eq!(writer.write(register::ID, 5), 0);

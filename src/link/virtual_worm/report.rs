@@ -1,12 +1,12 @@
 //! The truth as JSON, for `--ledger FILE` and for tests that hold the estimator against it.
 
 use super::devices::Devices;
-use super::ledger::Account;
+use super::ledger::PlantLedger;
 use serde::Serialize;
 
-/// Everything that the virtual worm knows about what happened. SI units; energies as in [`Account`].
+/// Everything that the virtual worm knows about what happened. SI units; energies as in [`PlantLedger`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Report {
+pub struct VirtualWormReport {
     /// Simulated time, s.
     pub time_s: f64,
     /// When the worm began to crawl, s; null when it never did.
@@ -20,18 +20,18 @@ pub struct Report {
     /// Temperature of the servo, °C.
     pub servo_c: f64,
     /// Everything since the start.
-    pub total: Account,
+    pub total: PlantLedger,
     /// Completed cycles that are missing below, because they are too many.
     pub forgotten_cycles: u64,
     /// The completed cycles, oldest first.
-    pub cycles: Vec<Account>,
+    pub cycles: Vec<PlantLedger>,
 }
 
 impl Devices {
     /// What happened so far.
-    pub fn report(&self) -> Report {
+    pub fn report(&self) -> VirtualWormReport {
         let plant = self.plant();
-        Report {
+        VirtualWormReport {
             time_s: plant.time_s(),
             crawl_began_s: self.crawl_began_s(),
             crawl_began_ns: self.crawl_began_ns,

@@ -49,7 +49,7 @@ impl Size {
 
 /// What a campaign is to test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum CampaignKind {
     /// Nothing is hidden.
     Clean,
     /// One effect of the library.
@@ -96,13 +96,13 @@ pub enum Wanted {
 }
 
 impl Wanted {
-    pub fn kind(self) -> Kind {
+    pub fn kind(self) -> CampaignKind {
         match self {
-            Self::Clean => Kind::Clean,
-            Self::Single(..) => Kind::Single,
-            Self::Outside(_) => Kind::Outside,
-            Self::Pair => Kind::Pair,
-            Self::Twin(_) => Kind::Twin,
+            Self::Clean => CampaignKind::Clean,
+            Self::Single(..) => CampaignKind::Single,
+            Self::Outside(_) => CampaignKind::Outside,
+            Self::Pair => CampaignKind::Pair,
+            Self::Twin(_) => CampaignKind::Twin,
         }
     }
 }
@@ -112,7 +112,7 @@ impl Wanted {
 pub struct HiddenCampaign {
     /// What is hidden and the seed.
     pub name: String,
-    pub kind: Kind,
+    pub kind: CampaignKind,
     pub seed: u64,
     /// What is believed of the worm.
     pub config: Config,

@@ -4,7 +4,7 @@ use super::campaign::HiddenCampaign;
 use super::repeat::{Condition, ExtraRun};
 use super::verdict::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict};
 use std::panic::{self, AssertUnwindSafe};
-use worm_analysis::experiment::Run;
+use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain;
 
 /// Standard errors to either end of a 90 % interval.
@@ -23,20 +23,20 @@ impl Explainer for Library {
 /// without an answer, and not the end of the others.
 fn search(campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<explain::Answer, String> {
     let own = campaign.recordings.iter().zip(&campaign.slopes_deg);
-    let own = own.map(|(recording, &slope_deg)| Run {
+    let own = own.map(|(recording, &slope_deg)| RecordedRun {
         recording,
         slope_deg,
         payload_kg: 0.0,
         cycle_s: Some(campaign.cycle_s),
     });
-    let proposed = extra.iter().map(|extra| Run {
+    let proposed = extra.iter().map(|extra| RecordedRun {
         recording: &extra.recording,
         slope_deg: extra.condition.slope_deg,
         payload_kg: extra.condition.payload_kg,
         // The time that the motor takes for a turn, rests left out.
         cycle_s: Some(extra.condition.cycle_s),
     });
-    let runs: Vec<Run> = own.chain(proposed).collect();
+    let runs: Vec<RecordedRun> = own.chain(proposed).collect();
     let options = explain::Options::default();
     let answer = || explain::explain(&runs, &campaign.config, &options, &mut |_| ());
     panic::catch_unwind(AssertUnwindSafe(answer))

@@ -67,7 +67,11 @@ impl Stranger {
             },
             _ => {
                 let fraction = rng.random_range(0.15..0.4);
-                let factor = if rng.random::<bool>() { 1.0 + fraction } else { 1.0 - fraction };
+                let factor = if rng.random::<bool>() {
+                    1.0 + fraction
+                } else {
+                    1.0 - fraction
+                };
                 Self::FrictionJump { factor }
             }
         }
@@ -90,7 +94,9 @@ impl Stranger {
         match *self {
             Self::Corrugation { period_m, force_n, .. } => vec![("period_m", period_m), ("force_n", force_n)],
             Self::FrictionSwing {
-                fraction, period_cycles, ..
+                fraction,
+                period_cycles,
+                ..
             } => vec![("share", fraction), ("period_cycles", period_cycles)],
             Self::Anchor {
                 place_m,

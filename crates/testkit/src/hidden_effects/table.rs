@@ -1,6 +1,6 @@
 //! Many judgements in one table, each share with its Wilson interval and what is aimed at.
 
-use super::campaign::Kind;
+use super::campaign::CampaignKind;
 use super::verdict::{Judgement, Verdict};
 use std::fmt;
 use std::io;
@@ -60,13 +60,13 @@ impl fmt::Display for Share {
 pub struct Table<'a>(pub &'a [Judgement]);
 
 impl Table<'_> {
-    fn of(&self, kind: Kind) -> impl Iterator<Item = &Judgement> {
+    fn of(&self, kind: CampaignKind) -> impl Iterator<Item = &Judgement> {
         self.0.iter().filter(move |judgement| judgement.kind == kind)
     }
 
     /// Single effects that the library itself says are detectable.
     fn detectable(&self) -> impl Iterator<Item = &Judgement> {
-        self.of(Kind::Single)
+        self.of(CampaignKind::Single)
             .filter(|judgement| judgement.significance_sigma >= DETECTABLE_SIGMA)
     }
 
@@ -83,7 +83,7 @@ impl Table<'_> {
             (
                 "singles at least 5 sigma",
                 Share::count(
-                    self.of(Kind::Single)
+                    self.of(CampaignKind::Single)
                         .map(|one| Some(one.significance_sigma >= DETECTABLE_SIGMA)),
                 ),
                 "",
@@ -95,7 +95,7 @@ impl Table<'_> {
             ),
             (
                 "class, top 1, every severity",
-                Share::count(self.of(Kind::Single).map(|one| one.right_class)),
+                Share::count(self.of(CampaignKind::Single).map(|one| one.right_class)),
                 "",
             ),
             (
@@ -110,22 +110,28 @@ impl Table<'_> {
             ),
             (
                 "clean, falsely named",
-                Share::count(self.of(Kind::Clean).map(|one| Some(one.verdict.names()))),
+                Share::count(self.of(CampaignKind::Clean).map(|one| Some(one.verdict.names()))),
                 "<= 5 %",
             ),
             (
                 "clean, called outside",
-                Share::count(self.of(Kind::Clean).map(|one| Some(one.verdict == Verdict::Outside))),
+                Share::count(
+                    self.of(CampaignKind::Clean)
+                        .map(|one| Some(one.verdict == Verdict::Outside)),
+                ),
                 "",
             ),
             (
                 "outside, abstained",
-                Share::count(self.of(Kind::Outside).map(abstains)),
+                Share::count(self.of(CampaignKind::Outside).map(abstains)),
                 ">= 80 %",
             ),
             (
                 "outside, seen to be outside",
-                Share::count(self.of(Kind::Outside).map(|one| Some(one.verdict == Verdict::Outside))),
+                Share::count(
+                    self.of(CampaignKind::Outside)
+                        .map(|one| Some(one.verdict == Verdict::Outside)),
+                ),
                 "",
             ),
             (

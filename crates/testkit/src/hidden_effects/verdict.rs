@@ -2,7 +2,7 @@
 //!
 //! [`Answer`] is an explanation as far as it is scored, so that the score does not hang on how the library lays out its own.
 
-use super::campaign::{HiddenCampaign, Kind};
+use super::campaign::{CampaignKind, HiddenCampaign};
 use super::effect::TrueEffect;
 use super::repeat::{Condition, ExtraRun};
 
@@ -107,7 +107,7 @@ pub trait Explainer: Sync {
 #[derive(Debug, Clone)]
 pub struct Judgement {
     pub case: String,
-    pub kind: Kind,
+    pub kind: CampaignKind,
     pub truth: Vec<TrueEffect>,
     /// What the effect does to the advance and within a cycle, m.
     pub visible_m: [f64; 2],
@@ -143,7 +143,8 @@ impl Judgement {
     /// All of it in a line.
     pub fn line(&self) -> String {
         let truth: Vec<String> = self.truth.iter().map(TrueEffect::in_words).collect();
-        let percent = |fraction: Option<f64>| fraction.map_or("-".to_owned(), |fraction| format!("{:.0} %", 100.0 * fraction));
+        let percent =
+            |fraction: Option<f64>| fraction.map_or("-".to_owned(), |fraction| format!("{:.0} %", 100.0 * fraction));
         let right = match (self.right_class, self.strict) {
             (_, Some(true)) => "right",
             (Some(true), _) => "right class",
@@ -207,7 +208,7 @@ pub fn judge(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Judgement 
         eprintln!("{}: {problem}", campaign.name);
         Answer::failed()
     });
-    let single = matches!(campaign.kind, Kind::Single | Kind::Twin);
+    let single = matches!(campaign.kind, CampaignKind::Single | CampaignKind::Twin);
     let truth = campaign.truth.first().filter(|_| single);
     let top = answer.top();
     let hit = truth.and_then(|truth| top.filter(|top| truth.is_met_by(top)).map(|top| (truth, top)));
@@ -240,9 +241,9 @@ pub fn judge(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Judgement 
             .filter(|_| ambiguous)
             .map(|truth| answer.members().any(|member| truth.is_met_by(member))),
         twins_reported: truth
-            .filter(|_| campaign.kind == Kind::Twin)
+            .filter(|_| campaign.kind == CampaignKind::Twin)
             .map(|truth| hit.is_some() && answer.tells_twins_of(truth)),
-        of_pair: (campaign.kind == Kind::Pair).then(|| {
+        of_pair: (campaign.kind == CampaignKind::Pair).then(|| {
             let met = |truth: &&TrueEffect| answer.names() && answer.named.iter().any(|named| truth.is_met_by(named));
             campaign.truth.iter().filter(met).count()
         }),

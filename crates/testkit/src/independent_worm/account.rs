@@ -5,7 +5,7 @@ use super::cam::Cam;
 
 /// Sums since the worm was laid down. A difference of two is the account of the stretch between.
 #[derive(Debug, Clone)]
-pub struct Account {
+pub struct TrueBalance {
     /// Mean position of the cells, m.
     pub mean_m: f64,
     /// Distance that each tip slid forward, m.
@@ -26,7 +26,7 @@ pub struct Account {
     pub damping_j: f64,
 }
 
-impl Account {
+impl TrueBalance {
     pub fn zero(cells: usize, mean_m: f64) -> Self {
         Self {
             mean_m,
@@ -82,7 +82,7 @@ impl Account {
 pub struct TrueCycle {
     pub start_s: f64,
     pub end_s: f64,
-    pub account: Account,
+    pub account: TrueBalance,
 }
 
 /// Everything there is to know of a recording.
@@ -104,7 +104,7 @@ pub struct Truth {
     pub stored_j: [f64; 2],
     time_s: Vec<f64>,
     phase: Vec<f64>,
-    accounts: Vec<Account>,
+    accounts: Vec<TrueBalance>,
 }
 
 impl Truth {
@@ -126,14 +126,14 @@ impl Truth {
     }
 
     /// Keeps how things stand; times must grow.
-    pub fn push(&mut self, time_s: f64, phase: f64, account: Account) {
+    pub fn push(&mut self, time_s: f64, phase: f64, account: TrueBalance) {
         self.time_s.push(time_s);
         self.phase.push(phase);
         self.accounts.push(account);
     }
 
     /// What happened between two times of the recording, s.
-    pub fn over(&self, start_s: f64, end_s: f64) -> Account {
+    pub fn over(&self, start_s: f64, end_s: f64) -> TrueBalance {
         let at = |time_s: f64| {
             let (row, fraction) = place(&self.time_s, time_s);
             self.accounts[row].towards(&self.accounts[row + 1], fraction)
@@ -148,7 +148,7 @@ impl Truth {
     }
 
     /// What happened over all of the recording.
-    pub fn overall(&self) -> Account {
+    pub fn overall(&self) -> TrueBalance {
         self.accounts[self.accounts.len() - 1].since(&self.accounts[0])
     }
 

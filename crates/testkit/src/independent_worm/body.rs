@@ -5,7 +5,7 @@
 //! P' = −Σ (k δᵢ + c δᵢ') − M g sin λ. The momentum is what is integrated, so a sudden change of eᵢ' needs no infinite
 //! force. A tip's place on the canal stays while its deformation keeps within the bounds and follows the cell otherwise.
 
-use super::account::Account;
+use super::account::TrueBalance;
 use super::cam::Cam;
 
 /// Standard gravity as the paper rounds it, m/s².
@@ -91,7 +91,7 @@ pub struct Motion {
     deformation_rate_m_s: Vec<f64>,
     extension_m: Vec<f64>,
     next_extension_m: Vec<f64>,
-    pub account: Account,
+    pub account: TrueBalance,
 }
 
 impl Motion {
@@ -109,7 +109,7 @@ impl Motion {
             translation_m_s: 0.0,
             velocity_m_s: vec![0.0; cells],
             contact_m: position_m.clone(),
-            account: Account::zero(cells, position_m.iter().sum::<f64>() / cells as f64),
+            account: TrueBalance::zero(cells, position_m.iter().sum::<f64>() / cells as f64),
             position_m,
             deformation_m: vec![0.0; cells],
             deformation_rate_m_s: vec![0.0; cells],

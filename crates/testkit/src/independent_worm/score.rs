@@ -1,6 +1,6 @@
 //! An analysis held against the truth.
 
-use super::account::{Account, Truth};
+use super::account::{TrueBalance, Truth};
 use std::fmt;
 use worm_analysis::experiment::Analysis;
 
@@ -74,7 +74,7 @@ impl Score {
                 (&cycle.values, account)
             })
             .collect();
-        let energy = |found: fn(&worm_analysis::experiment::CycleValues) -> f64, truly: fn(&Account) -> f64| {
+        let energy = |found: fn(&worm_analysis::experiment::CycleValues) -> f64, truly: fn(&TrueBalance) -> f64| {
             let found_j = pairs.iter().map(|(values, _)| found(values));
             let true_j = pairs.iter().map(|(_, account)| truly(account));
             let percent = |found_j: f64, true_j: f64| 100.0 * (found_j / true_j - 1.0);
@@ -112,7 +112,7 @@ impl Score {
                 .as_ref()
                 .map(|search| search.max_deformation_m.clone()),
             energies: [
-                energy(|values| values.energy_loss_j, Account::loss_j),
+                energy(|values| values.energy_loss_j, TrueBalance::loss_j),
                 energy(|values| values.energy_actuator_net_j, |account| account.actuator_net_j),
                 energy(
                     |values| values.energy_actuator_positive_j,

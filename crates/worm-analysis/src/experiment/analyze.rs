@@ -3,10 +3,10 @@
 mod theory;
 
 use self::theory::theory;
-use super::energy_balance;
 use super::analysis::{Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Theory};
+use super::energy_balance;
 use super::error::AnalysisError;
-use crate::identify::{self, Gait, Prior, fit, gait, onset, search};
+use crate::identify::{self, IdentifiedGait, Prior, fit, gait, onset, search};
 use crate::recording::Recording;
 use worm_estimator::config::Config;
 use worm_physics::effect::Setting;
@@ -27,7 +27,7 @@ const CYCLE_FRACTION: f64 = 0.2;
 
 /// One recording and the conditions that it was made under.
 #[derive(Debug, Clone, Copy)]
-pub struct Run<'a> {
+pub struct RecordedRun<'a> {
     /// The recording.
     pub recording: &'a Recording,
     /// Slope of the canal, degrees, positive uphill.
@@ -49,8 +49,8 @@ pub struct Progress {
 
 /// A recording on its way through the analysis.
 struct Prepared<'a> {
-    run: Run<'a>,
-    gait: Gait,
+    run: RecordedRun<'a>,
+    gait: IdentifiedGait,
     first_m: Vec<f64>,
     search: Option<search::Found>,
 }
@@ -60,7 +60,7 @@ struct Prepared<'a> {
 /// # Errors
 /// [`AnalysisError`] names the recording and the remedy.
 pub fn analyze(
-    runs: &[Run<'_>],
+    runs: &[RecordedRun<'_>],
     config: &Config,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Vec<Analysis>, AnalysisError> {
@@ -77,9 +77,9 @@ pub fn analyze(
     if prepared.is_empty() {
         return Err(AnalysisError::NoRun);
     }
-    let to_fit: Vec<identify::Run<'_>> = prepared
+    let to_fit: Vec<identify::PositionRun<'_>> = prepared
         .iter()
-        .map(|prepared| identify::Run {
+        .map(|prepared| identify::PositionRun {
             time_s: &prepared.run.recording.time_s,
             gait: &prepared.gait,
             slope_rad: prepared.run.slope_deg.to_radians(),
@@ -127,7 +127,7 @@ fn starts(base: &Worm, prepared: &[Prepared<'_>]) -> Vec<Vec<f64>> {
 }
 
 impl<'a> Prepared<'a> {
-    fn new(run: Run<'a>, base: &Worm, config: &Config) -> Result<Self, AnalysisError> {
+    fn new(run: RecordedRun<'a>, base: &Worm, config: &Config) -> Result<Self, AnalysisError> {
         let recording = run.recording;
         let name = || recording.source.display().to_string();
         if !(-90.0..=90.0).contains(&run.slope_deg) {
@@ -155,7 +155,7 @@ impl<'a> Prepared<'a> {
             phase: recording.gait_phase.as_deref(),
         };
         let gait = gait::find(&recording.time_s, &recording.position_m, &filled_m, prior).map_err(|source| {
-            AnalysisError::Gait {
+            AnalysisError::IdentifiedGait {
                 recording: name(),
                 source,
             }
@@ -361,7 +361,7 @@ fn check_stroke(seen_m: f64, configured_m: f64, name: impl Fn() -> String) -> Re
 }
 
 /// Time mean of each tip's deformation over the settled cycles, or over everything where there are none, m.
-fn mean_deformations(account: &energy_balance::Account) -> Vec<f64> {
+fn mean_deformations(account: &energy_balance::EnergyBalance) -> Vec<f64> {
     let range = match &account.settled {
         settled if settled.is_empty() => 0..account.series.time_s.len(),
         settled => settled.clone(),

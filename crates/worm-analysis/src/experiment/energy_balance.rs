@@ -7,7 +7,7 @@
 use super::analysis::{CycleResult, CycleValues, Series};
 use crate::identify::gait::steps_made;
 use crate::identify::theory::TheoryBody;
-use crate::identify::{FittedRun, Gait};
+use crate::identify::{FittedRun, IdentifiedGait};
 use crate::recording::Recording;
 use worm_physics::{Ledger, SlidesDown, Worm};
 
@@ -18,7 +18,7 @@ const SLIDING: f64 = 1e-9;
 
 /// What the tips did on one recording.
 #[derive(Debug, Clone)]
-pub(super) struct Account {
+pub(super) struct EnergyBalance {
     /// Whole gait cycles.
     pub cycles: Vec<CycleResult>,
     /// Everything at every sample.
@@ -37,7 +37,7 @@ struct Totals {
 
 struct Follower<'a> {
     worm: &'a Worm,
-    gait: &'a Gait,
+    gait: &'a IdentifiedGait,
     place_of: Vec<usize>,
     body: TheoryBody<'a>,
     origin_m: f64, // where theory's way begins
@@ -54,11 +54,11 @@ struct Follower<'a> {
 /// [`SlidesDown`] when the worm found cannot hold itself.
 pub(super) fn follow(
     recording: &Recording,
-    gait: &Gait,
+    gait: &IdentifiedGait,
     fitted: &FittedRun,
     damping_ratio: f64,
     mass_kg: f64,
-) -> Result<Account, SlidesDown> {
+) -> Result<EnergyBalance, SlidesDown> {
     let time_s = &recording.time_s;
     let worm = &fitted.worm;
     let cells = worm.cells();
@@ -145,7 +145,7 @@ pub(super) fn follow(
             },
         });
     }
-    Ok(Account {
+    Ok(EnergyBalance {
         cycles,
         series,
         settled,
@@ -163,7 +163,7 @@ fn stations(from: f64, to: f64, cells: usize) -> impl Iterator<Item = f64> {
 }
 
 impl<'a> Follower<'a> {
-    fn new(gait: &'a Gait, fitted: &'a FittedRun, damping_ratio: f64) -> Self {
+    fn new(gait: &'a IdentifiedGait, fitted: &'a FittedRun, damping_ratio: f64) -> Self {
         let worm = &fitted.worm;
         let cells = worm.cells();
         let first_phase = gait.phase[0];

@@ -24,7 +24,7 @@ pub enum AnalysisError {
     },
     /// No gait was found in the recording.
     #[error("{recording}: {source}")]
-    Gait {
+    IdentifiedGait {
         /// The recording.
         recording: String,
         /// What is wrong with the gait.

@@ -8,15 +8,15 @@
 //!
 //! Pure: recordings in, figures out; knows of no files.
 
-mod energy_balance;
 mod analysis;
 mod analyze;
+mod energy_balance;
 mod error;
 mod simulate;
 
 pub use analysis::{
     Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Series, Theory, TheoryCycle,
 };
-pub use analyze::{Progress, Run, analyze};
+pub use analyze::{Progress, RecordedRun, analyze};
 pub use error::AnalysisError;
 pub use simulate::{Simulation, SimulationError, simulate};

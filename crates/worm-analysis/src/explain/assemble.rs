@@ -4,17 +4,17 @@ use super::answer::{
     Answer, Calibrated, Figures, FoundParameter, NamedEffect, Remainder, ResidualMap, RunSummary, Screened, Stage,
     Verdict, with_cell,
 };
-use super::speed_droop::SpeedDroop;
-use super::fit::{Fit, Problem};
-use super::gap::{Measured, cycles};
 use super::cross_validation::HeldOut;
-use super::model_selection::{Candidate, Judged, are_twins};
-use super::residual_map::{map, places};
-use super::observed::Observed;
-use super::parameter::{Nuisance, Hypothesised, What};
-use super::period::period;
 use super::experiment_design::propose;
+use super::fit::{Fit, FitProblem};
+use super::gap::{Measured, cycles};
+use super::model_selection::{Candidate, Judged, are_twins};
+use super::observed::Observed;
+use super::parameter::{Hypothesised, Nuisance, What};
+use super::period::period;
+use super::residual_map::{map, places};
 use super::score_test::Screening;
+use super::speed_droop::SpeedDroop;
 use super::words;
 use worm_estimator::config::Config;
 use worm_physics::effect::{Effect, LIBRARY, Visible};
@@ -38,9 +38,12 @@ pub(super) struct Parts {
 }
 
 /// Puts the answer together.
-pub(super) fn assemble(problem: &Problem<'_, '_>, config: &Config, parts: &Parts) -> Answer {
+pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Parts) -> Answer {
     let judged = &parts.judged;
-    let speed_droop = parts.speed_droop.as_ref().filter(|speed_droop| speed_droop.improvement > DROOPS);
+    let speed_droop = parts
+        .speed_droop
+        .as_ref()
+        .filter(|speed_droop| speed_droop.improvement > DROOPS);
     let mut named: &[Candidate] = match judged.verdict {
         Verdict::Explained | Verdict::Ambiguous => &judged.candidates,
         Verdict::Agrees | Verdict::OutsideLibrary => &[],
@@ -141,7 +144,7 @@ struct Gap {
 }
 
 impl Gap {
-    fn measure(problem: &Problem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Self {
+    fn measure(problem: &FitProblem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Self {
         let judged = &parts.judged;
         let best = judged.candidates.first().map_or(&parts.recalibrated, |find| &find.fit);
         let measured = Measured::new(problem, best);
@@ -154,7 +157,11 @@ impl Gap {
         let floor = measured.floor_stage();
         let stage = |name: &'static str, find: &Candidate| {
             let folds = find.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
-            let names: Vec<&str> = find.hypothesised.iter().map(|hypothesised| hypothesised.effect.name).collect();
+            let names: Vec<&str> = find
+                .hypothesised
+                .iter()
+                .map(|hypothesised| hypothesised.effect.name)
+                .collect();
             measured.stage(name, Some(names.join(" + ")), &find.fit, folds)
         };
         let gap_m = recalibrated.held_out_rms_m - floor.held_out_rms_m;
@@ -182,7 +189,7 @@ impl Gap {
     }
 }
 
-fn maps(problem: &Problem<'_, '_>, fit: &Fit) -> Vec<ResidualMap> {
+fn maps(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<ResidualMap> {
     (0..problem.scene.observed.len())
         .map(|run| map(problem, run, fit))
         .collect()
@@ -213,7 +220,7 @@ fn droop_effect(speed_droop: &SpeedDroop) -> NamedEffect {
 }
 
 /// What the recordings are, and how far the worm got in them.
-fn runs(problem: &Problem<'_, '_>, parts: &Parts, named: Option<&Candidate>) -> Vec<RunSummary> {
+fn runs(problem: &FitProblem<'_, '_>, parts: &Parts, named: Option<&Candidate>) -> Vec<RunSummary> {
     let of = |(run, observed): (usize, &Observed<'_>)| {
         let predicted_m = |fit: &Fit| {
             let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at);
@@ -269,7 +276,8 @@ fn advance_m(observed: &Observed<'_>, position_m: impl Fn(usize, usize) -> f64) 
 /// The effects of a find, as people read them.
 pub(super) fn named_effects(find: &Candidate, probability: f64, closure: f64, margin: f64) -> Vec<NamedEffect> {
     let sigmas = find.sigmas();
-    let name = |hypothesised: &Hypothesised| with_cell(hypothesised.effect.name, hypothesised.cell.map(|cell| cell + 1));
+    let name =
+        |hypothesised: &Hypothesised| with_cell(hypothesised.effect.name, hypothesised.cell.map(|cell| cell + 1));
     let of = |(place, hypothesised): (usize, &Hypothesised)| {
         let quantities = find.fit.hypothesis.free.iter().enumerate();
         let parameters = quantities.filter_map(|(at, free)| match free.what {
@@ -326,7 +334,10 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
     let mut rows: Vec<Screened> = screened
         .iter()
         .map(|screening| {
-            let find = judged.all.iter().find(|find| find.hypothesised == [screening.hypothesised]);
+            let find = judged
+                .all
+                .iter()
+                .find(|find| find.hypothesised == [screening.hypothesised]);
             Screened {
                 name: screening.hypothesised.effect.name.to_owned(),
                 cell: screening.hypothesised.cell.map(|cell| cell + 1),

@@ -15,7 +15,7 @@
 //! An effect that could have been anything gives little to any outcome, and so pays for its freedom. Added is what the values of the
 //! whole fit cost by their priors: of two hypotheses that say the same of the data, that which need be less extreme is the likelier.
 
-use super::fit::{Fit, Problem, dot, in_parallel, prior_chi_squared};
+use super::fit::{Fit, FitProblem, dot, in_parallel, prior_chi_squared};
 use super::observed::Observed;
 use nalgebra::{DMatrix, DVector};
 
@@ -57,7 +57,7 @@ pub(super) fn cycle_of(observed: &Observed<'_>, sample: usize) -> usize {
 }
 
 /// All folds of a campaign: first the slopes, where there are several, then the blocks of cycles.
-pub(super) fn folds(problem: &Problem<'_, '_>) -> Vec<Fold> {
+pub(super) fn folds(problem: &FitProblem<'_, '_>) -> Vec<Fold> {
     let observed = &problem.scene.observed;
     let cycles = |observed: &Observed<'_>| cycle_of(observed, observed.samples() - 1) + 1;
     let mut folds = Vec::new();
@@ -89,7 +89,7 @@ pub(super) fn folds(problem: &Problem<'_, '_>) -> Vec<Fold> {
 
 impl Fold {
     /// For each residual, whether it stays in.
-    fn stays(&self, problem: &Problem<'_, '_>) -> Vec<bool> {
+    fn stays(&self, problem: &FitProblem<'_, '_>) -> Vec<bool> {
         let mut stays = Vec::new();
         for (observed, left_out) in problem.scene.observed.iter().zip(&self.left_out) {
             let of = |sample: usize| !left_out[cycle_of(observed, sample)];
@@ -104,7 +104,7 @@ impl Fold {
 }
 
 /// Holds a fitted hypothesis, whose derivatives are there, against every fold.
-pub(super) fn hold_out(problem: &Problem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
+pub(super) fn hold_out(problem: &FitProblem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
     let anew = in_parallel(folds.len(), |number| {
         let fold = &folds[number];
         let stays = fold.stays(problem);
@@ -119,7 +119,8 @@ pub(super) fn hold_out(problem: &Problem<'_, '_>, fit: &Fit, folds: &[Fold]) -> 
     let slopes = folds.len() - BLOCKS;
     let ways = if slopes > 0 { 2.0 } else { 1.0 };
     HeldOut {
-        chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / ways + prior_chi_squared(&fit.hypothesis, &fit.at),
+        chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / ways
+            + prior_chi_squared(&fit.hypothesis, &fit.at),
         fits: anew.into_iter().map(|(_, without)| without).collect(),
     }
 }

@@ -30,7 +30,7 @@ pub enum ExplainError {
     TwoCells,
     /// A recording shows no gait.
     #[error("{recording}: {source}")]
-    Gait {
+    IdentifiedGait {
         /// The recording.
         recording: String,
         /// What is wrong with the gait.

@@ -9,7 +9,7 @@ mod change;
 mod trial;
 
 use super::answer::{NextExperiment, Prediction};
-use super::fit::{Fit, Problem, in_parallel};
+use super::fit::{Fit, FitProblem, in_parallel};
 use super::parameter::{Hypothesised, What as Quantity};
 pub(super) use change::SLOPES_DEG;
 use change::{Change, What, changes};
@@ -40,7 +40,7 @@ impl Weighed {
 /// The run that best tells apart rivals that were fitted and have their derivatives; none with fewer than two.
 ///
 /// `cycle_s` is the usual time of a gait cycle.
-pub(super) fn propose(problem: &Problem<'_, '_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
+pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
     if candidates.len() < 2 {
         return None;
     }
@@ -98,7 +98,7 @@ fn nearest(said: &[Said], distance: impl Fn(usize, usize) -> f64) -> f64 {
 }
 
 /// Distance between the two nearest predictions of a run, standard deviations, whichever of the two is true.
-fn separation(problem: &Problem<'_, '_>, candidates: &[&Fit], change: &Change) -> Option<f64> {
+fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change) -> Option<f64> {
     let blank = blank(problem, change);
     let trial = Trial::new(problem, change, &blank)?;
     let said = ask_all(&trial, candidates)?;
@@ -148,7 +148,7 @@ fn same(candidates: &[&Fit], (rival, quantity): (usize, usize), other: usize) ->
 }
 
 /// A run as the answer tells it.
-fn in_answer(problem: &Problem<'_, '_>, candidates: &[&Fit], best: &Weighed) -> Option<NextExperiment> {
+fn in_answer(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &Weighed) -> Option<NextExperiment> {
     let blank = blank(problem, &best.change);
     let trial = Trial::new(problem, &best.change, &blank)?;
     let said = ask_all(&trial, candidates)?;
@@ -207,7 +207,9 @@ fn beside(trial: &Trial<'_>, mine: &Said, first: &Said, first_name: &str) -> Str
 
 /// A measurement that tells what no crawl does; none where no rival supposes anything.
 fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
-    let hypothesised = candidates.iter().find_map(|rival| rival.hypothesis.hypothesised.first())?;
+    let hypothesised = candidates
+        .iter()
+        .find_map(|rival| rival.hypothesis.hypothesised.first())?;
     let predictions = candidates.iter().map(|rival| Prediction {
         effect: name(rival),
         advance_m: None,

@@ -26,7 +26,7 @@ const MAX_DAMPING: f64 = 1e6;
 const ROWS_AT_ONCE: usize = 512;
 
 /// The campaign with its noise: everything a misfit needs.
-pub(super) struct Problem<'s, 'a> {
+pub(super) struct FitProblem<'s, 'a> {
     pub scene: &'s Scene<'a>,
     pub noise: Vec<RunNoise>,
     /// What the recalibrated model's misfit grows by where a periodic crawl is run once and repeated, not run throughout.
@@ -138,7 +138,7 @@ pub(super) fn dot(a: &[f64], b: &[f64], counts: Option<&[bool]>) -> f64 {
     }
 }
 
-impl Problem<'_, '_> {
+impl FitProblem<'_, '_> {
     /// Rows of each run, in the vector of all residuals.
     pub fn rows(&self, run: usize) -> std::ops::Range<usize> {
         let length = |run: usize| {

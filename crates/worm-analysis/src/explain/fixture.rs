@@ -1,11 +1,11 @@
 //! Campaigns for the tests of the search: the model's own crawl under an effect, with noise and a body that goes astray.
 
-use super::fit::{Fit, Problem};
+use super::fit::{Fit, FitProblem};
 use super::noise::RunNoise;
 use super::observed::Observed;
 use super::parameter::Hypothesised;
 use super::predict::{Hypothesis, Scene, rest};
-use crate::experiment::{Run, Simulation, simulate};
+use crate::experiment::{RecordedRun, Simulation, simulate};
 use crate::recording::Recording;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -95,7 +95,7 @@ pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Sce
         nominal: Vec::new(),
     };
     for (recording, &slope_deg) in recordings.iter().zip(&campaign.slopes_deg) {
-        let run = Run {
+        let run = RecordedRun {
             recording,
             slope_deg,
             payload_kg: 0.0,
@@ -112,12 +112,12 @@ pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Sce
 }
 
 /// The problem with the noise that some hypothesis leaves.
-pub(super) fn problem<'s, 'a>(scene: &'s Scene<'a>, (hypothesis, at): &(Hypothesis, Vec<f64>)) -> Problem<'s, 'a> {
+pub(super) fn problem<'s, 'a>(scene: &'s Scene<'a>, (hypothesis, at): &(Hypothesis, Vec<f64>)) -> FitProblem<'s, 'a> {
     let noise = |(run, observed): (usize, &Observed<'_>)| {
         let predicted = scene.predict(run, hypothesis, at).expect("it holds");
         RunNoise::measure(observed, &rest(observed, &predicted))
     };
-    Problem {
+    FitProblem {
         noise: scene.observed.iter().enumerate().map(noise).collect(),
         scene,
         repeating_excess: 0.0,
@@ -125,6 +125,6 @@ pub(super) fn problem<'s, 'a>(scene: &'s Scene<'a>, (hypothesis, at): &(Hypothes
 }
 
 /// A hypothesis taken as it is.
-pub(super) fn taken(problem: &Problem<'_, '_>, (hypothesis, at): (Hypothesis, Vec<f64>)) -> Fit {
+pub(super) fn taken(problem: &FitProblem<'_, '_>, (hypothesis, at): (Hypothesis, Vec<f64>)) -> Fit {
     problem.evaluate(&hypothesis, at)
 }

@@ -18,8 +18,8 @@ mod free_form;
 mod mean_cycle;
 
 use super::answer::Stage;
-use super::fit::{Fit, Problem};
 use super::cross_validation::FitWithout;
+use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
 use super::predict::{Predicted, rest};
 pub(super) use mean_cycle::cycles;
@@ -34,7 +34,7 @@ const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
 
 /// A campaign with the energy that its motion took by the best model's contacts: what the stages are measured by.
 pub(super) struct Measured<'p, 's, 'a> {
-    problem: &'p Problem<'s, 'a>,
+    problem: &'p FitProblem<'s, 'a>,
     /// Of each run's settled cycles, J; none where the best model cannot make the run.
     energy_j: Vec<Option<Vec<f64>>>,
     /// What the best model leaves of each run; none where it cannot make it.
@@ -61,7 +61,7 @@ impl Left {
         }
     }
 
-    fn of(problem: &Problem<'_, '_>, run: usize, fit: &Fit) -> Option<Self> {
+    fn of(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Self> {
         let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
         Some(Self::new(&problem.scene.observed[run], &predicted))
     }
@@ -96,7 +96,7 @@ impl Squares {
 
 impl<'p, 's, 'a> Measured<'p, 's, 'a> {
     /// The reference by the best fit there is.
-    pub fn new(problem: &'p Problem<'s, 'a>, best: &Fit) -> Self {
+    pub fn new(problem: &'p FitProblem<'s, 'a>, best: &Fit) -> Self {
         let runs = 0..problem.scene.observed.len();
         let left: Vec<Option<Left>> = runs.map(|run| Left::of(problem, run, best)).collect();
         let energy = |(run, left): (usize, &Option<Left>)| {

@@ -4,7 +4,7 @@
 //! that walks downhill stops at the first of them. So once it has stopped, the patch is tried out with its edges elsewhere, near
 //! and far, and with another friction, and the fit goes on from the best of them, until none is better.
 
-use super::fit::{Fit, Problem};
+use super::fit::{Fit, FitProblem};
 use super::parameter::What;
 
 /// How far an edge leaps, as shares of the patch's length, and by what factor its slickness, one less its share of friction, does.
@@ -15,7 +15,7 @@ const MAX_ROUNDS: usize = 6;
 const WORTHWHILE: f64 = 2.0;
 
 /// Leaps with the patch that was supposed last, where it is one.
-pub(super) fn restart_locally(problem: &Problem<'_, '_>, mut fit: Fit) -> Fit {
+pub(super) fn restart_locally(problem: &FitProblem<'_, '_>, mut fit: Fit) -> Fit {
     for _ in 0..MAX_ROUNDS {
         let Some(patch) = patch(&fit) else {
             return fit;

@@ -23,33 +23,33 @@
 //! - `scalar_data`: the same where only advances per cycle are known.
 //! - `assemble`: all of it put together; [`model_update`]: the model's file with the answer in it.
 
-mod scalar_data;
 pub mod answer;
 mod assemble;
-mod speed_droop;
+mod cross_validation;
 mod error;
+mod experiment_design;
 mod fit;
 #[cfg(test)]
 mod fixture;
 mod gap;
-mod cross_validation;
-mod model_selection;
 mod local_restart;
-mod residual_map;
-mod phase_correction;
+mod model_selection;
+pub mod model_update;
 mod noise;
 mod observed;
 mod parameter;
 mod period;
+mod phase_correction;
 mod predict;
-mod experiment_design;
+mod residual_map;
+mod scalar_data;
 mod score_test;
 mod search;
+mod speed_droop;
 mod words;
-pub mod model_update;
 
-pub use crate::experiment::Run;
-pub use scalar_data::explain_advances;
+pub use crate::experiment::RecordedRun;
 pub use answer::{Answer, Verdict};
 pub use error::ExplainError;
+pub use scalar_data::explain_advances;
 pub use search::{Options, explain};

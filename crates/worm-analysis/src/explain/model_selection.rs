@@ -13,8 +13,8 @@
 //! 5. One answer left is **explained**, several are **ambiguous**.
 
 use super::answer::Verdict;
-use super::fit::{Fit, Problem};
 use super::cross_validation::{Fold, HeldOut, hold_out as hold_out_fit};
+use super::fit::{Fit, FitProblem};
 use super::parameter::{Hypothesised, What};
 use super::predict::rest;
 
@@ -58,7 +58,7 @@ pub(super) struct Candidate {
 
 impl Candidate {
     /// A fit, and what it improves on another.
-    pub fn of(problem: &Problem<'_, '_>, base: &Fit, fit: Fit) -> Self {
+    pub fn of(problem: &FitProblem<'_, '_>, base: &Fit, fit: Fit) -> Self {
         Self {
             improvement: base.chi_squared - fit.chi_squared - problem.excess_of_repeating(base, &fit),
             hypothesised: fit.hypothesis.hypothesised.clone(),
@@ -112,7 +112,9 @@ impl Candidate {
 
     /// Misfit on data that it was not fitted to.
     pub fn held_out_misfit(&self) -> f64 {
-        self.held_out.as_ref().map_or(f64::INFINITY, |held_out| held_out.chi_squared)
+        self.held_out
+            .as_ref()
+            .map_or(f64::INFINITY, |held_out| held_out.chi_squared)
     }
 }
 
@@ -136,7 +138,10 @@ pub(super) fn are_twins(one: &Hypothesised, other: &Hypothesised) -> bool {
 fn are_alike(one: &Candidate, other: &Candidate) -> bool {
     let alike = |a: &Hypothesised, b: &Hypothesised| a.effect.name == b.effect.name || are_twins(a, b);
     one.hypothesised.len() == other.hypothesised.len()
-        && one.hypothesised.iter().all(|a| other.hypothesised.iter().any(|b| alike(a, b)))
+        && one
+            .hypothesised
+            .iter()
+            .all(|a| other.hypothesised.iter().any(|b| alike(a, b)))
 }
 
 /// The best of each kind, best first: twins and other cells of the same effect left out.
@@ -157,7 +162,7 @@ pub(super) struct Open {
 
 impl Open {
     /// What is open after recalibration.
-    pub fn of(problem: &Problem<'_, '_>, recalibrated: &Fit) -> Self {
+    pub fn of(problem: &FitProblem<'_, '_>, recalibrated: &Fit) -> Self {
         Self {
             whole: explainable(problem, recalibrated),
         }
@@ -169,14 +174,14 @@ impl Open {
     }
 
     /// Share of it that a fit leaves open.
-    pub fn fraction(&self, problem: &Problem<'_, '_>, fit: &Fit) -> f64 {
+    pub fn fraction(&self, problem: &FitProblem<'_, '_>, fit: &Fit) -> f64 {
         let left: f64 = explainable(problem, fit).iter().sum();
         (left / self.whole.iter().sum::<f64>().max(1.0)).max(0.0)
     }
 
     /// Whether what a fit leaves is noise, or too little to matter, in every run: an effect that is the right one is right
     /// everywhere.
-    pub fn is_closed(&self, problem: &Problem<'_, '_>, fit: &Fit) -> bool {
+    pub fn is_closed(&self, problem: &FitProblem<'_, '_>, fit: &Fit) -> bool {
         let left = explainable(problem, fit);
         let in_every_run = left
             .iter()
@@ -188,7 +193,7 @@ impl Open {
 }
 
 /// How much of each run's misfit a free form would take away beyond chance.
-fn explainable(problem: &Problem<'_, '_>, fit: &Fit) -> Vec<f64> {
+fn explainable(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<f64> {
     let runs = problem.scene.observed.iter().enumerate();
     runs.map(|(run, observed)| {
         let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at);
@@ -218,7 +223,7 @@ pub(super) struct Judged {
 }
 
 /// Holds the best finds against data that they were not fitted to, and puts the best of them first, notable ones before others.
-pub(super) fn hold_out(problem: &Problem<'_, '_>, recalibrated: &Fit, finds: &mut [Candidate], folds: &[Fold]) {
+pub(super) fn hold_out(problem: &FitProblem<'_, '_>, recalibrated: &Fit, finds: &mut [Candidate], folds: &[Fold]) {
     for find in finds.iter_mut().take(HELD_OUT) {
         let mut held_out = hold_out_fit(problem, &find.fit, folds);
         held_out.chi_squared += problem.excess_of_repeating(recalibrated, &find.fit);
@@ -230,7 +235,7 @@ pub(super) fn hold_out(problem: &Problem<'_, '_>, recalibrated: &Fit, finds: &mu
 
 /// Judges; `singles` and `pairs` best first.
 pub(super) fn judge(
-    problem: &Problem<'_, '_>,
+    problem: &FitProblem<'_, '_>,
     open: &Open,
     singles: Vec<Candidate>,
     pairs: Vec<Candidate>,

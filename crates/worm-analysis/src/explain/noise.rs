@@ -87,7 +87,9 @@ impl RunNoise {
             .round()
             .max(2.0) as usize;
         let mut whitened_residuals = Vec::with_capacity(observed.samples());
-        settled.whiten(free.body_m.iter().copied(), |whitened_residual| whitened_residuals.push(whitened_residual));
+        settled.whiten(free.body_m.iter().copied(), |whitened_residual| {
+            whitened_residuals.push(whitened_residual)
+        });
         let body_scale = 1.0
             / (lost * sum_variance(&whitened_residuals[from..], samples_per_step))
                 .max(1.0)
@@ -144,8 +146,9 @@ impl RunNoise {
         let from = observed.settled_from() * observed.cells();
         let chi_squared = |rest: &Residual| {
             let mut squares = 0.0;
-            self.settled
-                .whiten(rest.body_m.iter().copied(), |whitened_residual| squares += whitened_residual * whitened_residual);
+            self.settled.whiten(rest.body_m.iter().copied(), |whitened_residual| {
+                squares += whitened_residual * whitened_residual
+            });
             let relative = rest.relative_m[from..]
                 .iter()
                 .filter(|relative_m| relative_m.is_finite());

@@ -1,9 +1,9 @@
 //! The recordings as the search sees them: which sample is in which phase, which count, and how noisy they are.
 
 use super::error::ExplainError;
-use crate::experiment::Run;
+use crate::experiment::RecordedRun;
 use crate::identify::clean::leave_out_outliers;
-use crate::identify::{Gait, Prior, gait};
+use crate::identify::{IdentifiedGait, Prior, gait};
 use worm_estimator::config::Config;
 
 /// Cycles at the start that do not count where the worm was not seen laid down: the tips' state is not known there.
@@ -25,7 +25,7 @@ const MOVES: f64 = 0.005;
 /// One recording, prepared.
 #[derive(Debug, Clone)]
 pub(super) struct Observed<'a> {
-    pub run: Run<'a>,
+    pub run: RecordedRun<'a>,
     /// Gait phase at each sample, cycles.
     pub phase: Vec<f64>,
     pub phase_recorded: bool,
@@ -47,7 +47,7 @@ pub(super) struct Observed<'a> {
 }
 
 impl<'a> Observed<'a> {
-    pub fn new(run: Run<'a>, config: &Config) -> Result<Self, ExplainError> {
+    pub fn new(run: RecordedRun<'a>, config: &Config) -> Result<Self, ExplainError> {
         let recording = run.recording;
         let name = || recording.source.display().to_string();
         if !(-90.0..=90.0).contains(&run.slope_deg) {
@@ -63,7 +63,7 @@ impl<'a> Observed<'a> {
                 configured: config.worm.cells,
             });
         }
-        let gait = find_gait(run, config).map_err(|source| ExplainError::Gait {
+        let gait = find_gait(run, config).map_err(|source| ExplainError::IdentifiedGait {
             recording: name(),
             source,
         })?;
@@ -158,7 +158,7 @@ impl<'a> Observed<'a> {
 }
 
 /// The gait, also of a worm one of whose cells falls behind the others cycle by cycle.
-fn find_gait(run: Run<'_>, config: &Config) -> Result<Gait, gait::GaitError> {
+fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, gait::GaitError> {
     let recording = run.recording;
     let step_order = config.worm.step_order_from_zero();
     let find = |position_m: &[Vec<f64>], filled_m: &[Vec<f64>]| {

@@ -6,7 +6,7 @@
 //! The largest share of its scatter that a wave takes away is held against what it takes when the cycles of each run change
 //! places, which keeps their scatter and loses any wave.
 
-use super::fit::{Fit, Problem};
+use super::fit::{Fit, FitProblem};
 use super::predict::rest;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
@@ -43,7 +43,7 @@ struct Series {
 }
 
 /// The period of what a fit leaves; the clearer one where both in time and along the canal are beyond chance.
-pub(super) fn period(problem: &Problem<'_, '_>, fit: &Fit) -> Period {
+pub(super) fn period(problem: &FitProblem<'_, '_>, fit: &Fit) -> Period {
     let runs = 0..problem.scene.observed.len();
     let series: Vec<Series> = runs.filter_map(|run| ways(problem, run, fit)).collect();
     period_of(&series)
@@ -76,7 +76,7 @@ fn period_of(series: &[Series]) -> Period {
 }
 
 /// What the body makes in each settled cycle of a run beyond the model's way.
-fn ways(problem: &Problem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
+fn ways(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
     let observed = &problem.scene.observed[run];
     let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
     let left = rest(observed, &predicted);
@@ -105,7 +105,10 @@ fn ways(problem: &Problem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
         }
     }
     let mean_m = series.displacement_m.iter().sum::<f64>() / series.displacement_m.len() as f64;
-    series.displacement_m.iter_mut().for_each(|displacement_m| *displacement_m -= mean_m);
+    series
+        .displacement_m
+        .iter_mut()
+        .for_each(|displacement_m| *displacement_m -= mean_m);
     (series.displacement_m.len() >= MIN_CYCLES).then_some(series)
 }
 
@@ -172,10 +175,17 @@ mod tests {
                 let cycle: Vec<f64> = (0..11).map(f64::from).collect();
                 let place_m: Vec<f64> = cycle.iter().map(|cycle| advance_m * cycle).collect();
                 let ways = cycle.iter().zip(&place_m);
-                let mut displacement_m: Vec<f64> = ways.map(|(&cycle, &m)| wave(cycle, m) + 0.25e-4 * noise()).collect();
+                let mut displacement_m: Vec<f64> =
+                    ways.map(|(&cycle, &m)| wave(cycle, m) + 0.25e-4 * noise()).collect();
                 let mean_m = displacement_m.iter().sum::<f64>() / 11.0;
-                displacement_m.iter_mut().for_each(|displacement_m| *displacement_m -= mean_m);
-                Series { cycle, place_m, displacement_m }
+                displacement_m
+                    .iter_mut()
+                    .for_each(|displacement_m| *displacement_m -= mean_m);
+                Series {
+                    cycle,
+                    place_m,
+                    displacement_m,
+                }
             })
             .to_vec()
     }
@@ -194,7 +204,8 @@ mod tests {
             );
             let ribs = period_of(&runs(|_, m| 1e-4 * (TAU * m / 11e-3 + 1.0).sin(), seed));
             assert!(
-                ribs.displacement_m.is_some_and(|displacement_m| (displacement_m - 11e-3).abs() < 0.6e-3),
+                ribs.displacement_m
+                    .is_some_and(|displacement_m| (displacement_m - 11e-3).abs() < 0.6e-3),
                 "seed {seed}: {ribs:?}"
             );
         }

@@ -8,10 +8,10 @@
 //! phase had to be found from the positions, what the stepping cell does relative to the others went into it and tells nothing
 //! more: that direction is taken out.
 
-use super::phase_correction::PhaseCorrection;
 use super::noise::RunNoise;
 use super::observed::Observed;
-use super::parameter::{Free, Nuisance, Hypothesised, What};
+use super::parameter::{Free, Hypothesised, Nuisance, What};
+use super::phase_correction::PhaseCorrection;
 use worm_physics::effect::Setting;
 use worm_physics::{Crawl, Mechanics, Physics, Worm};
 
@@ -248,7 +248,9 @@ impl<'a> Clock<'a> {
     /// For samples asked in order.
     fn phase_at(&mut self, sample: usize) -> f64 {
         let phase = self.recorded_at(sample);
-        self.phase_correction.as_ref().map_or(phase, |phase_correction| phase_correction.mended(phase))
+        self.phase_correction
+            .as_ref()
+            .map_or(phase, |phase_correction| phase_correction.mended(phase))
     }
 
     fn recorded_at(&mut self, sample: usize) -> f64 {

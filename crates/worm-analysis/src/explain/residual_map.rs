@@ -12,7 +12,7 @@
 //! scatter badly; so the variance of each bin leans on that of the whole map, and the limit is that of Student's distribution.
 
 use super::answer::{Place, ResidualMap};
-use super::fit::{Fit, Problem};
+use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
 use super::predict::{Residual, rest};
 use rand::{RngExt, SeedableRng};
@@ -38,7 +38,7 @@ const OF_BODY: f64 = 0.5;
 const SLACK: f64 = 0.1;
 
 /// The map of one run under a fit; `NaN` all over where the fit cannot make the run.
-pub(super) fn map(problem: &Problem<'_, '_>, run: usize, fit: &Fit) -> ResidualMap {
+pub(super) fn map(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> ResidualMap {
     let observed = &problem.scene.observed[run];
     let cells = observed.cells();
     let bins = cells * BINS_PER_STEP;
@@ -109,7 +109,11 @@ impl Ways {
         for bin in 1..bins {
             let at_m = |bin: usize, cell: usize| sum_m[bin][cell] / seen[bin][cell]; // NaN where not seen
             let displacement_m: Vec<f64> = (0..cells).map(|cell| at_m(bin, cell) - at_m(bin - 1, cell)).collect();
-            let known: Vec<f64> = displacement_m.iter().copied().filter(|displacement_m| displacement_m.is_finite()).collect();
+            let known: Vec<f64> = displacement_m
+                .iter()
+                .copied()
+                .filter(|displacement_m| displacement_m.is_finite())
+                .collect();
             let body_m = known.iter().sum::<f64>() / known.len() as f64;
             let ((place, steps), (_, stepped)) = (stepping(bin), stepping(bin - 1));
             for (cell, displacement_m) in displacement_m.into_iter().enumerate() {

@@ -26,12 +26,12 @@ use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
 use super::fit::{Fit, in_parallel};
 use super::model_selection::Candidate;
-use super::parameter::{Free, Nuisance, Hypothesised, What};
+use super::parameter::{Free, Hypothesised, Nuisance, What};
 use super::predict::Hypothesis;
 use super::score_test::hypotheses;
 use crate::experiment::Progress;
 use crate::recording::Advance;
-use model_selection::{Judged, Kind};
+use model_selection::{AdvanceKind, Judged};
 use table::Table;
 use worm_estimator::config::Config;
 use worm_physics::effect::Parameter;
@@ -124,7 +124,9 @@ fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hyp
         // From nothing: an effect that is free to do nothing never fits worse than none.
         fits.push(table.fit(&hypothesis, &[&recalibrated.at[..], &tried[0]].concat()));
     }
-    let fit = fits.into_iter().min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared))?;
+    let fit = fits
+        .into_iter()
+        .min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared))?;
     Some(Candidate {
         hypothesised: vec![hypothesised],
         improvement: recalibrated.chi_squared - fit.chi_squared,
@@ -197,9 +199,9 @@ fn assemble(
         });
     let effects: Vec<_> = named.by_ref().take(1).collect();
     let rivals: Vec<_> = named.collect();
-    let stage = |stage: &'static str, kind: Option<&Kind>, fit: &Fit| Stage {
+    let stage = |stage: &'static str, kind: Option<&AdvanceKind>, fit: &Fit| Stage {
         stage,
-        effect: kind.map(Kind::name),
+        effect: kind.map(AdvanceKind::name),
         fit_rms_m: f64::NAN,
         held_out_rms_m: f64::NAN,
         advance_error_m: table.mean_error_m(fit),

@@ -8,7 +8,7 @@
 //! The best of many effects finds something in mere noise too. So noise is drawn on all directions together, with the
 //! correlations they have, and the largest score noted: what it stays below nineteen times in twenty is the threshold.
 
-use super::fit::{Fit, Problem, dot, in_parallel};
+use super::fit::{Fit, FitProblem, dot, in_parallel};
 use super::parameter::Hypothesised;
 use super::predict::Hypothesis;
 use nalgebra::{DMatrix, DVector};
@@ -179,7 +179,12 @@ struct Tried {
 }
 
 /// Screens effects on top of a fit, whose derivatives must be there; best first, with the threshold of chance.
-pub(super) fn screen(problem: &Problem<'_, '_>, fit: &Fit, hypothesised: &[Hypothesised], seed: u64) -> (Vec<Screening>, f64) {
+pub(super) fn screen(
+    problem: &FitProblem<'_, '_>,
+    fit: &Fit,
+    hypothesised: &[Hypothesised],
+    seed: u64,
+) -> (Vec<Screening>, f64) {
     let projection = Projection::new(fit);
     let residual_shadow = projection.shadow(&fit.residual);
     let canal_m = canal(problem);
@@ -272,7 +277,7 @@ pub(super) fn effect_quantities(hypothesis: &Hypothesis) -> usize {
 }
 
 /// Where tips have been, m.
-fn canal(problem: &Problem<'_, '_>) -> (f64, f64) {
+fn canal(problem: &FitProblem<'_, '_>) -> (f64, f64) {
     let seen = problem
         .scene
         .observed

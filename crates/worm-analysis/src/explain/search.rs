@@ -2,18 +2,18 @@
 
 use super::answer::Answer;
 use super::assemble;
-use super::speed_droop::speed_droop;
-use super::error::ExplainError;
-use super::fit::{Fit, Problem};
 use super::cross_validation;
-use super::model_selection::{self, Candidate, Open};
+use super::error::ExplainError;
+use super::fit::{Fit, FitProblem};
 use super::local_restart::restart_locally;
+use super::model_selection::{self, Candidate, Open};
 use super::noise::RunNoise;
 use super::observed::Observed;
-use super::parameter::{Nuisance, Hypothesised, What};
+use super::parameter::{Hypothesised, Nuisance, What};
 use super::predict::{Hypothesis, Scene, nominal, predict, rest};
 use super::score_test::{self, Screening};
-use crate::experiment::{Progress, Run};
+use super::speed_droop::speed_droop;
+use crate::experiment::{Progress, RecordedRun};
 use worm_estimator::config::Config;
 use worm_physics::effect::Setting;
 use worm_physics::{Physics, Worm};
@@ -50,7 +50,7 @@ impl Default for Options {
 }
 
 /// Prepares the runs of a campaign.
-fn prepare<'a>(runs: &[Run<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
+fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
     if runs.is_empty() {
         return Err(ExplainError::NoRun);
     }
@@ -132,7 +132,7 @@ fn judge_start(observed: &mut Observed<'_>, physics: &Physics) {
 /// # Errors
 /// [`ExplainError`] names the recording and the remedy.
 pub fn explain(
-    runs: &[Run<'_>],
+    runs: &[RecordedRun<'_>],
     config: &Config,
     options: &Options,
     progress: &mut dyn FnMut(Progress),
@@ -149,9 +149,14 @@ pub fn explain(
     let (screened, chance) = score_test::screen(&problem, &recalibrated, &hypothesised, options.seed);
     tell("refit", 0.3);
     let nominal = problem.with_derivatives(&recalibrated.hypothesis, recalibrated.hypothesis.neutral());
-    let mut finds = refit(&problem, &recalibrated, &nominal, &screened, REFITTED, &mut |fraction| {
-        tell("refit", 0.3 + 0.35 * fraction)
-    });
+    let mut finds = refit(
+        &problem,
+        &recalibrated,
+        &nominal,
+        &screened,
+        REFITTED,
+        &mut |fraction| tell("refit", 0.3 + 0.35 * fraction),
+    );
     let threshold = (SAFETY * chance).max(MIN_IMPROVEMENT);
     tell("held-out selection", 0.65);
     let folds = cross_validation::folds(&problem);
@@ -178,7 +183,14 @@ pub fn explain(
         }
     }
     tell("judgement", 0.9);
-    let judged = model_selection::judge(&problem, &open, finds, pairs, threshold, recalibrated_held_out.chi_squared);
+    let judged = model_selection::judge(
+        &problem,
+        &open,
+        finds,
+        pairs,
+        threshold,
+        recalibrated_held_out.chi_squared,
+    );
     let cycles_s: Vec<f64> = runs
         .iter()
         .map(|run| run.cycle_s.unwrap_or(config.gait.cycle_s))
@@ -202,7 +214,7 @@ pub fn explain(
 }
 
 /// Noise and recalibrated model, from one another.
-fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(Problem<'s, 'a>, Fit), ExplainError> {
+fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(FitProblem<'s, 'a>, Fit), ExplainError> {
     let mut at = base.neutral();
     let mut round = 0;
     loop {
@@ -214,7 +226,7 @@ fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(Probl
             })?;
             noise.push(RunNoise::measure(observed, &rest(observed, &predicted)));
         }
-        let problem = Problem {
+        let problem = FitProblem {
             scene,
             noise,
             repeating_excess: 0.0,
@@ -224,7 +236,7 @@ fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(Probl
         if round == NOISE_ROUNDS {
             problem.buy_all_derivatives(&mut fit);
             let repeating_excess = problem.repeating_excess(&fit);
-            let problem = Problem {
+            let problem = FitProblem {
                 repeating_excess,
                 ..problem
             };
@@ -239,7 +251,7 @@ fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(Probl
 /// The starts are what the screening found about the recalibrated model, and strong effects about the believed one: a strong
 /// effect drives the recalibration into a corner from which it cannot be seen.
 fn refit(
-    problem: &Problem<'_, '_>,
+    problem: &FitProblem<'_, '_>,
     base: &Fit,
     nominal: &Fit,
     screened: &[Screening],
@@ -307,7 +319,7 @@ fn choose(rough: Vec<Fit>, base: &Fit, max: usize) -> Vec<Fit> {
 
 /// A single effect fitted anew from where it lies in a pair, where that is a better fit: what a pair gains may be owed to a better
 /// valley of its first effect, and not to the second.
-fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Candidate, pair: &Candidate) -> Option<Candidate> {
+fn alone(problem: &FitProblem<'_, '_>, recalibrated: &Fit, single: &Candidate, pair: &Candidate) -> Option<Candidate> {
     let hypothesis = &single.fit.hypothesis;
     let place_in_pair = pair.hypothesised.iter().position(|one| single.hypothesised == [*one])?;
     let from_pair = |what: What| {
@@ -328,7 +340,7 @@ fn alone(problem: &Problem<'_, '_>, recalibrated: &Fit, single: &Candidate, pair
 
 /// Pairs of effects: each of the best single ones with what screens best, and above the threshold, on top of it.
 fn pair_up<'f>(
-    problem: &Problem<'_, '_>,
+    problem: &FitProblem<'_, '_>,
     recalibrated: &Fit,
     seeds: impl Iterator<Item = &'f Candidate>,
     hypothesised: &[Hypothesised],
@@ -339,7 +351,9 @@ fn pair_up<'f>(
     for first in seeds {
         let others: Vec<Hypothesised> = hypothesised
             .iter()
-            .filter(|other| !first.hypothesised.contains(other) && !model_selection::are_twins(other, &first.hypothesised[0]))
+            .filter(|other| {
+                !first.hypothesised.contains(other) && !model_selection::are_twins(other, &first.hypothesised[0])
+            })
             .copied()
             .collect();
         let base = problem.with_derivatives(&first.fit.hypothesis, first.fit.at.clone());

@@ -1,7 +1,7 @@
 //! The answer in words.
 
 use super::answer::{NamedEffect, Place, Verdict, answers_in_words};
-use super::fit::{Fit, Problem};
+use super::fit::{Fit, FitProblem};
 use super::model_selection::Judged;
 use super::parameter::What;
 
@@ -38,7 +38,11 @@ pub(super) fn sentence(
             let nearest = judged.candidates.first().map_or_else(
                 || "none that is strong enough to be told keeps what it promises on data left out".to_owned(),
                 |find| {
-                    let names: Vec<&str> = find.hypothesised.iter().map(|hypothesised| hypothesised.effect.name).collect();
+                    let names: Vec<&str> = find
+                        .hypothesised
+                        .iter()
+                        .map(|hypothesised| hypothesised.effect.name)
+                        .collect();
                     let how_near = match refused {
                         Some(closure) => format!(
                             "closes {:.0} % of the gap on cycles that it was not fitted to",
@@ -89,7 +93,7 @@ pub(super) fn remainder(judged: &Judged, places: &[Place]) -> String {
 }
 
 /// What the user should know.
-pub(super) fn warnings(problem: &Problem<'_, '_>, fit: &Fit) -> Vec<String> {
+pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<String> {
     let observed = &problem.scene.observed;
     let mut warnings: Vec<String> = observed
         .iter()

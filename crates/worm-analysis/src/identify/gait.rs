@@ -71,7 +71,7 @@ pub enum GaitError {
 
 /// The gait of a worm in a recording.
 #[derive(Debug, Clone)]
-pub struct Gait {
+pub struct IdentifiedGait {
     /// The cells in the order in which they step, from 0.
     pub step_order: Vec<usize>,
     /// Gait phase at each sample, cycles, never decreasing; `step_order[0]` begins its step at whole numbers.
@@ -124,7 +124,7 @@ pub fn find(
     measured_m: &[Vec<f64>],
     filled_m: &[Vec<f64>],
     prior: Prior<'_>,
-) -> Result<Gait, GaitError> {
+) -> Result<IdentifiedGait, GaitError> {
     if time_s.len() < MIN_SAMPLES {
         return Err(GaitError::TooFewSteps { cycles: 0.0 });
     }
@@ -248,7 +248,7 @@ impl<'a> Finder<'a> {
         steps_made(self.cells(), self.place_of[cell], phase)
     }
 
-    fn finish(self) -> Gait {
+    fn finish(self) -> IdentifiedGait {
         let cells = self.cells();
         let samples = self.phase.len();
         let (mut body_m, mut seen) = (vec![f64::NAN; samples], vec![0; samples]);
@@ -262,7 +262,7 @@ impl<'a> Finder<'a> {
                 (body_m[sample], seen[sample]) = (ways.sum::<f64>() / rows.len() as f64, rows.len());
             }
         }
-        Gait {
+        IdentifiedGait {
             step_order: self.order,
             phase: self.phase,
             phase_sigma: self.phase_sigma,

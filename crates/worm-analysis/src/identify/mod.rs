@@ -18,6 +18,6 @@ mod steps;
 pub(crate) mod theory;
 mod track;
 
-pub use fit::{FitError, Fitted, FittedRun, Run};
-pub use gait::{Gait, GaitError, Prior};
+pub use fit::{FitError, Fitted, FittedRun, PositionRun};
+pub use gait::{GaitError, IdentifiedGait, Prior};
 pub use onset::Onset;

@@ -4,7 +4,7 @@
 //! cell has made when the others stop moving back took its tip from one bound to the other: twice δmax, where it began its step
 //! at −δmax as the paper assumes. Here the eye is a broken line: falling, then level, laid through all steps of a cell together.
 
-use super::gait::Gait;
+use super::gait::IdentifiedGait;
 
 /// Parts that a step is looked at in.
 const PARTS: usize = 60;
@@ -25,7 +25,7 @@ pub struct Onset {
 }
 
 /// The onset of sliding of each cell, cell 0 first.
-pub fn find(gait: &Gait) -> Vec<Onset> {
+pub fn find(gait: &IdentifiedGait) -> Vec<Onset> {
     let cells = gait.step_order.len();
     let mut sums = vec![[(0.0, 0.0); PARTS]; cells]; // mean way since the step's begin, by part: sum and count
     let mut begin: Option<(i64, Vec<(usize, f64)>)> = None;

@@ -9,7 +9,7 @@
 //! A cell's deformation depends on its own candidate alone, so 7 n series are computed, not 7ⁿ, and the mean square of a sum of
 //! series follows from their means and products: a combination costs a few additions.
 
-use super::gait::Gait;
+use super::gait::IdentifiedGait;
 
 /// Candidates on either side of the first estimate, and how far they are apart, m.
 const SPREAD: (usize, f64) = (3, 1e-4);
@@ -37,7 +37,7 @@ pub struct Found {
 /// None for more cells than [`MAX_CELLS`], or when no whole cycle is left after the first.
 pub fn search(
     position_m: &[Vec<f64>],
-    gait: &Gait,
+    gait: &IdentifiedGait,
     first_m: &[f64],
     stiffness_n_per_m: &[f64],
     pull_n: f64,
@@ -169,7 +169,7 @@ fn balance_range(position_m: &[Vec<f64>], phase: &[f64]) -> Option<std::ops::Ran
 }
 
 /// For each cell the samples at which its steps end.
-fn step_ends(gait: &Gait) -> Vec<Vec<usize>> {
+fn step_ends(gait: &IdentifiedGait) -> Vec<Vec<usize>> {
     let cells = gait.step_order.len();
     let mut ends = vec![Vec::new(); cells];
     for sample in 1..gait.phase.len() {

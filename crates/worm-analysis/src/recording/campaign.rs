@@ -72,7 +72,7 @@ pub struct Campaign {
     /// The text of the configuration's file; `None` for the worm of the paper.
     pub config_text: Option<String>,
     /// Its recordings; none where it lists advances.
-    pub runs: Vec<Run>,
+    pub runs: Vec<CampaignRun>,
     /// Its advances; none where it lists recordings. At least one of either.
     pub advances: Vec<Advance>,
 }
@@ -94,7 +94,7 @@ pub struct Advance {
 
 /// One recording of a campaign.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct CampaignRun {
     /// Where the recording is.
     pub recording: PathBuf,
     /// Slope of the canal, degrees, positive uphill, −90 to 90.
@@ -155,7 +155,7 @@ impl Campaign {
             }
             None => (Config::default(), None),
         };
-        let mut runs: Vec<(Run, PathBuf)> = Vec::with_capacity(file.run.len());
+        let mut runs: Vec<(CampaignRun, PathBuf)> = Vec::with_capacity(file.run.len());
         let mut advances = Vec::new();
         for entry in &file.run {
             let Some(recording) = &entry.recording else {
@@ -251,9 +251,9 @@ impl Reader<'_> {
         self.path.parent().unwrap_or(Path::new("")).join(path)
     }
 
-    fn run(&self, entry: &RunEntry, recording: &Spanned<PathBuf>) -> Result<Run, CampaignError> {
+    fn run(&self, entry: &RunEntry, recording: &Spanned<PathBuf>) -> Result<CampaignRun, CampaignError> {
         let (slope_deg, payload_kg, cycle_s) = self.conditions(entry)?;
-        Ok(Run {
+        Ok(CampaignRun {
             recording: self.beside(recording.get_ref()),
             slope_deg,
             payload_kg,
@@ -321,7 +321,7 @@ impl Reader<'_> {
     }
 
     /// The recording's one true path.
-    fn find(&self, recording: &Spanned<PathBuf>, run: &Run) -> Result<PathBuf, CampaignError> {
+    fn find(&self, recording: &Spanned<PathBuf>, run: &CampaignRun) -> Result<PathBuf, CampaignError> {
         run.recording.canonicalize().map_err(|error| {
             let problem = format!("{}: {error}", run.recording.display());
             let remedy = "give the recording's path relative to the campaign's file";

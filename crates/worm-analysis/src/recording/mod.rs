@@ -22,13 +22,13 @@
 
 mod c3d;
 mod campaign;
-mod projection;
 mod gaps;
 mod markers;
 pub mod mcap;
 mod open;
-mod sanity_check;
+mod projection;
 mod quantile;
+mod sanity_check;
 mod series;
 mod table;
 mod text;
@@ -36,9 +36,9 @@ mod vicon;
 mod write;
 
 pub use campaign::PAYLOADS_KG;
-pub use campaign::{Advance, Campaign, CampaignError, Run};
-pub use projection::{Axis, AxisError};
+pub use campaign::{Advance, Campaign, CampaignError, CampaignRun};
 pub use open::{OpenOptions, open, open_with_progress};
+pub use projection::{Axis, AxisError};
 pub use series::{Motor, Recording};
 pub use worm_log::ReadError;
 pub use write::write_csv;

@@ -7,8 +7,8 @@
 //! decide is refused: `--axis` then says which way is up.
 
 use super::markers::Markers;
-use super::sanity_check::moves;
 use super::quantile::{quantile, spread};
+use super::sanity_check::moves;
 use super::series::Recording;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;

@@ -6,7 +6,10 @@ pub(super) fn quantile(values: impl IntoIterator<Item = f64>, fraction: f64) -> 
 }
 
 /// Several quantiles at once, as [`quantile`].
-pub(super) fn quantiles<const N: usize>(values: impl IntoIterator<Item = f64>, fractions: [f64; N]) -> Option<[f64; N]> {
+pub(super) fn quantiles<const N: usize>(
+    values: impl IntoIterator<Item = f64>,
+    fractions: [f64; N],
+) -> Option<[f64; N]> {
     let mut seen: Vec<f64> = values.into_iter().filter(|value| !value.is_nan()).collect();
     let last = seen.len().checked_sub(1)?;
     Some(fractions.map(|fraction| {

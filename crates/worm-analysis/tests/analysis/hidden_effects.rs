@@ -4,7 +4,7 @@ mod contact;
 
 use testkit::hidden_effects::CELLS;
 use testkit::hidden_effects::body::Worm;
-use testkit::hidden_effects::campaign::{HiddenCampaign, Kind, Size, Twin, Wanted, draw_sized};
+use testkit::hidden_effects::campaign::{CampaignKind, HiddenCampaign, Size, Twin, Wanted, draw_sized};
 use testkit::hidden_effects::effect::{Band, Effect};
 use testkit::hidden_effects::flaws::{Flaws, Patch};
 use testkit::hidden_effects::make::Make;
@@ -306,9 +306,16 @@ fn the_splits_are_whole_and_apart() {
     seeds.sort_unstable();
     seeds.dedup();
     assert_eq!(seeds.len(), 2 * development.len(), "no two cases share a seed");
-    let of = |kind: Kind| development.iter().filter(|case| case.wanted.kind() == kind).count();
+    let of = |kind: CampaignKind| development.iter().filter(|case| case.wanted.kind() == kind).count();
     assert_eq!(
-        [Kind::Clean, Kind::Single, Kind::Outside, Kind::Pair, Kind::Twin].map(of),
+        [
+            CampaignKind::Clean,
+            CampaignKind::Single,
+            CampaignKind::Outside,
+            CampaignKind::Pair,
+            CampaignKind::Twin
+        ]
+        .map(of),
         [24, 88, 18, 12, 6]
     );
 }

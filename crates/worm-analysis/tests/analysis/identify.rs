@@ -11,7 +11,7 @@ use testkit::independent_worm::camera::Camera;
 use testkit::independent_worm::draw::crawling;
 use testkit::independent_worm::scene::{Scene, positions_only};
 use testkit::independent_worm::score::{HEADER, PROMISE, Promise, Score, rms};
-use worm_analysis::experiment::{Analysis, PhaseSource, Run, analyze};
+use worm_analysis::experiment::{Analysis, PhaseSource, RecordedRun, analyze};
 use worm_analysis::recording::Recording;
 use worm_estimator::config::Config;
 
@@ -30,10 +30,10 @@ const SHARP: f64 = 0.001;
 
 /// Analyses recordings of one worm together.
 fn analyses(recordings: &[Recording], scenes: &[Scene], cycle_s: Option<f64>) -> Vec<Analysis> {
-    let runs: Vec<Run<'_>> = recordings
+    let runs: Vec<RecordedRun<'_>> = recordings
         .iter()
         .zip(scenes)
-        .map(|(recording, scene)| Run {
+        .map(|(recording, scene)| RecordedRun {
             recording,
             slope_deg: scene.body.slope_deg,
             payload_kg: 0.0,

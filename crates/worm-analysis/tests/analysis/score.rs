@@ -1,6 +1,6 @@
 //! The score, on answers that are known to be right or wrong.
 
-use testkit::hidden_effects::campaign::{HiddenCampaign, Kind, Size, Twin, Wanted, draw_sized};
+use testkit::hidden_effects::campaign::{CampaignKind, HiddenCampaign, Size, Twin, Wanted, draw_sized};
 use testkit::hidden_effects::effect::{Band, Effect, TrueEffect};
 use testkit::hidden_effects::repeat::ExtraRun;
 use testkit::hidden_effects::table::{Share, Table};
@@ -38,8 +38,8 @@ impl Explainer for Oracle {
         Ok(Answer {
             verdict: match campaign.kind {
                 _ if !self.wants_to_know => Verdict::Named,
-                Kind::Clean => Verdict::Nothing,
-                Kind::Outside => Verdict::Outside,
+                CampaignKind::Clean => Verdict::Nothing,
+                CampaignKind::Outside => Verdict::Outside,
                 _ if torn => Verdict::Ambiguous,
                 _ => Verdict::Named,
             },

@@ -33,13 +33,13 @@ pub enum ConfigError {
         /// The file.
         file: PathBuf,
         /// Every problem found.
-        problems: Vec<Problem>,
+        problems: Vec<ConfigProblem>,
     },
 }
 
 /// One value that is out of range or contradicts another.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Problem {
+pub struct ConfigProblem {
     /// The key, as `section.key`.
     pub key: String,
     /// The value that was given.
@@ -48,7 +48,7 @@ pub struct Problem {
     pub remedy: String,
 }
 
-impl Display for Problem {
+impl Display for ConfigProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} = {}: {}", self.key, self.value, self.remedy)
     }
@@ -56,7 +56,7 @@ impl Display for Problem {
 
 struct ProblemList<'a> {
     file: &'a Path,
-    problems: &'a [Problem],
+    problems: &'a [ConfigProblem],
 }
 
 impl Display for ProblemList<'_> {
@@ -83,14 +83,14 @@ pub(super) fn syntax(text: &str, file: &Path, error: &toml::de::Error) -> Config
 /// Collects problems, so that a person sees all of them at once.
 #[derive(Default)]
 pub(super) struct Checker {
-    pub(super) problems: Vec<Problem>,
+    pub(super) problems: Vec<ConfigProblem>,
 }
 
 impl Checker {
     /// Notes a problem unless `holds`.
     pub(super) fn require(&mut self, holds: bool, key: &str, value: impl Display, remedy: impl Display) {
         if !holds {
-            self.problems.push(Problem {
+            self.problems.push(ConfigProblem {
                 key: key.to_owned(),
                 value: value.to_string(),
                 remedy: remedy.to_string(),

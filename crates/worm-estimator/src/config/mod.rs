@@ -16,7 +16,7 @@ mod worm;
 
 pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
-pub use check::{ConfigError, Problem};
+pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use machine::{Battery, Control, Estimator, Limits, Port, ReadMode, Realtime, Servo, Topics, Tracker};
 pub use physics::PhysicsError;
@@ -105,7 +105,7 @@ impl Config {
     }
 
     /// Every value that is out of range or contradicts another.
-    pub fn problems(&self) -> Vec<Problem> {
+    pub fn problems(&self) -> Vec<ConfigProblem> {
         let mut checker = check::Checker::default();
         self.worm.check(&mut checker);
         for effect in &self.effect {

@@ -15,7 +15,7 @@ const JUMP_S: f64 = 0.2;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Capture {
     min_lag_s: Option<(f64, f64)>, // and when
-    before: Option<(f64, f64)>,      // time and phase of the tick before
+    before: Option<(f64, f64)>,    // time and phase of the tick before
 }
 
 impl Capture {

@@ -34,7 +34,7 @@ struct Touch {
 
 /// The account of one cycle, in the direction of the crawl.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Account {
+pub(super) struct EnergyBalance {
     pub(super) advance_m: f64,
     pub(super) advance_sigma_m: f64,
     pub(super) forward_slide_m: [f64; MAX_CELLS],
@@ -55,7 +55,7 @@ pub(super) struct Account {
     pub(super) settled: bool,
 }
 
-impl Account {
+impl EnergyBalance {
     /// Forward and backward slides of the tips as the canal sees them, for a crawl in the direction of `sign`, m.
     pub(super) fn slides_along_canal_m(&self, sign: f64) -> ([f64; MAX_CELLS], [f64; MAX_CELLS]) {
         if sign > 0.0 {
@@ -112,7 +112,7 @@ impl Accountant {
     /// Accounts for the last cycle of the fit. Where a tip's contact point is not known at its start, the tip is taken to
     /// carry its part of the weight if the worm was laid down and began to crawl; else the cycle is taken to be like any
     /// other, so that the tip begins it as it ends it.
-    pub(super) fn close(&mut self, fit: &Fit, tips: &[Tip], start: &Start<'_>) -> Account {
+    pub(super) fn close(&mut self, fit: &Fit, tips: &[Tip], start: &Start<'_>) -> EnergyBalance {
         if start.laid_down {
             return self.close_with_guess(fit, tips, start.contact_m, &start.resting_m);
         }
@@ -131,7 +131,7 @@ impl Accountant {
 
     /// The account with a guess of the deformations with which tips of unknown contact point begin, `NaN` for none. A guess
     /// holds until the end of the cell's own step, where (1) puts an end to it; its doubt goes into the standard errors.
-    fn close_with_guess(&mut self, fit: &Fit, tips: &[Tip], contact_m: &[f64], guess_m: &[f64]) -> Account {
+    fn close_with_guess(&mut self, fit: &Fit, tips: &[Tip], contact_m: &[f64], guess_m: &[f64]) -> EnergyBalance {
         self.tips.copy_from_slice(tips);
         self.work_by_contact_n.fill(0.0);
         self.sliding.fill(None);
@@ -150,7 +150,7 @@ impl Accountant {
         fit.clear_gradient(&mut self.loss_gradient);
         fit.clear_gradient(&mut self.actuator_gradient);
         fit.clear_gradient(&mut self.advance_gradient);
-        let mut account = Account {
+        let mut account = EnergyBalance {
             advance_m: 0.0,
             advance_sigma_m: f64::NAN,
             forward_slide_m: [0.0; MAX_CELLS],
@@ -224,7 +224,7 @@ impl Accountant {
     }
 
     /// Moves a tip to the end of a piece.
-    fn slide(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, account: &mut Account) {
+    fn slide(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, account: &mut EnergyBalance) {
         let (end, bound_m) = (piece + 1, self.tips[cell].bound_m);
         let at_m = fit.position_m(cell, end);
         // (1): at the end of its own step, if it was a step, the tip has slid forward.
@@ -243,7 +243,7 @@ impl Accountant {
     }
 
     /// Moves a tip whose contact point is known, or guessed, to the end of a piece.
-    fn follow(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, account: &mut Account) {
+    fn follow(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, account: &mut EnergyBalance) {
         let Tip {
             stiffness_n_per_m,
             bound_m,
@@ -291,7 +291,7 @@ impl Accountant {
     }
 
     /// Adds the actuator work of a piece, ∫ (k δ + m g sin λ) d(extension).
-    fn add_work(&mut self, fit: &Fit, piece: usize, account: &mut Account) {
+    fn add_work(&mut self, fit: &Fit, piece: usize, account: &mut EnergyBalance) {
         let cell = fit.stepping_cell(piece);
         let Tip {
             stiffness_n_per_m,
@@ -333,7 +333,7 @@ impl Accountant {
     }
 
     /// Adds advance and work against the weight.
-    fn add_weight(&mut self, fit: &Fit, from: usize, to: usize, account: &mut Account) {
+    fn add_weight(&mut self, fit: &Fit, from: usize, to: usize, account: &mut EnergyBalance) {
         let fraction = 1.0 / self.tips.len() as f64;
         for (cell, tip) in self.tips.iter().enumerate() {
             let displacement_m = fit.position_m(cell, to) - fit.position_m(cell, from);

@@ -1,14 +1,14 @@
 //! The estimator: states in, estimates and cycles out.
 
-use super::energy_balance::{Account, Accountant, Start, Tip};
 use super::bounds::Identification;
 use super::capture::Capture;
 use super::contact::Contacts;
 use super::cycles::{Cycles, Event};
 use super::electrical::{Electrical, Energies};
+use super::energy_balance::{Accountant, EnergyBalance, Start, Tip};
 use super::filter::BodyFilter;
 use super::fit::Fit;
-use super::gait::Gait;
+use super::gait::StepSequence;
 use super::lived::LivedTime;
 use super::mismatch::{Mismatch, ResidualMap};
 use super::prediction::Predictor;
@@ -43,7 +43,7 @@ struct Opened {
 #[derive(Debug, Clone)]
 pub struct Estimator {
     cells: usize,
-    gait: Gait,
+    gait: StepSequence,
     tracker_period_s: f64,
     tips: Vec<Tip>, // in forward direction
     filter: BodyFilter,
@@ -83,7 +83,7 @@ impl Estimator {
             return Err(EstimatorError::Config(problem));
         }
         let cells = config.worm.cells;
-        let gait = Gait::new(&config.worm);
+        let gait = StepSequence::new(&config.worm);
         let predictor = Predictor::new(config)?;
         let tips = predictor.tips();
         let fit = Fit::new(cells, config.worm.stroke_m);
@@ -340,7 +340,7 @@ impl Estimator {
         self.cycle.direction = direction;
     }
 
-    fn describe_motion(&mut self, account: &Account, sign: f64) {
+    fn describe_motion(&mut self, account: &EnergyBalance, sign: f64) {
         let known = self.bounds_are_known();
         let (forward_m, backward_m) = account.slides_along_canal_m(sign);
         let cycle = &mut self.cycle;
@@ -374,7 +374,7 @@ impl Estimator {
     }
 
     /// Replaces what the live positions gave for this cycle by what the fit gave.
-    fn correct_contacts(&mut self, account: &Account, sign: f64) {
+    fn correct_contacts(&mut self, account: &EnergyBalance, sign: f64) {
         let (slid_forward_m, slid_backward_m) = account.slides_along_canal_m(sign);
         let mut forward_m = *self.contacts.forward_m();
         let mut backward_m = *self.contacts.backward_m();

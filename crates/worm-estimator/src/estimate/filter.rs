@@ -27,7 +27,7 @@
 //!   running (the body moved) or one cell stays off for [`REACQUIRE_AFTER`] samples (it moved, or its first sample was an outlier).
 //! - The stroke of a cell is carried to its next step without its correlations.
 
-use super::gait::Gait;
+use super::gait::StepSequence;
 use crate::config::Config;
 use worm_physics::MAX_CELLS;
 
@@ -55,7 +55,7 @@ const NOISE_RANGE: f64 = 100.0;
 /// The filter. Fixed size; phases are gait cycles times cells, so that a step is a unit.
 #[derive(Debug, Clone)]
 pub(super) struct BodyFilter {
-    gait: Gait,
+    gait: StepSequence,
     stroke_m: f64,
     gate: f64, // standard deviations
     configured_variance: f64,
@@ -67,12 +67,12 @@ pub(super) struct BodyFilter {
     strokes: [(f64, f64); MAX_CELLS], // mean and variance carried to the cell's next step
     step: i64,
     at: Option<(f64, f64)>, // phase in steps and time of the state
-    sign: f64,             // of the last motion of the phase
+    sign: f64,              // of the last motion of the phase
     jump_m: Option<f64>,    // by which most cells were off in the last sample
 }
 
 impl BodyFilter {
-    pub(super) fn new(config: &Config, gait: Gait) -> Self {
+    pub(super) fn new(config: &Config, gait: StepSequence) -> Self {
         let stroke_m = config.worm.stroke_m;
         let configured_variance = config.tracker.noise_m * config.tracker.noise_m;
         Self {

@@ -23,7 +23,7 @@
 //! - The standard errors are those of the last reweighted problem, as if its corner variances had been known.
 
 use super::bordered::Bordered;
-use super::gait::Gait;
+use super::gait::StepSequence;
 use super::window::{CYCLES, INTERVALS, Window};
 
 /// First standard deviation of a corner of b within a step, strokes.
@@ -95,7 +95,7 @@ impl Fit {
 
     /// Fits the window, whose steps are those of `gait`; `noise_m` is the first guess at the noise of one position.
     /// False when the samples do not determine a fit.
-    pub(super) fn run(&mut self, window: &Window, gait: &Gait, noise_m: f64) -> bool {
+    pub(super) fn run(&mut self, window: &Window, gait: &StepSequence, noise_m: f64) -> bool {
         for (cell, step) in self.step_of_cell.iter_mut().enumerate() {
             *step = gait.step_of_cell(cell);
             self.cell_of_step[*step] = cell;

@@ -5,12 +5,12 @@ use worm_physics::MAX_CELLS;
 
 /// The order of the cells, for steps counted from phase 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Gait {
+pub(super) struct StepSequence {
     cells: usize,
     order: [usize; MAX_CELLS],
 }
 
-impl Gait {
+impl StepSequence {
     pub(super) fn new(worm: &Worm) -> Self {
         let mut order = [0; MAX_CELLS];
         order[..worm.cells].copy_from_slice(&worm.step_order_from_zero());

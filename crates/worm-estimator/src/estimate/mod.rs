@@ -32,13 +32,13 @@
 
 pub mod alarm;
 
-mod energy_balance;
 mod bordered;
 mod bounds;
 mod capture;
 mod contact;
 mod cycles;
 mod electrical;
+mod energy_balance;
 mod estimator;
 mod filter;
 mod fit;
@@ -55,5 +55,5 @@ pub use capture::Capture;
 pub use estimator::Estimator;
 pub use lived::LivedTime;
 pub use mismatch::{Residual, ResidualMap};
-pub use observer::{Observer, Report};
+pub use observer::{Observer, ObserverOutput};
 pub use update::{EstimatorError, Update};

@@ -7,7 +7,7 @@ use crate::message::{Cycle, Estimate, State};
 
 /// What one state has brought.
 #[derive(Debug, Clone)]
-pub struct Report {
+pub struct ObserverOutput {
     /// The estimate, when the state carried a tracker sample.
     pub estimate: Option<Estimate>,
     /// The gait cycle that ended.
@@ -38,7 +38,7 @@ impl Observer {
     }
 
     /// Takes the controller's next state.
-    pub fn update(&mut self, state: &State) -> Report {
+    pub fn update(&mut self, state: &State) -> ObserverOutput {
         let update = self.estimator.update(state);
         let (estimate, cycle) = (update.estimate.copied(), update.cycle.copied());
         let observation = alarm::Observation {
@@ -51,7 +51,7 @@ impl Observer {
         if !self.watch.is_sound() {
             self.estimator.leave_cycle_out();
         }
-        Report {
+        ObserverOutput {
             estimate: estimate.map(|estimate| self.with_alarms(estimate)),
             cycle,
             alarms,

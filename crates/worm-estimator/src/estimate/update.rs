@@ -1,7 +1,7 @@
 //! What the estimator gives out besides the messages.
 
+use crate::config::ConfigProblem;
 use crate::config::PhysicsError;
-use crate::config::Problem;
 use crate::message::{Cycle, Estimate};
 
 /// Why there can be no estimator.
@@ -9,7 +9,7 @@ use crate::message::{Cycle, Estimate};
 pub enum EstimatorError {
     /// The configuration was changed after it was checked.
     #[error("the configuration is not valid: {0}")]
-    Config(Problem),
+    Config(ConfigProblem),
     /// The configured worm is none to the model.
     #[error("the model refuses the configured worm: {0}")]
     Physics(#[from] PhysicsError),

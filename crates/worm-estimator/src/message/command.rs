@@ -21,7 +21,7 @@ coded_enum! {
 
 coded_enum! {
     /// What became of a command.
-    Verdict, "verdict" {
+    CommandOutcome, "verdict" {
         /// Carried out, or under way.
         Accepted = 0 => "accepted",
         /// Not possible in the present mode; the mode stands in the reply.
@@ -57,7 +57,7 @@ pub struct Command {
 pub struct Reply {
     /// Tick in which the command was taken.
     pub sequence: u64,
-    /// [`Verdict`] as a code.
+    /// [`CommandOutcome`] as a code.
     pub verdict: u32,
     /// [`super::Mode`] after the command, as a code.
     pub mode: u32,

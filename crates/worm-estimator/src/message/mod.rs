@@ -21,7 +21,7 @@ mod state;
 mod timing;
 
 pub use alarm::{Alarm, AlarmKind, Severity};
-pub use command::{Command, CommandKind, Reply, Verdict};
+pub use command::{Command, CommandKind, CommandOutcome, Reply};
 pub use cycle::Cycle;
 pub use estimate::Estimate;
 pub use json::JsonMessage;

@@ -38,7 +38,10 @@ pub fn yield_at(push: &Push, yielding: f64, damping_s: f64, drag_s_per_m: f64) -
     if yielding == 0.0 {
         let displacement_m = excess_n / (slack + push.bristle_n_per_m + damping);
         let bristle_m = push.bristle_m + displacement_m;
-        return Gone { displacement_m, bristle_m };
+        return Gone {
+            displacement_m,
+            bristle_m,
+        };
     }
     let linear = slack + push.bristle_n_per_m + damping - yielding * (push.pull_n + damping * push.bristle_m);
     let displacement_m = positive_root(yielding * slack, linear, excess_n);

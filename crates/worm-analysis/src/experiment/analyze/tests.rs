@@ -1,12 +1,12 @@
 //! Recordings that no reader lets through are refused all the same, and the shortest that can be analysed has all its figures.
 
-use super::{AnalysisError, Run, analyze};
+use super::{AnalysisError, RecordedRun, analyze};
 use crate::experiment::{Simulation, simulate};
 use crate::recording::Recording;
 use worm_estimator::config::Config;
 
-fn run(recording: &Recording) -> Run<'_> {
-    Run {
+fn run(recording: &Recording) -> RecordedRun<'_> {
+    RecordedRun {
         recording,
         slope_deg: 0.0,
         payload_kg: 0.0,
@@ -26,7 +26,7 @@ fn recordings_of_a_few_samples_are_errors() {
             short.gait_phase.iter_mut().for_each(|phase| phase.truncate(samples));
             let error = analyze(&[run(&short)], &Config::default(), &mut |_| {}).expect_err("too short");
             assert!(
-                matches!(error, AnalysisError::Gait { .. }),
+                matches!(error, AnalysisError::IdentifiedGait { .. }),
                 "{samples} samples: {error}"
             );
         }
@@ -57,7 +57,7 @@ fn without_a_settled_cycle_all_cycles_are_counted() {
         .iter_mut()
         .for_each(|series| drop(series.drain(..begin)));
     recording.gait_phase = Some(phase[begin..].to_vec());
-    let uphill = Run {
+    let uphill = RecordedRun {
         slope_deg: 20.0,
         ..run(&recording)
     };

@@ -1,6 +1,6 @@
 //! The account of a crawl that theory made, against the model's own ledger of the same crawl.
 
-use super::{Account, follow};
+use super::{EnergyBalance, follow};
 use crate::experiment::{Simulation, simulate};
 use crate::identify::theory::TheoryBody;
 use crate::identify::{FittedRun, Prior, gait};
@@ -29,7 +29,7 @@ fn recorded(slope_deg: f64, cycles: f64) -> (Recording, Worm) {
 }
 
 /// The account with the truth in the place of a fit: bounds, start and a drift of 0.
-fn account(recording: &Recording, worm: &Worm) -> Account {
+fn account(recording: &Recording, worm: &Worm) -> EnergyBalance {
     let prior = Prior {
         step_order: worm.step_order(),
         phase: recording.gait_phase.as_deref(),

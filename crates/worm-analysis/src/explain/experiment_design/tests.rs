@@ -3,7 +3,7 @@ use super::super::observed::Observed;
 use super::super::parameter::Nuisance;
 use super::super::predict::{Hypothesis, Scene, nominal, rest};
 use super::*;
-use crate::experiment::{Run, Simulation, simulate};
+use crate::experiment::{RecordedRun, Simulation, simulate};
 use crate::recording::Recording;
 use worm_estimator::config::Config;
 use worm_physics::{Physics, Worm, effect};
@@ -29,7 +29,7 @@ fn scene<'r>(recordings: &'r [Recording], config: &Config) -> Scene<'r> {
         .iter()
         .zip(SLOPES_DEG)
         .map(|(recording, slope_deg)| {
-            let run = Run {
+            let run = RecordedRun {
                 recording,
                 slope_deg,
                 payload_kg: 0.0,
@@ -63,7 +63,7 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
         RunNoise::measure(observed, &rest(observed, &predicted))
     });
     let noise = noise.collect();
-    let problem = Problem {
+    let problem = FitProblem {
         scene: &scene,
         noise,
         repeating_excess: 0.0,

@@ -3,13 +3,13 @@
 //! The distance between two rivals is what the data of the new run would say against the wrong one, which may turn everything
 //! that is free in it as far as the campaign so far allows (its own normal matrix is the prior), and the error of the new run's slope.
 
-use super::super::fit::{Fit, Problem, dot};
+use super::super::fit::{Fit, FitProblem, dot};
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
 use super::super::parameter::{Nuisance, What};
 use super::super::predict::{Predicted, Scene, residuals, rest};
 use super::change::Change;
-use crate::experiment::Run;
+use crate::experiment::RecordedRun;
 use crate::recording::Recording;
 use nalgebra::{DMatrix, DVector};
 
@@ -24,7 +24,7 @@ const SETTLING_CYCLES: f64 = 2.0;
 const FRESH_SLOPE: What = What::Nuisance(Nuisance::SlopeOf(0));
 
 /// The recording that a change would give, without positions, and which share of the camera's samples it has, as one in so many.
-pub(super) fn blank(problem: &Problem<'_, '_>, change: &Change) -> (Recording, f64) {
+pub(super) fn blank(problem: &FitProblem<'_, '_>, change: &Change) -> (Recording, f64) {
     let base = &problem.scene.observed[change.base];
     let time_s = &base.run.recording.time_s;
     let own_hz = (time_s.len() - 1) as f64 / (time_s[time_s.len() - 1] - time_s[0]);
@@ -66,13 +66,17 @@ pub(super) struct Said {
 
 impl<'r> Trial<'r> {
     /// The run of a change; none where the canal cannot lie like that.
-    pub fn new(problem: &Problem<'_, '_>, change: &Change, (recording, thinned): &'r (Recording, f64)) -> Option<Self> {
+    pub fn new(
+        problem: &FitProblem<'_, '_>,
+        change: &Change,
+        (recording, thinned): &'r (Recording, f64),
+    ) -> Option<Self> {
         let base = &problem.scene.observed[change.base];
         let mut physics = problem.scene.nominal[change.base].clone();
         physics.worm = physics.worm.with_slope_rad(change.slope_deg.to_radians()).ok()?;
         physics.worm.add_mass_kg(change.extra_kg);
         let mut observed = Observed {
-            run: Run {
+            run: RecordedRun {
                 recording,
                 slope_deg: change.slope_deg,
                 payload_kg: base.run.payload_kg + change.extra_kg,

@@ -1,7 +1,7 @@
 //! Energy per cycle (11): by a model's own motion, and by its contacts on a path that was measured.
 
 use super::{at_boundaries, settled_cycles};
-use crate::explain::fit::{Fit, Problem};
+use crate::explain::fit::{Fit, FitProblem};
 use crate::explain::observed::Observed;
 use crate::explain::predict::start;
 use worm_physics::Mechanics;
@@ -23,7 +23,7 @@ impl Walk {
 }
 
 /// The worm of a fit through a run by its own motion; none where it slides down.
-pub(super) fn own(problem: &Problem<'_, '_>, run: usize, fit: &Fit) -> Option<Walk> {
+pub(super) fn own(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Walk> {
     walk(problem, run, fit, None)
 }
 
@@ -31,7 +31,7 @@ pub(super) fn own(problem: &Problem<'_, '_>, run: usize, fit: &Fit) -> Option<Wa
 ///
 /// Its tips slide where the laws of its contacts have them slide on that path, so that what they take is the energy of a motion
 /// that was measured, by contacts that nobody measured.
-pub(super) fn carried(problem: &Problem<'_, '_>, run: usize, fit: &Fit, beyond_m: &[f64]) -> Option<Walk> {
+pub(super) fn carried(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit, beyond_m: &[f64]) -> Option<Walk> {
     let own = own(problem, run, fit)?;
     let (physics, _) = problem.scene.physics(run, &fit.hypothesis, &fit.at);
     let path_m: Vec<f64> = own
@@ -43,7 +43,7 @@ pub(super) fn carried(problem: &Problem<'_, '_>, run: usize, fit: &Fit, beyond_m
     walk(problem, run, fit, Some(&path_m))
 }
 
-fn walk(problem: &Problem<'_, '_>, run: usize, fit: &Fit, path_m: Option<&[f64]>) -> Option<Walk> {
+fn walk(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit, path_m: Option<&[f64]>) -> Option<Walk> {
     let observed = &problem.scene.observed[run];
     let (physics, damping) = problem.scene.physics(run, &fit.hypothesis, &fit.at);
     let mechanics = Mechanics::new(&physics);

@@ -1,7 +1,7 @@
 //! The mean cycle of each run for the page: what was measured, and what the models say at the same samples.
 
 use crate::explain::answer::CycleSeries;
-use crate::explain::fit::{Fit, Problem};
+use crate::explain::fit::{Fit, FitProblem};
 use crate::explain::observed::Observed;
 use crate::explain::predict::{Predicted, rest};
 
@@ -11,7 +11,7 @@ const BINS: usize = 72;
 /// Each run's way of the body within a cycle: measured, by the believed, the recalibrated and the named model. A model that cannot
 /// make a run has no series there; phases that no cycle saw are left out.
 pub(in crate::explain) fn cycles(
-    problem: &Problem<'_, '_>,
+    problem: &FitProblem<'_, '_>,
     baseline: &Fit,
     recalibrated: &Fit,
     named: Option<&Fit>,

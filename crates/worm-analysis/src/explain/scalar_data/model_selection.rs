@@ -34,14 +34,14 @@ pub(super) fn chance(scalars: usize) -> f64 {
 }
 
 /// An effect with the cells that it may concern, one of several twins.
-pub(super) struct Kind {
+pub(super) struct AdvanceKind {
     /// At the cell where it fits best.
     pub find: Candidate,
     /// Every cell, from 1, at which it brings the model within chance.
     cells: Vec<usize>,
 }
 
-impl Kind {
+impl AdvanceKind {
     /// Whether the advances do not tell which cell it is.
     pub fn is_any_cell(&self) -> bool {
         self.cells.len() > 1
@@ -63,11 +63,11 @@ pub(super) struct Judged {
     pub verdict: Verdict,
     scalars: usize,
     /// What brings the model within chance, likeliest first.
-    pub set: Vec<Kind>,
+    pub set: Vec<AdvanceKind>,
     /// Probability of each.
     pub probability: Vec<f64>,
     /// What does not, likeliest first.
-    pub others: Vec<Kind>,
+    pub others: Vec<AdvanceKind>,
     /// The set is one effect, and there are scalars enough to say so.
     pub is_proven: bool,
 }
@@ -79,15 +79,18 @@ pub(super) fn judge(table: &Table<'_>, recalibrated: &Fit, mut finds: Vec<Candid
     let cost = |find: &Candidate| find.fit.chi_squared + 2.0 * parameters(find) as f64;
     let is_within = |find: &Candidate| find.fit.chi_squared <= ruled_out(scalars, find);
     finds.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
-    let mut kinds: Vec<Kind> = Vec::new();
+    let mut kinds: Vec<AdvanceKind> = Vec::new();
     for find in finds {
-        let cell = find.hypothesised[0].cell.map(|cell| cell + 1).filter(|_| is_within(&find));
+        let cell = find.hypothesised[0]
+            .cell
+            .map(|cell| cell + 1)
+            .filter(|_| is_within(&find));
         match kinds
             .iter_mut()
             .find(|kind| are_alike(&kind.find.hypothesised[0], &find.hypothesised[0]))
         {
             Some(kind) => kind.cells.extend(cell),
-            None => kinds.push(Kind {
+            None => kinds.push(AdvanceKind {
                 find,
                 cells: cell.into_iter().collect(),
             }),
@@ -95,10 +98,11 @@ pub(super) fn judge(table: &Table<'_>, recalibrated: &Fit, mut finds: Vec<Candid
     }
     let agrees = recalibrated.chi_squared <= chance(scalars);
     let min = kinds.first().map_or(0.0, |kind| cost(&kind.find));
-    let weight = |kind: &Kind| (-0.5 * (cost(&kind.find) - min)).exp();
+    let weight = |kind: &AdvanceKind| (-0.5 * (cost(&kind.find) - min)).exp();
     let whole: f64 = kinds.iter().map(weight).sum();
     kinds.iter_mut().for_each(|kind| kind.cells.sort_unstable());
-    let (set, others): (Vec<Kind>, Vec<Kind>) = kinds.into_iter().partition(|kind| !agrees && is_within(&kind.find));
+    let (set, others): (Vec<AdvanceKind>, Vec<AdvanceKind>) =
+        kinds.into_iter().partition(|kind| !agrees && is_within(&kind.find));
     let is_proven = matches!(&set[..], [only] if scalars > asked(only) && !only.is_any_cell());
     Judged {
         verdict: match &set[..] {
@@ -125,7 +129,7 @@ fn parameters(find: &Candidate) -> usize {
 }
 
 /// Quantities that the scalars have to settle before they prove an effect; they must be more.
-fn asked(kind: &Kind) -> usize {
+fn asked(kind: &AdvanceKind) -> usize {
     COMMON + parameters(&kind.find)
 }
 
@@ -159,7 +163,7 @@ impl Judged {
                 "The recalibrated model misses the {scalars} advances by more than chance, and each of {} effects alone would mend \
                  it: {}. {scalars} scalars cannot decide between them.",
                 self.set.len(),
-                self.set.iter().map(Kind::name).collect::<Vec<_>>().join(", ")
+                self.set.iter().map(AdvanceKind::name).collect::<Vec<_>>().join(", ")
             ),
             (_, []) => format!(
                 "Model and advances disagree, and no single effect of the library brings the model within chance{}.",

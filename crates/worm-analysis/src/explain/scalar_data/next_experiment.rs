@@ -4,8 +4,8 @@
 //! farthest apart, so that one run does both.
 
 use super::super::answer::{NextExperiment, Prediction, Verdict};
-use super::super::fit::Fit;
 use super::super::experiment_design::{MIN_ADVANCE, SLOPES_DEG};
+use super::super::fit::Fit;
 use super::model_selection::Judged;
 use super::table::Table;
 use worm_physics::Cycle;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::experiment::Run;
+use crate::experiment::RecordedRun;
 use crate::explain::parameter::Nuisance;
 use crate::explain::predict::Hypothesis;
 use crate::recording::Recording;
@@ -84,7 +84,7 @@ fn found(per_n: f64, rest_s: f64, seed: u64) -> SpeedDroop {
     };
     let recordings: Vec<Recording> = vec![recording(Vec::new()); SLOPES_DEG.len()];
     let observed = |recording, phase: Vec<f64>| Observed {
-        run: Run {
+        run: RecordedRun {
             recording,
             slope_deg: 0.0,
             payload_kg: 0.0,
@@ -130,7 +130,10 @@ fn a_motor_that_droops_is_found_with_its_value() {
     for (per_n, rest_s) in [(0.05, 0.0), (0.2, 0.0), (0.05, 2.0)] {
         for seed in 0..5 {
             let speed_droop = found(per_n, rest_s, seed);
-            assert!(speed_droop.improvement > 6.0, "{per_n} at rest for {rest_s} s: {speed_droop:?}");
+            assert!(
+                speed_droop.improvement > 6.0,
+                "{per_n} at rest for {rest_s} s: {speed_droop:?}"
+            );
             let off = (speed_droop.slowdown_per_n - per_n) / speed_droop.sigma;
             assert!(off.abs() < 2.5, "{per_n} at rest for {rest_s} s: {speed_droop:?}");
         }

@@ -97,7 +97,10 @@ fn the_true_drift_is_the_likeliest() {
                 factor,
             )
         });
-        let min = chi_squareds.iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("candidates");
+        let min = chi_squareds
+            .iter()
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .expect("candidates");
         assert_eq!(min.1, 1.0, "seed {seed}: {chi_squareds:?}");
     }
 }

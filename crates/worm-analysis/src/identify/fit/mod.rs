@@ -20,10 +20,10 @@ mod problem;
 mod run;
 
 use super::drift::Drift;
-use super::gait::Gait;
+use super::gait::IdentifiedGait;
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::DVector;
-use problem::{DAMPING, IMPOSSIBLE, Problem};
+use problem::{BoundsProblem, DAMPING, IMPOSSIBLE};
 use worm_physics::{Worm, WormError};
 
 /// Rise of the misfit, beyond one for each cell, up to which a worm counts as laid down.
@@ -49,11 +49,11 @@ const ROUNDS: usize = 2;
 
 /// One run of the worm.
 #[derive(Debug, Clone, Copy)]
-pub struct Run<'a> {
+pub struct PositionRun<'a> {
     /// Time of each sample, s.
     pub time_s: &'a [f64],
     /// Its gait.
-    pub gait: &'a Gait,
+    pub gait: &'a IdentifiedGait,
     /// Slope of the canal, rad.
     pub slope_rad: f64,
     /// Known extra mass, kg.
@@ -116,11 +116,11 @@ pub enum FitError {
 /// [`FitError`].
 pub fn fit(
     base: &Worm,
-    runs: &[Run<'_>],
+    runs: &[PositionRun<'_>],
     starts_m: &[Vec<f64>],
     progress: &mut dyn FnMut(f64),
 ) -> Result<Fitted, FitError> {
-    let mut problem = Problem::new(base, runs)?;
+    let mut problem = BoundsProblem::new(base, runs)?;
     let rounds = (1 + ROUNDS + runs.len()) as f64;
     let mut done = 0.0;
     let mut step = || {
@@ -143,7 +143,7 @@ pub fn fit(
     problem.finish()
 }
 
-impl<'a> Problem<'a> {
+impl<'a> BoundsProblem<'a> {
     /// Searches from the starting points, those first that promise most, until one leads to what noise explains; else from all.
     fn search(&mut self, starts_m: &[Vec<f64>]) -> Result<DVector<f64>, FitError> {
         let mut starts: Vec<(f64, DVector<f64>)> = Vec::with_capacity(starts_m.len());

@@ -1,7 +1,7 @@
 //! The fit as a problem of least squares: parameters, residuals, Jacobian.
 
 use super::run::{RunData, common_deformation_m};
-use super::{FitError, Run};
+use super::{FitError, PositionRun};
 use levenberg_marquardt::LeastSquaresProblem;
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use worm_physics::{Worm, WormError};
@@ -23,15 +23,15 @@ pub(super) const IMPOSSIBLE: f64 = 1e3;
 
 /// How the parameters lie in their vector: logarithms of the bounds, of the damping ratio, and of the mass where it can be
 /// seen, then each run's deformations at the start in mm.
-pub(super) struct Problem<'a> {
+pub(super) struct BoundsProblem<'a> {
     pub base: Worm,
     pub runs: Vec<RunData<'a>>,
     pub with_mass: bool,
     pub parameters: DVector<f64>,
 }
 
-impl<'a> Problem<'a> {
-    pub(super) fn new(base: &Worm, runs: &[Run<'a>]) -> Result<Self, FitError> {
+impl<'a> BoundsProblem<'a> {
+    pub(super) fn new(base: &Worm, runs: &[PositionRun<'a>]) -> Result<Self, FitError> {
         let cells = base.cells();
         let runs: Vec<RunData<'a>> = runs
             .iter()
@@ -263,7 +263,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+impl LeastSquaresProblem<f64, Dyn, Dyn> for BoundsProblem<'_> {
     type ResidualStorage = Owned<f64, Dyn>;
     type JacobianStorage = Owned<f64, Dyn, Dyn>;
     type ParameterStorage = Owned<f64, Dyn>;

@@ -1,6 +1,6 @@
 //! One run as the fit sees it: which samples count, and theory's way through them.
 
-use super::Run;
+use super::PositionRun;
 use crate::identify::drift::Drift;
 use crate::identify::theory::TheoryBody;
 use worm_physics::{Motion, Worm, WormError, steady_cycle};
@@ -17,7 +17,7 @@ const FIRST_DRIFT_M: f64 = 5e-5;
 
 /// One run.
 pub(super) struct RunData<'a> {
-    pub run: Run<'a>,
+    pub run: PositionRun<'a>,
     pub worm: Worm, // order, stroke and slope of the run
     pub variance_m2: Vec<f64>,
     pub drift: Drift,
@@ -26,7 +26,7 @@ pub(super) struct RunData<'a> {
 }
 
 impl<'a> RunData<'a> {
-    pub(super) fn new(base: &Worm, run: Run<'a>) -> Result<Self, WormError> {
+    pub(super) fn new(base: &Worm, run: PositionRun<'a>) -> Result<Self, WormError> {
         let gait = run.gait;
         let worm = base
             .clone()
@@ -75,7 +75,7 @@ impl<'a> RunData<'a> {
 
     /// Way of the body at every sample, m: the mean of the cells' positions less what the stroke alone would have made.
     pub(super) fn displacement_m(&self, worm: &Worm, start_m: &[f64], damping_ratio: f64) -> Option<Vec<f64>> {
-        let Run { time_s, gait, .. } = self.run;
+        let PositionRun { time_s, gait, .. } = self.run;
         let mut body = TheoryBody::at_rest(worm, gait.phase[0], start_m, damping_ratio);
         let mut displacement_m = Vec::with_capacity(time_s.len());
         for sample in 0..time_s.len() {

@@ -1,6 +1,6 @@
 //! Gaits of worms that pause, begin and end anywhere, and are seen badly; and what is not a gait.
 
-use super::{Gait, GaitError, Prior, find};
+use super::{GaitError, IdentifiedGait, Prior, find};
 use crate::recording::Recording;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -39,7 +39,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn find(&self, step_order: &[usize], phase: Option<&[f64]>) -> Result<Gait, GaitError> {
+    fn find(&self, step_order: &[usize], phase: Option<&[f64]>) -> Result<IdentifiedGait, GaitError> {
         let filled_m = Recording {
             source: "seen".into(),
             cell_names: Vec::new(),
@@ -112,7 +112,7 @@ fn shuffled(cells: usize, seed: u64) -> Vec<usize> {
 }
 
 /// Root mean square of the error of the phase, whole cycles apart, cycles.
-fn phase_error(gait: &Gait, truth: &[f64]) -> f64 {
+fn phase_error(gait: &IdentifiedGait, truth: &[f64]) -> f64 {
     let apart = (gait.phase[truth.len() / 2] - truth[truth.len() / 2]).round();
     let squares = gait
         .phase

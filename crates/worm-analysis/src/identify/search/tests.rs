@@ -2,10 +2,10 @@
 
 use super::{CANDIDATES, search};
 use crate::experiment::{Simulation, simulate};
-use crate::identify::{Gait, Prior, gait};
+use crate::identify::{IdentifiedGait, Prior, gait};
 use worm_estimator::config::Config;
 
-fn recorded(simulation: Simulation) -> (Vec<Vec<f64>>, Gait) {
+fn recorded(simulation: Simulation) -> (Vec<Vec<f64>>, IdentifiedGait) {
     let config = Config::default();
     let recording = simulate(&config, &simulation).expect("the paper's worm crawls");
     let filled_m = recording.filled();
@@ -17,7 +17,7 @@ fn recorded(simulation: Simulation) -> (Vec<Vec<f64>>, Gait) {
     (filled_m, gait)
 }
 
-fn noisy(cycles: f64, slope_deg: f64) -> (Vec<Vec<f64>>, Gait) {
+fn noisy(cycles: f64, slope_deg: f64) -> (Vec<Vec<f64>>, IdentifiedGait) {
     recorded(Simulation {
         cycles,
         slope_deg,
@@ -31,7 +31,7 @@ fn noisy(cycles: f64, slope_deg: f64) -> (Vec<Vec<f64>>, Gait) {
 /// The balance (5) of one combination over the whole cycles after the first: mean and standard deviation of the force, N.
 fn balance(
     position_m: &[Vec<f64>],
-    gait: &Gait,
+    gait: &IdentifiedGait,
     bounds_m: &[f64],
     stiffness_n_per_m: &[f64],
     pull_n: f64,
@@ -70,7 +70,7 @@ fn balance(
 /// All combinations of seven candidates a cell, one after the other: bounds, mean and standard deviation of the best.
 fn brute_force(
     position_m: &[Vec<f64>],
-    gait: &Gait,
+    gait: &IdentifiedGait,
     first_m: &[f64],
     stiffness_n_per_m: &[f64],
     pull_n: f64,
@@ -127,7 +127,7 @@ fn there_is_nothing_to_search_without_a_whole_cycle_or_with_too_many_cells() {
     assert_eq!(search(&unseen, &whole, &[2e-3; 4], &[980.0; 4], 0.0), None);
 
     let eight = [position_m.clone(), position_m].concat();
-    let order = Gait {
+    let order = IdentifiedGait {
         step_order: (0..8).collect(),
         ..whole
     };

@@ -117,9 +117,17 @@ fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[
             }
             return Ok(());
         }
-        let scattered = scattered.map(|((phase, displacement_m), scatter_m)| (*phase, ribbon(displacement_m * 1e3, *scatter_m)));
+        let scattered =
+            scattered.map(|((phase, displacement_m), scatter_m)| (*phase, ribbon(displacement_m * 1e3, *scatter_m)));
         plot.ribbon(scattered, MUTED, SCATTER)?;
-        let in_mm = |displacement_m: &[f64]| at_phases(displacement_m.iter().map(|displacement_m| displacement_m * 1e3).collect());
+        let in_mm = |displacement_m: &[f64]| {
+            at_phases(
+                displacement_m
+                    .iter()
+                    .map(|displacement_m| displacement_m * 1e3)
+                    .collect(),
+            )
+        };
         plot.line(in_mm(&run.measured_m), Stroke::new(MEASURED, MEASURED_WIDTH))?;
         for line in lines(run) {
             plot.line(in_mm(line.values_m), line.stroke)?;

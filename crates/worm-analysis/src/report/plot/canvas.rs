@@ -1,9 +1,9 @@
 //! What draws: sheets, rows, and the marks that a plot knows.
 
 use super::axis::Axis;
+use super::decimate;
 use super::palette::{Colour, GRID, INK, MUTED, PAPER};
 use super::raw::{Raw, TEXT, dots, text_size, text_style};
-use super::decimate;
 use plotters::prelude::{
     Cartesian2d, ChartBuilder, ChartContext, Circle, DrawingAreaErrorKind, EmptyElement, LabelAreaPosition,
     PathElement, Polygon, Rectangle, SVGBackend, Text,

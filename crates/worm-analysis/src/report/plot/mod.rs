@@ -6,11 +6,11 @@
 
 mod axis;
 mod canvas;
+mod decimate;
 mod palette;
 mod raw;
 #[cfg(test)]
 mod tests;
-mod decimate;
 
 pub use axis::Axis;
 pub use canvas::{DrawError, Plot, Row, Sheet, Stroke, draw};

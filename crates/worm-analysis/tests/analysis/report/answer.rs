@@ -57,7 +57,13 @@ impl Ways {
     /// Mean way of the cells, less what the stroke alone would make.
     fn of_body_m(&self) -> Vec<f64> {
         let cells = self.cell_m.len() as f64;
-        let mean_m = |sample: usize| self.cell_m.iter().map(|displacement_m| displacement_m[sample]).sum::<f64>() / cells;
+        let mean_m = |sample: usize| {
+            self.cell_m
+                .iter()
+                .map(|displacement_m| displacement_m[sample])
+                .sum::<f64>()
+                / cells
+        };
         let samples = self.phase.iter().enumerate();
         samples
             .map(|(sample, phase)| mean_m(sample) - 11.5e-3 * phase)

@@ -12,7 +12,7 @@
 //!
 //! The watched value is (charge − reserve) over the energy for the way home.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::{Moment, finite_or_zero};
 use super::sample::Positions;
 use crate::config::{Battery, Config};
@@ -96,9 +96,9 @@ impl BatteryLow {
         (self.gained_m >= MIN_ADVANCE_SHARE * self.stroke_m).then(|| self.paid_j / self.gained_m)
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
         let Some(battery) = &self.battery else {
-            return Finding::Blind;
+            return AlarmReading::Blind;
         };
         let volts = state.bus_voltage_v;
         if volts.is_finite() && volts > 0.5 * battery.empty_v && volts < 2.0 * battery.full_v {
@@ -117,22 +117,22 @@ impl BatteryLow {
             self.fraction = (self.fraction + weight * (by_voltage - self.fraction)).clamp(0.0, 1.0);
         }
         if self.known_s < USABLE_S {
-            return Finding::Blind;
+            return AlarmReading::Blind;
         }
         let left_j = (self.fraction - battery.reserve_share) * battery.capacity_j;
         let home_j = self.distance_m * self.cost_j_per_m().unwrap_or(0.0);
         let ratio = (left_j.max(0.0) / home_j.max(left_j.max(1e-9) / LARGEST_RATIO)).min(LARGEST_RATIO);
         let verdict = if ratio < self.threshold {
-            Verdict::Bad
+            ReadingState::Bad
         } else if ratio > CLEAR_FACTOR * self.threshold {
-            Verdict::Good
+            ReadingState::Good
         } else {
-            Verdict::Between
+            ReadingState::Between
         };
-        if verdict != Verdict::Bad {
+        if verdict != ReadingState::Bad {
             self.since_ns = moment.now_ns;
         }
-        Finding::Seen(Reading {
+        AlarmReading::Seen(Reading {
             value: ratio,
             threshold: self.threshold,
             verdict,

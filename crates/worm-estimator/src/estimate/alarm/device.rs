@@ -4,7 +4,7 @@
 //! (or the fault's code) and threshold 0. Otherwise value and threshold are the temperature, °C: the servo reads it in
 //! steps of one degree, so it must be 3 °C below the threshold before it counts as cool.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::Moment;
 use crate::config::Config;
 use crate::message::{Fault, Severity, State};
@@ -32,7 +32,7 @@ impl DeviceFault {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
         let stopped_by = Fault::try_from(state.fault).ok().filter(|fault| {
             matches!(
                 fault,
@@ -46,9 +46,14 @@ impl DeviceFault {
         });
         let celsius = state.motor_temperature_c;
         let (value, threshold, verdict, severity) = if state.hardware_error != 0 {
-            (f64::from(state.hardware_error), 0.0, Verdict::Bad, Severity::Critical)
+            (
+                f64::from(state.hardware_error),
+                0.0,
+                ReadingState::Bad,
+                Severity::Critical,
+            )
         } else if let Some(fault) = stopped_by {
-            (f64::from(fault.code()), 0.0, Verdict::Bad, Severity::Critical)
+            (f64::from(fault.code()), 0.0, ReadingState::Bad, Severity::Critical)
         } else if celsius.is_finite() {
             self.hot_s = if celsius > self.threshold_c {
                 self.hot_s + moment.step_s
@@ -56,11 +61,11 @@ impl DeviceFault {
                 0.0
             };
             let verdict = if self.hot_s > HOT_S {
-                Verdict::Bad
+                ReadingState::Bad
             } else if celsius < self.threshold_c - COOL_C {
-                Verdict::Good
+                ReadingState::Good
             } else {
-                Verdict::Between
+                ReadingState::Between
             };
             let severity = if celsius > self.limit_c {
                 Severity::Critical
@@ -69,12 +74,12 @@ impl DeviceFault {
             };
             (celsius, self.threshold_c, verdict, severity)
         } else {
-            return Finding::Blind;
+            return AlarmReading::Blind;
         };
-        if verdict != Verdict::Bad && self.hot_s == 0.0 {
+        if verdict != ReadingState::Bad && self.hot_s == 0.0 {
             self.since_ns = moment.now_ns;
         }
-        Finding::Seen(Reading {
+        AlarmReading::Seen(Reading {
             value,
             threshold,
             verdict,

@@ -5,9 +5,9 @@
 //! end to end, every tip's deformation known. What a cycle costs depends on speed and direction, so a new regime calibrates
 //! anew and the alarm is unarmed meanwhile; holding and going on at the same speed keeps what was learned.
 
-use super::latch::{Finding, Reading, Verdict};
-use super::motion::Moment;
 use super::cusum::{Level, PageChart};
+use super::latch::{AlarmReading, Reading, ReadingState};
+use super::motion::Moment;
 use crate::config::Config;
 use crate::message::{Cycle, Severity};
 
@@ -43,7 +43,7 @@ impl EnergyOverBudget {
     }
 
     /// Every tick; `sound` when nothing else is wrong, so that the cycle may count.
-    pub(super) fn update(&mut self, moment: &Moment, cycle: Option<&Cycle>, sound: bool) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, cycle: Option<&Cycle>, sound: bool) -> AlarmReading {
         if moment.regime != self.regime {
             self.regime = moment.regime;
             self.electrical = self.fresh.clone();
@@ -61,7 +61,7 @@ impl EnergyOverBudget {
             self.disturbed = false;
         }
         // A new regime has another usual: what was over the old budget says nothing about it.
-        self.reading.map_or(Finding::Idle, Finding::Seen)
+        self.reading.map_or(AlarmReading::Idle, AlarmReading::Seen)
     }
 
     fn judge(&mut self, cycle: &Cycle) {
@@ -97,11 +97,11 @@ impl EnergyOverBudget {
             electrical
         };
         let verdict = if worse.beyond {
-            Verdict::Bad
+            ReadingState::Bad
         } else if electrical.at_zero && locomotion.at_zero {
-            Verdict::Good
+            ReadingState::Good
         } else {
-            Verdict::Between
+            ReadingState::Between
         };
         self.reading = Some(Reading {
             value: worse.excess,

@@ -7,7 +7,7 @@
 //! extension falls short of the usual by more than `threshold` of it, and by more than noise (as learned) can make it; until its
 //! calibration is done the share that may be missing is half-way between `threshold` and all.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::Moment;
 use super::sample::Positions;
 use crate::config::Config;
@@ -74,7 +74,7 @@ struct Step {
     began_ns: u64,
     seen_from: f64,
     seen_to: f64,
-    short: u32,       // samples in a row that fell short
+    short: u32,          // samples in a row that fell short
     worst_fraction: f64, // largest share missing in the last part of the step
     profile: Profile,
 }
@@ -124,7 +124,7 @@ impl JammedCell {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, positions: &Positions) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, positions: &Positions) -> AlarmReading {
         if moment.regime != self.regime {
             self.regime = moment.regime;
             let side = side_of(moment);
@@ -132,7 +132,7 @@ impl JammedCell {
         }
         let Some(phase) = moment.phase.filter(|_| moment.torque) else {
             self.pause();
-            return Finding::Idle;
+            return AlarmReading::Idle;
         };
         if moment.reversals != self.reversals {
             self.reversals = moment.reversals;
@@ -154,9 +154,9 @@ impl JammedCell {
         if moment.still {
             self.jammed = None;
             self.reading = None;
-            return Finding::Idle;
+            return AlarmReading::Idle;
         }
-        self.reading.map_or(Finding::Blind, Finding::Seen)
+        self.reading.map_or(AlarmReading::Blind, AlarmReading::Seen)
     }
 
     /// A new step: its start lies between the last sample and this one, where the cam passed from cell to cell.
@@ -213,7 +213,8 @@ impl JammedCell {
         let missing_fraction = 1.0 - ratio / usual_ratio.max(0.1);
         let missing_m = (usual_ratio - ratio) * covered * self.stroke_m;
         let noise_m = NOISE_SIGMAS * self.noise_m.max(self.variance_m2.sqrt());
-        let short = missing_fraction > fraction && missing_m > noise_m.min(LARGEST_NOISE_FRACTION * usual_ratio * self.stroke_m);
+        let short = missing_fraction > fraction
+            && missing_m > noise_m.min(LARGEST_NOISE_FRACTION * usual_ratio * self.stroke_m);
         if calibrated && !short {
             let error_m = missing_m.clamp(-noise_m, noise_m);
             self.variance_m2 += (error_m * error_m - self.variance_m2) / NOISE_MEMORY;
@@ -227,9 +228,9 @@ impl JammedCell {
             };
         }
         let verdict = match self.jammed {
-            Some((_, good)) if good < GOOD_STEPS => Verdict::Bad,
-            _ if missing_fraction < 0.5 * fraction => Verdict::Good,
-            _ => Verdict::Between,
+            Some((_, good)) if good < GOOD_STEPS => ReadingState::Bad,
+            _ if missing_fraction < 0.5 * fraction => ReadingState::Good,
+            _ => ReadingState::Between,
         };
         let about = self.jammed.map_or(step.cell, |(cell, _)| cell);
         let keeps = |reading: &Reading| about != step.cell && reading.cell == Some(about);
@@ -265,7 +266,7 @@ impl JammedCell {
             if *good >= GOOD_STEPS {
                 self.jammed = None;
                 if let Some(reading) = &mut self.reading {
-                    reading.verdict = Verdict::Good;
+                    reading.verdict = ReadingState::Good;
                     reading.value = step.worst_fraction;
                 }
             }

@@ -4,7 +4,7 @@ use crate::message::{Alarm, AlarmKind, Severity};
 
 /// Which side of its threshold the watched quantity is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(super) enum ReadingState {
     /// Beyond the threshold, confirmed against noise by the detector.
     Bad,
     /// Neither beyond the threshold nor clearly off it: changes nothing.
@@ -15,7 +15,7 @@ pub(super) enum Verdict {
 
 /// What a detector knows after an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Finding {
+pub(super) enum AlarmReading {
     /// It cannot tell: not calibrated, or nothing to compare. What is raised stays raised.
     Blind,
     /// The worm does not do what is watched, so nothing can be wrong with it. What is raised will clear.
@@ -30,7 +30,7 @@ pub(super) struct Reading {
     pub value: f64,
     /// In the unit of `value`.
     pub threshold: f64,
-    pub verdict: Verdict,
+    pub verdict: ReadingState,
     /// When the condition began, if it holds, ns.
     pub since_ns: u64,
     /// The cell that is meant.
@@ -38,7 +38,7 @@ pub(super) struct Reading {
     pub severity: Severity,
 }
 
-impl Finding {
+impl AlarmReading {
     pub(super) const fn watches(&self) -> bool {
         matches!(self, Self::Seen(_))
     }
@@ -53,7 +53,7 @@ pub(super) struct Patience {
     pub clear_after_ns: u64,
 }
 
-/// Raised or not, with hysteresis in time; the hysteresis in value is the detector's three-way [`Verdict`].
+/// Raised or not, with hysteresis in time; the hysteresis in value is the detector's three-way [`ReadingState`].
 #[derive(Debug, Clone)]
 pub(super) struct Latch {
     kind: AlarmKind,
@@ -85,10 +85,10 @@ impl Latch {
     }
 
     /// Follows the newest finding; the change it made, if any, still without its number.
-    pub(super) fn update(&mut self, now_ns: u64, phase: f64, finding: &Finding) -> Option<Alarm> {
+    pub(super) fn update(&mut self, now_ns: u64, phase: f64, finding: &AlarmReading) -> Option<Alarm> {
         let watched_from_ns = *self.watched_from_ns.get_or_insert(now_ns);
         match (self.raised, finding) {
-            (None, Finding::Seen(reading)) if reading.verdict == Verdict::Bad && is_sound(reading) => {
+            (None, AlarmReading::Seen(reading)) if reading.verdict == ReadingState::Bad && is_sound(reading) => {
                 let from_ns = *self.bad_from_ns.get_or_insert(now_ns);
                 (now_ns.saturating_sub(from_ns) >= self.timeout.raise_after_ns).then(|| {
                     let reading = Reading {
@@ -106,9 +106,9 @@ impl Latch {
             }
             (Some(raised), finding) => {
                 let over = match finding {
-                    Finding::Blind => false,
-                    Finding::Idle => true,
-                    Finding::Seen(reading) => reading.verdict == Verdict::Good,
+                    AlarmReading::Blind => false,
+                    AlarmReading::Idle => true,
+                    AlarmReading::Seen(reading) => reading.verdict == ReadingState::Good,
                 };
                 if !over {
                     self.over_from_ns = None;
@@ -119,7 +119,7 @@ impl Latch {
                     return None;
                 }
                 let last = match finding {
-                    Finding::Seen(now) if is_sound(now) => Reading {
+                    AlarmReading::Seen(now) if is_sound(now) => Reading {
                         value: now.value,
                         threshold: now.threshold,
                         ..raised

@@ -4,7 +4,7 @@
 //! compared, so states that the estimator did not receive are counted all the same. An answer that comes late is none that failed:
 //! that is a busy computer, and `timing` tells it. The controller's own verdict, link lost, raises the alarm at once.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::Moment;
 use crate::config::Config;
 use crate::message::{Fault, Severity, State};
@@ -42,7 +42,7 @@ impl LinkFault {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
         self.advance_window(moment.present_s);
         let (ticks, failures) = match self.last {
             Some((sequence, failures)) => (
@@ -57,24 +57,20 @@ impl LinkFault {
         part.1 = part.1.saturating_add(failures);
         let ticks: f64 = self.parts.iter().map(|part| part.0 as f64).sum();
         let failures: f64 = self.parts.iter().map(|part| part.1 as f64).sum();
-        let min_ticks = if self.filled_s < WINDOW_S {
-            1.0
-        } else {
-            MIN_RATE_SHARE
-        } * self.exchanges_in_window;
+        let min_ticks = if self.filled_s < WINDOW_S { 1.0 } else { MIN_RATE_SHARE } * self.exchanges_in_window;
         let fraction = failures / ticks.max(min_ticks);
         if failures == 0.0 {
             self.since_ns = moment.now_ns;
         }
         let lost = state.fault == Fault::LinkLost.code();
         let verdict = if lost || fraction > self.threshold {
-            Verdict::Bad
+            ReadingState::Bad
         } else if fraction <= 0.5 * self.threshold {
-            Verdict::Good
+            ReadingState::Good
         } else {
-            Verdict::Between
+            ReadingState::Between
         };
-        Finding::Seen(Reading {
+        AlarmReading::Seen(Reading {
             value: fraction,
             threshold: self.threshold,
             verdict,

@@ -8,7 +8,7 @@
 //! Value is the unexplained way, measured less modelled along the crawl. The cell is the one whose way shows it best, and the
 //! alarm's phase is the last at which the gait was where it shows: with the step order that tells whose step it was.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::Moment;
 use crate::config::Config;
 use crate::estimate::mismatch::ResidualMap;
@@ -20,7 +20,7 @@ pub(super) struct ModelMismatch {
     revision: u64,
     place: Option<f64>, // gait phase of what was found last, 0 to 1
     since_ns: u64,
-    finding: Finding,
+    finding: AlarmReading,
 }
 
 impl ModelMismatch {
@@ -30,11 +30,11 @@ impl ModelMismatch {
             revision: 0,
             place: None,
             since_ns: 0,
-            finding: Finding::Blind,
+            finding: AlarmReading::Blind,
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, map: Option<&ResidualMap>) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, map: Option<&ResidualMap>) -> AlarmReading {
         if let Some(map) = map.filter(|map| map.revision() != self.revision) {
             self.revision = map.revision();
             self.finding = self.judge(moment, map);
@@ -47,21 +47,21 @@ impl ModelMismatch {
         self.place.map_or(phase, |place| (phase - place).floor() + place)
     }
 
-    fn judge(&mut self, moment: &Moment, map: &ResidualMap) -> Finding {
+    fn judge(&mut self, moment: &Moment, map: &ResidualMap) -> AlarmReading {
         let Some(found) = map.unexplained(self.threshold_m) else {
             self.since_ns = moment.now_ns;
-            return Finding::Blind;
+            return AlarmReading::Blind;
         };
         let verdict = if found.is_significant {
-            Verdict::Bad
+            ReadingState::Bad
         } else if found.is_within {
             self.since_ns = moment.now_ns;
-            Verdict::Good
+            ReadingState::Good
         } else {
-            Verdict::Between
+            ReadingState::Between
         };
         self.place = Some(found.at.phase);
-        Finding::Seen(Reading {
+        AlarmReading::Seen(Reading {
             value: found.excess_m,
             threshold: self.threshold_m,
             verdict,

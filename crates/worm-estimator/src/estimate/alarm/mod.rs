@@ -22,6 +22,7 @@
 
 mod battery;
 mod changes;
+mod cusum;
 mod device;
 mod energy;
 mod jam;
@@ -29,7 +30,6 @@ mod latch;
 mod link;
 mod mismatch;
 mod motion;
-mod cusum;
 mod progress;
 mod sample;
 mod sliding;
@@ -45,7 +45,7 @@ pub use changes::AlarmChanges;
 use crate::config::Config;
 use crate::estimate::ResidualMap;
 use crate::message::{AlarmKind, Cycle, Estimate, State};
-use latch::{Finding, Latch, Patience};
+use latch::{AlarmReading, Latch, Patience};
 use motion::{Moment, Motion};
 use sample::Sight;
 use worm_physics::MAX_CELLS;
@@ -95,7 +95,7 @@ struct Detectors {
     tracker: tracker::TrackerFault,
     device: device::DeviceFault,
     mismatch: mismatch::ModelMismatch,
-    by_position: [Finding; 3], // jam, progress, sliding, as of the last sample
+    by_position: [AlarmReading; 3], // jam, progress, sliding, as of the last sample
     sample_age_s: f64,
 }
 
@@ -115,7 +115,7 @@ impl Watch {
             tracker: tracker::TrackerFault::new(config),
             device: device::DeviceFault::new(config),
             mismatch: mismatch::ModelMismatch::new(config),
-            by_position: [Finding::Blind; 3],
+            by_position: [AlarmReading::Blind; 3],
             sample_age_s: 0.0,
         };
         Self {
@@ -198,7 +198,7 @@ impl Watch {
     }
 
     /// What every detector finds, in the order of [`AlarmKind::ALL`].
-    fn findings(&mut self, moment: &Moment, observation: &Observation<'_>, sound: bool) -> [Finding; KINDS] {
+    fn findings(&mut self, moment: &Moment, observation: &Observation<'_>, sound: bool) -> [AlarmReading; KINDS] {
         let Observation {
             state,
             estimate,
@@ -221,7 +221,7 @@ impl Watch {
             None => {
                 detectors.sample_age_s += moment.step_s;
                 if detectors.sample_age_s > STALE_S {
-                    detectors.by_position = [Finding::Blind; 3];
+                    detectors.by_position = [AlarmReading::Blind; 3];
                 }
             }
         }
@@ -242,7 +242,7 @@ impl Watch {
 }
 
 impl Detectors {
-    fn judge_positions(&mut self, moment: &Moment, positions: &sample::Positions, sound: bool) -> [Finding; 3] {
+    fn judge_positions(&mut self, moment: &Moment, positions: &sample::Positions, sound: bool) -> [AlarmReading; 3] {
         let stride = self.strides.update(moment, positions);
         let progress = self.progress.update(moment, &self.strides, stride.as_ref(), sound);
         let usual_m = self.progress.usual_m(moment.direction);

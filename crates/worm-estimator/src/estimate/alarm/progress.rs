@@ -6,7 +6,7 @@
 //! does not progress, whatever the model says. When the worm slips from one moment to the next, the advance over the
 //! last cycle falls along a straight line, so the default share of 0.3 tells after 0.7 of a cycle.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::Moment;
 use super::stride::{Stride, Strides, Usual};
 use crate::config::Config;
@@ -70,21 +70,21 @@ impl NoProgress {
         strides: &Strides,
         stride: Option<&Stride>,
         sound: bool,
-    ) -> Finding {
+    ) -> AlarmReading {
         let idle = moment.still || !moment.torque;
         if idle || !strides.is_settled() {
             self.below = 0;
             self.reading = None;
             if !idle {
-                return Finding::Blind;
+                return AlarmReading::Blind;
             }
             self.since_ns = moment.now_ns;
-            return Finding::Idle;
+            return AlarmReading::Idle;
         }
         if let Some(stride) = stride {
             self.reading = Some(self.judge(moment, strides, stride.advance_m, sound));
         }
-        self.reading.map_or(Finding::Blind, Finding::Seen)
+        self.reading.map_or(AlarmReading::Blind, AlarmReading::Seen)
     }
 
     fn judge(&mut self, moment: &Moment, strides: &Strides, advance_m: f64, sound: bool) -> Reading {
@@ -112,11 +112,11 @@ impl NoProgress {
             self.since_ns = moment.now_ns;
         }
         let verdict = if self.below >= CONFIRMATIONS {
-            Verdict::Bad
+            ReadingState::Bad
         } else if advance_m > limit_m + CLEAR_FRACTION * (usual_m - limit_m) {
-            Verdict::Good
+            ReadingState::Good
         } else {
-            Verdict::Between
+            ReadingState::Between
         };
         Reading {
             value: advance_m,

@@ -11,7 +11,7 @@
 //!
 //! It clears when the worm has not sunk further for a while, and then watches anew from there.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::Moment;
 use super::sample::Positions;
 use super::stride::{BINS, Strides};
@@ -112,7 +112,7 @@ impl SlidingDown {
         strides: &Strides,
         usual_m: Option<f64>,
         sound: bool,
-    ) -> Finding {
+    ) -> AlarmReading {
         self.smooth(positions);
         let up = if self.slope_sign == 0.0 {
             moment.direction
@@ -142,8 +142,8 @@ impl SlidingDown {
             Manner::Descending => self.descended(moment, positions, strides, usual_m),
         };
         match excess_m {
-            Some(excess_m) if positions.mask != 0 => Finding::Seen(self.judge(moment, excess_m)),
-            _ => Finding::Blind,
+            Some(excess_m) if positions.mask != 0 => AlarmReading::Seen(self.judge(moment, excess_m)),
+            _ => AlarmReading::Blind,
         }
     }
 
@@ -232,7 +232,11 @@ impl SlidingDown {
             self.lowest_excess_m = excess_m;
             self.sunk_ns = moment.now_ns;
         }
-        let mut verdict = if self.sliding { Verdict::Bad } else { Verdict::Good };
+        let mut verdict = if self.sliding {
+            ReadingState::Bad
+        } else {
+            ReadingState::Good
+        };
         if self.sliding {
             if excess_m > self.lowest_excess_m + FURTHER_FRACTION * self.threshold_m {
                 self.lowest_excess_m = excess_m;
@@ -248,7 +252,7 @@ impl SlidingDown {
                 self.sliding = false;
                 self.start_here(moment);
                 self.since_ns = moment.now_ns;
-                verdict = Verdict::Good;
+                verdict = ReadingState::Good;
             }
         }
         Reading {

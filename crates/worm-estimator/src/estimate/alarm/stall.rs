@@ -14,7 +14,7 @@
 //! While the commanded speed changes, twice the threshold is needed, unless the current says the motor works hard: the
 //! current only corroborates, the encoder decides.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::{GOAL_UNIT_TURNS_PER_S, Moment, finite_or_zero};
 use crate::config::Config;
 use crate::message::{Severity, State};
@@ -77,10 +77,10 @@ impl MotorStall {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
         let Some(phase) = moment.phase.filter(|_| moment.torque) else {
             self.forget();
-            return Finding::Idle;
+            return AlarmReading::Idle;
         };
         self.follow_command(moment);
         if moment.phase_is_new {
@@ -90,7 +90,7 @@ impl MotorStall {
         if self.uncommanded_s >= SETTLED_S {
             self.lag = 0.0;
             self.beyond = 0;
-            return Finding::Idle;
+            return AlarmReading::Idle;
         }
         let works_hard = finite_or_zero(state.motor_current_a).abs() >= self.hard_work_a;
         let usual = self.threshold_at(moment.goal_turns_per_s);
@@ -103,13 +103,13 @@ impl MotorStall {
             self.beyond = if self.lag > threshold { self.beyond + 1 } else { 0 };
         }
         let verdict = if self.beyond >= CONFIRMATIONS {
-            Verdict::Bad
+            ReadingState::Bad
         } else if self.lag < 0.5 * threshold {
-            Verdict::Good
+            ReadingState::Good
         } else {
-            Verdict::Between
+            ReadingState::Between
         };
-        Finding::Seen(Reading {
+        AlarmReading::Seen(Reading {
             value: self.lag,
             threshold,
             verdict,

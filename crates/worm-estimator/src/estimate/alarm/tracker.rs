@@ -5,7 +5,7 @@
 //! others are below half the threshold. No sample at all for the controller's tracker timeout raises the alarm at once,
 //! and so does the controller's own verdict that the tracker is stale.
 
-use super::latch::{Finding, Reading, Verdict};
+use super::latch::{AlarmReading, Reading, ReadingState};
 use super::motion::Moment;
 use crate::config::Config;
 use crate::message::{Fault, Severity, State};
@@ -62,22 +62,22 @@ impl TrackerFault {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> Finding {
+    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
         self.advance_window(moment);
         self.count(state);
         let silent = self.silent_s > self.timeout_s || state.fault == Fault::TrackerStale.code();
         let (fraction, cell) = self.worst();
         let verdict = if silent || fraction > self.threshold {
-            Verdict::Bad
+            ReadingState::Bad
         } else if fraction <= 0.5 * self.threshold {
-            Verdict::Good
+            ReadingState::Good
         } else {
-            Verdict::Between
+            ReadingState::Between
         };
-        if verdict == Verdict::Good {
+        if verdict == ReadingState::Good {
             self.since_ns = moment.now_ns;
         }
-        Finding::Seen(Reading {
+        AlarmReading::Seen(Reading {
             value: fraction,
             threshold: self.threshold,
             verdict,
