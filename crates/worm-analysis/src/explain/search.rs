@@ -50,7 +50,7 @@ impl Default for Options {
 }
 
 /// Prepares the runs of a campaign.
-fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
+pub(super) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
     if runs.is_empty() {
         return Err(ExplainError::NoRun);
     }

@@ -1,4 +1,4 @@
-//! Order statistics of what was seen: they stay put when a marker is lost, swapped or thrown far away.
+//! Order statistics of the seen values: a lost, swapped or stray marker hardly changes them.
 
 /// The value below which a `fraction` of the seen values lies; `NaN` values are not seen. `None` where nothing was seen.
 pub(super) fn quantile(values: impl IntoIterator<Item = f64>, fraction: f64) -> Option<f64> {
@@ -24,7 +24,7 @@ pub(super) fn spread(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Standard deviation of the noise on a series, from the second differences of neighbours that were all seen: steady motion
-/// cancels in them, and their median does not feel the few samples at which a step begins or ends.
+/// cancels in them, and their median is not affected by the few samples at which a step begins or ends.
 pub(super) fn noise(values: &[f64]) -> f64 {
     // Median of |x| is 0.6745 σ, and a second difference carries √6 times the noise of one value.
     const MEDIAN_TO_SIGMA: f64 = 0.674_49 * 2.449_49;
@@ -33,3 +33,16 @@ pub(super) fn noise(values: &[f64]) -> f64 {
         .map(|window| (window[0] - 2.0 * window[1] + window[2]).abs());
     quantile(differences, 0.5).unwrap_or(0.0) / MEDIAN_TO_SIGMA
 }
+
+/// A series that spreads less than this many times its noise stands still: noise alone spreads 3.3 times.
+const STILL_NOISE: f64 = 5.0;
+/// A series that spreads less than this stands still, m: half the smallest stroke that a worm may have.
+const STILL_M: f64 = 5e-5;
+
+/// Whether a series of positions, m, moves beyond its noise.
+pub(super) fn moves(series: &[f64]) -> bool {
+    spread(series.iter().copied()) > STILL_M.max(STILL_NOISE * noise(series))
+}
+
+#[cfg(test)]
+mod tests;
