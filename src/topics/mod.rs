@@ -17,7 +17,8 @@
 //!
 //! ```no_run
 //! use std::time::Duration;
-//! use wormd::{config::Config, message::State, topics::{Controller, Hub, Instance, RoleLock}};
+//! use worm_estimator::{config::Config, message::State};
+//! use wormd::topics::{Controller, Hub, Instance, RoleLock};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let instance = Instance::of(&Config::default())?;
@@ -44,7 +45,8 @@
 //! Only the holder of a role's lock gets that role's publishers, so no second process writes a topic by mistake:
 //!
 //! ```compile_fail,E0308
-//! use wormd::{message::State, topics::{Estimator, Hub, Instance, RoleLock}};
+//! use worm_estimator::message::State;
+//! use wormd::topics::{Estimator, Hub, Instance, RoleLock};
 //! # fn f(hub: &Hub, estimator: &RoleLock<Estimator>) {
 //! let publisher = hub.publisher::<State>(estimator); // the state belongs to the controller
 //! # }

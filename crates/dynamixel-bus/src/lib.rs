@@ -18,7 +18,7 @@
 //! # fn run() -> Result<(), Box<dyn std::error::Error>> {
 //! let (tty, _findings) = Tty::open(Path::new("/dev/ttyUSB0"), 57_600)?;
 //! let mut bus = Bus::new(tty);
-//! let servo = DeviceId::new(1)?;
+//! let servo = DeviceId::new(1).ok_or("no such ID")?;
 //! let identity = bus.ping(servo, Instant::now() + Duration::from_millis(50))?;
 //! println!("model {}, firmware {}", identity.model, identity.firmware);
 //! # Ok(()) }
