@@ -6,7 +6,7 @@
 //!    opened for one process alone, with its USB latency timer checked and corrected. [`FaultInjector`] makes any port a bad one,
 //!    from a seed.
 //! 3. A [`Bus`] does one transaction at a time on a port: ping, read, write, sync and bulk read, reboot. It counts what goes
-//!    wrong by kind ([`LinkCounters`]).
+//!    wrong by kind ([`BusCounters`]).
 //!
 //! Points 2 and 3 need the feature `std`, which is on by default.
 //!
@@ -45,7 +45,7 @@ mod tty;
 #[cfg(feature = "std")]
 pub use bus::{Bus, Identity, TransactionError, WaitEnd};
 #[cfg(feature = "std")]
-pub use counters::{LinkCounters, RefusalCounters};
+pub use counters::{BusCounters, RefusalCounters};
 #[cfg(feature = "std")]
 pub use fault_injector::{FaultInjector, Faults};
 #[cfg(feature = "std")]
