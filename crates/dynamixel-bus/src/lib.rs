@@ -1,7 +1,7 @@
 //! DYNAMIXEL Protocol 2.0, from bytes to transactions, for both ends of the line.
 //!
 //! 1. [`packet`] turns bytes into valid values and back. It needs neither `std` nor an allocator, so a microcontroller can be a
-//!    device with it: see `examples/tracker.rs`.
+//!    device with it: see `examples/tracker`.
 //! 2. A [`Port`] sends and receives, and waits no longer than its deadline. [`Tty`] is a serial port of the operating system,
 //!    opened for one process alone, with its USB latency timer checked and corrected. [`FaultInjector`] makes any port a bad one,
 //!    from a seed.
@@ -18,12 +18,17 @@
 //! # fn run() -> Result<(), Box<dyn std::error::Error>> {
 //! let (tty, _findings) = Tty::open(Path::new("/dev/ttyUSB0"), 57_600)?;
 //! let mut bus = Bus::new(tty);
-//! let servo = DeviceId::new(1)?;
+//! let servo = DeviceId::new(1).ok_or("no such ID")?;
 //! let identity = bus.ping(servo, Instant::now() + Duration::from_millis(50))?;
 //! println!("model {}, firmware {}", identity.model, identity.firmware);
 //! # Ok(()) }
 //! ```
 #![cfg_attr(not(feature = "std"), no_std)]
+
+/// The examples of the README are tested, too.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 #[cfg(feature = "std")]
 mod bus;
