@@ -1,8 +1,11 @@
 //! Where the incremental motion must arrive: ever smaller increments, ever slower gaits, a free swing.
 
-use super::{CYCLE_S, STIFFNESS_N_PER_M, effect, paper, strong};
+use super::{CYCLE_S, effect, paper, strong};
+use crate::{Crawl, Locomotion, Mechanics, Physics};
 use std::f64::consts::TAU;
-use worm_physics::{Crawl, Locomotion, Mechanics, Physics};
+
+/// Stiffness of the paper's pads, N/m.
+const STIFFNESS_N_PER_M: f64 = 980.0;
 
 /// Where the mean of the cells is after two cycles of `cycle_s`, m, in `parts` calls of each of which makes one increment.
 fn displacement_m(physics: &Physics, damping_ratio: Option<f64>, cycle_s: f64, parts: u32) -> f64 {

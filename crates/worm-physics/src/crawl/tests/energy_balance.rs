@@ -1,7 +1,7 @@
 //! The account of energy closes under every law, at every instant.
 
 use super::{CYCLE_S, paper, strong};
-use worm_physics::{Crawl, Mechanics, Physics};
+use crate::{Crawl, Mechanics, Physics};
 
 /// Largest gap, J, beside some 0.1 J that are moved.
 const GAP_J: f64 = 1e-9;

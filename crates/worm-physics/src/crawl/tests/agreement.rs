@@ -1,9 +1,9 @@
 //! Wherever both motions apply they are the same motion.
 
 use super::{effect, of_cell};
+use crate::effect::Setting;
+use crate::{Contact, Crawl, Ledger, Mechanics, Motion, Physics, Worm};
 use proptest::prelude::*;
-use worm_physics::effect::Setting;
-use worm_physics::{Contact, Crawl, Ledger, Mechanics, Motion, Physics, Worm};
 
 /// Positions, deformations and slides, m.
 const SAME_M: f64 = 1e-9;
