@@ -8,7 +8,7 @@ use super::cross_validation::HeldOut;
 use super::experiment_design::propose;
 use super::fit::{Fit, FitProblem};
 use super::gap::{Measured, cycles};
-use super::model_selection::{Candidate, Judged, are_twins};
+use super::model_selection::{Candidate, Judged};
 use super::observed::Observed;
 use super::parameter::{Hypothesised, Nuisance, What};
 use super::period::period;
@@ -17,7 +17,7 @@ use super::score_test::Screening;
 use super::speed_droop::SpeedDroop;
 use super::words;
 use worm_estimator::config::Config;
-use worm_physics::effect::{Effect, LIBRARY, Visible};
+use worm_physics::effect::{Effect, LIBRARY, MOTOR_DROOP};
 
 /// Places listed at most.
 const PLACES: usize = 12;
@@ -196,8 +196,8 @@ fn maps(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<ResidualMap> {
 }
 
 fn droop_effect(speed_droop: &SpeedDroop) -> NamedEffect {
-    let effect = &worm_physics::effect::MOTOR_DROOP;
-    let parameter = &effect.parameters[0];
+    let effect = MOTOR_DROOP;
+    let parameter = effect.severity();
     NamedEffect {
         name: effect.name.to_owned(),
         twins: Vec::new(),
@@ -295,7 +295,12 @@ pub(super) fn named_effects(find: &Candidate, probability: f64, closure: f64, ma
         });
         NamedEffect {
             name: hypothesised.effect.name.to_owned(),
-            twins: twins(hypothesised),
+            twins: hypothesised
+                .effect
+                .all_twins(hypothesised.cell)
+                .into_iter()
+                .map(str::to_owned)
+                .collect(),
             parameters: parameters.collect(),
             cell: hypothesised.cell.map(|cell| cell + 1),
             together_with: find
@@ -312,21 +317,6 @@ pub(super) fn named_effects(find: &Candidate, probability: f64, closure: f64, ma
         }
     };
     find.hypothesised.iter().enumerate().map(of).collect()
-}
-
-/// What no positions can tell from an effect: by name where the library has it, else described.
-fn twins(hypothesised: &Hypothesised) -> Vec<String> {
-    let in_library = LIBRARY.iter().map(|&effect| Hypothesised { effect, cell: None });
-    let mut twins: Vec<String> = in_library
-        .filter(|other| are_twins(hypothesised, other))
-        .map(|other| other.effect.name.to_owned())
-        .collect();
-    let is_name = |twin: &&&str| LIBRARY.iter().any(|effect| effect.name == **twin);
-    let described = hypothesised.effect.twins.iter().filter(|twin| !is_name(twin));
-    if hypothesised.cell.is_none() || hypothesised.effect.name != "lost-stroke" {
-        twins.extend(described.map(|twin| (*twin).to_owned()));
-    }
-    twins
 }
 
 /// The library's scores, and what became of each effect.
@@ -351,10 +341,10 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
             }
         })
         .collect();
-    add_unscreened(&mut rows, |effect| match effect.visible {
-        Visible::PhaseTime if droops => "refitted",
-        Visible::PhaseTime => "screened-out",
-        _ => "not-visible",
+    add_unscreened(&mut rows, |effect| match (effect.shows_in_time_alone(), droops) {
+        (true, true) => "refitted",
+        (true, false) => "screened-out",
+        (false, _) => "not-visible",
     });
     rows
 }

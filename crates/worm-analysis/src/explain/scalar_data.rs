@@ -34,7 +34,7 @@ use crate::recording::Advance;
 use model_selection::{AdvanceKind, Judged};
 use table::Table;
 use worm_estimator::config::Config;
-use worm_physics::effect::Parameter;
+use worm_physics::effect::Effect;
 
 /// Fewest advances that say anything of more than the stroke.
 const LEAST: usize = 2;
@@ -101,7 +101,7 @@ fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
 /// it.
 fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hypothesised) -> Option<Candidate> {
     let hypothesis = Hypothesis::new(&recalibrated.hypothesis.free, &[hypothesised]);
-    let tried = tried(hypothesised.effect.parameters);
+    let tried = tried(hypothesised.effect);
     if !tried
         .iter()
         .any(|values| table.shows(&hypothesis, nominal, values, VISIBLE_M))
@@ -135,19 +135,14 @@ fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hyp
     })
 }
 
-/// Values of an effect's parameters to try, its severity to either side of doing nothing.
-fn tried(parameters: &[Parameter]) -> Vec<Vec<f64>> {
-    let (severity, shape) = (&parameters[0], &parameters[1..]);
+/// Values of an effect's parameters to try, with severities on either side of neutral.
+fn tried(effect: &Effect) -> Vec<Vec<f64>> {
+    let severity = effect.severity();
     let sides = TRIED.iter().flat_map(|&notable| [notable, -notable]);
-    let severities = sides
+    sides
         .map(|notable| severity.neutral + notable * severity.notable)
-        .filter(|value| (severity.min..=severity.max).contains(value));
-    severities
-        .map(|value| {
-            let mut values = vec![value];
-            values.extend(shape.iter().map(|parameter| parameter.neutral));
-            values
-        })
+        .filter(|value| (severity.min..=severity.max).contains(value))
+        .map(|value| effect.values_with_neutral_shape(value))
         .collect()
 }
 

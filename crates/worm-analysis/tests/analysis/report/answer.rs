@@ -179,7 +179,11 @@ pub fn found(
         });
     NamedEffect {
         name: name.to_owned(),
-        twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
+        twins: effect
+            .all_twins(cell.map(|cell| cell - 1))
+            .into_iter()
+            .map(str::to_owned)
+            .collect(),
         parameters: parameters.collect(),
         cell,
         together_with: Vec::new(),
