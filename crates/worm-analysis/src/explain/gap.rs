@@ -21,7 +21,8 @@ use super::answer::Stage;
 use super::cross_validation::FitWithout;
 use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
-use super::predict::{Predicted, rest};
+use super::predict::Predicted;
+use super::residual::Residual;
 pub(super) use mean_cycle::cycles;
 use std::ops::Range;
 
@@ -50,14 +51,14 @@ struct Left {
 
 impl Left {
     fn new(observed: &Observed<'_>, predicted: &Predicted) -> Self {
-        let rest = rest(observed, predicted);
+        let residual = Residual::new(observed, predicted);
         let cells = observed.cells();
-        let own_m = rest.relative_m.iter().enumerate();
+        let own_m = residual.relative_m.iter().enumerate();
         Self {
             own_m: own_m
-                .map(|(at, relative_m)| rest.body_m[at / cells] + relative_m)
+                .map(|(at, relative_m)| residual.body_m[at / cells] + relative_m)
                 .collect(),
-            body_m: rest.body_m,
+            body_m: residual.body_m,
         }
     }
 

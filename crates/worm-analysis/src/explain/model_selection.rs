@@ -16,7 +16,7 @@ use super::answer::Verdict;
 use super::cross_validation::{Fold, HeldOut, hold_out as hold_out_fit};
 use super::fit::{Fit, FitProblem};
 use super::parameter::{Hypothesised, What};
-use super::predict::rest;
+use super::residual::Residual;
 
 /// Effects that are held against data they were not fitted to.
 const HELD_OUT: usize = 6;
@@ -190,7 +190,7 @@ fn explainable(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<f64> {
     runs.map(|(run, observed)| {
         let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at);
         predicted.map_or(f64::INFINITY, |predicted| {
-            problem.noise[run].explainable(observed, &rest(observed, &predicted))
+            problem.noise[run].explainable(observed, &Residual::new(observed, &predicted))
         })
     })
     .collect()

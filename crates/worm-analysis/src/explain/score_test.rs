@@ -9,8 +9,8 @@
 //! correlations they have, and the largest score noted: what it stays below nineteen times in twenty is the threshold.
 
 use super::fit::{Fit, FitProblem, dot, in_parallel};
+use super::hypothesis::Hypothesis;
 use super::parameter::Hypothesised;
-use super::predict::Hypothesis;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

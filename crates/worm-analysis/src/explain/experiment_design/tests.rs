@@ -1,7 +1,9 @@
+use super::super::hypothesis::Hypothesis;
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
 use super::super::parameter::Nuisance;
-use super::super::predict::{Hypothesis, Scene, nominal, rest};
+use super::super::predict::{Scene, nominal};
+use super::super::residual::Residual;
 use super::*;
 use crate::experiment::{RecordedRun, Simulation, simulate};
 use crate::recording::Recording;
@@ -60,7 +62,7 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
     let base = Hypothesis::new(&nuisances, &[]);
     let noise = scene.observed.iter().enumerate().map(|(run, observed)| {
         let predicted = scene.predict(run, &base, &base.neutral()).expect("the worm holds");
-        RunNoise::measure(observed, &rest(observed, &predicted))
+        RunNoise::measure(observed, &Residual::new(observed, &predicted))
     });
     let noise = noise.collect();
     let problem = FitProblem {
