@@ -1,8 +1,8 @@
 //! The answer, put together from what was found.
 
 use super::answer::{
-    Answer, Calibrated, Figures, FoundParameter, NamedEffect, Remainder, ResidualMap, RunSummary, Screened, Stage,
-    Verdict, with_cell,
+    Answer, Calibrated, Figures, FoundParameter, NamedEffect, Remainder, ResidualMap, RunSummary, Screened,
+    ScreeningOutcome, Stage, StageKind, Verdict, with_cell,
 };
 use super::cross_validation::HeldOut;
 use super::experiment_design::propose;
@@ -149,28 +149,31 @@ impl Gap {
         let best = judged.candidates.first().map_or(&parts.recalibrated, |find| &find.fit);
         let measured = Measured::new(problem, best);
         let recalibrated = measured.stage(
-            "recalibrated",
+            StageKind::Recalibrated,
             None,
             &parts.recalibrated,
             &parts.recalibrated_held_out.fits,
         );
         let floor = measured.floor_stage();
-        let stage = |name: &'static str, find: &Candidate| {
+        let stage = |kind: StageKind, find: &Candidate| {
             let folds = find.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
             let names: Vec<&str> = find
                 .hypothesised
                 .iter()
                 .map(|hypothesised| hypothesised.effect.name)
                 .collect();
-            measured.stage(name, Some(names.join(" + ")), &find.fit, folds)
+            measured.stage(kind, Some(names.join(" + ")), &find.fit, folds)
         };
         let gap_m = recalibrated.held_out_rms_m - floor.held_out_rms_m;
         let closure = |stage: &Stage| (recalibrated.held_out_rms_m - stage.held_out_rms_m) / gap_m;
-        let of_named: Vec<Stage> = named.iter().map(|find| stage("named", find)).collect();
-        let wrong = judged.best_wrong.as_ref().map(|find| stage("best-wrong", find));
+        let of_named: Vec<Stage> = named.iter().map(|find| stage(StageKind::Named, find)).collect();
+        let wrong = judged.best_wrong.as_ref().map(|find| stage(StageKind::BestWrong, find));
         let closures = of_named.iter().map(closure).collect();
         let best_wrong = wrong.as_ref().map_or(0.0, closure);
-        let mut stages = vec![measured.stage("baseline", None, &parts.nominal, &[]), recalibrated];
+        let mut stages = vec![
+            measured.stage(StageKind::Baseline, None, &parts.nominal, &[]),
+            recalibrated,
+        ];
         stages.extend(wrong);
         stages.extend(of_named.into_iter().next());
         stages.push(measured.free_form_stage(&parts.recalibrated));
@@ -334,23 +337,23 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
                 score: screening.score,
                 improvement: find.filter(|find| find.fit.converged).map(|find| find.improvement),
                 outcome: match find {
-                    None => "screened-out",
-                    Some(find) if find.fit.converged => "refitted",
-                    Some(_) => "did-not-converge",
+                    None => ScreeningOutcome::ScreenedOut,
+                    Some(find) if find.fit.converged => ScreeningOutcome::Refitted,
+                    Some(_) => ScreeningOutcome::DidNotConverge,
                 },
             }
         })
         .collect();
     add_unscreened(&mut rows, |effect| match (effect.shows_in_time_alone(), droops) {
-        (true, true) => "refitted",
-        (true, false) => "screened-out",
-        (false, _) => "not-visible",
+        (true, true) => ScreeningOutcome::Refitted,
+        (true, false) => ScreeningOutcome::ScreenedOut,
+        (false, _) => ScreeningOutcome::NotVisible,
     });
     rows
 }
 
 /// Adds every effect of the library that has no row yet, with what became of it.
-pub(super) fn add_unscreened(rows: &mut Vec<Screened>, outcome: impl Fn(&Effect) -> &'static str) {
+pub(super) fn add_unscreened(rows: &mut Vec<Screened>, outcome: impl Fn(&Effect) -> ScreeningOutcome) {
     for effect in LIBRARY {
         if !rows.iter().any(|row| row.name == effect.name) {
             rows.push(Screened {

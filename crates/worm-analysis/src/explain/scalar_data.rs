@@ -21,7 +21,7 @@ mod model_selection;
 mod next_experiment;
 mod table;
 
-use super::answer::{Answer, Figures, RunSummary, Screened, Stage};
+use super::answer::{Answer, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
 use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
 use super::fit::{Fit, in_parallel};
@@ -160,14 +160,14 @@ fn screening(hypothesised: &[Hypothesised], finds: &[Option<Candidate>]) -> Vec<
                 .filter(|find| find.fit.converged)
                 .map(|find| find.improvement),
             outcome: match find {
-                None => "not-visible",
-                Some(find) if find.fit.converged => "refitted",
-                Some(_) => "did-not-converge",
+                None => ScreeningOutcome::NotVisible,
+                Some(find) if find.fit.converged => ScreeningOutcome::Refitted,
+                Some(_) => ScreeningOutcome::DidNotConverge,
             },
         })
         .collect();
     rows.sort_by(|a, b| b.score.total_cmp(&a.score));
-    add_unscreened(&mut rows, |_| "not-visible");
+    add_unscreened(&mut rows, |_| ScreeningOutcome::NotVisible);
     rows
 }
 
@@ -194,7 +194,7 @@ fn assemble(
         });
     let effects: Vec<_> = named.by_ref().take(1).collect();
     let rivals: Vec<_> = named.collect();
-    let stage = |stage: &'static str, kind: Option<&AdvanceKind>, fit: &Fit| Stage {
+    let stage = |stage: StageKind, kind: Option<&AdvanceKind>, fit: &Fit| Stage {
         stage,
         effect: kind.map(AdvanceKind::name),
         fit_rms_m: f64::NAN,
@@ -203,13 +203,13 @@ fn assemble(
         energy_error_j: f64::NAN,
     };
     let mut stages = vec![
-        stage("baseline", None, nominal),
-        stage("recalibrated", None, recalibrated),
+        stage(StageKind::Baseline, None, nominal),
+        stage(StageKind::Recalibrated, None, recalibrated),
     ];
     let wrong = judged.others.first();
-    stages.extend(wrong.map(|kind| stage("best-wrong", Some(kind), &kind.find.fit)));
+    stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.find.fit)));
     let best = judged.set.first();
-    stages.extend(best.map(|kind| stage("named", Some(kind), &kind.find.fit)));
+    stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.find.fit)));
     // Where none is named for sure, what goes into the model is what is sure of it.
     let kept = best
         .filter(|_| judged.is_proven)
