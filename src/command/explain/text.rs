@@ -2,7 +2,9 @@
 
 use crate::command::columns::{Row, aligned};
 use worm_analysis::explain::Answer;
-use worm_analysis::explain::answer::{Calibrated, NamedEffect, NextExperiment, Place, Remainder, RunSummary, Stage};
+use worm_analysis::explain::answer::{
+    Calibrated, NamedEffect, NextExperiment, Place, Remainder, RunSummary, Stage, StageKind,
+};
 use worm_estimator::number::{NONE, fixed};
 use worm_physics::effect;
 
@@ -118,13 +120,12 @@ fn gap(stages: &[Stage]) -> Vec<Row> {
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(stages.iter().map(|stage| {
         let name = match stage.stage {
-            "baseline" => "believed model",
-            "recalibrated" => "recalibrated",
-            "best-wrong" => "best wrong effect",
-            "named" => "named effect",
-            "free-form" => "free form, the most that can be",
-            "floor" => "noise floor",
-            other => other,
+            StageKind::Baseline => "believed model",
+            StageKind::Recalibrated => "recalibrated",
+            StageKind::BestWrong => "best wrong effect",
+            StageKind::Named => "named effect",
+            StageKind::FreeForm => "free form, the most that can be",
+            StageKind::Floor => "noise floor",
         };
         let effect = stage
             .effect
@@ -238,7 +239,7 @@ fn quantity(value: f64, sigma: f64, unit: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use worm_analysis::explain::answer::{Figures, FoundParameter, Prediction};
+    use worm_analysis::explain::answer::{ExperimentChange, Figures, FoundParameter, Prediction, RunChange};
     use worm_analysis::explain::{Answer, Verdict};
 
     fn named(name: &str, parameter: (&str, f64, f64, &str)) -> NamedEffect {
@@ -279,7 +280,7 @@ mod tests {
                 significance: 7.2,
             }],
             stages: vec![Stage {
-                stage: "named",
+                stage: StageKind::Named,
                 effect: Some("constant-drag".to_owned()),
                 fit_rms_m: 5.1e-5,
                 held_out_rms_m: 5.4e-5,
@@ -294,7 +295,7 @@ mod tests {
                 places: Vec::new(),
             }),
             next_experiment: Some(NextExperiment {
-                change: "slope_deg".to_owned(),
+                change: ExperimentChange::Run(RunChange::Slope),
                 value: Some(45.0),
                 unit: "deg".to_owned(),
                 slope_deg: Some(45.0),

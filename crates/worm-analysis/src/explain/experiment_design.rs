@@ -8,11 +8,11 @@
 mod change;
 mod trial;
 
-use super::answer::{NextExperiment, Prediction};
+use super::answer::{ExperimentChange, NextExperiment, Prediction};
 use super::fit::{Fit, FitProblem, in_parallel};
-use super::parameter::{Hypothesised, What as Quantity};
+use super::parameter::{Hypothesised, What};
 pub(super) use change::SLOPES_DEG;
-use change::{Change, What, changes};
+use change::{BY_COST, Change, changes, cost};
 use trial::{Reach, Said, Trial, blank, plain_distance};
 use worm_physics::effect::Setting;
 
@@ -33,7 +33,7 @@ struct Weighed {
 impl Weighed {
     /// What it is worth for what it costs; more than enough is worth no more.
     fn worth(&self) -> f64 {
-        self.separation.min(SETTLES) / self.change.what.cost()
+        self.separation.min(SETTLES) / cost(self.change.what)
     }
 }
 
@@ -60,9 +60,9 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         .collect();
     possible.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut best: Option<Weighed> = None;
-    for what in What::ALL {
+    for what in BY_COST {
         // The dearer kinds could not be worth more than one that settles it already.
-        if best.as_ref().is_some_and(|best| best.worth() > SETTLES / what.cost()) {
+        if best.as_ref().is_some_and(|best| best.worth() > SETTLES / cost(what)) {
             break;
         }
         let mine = possible.iter().filter(|(_, change)| change.what == what);
@@ -143,7 +143,7 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
 fn same(candidates: &[&Fit], (rival, quantity): (usize, usize), other: usize) -> Option<usize> {
     let what = candidates[rival].hypothesis.free[quantity].what;
     let others = &candidates[other].hypothesis.free;
-    let is_nuisance = matches!(what, Quantity::Nuisance(_));
+    let is_nuisance = matches!(what, What::Nuisance(_));
     others.iter().position(|free| is_nuisance && free.what == what)
 }
 
@@ -165,11 +165,11 @@ fn in_answer(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &Weighed) 
                 _ => format!("at {slope}, {}", beside(&trial, mine, &said[0], &name(candidates[0]))),
             },
         });
-    let (change, unit) = best.change.what.name();
+    let what = best.change.what;
     Some(NextExperiment {
-        change: change.to_owned(),
+        change: ExperimentChange::Run(what),
         value: Some(best.change.value),
-        unit: unit.to_owned(),
+        unit: what.unit().to_owned(),
         slope_deg: Some(best.change.slope_deg),
         description: best.change.in_words(),
         predictions: predictions.collect(),
@@ -216,7 +216,7 @@ fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
         description: values(rival),
     });
     Some(NextExperiment {
-        change: hypothesised.effect.separated_by.to_owned(),
+        change: ExperimentChange::Measurement(hypothesised.effect.separated_by),
         value: None,
         unit: String::new(),
         slope_deg: None,

@@ -4,9 +4,11 @@
 //! Broyden's rank-one updates; it is bought anew when it no longer leads downhill. Quantities at a limit that pull outward are
 //! held there. Everything is deterministic: which thread computes what does not change it.
 
+use super::hypothesis::Hypothesis;
 use super::noise::RunNoise;
 use super::parameter::{Free, Nuisance, What};
-use super::predict::{Hypothesis, Scene, impossible, residuals, rest};
+use super::predict::Scene;
+use super::residual::Residual;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -22,6 +24,8 @@ const DAMPING: (f64, f64, f64) = (1e-3, 6.0, 0.25);
 /// Damping beyond which no step leads downhill.
 const MAX_DAMPING: f64 = 1e6;
 
+/// Residual of a run that the worm could not have made.
+const IMPOSSIBLE: f64 = 1e3;
 /// Rows of all columns of derivatives that fit the processor's cache together.
 const ROWS_AT_ONCE: usize = 512;
 
@@ -154,8 +158,8 @@ impl FitProblem<'_, '_> {
         let observed = &self.scene.observed[run];
         let mut out = Vec::with_capacity(self.rows(run).len());
         match self.scene.predict(run, hypothesis, at) {
-            Some(predicted) => residuals(observed, &self.noise[run], &rest(observed, &predicted), &mut out),
-            None => impossible(observed, &mut out),
+            Some(predicted) => self.noise[run].whiten(observed, &Residual::new(observed, &predicted), &mut out),
+            None => out.resize(self.rows(run).len(), IMPOSSIBLE),
         }
         out
     }

@@ -7,7 +7,8 @@ use super::super::fit::{Fit, FitProblem, dot};
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
 use super::super::parameter::{Nuisance, What};
-use super::super::predict::{Predicted, Scene, residuals, rest};
+use super::super::predict::{Predicted, Scene};
+use super::super::residual::Residual;
 use super::change::Change;
 use crate::experiment::RecordedRun;
 use crate::recording::Recording;
@@ -124,7 +125,8 @@ impl<'r> Trial<'r> {
         physics.clamped_worm().check_hold().ok()?;
         let predicted = self.scene.predict(0, &rival.hypothesis, at)?;
         let mut whitened = Vec::new();
-        residuals(observed, &self.noise, &rest(observed, &predicted), &mut whitened);
+        self.noise
+            .whiten(observed, &Residual::new(observed, &predicted), &mut whitened);
         let cells = observed.cells();
         let mean_m = |sample: usize| {
             let cells_m = &predicted.position_m[sample * cells..(sample + 1) * cells];

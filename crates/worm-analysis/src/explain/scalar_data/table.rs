@@ -4,8 +4,8 @@
 
 use super::super::error::ExplainError;
 use super::super::fit::Fit;
+use super::super::hypothesis::Hypothesis;
 use super::super::parameter::{Free, Nuisance, What};
-use super::super::predict::Hypothesis;
 use super::name;
 use crate::recording::Advance;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};

@@ -2,7 +2,7 @@
 
 use super::map;
 use super::words::{self, Quantity, clause, mm, with_cell};
-use crate::explain::answer::{NamedEffect, Screened};
+use crate::explain::answer::{NamedEffect, Screened, ScreeningOutcome, StageKind};
 use crate::explain::{Answer, Verdict};
 use crate::report::number::{count, fixed, in_words, percent, significant};
 use crate::report::page::{Figure, Key, Mark, Page, Panel};
@@ -119,8 +119,8 @@ fn why(answer: &Answer) -> String {
 
 /// What the best effect of another kind leaves, as a clause; empty where there was none.
 fn best_wrong(answer: &Answer) -> String {
-    let stage = |name: &str| answer.stages.iter().find(|stage| stage.stage == name);
-    let (Some(wrong), Some(named)) = (stage("best-wrong"), stage("named")) else {
+    let stage = |kind: StageKind| answer.stages.iter().find(|stage| stage.stage == kind);
+    let (Some(wrong), Some(named)) = (stage(StageKind::BestWrong), stage(StageKind::Named)) else {
         return String::new();
     };
     let other = wrong.effect.as_deref().unwrap_or("the best effect of another kind");
@@ -140,16 +140,15 @@ impl Screened {
     /// What became of it, in words.
     fn outcome_in_words(&self) -> &'static str {
         match self.outcome {
-            "screened-out" => "not refitted, others promised more",
-            "refitted" => "refitted",
-            "did-not-converge" => "the fit did not converge",
-            "not-visible" => "not visible in these data",
-            other => other,
+            ScreeningOutcome::ScreenedOut => "not refitted, others promised more",
+            ScreeningOutcome::Refitted => "refitted",
+            ScreeningOutcome::DidNotConverge => "the fit did not converge",
+            ScreeningOutcome::NotVisible => "not visible in these data",
         }
     }
 
     fn is_visible(&self) -> bool {
-        self.outcome != "not-visible"
+        self.outcome != ScreeningOutcome::NotVisible
     }
 }
 
@@ -245,7 +244,7 @@ fn picture(answer: &Answer) -> Result<String, DrawError> {
             };
             let end = reached.max(LEAST);
             let (along, across) = ([LEAST, end], [row - HALF_BAR, row + HALF_BAR]);
-            if bar.outcome == "did-not-converge" {
+            if bar.outcome == ScreeningOutcome::DidNotConverge {
                 plot.edge(along, across, Stroke::new(MUTED, 1.5))?;
             } else {
                 plot.fill(along, across, colour, 1.0)?;

@@ -1,7 +1,7 @@
 //! How the gap shrinks, stage by stage, on cycles that nothing was fitted to.
 
 use super::words::mm;
-use crate::explain::answer::Stage;
+use crate::explain::answer::{Stage, StageKind};
 use crate::explain::{Answer, Verdict};
 use crate::report::number::fixed;
 use crate::report::page::{Figure, Key, Mark, Page, Panel};
@@ -20,7 +20,7 @@ const BEHIND: f64 = 0.2;
 
 /// A stage as the page tells it.
 struct Told {
-    key: &'static str,
+    key: StageKind,
     name: &'static str,
     mark: Mark,
     colour: Colour,
@@ -30,35 +30,35 @@ struct Told {
 /// The stages in the order in which they are told; the noise floor is a line, not a bar.
 const STAGES: [Told; 5] = [
     Told {
-        key: "baseline",
+        key: StageKind::Baseline,
         name: "believed model",
         mark: Mark::Box,
         colour: MID,
         meaning: "the model as it was believed",
     },
     Told {
-        key: "recalibrated",
+        key: StageKind::Recalibrated,
         name: "recalibrated",
         mark: Mark::Box,
         colour: SHADE,
         meaning: "its known quantities adjusted within what is believable: the gap that counts is what is left here",
     },
     Told {
-        key: "best-wrong",
+        key: StageKind::BestWrong,
         name: "best rival",
         mark: Mark::Box,
         colour: LIGHT,
         meaning: "the best effect of another kind",
     },
     Told {
-        key: "named",
+        key: StageKind::Named,
         name: "named",
         mark: Mark::Box,
         colour: ACCENT,
         meaning: "the model with the effect named",
     },
     Told {
-        key: "free-form",
+        key: StageKind::FreeForm,
         name: "free form",
         mark: Mark::Frame,
         colour: MUTED,
@@ -99,7 +99,7 @@ pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
     Ok(())
 }
 
-fn stage<'a>(answer: &'a Answer, key: &str) -> Option<&'a Stage> {
+fn stage<'a>(answer: &'a Answer, key: StageKind) -> Option<&'a Stage> {
     answer.stages.iter().find(|stage| stage.stage == key)
 }
 
@@ -112,7 +112,7 @@ fn name(told: &Told, stage: &Stage) -> String {
 }
 
 fn figure(answer: &Answer, bars: &[(&Told, &Stage)]) -> Result<Figure, DrawError> {
-    let floor = stage(answer, "floor");
+    let floor = stage(answer, StageKind::Floor);
     let mut keys: Vec<Key> = bars
         .iter()
         .map(|(told, _)| Key::new(told.mark, told.colour, told.name))
@@ -124,7 +124,7 @@ fn figure(answer: &Answer, bars: &[(&Told, &Stage)]) -> Result<Figure, DrawError
         .iter()
         .map(|(told, _)| format!("{}: {}", told.name, told.meaning))
         .collect();
-    let missing = match (stage(answer, "named"), floor) {
+    let missing = match (stage(answer, StageKind::Named), floor) {
         (None, _) => " No bar for a named effect, for none is named.",
         (_, None) => " The noise floor is not known.",
         _ => "",
@@ -223,7 +223,7 @@ fn table(answer: &Answer) -> Table {
         let stage = stage(answer, told.key)?;
         Some((name(told, stage), stage))
     });
-    let floor = stage(answer, "floor").map(|stage| ("noise floor".to_owned(), stage));
+    let floor = stage(answer, StageKind::Floor).map(|stage| ("noise floor".to_owned(), stage));
     for (name, stage) in told.chain(floor) {
         let off_mm = fixed(stage.advance_error_m * 1e3, 3);
         table.rows.push(if is_by_advances {

@@ -1,7 +1,7 @@
 //! The next experiment: what to change, and what each candidate says will happen.
 
 use super::words::{clause, readable};
-use crate::explain::answer::NextExperiment;
+use crate::explain::answer::{ExperimentChange, NextExperiment, RunChange};
 use crate::explain::{Answer, Verdict};
 use crate::report::number::{fixed, significant};
 use crate::report::page::Page;
@@ -34,14 +34,14 @@ pub(super) fn add(page: &mut Page, answer: &Answer) {
 fn setting(next: &NextExperiment) -> String {
     match next.value {
         Some(value) => {
-            let (what, value, unit) = match &*next.change {
-                "slope_deg" => ("slope", value, "°"),
-                "cycle_s" => ("time of a gait cycle", value, " s"),
-                "payload_kg" => ("known extra mass", value * 1e3, " g"),
-                "start_m" => ("start shifted along the canal by", value * 1e3, " mm"),
-                "cycles" => ("gait cycles", value, ""),
-                "dwell_s" => ("rest between the cycles", value, " s"),
-                other => return in_unit(other, value, &next.unit),
+            let (what, value, unit) = match next.change {
+                ExperimentChange::Run(RunChange::Slope) => ("slope", value, "°"),
+                ExperimentChange::Run(RunChange::Cycle) => ("time of a gait cycle", value, " s"),
+                ExperimentChange::Run(RunChange::Payload) => ("known extra mass", value * 1e3, " g"),
+                ExperimentChange::Run(RunChange::Start) => ("start shifted along the canal by", value * 1e3, " mm"),
+                ExperimentChange::Run(RunChange::Cycles) => ("gait cycles", value, ""),
+                ExperimentChange::Run(RunChange::Dwell) => ("rest between the cycles", value, " s"),
+                ExperimentChange::Measurement(what) => return in_unit(what, value, &next.unit),
             };
             let value = if value.fract() == 0.0 {
                 fixed(value, 0)
@@ -50,7 +50,13 @@ fn setting(next: &NextExperiment) -> String {
             };
             format!("What to change: {what} {value}{unit}.")
         }
-        None => format!("What to measure: {}.", clause(&next.change)),
+        None => {
+            let what = match next.change {
+                ExperimentChange::Measurement(what) => what,
+                ExperimentChange::Run(_) => "",
+            };
+            format!("What to measure: {}.", clause(what))
+        }
     }
 }
 

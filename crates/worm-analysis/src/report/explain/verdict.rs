@@ -1,7 +1,7 @@
 //! The head of the page: the answer in a sentence, then its values, before any figure.
 
 use super::words::{self, Quantity, clause, with_cell};
-use crate::explain::answer::{NamedEffect, RunSummary, Stage, answers_in_words};
+use crate::explain::answer::{NamedEffect, RunSummary, Stage, StageKind, answers_in_words};
 use crate::explain::{Answer, Verdict};
 use crate::report::number::{NONE, count, fixed, in_words, percent};
 use crate::report::page::{Page, escaped};
@@ -208,13 +208,13 @@ fn gap_tiles(answer: &Answer) -> Vec<Tile> {
         .filter(|stage| !answer.is_by_advances() || stage.held_out_rms_m.is_finite());
     let stages = held_out.filter_map(|stage| {
         let (name, how) = match stage.stage {
-            "baseline" => ("as believed", ""),
-            "recalibrated" => ("recalibrated", "within what was allowed"),
-            "named" if answer.verdict == Verdict::Ambiguous => ("with the first candidate", ""),
-            "named" if answer.effects.len() > 1 => ("with the effects named", ""),
-            "named" => ("with the effect named", ""),
-            "floor" => ("noise floor", "no model can do better"),
-            _ => return None,
+            StageKind::Baseline => ("as believed", ""),
+            StageKind::Recalibrated => ("recalibrated", "within what was allowed"),
+            StageKind::Named if answer.verdict == Verdict::Ambiguous => ("with the first candidate", ""),
+            StageKind::Named if answer.effects.len() > 1 => ("with the effects named", ""),
+            StageKind::Named => ("with the effect named", ""),
+            StageKind::Floor => ("noise floor", "no model can do better"),
+            StageKind::BestWrong | StageKind::FreeForm => return None,
         };
         Some(gap_tile(stage, name, how))
     });
