@@ -21,6 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::message::Timing;
+use worm_estimator::time::seconds;
 
 /// How long the floor is measured when the loop cannot be.
 const FLOOR_ALONE: Duration = Duration::from_secs(5);
@@ -174,8 +175,8 @@ impl Measurement<'_> {
         );
         let cpu = self.testbed.cpu_ns();
         let findings = &mut self.findings;
-        findings.measured_s = begun.elapsed().as_secs_f64();
-        let fraction = |before: u64, after: u64| after.saturating_sub(before) as f64 / 1e9 / findings.measured_s;
+        findings.measured_s = seconds(begun.elapsed().as_nanos() as u64);
+        let fraction = |before: u64, after: u64| seconds(after.saturating_sub(before)) / findings.measured_s;
         findings.controller_cpu_share = fraction(cpu_before.0, cpu.0);
         findings.estimator_cpu_share = fraction(cpu_before.1, cpu.1);
         findings.ticks = stats;
