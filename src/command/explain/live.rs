@@ -2,8 +2,8 @@
 
 use crate::command::dataset::READING;
 use crate::command::progress::Progress;
-use crate::command::record::{LOOK, Recorder};
 use crate::command::{Failure, end_on_signal_until};
+use crate::recorder::{POLL_INTERVAL, Recorder};
 use crate::topics::{Controller, Hub, Instance, RoleLock};
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -49,8 +49,8 @@ pub(super) fn record(
             done = Err(watch.ended_early("was no longer to be recorded", log));
             break;
         }
-        std::thread::sleep(LOOK);
-        done = recorder.hear().and_then(|heard| watch.see(heard.state.as_ref(), log));
+        std::thread::sleep(POLL_INTERVAL);
+        done = recorder.poll().and_then(|polled| watch.see(polled.state.as_ref(), log));
         progress.tell("recording the worm", READING * watch.fraction());
     }
     recorder.close()?;

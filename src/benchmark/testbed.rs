@@ -1,11 +1,12 @@
-//! The worm that is measured: virtual worm and controller as processes, as in `wormd up`, and the estimator, the very same code,
-//! in a thread of this process, so that the moment at which it has a state in hand is known.
+//! The worm that is measured: virtual worm and controller as processes, as in `wormd up`, and the same estimator code in a
+//! thread of this process, so that the time at which it receives a state is known.
 
-use super::bench::{Bench, ConfigFile};
-use crate::command::child_process::{Child, Log, START_PATIENCE};
-use crate::command::estimate::{self, PRIORITY_BELOW_LOOP};
-use crate::command::{Failure, print};
+use super::settings::{Benchmark, ConfigFile};
+use crate::estimator::{self, PRIORITY_BELOW_LOOP};
+use crate::failure::Failure;
+use crate::print;
 use crate::realtime::{self, Grant, monotonic_ns};
+use crate::supervisor::child_process::{Child, Log, START_TIMEOUT};
 use crate::topics::{Estimator, Hub, Instance, RoleLock, Supervisor};
 use crossbeam::channel::{Receiver, Sender, bounded};
 use nix::unistd::{Pid, gettid};
@@ -18,25 +19,25 @@ use std::time::Duration;
 use worm_estimator::config::Realtime;
 use worm_estimator::message::{Alarm, AlarmKind, State};
 
-/// Notes that may wait to be taken; more are dropped. The measuring loop takes them every few milliseconds.
-pub(super) const NOTES: usize = 65_536;
+/// Length of the queues to the measuring thread, which empties them every few milliseconds. What does not fit is dropped.
+pub(super) const QUEUE: usize = 65_536;
 
-/// How long the alarm's listener sleeps at most, and with it the time until an end is noticed.
-const LONGEST_SLEEP: Duration = Duration::from_millis(100);
+/// Longest sleep of the alarm listener, and so the delay with which it notices the end.
+const MAX_SLEEP: Duration = Duration::from_millis(100);
 
-/// A state's number and when somebody had it in hand, ns.
+/// A state's number, and when it was received, ns.
 pub(super) type Received = (u64, u64);
 
-/// The running worm. Ended in the order of its fields' importance by [`end`](Self::end), or when dropped.
+/// The running worm. [`end`](Self::end) or its drop ends it, the controller first.
 pub(super) struct Testbed {
     pub(super) instance: Instance,
     pub(super) controller: Child,
     virtual_worm: Option<VirtualWorm>,
     end: Arc<AtomicBool>,
     threads: Vec<JoinHandle<Result<(), Failure>>>,
-    /// When the estimator had each state in hand.
-    pub(super) heard: Receiver<Received>,
-    /// When stalls of the motor had woken a listener of the alarms, ns.
+    /// When the estimator received each state.
+    pub(super) received: Receiver<Received>,
+    /// When alarms of a motor stall woke their listener, ns.
     pub(super) stall_alarms: Receiver<u64>,
     estimator_tid: Pid,
     file: ConfigFile,
@@ -51,49 +52,54 @@ struct VirtualWorm {
 
 impl Testbed {
     /// Starts everything, the controller last, and waits until it is ready.
-    pub(super) fn start(bench: &Bench, instance: &Instance, log: &Log, end: &AtomicBool) -> Result<Self, Failure> {
-        // As `wormd up` does, which may be running under this name.
+    pub(super) fn start(
+        benchmark: &Benchmark,
+        instance: &Instance,
+        log: &Log,
+        end: &AtomicBool,
+    ) -> Result<Self, Failure> {
+        // The same lock as of `wormd up`, which may be running under this name.
         let role = RoleLock::take(instance).map_err(Failure::unusable)?;
-        let file = bench.file(instance.folder())?;
-        let virtual_worm = match bench.config.port {
-            None => Some(VirtualWorm::start(bench, &file, instance, log, end)?),
+        let file = benchmark.file(instance.folder())?;
+        let virtual_worm = match benchmark.config.port {
+            None => Some(VirtualWorm::start(benchmark, &file, instance, log, end)?),
             Some(_) => None,
         };
         let threads_end = Arc::new(AtomicBool::new(false));
-        let (heard_sender, heard) = bounded(NOTES);
-        let (alarm_sender, stall_alarms) = bounded(NOTES);
+        let (received_sender, received) = bounded(QUEUE);
+        let (alarm_sender, stall_alarms) = bounded(QUEUE);
         let mut threads = Vec::new();
-        let (estimator, estimator_tid) = start_estimator(bench, instance, heard_sender, &threads_end)?;
+        let (estimator, estimator_tid) = start_estimator(benchmark, instance, received_sender, &threads_end)?;
         threads.push(estimator);
-        threads.push(start_alarm_listener(bench, instance, alarm_sender, &threads_end)?);
+        threads.push(start_alarm_listener(benchmark, instance, alarm_sender, &threads_end)?);
         let mut testbed = Self {
             instance: instance.clone(),
-            controller: start_controller(bench, &file, virtual_worm.as_ref(), log)?,
+            controller: start_controller(benchmark, &file, virtual_worm.as_ref(), log)?,
             virtual_worm,
             end: threads_end,
             threads,
-            heard,
+            received,
             stall_alarms,
             estimator_tid,
             file,
             _role: role,
         };
-        testbed.controller.wait_until_ready(START_PATIENCE, log, end)?;
+        testbed.controller.wait_until_ready(START_TIMEOUT, log, end)?;
         Ok(testbed)
     }
 
-    /// Ends the controller, and starts another one at another rate.
+    /// Ends the controller, and starts one at another rate.
     pub(super) fn restart_controller(
         &mut self,
-        bench: &Bench,
+        benchmark: &Benchmark,
         rate_hz: f64,
         log: &Log,
         end: &AtomicBool,
     ) -> Result<(), Failure> {
         self.controller.end();
-        let file = bench.file_at(rate_hz, self.instance.folder())?;
-        self.controller = start_controller(bench, &file, self.virtual_worm.as_ref(), log)?;
-        self.controller.wait_until_ready(START_PATIENCE, log, end)
+        let file = benchmark.file_at(rate_hz, self.instance.folder())?;
+        self.controller = start_controller(benchmark, &file, self.virtual_worm.as_ref(), log)?;
+        self.controller.wait_until_ready(START_TIMEOUT, log, end)
     }
 
     /// The configuration file of its processes.
@@ -101,7 +107,7 @@ impl Testbed {
         self.file.path()
     }
 
-    /// How a process ended that should not have.
+    /// How a process ended by itself, if one has.
     pub(super) fn find_ended(&mut self) -> Option<String> {
         if let Some(status) = self.controller.exit_status() {
             return Some(format!("the controller ended by itself, {status}"));
@@ -111,8 +117,8 @@ impl Testbed {
         Some(format!("the virtual worm ended by itself, {status}"))
     }
 
-    /// Ends everything, the controller first, which stops the motor; gives when the virtual worm began to
-    /// crawl, ns.
+    /// Ends everything, first the controller, which stops the motor. Returns when the virtual worm began to crawl, ns; none on
+    /// a real worm.
     pub(super) fn end(mut self) -> Option<u64> {
         self.controller.end();
         self.end_threads();
@@ -123,7 +129,7 @@ impl Testbed {
         ledger["crawl_began_ns"].as_u64()
     }
 
-    /// CPU time that the controller's threads and the estimator have taken so far, ns.
+    /// CPU time that the controller's threads and the estimator have used so far, ns.
     pub(super) fn cpu_ns(&self) -> (u64, u64) {
         let controller = format!("/proc/{}/task", self.controller.id());
         let threads = std::fs::read_dir(controller).into_iter().flatten().flatten();
@@ -153,7 +159,7 @@ impl Drop for Testbed {
 
 impl VirtualWorm {
     fn start(
-        bench: &Bench,
+        benchmark: &Benchmark,
         file: &ConfigFile,
         instance: &Instance,
         log: &Log,
@@ -170,11 +176,15 @@ impl VirtualWorm {
             "--ledger".into(),
             ledger.clone().into(),
         ];
-        for fault in bench.stall_faults() {
+        for fault in benchmark.stall_faults() {
             arguments.extend(["--fault".into(), fault.into()]);
         }
-        let mut child = Child::start("virtual-worm", &louder(arguments, bench.verbose), log)?;
-        child.wait_until_ready(START_PATIENCE, log, end)?;
+        let mut child = Child::start(
+            "virtual-worm",
+            &with_verbosity(arguments, benchmark.options.verbose),
+            log,
+        )?;
+        child.wait_until_ready(START_TIMEOUT, log, end)?;
         Ok(Self { child, link, ledger })
     }
 }
@@ -182,23 +192,28 @@ impl VirtualWorm {
 impl Drop for VirtualWorm {
     fn drop(&mut self) {
         self.child.end();
-        // It may never have been written.
+        // It may not exist: the virtual worm writes it at its end.
         let _ = std::fs::remove_file(&self.ledger);
     }
 }
 
-fn louder(mut arguments: Vec<OsString>, verbose: u8) -> Vec<OsString> {
+fn with_verbosity(mut arguments: Vec<OsString>, verbose: u8) -> Vec<OsString> {
     arguments.extend((0..verbose).map(|_| OsString::from("-v")));
     arguments
 }
 
-fn start_controller(bench: &Bench, file: &ConfigFile, worm: Option<&VirtualWorm>, log: &Log) -> Result<Child, Failure> {
+fn start_controller(
+    benchmark: &Benchmark,
+    file: &ConfigFile,
+    worm: Option<&VirtualWorm>,
+    log: &Log,
+) -> Result<Child, Failure> {
     let mut arguments: Vec<OsString> = vec!["control".into(), "--config".into(), file.path().into()];
     if let Some(worm) = worm {
         arguments.extend(["--port".into(), worm.link.clone().into()]);
     }
-    let mut child = Child::start("control", &louder(arguments, bench.verbose), log)?;
-    child.be_patient(Duration::from_secs_f64(bench.config.gait.ramp_s));
+    let mut child = Child::start("control", &with_verbosity(arguments, benchmark.options.verbose), log)?;
+    child.extend_end_timeout(Duration::from_secs_f64(benchmark.config.gait.ramp_s));
     Ok(child)
 }
 
@@ -211,28 +226,28 @@ fn spawn(name: &str, work: impl FnOnce() -> Result<(), Failure> + Send + 'static
         .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))
 }
 
-/// Starts the estimator, and waits until it listens.
+/// Starts the estimator, and waits until it listens; returns its thread and thread id.
 fn start_estimator(
-    bench: &Bench,
+    benchmark: &Benchmark,
     instance: &Instance,
-    heard: Sender<Received>,
+    received: Sender<Received>,
     end: &Arc<AtomicBool>,
 ) -> Result<(Thread, Pid), Failure> {
     let role = RoleLock::<Estimator>::take(instance).map_err(Failure::unusable)?;
     let hub = Hub::open(instance).map_err(Failure::failed)?;
-    let (config, end) = (bench.config.clone(), Arc::clone(end));
+    let (config, end) = (benchmark.config.clone(), Arc::clone(end));
     let (ready, is_ready) = bounded(1);
     let thread = spawn("estimator", move || {
-        // Notes that nobody takes any more may be lost.
-        let heard = |state: &State| {
-            let _ = heard.try_send((state.sequence, monotonic_ns()));
+        // After the measurement nobody empties the queue.
+        let on_state = |state: &State| {
+            let _ = received.try_send((state.sequence, monotonic_ns()));
         };
-        let listens = |_: &[Grant]| {
+        let on_ready = |_: &[Grant]| {
             let _ = ready.send(gettid());
         };
-        estimate::attend(&config, &hub, &role, &end, listens, heard)
+        estimator::run(&config, &hub, &role, &end, on_ready, on_state)
     })?;
-    // Should it end instead, its channel closes; joining tells why.
+    // If it ends instead, the channel closes, and joining returns the reason.
     match is_ready.recv() {
         Ok(tid) => Ok((thread, tid)),
         Err(_) => match thread.join() {
@@ -250,22 +265,22 @@ fn cpu_ns_of(thread: &Path) -> u64 {
         .unwrap_or(0)
 }
 
-/// A listener to alarms, as a person's program would be one, woken by their event.
+/// A listener to alarms as a user's program would have it, woken by their event.
 fn start_alarm_listener(
-    bench: &Bench,
+    benchmark: &Benchmark,
     instance: &Instance,
     stalls: Sender<u64>,
     end: &Arc<AtomicBool>,
 ) -> Result<Thread, Failure> {
     let hub = Hub::open(instance).map_err(Failure::failed)?;
-    let wanted = estimator_realtime(&bench.config.realtime);
+    let wanted = estimator_realtime(&benchmark.config.realtime);
     let end = Arc::clone(end);
     spawn("alarm listener", move || {
-        let bell = hub.listener::<Alarm>().map_err(Failure::failed)?;
+        let event = hub.listener::<Alarm>().map_err(Failure::failed)?;
         let mut alarms = hub.subscriber::<Alarm>().map_err(Failure::failed)?;
         realtime::request(&wanted, 0);
         while !end.load(Ordering::Relaxed) {
-            bell.wait(LONGEST_SLEEP).map_err(Failure::failed)?;
+            event.wait(MAX_SLEEP).map_err(Failure::failed)?;
             while let Some(alarm) = alarms.next().map_err(Failure::failed)? {
                 if alarm.kind == AlarmKind::MotorStall.code() && alarm.raised != 0 {
                     let _ = stalls.try_send(monotonic_ns());
@@ -276,7 +291,7 @@ fn start_alarm_listener(
     })
 }
 
-/// What the estimator asks of the operating system, for a thread beside it.
+/// What a thread at the estimator's priority requests from the operating system.
 pub(super) fn estimator_realtime(wanted: &Realtime) -> Realtime {
     let priority = match wanted.priority {
         0 => 0,

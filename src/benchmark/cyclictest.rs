@@ -1,28 +1,28 @@
-//! `cyclictest`, where it is installed: the yardstick that others know.
+//! `cyclictest`, where it is installed: the usual reference for wake latency.
 
-use super::bench::Bench;
+use super::settings::Benchmark;
 use crate::latency::outcome::Cyclictest;
 use std::process::Command;
 
 /// How long it runs at most, s.
-const LONGEST_S: u64 = 5;
+const MAX_S: u64 = 5;
 
 /// Runs it with the loop's rate, priority and CPU, beside the running loop.
 ///
 /// # Errors
-/// A sentence for the person who asked for it.
-pub(super) fn run(bench: &Bench) -> Result<Cyclictest, String> {
-    let seconds = bench.duration.as_secs().clamp(1, LONGEST_S);
-    let interval_us = bench.period_ns() / 1000;
+/// A sentence for the operator.
+pub(super) fn run(benchmark: &Benchmark) -> Result<Cyclictest, String> {
+    let seconds = benchmark.options.duration.as_secs().clamp(1, MAX_S);
+    let interval_us = benchmark.period_ns() / 1000;
     let mut arguments = vec![
         "--quiet".to_owned(),
         "--mlockall".to_owned(),
         "--threads=1".to_owned(),
         format!("--interval={interval_us}"),
         format!("--duration={seconds}"),
-        format!("--priority={}", bench.config.realtime.priority),
+        format!("--priority={}", benchmark.config.realtime.priority),
     ];
-    arguments.extend(bench.config.realtime.cpu.map(|cpu| format!("--affinity={cpu}")));
+    arguments.extend(benchmark.config.realtime.cpu.map(|cpu| format!("--affinity={cpu}")));
     let command = format!("cyclictest {}", arguments.join(" "));
     let output = Command::new("cyclictest")
         .args(&arguments)
@@ -43,7 +43,7 @@ pub(super) fn run(bench: &Bench) -> Result<Cyclictest, String> {
             max_us,
         }),
         _ => Err(format!(
-            "`{command}` did not tell its result: {}",
+            "`{command}` did not report a result: {}",
             String::from_utf8_lossy(&output.stderr).trim()
         )),
     }
@@ -63,8 +63,8 @@ mod tests {
     #[test]
     fn its_line_is_read() {
         let text = "# /dev/cpu_dma_latency set to 0us\nT: 0 (48329) P:80 I:1000 C:   4998 Min:     12 Act:   47 Avg:   52 Max:     731\n";
-        let told = ["Min:", "Avg:", "Max:"].map(|key| number_behind(text, key));
-        assert_eq!(told, [Some(12.0), Some(52.0), Some(731.0)]);
+        let numbers = ["Min:", "Avg:", "Max:"].map(|key| number_behind(text, key));
+        assert_eq!(numbers, [Some(12.0), Some(52.0), Some(731.0)]);
         assert_eq!(number_behind("nothing", "Min:"), None);
     }
 }

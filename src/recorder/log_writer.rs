@@ -1,7 +1,6 @@
-//! Where the log is written: a thread with the file, and a queue before it for as long as a disk may stand still.
+//! The thread that writes the log, with a queue in front of it for as long as a disk may stall.
 
-use super::TelemetryReceiver;
-use crate::command::Failure;
+use crate::failure::Failure;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -11,13 +10,13 @@ use std::time::{Duration, Instant};
 use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
 use worm_log::{Channel, Logged, Origin, WriteError, Writer};
 
-/// How often what was written is made safe from a power loss. At most this is lost, and what the queue holds.
-const SAFE_EVERY: Duration = Duration::from_millis(200);
+/// Interval of the synchronisation to disk: a power loss costs at most this, and what is in the queue.
+const SYNC_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Batches that may wait for the disk: 10 s of them. When they are full, the topics wait, and then lose their oldest.
+/// Batches that may wait for the disk: 10 s of them. Beyond that the topics are not read, and in time lose their oldest messages.
 const QUEUE: usize = 500;
 
-/// What the topics held.
+/// The new messages of one poll.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     pub states: Vec<State>,
@@ -34,20 +33,20 @@ impl Batch {
     }
 }
 
-/// The thread that writes.
+/// The writing thread.
 pub(super) struct LogWriter {
     queue: Sender<Batch>,
     thread: JoinHandle<Result<Counts, Failure>>,
 }
 
 /// Messages written, by channel.
-type Counts = Vec<(Channel, u64)>;
+pub(super) type Counts = Vec<(Channel, u64)>;
 
 impl LogWriter {
     /// Begins the log.
     ///
     /// # Errors
-    /// [`Failure::Unusable`] when there is such a file and `force` does not say to write over it, or it cannot be made.
+    /// [`Failure::Unusable`] when the file exists and `force` is not set, or it cannot be created.
     pub(super) fn open(path: &Path, force: bool, origin: &Origin) -> Result<Self, Failure> {
         let mut options = File::options();
         options.write(true).create(true).truncate(true).create_new(!force);
@@ -55,9 +54,7 @@ impl LogWriter {
             let name = path.display();
             Failure::unusable(match error.kind() {
                 io::ErrorKind::AlreadyExists => {
-                    format!(
-                        "{name} is there already: choose another name, or write over it with `wormd record --force`"
-                    )
+                    format!("{name} exists already: choose another name, or overwrite it with `wormd record --force`")
                 }
                 _ => format!("{name} cannot be written: {error}: choose another place"),
             })
@@ -69,9 +66,9 @@ impl LogWriter {
         let thread = std::thread::Builder::new()
             .name("log".to_owned())
             .spawn(move || {
-                write(writer, &synced, &batches).map_err(|error| match error {
-                    Refused::Write(error) => Failure::failed(error),
-                    Refused::Sync(error) => {
+                write_batches(writer, &synced, &batches).map_err(|error| match error {
+                    Stopped::Write(error) => Failure::failed(error),
+                    Stopped::Sync(error) => {
                         Failure::failed(format!("{}: {error}: is the disk still there?", path.display()))
                     }
                 })
@@ -80,53 +77,50 @@ impl LogWriter {
         Ok(Self { queue, thread })
     }
 
-    /// Hands a batch to the thread.
+    /// Queues a batch for the thread.
     ///
     /// # Errors
-    /// When the thread has ended; [`LogWriter::close`] tells why.
-    pub(super) fn take(&self, batch: Batch) -> Result<(), Failure> {
+    /// When the thread has ended; [`LogWriter::close`] returns why.
+    pub(super) fn write(&self, batch: Batch) -> Result<(), Failure> {
         self.queue
             .send(batch)
-            .map_err(|_| Failure::failed("the log could not be written on"))
+            .map_err(|_| Failure::failed("the log could not be written"))
     }
 
-    /// Finishes the log and says what is in it.
+    /// Finishes the log; returns how many messages each channel got.
     ///
     /// # Errors
-    /// [`Failure::Failed`] when the file could not be written to its end; what was written before can be read.
-    pub(super) fn close(self, receiver: &TelemetryReceiver) -> Result<String, Failure> {
+    /// [`Failure::Failed`] when the file could not be completed; what was written until then can be read.
+    pub(super) fn close(self) -> Result<Counts, Failure> {
         drop(self.queue);
-        let counts = match self.thread.join() {
-            Ok(counts) => counts?,
+        match self.thread.join() {
+            Ok(counts) => counts,
             Err(panic) => std::panic::resume_unwind(panic),
-        };
-        let counts = counts.iter().map(|&(channel, count)| {
-            let lost = match receiver.lost(channel) {
-                Some(lost) => format!(" ({lost} lost)"),
-                None => String::new(),
-            };
-            format!("{} {count}{lost}", channel.name())
-        });
-        Ok(format!("recorded: {}", counts.collect::<Vec<_>>().join(", ")))
+        }
     }
 }
 
-enum Refused {
+/// What stopped the writing.
+enum Stopped {
     Write(WriteError),
     Sync(io::Error),
 }
 
-impl From<WriteError> for Refused {
+impl From<WriteError> for Stopped {
     fn from(error: WriteError) -> Self {
         Self::Write(error)
     }
 }
 
-/// Writes what comes until nothing will come any more.
-fn write(mut writer: Writer<BufWriter<File>>, file: &File, batches: &Receiver<Batch>) -> Result<Counts, Refused> {
-    let mut unsafe_since: Option<Instant> = None;
+/// Writes batches until the queue is closed, and synchronises the file regularly.
+fn write_batches(
+    mut writer: Writer<BufWriter<File>>,
+    file: &File,
+    batches: &Receiver<Batch>,
+) -> Result<Counts, Stopped> {
+    let mut unsynced_since: Option<Instant> = None;
     loop {
-        let left = unsafe_since.map_or(SAFE_EVERY, |since| SAFE_EVERY.saturating_sub(since.elapsed()));
+        let left = unsynced_since.map_or(SYNC_INTERVAL, |since| SYNC_INTERVAL.saturating_sub(since.elapsed()));
         match batches.recv_timeout(left) {
             Ok(batch) => {
                 write_all(&mut writer, &batch.states)?;
@@ -134,15 +128,15 @@ fn write(mut writer: Writer<BufWriter<File>>, file: &File, batches: &Receiver<Ba
                 write_all(&mut writer, &batch.estimates)?;
                 write_all(&mut writer, &batch.cycles)?;
                 write_all(&mut writer, &batch.alarms)?;
-                unsafe_since.get_or_insert_with(Instant::now);
+                unsynced_since.get_or_insert_with(Instant::now);
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
-        if unsafe_since.is_some_and(|since| since.elapsed() >= SAFE_EVERY) {
+        if unsynced_since.is_some_and(|since| since.elapsed() >= SYNC_INTERVAL) {
             writer.flush()?;
-            file.sync_data().map_err(Refused::Sync)?;
-            unsafe_since = None;
+            file.sync_data().map_err(Stopped::Sync)?;
+            unsynced_since = None;
         }
     }
     let counts = Channel::ALL
@@ -150,7 +144,7 @@ fn write(mut writer: Writer<BufWriter<File>>, file: &File, batches: &Receiver<Ba
         .map(|&channel| (channel, writer.count(channel)))
         .collect();
     writer.finish()?;
-    file.sync_all().map_err(Refused::Sync)?;
+    file.sync_all().map_err(Stopped::Sync)?;
     Ok(counts)
 }
 

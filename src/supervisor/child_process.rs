@@ -1,6 +1,7 @@
-//! The processes of a running worm, as children of this one: of `wormd up`, or of `wormd latency`.
+//! A process of a running worm, as a child of this one.
 
-use super::{Failure, print};
+use crate::failure::Failure;
+use crate::print;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, unbounded};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -12,20 +13,20 @@ use std::process::{Child as Process, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long a process may take to be ready. Starting beside the remains of a killed worm takes the longest.
-pub(super) const START_PATIENCE: Duration = Duration::from_secs(20);
+/// How long a process may take to be ready. Cleaning up after a killed worm takes the longest.
+pub(crate) const START_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// Time that a process is given to end in order, once the worm stands.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// How long a process may take to end in order once the worm stands still.
+const END_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// How often one who waits for a process looks whether it is still wanted.
+/// How often a wait for a process checks whether it was cancelled.
 const POLL: Duration = Duration::from_millis(20);
 
-/// One line that a child has logged.
+/// One line of a child's log.
 #[derive(Debug, Clone)]
-pub(super) struct LogLine {
-    pub(super) role: &'static str,
-    pub(super) text: String,
+pub(crate) struct LogLine {
+    pub(crate) role: &'static str,
+    pub(crate) text: String,
 }
 
 impl fmt::Display for LogLine {
@@ -34,22 +35,22 @@ impl fmt::Display for LogLine {
     }
 }
 
-/// Collects what the children log.
-pub(super) struct Log {
+/// Collects the log lines of all children.
+pub(crate) struct Log {
     sender: Sender<LogLine>,
-    pub(super) lines: Receiver<LogLine>,
+    pub(crate) lines: Receiver<LogLine>,
 }
 
 impl Log {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let (sender, lines) = unbounded();
         Self { sender, lines }
     }
 
-    /// The last error message of a process that has ended; what came before it goes to standard error.
-    fn last_words(&self, role: &str) -> Option<String> {
+    /// The last error message of a process that has ended; earlier lines go to standard error.
+    fn last_error(&self, role: &str) -> Option<String> {
         let mut last = None;
-        // The thread that forwards its lines may be a moment behind.
+        // The thread that forwards its lines may lag a little.
         while let Ok(line) = self.lines.recv_timeout(Duration::from_millis(100)) {
             match line.text.strip_prefix("wormd: ") {
                 Some(text) if line.role == role => last = Some(text.to_owned()),
@@ -60,18 +61,18 @@ impl Log {
     }
 }
 
-/// A running child. Dropping it ends it: in order if it will, by force if not.
-pub(super) struct Child {
-    pub(super) role: &'static str,
+/// A running child. Dropping it ends it: in order if possible, by force if not.
+pub(crate) struct Child {
+    pub(crate) role: &'static str,
     process: Process,
     stdout_lines: Receiver<LogLine>,
-    /// Time that it is given to end in order.
-    timeout: Duration,
+    /// How long it may take to end in order.
+    end_timeout: Duration,
 }
 
 impl Child {
-    /// Starts this very binary with the given arguments.
-    pub(super) fn start(role: &'static str, arguments: &[OsString], log: &Log) -> Result<Self, Failure> {
+    /// Starts this same binary with the given arguments.
+    pub(crate) fn start(role: &'static str, arguments: &[OsString], log: &Log) -> Result<Self, Failure> {
         let binary = std::env::current_exe()
             .map_err(|error| Failure::failed(format!("wormd cannot find its own binary: {error}")))?;
         let mut command = Command::new(binary);
@@ -80,12 +81,12 @@ impl Child {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
-        // A group of its own: Ctrl-C goes to the parent alone, which stops the worm before it stops the processes.
+        // A process group of its own: Ctrl-C reaches only the parent, which stops the worm before it ends the processes.
         command.process_group(0);
         // SAFETY: prctl is async-signal-safe, and nothing is allocated between fork and exec.
         unsafe {
             command.pre_exec(|| {
-                // Should the parent be killed, the child is asked to end in order.
+                // If the parent is killed, the kernel asks the child to end.
                 nix::sys::prctl::set_pdeathsig(Signal::SIGTERM).map_err(std::io::Error::from)
             });
         }
@@ -103,26 +104,26 @@ impl Child {
             role,
             process,
             stdout_lines,
-            timeout: PATIENCE,
+            end_timeout: END_TIMEOUT,
         })
     }
 
-    /// It may take so much longer to end in order than a process usually does.
-    pub(super) fn be_patient(&mut self, more: Duration) {
-        self.timeout = PATIENCE + more;
+    /// Allows it this much more time to end in order than a process usually has.
+    pub(crate) fn extend_end_timeout(&mut self, more: Duration) {
+        self.end_timeout = END_TIMEOUT + more;
     }
 
     /// Process id.
-    pub(super) fn id(&self) -> u32 {
+    pub(crate) fn id(&self) -> u32 {
         self.process.id()
     }
 
-    /// Waits for the first line on the child's standard output: its word that it is ready.
+    /// Waits for the first line on the child's standard output, which it writes when it is ready.
     ///
     /// # Errors
-    /// What the child said as it ended, with its exit status: unusable input stays unusable input. And when `end` was set
-    /// meanwhile.
-    pub(super) fn wait_until_ready(&mut self, timeout: Duration, log: &Log, end: &AtomicBool) -> Result<(), Failure> {
+    /// The child's last error message when it ended: [`Failure::Unusable`] if its exit status says so. Also when `timeout`
+    /// passed, or `end` was set meanwhile.
+    pub(crate) fn wait_until_ready(&mut self, timeout: Duration, log: &Log, end: &AtomicBool) -> Result<(), Failure> {
         let begun = Instant::now();
         while begun.elapsed() < timeout {
             match self.stdout_lines.recv_timeout(POLL) {
@@ -140,10 +141,10 @@ impl Child {
                 self.role
             )));
         };
-        let last_words = log
-            .last_words(self.role)
+        let last_error = log
+            .last_error(self.role)
             .unwrap_or_else(|| format!("ended at once, {status}"));
-        let text = format!("{}: {last_words}", self.role);
+        let text = format!("{}: {last_error}", self.role);
         Err(if status.code() == Some(2) {
             Failure::unusable(text)
         } else {
@@ -151,29 +152,29 @@ impl Child {
         })
     }
 
-    /// The last line on the standard output of a child that has ended, if it has written any since it was ready.
-    pub(super) fn last_line(&self) -> Option<String> {
-        // The thread that forwards them ends, and with it this, when all have been forwarded.
+    /// The last line on the standard output of a child that has ended, if it wrote any after it was ready.
+    pub(crate) fn last_line(&self) -> Option<String> {
+        // The forwarding thread closes the channel at the end of the stream, which ends this iteration.
         self.stdout_lines.iter().last().map(|line| line.text)
     }
 
     /// How it ended, if it has.
-    pub(super) fn exit_status(&mut self) -> Option<ExitStatus> {
+    pub(crate) fn exit_status(&mut self) -> Option<ExitStatus> {
         self.process.try_wait().ok().flatten()
     }
 
     fn ask_to_end(&self) {
-        // It may have ended already; then there is nobody to ask.
+        // Fails only when the process has ended already.
         let _ = kill(Pid::from_raw(self.process.id() as i32), Signal::SIGTERM);
     }
 
-    /// Ends it and tells how it ended.
-    pub(super) fn end(&mut self) -> Option<ExitStatus> {
+    /// Ends it, and returns how it ended.
+    pub(crate) fn end(&mut self) -> Option<ExitStatus> {
         if let Some(status) = self.exit_status() {
             return Some(status);
         }
         self.ask_to_end();
-        let deadline = Instant::now() + self.timeout;
+        let deadline = Instant::now() + self.end_timeout;
         while Instant::now() < deadline {
             if let Some(status) = self.exit_status() {
                 return Some(status);
@@ -184,9 +185,9 @@ impl Child {
             "the {} process (pid {}) did not end within {:?} and was killed",
             self.role,
             self.id(),
-            self.timeout
+            self.end_timeout
         );
-        // What cannot be killed is gone.
+        // Fails only when the process has ended already.
         let _ = self.process.kill();
         self.process.wait().ok()
     }

@@ -1,7 +1,7 @@
-//! What a parent of the worm's processes hears of its worm, and how it gets it to crawl.
+//! All topics of the worm, read into one [`Telemetry`], and the start of a crawl, which waits for them.
 
-use super::Failure;
-use super::send_command::give;
+use super::controller::order;
+use crate::failure::Failure;
 use crate::topics::{CommandClient, Hub, Subscriber};
 use crate::watch::Telemetry;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Mode, State, Timing};
 
-/// How long the worm may take to reach a mode that it was commanded into, beside the time of the ramp.
-pub(super) const MODE_PATIENCE: Duration = Duration::from_secs(5);
+/// How long the worm may take to reach a commanded mode, beyond the time of the ramp.
+pub(crate) const MODE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// All topics of the worm.
-pub(super) struct TelemetryReceiver {
+pub(crate) struct TelemetryReceiver {
     state: Subscriber<State>,
     timing: Subscriber<Timing>,
     estimate: Subscriber<Estimate>,
@@ -22,7 +22,11 @@ pub(super) struct TelemetryReceiver {
 }
 
 impl TelemetryReceiver {
-    pub(super) fn open(hub: &Hub) -> Result<Self, Failure> {
+    /// Subscribes to all topics.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when iceoryx2 refuses.
+    pub(crate) fn open(hub: &Hub) -> Result<Self, Failure> {
         Ok(Self {
             state: hub.subscriber().map_err(Failure::failed)?,
             timing: hub.subscriber().map_err(Failure::failed)?,
@@ -32,8 +36,8 @@ impl TelemetryReceiver {
         })
     }
 
-    /// Takes everything that has come. A topic that cannot be read is one that says nothing; the processes tell why.
-    pub(super) fn listen(&mut self, telemetry: &mut Telemetry) {
+    /// Reads everything new. A topic that cannot be read counts as silent; the processes log the reason.
+    pub(crate) fn poll(&mut self, telemetry: &mut Telemetry) {
         while let Ok(Some(state)) = self.state.next() {
             telemetry.take_state(&state);
         }
@@ -51,8 +55,8 @@ impl TelemetryReceiver {
         }
     }
 
-    /// Listens until a condition holds; false when it did not within `timeout`, or `should_abort` says that it will not.
-    pub(super) fn wait_for(
+    /// Reads until `condition` holds; false when it does not within `timeout`, or `should_abort` returns true.
+    pub(crate) fn wait_for(
         &mut self,
         telemetry: &mut Telemetry,
         timeout: Duration,
@@ -61,7 +65,7 @@ impl TelemetryReceiver {
     ) -> bool {
         let begun = Instant::now();
         loop {
-            self.listen(telemetry);
+            self.poll(telemetry);
             if condition(telemetry) {
                 return true;
             }
@@ -72,17 +76,20 @@ impl TelemetryReceiver {
         }
     }
 
-    /// Where the controller stands, by the newest state.
-    pub(super) fn mode(&mut self, telemetry: &mut Telemetry) -> Mode {
-        self.listen(telemetry);
+    /// The controller's mode in the newest state.
+    pub(crate) fn mode(&mut self, telemetry: &mut Telemetry) -> Mode {
+        self.poll(telemetry);
         telemetry
             .state
             .and_then(|state| Mode::try_from(state.mode).ok())
             .unwrap_or(Mode::Disarmed)
     }
 
-    /// Has the worm armed, waits until it and the estimator are ready, and has it crawl; nothing more once `end` is set.
-    pub(super) fn start_crawling(
+    /// Arms the worm, waits until it and the estimator are ready, and makes it crawl; returns early once `end` is set.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when the controller refuses a command, or the worm is not ready in time.
+    pub(crate) fn start_crawling(
         &mut self,
         client: &CommandClient,
         config: &Config,
@@ -90,10 +97,10 @@ impl TelemetryReceiver {
         end: &AtomicBool,
         mut should_abort: impl FnMut() -> bool,
     ) -> Result<(), Failure> {
-        give(client, CommandKind::Arm)?;
+        order(client, CommandKind::Arm)?;
         let armed = self.wait_for(
             telemetry,
-            MODE_PATIENCE,
+            MODE_TIMEOUT,
             || end.load(Ordering::Relaxed) || should_abort(),
             |telemetry| {
                 telemetry.state.is_some_and(|state| state.mode == Mode::Armed.code())
@@ -106,9 +113,9 @@ impl TelemetryReceiver {
         if !armed {
             let mode = self.mode(telemetry);
             return Err(Failure::failed(format!(
-                "the worm was not ready to crawl within {MODE_PATIENCE:?} (it is {mode}); the log tells why"
+                "the worm was not ready to crawl within {MODE_TIMEOUT:?} (it is {mode}); the log says why"
             )));
         }
-        give(client, CommandKind::Crawl)
+        order(client, CommandKind::Crawl)
     }
 }

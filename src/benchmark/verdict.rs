@@ -1,99 +1,100 @@
-//! What the measurement amounts to: the outcome, its headline and its warnings.
+//! The outcome of the benchmark from its findings, with headline and warnings.
 
-use super::bench::Bench;
-use super::measure::Findings;
-use super::rates::MISSED_FRACTION;
-use crate::command::Failure;
+use super::findings::{Findings, MAX_MISSED_FRACTION};
+use super::settings::Benchmark;
+use crate::failure::Failure;
 use crate::latency::{Outcome, Percentiles, ratio};
 use crate::realtime::{InForce, machine};
 
-/// Percentiles of the tail mean nothing with fewer ticks than this.
+/// With fewer ticks the percentiles of the tail are meaningless.
 const FEW_TICKS: u64 = 2_000;
 
-/// Everything that was found, put together.
-pub(super) fn outcome(bench: &Bench, findings: Findings, trouble: Option<&Failure>) -> Outcome {
+/// The outcome. `problem` is what cut the measurement short, if anything.
+pub(super) fn outcome(benchmark: &Benchmark, findings: Findings, problem: Option<&Failure>) -> Outcome {
     let mut warnings = Vec::new();
-    if let Some(trouble) = trouble {
-        warnings.push(trouble.to_string());
+    if let Some(problem) = problem {
+        warnings.push(problem.to_string());
     }
-    let refused = refused(bench, findings.in_force.as_ref());
+    let refused = refused(benchmark, findings.in_force.as_ref());
     warnings.extend(refused.iter().map(|what| format!("in force for the loop: {what}")));
-    // The bare sleeper has asked for the same, and was told why.
+    // The bare sleeper requested the same as the loop, and knows the reasons of the refusals.
     warnings.extend(findings.floor.refusals.iter().cloned());
     warnings.extend(findings.warnings.iter().cloned());
-    let account = &findings.account;
-    let deadlines = account.ticks + account.overruns;
-    if account.ticks > 0 && account.ticks < FEW_TICKS {
+    let stats = &findings.ticks;
+    let deadlines = stats.ticks + stats.overruns;
+    if stats.ticks > 0 && stats.ticks < FEW_TICKS {
         warnings.push(format!(
             "only {} ticks were measured: the 99.9th percentile is little more than the largest value; give a longer --duration",
-            account.ticks
+            stats.ticks
         ));
     }
-    if account.overruns as f64 > MISSED_FRACTION * deadlines as f64 {
+    if stats.overruns as f64 > MAX_MISSED_FRACTION * deadlines as f64 {
         warnings.push(format!(
             "{} Hz is not met: {:.1} % of the deadlines were missed; try a lower --rate",
-            bench.config.control.rate_hz,
-            100.0 * account.overruns as f64 / deadlines as f64
+            benchmark.config.control.rate_hz,
+            100.0 * stats.overruns as f64 / deadlines as f64
         ));
     }
-    if bench.config.port.is_none() && account.ticks > 0 && findings.alarm.is_empty() {
-        warnings.push(match bench.stalls_s().len() {
+    if benchmark.config.port.is_none() && stats.ticks > 0 && findings.alarm.is_empty() {
+        warnings.push(match benchmark.stalls_s().len() {
             0 => "no alarm was measured: its first stall needs a --duration of 3 s".to_owned(),
             stalls => {
                 format!("no alarm was measured: none came of {stalls} stall(s), too short for this gait or cut off")
             }
         });
     }
-    let headline = headline(bench, &findings, &refused, trouble);
+    let headline = headline(benchmark, &findings, &refused, problem);
     let highest_rate_hz = findings
         .rates
         .iter()
         .filter(|trial| trial.sustained)
         .map(|trial| trial.rate_hz)
         .reduce(f64::max);
-    let mut settings = machine::settings(bench.config.realtime.cpu);
+    let mut settings = machine::settings(benchmark.config.realtime.cpu);
     if let Some(in_force) = &findings.in_force {
         settings.insert(0, in_force_setting(in_force, &refused));
     }
-    // A share of nothing is not known.
+    // Without a measurement the shares are unknown.
     let fraction = |fraction: f64| if findings.measured_s > 0.0 { fraction } else { f64::NAN };
     let (controller_cpu_share, estimator_cpu_share) = (
         fraction(findings.controller_cpu_share),
         fraction(findings.estimator_cpu_share),
     );
-    let Findings { account, floor, .. } = findings;
+    let Findings {
+        ticks: stats, floor, ..
+    } = findings;
     Outcome {
         headline,
-        worm: bench.config.worm.name.clone(),
-        port: bench
+        worm: benchmark.config.worm.name.clone(),
+        port: benchmark
             .config
             .port
             .as_ref()
             .map_or("the virtual worm".to_owned(), |port| port.path.clone()),
-        rate_hz: bench.config.control.rate_hz,
+        rate_hz: benchmark.config.control.rate_hz,
         duration_s: findings.measured_s,
-        load: bench.load,
-        ticks: account.ticks,
-        overruns: account.overruns,
-        overruns_of_product: account.overruns_of_product,
-        wake_us: account.wake,
+        load: benchmark.options.load,
+        ticks: stats.ticks,
+        overruns: stats.overruns,
+        overruns_of_product: stats.overruns_of_product,
+        wake_us: stats.wake,
         floor_wake_us: floor.wake,
-        period_us: account.period,
-        execution_us: account.execution,
-        bus_us: account.bus,
-        compute_us: account.compute,
-        publish_us: account.publish,
-        own_work_us: account.own_work,
-        notify_us: account.notify,
+        period_us: stats.period,
+        execution_us: stats.execution,
+        bus_us: stats.bus,
+        compute_us: stats.compute,
+        publish_us: stats.publish,
+        own_work_us: stats.own_work,
+        notify_us: stats.notify,
         floor_notify_us: floor.notify,
         delivery_us: findings.delivery,
         floor_delivery_us: findings.floor_delivery,
         polled_delivery_us: findings.polled_delivery,
         floor_polled_delivery_us: findings.floor_polled_delivery,
         alarm_us: findings.alarm,
-        culprits: account.culprits,
-        host_pauses: account.host_pauses,
-        worst_ticks: account.worst,
+        culprits: stats.culprits,
+        host_pauses: stats.host_pauses,
+        worst_ticks: stats.worst,
         controller_cpu_share,
         floor_cpu_share: floor.cpu_share,
         estimator_cpu_share,
@@ -113,9 +114,9 @@ pub(super) fn outcome(bench: &Bench, findings: Findings, trouble: Option<&Failur
     }
 }
 
-/// What the loop was to have and has not.
-fn refused(bench: &Bench, in_force: Option<&InForce>) -> Vec<String> {
-    in_force.map_or_else(Vec::new, |in_force| in_force.shortfalls(&bench.config.realtime, 0))
+/// What the loop was to get from the operating system and did not.
+fn refused(benchmark: &Benchmark, in_force: Option<&InForce>) -> Vec<String> {
+    in_force.map_or_else(Vec::new, |in_force| in_force.shortfalls(&benchmark.config.realtime, 0))
 }
 
 fn in_force_setting(in_force: &InForce, refused: &[String]) -> machine::Setting {
@@ -131,10 +132,10 @@ fn in_force_setting(in_force: &InForce, refused: &[String]) -> machine::Setting 
     }
 }
 
-fn headline(bench: &Bench, findings: &Findings, refused: &[String], trouble: Option<&Failure>) -> String {
-    let account = &findings.account;
+fn headline(benchmark: &Benchmark, findings: &Findings, refused: &[String], problem: Option<&Failure>) -> String {
+    let stats = &findings.ticks;
     let floor = findings.floor.wake.percentiles();
-    if account.wake.is_empty() {
+    if stats.wake.is_empty() {
         let floor = match findings.floor.wake.is_empty() {
             true => String::new(),
             false => format!(
@@ -142,25 +143,25 @@ fn headline(bench: &Bench, findings: &Findings, refused: &[String], trouble: Opt
                 floor.p50, floor.p99
             ),
         };
-        let why = trouble.map_or("no tick was measured".to_owned(), ToString::to_string);
+        let why = problem.map_or("no tick was measured".to_owned(), ToString::to_string);
         return format!("THE LOOP WAS NOT MEASURED: {why}{floor}");
     }
-    let wake = account.wake.percentiles();
+    let wake = stats.wake.percentiles();
     let times = |of: fn(&Percentiles) -> f64| {
-        ratio(&account.wake, &findings.floor.wake, of).map_or("-".to_owned(), |ratio| format!("{ratio:.2}"))
+        ratio(&stats.wake, &findings.floor.wake, of).map_or("-".to_owned(), |ratio| format!("{ratio:.2}"))
     };
     let mut headline = format!(
         "{} Hz{}: woken {:.1} µs late (p50), {:.1} µs (p99), {} and {} times the bare sleeper; {} of {} deadlines missed, {} by \
          wormd's own work",
-        bench.config.control.rate_hz,
-        if bench.load { " under load" } else { "" },
+        benchmark.config.control.rate_hz,
+        if benchmark.options.load { " under load" } else { "" },
         wake.p50,
         wake.p99,
         times(|wake| wake.p50),
         times(|wake| wake.p99),
-        account.overruns,
-        account.ticks + account.overruns,
-        match account.overruns_of_product {
+        stats.overruns,
+        stats.ticks + stats.overruns,
+        match stats.overruns_of_product {
             0 => "none".to_owned(),
             count => count.to_string(),
         },
@@ -168,8 +169,8 @@ fn headline(bench: &Bench, findings: &Findings, refused: &[String], trouble: Opt
     if !refused.is_empty() {
         headline = format!("REFUSED BY THE SYSTEM: {}. {headline}", refused.join("; "));
     }
-    if let Some(trouble) = trouble {
-        headline = format!("CUT SHORT: {trouble}. {headline}");
+    if let Some(problem) = problem {
+        headline = format!("CUT SHORT: {problem}. {headline}");
     }
     headline
 }

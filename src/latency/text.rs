@@ -1,7 +1,7 @@
 //! An outcome as the terminal shows it: at most 120 columns, numbers under each other, units in the heads.
 
-use crate::latency::attribution::meaning;
-use crate::latency::{Durations, Measure, Outcome, Tick};
+use super::attribution::meaning;
+use super::{Durations, Measure, Outcome, Tick};
 use crate::realtime::machine::Setting;
 use std::fmt;
 use worm_estimator::number::{NONE, count, fixed, percent, shortest};
