@@ -4,8 +4,6 @@
 pub mod analyze;
 pub mod check;
 mod child_process;
-#[cfg(feature = "analysis")]
-mod columns;
 pub mod control;
 #[cfg(feature = "analysis")]
 mod dataset;

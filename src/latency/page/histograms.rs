@@ -1,9 +1,11 @@
 //! Every duration as a histogram over its floor's, both axes logarithmic: one late tick among a million is seen.
 
-use super::words::{NOT_MEASURED, told};
+use super::words::{NOT_MEASURED, with_unit};
 use crate::latency::{Durations, Outcome};
 use worm_analysis::report::page::{Figure, Key, Mark, Panel};
-use worm_analysis::report::plot::{Axis, BLUE, Colour, DrawError, INK, MUTED, Row, Sheet, Stroke, VERMILION, draw};
+use worm_analysis::report::plot::{
+    Axis, BLUE, Colour, DrawError, INK, MUTED, Row, Sheet, Stroke, Svg, VERMILION, draw,
+};
 
 const LOOP: Colour = BLUE;
 const FLOOR: Colour = VERMILION;
@@ -42,7 +44,7 @@ pub(super) fn wake(outcome: &Outcome) -> Result<Figure, DrawError> {
     };
     Ok(Figure {
         id: "wake",
-        title: "How late the loop runs, and how late a bare sleeper does".to_owned(),
+        title: "How late the loop runs, and how late a bare sleeper does",
         keys: keys("bare sleeper, in the same run"),
         panels: vec![histogram.panel()?],
         caption: "Where the line follows the edge of the area, the loop is as punctual as the machine lets it be; what the area \
@@ -87,7 +89,7 @@ pub(super) fn parts(outcome: &Outcome) -> Result<Figure, DrawError> {
     });
     Ok(Figure {
         id: "parts",
-        title: "The parts of a tick, and what comes of it".to_owned(),
+        title: "The parts of a tick, and what comes of it",
         keys: keys("the same without wormd: bare notifier, bare iceoryx2 pairs"),
         panels: panels.collect::<Result<_, _>>()?,
         caption: "Delivery runs from before the state is published until a subscriber has it in hand: the estimator, which sleeps \
@@ -102,14 +104,11 @@ fn keys(floor: &str) -> Vec<Key> {
 
 impl Histogram<'_> {
     fn panel(&self) -> Result<Panel, DrawError> {
-        Ok(Panel {
-            title: self.title.to_owned(),
-            quantity: "how many, by µs, both logarithmic".to_owned(),
-            svg: self.picture()?,
-        })
+        let quantity = "count by µs, both logarithmic";
+        Ok(Panel::new(self.title, quantity, self.picture()?))
     }
 
-    fn picture(&self) -> Result<String, DrawError> {
+    fn picture(&self) -> Result<Svg, DrawError> {
         let both = || std::iter::once(self.durations).chain(self.floor);
         let ends = both().flat_map(Durations::bars).map(|(us, _)| us.max(SHORTEST_US));
         let (shortest, longest) = ends.fold((f64::INFINITY, 0.0f64), |(low, high), us| (low.min(us), high.max(us)));
@@ -155,9 +154,9 @@ impl Histogram<'_> {
         let tell = |durations: &Durations| match durations.measured() {
             Some(us) => format!(
                 "median {}, 99th percentile {}, largest {}",
-                told(us.p50),
-                told(us.p99),
-                told(us.max)
+                with_unit(us.p50),
+                with_unit(us.p99),
+                with_unit(us.max)
             ),
             None => NOT_MEASURED.to_owned(),
         };

@@ -17,7 +17,7 @@ mod words;
 
 use crate::latency::Outcome;
 use std::path::{Path, PathBuf};
-use worm_analysis::report::page::{Page, escaped};
+use worm_analysis::report::page::Page;
 use worm_analysis::report::plot::DrawError;
 use worm_analysis::report::{ReportError, file};
 
@@ -37,16 +37,14 @@ pub fn write(dir: &Path, outcome: &Outcome) -> Result<PathBuf, ReportError> {
 
 fn page(outcome: &Outcome) -> Result<String, DrawError> {
     let title = format!("Latency of {}", outcome.worm);
-    let mut page = Page::new(&title).with_style(include_str!("style.css"));
-    page.html(&format!("<h1>{}</h1>", escaped(&title)));
-    page.html(&format!("<p class=\"lead\">{}</p>", escaped(&tiles::lead(outcome))));
-    page.html(&format!("<p class=\"finding\">{}</p>", escaped(&outcome.headline)));
-    page.html(&tiles::html(outcome));
+    let mut page = Page::new(&title, &tiles::lead(outcome)).with_style(include_str!("style.css"));
+    page.paragraph_of("finding", &outcome.headline);
+    page.tiles(&tiles::rows(outcome));
     page.warnings(&outcome.warnings);
     page.heading("How late, and how late a bare sleeper is");
     page.figure(&histograms::wake(outcome)?);
     page.figure(&histograms::parts(outcome)?);
-    page.table(&tables::measures(outcome));
+    page.add(tables::measures(outcome));
     page.heading("Who made ticks late");
     tables::add_culprits(&mut page, outcome);
     page.heading("The worst ticks");

@@ -3,8 +3,7 @@
 use super::words::{NOT_MEASURED, times, us};
 use crate::latency::attribution::meaning;
 use crate::latency::{Durations, Outcome};
-use worm_analysis::report::page::Page;
-use worm_analysis::report::table::Table;
+use worm_analysis::report::page::{Page, Table};
 use worm_estimator::number::{NONE, percent, shortest};
 
 /// Every duration at every percentile, each over its floor.
@@ -79,7 +78,7 @@ pub(super) fn add_culprits(page: &mut Page, outcome: &Outcome) {
     if pauses.count > 0 {
         table.note = Some(format!("{pauses}."));
     }
-    page.table(&table);
+    page.add(&table);
 }
 
 /// The rates that were tried.
@@ -113,7 +112,7 @@ pub(super) fn add_rates(page: &mut Page, outcome: &Outcome) {
             ]
         })
         .collect();
-    page.table(&table);
+    page.add(&table);
 }
 
 /// What was in force, judged, and what cyclictest says of the machine.
@@ -133,7 +132,7 @@ pub(super) fn add_settings(page: &mut Page, outcome: &Outcome) {
         });
         table.rows = rows.collect();
         table.note = Some("✓ as it should be, ✗ not.".to_owned());
-        page.table(&table);
+        page.add(&table);
     }
     if let Some(found) = &outcome.cyclictest {
         let mut table = Table::new("Wake lateness by cyclictest, µs", ["called as", "min", "mean", "max"]);
@@ -143,6 +142,6 @@ pub(super) fn add_settings(page: &mut Page, outcome: &Outcome) {
             us(found.mean_us),
             us(found.max_us),
         ]);
-        page.table(&table);
+        page.add(&table);
     }
 }

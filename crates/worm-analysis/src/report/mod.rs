@@ -16,15 +16,12 @@ pub mod explain;
 mod figure;
 pub mod file;
 
-pub use worm_estimator::number;
 pub mod page;
 pub mod plot;
 mod runs;
 mod sheets;
 mod summary;
-pub mod table;
 mod tables;
-pub mod tile;
 
 pub use file::replace as replace_file;
 
@@ -34,6 +31,7 @@ use plot::DrawError;
 use runs::Runs;
 use std::io;
 use std::path::{Path, PathBuf};
+use worm_estimator::number::in_words;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -118,6 +116,13 @@ pub fn write(dir: &Path, title: &str, runs: &[Analysis]) -> Result<Written, Repo
     })
 }
 
+/// What the report says, for the terminal: its lead and its tables, without figures and single cycles.
+pub fn text(runs: &[Analysis]) -> String {
+    let runs = Runs(runs);
+    let tables = tables::main(runs).map(|table| table.to_string());
+    [&[summary::lead(runs)], &tables[..]].concat().join("\n\n")
+}
+
 /// Makes the directory of a report and tries whether it can be written, so that nobody waits for an analysis in vain.
 ///
 /// # Errors
@@ -136,20 +141,21 @@ fn folders(runs: usize) -> Vec<String> {
 }
 
 fn compose(title: &str, runs: Runs<'_>, folders: &[String]) -> Result<String, DrawError> {
-    let mut page = Page::new(title);
-    summary::add(&mut page, title, runs)?;
+    let mut page = Page::new(title, &summary::lead(runs));
+    summary::add(&mut page, runs)?;
     page.heading("Figures");
     for figure in figure::all(runs)? {
         page.figure(&figure);
     }
     page.heading("Tables");
-    page.table(&tables::identification(runs));
-    page.table(&tables::mean_deformation(runs));
-    page.table(&tables::against_theory(runs));
+    let [identification, mean_deformation, against_theory, recordings] = tables::main(runs);
+    page.add(&identification);
+    page.add(&mean_deformation);
+    page.add(&against_theory);
     for (name, run) in runs.named() {
-        page.table(&tables::cycles(&name, run));
+        page.add(tables::cycles(&name, run));
     }
-    page.table(&tables::recordings(runs));
+    page.add(&recordings);
     page.heading("The series behind the figures");
     let places: Vec<String> = folders
         .iter()
@@ -164,7 +170,7 @@ fn compose(title: &str, runs: Runs<'_>, folders: &[String]) -> Result<String, Dr
     page.paragraph(&format!(
         "As CSV, {}: series.csv with every sample of positions, contact points, deformations, forces and energies, and cycles.csv \
          with every cycle. SI units stand in the names of the columns; an empty field is not known.",
-        number::in_words(&places)
+        in_words(&places)
     ));
     page.paragraph(
         "Equation, section, figure and table numbers are those of D. Zarrouk, I. Sharf, M. Shoham, Energetic analysis and \

@@ -3,16 +3,16 @@
 use super::panel_per_run;
 use super::window::Window;
 use crate::experiment::Analysis;
-use crate::report::number::{fixed, mean};
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, DrawError, INK, MID, MUTED, Row, Sheet, Stroke, draw};
+use crate::report::plot::{Axis, DrawError, INK, MID, MUTED, Row, Sheet, Stroke, Svg, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{fixed, mean};
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     let panels = panel_per_run(runs, "force on the body, N", picture)?;
     Ok(Figure {
         id: "balance",
-        title: "Does the momentum balance hold?".to_owned(),
+        title: "Does the momentum balance hold?",
         keys: vec![
             Key::new(Mark::Line, MID, "contacts and weight together"),
             Key::new(Mark::Dashed, INK, "their mean over whole cycles"),
@@ -22,7 +22,7 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::whole(run);
     let force = || window.points(&run.series.total_force_n, 1.0);
     let heights = force().map(|(_, newton)| newton).chain([0.0, run.momentum_violation_n]);
@@ -40,8 +40,8 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let balance = runs.tell(|run| Some(format!("{} N", fixed(run.momentum_violation_n, 3))));
-    let worst = runs.tell(|run| {
+    let balance = runs.describe(|run| Some(format!("{} N", fixed(run.momentum_violation_n, 3))));
+    let worst = runs.describe(|run| {
         let force_n = run
             .series
             .total_force_n

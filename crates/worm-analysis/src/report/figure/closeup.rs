@@ -4,10 +4,10 @@
 use super::window::{Window, of_cell};
 use super::{cell_keys, panel_per_run};
 use crate::experiment::Analysis;
-use crate::report::number::{fixed, list_or_range, mean};
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{fixed, list_or_range, mean};
 
 /// Most dots drawn for one cell.
 const DOTS: usize = 150;
@@ -25,14 +25,14 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     ]);
     Ok(Figure {
         id: "closeup",
-        title: "One cycle in close-up: sticking and sliding".to_owned(),
+        title: "One cycle in close-up: sticking and sliding",
         keys,
         panels,
         caption: caption(runs),
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::of_cycles(run, 1);
     let series = &run.series;
     let from_start = |list, cell| window.points_from_start(of_cell(list, cell), 1e3);
@@ -103,12 +103,12 @@ fn draw_onsets(
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let shown = runs.tell(|run| Some(Window::of_cycles(run, 1).name()));
-    let first = runs.tell(|run| {
+    let shown = runs.describe(|run| Some(Window::of_cycles(run, 1).name()));
+    let first = runs.describe(|run| {
         let list_mm: Vec<f64> = run.first_estimate.max_deformation_m.iter().map(|m| m * 1e3).collect();
         Some(list_or_range(&list_mm, 2, "mm"))
     });
-    let apart = runs.tell(|run| {
+    let apart = runs.describe(|run| {
         distance_to_path_m(run).map(|m| format!("{} mm (noise: {} mm)", fixed(m * 1e3, 3), fixed(run.noise_m * 1e3, 3)))
     });
     let apart = if apart.is_empty() {

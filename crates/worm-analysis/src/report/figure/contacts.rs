@@ -3,10 +3,10 @@
 use super::window::{Window, of_cell};
 use super::{cell_keys, panel_per_run};
 use crate::experiment::Analysis;
-use crate::report::number::{fixed, mean};
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{fixed, mean};
 
 /// Cycles shown.
 const CYCLES: usize = 3;
@@ -17,14 +17,14 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     keys.push(Key::new(Mark::Band, MUTED, "step of the cell of that colour"));
     Ok(Figure {
         id: "contacts",
-        title: "Where the tips touch the canal".to_owned(),
+        title: "Where the tips touch the canal",
         keys,
         panels,
         caption: caption(runs),
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::of_cycles(run, CYCLES);
     let contact = |cell| window.points_from_start(of_cell(&run.series.contact_m, cell), 1e3);
     let heights = (0..run.cells).flat_map(|cell| contact(cell).map(|(_, mm)| mm));
@@ -45,8 +45,8 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let shown = runs.tell(|run| Some(Window::of_cycles(run, CYCLES).name()));
-    let slides = runs.tell(|run| {
+    let shown = runs.describe(|run| Some(Window::of_cycles(run, CYCLES).name()));
+    let slides = runs.describe(|run| {
         Some(format!(
             "{} mm forward and {} mm backward",
             fixed(mean(&run.mean.forward_slide_m) * 1e3, 2),

@@ -3,10 +3,10 @@
 use super::panel_per_run;
 use super::window::{Window, of_cell};
 use crate::experiment::Analysis;
-use crate::report::number::list_or_range;
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::list_or_range;
 
 /// Cycles shown.
 const CYCLES: usize = 2;
@@ -18,7 +18,7 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     let panels = panel_per_run(runs, "tip deformation, mm", picture)?;
     Ok(Figure {
         id: "deformations",
-        title: "How far each tip is bent".to_owned(),
+        title: "How far each tip is bent",
         keys: vec![
             Key::new(Mark::Line, MUTED, "thin: the tip sticks"),
             Key::new(Mark::Thick, MUTED, "thick: it slides"),
@@ -30,7 +30,7 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::of_cycles(run, CYCLES);
     let colours = cell_colours(run.cells);
     let deformation = |cell| window.points(of_cell(&run.series.deformation_m, cell), 1e3);
@@ -71,8 +71,8 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let shown = runs.tell(|run| Some(Window::of_cycles(run, CYCLES).name()));
-    let bounds = runs.tell(|run| {
+    let shown = runs.describe(|run| Some(Window::of_cycles(run, CYCLES).name()));
+    let bounds = runs.describe(|run| {
         let list_mm: Vec<f64> = run.max_deformation_m.iter().map(|m| m * 1e3).collect();
         Some(list_or_range(&list_mm, 2, "mm"))
     });

@@ -1,10 +1,10 @@
 //! Energy per cycle by both methods, against theory and rigid contacts, figure 8 of the paper.
 
 use crate::experiment::{Analysis, CycleValues};
-use crate::report::number::{fixed, with_error};
 use crate::report::page::{Figure, Key, Mark, Panel};
-use crate::report::plot::{Axis, Colour, DrawError, INK, LIGHT, MID, MUTED, Row, SHADE, Sheet, Stroke, draw};
+use crate::report::plot::{Axis, Colour, DrawError, INK, LIGHT, MID, MUTED, Row, SHADE, Sheet, Stroke, Svg, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{fixed, with_error};
 
 /// How bars stand, in places.
 struct Layout {
@@ -68,18 +68,18 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     ]);
     Ok(Figure {
         id: "energy",
-        title: "What a cycle costs".to_owned(),
+        title: "What a cycle costs",
         keys,
-        panels: vec![Panel {
-            title: "energy per cycle".to_owned(),
-            quantity: if runs.0.len() > 1 { "mJ, by slope" } else { "mJ" }.to_owned(),
-            svg: picture(runs)?,
-        }],
+        panels: vec![Panel::new(
+            "energy per cycle",
+            if runs.0.len() > 1 { "mJ, by slope" } else { "mJ" },
+            picture(runs)?,
+        )],
         caption: caption(runs),
     })
 }
 
-fn picture(runs: Runs<'_>) -> Result<String, DrawError> {
+fn picture(runs: Runs<'_>) -> Result<Svg, DrawError> {
     let heights = runs.0.iter().flat_map(|run| {
         let theory = run.theory.identified.iter().chain(&run.theory.nominal);
         let theory = theory.map(|theory| theory.values.energy_actuator_positive_j * 1e3);
@@ -130,17 +130,17 @@ fn picture(runs: Runs<'_>) -> Result<String, DrawError> {
 
 fn caption(runs: Runs<'_>) -> String {
     let told = |of: fn(&CycleValues) -> f64| {
-        runs.tell(|run| Some(format!("{} mJ", with_error(of(&run.mean) * 1e3, of(&run.std) * 1e3, 1))))
+        runs.describe(|run| Some(format!("{} mJ", with_error(of(&run.mean) * 1e3, of(&run.std) * 1e3, 1))))
     };
     let losses = told(|values| values.energy_loss_j);
     let net = told(|values| values.energy_actuator_net_j);
-    let theory = runs.tell(|run| {
+    let theory = runs.describe(|run| {
         let theory = run.theory.identified.as_ref()?;
         Some(format!("{} mJ", fixed(theory.values.energy_loss_j * 1e3, 1)))
     });
     let theory = if theory.is_empty() { "none".to_owned() } else { theory };
     let without = runs.without_theory();
-    let rigid = match runs.tell(|run| rigid_ratio(run).map(|ratio| format!("{} times", fixed(ratio, 2)))) {
+    let rigid = match runs.describe(|run| rigid_ratio(run).map(|ratio| format!("{} times", fixed(ratio, 2)))) {
         none if none.is_empty() => "Rigid contacts cannot be compared without an advance.".to_owned(),
         ratios => format!("Compliance costs {ratios} what rigid contacts would take for the same advance."),
     };

@@ -15,7 +15,7 @@ mod trend;
 mod window;
 
 use super::page::{Figure, Key, Mark, Panel};
-use super::plot::{DrawError, cell_colours};
+use super::plot::{DrawError, Svg, cell_colours};
 use super::runs::Runs;
 use crate::experiment::Analysis;
 
@@ -40,15 +40,12 @@ pub(super) fn all(runs: Runs<'_>) -> Result<Vec<Figure>, DrawError> {
 fn panel_per_run(
     runs: Runs<'_>,
     quantity: &str,
-    picture: impl Fn(&str, &Analysis) -> Result<String, DrawError>,
+    picture: impl Fn(&str, &Analysis) -> Result<Svg, DrawError>,
 ) -> Result<Vec<Panel>, DrawError> {
     runs.named()
         .map(|(name, run)| {
-            Ok(Panel {
-                svg: picture(&name, run)?,
-                title: name,
-                quantity: quantity.to_owned(),
-            })
+            let svg = picture(&name, run)?;
+            Ok(Panel::new(name, quantity, svg))
         })
         .collect()
 }

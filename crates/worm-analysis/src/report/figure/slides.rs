@@ -1,10 +1,12 @@
 //! Forward and backward slides per cycle against theory, figure 7 of the paper.
 
 use crate::experiment::{Analysis, CycleValues};
-use crate::report::number::{count, fixed, mean};
 use crate::report::page::{Figure, Key, Mark, Panel};
-use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, SHADE, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{
+    Axis, Colour, DrawError, INK, MUTED, Plot, Row, SHADE, Sheet, Stroke, Svg, cell_colours, draw,
+};
 use crate::report::runs::Runs;
+use worm_estimator::number::{count, fixed, mean};
 
 /// Half the width of a bar, in places.
 const HALF_BAR: f64 = 0.3;
@@ -122,15 +124,12 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     let mut panels = Vec::new();
     for (number, (title, places)) in groups.into_iter().enumerate() {
         let by_slope = number == 0 && runs.0.len() > 1;
-        panels.push(Panel {
-            svg: picture(&title, &places, &y, (!by_slope).then_some("cell"))?,
-            title,
-            quantity: "slide per cycle, mm: forward up, backward down".to_owned(),
-        });
+        let svg = picture(&title, &places, &y, (!by_slope).then_some("cell"))?;
+        panels.push(Panel::new(title, "slide per cycle, mm: forward up, backward down", svg));
     }
     Ok(Figure {
         id: "slides",
-        title: "How far the tips slide".to_owned(),
+        title: "How far the tips slide",
         keys: vec![
             Key::new(
                 Mark::Box,
@@ -145,7 +144,7 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     })
 }
 
-fn picture(name: &str, places: &[Place], y: &Axis, x_label: Option<&str>) -> Result<String, DrawError> {
+fn picture(name: &str, places: &[Place], y: &Axis, x_label: Option<&str>) -> Result<Svg, DrawError> {
     let sheet = Sheet {
         description: format!("Forward and backward slide per cycle, {name}"),
         x_label: x_label.map(str::to_owned),
@@ -187,8 +186,8 @@ fn caption(runs: Runs<'_>) -> String {
             fixed(-pair.backward_mm, 2)
         )
     };
-    let measured = runs.tell(|run| Some(slides(Pair::averaged(&run.mean))));
-    let theory = runs.tell(|run| {
+    let measured = runs.describe(|run| Some(slides(Pair::averaged(&run.mean))));
+    let theory = runs.describe(|run| {
         let theory = run.theory.identified.as_ref()?;
         Some(slides(Pair::averaged(&theory.values)))
     });
@@ -197,7 +196,7 @@ fn caption(runs: Runs<'_>) -> String {
     } else {
         format!("theory says for the identified worm {theory}")
     };
-    let cycles = runs.tell(|run| {
+    let cycles = runs.describe(|run| {
         let settled = run.cycles.iter().filter(|cycle| cycle.settled).count();
         Some(count(settled, "settled cycle"))
     });

@@ -1,8 +1,8 @@
 //! Axes with round ticks whose labels all have the same decimals.
 
-use crate::report::number;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
+use worm_estimator::number;
 
 /// Values beyond this are not drawn: no quantity of a worm, in mm, mJ, N or s, comes near it.
 const LARGEST: f64 = 1e9;

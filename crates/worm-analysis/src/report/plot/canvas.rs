@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::decimate;
 use super::palette::{Colour, GRID, INK, MUTED, PAPER};
-use super::raw::{Raw, TEXT, dots, text_size, text_style};
+use super::raw::{Raw, Svg, TEXT, dots, text_size, text_style};
 use plotters::prelude::{
     Cartesian2d, ChartBuilder, ChartContext, Circle, DrawingAreaErrorKind, EmptyElement, LabelAreaPosition,
     PathElement, Polygon, Rectangle, SVGBackend, Text,
@@ -161,6 +161,17 @@ impl Plot<'_, '_, '_> {
         Ok(())
     }
 
+    /// A named threshold: a dashed upright line at a place, from one height to another.
+    ///
+    /// # Errors
+    /// [`DrawError`].
+    pub fn threshold(&mut self, x: f64, y: [f64; 2], colour: Colour, name: &str) -> Result<(), DrawError> {
+        // Pale under the dashes, so that they show on a dark bar.
+        self.upright(x, y[0], y[1], Stroke::new(PAPER, 3.0))?;
+        self.upright(x, y[0], y[1], Stroke::new(INK, 1.5).dashed())?;
+        self.name_above(x, colour, name)
+    }
+
     /// Dots, of a radius in units.
     ///
     /// # Errors
@@ -316,14 +327,14 @@ impl Plot<'_, '_, '_> {
     }
 }
 
-/// Draws a sheet: `paint` is called for each row with its number, topmost first. Gives inline SVG.
+/// Draws a sheet as inline SVG: `paint` is called for each row with its number, topmost first.
 ///
 /// # Errors
 /// [`DrawError`].
 pub fn draw(
     sheet: &Sheet,
     mut paint: impl FnMut(usize, &mut Plot<'_, '_, '_>) -> Result<(), DrawError>,
-) -> Result<String, DrawError> {
+) -> Result<Svg, DrawError> {
     let rows_height: f64 = sheet.rows.iter().map(|row| row.height + BETWEEN_ROWS).sum();
     let longest_name = sheet.rows.iter().map(|row| row.y.longest_name()).max().unwrap_or(0);
     let left = (NAME_CHARACTER * longest_name as f64 + BESIDE_NAME).clamp(LEFT, 0.5 * WIDTH);

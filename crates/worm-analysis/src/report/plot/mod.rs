@@ -15,7 +15,8 @@ mod tests;
 pub use axis::Axis;
 pub use canvas::{DrawError, Plot, Row, Sheet, Stroke, draw};
 pub use palette::{
-    ACCENT, BLUE, Colour, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, VERMILION, cell_colours, css, diverging,
+    ACCENT, BLUE, Colour, GOOD, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, VERMILION, cell_colours, css, diverging,
 };
 
 pub(super) use raw::Raw;
+pub use raw::Svg;

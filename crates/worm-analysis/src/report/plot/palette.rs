@@ -19,6 +19,8 @@ pub const MID: Colour = RGBColor(0x83, 0x98, 0xab);
 pub const LIGHT: Colour = RGBColor(0xc4, 0xd0, 0xda);
 /// What is to be seen first among them.
 pub const ACCENT: Colour = RGBColor(0xc8, 0x10, 0x2e);
+/// What reaches its aim; as dark as [`ACCENT`], so the two are told apart by words, too.
+pub const GOOD: Colour = RGBColor(0x00, 0x73, 0x4f);
 /// The ground.
 pub const PAPER: Colour = RGBColor(0xff, 0xff, 0xff);
 

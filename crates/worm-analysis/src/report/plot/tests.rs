@@ -11,7 +11,7 @@ fn picture(paint: impl Fn(&mut Plot<'_, '_, '_>) -> Result<(), DrawError>) -> St
         x: Axis::between(0.0, 10.0, 5),
         rows: vec![Row::new(Axis::between(-1.0, 1.0, 2), 100.0)],
     };
-    draw(&sheet, |_, plot| paint(plot)).expect("a picture")
+    draw(&sheet, |_, plot| paint(plot)).expect("a picture").into_string()
 }
 
 #[test]
