@@ -1,4 +1,4 @@
-//! The head of the page: the answer, large, against what it aims at.
+//! The head of the page: the most important values, large, against their aims.
 
 use super::words::{NOT_MEASURED, duration, times, with_unit};
 use crate::latency::{Durations, Outcome, Percentiles, ratio};

@@ -1,15 +1,14 @@
 //! The report: one page with every figure and table of an experiment, and its series as CSV.
 //!
-//! [`write()`] takes what the analysis found on one recording, or on several of one worm, and leaves a directory with
+//! [`write()`] takes what the analysis found on one recording, or on several of one worm, and writes a directory with
 //! `report.html`, a file that fetches nothing and can be passed on as it is, and beside it `series.csv` and `cycles.csv`; with
-//! several runs these stand in `run-1`, `run-2`, … in the order given.
+//! several runs these are in `run-1`, `run-2`, … in the order given.
 //!
-//! # The map, in reading order
-//! - [`number`]: numbers as people read them.
+//! # Modules, in reading order
 //! - [`plot`]: pictures as inline SVG; what is not finite is never drawn.
-//! - [`page`], [`table`] and `tile`: the page, its style, figures, tables and large figures. These know nothing of worms.
-//! - `runs`, `figure`, `summary`, `tables`: what this report shows.
-//! - `sheets` and `file`: the CSV, and how files are replaced.
+//! - [`page`]: the page, its figures, tables and tiles. Neither knows anything of worms.
+//! - `runs`, `summary`, `figure`, `tables`: the contents of this report.
+//! - `sheets` and [`file`]: the CSV, and how files are replaced.
 //! - [`explain`]: another page, on the search for the effect that the model misses.
 
 pub mod explain;
@@ -33,10 +32,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use worm_estimator::number::in_words;
 
-/// Why there is no report.
+/// Why a report could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// There is nothing to report on.
+    /// There is no run to report on.
     #[error("a report needs at least one analysed recording: give one")]
     NoRuns,
     /// The runs are not of one worm.
@@ -54,11 +53,11 @@ pub enum ReportError {
     /// A directory or file cannot be written.
     #[error("{}: {problem}: {source}: {remedy}", path.display())]
     File {
-        /// Which.
+        /// Its path.
         path: PathBuf,
         /// What went wrong.
         problem: &'static str,
-        /// What the operating system said.
+        /// The operating system's error.
         source: io::Error,
         /// What to do.
         remedy: &'static str,
@@ -74,7 +73,7 @@ pub enum ReportError {
     Json(#[from] serde_json::Error),
 }
 
-/// What was written.
+/// The files of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     /// The page.
@@ -83,7 +82,7 @@ pub struct Written {
     pub sheets: Vec<PathBuf>,
 }
 
-/// Writes the report on the runs of one worm into a directory, which is made if need be. Files of an earlier report are
+/// Writes the report on the runs of one worm into a directory, which is made if necessary. Files of an earlier report are
 /// replaced, each at once; other files are left alone.
 ///
 /// # Errors
@@ -123,7 +122,7 @@ pub fn text(runs: &[Analysis]) -> String {
     [&[summary::lead(runs)], &tables[..]].concat().join("\n\n")
 }
 
-/// Makes the directory of a report and tries whether it can be written, so that nobody waits for an analysis in vain.
+/// Makes the directory of a report and checks that it can be written, before a long analysis.
 ///
 /// # Errors
 /// [`ReportError::File`].

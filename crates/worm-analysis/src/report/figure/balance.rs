@@ -33,9 +33,9 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
         rows: vec![Row::new(Axis::around(heights, 5), 200.0)],
     };
     draw(&sheet, |_, plot| {
-        plot.level(0.0, Stroke::new(MUTED, 0.75))?;
+        plot.horizontal_line(0.0, Stroke::new(MUTED, 0.75))?;
         plot.line(force(), Stroke::new(MID, 0.9))?;
-        plot.level(run.momentum_violation_n, Stroke::new(INK, 1.5).dashed())
+        plot.horizontal_line(run.momentum_violation_n, Stroke::new(INK, 1.5).dashed())
     })
 }
 
@@ -53,7 +53,7 @@ fn caption(runs: Runs<'_>) -> String {
         Some(format!("{} N", fixed(mean(&squares).sqrt(), 3)))
     });
     format!(
-        "kt Σδ + m g sin λ, the force that equation (5) wants to vanish in the mean: a worm that rests between its steps gains \
+        "kt Σδ + m g sin λ, the force whose mean vanishes by equation (5): a worm that rests between its steps gains \
          no momentum. Mean over whole cycles, with the configured mass: {balance}. About it the force scatters by {worst} (root \
          mean square), from noise in the positions and from what the model leaves out."
     )

@@ -13,7 +13,7 @@ use worm_estimator::number::{fixed, list_or_range, mean};
 const DOTS: usize = 150;
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let panels = panel_per_run(runs, "way since the cycle began, mm", picture)?;
+    let panels = panel_per_run(runs, "displacement since the cycle began, mm", picture)?;
     let mut keys = cell_keys(runs.cells(), Mark::Thick);
     keys.extend([
         Key::new(Mark::Line, MUTED, "thin: the tip sticks"),
@@ -47,7 +47,7 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
         lines.chain(measured(cell)).map(|(_, mm)| mm)
     });
     let sheet = Sheet {
-        description: format!("Way of each cell over {} at {name}", window.name()),
+        description: format!("Displacement of each cell over {} at {name}", window.name()),
         x_label: Some("time since the cycle began, s".to_owned()),
         x: window.time_axis(),
         rows: vec![Row::new(Axis::around(heights, 6), 330.0)],
@@ -55,7 +55,7 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let colours = cell_colours(run.cells);
     draw(&sheet, |_, plot| {
         window.draw_steps(plot, &colours, true)?;
-        plot.level(0.0, Stroke::new(MUTED, 0.75))?;
+        plot.horizontal_line(0.0, Stroke::new(MUTED, 0.75))?;
         for (cell, &colour) in colours.iter().enumerate() {
             let every = window.samples.len().div_ceil(DOTS).max(1);
             plot.dots(
@@ -76,7 +76,7 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     })
 }
 
-/// Marks where each stepping cell has made twice its first estimate: it loads from −δmax to δmax before it slides.
+/// Marks where each stepping cell has moved by twice its first estimate: it loads from −δmax to δmax before it slides.
 fn draw_onsets(
     plot: &mut Plot<'_, '_, '_>,
     window: &Window<'_>,
@@ -119,9 +119,9 @@ fn caption(runs: Runs<'_>) -> String {
     let without = runs.without_theory();
     format!(
         "After figure 4 of the paper; shown: {shown}. While a cell steps, the others are pushed back; as a rule they rest as \
-         soon as it slides forward. The ring marks where the stepping cell has made twice its first estimate, the way from −δmax \
-         to δmax (first estimates, cell 1 first: {first}). The lines are theory's path, fitted to the positions, with what worm \
-         and canal drift from it; the dots say how well it fits{without}.{apart}"
+         soon as it slides forward. The ring marks where the stepping cell has moved by twice its first estimate, from −δmax \
+         to δmax (first estimates, cell 1 first: {first}). The lines are theory's path, fitted to the positions, plus the drift of worm \
+         and canal from it; the dots show how well it fits{without}.{apart}"
     )
 }
 

@@ -1,12 +1,11 @@
 //! Contact points of the tips, figure 5 of the paper.
 
 use super::window::{Window, of_cell};
-use super::{cell_keys, panel_per_run};
+use super::{cell_keys, panel_per_run, slides_in_words};
 use crate::experiment::Analysis;
 use crate::report::page::{Figure, Key, Mark};
 use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
-use worm_estimator::number::{fixed, mean};
 
 /// Cycles shown.
 const CYCLES: usize = 3;
@@ -46,16 +45,10 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
 
 fn caption(runs: Runs<'_>) -> String {
     let shown = runs.describe(|run| Some(Window::of_cycles(run, CYCLES).name()));
-    let slides = runs.describe(|run| {
-        Some(format!(
-            "{} mm forward and {} mm backward",
-            fixed(mean(&run.mean.forward_slide_m) * 1e3, 2),
-            fixed(mean(&run.mean.backward_slide_m) * 1e3, 2)
-        ))
-    });
+    let slides = runs.describe(|run| Some(slides_in_words(&run.mean)));
     format!(
         "After figure 5 of the paper; shown: {shown}. A level line is a tip that sticks; a rise is a tip that slides forward \
-         in its own step; a fall is one that is pushed or pulled back over the canal. A tip slides per cycle, in the mean over \
+         in its own step; a fall is one that is pushed or pulled back over the canal. Slides of a tip per cycle, averaged over \
          the cells: {slides}."
     )
 }

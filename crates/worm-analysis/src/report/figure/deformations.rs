@@ -10,7 +10,7 @@ use worm_estimator::number::list_or_range;
 
 /// Cycles shown.
 const CYCLES: usize = 2;
-/// Height of all strips together, and the least and most that one may have, units.
+/// Height of all strips together, and the smallest and largest of one, units.
 const ALL_STRIPS: f64 = 330.0;
 const STRIP: [f64; 2] = [42.0, 100.0];
 
@@ -44,7 +44,7 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
             .map(|(_, mm)| mm)
             .chain([bound_mm(cell), -bound_mm(cell)])
     });
-    // One scale for all strips, so that a softer or weaker tip is seen to be one.
+    // One scale for all strips, so that a softer or weaker tip stands out.
     let y = Axis::around(heights, 4);
     let height = (ALL_STRIPS / run.cells.max(1) as f64).clamp(STRIP[0], STRIP[1]);
     let strip = |(cell, colour): (usize, &_)| Row {
@@ -60,10 +60,10 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     };
     draw(&sheet, |cell, plot| {
         window.draw_steps(plot, &colours, cell == 0)?;
-        plot.level(0.0, Stroke::new(MUTED, 0.75))?;
+        plot.horizontal_line(0.0, Stroke::new(MUTED, 0.75))?;
         let colour = colours[cell];
         for bound_mm in [bound_mm(cell), -bound_mm(cell)] {
-            plot.level(bound_mm, Stroke::new(colour, 0.9).dashed())?;
+            plot.horizontal_line(bound_mm, Stroke::new(colour, 0.9).dashed())?;
         }
         plot.line(deformation(cell), Stroke::new(colour, 1.2))?;
         plot.line(window.where_sliding(cell, deformation(cell)), Stroke::new(colour, 3.6))

@@ -50,7 +50,7 @@ fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     })
 }
 
-/// Where the hindmost cell is first seen: the figure counts from there, for the zero of a tracker says nothing.
+/// Where the hindmost cell is first seen: the figure counts from there, because the zero of a tracker is arbitrary.
 fn origin_m(run: &Analysis) -> f64 {
     let window = Window::whole(run);
     let firsts = (0..run.cells).map(|cell| window.origin(of_cell(&run.series.position_m, cell)));
@@ -80,7 +80,7 @@ fn caption(runs: Runs<'_>) -> String {
     let gaps = if seen.is_empty() {
         String::new()
     } else {
-        format!(" Not seen were {seen} of the positions; there the pale trace breaks.")
+        format!(" The tracker missed {seen} of the positions; there the pale trace breaks.")
     };
     format!(
         "After figure 3 of the paper. Once in a cycle each cell steps forward relative to the others; in their steps it is pushed \

@@ -1,4 +1,4 @@
-//! Advance and energy over the cycles: does anything drift?
+//! Advance and energy over the cycles, to show any drift.
 
 use super::energy::METHODS;
 use super::panel_per_run;
@@ -69,7 +69,7 @@ fn draw_trend(
     of: impl Fn(&CycleResult) -> f64,
 ) -> Result<(), DrawError> {
     let points = || run.cycles.iter().map(|cycle| (cycle.index as f64 + 1.0, of(cycle)));
-    plot.level(mean, Stroke::new(colour, 1.2).dashed())?;
+    plot.horizontal_line(mean, Stroke::new(colour, 1.2).dashed())?;
     plot.line(points(), Stroke::new(colour, 1.4))?;
     for (cycle, (x, y)) in run.cycles.iter().zip(points()) {
         if cycle.settled {

@@ -1,8 +1,8 @@
-//! Pictures for a page: inline SVG of one style, over `plotters`.
+//! Pictures for a page: inline SVG in one style, drawn by `plotters`.
 //!
 //! A picture is a [`Sheet`] with one or more [`Row`]s, drawn by [`draw`] through a [`Plot`], which knows lines, dots, bands,
-//! bars and marks. Whatever is drawn may hold gaps: `NaN` breaks a line and draws nothing, so that no picture ever holds a
-//! coordinate that is not one. Lines are thinned to what the picture can show.
+//! bars and marks. Data may have gaps: `NaN` breaks a line and draws nothing, so no picture holds a coordinate that is not
+//! finite. Lines are thinned to what the picture can show.
 
 mod axis;
 mod canvas;

@@ -23,12 +23,12 @@ pub(super) fn dots(units: f64) -> i32 {
     (units * DOTS).round() as i32
 }
 
-/// Height of text as `plotters` wants it.
+/// Height of text for `plotters`.
 pub(super) fn text_size() -> f64 {
     TEXT * DOTS * TEXT_FACTOR
 }
 
-/// The style of text, and where it stands from its place.
+/// The style of text, and its alignment to its place.
 pub(super) fn text_style(colour: Colour, horizontal: HPos, vertical: VPos, bold: bool) -> TextStyle<'static> {
     let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
     ("sans-serif", text_size(), style)
@@ -88,10 +88,10 @@ impl Raw<'_> {
         Ok(())
     }
 
-    /// Words at a place.
-    pub(super) fn words(&self, place: (f64, f64), words: &str, style: TextStyle<'_>) -> Result<(), DrawError> {
+    /// Text at a place.
+    pub(super) fn text(&self, place: (f64, f64), text: &str, style: TextStyle<'_>) -> Result<(), DrawError> {
         let place = (dots(place.0), dots(place.1));
-        self.area.draw(&Text::new(words.to_owned(), place, style))?;
+        self.area.draw(&Text::new(text.to_owned(), place, style))?;
         Ok(())
     }
 }

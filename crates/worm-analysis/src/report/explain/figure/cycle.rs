@@ -101,7 +101,7 @@ fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[
                 MUTED,
                 SCATTER,
             )?;
-            plot.level(0.0, Stroke::new(INK, 1.2))?;
+            plot.horizontal_line(0.0, Stroke::new(INK, 1.2))?;
             for (line, residual) in lines(run).into_iter().zip(&residuals) {
                 plot.line(at_phases(residual.clone()), line.stroke)?;
             }
@@ -178,6 +178,6 @@ fn worst_m(run: &CycleSeries, model_m: &[f64]) -> Option<f64> {
     let off_mm = minus_measured_mm(run, model_m).into_iter().map(f64::abs);
     let known_m = off_mm
         .map(|off_mm| off_mm * 1e-3)
-        .filter(|off_m| Axis::can_show(*off_m));
+        .filter(|off_m| Axis::is_drawable(*off_m));
     known_m.reduce(f64::max)
 }

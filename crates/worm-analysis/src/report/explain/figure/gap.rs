@@ -74,7 +74,7 @@ fn picture(bars: &[(StageView, &Stage)], floor: Option<&Stage>) -> Result<Svg, D
         .iter()
         .map(|(_, stage)| stage.held_out_rms_m * 1e3)
         .chain([floor_mm]);
-    let longest_mm = values_mm.filter(|mm| Axis::can_show(*mm)).fold(0.0, f64::max);
+    let longest_mm = values_mm.filter(|mm| Axis::is_drawable(*mm)).fold(0.0, f64::max);
     let values = bars
         .iter()
         .map(|(view, stage)| format!("{} {}", view.with_effect(stage), mm(stage.held_out_rms_m)));
@@ -94,10 +94,10 @@ fn picture(bars: &[(StageView, &Stage)], floor: Option<&Stage>) -> Result<Svg, D
             let row = (bars.len() - 1 - number) as f64;
             let value_mm = stage.held_out_rms_m * 1e3;
             if let Some(effect) = &stage.effect {
-                plot.words_behind(beside_floor_mm, row - BELOW, MUTED, &shortened(effect))?;
+                plot.text_beside(beside_floor_mm, row - BELOW, MUTED, &shortened(effect))?;
             }
-            if !Axis::can_show(value_mm) {
-                plot.words_behind(0.0, row, MUTED, "not known")?;
+            if !Axis::is_drawable(value_mm) {
+                plot.text_beside(0.0, row, MUTED, "not known")?;
                 continue;
             }
             let (along, across) = ([0.0, value_mm], [row - HALF_BAR, row + HALF_BAR]);
@@ -105,7 +105,7 @@ fn picture(bars: &[(StageView, &Stage)], floor: Option<&Stage>) -> Result<Svg, D
                 (Mark::Frame, colour) => plot.edge(along, across, Stroke::new(colour, 1.5))?,
                 (_, colour) => plot.fill(along, across, colour, 1.0)?,
             }
-            plot.words_behind(value_mm, row, INK, &format!("{} mm", fixed(value_mm, 3)))?;
+            plot.text_beside(value_mm, row, INK, &format!("{} mm", fixed(value_mm, 3)))?;
         }
         let height = [-0.5, bars.len() as f64 - 0.5];
         plot.threshold(floor_mm, height, INK, &format!("floor {}", fixed(floor_mm, 3)))

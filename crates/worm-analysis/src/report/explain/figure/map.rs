@@ -23,7 +23,7 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let figures = &answer.figures;
     let maps = figures.maps_before.iter().chain(&figures.maps_after);
     let values_m = maps.flat_map(|map| map.residual_m.iter().flatten().copied());
-    let known_m = values_m.map(f64::abs).filter(|value_m| Axis::can_show(*value_m));
+    let known_m = values_m.map(f64::abs).filter(|value_m| Axis::is_drawable(*value_m));
     let largest_m = known_m.fold(0.0, f64::max);
     let colours = cell_colours(cells(answer));
     let names = names_by_slope(figures.maps_before.iter().map(|map| map.slope_deg));
@@ -102,7 +102,11 @@ fn paint(plot: &mut Plot<'_, '_, '_>, map: &ResidualMap, cells: usize, largest_m
             } else {
                 residual_m
             };
-            let fraction = if Axis::can_show(residual_m) { fraction } else { f64::NAN };
+            let fraction = if Axis::is_drawable(residual_m) {
+                fraction
+            } else {
+                f64::NAN
+            };
             let colour = if fraction.is_nan() { LIGHT } else { diverging(fraction) };
             plot.fill(ends, [row - 0.5, row + 0.5], colour, 1.0)?;
             let sigma = significance.get(bin).map_or(0.0, |sigma| sigma.abs());
@@ -134,7 +138,7 @@ fn name_steps(
     let long = |cell: usize| format!("cell {cell} steps");
     let is_long = plot.has_room(narrowest, long(cells).chars().count());
     for (cell, ends) in steps {
-        plot.upright(ends[1], -0.5, cells as f64 - 0.5, Stroke::new(INK, 1.0))?;
+        plot.vertical_line(ends[1], -0.5, cells as f64 - 0.5, Stroke::new(INK, 1.0))?;
         if named {
             let colour = cell
                 .checked_sub(1)
@@ -142,7 +146,7 @@ fn name_steps(
                 .copied()
                 .unwrap_or(INK);
             let name = if is_long { long(cell) } else { cell.to_string() };
-            plot.name_above(0.5 * (ends[0] + ends[1]), colour, &name)?;
+            plot.label_above(0.5 * (ends[0] + ends[1]), colour, &name)?;
         }
     }
     Ok(())

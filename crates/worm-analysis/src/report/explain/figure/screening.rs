@@ -72,7 +72,7 @@ fn picture(answer: &Answer) -> Result<Svg, DrawError> {
         for (number, bar) in bars.iter().enumerate() {
             let row = (bars.len() - 1 - number) as f64;
             if !is_visible(bar) {
-                plot.words_behind(MIN_IMPROVEMENT, row, MUTED, &outcome(bar))?;
+                plot.text_beside(MIN_IMPROVEMENT, row, MUTED, &outcome(bar))?;
                 continue;
             }
             let colour = match bar.improvement {
@@ -87,7 +87,7 @@ fn picture(answer: &Answer) -> Result<Svg, DrawError> {
             } else {
                 plot.fill(along, across, colour, 1.0)?;
             }
-            plot.words_behind(end, row, INK, &significant(reached(bar), 2))?;
+            plot.text_beside(end, row, INK, &significant(reached(bar), 2))?;
         }
         let invisible = bars.iter().filter(|bar| !is_visible(bar)).count() as f64;
         let height = [invisible - 0.5, bars.len() as f64 - 0.5];
