@@ -3,8 +3,6 @@
 #[cfg(feature = "analysis")]
 pub mod analyze;
 pub mod check;
-#[cfg(feature = "analysis")]
-mod columns;
 pub mod control;
 #[cfg(feature = "analysis")]
 mod dataset;

@@ -280,7 +280,7 @@ fn runs(figures: &Figures, is_named: bool) -> Vec<RunSummary> {
     figures.cycles.iter().map(run).collect()
 }
 
-fn calibration() -> Vec<Calibrated> {
+pub fn calibration() -> Vec<Calibrated> {
     let value = |name: &str, nominal, found, sigma, unit, at_limit| Calibrated {
         name: name.to_owned(),
         nominal,

@@ -1,95 +1,45 @@
 //! Where model and data disagree: a map for each run, cell by phase, before and after.
 
-use super::words::{self, mm};
+use super::super::view::{cells, named_model};
 use crate::explain::Answer;
-use crate::explain::answer::{Place, ResidualMap};
-use crate::report::number::{count, fixed};
-use crate::report::page::{Figure, Key, Mark, Page, Panel};
+use crate::explain::answer::ResidualMap;
+use crate::report::page::{Figure, Key, Mark, Panel};
 use crate::report::plot::{
-    Axis, Colour, DrawError, INK, LIGHT, MUTED, PAPER, Plot, Row, Sheet, Stroke, cell_colours, diverging, draw,
+    Axis, Colour, DrawError, INK, LIGHT, MUTED, PAPER, Plot, Row, Sheet, Stroke, Svg, cell_colours, diverging, draw,
 };
-use crate::report::runs::{names_by_slope, slope};
-use crate::report::table::Table;
+use crate::report::runs::names_by_slope;
+use worm_estimator::number::{count, fixed};
 
 /// Standard errors from which a bin is marked, and from which it is marked strongly.
-pub(super) const SEEN: f64 = 3.0;
-const PLAIN: f64 = 5.0;
-/// Height of a cell's row, units, and the least of a map.
+const SIGNIFICANT: f64 = 3.0;
+const VERY_SIGNIFICANT: f64 = 5.0;
+/// Height of a cell's row, units, and the smallest of a map.
 const ROW: f64 = 30.0;
-const LEAST: f64 = 80.0;
-/// Share of the scale from which a mark on it must be white to be seen.
+const MIN_HEIGHT: f64 = 80.0;
+/// Fraction of the scale from which a mark must be white to be visible.
 const DARK: f64 = 0.7;
-/// Most places that the table lists.
-const MAX_PLACES: usize = 24;
 
-pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
-    if answer.is_by_advances() {
-        page.paragraph("Advances tell that there is a gap, and on which slopes; in which cell and when, only recorded positions do.");
-        return Ok(());
-    }
-    page.paragraph(&told(answer));
-    let maps = &answer.figures.maps_before;
-    if maps.iter().all(|map| map.phase.is_empty()) {
-        page.paragraph("There is no map: the answer holds no residual by cell and phase.");
-    } else {
-        page.figure(&figure(answer)?);
-    }
-    if !answer.r#where.is_empty() {
-        page.table(&table(&answer.r#where));
-    }
-    Ok(())
-}
-
-/// The largest disagreement in words.
-fn told(answer: &Answer) -> String {
-    let Some(first) = answer.r#where.first() else {
-        return "No place is listed where the recalibrated model and the data disagree by more than chance.".to_owned();
-    };
-    let way = if first.residual_m < 0.0 { "less far" } else { "further" };
-    format!(
-        "Most clearly on {}: while cell {} steps, at phase {} of the gait cycle, cell {} gets {} {way} than the model has it, in \
-         the mean over the cycles; that is {} times the standard error.",
-        slope_in_words(first.slope_deg),
-        first.stepping_cell,
-        fixed(first.phase, 2),
-        first.cell,
-        mm(first.residual_m.abs()),
-        fixed(first.significance.abs(), 0)
-    )
-}
-
-fn slope_in_words(slope_deg: f64) -> String {
-    if slope_deg == 0.0 {
-        "the level".to_owned()
-    } else {
-        format!("the slope of {}", slope(slope_deg))
-    }
-}
-
-fn figure(answer: &Answer) -> Result<Figure, DrawError> {
+pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let figures = &answer.figures;
     let maps = figures.maps_before.iter().chain(&figures.maps_after);
     let values_m = maps.flat_map(|map| map.residual_m.iter().flatten().copied());
-    let known_m = values_m.map(f64::abs).filter(|value_m| Axis::can_show(*value_m));
+    let known_m = values_m.map(f64::abs).filter(|value_m| Axis::is_drawable(*value_m));
     let largest_m = known_m.fold(0.0, f64::max);
-    let colours = cell_colours(words::cells(answer));
+    let colours = cell_colours(cells(answer));
     let names = names_by_slope(figures.maps_before.iter().map(|map| map.slope_deg));
     let mut panels = Vec::new();
     for (number, (name, before)) in names.into_iter().zip(&figures.maps_before).enumerate() {
         let after = figures.maps_after.get(number);
         let quantity = match after {
-            Some(_) => format!("above: recalibrated; below: {}", words::named_model(answer)),
+            Some(_) => format!("above: recalibrated; below: {}", named_model(answer)),
             None => "recalibrated model".to_owned(),
         };
-        panels.push(Panel {
-            svg: picture(&name, before, after, largest_m, &colours)?,
-            title: name,
-            quantity,
-        });
+        let svg = picture(&name, before, after, largest_m, &colours)?;
+        panels.push(Panel::new(name, quantity, svg));
     }
     Ok(Figure {
         id: "map",
-        title: "Which cell is not where the model has it, and when".to_owned(),
+        title: "Which cell is not where the model has it, and when",
         keys: keys(largest_m),
         panels,
         caption: caption(answer),
@@ -105,8 +55,8 @@ fn keys(largest_m: f64) -> Vec<Key> {
         step(0.0, "0".to_owned()),
         step(0.5, format!("+{}", mm(0.5))),
         step(1.0, format!("+{} mm: ahead of the model", mm(1.0))),
-        Key::new(Mark::Dot, MUTED, format!("from {SEEN} standard errors")),
-        Key::new(Mark::Diamond, INK, format!("from {PLAIN} standard errors")),
+        Key::new(Mark::Dot, MUTED, format!("from {SIGNIFICANT} standard errors")),
+        Key::new(Mark::Diamond, INK, format!("from {VERY_SIGNIFICANT} standard errors")),
     ]
 }
 
@@ -116,10 +66,10 @@ fn picture(
     after: Option<&ResidualMap>,
     largest_m: f64,
     colours: &[Colour],
-) -> Result<String, DrawError> {
+) -> Result<Svg, DrawError> {
     let maps: Vec<&ResidualMap> = std::iter::once(before).chain(after).collect();
     let cells = maps.iter().map(|map| map.residual_m.len()).max().unwrap_or(0).max(1);
-    let height = (ROW * cells as f64).max(LEAST);
+    let height = (ROW * cells as f64).max(MIN_HEIGHT);
     let row = |label: &str| Row {
         label: (maps.len() > 1).then(|| (label.to_owned(), INK)),
         ..Row::new(
@@ -129,7 +79,7 @@ fn picture(
     };
     let sheet = Sheet {
         description: description(name, before, after),
-        x_label: Some("gait phase, share of a cycle".to_owned()),
+        x_label: Some("gait phase, fraction of a cycle".to_owned()),
         x: Axis::between(0.0, 1.0, 5),
         rows: ["old", "new"][..maps.len()].iter().map(|label| row(label)).collect(),
     };
@@ -152,15 +102,19 @@ fn paint(plot: &mut Plot<'_, '_, '_>, map: &ResidualMap, cells: usize, largest_m
             } else {
                 residual_m
             };
-            let fraction = if Axis::can_show(residual_m) { fraction } else { f64::NAN };
+            let fraction = if Axis::is_drawable(residual_m) {
+                fraction
+            } else {
+                f64::NAN
+            };
             let colour = if fraction.is_nan() { LIGHT } else { diverging(fraction) };
             plot.fill(ends, [row - 0.5, row + 0.5], colour, 1.0)?;
             let sigma = significance.get(bin).map_or(0.0, |sigma| sigma.abs());
             let mark = if fraction.abs() > DARK { PAPER } else { INK };
             let middle = 0.5 * (ends[0] + ends[1]);
-            if sigma >= PLAIN {
+            if sigma >= VERY_SIGNIFICANT {
                 plot.diamond(middle, row, INK)?;
-            } else if sigma >= SEEN {
+            } else if sigma >= SIGNIFICANT {
                 plot.dots([(middle, row)], mark, 2.2)?;
             }
         }
@@ -168,7 +122,7 @@ fn paint(plot: &mut Plot<'_, '_, '_>, map: &ResidualMap, cells: usize, largest_m
     Ok(())
 }
 
-/// Parts the steps by upright lines and says above which cell makes each.
+/// Separates the steps by upright lines and names above each the cell that steps.
 fn name_steps(
     plot: &mut Plot<'_, '_, '_>,
     map: &ResidualMap,
@@ -184,7 +138,7 @@ fn name_steps(
     let long = |cell: usize| format!("cell {cell} steps");
     let is_long = plot.has_room(narrowest, long(cells).chars().count());
     for (cell, ends) in steps {
-        plot.upright(ends[1], -0.5, cells as f64 - 0.5, Stroke::new(INK, 1.0))?;
+        plot.vertical_line(ends[1], -0.5, cells as f64 - 0.5, Stroke::new(INK, 1.0))?;
         if named {
             let colour = cell
                 .checked_sub(1)
@@ -192,7 +146,7 @@ fn name_steps(
                 .copied()
                 .unwrap_or(INK);
             let name = if is_long { long(cell) } else { cell.to_string() };
-            plot.name_above(0.5 * (ends[0] + ends[1]), colour, &name)?;
+            plot.label_above(0.5 * (ends[0] + ends[1]), colour, &name)?;
         }
     }
     Ok(())
@@ -210,7 +164,7 @@ pub(super) fn steps(map: &ResidualMap) -> Vec<(usize, [f64; 2])> {
     steps
 }
 
-/// The ends of bins of which the middles are known: they touch, and fill the cycle.
+/// The ends of bins with these middles: they touch, and fill the cycle.
 fn edges(middles: &[f64]) -> Vec<[f64; 2]> {
     let between: Vec<f64> = middles.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
     let starts = std::iter::once(0.0).chain(between.iter().copied());
@@ -225,13 +179,13 @@ fn edges(middles: &[f64]) -> Vec<[f64; 2]> {
 fn description(name: &str, before: &ResidualMap, after: Option<&ResidualMap>) -> String {
     let standing_out = |map: &ResidualMap| {
         let sigmas = map.significance.iter().flatten();
-        count(sigmas.filter(|sigma| sigma.abs() >= SEEN).count(), "bin")
+        count(sigmas.filter(|sigma| sigma.abs() >= SIGNIFICANT).count(), "bin")
     };
     let after = after.map_or_else(String::new, |map| {
         format!(", with the named model {}", standing_out(map))
     });
     format!(
-        "Map of the residual by cell and gait phase at {name}: with the recalibrated model {} beyond {SEEN} standard errors{after}",
+        "Map of the residual by cell and gait phase at {name}: with the recalibrated model {} beyond {SIGNIFICANT} standard errors{after}",
         standing_out(before)
     )
 }
@@ -243,35 +197,8 @@ fn caption(answer: &Answer) -> String {
         " Below, on the same scale, what the named model leaves: the paler and the less marked, the better it explains the data."
     };
     format!(
-        "Way that each cell makes beyond the model's in a part of the gait cycle, mean over the cycles. Columns are grouped by the \
-         cell that steps. With normal errors, chance reaches {SEEN} standard errors in about one bin of 370, and {PLAIN} in one \
+        "How much further each cell moves than the model predicts in a part of the gait cycle, mean over the cycles. Columns are \
+         grouped by the cell that steps. With normal errors, chance reaches {SIGNIFICANT} standard errors in about one bin of 370, and {VERY_SIGNIFICANT} in one \
          of nearly two million.{after}"
     )
-}
-
-/// Places of disagreement; also what nothing explains is listed so.
-pub(super) fn table(places: &[Place]) -> Table {
-    let head = [
-        "cell",
-        "while this cell steps",
-        "gait phase",
-        "slope",
-        "way beyond the model's, mm a cycle",
-        "in standard errors",
-    ];
-    let mut table = Table::new("Where model and data disagree, the clearest first", head);
-    table.word_columns = 2;
-    for place in places.iter().take(MAX_PLACES) {
-        table.rows.push(vec![
-            format!("cell {}", place.cell),
-            format!("cell {}", place.stepping_cell),
-            fixed(place.phase, 2),
-            slope(place.slope_deg),
-            fixed(place.residual_m * 1e3, 3),
-            fixed(place.significance, 1),
-        ]);
-    }
-    table.note = (places.len() > MAX_PLACES)
-        .then(|| format!("{} more in report.json.", count(places.len() - MAX_PLACES, "place")));
-    table
 }

@@ -1,9 +1,8 @@
-//! Effects, parameters and cells in words, and quantities in the units that people read.
+//! Parameters in the units that people read, and what the library says of an effect.
 
 use crate::explain::Answer;
-pub(super) use crate::explain::answer::with_cell;
-use crate::explain::answer::{FoundParameter, NamedEffect};
-use crate::report::number::{fixed, in_words, to_error};
+use crate::explain::answer::FoundParameter;
+use worm_estimator::number::{fixed, to_error};
 use worm_physics::effect::{self, Parameter};
 
 /// A unit of files as people read it: the factor to it, and its name.
@@ -34,23 +33,23 @@ const ENDINGS: [(&str, &str); 9] = [
 ];
 
 /// A parameter as people read it.
-pub(super) struct Quantity {
-    /// What it is called, without its unit.
+pub(super) struct ParameterView {
+    /// Its name, without its unit.
     pub name: String,
     /// Its value, with its error behind ` ± ` where that is known.
     pub value: String,
     /// The unit of both.
     pub unit: String,
-    /// What it is; empty where the library does not know it.
+    /// What it is; empty where the library does not have it.
     pub about: &'static str,
 }
 
-impl Quantity {
+impl ParameterView {
     /// A parameter of an effect.
     pub fn of(effect: &str, found: &FoundParameter) -> Self {
         let known = in_library(effect, &found.name);
         let (factor, unit) = match (&*found.unit, known) {
-            // What does nothing at 1 is a factor; what does nothing at 0 is a share.
+            // Neutral at 1, it is a factor; neutral at 0, a fraction.
             ("", Some(parameter)) if parameter.neutral == 0.0 => (100.0, "%"),
             ("", Some(_)) => (1.0, "×"),
             (unit, _) => readable(unit),
@@ -78,33 +77,18 @@ fn in_library(effect: &str, parameter: &str) -> Option<&'static Parameter> {
     effect.parameters.iter().find(|known| known.name == parameter)
 }
 
-/// What an effect is, in a sentence; empty where the library does not know it.
-pub(super) fn sentence(name: &str) -> &'static str {
+/// What an effect is, in a sentence; empty where the library does not have it.
+pub(super) fn library_sentence(name: &str) -> &'static str {
     effect::named(name).map_or("", |effect| effect.sentence)
 }
 
-/// What an effect does, as a formula; empty where the library does not know it.
+/// What an effect does, as a formula; empty where the library does not have it.
 pub(super) fn formula(name: &str) -> &'static str {
     effect::named(name).map_or("", |effect| effect.formula)
 }
 
-/// Several effects in words, in their order.
-pub(super) fn names<'a>(effects: impl IntoIterator<Item = &'a NamedEffect>) -> String {
-    let names: Vec<String> = effects.into_iter().map(NamedEffect::in_words).collect();
-    in_words(&names)
-}
-
-/// The model with the named effects in it, in words; that of the best candidate where there are several.
-pub(super) fn named_model(answer: &Answer) -> String {
-    if answer.effects.is_empty() {
-        "the named model".to_owned()
-    } else {
-        format!("with {}", names(&answer.effects))
-    }
-}
-
 /// Cells of the worm, as far as the answer shows them.
-pub(super) fn cells(answer: &Answer) -> usize {
+pub(in crate::report::explain) fn cells(answer: &Answer) -> usize {
     let maps = answer.figures.maps_before.iter().chain(&answer.figures.maps_after);
     let mapped = maps.map(|map| map.stepping_cell.iter().copied().fold(map.residual_m.len(), usize::max));
     let places = answer.r#where.iter().map(|place| place.cell.max(place.stepping_cell));
@@ -114,21 +98,43 @@ pub(super) fn cells(answer: &Answer) -> usize {
     cells.clamp(1, worm_physics::MAX_CELLS)
 }
 
-/// What the answer rests on, in words.
-pub(super) fn evidence(answer: &Answer) -> &'static str {
-    if answer.is_by_advances() {
-        "advances"
-    } else {
-        "recordings"
-    }
-}
-
 /// A length in mm with its unit.
-pub(super) fn mm(length_m: f64) -> String {
+pub(in crate::report::explain) fn mm(length_m: f64) -> String {
     format!("{} mm", fixed(length_m * 1e3, 3))
 }
 
-/// A text as a clause within a sentence: without the full stop that it may end with.
+/// A text for use within a sentence: without the full stop at its end.
 pub(super) fn clause(text: &str) -> &str {
     text.trim().trim_end_matches('.')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use worm_estimator::number::NONE;
+
+    #[test]
+    fn parameters_are_in_the_units_that_people_read() {
+        for (value, sigma, unit, text) in [
+            (0.000_42, 0.000_013, "m", "0.420 ± 0.013 mm"),
+            (0.0152, 0.0021, "s", "15.2 ± 2.1 ms"),
+            (0.05, 0.012, "kg", "50 ± 12 g"),
+            (-1.25, 0.31, "deg", "−1.25 ± 0.31 °"),
+            (0.0115, f64::NAN, "m", "11.5 mm"),
+            (0.2034, 0.012, "N", "0.203 ± 0.012 N"),
+            (3e-5, 2e-6, "m/N", "0.0300 ± 0.0020 mm/N"),
+            (1.0, f64::NAN, "", "1.00"),
+            (f64::NAN, 0.1, "", NONE),
+        ] {
+            let found = FoundParameter {
+                name: "play".to_owned(),
+                value,
+                sigma,
+                unit: unit.to_owned(),
+                cell: None,
+            };
+            let view = ParameterView::of("no-such-effect", &found);
+            assert_eq!(view.in_words(), format!("play {text}"));
+        }
+    }
 }

@@ -1,12 +1,12 @@
-//! The mean cycle of each run: what was measured, and what each model makes of it.
+//! The mean cycle of each run, measured and by each model.
 
+use super::super::view::{cells, mm, named_model};
 use super::map::steps;
-use super::words::{self, mm};
 use crate::explain::Answer;
 use crate::explain::answer::{CycleSeries, ResidualMap};
-use crate::report::page::{Figure, Key, Mark, Page, Panel};
+use crate::report::page::{Figure, Key, Mark, Panel};
 use crate::report::plot::{
-    ACCENT, Axis, Colour, DrawError, INK, LIGHT, MID, MUTED, Plot, Row, SHADE, Sheet, Stroke, cell_colours, draw,
+    ACCENT, Axis, Colour, DrawError, INK, LIGHT, MID, MUTED, Plot, Row, SHADE, Sheet, Stroke, Svg, cell_colours, draw,
 };
 use crate::report::runs::names_by_slope;
 
@@ -15,31 +15,19 @@ const RESIDUAL_HEIGHT: f64 = 130.0;
 /// Strength of the bands that mark steps, and of the scatter.
 const STEP: f64 = 0.09;
 const SCATTER: f64 = 0.3;
-/// What was measured lies pale and thick under the models.
+/// The measurement lies pale and thick under the models.
 const MEASURED: Colour = LIGHT;
 const MEASURED_WIDTH: f64 = 6.0;
 
-pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
-    if answer.is_by_advances() {
-        page.paragraph(
-            "There is no cycle to show, for no positions were recorded; the advances stand at the end of this page.",
-        );
-        return Ok(());
-    }
+pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let cycles = &answer.figures.cycles;
-    if cycles.iter().all(|run| run.phase.is_empty()) {
-        page.paragraph("There is no mean cycle to show: the answer holds none of any run.");
-        return Ok(());
-    }
-    let colours = cell_colours(words::cells(answer));
+    let colours = cell_colours(cells(answer));
     let names = names_by_slope(cycles.iter().map(|run| run.slope_deg));
     let mut panels = Vec::new();
     for (number, (name, run)) in names.iter().zip(cycles).enumerate() {
-        panels.push(Panel {
-            title: name.clone(),
-            quantity: "above: way of the body, mm; below: models less measured, mm".to_owned(),
-            svg: picture(name, run, answer.figures.maps_before.get(number), &colours)?,
-        });
+        let svg = picture(name, run, answer.figures.maps_before.get(number), &colours)?;
+        let quantity = "above: displacement of the body, mm; below: models minus measured, mm";
+        panels.push(Panel::new(name, quantity, svg));
     }
     let mut keys = vec![
         Key::new(Mark::Thick, MEASURED, "measured, mean of the settled cycles"),
@@ -48,21 +36,20 @@ pub(super) fn add(page: &mut Page, answer: &Answer) -> Result<(), DrawError> {
             MUTED,
             "its scatter from cycle to cycle, one standard deviation",
         ),
-        Key::new(Mark::Dashed, MID, "believed model"),
-        Key::new(Mark::Line, SHADE, "recalibrated"),
+        Key::new(Mark::Dashed, MID, "nominal model"),
+        Key::new(Mark::Line, SHADE, "recalibrated model"),
     ];
     let is_named = cycles.iter().any(|run| !run.named_m.is_empty());
     if is_named {
-        keys.push(Key::new(Mark::Line, ACCENT, words::named_model(answer)));
+        keys.push(Key::new(Mark::Line, ACCENT, named_model(answer)));
     }
-    page.figure(&Figure {
+    Ok(Figure {
         id: "cycle",
-        title: "The mean cycle".to_owned(),
+        title: "The mean cycle",
         keys,
         panels,
         caption: caption(&names, cycles, is_named),
-    });
-    Ok(())
+    })
 }
 
 /// A model's line in one run.
@@ -80,19 +67,22 @@ fn lines(run: &CycleSeries) -> [Line<'_>; 3] {
     ]
 }
 
-fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[Colour]) -> Result<String, DrawError> {
-    let residuals = lines(run).map(|line| less_measured_mm(run, line.values_m));
+fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[Colour]) -> Result<Svg, DrawError> {
+    let residuals = lines(run).map(|line| minus_measured_mm(run, line.values_m));
     let ribbon = |centre: f64, scatter_m: f64| [centre - scatter_m * 1e3, centre + scatter_m * 1e3];
     let scatter = run.scatter_m.iter().map(|scatter_m| scatter_m * 1e3);
-    let ways = [&run.measured_m, &run.baseline_m, &run.recalibrated_m, &run.named_m];
-    let ways_mm = ways.into_iter().flatten().map(|displacement_m| displacement_m * 1e3);
+    let displacements = [&run.measured_m, &run.baseline_m, &run.recalibrated_m, &run.named_m];
+    let displacements_mm = displacements
+        .into_iter()
+        .flatten()
+        .map(|displacement_m| displacement_m * 1e3);
     let below_mm = residuals.iter().flatten().copied();
     let sheet = Sheet {
-        description: format!("The mean cycle at {name}, measured and by each model, and what each is off by"),
-        x_label: Some("gait phase, share of a cycle".to_owned()),
+        description: format!("The mean cycle at {name}, measured and by each model, and the error of each"),
+        x_label: Some("gait phase, fraction of a cycle".to_owned()),
         x: Axis::between(0.0, 1.0, 5),
         rows: vec![
-            Row::new(Axis::around(ways_mm, 5), HEIGHT),
+            Row::new(Axis::around(displacements_mm, 5), HEIGHT),
             Row::new(
                 Axis::around(below_mm.chain(scatter.clone()).chain(scatter.map(|mm| -mm)), 4),
                 RESIDUAL_HEIGHT,
@@ -111,7 +101,7 @@ fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[
                 MUTED,
                 SCATTER,
             )?;
-            plot.level(0.0, Stroke::new(INK, 1.2))?;
+            plot.horizontal_line(0.0, Stroke::new(INK, 1.2))?;
             for (line, residual) in lines(run).into_iter().zip(&residuals) {
                 plot.line(at_phases(residual.clone()), line.stroke)?;
             }
@@ -155,7 +145,7 @@ fn shade_steps(
     Ok(())
 }
 
-fn less_measured_mm(run: &CycleSeries, model_m: &[f64]) -> Vec<f64> {
+fn minus_measured_mm(run: &CycleSeries, model_m: &[f64]) -> Vec<f64> {
     let pairs = model_m.iter().zip(&run.measured_m);
     pairs
         .map(|(model_m, measured_m)| (model_m - measured_m) * 1e3)
@@ -163,7 +153,7 @@ fn less_measured_mm(run: &CycleSeries, model_m: &[f64]) -> Vec<f64> {
 }
 
 fn caption(names: &[String], cycles: &[CycleSeries], is_named: bool) -> String {
-    let told = names.iter().zip(cycles).filter_map(|(name, run)| {
+    let worst = names.iter().zip(cycles).filter_map(|(name, run)| {
         let [_, recalibrated, named] = lines(run).map(|line| worst_m(run, line.values_m));
         let after = named.filter(|_| is_named);
         let after = after.map_or_else(String::new, |named_m| format!(", the named one by {}", mm(named_m)));
@@ -172,22 +162,22 @@ fn caption(names: &[String], cycles: &[CycleSeries], is_named: bool) -> String {
             mm(recalibrated?)
         ))
     });
-    let worst = match told.collect::<Vec<_>>() {
+    let worst = match worst.collect::<Vec<_>>() {
         none if none.is_empty() => String::new(),
-        told => format!(" Off at most: {}.", told.join("; ")),
+        worst => format!(" Largest errors: {}.", worst.join("; ")),
     };
     format!(
         "Mean position of the cells since the start of the cycle, less what the stroke alone would make: it falls where tips slip \
-         back. Bands and numbers above mark the step of each cell. Below, enlarged, what each model is off by; a model that \
+         back. Bands and numbers above mark the step of each cell. Below, enlarged, the error of each model; a model that \
          explains the data stays within the grey scatter.{worst}"
     )
 }
 
-/// The largest difference to what was measured, m; none where nothing can be compared.
+/// The largest difference from the measurement, m; none where nothing can be compared.
 fn worst_m(run: &CycleSeries, model_m: &[f64]) -> Option<f64> {
-    let off_mm = less_measured_mm(run, model_m).into_iter().map(f64::abs);
+    let off_mm = minus_measured_mm(run, model_m).into_iter().map(f64::abs);
     let known_m = off_mm
         .map(|off_mm| off_mm * 1e-3)
-        .filter(|off_m| Axis::can_show(*off_m));
+        .filter(|off_m| Axis::is_drawable(*off_m));
     known_m.reduce(f64::max)
 }
