@@ -5,12 +5,12 @@ use super::capture::Capture;
 use super::contact::Contacts;
 use super::cycles::{Cycles, Event};
 use super::electrical::{Electrical, Energies};
-use super::energy_balance::{Accountant, EnergyBalance, Start, Tip};
+use super::energy_balance::{EnergyBalance, EnergyIntegrator, Start, Tip};
 use super::filter::BodyFilter;
 use super::fit::Fit;
 use super::gait::StepSequence;
-use super::lived::LivedTime;
 use super::mismatch::{Mismatch, ResidualMap};
+use super::motor_time::MotorTime;
 use super::prediction::Predictor;
 use super::unknown;
 use super::update::{EstimatorError, Update};
@@ -22,7 +22,7 @@ use worm_physics::MAX_CELLS;
 /// Positions beyond this are no positions, m.
 const FARTHEST_M: f64 = 1e5;
 /// Steps of the gait without a believed position after which the contact points are lost.
-const LONGEST_BLIND_STEPS: f64 = 0.5;
+const MAX_BLIND_STEPS: f64 = 0.5;
 /// Tracker periods that are no silence yet, however far the gait goes in them.
 const SHORTEST_SILENCE_PERIODS: f64 = 2.5;
 /// Standard deviation of largest tip deformations that are only guessed, as a share: that of all of them together.
@@ -30,7 +30,7 @@ const GUESSED_BOUND_FRACTION: f64 = 0.15;
 
 /// Account of the open cycle.
 #[derive(Debug, Clone, Copy)]
-struct Opened {
+struct CycleStart {
     time_s: f64,
     host_paused_ns: u64,
     electrical: Energies,
@@ -48,22 +48,22 @@ pub struct Estimator {
     tips: Vec<Tip>, // in forward direction
     filter: BodyFilter,
     contacts: Contacts,
-    lived: LivedTime,
+    motor_time: MotorTime,
     capture: Capture,
     host_paused_ns: u64, // as of the last state
     cycles: Cycles,
     electrical: Electrical,
     window: Window,
     window_contact_m: [f64; MAX_CELLS], // at the window's start, in the direction of the crawl
-    window_whole: bool,                 // no silence in the open cycle
+    window_is_complete: bool,           // no silence in the open cycle
     has_crawled: bool,                  // a cycle has ended
-    laid_down: bool,                    // the open cycle is the first, and began at rest
+    starts_at_rest: bool,               // the open cycle is the first, and began at rest
     fit: Fit,
-    accountant: Accountant,
+    energy_integrator: EnergyIntegrator,
     identification: Option<Identification>,
     mismatch: Mismatch,
     predictor: Predictor,
-    opened: Opened,
+    cycle_start: CycleStart,
     cycle_index: u64,
     last: Option<(u64, f64, f64)>, // sequence, time and phase of the last state
     last_seen: Option<(f64, f64)>, // time and phase of the last believed position
@@ -94,22 +94,22 @@ impl Estimator {
             tracker_period_s: 1.0 / config.tracker.rate_hz,
             filter: BodyFilter::new(config, gait),
             contacts: Contacts::new(&tips),
-            lived: LivedTime::default(),
+            motor_time: MotorTime::default(),
             capture: Capture::default(),
             host_paused_ns: 0,
             cycles: Cycles::new(config.gait.direction.sign() as i32),
             electrical: Electrical::new(config.servo.winding_resistance_ohm),
             window: Window::new(cells),
             window_contact_m: [f64::NAN; MAX_CELLS],
-            window_whole: false,
+            window_is_complete: false,
             has_crawled: false,
-            laid_down: false,
-            accountant: Accountant::new(cells, fit.unknowns()),
+            starts_at_rest: false,
+            energy_integrator: EnergyIntegrator::new(cells, fit.unknowns()),
             fit,
             identification: identified.then(|| Identification::new(&tips)),
             mismatch: Mismatch::new(predictor.worm()),
             predictor,
-            opened: Opened {
+            cycle_start: CycleStart {
                 time_s: 0.0,
                 host_paused_ns: 0,
                 electrical: Energies::default(),
@@ -141,17 +141,17 @@ impl Estimator {
     }
 
     /// Something is wrong with the worm that has a name of its own: the open cycle does not enter the residual map.
-    pub fn leave_cycle_out(&mut self) {
+    pub fn exclude_cycle(&mut self) {
         self.mismatch.disturb();
     }
 
     /// Takes up one state.
     pub fn update(&mut self, state: &State) -> Update<'_> {
         let time_s = state.time_ns as f64 * 1e-9;
-        self.notice_restart(state, time_s);
-        let lived_ns = self.lived.update(state);
-        let lived_s = lived_ns as f64 * 1e-9;
-        self.electrical.update(state, lived_ns);
+        self.detect_restart(state, time_s);
+        let motor_ns = self.motor_time.update(state);
+        let motor_s = motor_ns as f64 * 1e-9;
+        self.electrical.update(state, motor_ns);
         self.host_paused_ns = state.host_paused_ns;
         if state.mode != Mode::Crawling.code() {
             self.mismatch.disturb();
@@ -162,11 +162,11 @@ impl Estimator {
         }
         let sampled = state.sample_is_new == 1 && state.phase.is_finite();
         if sampled {
-            self.take_sample(state, time_s, lived_s);
+            self.take_sample(state, time_s, motor_s);
         }
         if state.phase.is_finite() {
-            self.capture.note_tick(lived_s, state.phase);
-            self.notice_silence(state.phase, time_s);
+            self.capture.note_tick(motor_s, state.phase);
+            self.detect_silence(state.phase, time_s);
             self.last = Some((state.sequence, time_s, state.phase));
         } else if let Some((sequence, ..)) = &mut self.last {
             *sequence = state.sequence;
@@ -181,14 +181,14 @@ impl Estimator {
     }
 
     /// Counts lost states; starts over when the controller did.
-    fn notice_restart(&mut self, state: &State, time_s: f64) {
+    fn detect_restart(&mut self, state: &State, time_s: f64) {
         let Some((sequence, last_s, _)) = self.last else { return };
         if state.sequence > sequence && time_s >= last_s {
             self.estimate.states_lost += state.sequence - sequence - 1;
             return;
         }
         self.filter.forget();
-        self.lived.forget();
+        self.motor_time.forget();
         self.capture.forget();
         self.cycles.forget();
         self.electrical.restart();
@@ -202,7 +202,7 @@ impl Estimator {
         self.contacts.forget();
         self.window.clear();
         self.window_contact_m = [f64::NAN; MAX_CELLS];
-        self.window_whole = false;
+        self.window_is_complete = false;
         // Where the open step began was not seen well enough for (1) to hold at its end.
         self.entered = (f64::NAN, f64::NAN);
         if let Some(identification) = &mut self.identification {
@@ -210,12 +210,12 @@ impl Estimator {
         }
     }
 
-    fn notice_silence(&mut self, phase: f64, time_s: f64) {
+    fn detect_silence(&mut self, phase: f64, time_s: f64) {
         let Some((seen_s, seen_phase)) = self.last_seen else {
             return;
         };
         let blind_steps = (phase - seen_phase).abs() * self.cells as f64;
-        if blind_steps > LONGEST_BLIND_STEPS && time_s - seen_s > SHORTEST_SILENCE_PERIODS * self.tracker_period_s {
+        if blind_steps > MAX_BLIND_STEPS && time_s - seen_s > SHORTEST_SILENCE_PERIODS * self.tracker_period_s {
             self.last_seen = None;
             self.lose_contacts();
         }
@@ -224,21 +224,21 @@ impl Estimator {
     /// Follows the phase over the ends of cycles. True when `self.cycle` is a new one.
     fn follow_phase(&mut self, phase: f64, time_s: f64) -> bool {
         match self.cycles.advance_to(phase) {
-            Event::Goes => false,
-            Event::Rests => {
-                self.laid_down = !self.has_crawled;
+            Event::Continues => false,
+            Event::AtRest => {
+                self.starts_at_rest = !self.has_crawled;
                 self.mismatch.rest();
                 self.open(time_s);
                 false
             }
-            Event::Begins => {
-                self.laid_down = false;
+            Event::Began => {
+                self.starts_at_rest = false;
                 self.begin_window();
                 self.cycle_index = 0;
                 self.open(time_s);
                 false
             }
-            Event::Ends { fraction, whole } => {
+            Event::Ended { fraction, whole } => {
                 let end_s = match self.last {
                     Some((_, last_s, _)) => last_s + fraction * (time_s - last_s),
                     None => time_s,
@@ -249,7 +249,7 @@ impl Estimator {
                     self.begin_window();
                 }
                 self.open(end_s);
-                (self.has_crawled, self.laid_down) = (true, false);
+                (self.has_crawled, self.starts_at_rest) = (true, false);
                 whole
             }
         }
@@ -258,7 +258,7 @@ impl Estimator {
     /// A window that begins here, with the contact points of this moment.
     fn begin_window(&mut self) {
         self.window.clear();
-        self.window_whole = true;
+        self.window_is_complete = true;
         self.mismatch.begin(self.cycles.direction());
         let sign = f64::from(self.cycles.direction());
         self.window_contact_m = self.contacts.contact_m().map(|contact_m| sign * contact_m);
@@ -268,7 +268,7 @@ impl Estimator {
     }
 
     fn open(&mut self, time_s: f64) {
-        self.opened = Opened {
+        self.cycle_start = CycleStart {
             time_s,
             host_paused_ns: self.host_paused_ns,
             electrical: self.electrical.total(),
@@ -283,7 +283,7 @@ impl Estimator {
         let direction = self.cycles.direction();
         let sign = f64::from(direction);
         let gait = self.gait.seen_along(direction);
-        let fitted = self.window_whole
+        let fitted = self.window_is_complete
             && self.window.samples() as usize >= 2 * self.cells
             && self.fit.run(&self.window, &gait, self.filter.noise_m());
         self.cycle = unknown::cycle(self.cells);
@@ -300,12 +300,12 @@ impl Estimator {
             let start = Start {
                 contact_m: &self.window_contact_m[..self.cells],
                 resting_m: self.predictor.resting_deformation_m().map(|m| sign * m),
-                laid_down: self.laid_down,
+                starts_at_rest: self.starts_at_rest,
             };
-            let account = self.accountant.close(&self.fit, tips, &start);
-            self.describe_motion(&account, sign);
-            self.correct_contacts(&account, sign);
-            self.window_contact_m = account.contact_at_start_m;
+            let balance = self.energy_integrator.close(&self.fit, tips, &start);
+            self.describe_motion(&balance, sign);
+            self.correct_contacts(&balance, sign);
+            self.window_contact_m = balance.contact_at_start_m;
             if self.bounds_are_known() {
                 self.mismatch.take_up(&self.window);
             }
@@ -328,11 +328,11 @@ impl Estimator {
     }
 
     fn describe_electrical(&mut self, end_s: f64, direction: i32) {
-        let spent = self.electrical.total().since(&self.opened.electrical);
+        let spent = self.electrical.total().since(&self.cycle_start.electrical);
         self.cycle.index = self.cycle_index;
         self.cycle.end_ns = (end_s * 1e9) as u64;
-        self.cycle.duration_s = end_s - self.opened.time_s;
-        self.cycle.host_paused_s = self.host_paused_ns.saturating_sub(self.opened.host_paused_ns) as f64 / 1e9;
+        self.cycle.duration_s = end_s - self.cycle_start.time_s;
+        self.cycle.host_paused_s = self.host_paused_ns.saturating_sub(self.cycle_start.host_paused_ns) as f64 / 1e9;
         self.cycle.energy_electrical_j = spent.electrical_j;
         self.cycle.energy_copper_j = spent.copper_j;
         self.cycle.energy_electrical_sigma_j = spent.sigma_j();
@@ -340,22 +340,22 @@ impl Estimator {
         self.cycle.direction = direction;
     }
 
-    fn describe_motion(&mut self, account: &EnergyBalance, sign: f64) {
+    fn describe_motion(&mut self, balance: &EnergyBalance, sign: f64) {
         let known = self.bounds_are_known();
-        let (forward_m, backward_m) = account.slides_along_canal_m(sign);
+        let (forward_m, backward_m) = balance.slides_along_canal_m(sign);
         let cycle = &mut self.cycle;
-        cycle.advance_m = sign * account.advance_m;
-        cycle.advance_sigma_m = account.advance_sigma_m;
+        cycle.advance_m = sign * balance.advance_m;
+        cycle.advance_sigma_m = balance.advance_sigma_m;
         cycle.forward_slide_m = forward_m;
         cycle.backward_slide_m = backward_m;
-        cycle.energy_loss_j = account.loss_j;
-        cycle.energy_actuator_net_j = account.actuator_net_j;
-        cycle.energy_actuator_positive_j = account.actuator_positive_j;
-        cycle.energy_friction_inside_j = cycle.energy_electrical_j - cycle.energy_copper_j - account.actuator_net_j;
-        cycle.settled = u32::from(known && account.settled);
-        if account.advance_m > account.advance_sigma_m {
+        cycle.energy_loss_j = balance.loss_j;
+        cycle.energy_actuator_net_j = balance.actuator_net_j;
+        cycle.energy_actuator_positive_j = balance.actuator_positive_j;
+        cycle.energy_friction_inside_j = cycle.energy_electrical_j - cycle.energy_copper_j - balance.actuator_net_j;
+        cycle.settled = u32::from(known && balance.settled);
+        if balance.advance_m > balance.advance_sigma_m {
             let weight_n = self.predictor.weight_n();
-            cycle.cot = account.actuator_positive_j / (weight_n * account.advance_m);
+            cycle.cot = balance.actuator_positive_j / (weight_n * balance.advance_m);
         }
         let mut by_bound = [0.0; MAX_CELLS];
         for (cell, tip) in self.tips.iter().enumerate() {
@@ -365,29 +365,29 @@ impl Estimator {
             None => 0.0,
             Some(found) if known => found.standard_error(&by_bound),
             Some(_) => {
-                let doubtful = by_bound.iter().zip(&self.tips);
-                GUESSED_BOUND_FRACTION * doubtful.map(|(by_bound_n, tip)| by_bound_n * tip.bound_m).sum::<f64>()
+                let suspected = by_bound.iter().zip(&self.tips);
+                GUESSED_BOUND_FRACTION * suspected.map(|(by_bound_n, tip)| by_bound_n * tip.bound_m).sum::<f64>()
             }
         };
-        cycle.energy_loss_sigma_j = account.loss_sigma_j.hypot(from_bounds_j);
-        cycle.energy_actuator_sigma_j = account.actuator_sigma_j.hypot(from_bounds_j);
+        cycle.energy_loss_sigma_j = balance.loss_sigma_j.hypot(from_bounds_j);
+        cycle.energy_actuator_sigma_j = balance.actuator_sigma_j.hypot(from_bounds_j);
     }
 
     /// Replaces what the live positions gave for this cycle by what the fit gave.
-    fn correct_contacts(&mut self, account: &EnergyBalance, sign: f64) {
-        let (slid_forward_m, slid_backward_m) = account.slides_along_canal_m(sign);
+    fn correct_contacts(&mut self, balance: &EnergyBalance, sign: f64) {
+        let (slid_forward_m, slid_backward_m) = balance.slides_along_canal_m(sign);
         let mut forward_m = *self.contacts.forward_m();
         let mut backward_m = *self.contacts.backward_m();
         let mut loss_j = self.contacts.loss_j();
-        if account.complete {
-            loss_j = self.opened.loss_j;
+        if balance.complete {
+            loss_j = self.cycle_start.loss_j;
             for (cell, tip) in self.tips.iter().enumerate() {
-                forward_m[cell] = self.opened.forward_m[cell] + slid_forward_m[cell];
-                backward_m[cell] = self.opened.backward_m[cell] + slid_backward_m[cell];
+                forward_m[cell] = self.cycle_start.forward_m[cell] + slid_forward_m[cell];
+                backward_m[cell] = self.cycle_start.backward_m[cell] + slid_backward_m[cell];
                 loss_j += tip.stiffness_n_per_m * tip.bound_m * (slid_forward_m[cell] + slid_backward_m[cell]);
             }
         }
-        let contact_m = account.contact_at_end_m.map(|contact_m| sign * contact_m);
+        let contact_m = balance.contact_at_end_m.map(|contact_m| sign * contact_m);
         self.contacts.correct(&contact_m, &forward_m, &backward_m, loss_j);
     }
 
@@ -414,8 +414,8 @@ impl Estimator {
     }
 
     /// Takes up the tracker sample of a state.
-    fn take_sample(&mut self, state: &State, time_s: f64, lived_s: f64) {
-        let (captured_s, phase) = self.capture.place(state.sample_time_s, lived_s, state.phase);
+    fn take_sample(&mut self, state: &State, time_s: f64, motor_s: f64) {
+        let (captured_s, phase) = self.capture.place(state.sample_time_s, motor_s, state.phase);
         let mut position_m = [f64::NAN; MAX_CELLS];
         for (cell, to) in position_m[..self.cells].iter_mut().enumerate() {
             *to = state
@@ -424,22 +424,22 @@ impl Estimator {
                 .unwrap_or(f64::NAN);
         }
         self.predict(phase, captured_s);
-        let believed = self.filter.observe(&position_m[..self.cells]);
-        if believed != 0 {
+        let accepted = self.filter.observe(&position_m[..self.cells]);
+        if accepted != 0 {
             self.last_seen = Some((time_s, state.phase));
         }
         let sign = f64::from(self.cycles.direction());
         for (cell, position_m) in position_m[..self.cells].iter_mut().enumerate() {
             self.contacts
                 .follow(cell, self.filter.position_m(cell), self.filter.sigma_m(cell));
-            *position_m = if believed >> cell & 1 == 1 {
+            *position_m = if accepted >> cell & 1 == 1 {
                 sign * *position_m
             } else {
                 f64::NAN
             };
         }
-        if believed != 0
-            && self.window_whole
+        if accepted != 0
+            && self.window_is_complete
             && let Some(cycle_phase) = self.cycles.phase_in_cycle(phase)
         {
             self.window.add(cycle_phase, &position_m[..self.cells]);
