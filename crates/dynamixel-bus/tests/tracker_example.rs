@@ -1,9 +1,12 @@
 //! The device of `examples/tracker`, byte by byte and with a clock of its own.
 
+#[path = "../examples/tracker/capture.rs"]
+mod capture;
 #[path = "../examples/tracker/device.rs"]
 mod device;
 
-use device::{CAPTURE_PERIOD_US, FIRMWARE, MODEL, Tracker, is_seen, position_um};
+use capture::{PERIOD_US, is_seen, position_um};
+use device::{FIRMWARE, MODEL, Tracker};
 use dynamixel_bus::packet::{
     Decoder, DeviceId, FastReplyWriter, FastSegment, Instruction, InstructionPacket, MAX_PACKET_LEN, Packet, ReadSpan,
     ReadSpans, Recipient, StatusError, StatusFlags, StatusPacket,
@@ -97,7 +100,7 @@ fn broadcast_ping_is_answered_in_the_slot_of_the_id() {
 fn block_holds_one_capture() {
     // In capture 19 the last cell is hidden; its position is that of capture 18.
     for sample in [0u32, 7, 19, 1_000] {
-        let now_us = u64::from(sample) * CAPTURE_PERIOD_US + 1_234;
+        let now_us = u64::from(sample) * PERIOD_US + 1_234;
         let read = Instruction::Read {
             address: 128,
             length: 11 + 4 * CELLS as u16,
@@ -105,7 +108,7 @@ fn block_holds_one_capture() {
         let (_, error, data) = ask(&mut tracker(), read, now_us);
         assert_eq!(error, None);
         let mut expected = sample.to_le_bytes().to_vec();
-        expected.extend((sample * CAPTURE_PERIOD_US as u32).to_le_bytes());
+        expected.extend((sample * PERIOD_US as u32).to_le_bytes());
         let hides_last = sample == 19;
         expected.extend([CELLS as u8, if hides_last { 0b0_1111 } else { 0b1_1111 }, 0]);
         for cell in 0..CELLS {

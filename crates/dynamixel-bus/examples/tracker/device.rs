@@ -21,6 +21,7 @@
 //!
 //! So a device behind a silent one stays silent, as the protocol has it.
 
+use super::capture::{Capture, MAX_CELLS};
 use dynamixel_bus::Register;
 use dynamixel_bus::packet::{
     DecodeError, Decoder, DeviceId, FastReply, FastReplyWriter, FastSegment, Instruction, MAX_PACKET_LEN,
@@ -31,10 +32,6 @@ use dynamixel_bus::packet::{
 pub const MODEL: u16 = 0x574D;
 /// Version of this firmware.
 pub const FIRMWARE: u8 = 1;
-/// Most cells that the control table has room for.
-pub const MAX_CELLS: usize = 16;
-/// Time from one capture to the next, µs.
-pub const CAPTURE_PERIOD_US: u64 = 10_000;
 
 /// A packet whose end does not come within this time is given up, µs.
 const IDLE_US: u64 = 5_000;
@@ -58,17 +55,6 @@ const VALID_MASK: Register = Register::new(137, 2, "valid mask");
 const FIRST_POSITION: Register = Register::new(139, 4, "cell position");
 
 const TABLE_LEN: usize = FIRST_POSITION.address as usize + MAX_CELLS * FIRST_POSITION.size as usize;
-
-/// Position of a cell at a capture, µm: a camera would go here. The worm moves on by 100 µm with each capture and starts
-/// again every 1000 captures.
-pub fn position_um(cell: usize, sample: u32) -> i32 {
-    50_000 * cell as i32 + 100 * (sample % 1_000) as i32
-}
-
-/// Whether a cell is seen at a capture. The last cell is hidden in each tenth.
-pub fn is_seen(cell: usize, cells: usize, sample: u32) -> bool {
-    cell < cells && !(cell + 1 == cells && sample % 10 == 9)
-}
 
 /// A tracker on a DYNAMIXEL bus.
 pub struct Tracker {
@@ -448,8 +434,7 @@ impl Device {
 
     /// The control table with the newest capture. It is made for each read, so that a read never mixes two captures.
     fn table(&self, now_us: u64) -> [u8; TABLE_LEN] {
-        let sample = (now_us / CAPTURE_PERIOD_US) as u32; // wraps
-        let capture_us = (now_us - now_us % CAPTURE_PERIOD_US) as u32; // wraps
+        let capture = Capture::newest(now_us, self.cells);
         let mut table = [0; TABLE_LEN];
         let mut put = |register: Register, value: &[u8]| {
             let from = usize::from(register.address);
@@ -459,25 +444,20 @@ impl Device {
         put(FIRMWARE_VERSION, &[FIRMWARE]);
         put(ID, &[self.id.get()]);
         put(STATUS_RETURN_LEVEL, &[self.status_return_level]);
-        put(SAMPLE, &sample.to_le_bytes());
-        put(CAPTURE_TIME, &capture_us.to_le_bytes());
+        put(SAMPLE, &capture.sample.to_le_bytes());
+        put(CAPTURE_TIME, &capture.time_us.to_le_bytes());
         put(CELL_COUNT, &[self.cells as u8]);
-        let mut valid = 0u16;
-        for cell in 0..self.cells {
-            let seen = is_seen(cell, self.cells, sample);
-            valid |= u16::from(seen) << cell;
-            // A cell is hidden in one capture at a time.
-            let known = if seen { sample } else { sample.wrapping_sub(1) };
+        put(VALID_MASK, &capture.valid_mask.to_le_bytes());
+        for (cell, position_um) in capture.positions_um[..self.cells].iter().enumerate() {
             let address = FIRST_POSITION.address + FIRST_POSITION.size * cell as u16;
             put(
                 Register {
                     address,
                     ..FIRST_POSITION
                 },
-                &position_um(cell, known).to_le_bytes(),
+                &position_um.to_le_bytes(),
             );
         }
-        put(VALID_MASK, &valid.to_le_bytes());
         table
     }
 }

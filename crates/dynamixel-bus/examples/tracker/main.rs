@@ -1,6 +1,7 @@
 //! A tracker of cell positions as a DYNAMIXEL device of one's own: the other end of the line.
 //!
-//! `device.rs` is the device, and would run on a microcontroller as it is. This file gives it a clock and a line:
+//! `device.rs` is the device and `capture.rs` what it measures. Both would run on a microcontroller as they are. This file gives
+//! them a clock and a line:
 //!
 //! ```text
 //! tracker /dev/ttyUSB0 [baud]     # a serial port
@@ -9,6 +10,7 @@
 //!
 //! It has ID 100 and tracks 5 cells, unless `TRACKER_ID` and `TRACKER_CELLS` say otherwise.
 
+mod capture;
 mod device;
 
 use device::Tracker;

@@ -16,10 +16,10 @@ const LATE_READING_NS: u64 = 50_000_000;
 
 /// Follows the motor's time from state to state.
 #[derive(Debug, Clone, Default)]
-pub struct LivedTime {
+pub struct MotorTime {
     last: Option<Reading>,
-    stood_ns: i64,
-    doubtful: Option<Doubt>,
+    standstill_ns: i64,
+    suspected: Option<SuspectedStandstill>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -30,12 +30,12 @@ struct Reading {
 
 /// A gap that the motor seems to have stood still in.
 #[derive(Debug, Clone, Copy)]
-struct Doubt {
+struct SuspectedStandstill {
     until_ns: u64,
-    stood_ns: i64,
+    standstill_ns: i64,
 }
 
-impl LivedTime {
+impl MotorTime {
     /// Takes a state; the motor's time at it, ns: the computer's less what the motor stood still.
     pub fn update(&mut self, state: &State) -> u64 {
         if state.motor_is_new == 1 {
@@ -47,34 +47,34 @@ impl LivedTime {
                 self.compare(last, reading);
             }
         }
-        state.time_ns.saturating_add_signed(-self.stood_ns)
+        state.time_ns.saturating_add_signed(-self.standstill_ns)
     }
 
     /// Nothing is known of the clocks any more; what the motor stood still stays.
     pub fn forget(&mut self) {
         self.last = None;
-        self.doubtful = None;
+        self.suspected = None;
     }
 
     fn compare(&mut self, from: Reading, to: Reading) {
         let elapsed_ns = to.time_ns.saturating_sub(from.time_ns);
-        let lived_s = to.motor_s - from.motor_s;
-        if !lived_s.is_finite() || lived_s < 0.0 {
+        let motor_s = to.motor_s - from.motor_s;
+        if !motor_s.is_finite() || motor_s < 0.0 {
             return;
         }
-        let behind_ns = elapsed_ns as i64 - (lived_s * 1e9).round() as i64;
+        let behind_ns = elapsed_ns as i64 - (motor_s * 1e9).round() as i64;
         let tolerance_ns = TOLERANCE_NS + (TOLERANCE_FRACTION * elapsed_ns as f64) as i64;
         if behind_ns > tolerance_ns {
-            self.stood_ns += behind_ns;
-            self.doubtful = Some(Doubt {
+            self.standstill_ns += behind_ns;
+            self.suspected = Some(SuspectedStandstill {
                 until_ns: to.time_ns + LATE_READING_NS,
-                stood_ns: behind_ns,
+                standstill_ns: behind_ns,
             });
         } else if behind_ns < -tolerance_ns
-            && let Some(doubt) = self.doubtful.take_if(|doubt| to.time_ns <= doubt.until_ns)
+            && let Some(doubt) = self.suspected.take_if(|doubt| to.time_ns <= doubt.until_ns)
         {
             // The motor has made up for it: it had not stood still, its reading was late.
-            self.stood_ns -= doubt.stood_ns.min(-behind_ns);
+            self.standstill_ns -= doubt.standstill_ns.min(-behind_ns);
         }
     }
 }
@@ -84,11 +84,11 @@ mod tests {
     use super::*;
 
     /// Lived time in ms after readings at these times of the computer's and the servo's clock, in ms.
-    fn lived_ms(readings: &[(u64, f64)]) -> u64 {
-        let mut lived = LivedTime::default();
+    fn motor_time_ms(readings: &[(u64, f64)]) -> u64 {
+        let mut motor_time = MotorTime::default();
         let mut now_ns = 0;
         for &(time_ms, motor_ms) in readings {
-            now_ns = lived.update(&State {
+            now_ns = motor_time.update(&State {
                 time_ns: time_ms * 1_000_000,
                 motor_time_s: motor_ms * 1e-3,
                 motor_is_new: 1,
@@ -124,7 +124,7 @@ mod tests {
             ("a clock that is not known", &[(1000, f64::NAN), (1300, f64::NAN)], 1300),
             ("a clock that went back", &[(1000, 500.0), (1300, 3.0)], 1300),
         ] {
-            assert_eq!(lived_ms(readings), expected, "{what}");
+            assert_eq!(motor_time_ms(readings), expected, "{what}");
         }
     }
 }

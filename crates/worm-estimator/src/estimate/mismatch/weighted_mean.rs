@@ -3,7 +3,7 @@
 /// What is kept of the weight of the past with each new value: a memory of eight cycles.
 const KEPT: f64 = 7.0 / 8.0;
 /// Values before which nothing is said.
-pub(super) const LEAST: u32 = 4;
+pub(super) const MIN_VALUES: u32 = 4;
 /// How many values the scatter of the whole map counts for in the scatter of one entry.
 const POOLED: f64 = 8.0;
 
@@ -12,7 +12,7 @@ const POOLED: f64 = 8.0;
 /// The scatter is taken from the differences of successive values, so a step from one level to another, which is what a fault is,
 /// hardly widens it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Tally {
+pub(super) struct WeightedMean {
     count: u32,
     weight: f64,
     squared_weight: f64,
@@ -24,13 +24,13 @@ pub(super) struct Tally {
 
 /// A mean and its standard error, with the degrees of freedom of that.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Known {
+pub(super) struct MeanEstimate {
     pub(super) mean: f64,
     pub(super) sigma: f64,
     degrees: f64,
 }
 
-impl Tally {
+impl WeightedMean {
     pub(super) fn add(&mut self, value: f64) {
         if !value.is_finite() {
             return;
@@ -52,14 +52,14 @@ impl Tally {
         (self.count > 1).then(|| self.scatter / self.scatter_weight)
     }
 
-    /// The mean, once there are [`LEAST`] values; `pooled` is the variance of one value over the whole map.
-    pub(super) fn known(&self, pooled: f64) -> Option<Known> {
-        let variance = self.variance().filter(|_| self.count >= LEAST)?;
+    /// The mean, once there are [`MIN_VALUES`] values; `pooled` is the variance of one value over the whole map.
+    pub(super) fn known(&self, pooled: f64) -> Option<MeanEstimate> {
+        let variance = self.variance().filter(|_| self.count >= MIN_VALUES)?;
         let values = self.weight * self.weight / self.squared_weight;
         // Differences of successive values are worth two thirds of deviations from a mean.
         let degrees = 2.0 / 3.0 * (values - 1.0);
         let moderated = (POOLED * pooled + degrees * variance) / (POOLED + degrees);
-        Some(Known {
+        Some(MeanEstimate {
             mean: self.mean,
             sigma: (moderated / values).sqrt(),
             degrees: POOLED + degrees,
@@ -67,7 +67,7 @@ impl Tally {
     }
 }
 
-impl Known {
+impl MeanEstimate {
     /// How far a mean is beyond a bound, in standard deviations of a normal distribution with the same tail as Student's:
     /// Wallace, Annals of Mathematical Statistics 30 (1959) 1124. 0 within the bound.
     pub(super) fn beyond(&self, mean: f64, bound: f64) -> f64 {

@@ -54,7 +54,7 @@ pub(super) struct Allowance {
 ///
 /// Like the window it sees everything along the crawl: crawling backward it is the mirrored worm, which runs forward.
 #[derive(Debug, Clone)]
-pub(super) struct Shadow {
+pub(super) struct ReferenceModel {
     forward: Worm,
     backward: Worm,
     is_backward: bool,
@@ -63,7 +63,7 @@ pub(super) struct Shadow {
     path_m: Vec<f64>, // [knot][cell] over the cycle before and the last
 }
 
-impl Shadow {
+impl ReferenceModel {
     pub(super) fn new(worm: &Worm) -> Self {
         let cells = worm.cells();
         Self {

@@ -4,7 +4,7 @@
 //! cam turned by hand is seen for what it is.
 
 use crate::config::Config;
-use crate::estimate::LivedTime;
+use crate::estimate::MotorTime;
 use crate::message::{Mode, State};
 
 /// Goal velocity of one count, turns/s: 0.229 rev/min (XL330-M288 e-manual, register 104).
@@ -29,7 +29,7 @@ const LONGEST_STEP_S: f64 = 1.0;
 
 /// One tick as the detectors see it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
+pub(super) struct Tick {
     pub now_ns: u64,
     /// Since the previous tick, s; 0 in the first one and after a restart.
     pub step_s: f64,
@@ -37,7 +37,7 @@ pub(super) struct Moment {
     pub present_s: f64,
     /// What the motor lived through since its last reading before this tick, s: less than has passed where it stood still with its
     /// computer.
-    pub lived_s: f64,
+    pub motor_s: f64,
     /// The controller began anew: its sequence went back.
     pub restarted: bool,
     /// Gait phase, cycles; `None` before it was read.
@@ -64,9 +64,9 @@ pub(super) struct Moment {
 
 /// Follows the cam from tick to tick.
 #[derive(Debug, Clone)]
-pub(super) struct Motion {
+pub(super) struct CamMotion {
     last: Option<(u64, u64)>, // sequence and time of the last tick
-    lived: LivedTime,
+    motor_time: MotorTime,
     read_ns: Option<u64>, // lived time of the last motor reading
     host_paused_ns: u64,
     phase: Option<f64>,
@@ -81,11 +81,11 @@ pub(super) struct Motion {
     regime_cycles_per_s: f64,
 }
 
-impl Motion {
+impl CamMotion {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             last: None,
-            lived: LivedTime::default(),
+            motor_time: MotorTime::default(),
             read_ns: None,
             host_paused_ns: 0,
             phase: None,
@@ -101,7 +101,7 @@ impl Motion {
         }
     }
 
-    pub(super) fn update(&mut self, state: &State) -> Moment {
+    pub(super) fn update(&mut self, state: &State) -> Tick {
         let restarted = self
             .last
             .is_some_and(|(sequence, time_ns)| state.sequence < sequence || state.time_ns < time_ns);
@@ -111,11 +111,11 @@ impl Motion {
         }
         .min(LONGEST_STEP_S);
         self.last = Some((state.sequence, state.time_ns));
-        let lived_ns = self.lived.update(state);
+        let motor_ns = self.motor_time.update(state);
         let seconds_since = |then_ns: u64, now_ns: u64| now_ns.saturating_sub(then_ns) as f64 * 1e-9;
-        let lived_s = self.read_ns.map_or(0.0, |read_ns| seconds_since(read_ns, lived_ns));
+        let motor_s = self.read_ns.map_or(0.0, |read_ns| seconds_since(read_ns, motor_ns));
         if state.motor_is_new == 1 {
-            self.read_ns = Some(lived_ns);
+            self.read_ns = Some(motor_ns);
         }
         let paused_s = seconds_since(
             std::mem::replace(&mut self.host_paused_ns, state.host_paused_ns),
@@ -139,11 +139,11 @@ impl Motion {
             self.rest_s + step_s
         };
         self.follow_goal(goal, crawling, step_s);
-        Moment {
+        Tick {
             now_ns: state.time_ns,
             step_s,
             present_s: (step_s - paused_s).max(0.0),
-            lived_s,
+            motor_s,
             restarted,
             phase: self.phase,
             phase_is_new,

@@ -4,25 +4,25 @@
 //! meet all (the border). Cholesky's method keeps that shape, so a system of 270 unknowns costs some ten microseconds.
 
 /// Entries beside the diagonal that a row of the band may have, to the left.
-pub(super) const REACH: usize = 4;
+pub(super) const BANDWIDTH: usize = 4;
 
 /// A system, its factor, or both after one another. All memory is taken at construction.
 #[derive(Debug, Clone)]
-pub(super) struct Bordered {
+pub(super) struct BorderedBandMatrix {
     band: usize,
     border: usize,
-    rows: Vec<[f64; REACH + 1]>, // row i: columns i − REACH ..= i
-    coupling: Vec<f64>,          // for each row of the band its entries in the border
-    corner: Vec<f64>,            // border by border, lower triangle
+    rows: Vec<[f64; BANDWIDTH + 1]>, // row i: columns i − REACH ..= i
+    coupling: Vec<f64>,              // for each row of the band its entries in the border
+    corner: Vec<f64>,                // border by border, lower triangle
 }
 
-impl Bordered {
+impl BorderedBandMatrix {
     /// Room for a system of up to that size.
     pub(super) fn with_capacity(band: usize, border: usize) -> Self {
         Self {
             band,
             border,
-            rows: vec![[0.0; REACH + 1]; band],
+            rows: vec![[0.0; BANDWIDTH + 1]; band],
             coupling: vec![0.0; band * border],
             corner: vec![0.0; border * border],
         }
@@ -32,7 +32,7 @@ impl Bordered {
     pub(super) fn reset(&mut self, band: usize, border: usize) {
         self.band = band;
         self.border = border;
-        self.rows[..band].fill([0.0; REACH + 1]);
+        self.rows[..band].fill([0.0; BANDWIDTH + 1]);
         self.coupling[..band * border].fill(0.0);
         self.corner[..border * border].fill(0.0);
     }
@@ -62,11 +62,11 @@ impl Bordered {
         self.band
     }
 
-    /// Adds to the entry at (i, j) and (j, i). Within the band they must be at most [`REACH`] apart.
+    /// Adds to the entry at (i, j) and (j, i). Within the band they must be at most [`BANDWIDTH`] apart.
     pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
         let (row, column) = if i >= j { (i, j) } else { (j, i) };
         if row < self.band {
-            self.rows[row][REACH + column - row] += value;
+            self.rows[row][BANDWIDTH + column - row] += value;
         } else if column < self.band {
             self.coupling[column * self.border + row - self.band] += value;
         } else {
@@ -79,8 +79,8 @@ impl Bordered {
         let (x_band, x_border) = x.split_at(self.band);
         y.fill(0.0);
         for i in 0..self.band {
-            for j in i.saturating_sub(REACH)..=i {
-                let entry = self.rows[i][REACH + j - i];
+            for j in i.saturating_sub(BANDWIDTH)..=i {
+                let entry = self.rows[i][BANDWIDTH + j - i];
                 y[i] += entry * x_band[j];
                 if j < i {
                     y[j] += entry * x_band[i];
@@ -110,15 +110,15 @@ impl Bordered {
     /// Replaces the matrix by its Cholesky factor. False when it is not positive definite, to rounding.
     pub(super) fn factor(&mut self) -> bool {
         for i in 0..self.band {
-            for j in i.saturating_sub(REACH)..=i {
-                let mut sum = self.rows[i][REACH + j - i];
-                for k in i.saturating_sub(REACH)..j {
-                    sum -= self.rows[i][REACH + k - i] * self.rows[j][REACH + k - j];
+            for j in i.saturating_sub(BANDWIDTH)..=i {
+                let mut sum = self.rows[i][BANDWIDTH + j - i];
+                for k in i.saturating_sub(BANDWIDTH)..j {
+                    sum -= self.rows[i][BANDWIDTH + k - i] * self.rows[j][BANDWIDTH + k - j];
                 }
                 if j < i {
-                    self.rows[i][REACH + j - i] = sum / self.rows[j][REACH];
+                    self.rows[i][BANDWIDTH + j - i] = sum / self.rows[j][BANDWIDTH];
                 } else if sum > 0.0 {
-                    self.rows[i][REACH] = sum.sqrt();
+                    self.rows[i][BANDWIDTH] = sum.sqrt();
                 } else {
                     return false;
                 }
@@ -127,14 +127,14 @@ impl Bordered {
         for i in 0..self.band {
             let (before, from) = self.coupling.split_at_mut(i * self.border);
             let row = &mut from[..self.border];
-            for j in i.saturating_sub(REACH)..i {
+            for j in i.saturating_sub(BANDWIDTH)..i {
                 subtract(
                     row,
-                    self.rows[i][REACH + j - i],
+                    self.rows[i][BANDWIDTH + j - i],
                     &before[j * self.border..][..self.border],
                 );
             }
-            let scale = 1.0 / self.rows[i][REACH];
+            let scale = 1.0 / self.rows[i][BANDWIDTH];
             row.iter_mut().for_each(|entry| *entry *= scale);
         }
         self.reduce_corner();
@@ -208,21 +208,21 @@ impl Bordered {
             *x -= dot(row, x_border);
         }
         for i in (0..self.band).rev() {
-            x_band[i] /= self.rows[i][REACH];
-            for j in i.saturating_sub(REACH)..i {
-                x_band[j] -= self.rows[i][REACH + j - i] * x_band[i];
+            x_band[i] /= self.rows[i][BANDWIDTH];
+            for j in i.saturating_sub(BANDWIDTH)..i {
+                x_band[j] -= self.rows[i][BANDWIDTH + j - i] * x_band[i];
             }
         }
     }
 }
 
-fn forward(rows: &[[f64; REACH + 1]], x: &mut [f64]) {
+fn forward(rows: &[[f64; BANDWIDTH + 1]], x: &mut [f64]) {
     for (i, row) in rows.iter().enumerate() {
         let mut sum = x[i];
-        for j in i.saturating_sub(REACH)..i {
-            sum -= row[REACH + j - i] * x[j];
+        for j in i.saturating_sub(BANDWIDTH)..i {
+            sum -= row[BANDWIDTH + j - i] * x[j];
         }
-        x[i] = sum / row[REACH];
+        x[i] = sum / row[BANDWIDTH];
     }
 }
 
@@ -243,14 +243,14 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     /// A well-conditioned system of 9 + 3 unknowns and the same as a dense matrix.
-    fn example() -> (Bordered, DMatrix<f64>) {
+    fn example() -> (BorderedBandMatrix, DMatrix<f64>) {
         let (band, border) = (9, 3);
-        let mut system = Bordered::with_capacity(20, 5);
+        let mut system = BorderedBandMatrix::with_capacity(20, 5);
         system.reset(band, border);
         let mut dense = DMatrix::zeros(band + border, band + border);
         for i in 0..band + border {
             for j in 0..=i {
-                if i >= band || i - j <= REACH {
+                if i >= band || i - j <= BANDWIDTH {
                     let value = if i == j { 20.0 } else { ((i * 7 + j * 3) as f64).sin() };
                     system.add(j, i, value);
                     dense[(i, j)] = value;
