@@ -1,8 +1,8 @@
 //! The library's own search, asked as its user would ask it, and its answer as far as it is scored.
 
+use super::assessment::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict};
 use super::campaign::HiddenCampaign;
-use super::repeat::{Condition, ExtraRun};
-use super::verdict::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict};
+use super::follow_up::{Condition, ExtraRun};
 use std::panic::{self, AssertUnwindSafe};
 use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain;
@@ -136,7 +136,7 @@ fn begun_m(campaign: &HiddenCampaign, slope_deg: f64) -> f64 {
     let displacements_m: Vec<f64> = from_its_place_m
         .filter_map(|(cell, series_m)| {
             let first_m = series_m.iter().find(|at_m| at_m.is_finite())?;
-            Some(first_m + campaign.worm.make.spacing_m * cell as f64)
+            Some(first_m + campaign.worm.parameters.spacing_m * cell as f64)
         })
         .collect();
     displacements_m.iter().sum::<f64>() / displacements_m.len() as f64

@@ -2,17 +2,15 @@
 
 use super::CELLS;
 use super::motor::Motor;
-use super::tip::contact::{Contact, between};
+use super::tip::contact::Contact;
+use crate::nominal::{DAMPING_RATIO, MASS_KG, MAX_DEFORMATION_M, SPACING_M, STIFFNESS_N_PER_M, STROKE_M};
+use crate::random::{about_one, log_uniform, shuffle};
 use rand::RngExt;
-use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-/// Deviations beyond so many standard deviations are thrown again.
-const WIDEST: f64 = 2.2;
 
 /// The worm's own figures, before anything is hidden in it.
 #[derive(Debug, Clone)]
-pub struct Make {
+pub struct WormParameters {
     /// Mass of the whole worm in equal shares, kg.
     pub mass_kg: f64,
     /// Friction force of each tip, N.
@@ -35,17 +33,17 @@ pub struct Make {
     pub step_order: [usize; CELLS],
 }
 
-impl Make {
+impl WormParameters {
     /// The worm that is believed in, on tips that do not give before they slide.
     pub fn nominal() -> Self {
         Self {
-            mass_kg: 0.333,
-            friction_n: [980.0 * 1.75e-3; CELLS],
-            stiffness_n_per_m: [980.0; CELLS],
-            stroke_m: 0.0115,
-            spacing_m: 0.040,
+            mass_kg: MASS_KG,
+            friction_n: [STIFFNESS_N_PER_M * MAX_DEFORMATION_M; CELLS],
+            stiffness_n_per_m: [STIFFNESS_N_PER_M; CELLS],
+            stroke_m: STROKE_M,
+            spacing_m: SPACING_M,
             contact: Contact::rigid(),
-            damping_ratio: 0.3,
+            damping_ratio: DAMPING_RATIO,
             rounding: 0.005,
             motor: Motor::even(),
             scatter: 0.0,
@@ -69,13 +67,15 @@ impl Make {
             spacing_m: rng.random_range(0.036..0.044),
             contact: Contact::draw(rng),
             damping_ratio: 10f64.powf(rng.random_range(-1.0..0.0)),
-            rounding: between(0.002, 0.03, rng),
+            rounding: log_uniform(0.002, 0.03, rng),
             motor: Motor::draw(rng),
             scatter: rng.random_range(0.005..0.015),
-            step_order: if rng.random_range(0..4) == 0 {
-                shuffled(rng)
-            } else {
-                nominal.step_order
+            step_order: {
+                let mut order = nominal.step_order;
+                if rng.random_range(0..4) == 0 {
+                    shuffle(&mut order, rng);
+                }
+                order
             },
         }
     }
@@ -85,27 +85,4 @@ impl Make {
         let each = |_| (0..cycles).map(|_| about_one(self.scatter, rng)).collect();
         (0..CELLS).map(each).collect()
     }
-}
-
-/// A factor about 1 with a standard deviation, its far ends cut off.
-pub fn about_one(sigma: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
-    1.0 + sigma * normal(rng)
-}
-
-/// A standard normal value, its far ends cut off.
-pub fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
-    loop {
-        let value: f64 = StandardNormal.sample(rng);
-        if value.abs() <= WIDEST {
-            return value;
-        }
-    }
-}
-
-fn shuffled(rng: &mut Xoshiro256PlusPlus) -> [usize; CELLS] {
-    let mut order = std::array::from_fn(|cell| cell);
-    for last in (1..CELLS).rev() {
-        order.swap(last, rng.random_range(0..=last));
-    }
-    order
 }

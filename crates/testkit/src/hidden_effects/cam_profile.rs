@@ -1,14 +1,14 @@
 //! What the cam makes of its phase: how far each cell stands ahead in the body.
 
 use super::CELLS;
-use super::flaws::Flaws;
-use super::make::Make;
-use super::stranger::Stranger;
+use super::deviations::Deviations;
+use super::parameters::WormParameters;
+use super::unmodelled::UnmodelledEffect;
 use std::f64::consts::TAU;
 
 /// The cam with everything that may be wrong with it.
 #[derive(Debug, Clone)]
-pub struct Gear {
+pub struct CamProfile {
     stroke_m: [f64; CELLS],
     /// Place of each cell in the step order, from 0.
     slot: [f64; CELLS],
@@ -19,22 +19,24 @@ pub struct Gear {
     wave_m: [f64; CELLS],
 }
 
-impl Gear {
-    pub fn new(make: &Make, flaws: &Flaws, stranger: Option<&Stranger>) -> Self {
+impl CamProfile {
+    pub fn new(parameters: &WormParameters, deviations: &Deviations, unmodelled: Option<&UnmodelledEffect>) -> Self {
         let mut slot = [0.0; CELLS];
-        for (place, &cell) in make.step_order.iter().enumerate() {
+        for (place, &cell) in parameters.step_order.iter().enumerate() {
             slot[cell] = place as f64;
         }
-        let wave_m = match stranger {
-            Some(Stranger::ProfileError { wave_share }) => wave_share.map(|fraction| fraction * make.stroke_m),
+        let wave_m = match unmodelled {
+            Some(UnmodelledEffect::ProfileError { wave_share }) => {
+                wave_share.map(|fraction| fraction * parameters.stroke_m)
+            }
             _ => [0.0; CELLS],
         };
         Self {
-            stroke_m: flaws.stroke_factor.map(|factor| factor * make.stroke_m),
+            stroke_m: deviations.stroke_factor.map(|factor| factor * parameters.stroke_m),
             slot,
-            rounding: make.rounding,
-            play_m: flaws.play_m,
-            overlap: flaws.overlap,
+            rounding: parameters.rounding,
+            play_m: deviations.play_m,
+            overlap: deviations.overlap,
             wave_m,
         }
     }

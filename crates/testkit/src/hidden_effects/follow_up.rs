@@ -1,9 +1,9 @@
 //! One more run of the same worm under another condition: the experiment that an answer proposes.
 
-use super::body::Place;
+use super::body::Placement;
 use super::campaign::{HiddenCampaign, SLOPE_SIGMA_DEG, crawl};
-use super::make::normal;
-use super::scene::{Lost, Scene};
+use super::scene::{CrawlFailed, Scene};
+use crate::random::truncated_normal;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use worm_analysis::recording::Recording;
@@ -48,17 +48,17 @@ impl HiddenCampaign {
     /// One more run of the same worm, what is hidden in it included, from rest, with dice of its own.
     ///
     /// # Errors
-    /// [`Lost`] when the worm does not crawl under the condition.
-    pub fn repeat(&self, condition: Condition, seed: u64) -> Result<ExtraRun, Lost> {
+    /// [`CrawlFailed`] when the worm does not crawl under the condition.
+    pub fn follow_up(&self, condition: Condition, seed: u64) -> Result<ExtraRun, CrawlFailed> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ seed.rotate_left(24));
         let model = &self.scenes[self.scenes.len() - 1];
         let scene = Scene {
-            place: Place {
-                slope_deg: condition.slope_deg + SLOPE_SIGMA_DEG * normal(&mut rng),
+            placement: Placement {
+                slope_deg: condition.slope_deg + SLOPE_SIGMA_DEG * truncated_normal(&mut rng),
                 payload_kg: condition.payload_kg,
                 start_m: condition.start_shift_m,
             },
-            drive: self.worm.make.motor.drive(condition.cycle_s, &mut rng),
+            drive: self.worm.parameters.motor.drive(condition.cycle_s, &mut rng),
             warm_up_cycles: 0.0,
             cycles: condition.cycles,
             dwell_s: condition.dwell_s,

@@ -12,7 +12,7 @@ pub struct Patch {
 
 /// What differs from the worm that is believed in. The default differs in nothing.
 #[derive(Debug, Clone)]
-pub struct Flaws {
+pub struct Deviations {
     /// Friction force of each cell over what it would be.
     pub friction_factor: [f64; CELLS],
     /// Pad stiffness of each cell over what it would be; the friction force stays.
@@ -60,7 +60,7 @@ pub struct Flaws {
     pub slope_sensitivity: f64,
 }
 
-impl Default for Flaws {
+impl Default for Deviations {
     fn default() -> Self {
         Self {
             friction_factor: [1.0; CELLS],

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 /// Something that the library does not know.
 #[derive(Debug, Clone)]
-pub enum Stranger {
+pub enum UnmodelledEffect {
     /// A corrugated canal pushes each cell to and fro.
     Corrugation {
         period_m: f64,
@@ -35,7 +35,7 @@ const OBSTACLE_M: f64 = 5e-3;
 /// How many kinds there are.
 pub const KINDS: u64 = 6;
 
-impl Stranger {
+impl UnmodelledEffect {
     /// One of the [`KINDS`], its figures thrown.
     pub fn draw(kind: u64, rng: &mut Xoshiro256PlusPlus) -> Self {
         match kind % KINDS {

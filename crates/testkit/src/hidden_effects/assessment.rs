@@ -4,7 +4,7 @@
 
 use super::campaign::{CampaignKind, HiddenCampaign};
 use super::effect::TrueEffect;
-use super::repeat::{Condition, ExtraRun};
+use super::follow_up::{Condition, ExtraRun};
 
 /// What an explanation comes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,12 +105,12 @@ pub trait Explainer: Sync {
 
 /// How one case came out. What does not apply to it is absent.
 #[derive(Debug, Clone)]
-pub struct Judgement {
+pub struct Assessment {
     pub case: String,
     pub kind: CampaignKind,
     pub truth: Vec<TrueEffect>,
     /// What the effect does to the advance and within a cycle, m.
-    pub visible_m: [f64; 2],
+    pub effect_size_m: [f64; 2],
     pub verdict: Verdict,
     /// The first effect named.
     pub top: Option<String>,
@@ -139,7 +139,7 @@ pub struct Judgement {
     pub settled: Option<bool>,
 }
 
-impl Judgement {
+impl Assessment {
     /// All of it in a line.
     pub fn line(&self) -> String {
         let truth: Vec<String> = self.truth.iter().map(TrueEffect::in_words).collect();
@@ -155,8 +155,8 @@ impl Judgement {
             "{:<32} [{}; {:.2}/{:.2} mm] {} {} {:.1} sigma {right} closure {} severity {}",
             self.case,
             truth.join(" + "),
-            1e3 * self.visible_m[0],
-            1e3 * self.visible_m[1],
+            1e3 * self.effect_size_m[0],
+            1e3 * self.effect_size_m[1],
             self.verdict.name(),
             self.top.as_deref().unwrap_or(""),
             self.significance_sigma,
@@ -184,7 +184,7 @@ impl TrueEffect {
     }
 
     /// Whether an answer's effect is this one or its twin.
-    fn is_met_by(&self, named: &Named) -> bool {
+    fn matches(&self, named: &Named) -> bool {
         let aliases = self.aliases();
         let says = |name: &str| aliases.contains(&name);
         // A fault of one cell is no twin of the same fault of all.
@@ -203,7 +203,7 @@ impl TrueEffect {
 }
 
 /// Holds the answer to a campaign against the truth, and has the proposed run made where the answer is ambiguous.
-pub fn judge(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Judgement {
+pub fn assess(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Assessment {
     let answer = explainer.explain(campaign, &[]).unwrap_or_else(|problem| {
         eprintln!("{}: {problem}", campaign.name);
         Answer::failed()
@@ -211,7 +211,7 @@ pub fn judge(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Judgement 
     let single = matches!(campaign.kind, CampaignKind::Single | CampaignKind::Twin);
     let truth = campaign.truth.first().filter(|_| single);
     let top = answer.top();
-    let hit = truth.and_then(|truth| top.filter(|top| truth.is_met_by(top)).map(|top| (truth, top)));
+    let hit = truth.and_then(|truth| top.filter(|top| truth.matches(top)).map(|top| (truth, top)));
     let by_name = hit.filter(|(truth, top)| truth.name == top.name);
     let severity = by_name.and_then(|(truth, top)| {
         let (name, value, neutral) = truth.severity()?;
@@ -222,11 +222,11 @@ pub fn judge(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Judgement 
     let ambiguous = answer.verdict == Verdict::Ambiguous;
     let alone = answer.verdict == Verdict::Named && answer.named.len() == 1;
     let has_cell = |(truth, _): &(&TrueEffect, &Named)| truth.cell.is_some();
-    Judgement {
+    Assessment {
         case: campaign.name.clone(),
         kind: campaign.kind,
         truth: campaign.truth.clone(),
-        visible_m: [campaign.visible.advance_m, campaign.visible.within_cycle_m],
+        effect_size_m: [campaign.effect_size.advance_m, campaign.effect_size.within_cycle_m],
         verdict: answer.verdict,
         top: top.map(|top| top.name.clone()),
         significance_sigma: truth.map_or(0.0, |truth| answer.significance_of(truth)),
@@ -239,12 +239,12 @@ pub fn judge(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Judgement 
         covered: severity.map(|(_, covered)| covered),
         in_set: truth
             .filter(|_| ambiguous)
-            .map(|truth| answer.members().any(|member| truth.is_met_by(member))),
+            .map(|truth| answer.members().any(|member| truth.matches(member))),
         twins_reported: truth
             .filter(|_| campaign.kind == CampaignKind::Twin)
             .map(|truth| hit.is_some() && answer.tells_twins_of(truth)),
         of_pair: (campaign.kind == CampaignKind::Pair).then(|| {
-            let met = |truth: &&TrueEffect| answer.names() && answer.named.iter().any(|named| truth.is_met_by(named));
+            let met = |truth: &&TrueEffect| answer.names() && answer.named.iter().any(|named| truth.matches(named));
             campaign.truth.iter().filter(met).count()
         }),
         settled: truth
@@ -320,11 +320,11 @@ fn is_settled(
         None => return Some(false),
     };
     // A proposal under which the worm does not crawl settles nothing.
-    let Ok(extra) = campaign.repeat(condition, 1) else {
+    let Ok(extra) = campaign.follow_up(condition, 1) else {
         return Some(false);
     };
     let settled = explainer
         .explain(campaign, &[extra])
-        .is_ok_and(|answer| answer.verdict == Verdict::Named && answer.top().is_some_and(|top| truth.is_met_by(top)));
+        .is_ok_and(|answer| answer.verdict == Verdict::Named && answer.top().is_some_and(|top| truth.matches(top)));
     Some(settled)
 }

@@ -1,14 +1,14 @@
 //! What a hidden effect does to the positions: the same worm under the same dice with it and without.
 
 use super::CELLS;
-use super::scene::Played;
+use super::scene::SimulatedRun;
 
 /// Places in a cycle at which two runs are compared.
 const PLACES: usize = 48;
 
 /// Root mean squares of the difference that an effect makes.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Visible {
+pub struct EffectSize {
     /// Of each cycle's mean advance, m.
     pub advance_m: f64,
     /// Of each cell's positions at the same phase within a cycle, their mean over the cycle apart, m.
@@ -17,22 +17,26 @@ pub struct Visible {
     pub cycle_time_s: f64,
 }
 
-impl Visible {
+impl EffectSize {
     /// What differs between the runs of two worms.
-    pub fn between(hidden: &[Played], honest: &[Played]) -> Self {
-        let (mut advance, mut within, mut time) = (Square::default(), Square::default(), Square::default());
-        for (hidden, honest) in hidden.iter().zip(honest) {
-            for (one, other) in advances_m(hidden).iter().zip(&advances_m(honest)) {
+    pub fn between(with_effect: &[SimulatedRun], baseline: &[SimulatedRun]) -> Self {
+        let (mut advance, mut within, mut time) = (
+            SumOfSquares::default(),
+            SumOfSquares::default(),
+            SumOfSquares::default(),
+        );
+        for (with_effect, baseline) in with_effect.iter().zip(baseline) {
+            for (one, other) in advances_m(with_effect).iter().zip(&advances_m(baseline)) {
                 advance.add(one - other);
             }
-            for cycle in whole_cycles(hidden).filter(|&cycle| whole_cycles(honest).any(|other| other == cycle)) {
-                let lasts_s = |played: &Played| played.time_at(cycle + 1.0) - played.time_at(cycle);
-                time.add(lasts_s(hidden) - lasts_s(honest));
+            for cycle in whole_cycles(with_effect).filter(|&cycle| whole_cycles(baseline).any(|other| other == cycle)) {
+                let lasts_s = |simulated: &SimulatedRun| simulated.time_at(cycle + 1.0) - simulated.time_at(cycle);
+                time.add(lasts_s(with_effect) - lasts_s(baseline));
                 for cell in 0..CELLS {
                     let differences_m: Vec<f64> = (0..PLACES)
                         .map(|place| {
                             let phase = cycle + place as f64 / PLACES as f64;
-                            hidden.position_at(cell, phase) - honest.position_at(cell, phase)
+                            with_effect.position_at(cell, phase) - baseline.position_at(cell, phase)
                         })
                         .collect();
                     let mean_m = differences_m.iter().sum::<f64>() / PLACES as f64;
@@ -49,22 +53,22 @@ impl Visible {
 }
 
 /// Mean advance of the cells in every whole cycle of a run, m.
-pub fn advances_m(played: &Played) -> Vec<f64> {
-    let mean_m = |phase: f64| (0..CELLS).map(|cell| played.position_at(cell, phase)).sum::<f64>() / CELLS as f64;
-    whole_cycles(played)
+pub fn advances_m(simulated: &SimulatedRun) -> Vec<f64> {
+    let mean_m = |phase: f64| (0..CELLS).map(|cell| simulated.position_at(cell, phase)).sum::<f64>() / CELLS as f64;
+    whole_cycles(simulated)
         .map(|cycle| mean_m(cycle + 1.0) - mean_m(cycle))
         .collect()
 }
 
 /// The phases at which the whole cycles of a run begin.
-fn whole_cycles(played: &Played) -> impl Iterator<Item = f64> {
-    let first = played.phase.first().map_or(0.0, |phase| phase.ceil());
+fn whole_cycles(simulated: &SimulatedRun) -> impl Iterator<Item = f64> {
+    let first = simulated.phase.first().map_or(0.0, |phase| phase.ceil());
     // A run that ends at a whole cycle has its last sample a little before.
-    let last = played.phase.last().map_or(0.0, |phase| (phase + 0.01).floor());
+    let last = simulated.phase.last().map_or(0.0, |phase| (phase + 0.01).floor());
     (0..(last - first).max(0.0) as usize).map(move |cycle| first + cycle as f64)
 }
 
-impl Played {
+impl SimulatedRun {
     /// Sample before a phase, and the share of the way to the next.
     fn place(&self, phase: f64) -> (usize, f64) {
         let after = self.phase.partition_point(|&earlier| earlier <= phase);
@@ -94,12 +98,12 @@ impl Played {
 }
 
 #[derive(Debug, Default)]
-struct Square {
+struct SumOfSquares {
     count: f64,
     sum: f64,
 }
 
-impl Square {
+impl SumOfSquares {
     fn add(&mut self, value: f64) {
         self.count += 1.0;
         self.sum += value * value;

@@ -1,88 +1,15 @@
-//! What truly happened.
+//! What truly happened in a recording.
 
+use super::balance::TrueBalance;
 use super::body::Body;
 use super::cam::Cam;
-
-/// Sums since the worm was laid down. A difference of two is the account of the stretch between.
-#[derive(Debug, Clone)]
-pub struct TrueBalance {
-    /// Mean position of the cells, m.
-    pub mean_m: f64,
-    /// Distance that each tip slid forward, m.
-    pub forward_slide_m: Vec<f64>,
-    /// Distance that each tip slid backward, m, counted positive.
-    pub backward_slide_m: Vec<f64>,
-    /// Σ k |δ| |ΔX_C|, J.
-    pub friction_j: f64,
-    /// Work against the weight, J.
-    pub weight_j: f64,
-    /// Net actuator work by (13), J: Σ ∫ (k δ + m g sin λ) d(extension).
-    pub actuator_net_j: f64,
-    /// The positive part of it, J.
-    pub actuator_positive_j: f64,
-    /// What the cam really gave, inertia and damping included, J.
-    pub cam_j: f64,
-    /// What the contacts' dampers took, J.
-    pub damping_j: f64,
-}
-
-impl TrueBalance {
-    pub fn zero(cells: usize, mean_m: f64) -> Self {
-        Self {
-            mean_m,
-            forward_slide_m: vec![0.0; cells],
-            backward_slide_m: vec![0.0; cells],
-            friction_j: 0.0,
-            weight_j: 0.0,
-            actuator_net_j: 0.0,
-            actuator_positive_j: 0.0,
-            cam_j: 0.0,
-            damping_j: 0.0,
-        }
-    }
-
-    /// Net displacement, m.
-    pub fn advance_m(&self) -> f64 {
-        self.mean_m
-    }
-
-    /// Energy by losses and weight (11), J.
-    pub fn loss_j(&self) -> f64 {
-        self.friction_j + self.weight_j
-    }
-
-    /// `self + share (other − self)`, each entry.
-    fn towards(&self, other: &Self, fraction: f64) -> Self {
-        self.with(other, |a, b| a + fraction * (b - a))
-    }
-
-    /// The account since `earlier`.
-    pub fn since(&self, earlier: &Self) -> Self {
-        self.with(earlier, |now, then| now - then)
-    }
-
-    fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
-        let each = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(&a, &b)| of(a, b)).collect();
-        Self {
-            mean_m: of(self.mean_m, other.mean_m),
-            forward_slide_m: each(&self.forward_slide_m, &other.forward_slide_m),
-            backward_slide_m: each(&self.backward_slide_m, &other.backward_slide_m),
-            friction_j: of(self.friction_j, other.friction_j),
-            weight_j: of(self.weight_j, other.weight_j),
-            actuator_net_j: of(self.actuator_net_j, other.actuator_net_j),
-            actuator_positive_j: of(self.actuator_positive_j, other.actuator_positive_j),
-            cam_j: of(self.cam_j, other.cam_j),
-            damping_j: of(self.damping_j, other.damping_j),
-        }
-    }
-}
 
 /// One whole gait cycle, from one whole number of the phase to the next.
 #[derive(Debug, Clone)]
 pub struct TrueCycle {
     pub start_s: f64,
     pub end_s: f64,
-    pub account: TrueBalance,
+    pub balance: TrueBalance,
 }
 
 /// Everything there is to know of a recording.
@@ -104,7 +31,7 @@ pub struct Truth {
     pub stored_j: [f64; 2],
     time_s: Vec<f64>,
     phase: Vec<f64>,
-    accounts: Vec<TrueBalance>,
+    balances: Vec<TrueBalance>,
 }
 
 impl Truth {
@@ -121,22 +48,22 @@ impl Truth {
             stored_j: [0.0; 2],
             time_s: Vec::new(),
             phase: Vec::new(),
-            accounts: Vec::new(),
+            balances: Vec::new(),
         }
     }
 
     /// Keeps how things stand; times must grow.
-    pub fn push(&mut self, time_s: f64, phase: f64, account: TrueBalance) {
+    pub fn push(&mut self, time_s: f64, phase: f64, balance: TrueBalance) {
         self.time_s.push(time_s);
         self.phase.push(phase);
-        self.accounts.push(account);
+        self.balances.push(balance);
     }
 
     /// What happened between two times of the recording, s.
     pub fn over(&self, start_s: f64, end_s: f64) -> TrueBalance {
         let at = |time_s: f64| {
             let (row, fraction) = place(&self.time_s, time_s);
-            self.accounts[row].towards(&self.accounts[row + 1], fraction)
+            self.balances[row].interpolate(&self.balances[row + 1], fraction)
         };
         at(end_s).since(&at(start_s))
     }
@@ -149,7 +76,7 @@ impl Truth {
 
     /// What happened over all of the recording.
     pub fn overall(&self) -> TrueBalance {
-        self.accounts[self.accounts.len() - 1].since(&self.accounts[0])
+        self.balances[self.balances.len() - 1].since(&self.balances[0])
     }
 
     /// Finds the whole cycles among the rows. A cycle begins where the phase leaves its whole number and ends where it
@@ -173,7 +100,7 @@ impl Truth {
                 TrueCycle {
                     start_s,
                     end_s,
-                    account: self.over(start_s, end_s),
+                    balance: self.over(start_s, end_s),
                 }
             })
             .collect();
