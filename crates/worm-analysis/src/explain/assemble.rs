@@ -393,11 +393,11 @@ pub(super) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
                 Nuisance::Clock => ("clock".to_owned(), 0.0, value, sigma, "s"),
                 Nuisance::Damping => {
                     let (name, _, found, sigma, unit) = factor("damping".to_owned());
-                    (name, free.centre.exp(), found, sigma, unit)
+                    (name, free.quantity.centre.exp(), found, sigma, unit)
                 }
-                Nuisance::Presliding => ("presliding".to_owned(), free.centre, value, sigma, ""),
-                Nuisance::Rounding => ("rounding".to_owned(), free.centre, value, sigma, ""),
-                Nuisance::Viscosity => ("viscosity".to_owned(), free.centre, value, sigma, "N s/m"),
+                Nuisance::Presliding => ("presliding".to_owned(), free.quantity.centre, value, sigma, ""),
+                Nuisance::Rounding => ("rounding".to_owned(), free.quantity.centre, value, sigma, ""),
+                Nuisance::Viscosity => ("viscosity".to_owned(), free.quantity.centre, value, sigma, "N s/m"),
             };
             Some(Calibrated {
                 name,

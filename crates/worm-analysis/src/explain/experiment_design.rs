@@ -9,10 +9,11 @@ mod change;
 mod trial;
 
 use super::answer::{ExperimentChange, NextExperiment, Prediction};
-use super::fit::{Fit, FitProblem, in_parallel};
+use super::fit::{Fit, FitProblem};
 use super::parameter::{Hypothesised, What};
 pub(super) use change::SLOPES_DEG;
 use change::{BY_COST, Change, changes, cost};
+use rayon::prelude::*;
 use trial::{Reach, Said, Trial, blank, plain_distance};
 use worm_physics::effect::Setting;
 
@@ -45,14 +46,15 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         return None;
     }
     let changes = changes(problem.scene, cycle_s);
-    let plain = in_parallel(changes.len(), |number| {
-        let blank = blank(problem, &changes[number]);
-        let said = ask_all(&Trial::new(problem, &changes[number], &blank)?, candidates)?;
+    let plain_distance_of = |change: &Change| {
+        let blank = blank(problem, change);
+        let said = ask_all(&Trial::new(problem, change, &blank)?, candidates)?;
         let crawls = |said: &Said| said.advance_m > MIN_ADVANCE * problem.scene.nominal[0].worm.stroke_m();
         said.iter()
             .all(crawls)
             .then(|| nearest(&said, |a, b| plain_distance(&said[a], &said[b])))
-    });
+    };
+    let plain: Vec<Option<f64>> = changes.par_iter().map(plain_distance_of).collect();
     let mut possible: Vec<(f64, Change)> = plain
         .into_iter()
         .zip(changes)
@@ -115,10 +117,10 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
         })
         .filter(|&(rival, quantity)| rival == quick || same(candidates, (rival, quantity), quick).is_none())
         .collect();
-    let columns = in_parallel(tasks.len(), |task| {
-        let (rival, quantity) = tasks[task];
-        trial.derivative(candidates[rival], &said[rival], quantity)
-    });
+    let columns: Vec<Vec<f64>> = tasks
+        .par_iter()
+        .map(|&(rival, quantity)| trial.derivative(candidates[rival], &said[rival], quantity))
+        .collect();
     let column = |rival: usize, quantity: usize| {
         let bought = tasks.iter().position(|&task| {
             task == (rival, quantity)

@@ -1,6 +1,7 @@
 //! A hypothesis about the worm: which effects act on it, and which quantities are free.
 
 use super::parameter::{Free, Hypothesised, What};
+use crate::least_squares::Quantity;
 use worm_physics::effect::Setting;
 
 /// Nuisances and effects, and which quantities are free.
@@ -29,7 +30,12 @@ impl Hypothesis {
 
     /// The nominal values: every nuisance at its centre, every effect neutral.
     pub fn neutral(&self) -> Vec<f64> {
-        self.free.iter().map(|free| free.centre).collect()
+        self.free.iter().map(|free| free.quantity.centre).collect()
+    }
+
+    /// Priors and limits of all free quantities.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        self.free.iter().map(|free| free.quantity).collect()
     }
 
     /// The effects with these values.

@@ -21,7 +21,7 @@ pub(super) fn restart_locally(problem: &FitProblem<'_, '_>, mut fit: Fit) -> Fit
             let mut at = fit.at.clone();
             for (&quantity, value) in quantities.iter().zip(values) {
                 let free = &fit.hypothesis.free[quantity];
-                at[quantity] = value.clamp(free.min, free.max);
+                at[quantity] = value.clamp(free.quantity.min, free.quantity.max);
             }
             problem.evaluate(&fit.hypothesis, at)
         });

@@ -24,7 +24,7 @@ mod table;
 use super::answer::{Answer, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
 use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
-use super::fit::{Fit, in_parallel};
+use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::model_selection::Candidate;
 use super::parameter::{Free, Hypothesised, Nuisance, What};
@@ -32,6 +32,7 @@ use super::score_test::hypotheses;
 use crate::experiment::Progress;
 use crate::recording::Advance;
 use model_selection::{AdvanceKind, Judged};
+use rayon::prelude::*;
 use table::Table;
 use worm_estimator::config::Config;
 use worm_physics::effect::Effect;
@@ -77,9 +78,8 @@ pub fn explain_advances(
     let mut finds: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
     // A few at a time, so that a person sees how far it is.
     for some in hypothesised.chunks(8) {
-        finds.extend(in_parallel(some.len(), |number| {
-            refit(&table, &nominal, &recalibrated, some[number])
-        }));
+        let some = some.par_iter();
+        finds.par_extend(some.map(|&hypothesised| refit(&table, &nominal, &recalibrated, hypothesised)));
         tell("refit", 0.1 + 0.8 * finds.len() as f64 / hypothesised.len() as f64);
     }
     tell("judgement", 0.9);

@@ -8,13 +8,15 @@
 //! The best of many effects finds something in mere noise too. So noise is drawn on all directions together, with the
 //! correlations they have, and the largest score noted: what it stays below nineteen times in twenty is the threshold.
 
-use super::fit::{Fit, FitProblem, dot, in_parallel};
+use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
 use super::parameter::Hypothesised;
+use crate::least_squares::{dot, submatrix};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
 use worm_physics::effect::{Effect, LIBRARY, Scope};
 
 /// Strengths that are tried, in notable changes; a single one where an effect has a place, for there are many places to try.
@@ -105,7 +107,7 @@ impl<'f> Projection<'f> {
     fn new(fit: &'f Fit) -> Self {
         let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
         let normal = fit.normal(None);
-        let mut matrix = DMatrix::from_fn(open.len(), open.len(), |row, column| normal[(open[row], open[column])]);
+        let mut matrix = submatrix(&normal, &open);
         for row in 0..open.len() {
             matrix[(row, row)] += 1e-9 * (1.0 + matrix[(row, row)]);
         }
@@ -166,8 +168,7 @@ pub(super) fn screen(
             })
         })
         .collect();
-    let tried: Vec<Option<Tried>> = in_parallel(tasks.len(), |task| {
-        let (number, values, is_weakest) = &tasks[task];
+    let try_out = |(number, values, is_weakest): &(usize, Vec<f64>, bool)| {
         let hypothesised = hypothesised[*number];
         let mut all = fit.hypothesis.hypothesised.clone();
         all.push(hypothesised);
@@ -175,7 +176,7 @@ pub(super) fn screen(
         let hypothesis = Hypothesis::new(&nuisances, &all);
         let mut at = fit.at.clone();
         at.extend(values);
-        let mut direction = problem.residuals_here(&hypothesis, &at);
+        let mut direction = problem.residuals(&hypothesis, &at);
         for (value, here) in direction.iter_mut().zip(&fit.residual) {
             *value -= here;
         }
@@ -195,8 +196,8 @@ pub(super) fn screen(
             fraction,
             direction: is_weakest.then_some((direction, shadow, own)),
         })
-    });
-    let tried: Vec<Tried> = tried.into_iter().flatten().collect();
+    };
+    let tried: Vec<Tried> = tasks.par_iter().filter_map(try_out).collect();
     let threshold = threshold(&projection, &tried, seed);
     let mut screened: Vec<Screening> = hypothesised
         .iter()
@@ -260,15 +261,14 @@ fn threshold(projection: &Projection<'_>, tried: &[Tried], seed: u64) -> f64 {
     if count == 0 {
         return 0.0;
     }
-    let rows = in_parallel(count, |row| {
+    let correlations = |row: usize| -> Vec<f64> {
         let (a, a_shadow, a_own) = directions[row];
-        (0..=row)
-            .map(|column| {
-                let (b, b_shadow, b_own) = directions[column];
-                projection.product(a, a_shadow, b, b_shadow) / (a_own * b_own).sqrt()
-            })
-            .collect::<Vec<f64>>()
-    });
+        let with_others = directions[..=row].iter();
+        with_others
+            .map(|(b, b_shadow, b_own)| projection.product(a, a_shadow, b, b_shadow) / (a_own * b_own).sqrt())
+            .collect()
+    };
+    let rows: Vec<Vec<f64>> = (0..count).into_par_iter().map(correlations).collect();
     let mut gram = DMatrix::from_fn(count, count, |row, column| rows[row.max(column)][row.min(column)]);
     for row in 0..count {
         gram[(row, row)] += 1e-6;

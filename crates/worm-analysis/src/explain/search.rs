@@ -236,7 +236,7 @@ fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(FitPr
         let mut fit = problem.fit(base, at, None);
         round += 1;
         if round == NOISE_ROUNDS {
-            problem.buy_all_derivatives(&mut fit);
+            problem.compute_jacobian(&mut fit);
             let repeating_excess = problem.repeating_excess(&fit);
             let problem = FitProblem {
                 repeating_excess,

@@ -79,8 +79,7 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
             let mut at = hypothesis.neutral();
             *at.last_mut().expect("the effect's parameter") = value;
             let mut fit = problem.evaluate(&hypothesis, at);
-            let all: Vec<usize> = (0..fit.at.len()).collect();
-            problem.compute_jacobian_columns(&mut fit, &all);
+            problem.compute_jacobian(&mut fit);
             fit
         })
         .collect();
