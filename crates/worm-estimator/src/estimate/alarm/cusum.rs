@@ -133,7 +133,7 @@ impl CusumChart {
         0.5 * self.shift + 2.0 * self.sigma / f64::from(self.count).sqrt()
     }
 
-    /// The decision limit h, share of the usual.
+    /// The decision limit h, as a fraction of the baseline.
     fn limit(&self) -> f64 {
         let drift = 0.5 * self.shift / self.sigma;
         let mut b = 1.0;
