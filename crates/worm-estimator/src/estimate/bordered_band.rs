@@ -1,12 +1,12 @@
 //! Symmetric positive definite systems whose matrix is a narrow band with a dense border.
 //!
-//! The unknowns of a fit along the gait phase come in two kinds: many that only meet their neighbours (the band) and a few that
-//! meet all (the border). Cholesky's method keeps that shape, so a system of 270 unknowns costs some ten microseconds.
+//! A fit along the gait phase has two kinds of unknowns: many that are coupled to their neighbours only (the band), and a few that are
+//! coupled to all (the border). The Cholesky factor keeps that shape, so a system of 270 unknowns costs some ten microseconds.
 
-/// Entries beside the diagonal that a row of the band may have, to the left.
+/// Half bandwidth: entries left of the diagonal that a row of the band may have.
 pub(super) const BANDWIDTH: usize = 4;
 
-/// A system, its factor, or both after one another. All memory is taken at construction.
+/// A matrix, or its Cholesky factor. All memory is allocated at construction.
 #[derive(Debug, Clone)]
 pub(super) struct BorderedBandMatrix {
     band: usize,
@@ -17,7 +17,7 @@ pub(super) struct BorderedBandMatrix {
 }
 
 impl BorderedBandMatrix {
-    /// Room for a system of up to that size.
+    /// Memory for a system of up to that size.
     pub(super) fn with_capacity(band: usize, border: usize) -> Self {
         Self {
             band,
@@ -28,7 +28,7 @@ impl BorderedBandMatrix {
         }
     }
 
-    /// All entries 0, in a size within the capacity.
+    /// Sets the size, within the capacity, and all entries to 0.
     pub(super) fn reset(&mut self, band: usize, border: usize) {
         self.band = band;
         self.border = border;
@@ -37,7 +37,7 @@ impl BorderedBandMatrix {
         self.corner[..border * border].fill(0.0);
     }
 
-    /// Becomes another system of the same size.
+    /// Copies another system, scaled.
     pub(super) fn copy_from(&mut self, other: &Self, scale: f64) {
         self.reset(other.band, other.border);
         for (to, from) in self.rows.iter_mut().zip(&other.rows[..other.band]) {
@@ -157,7 +157,7 @@ impl BorderedBandMatrix {
         true
     }
 
-    /// Takes from the corner what the band explains of it. Four rows at a time, for this is where the time goes.
+    /// Subtracts the band's part from the corner (Schur complement). Four rows at a time, for most of the time is spent here.
     fn reduce_corner(&mut self) {
         let rows = &self.coupling[..self.band * self.border];
         let mut fours = rows.chunks_exact(4 * self.border);
@@ -181,7 +181,7 @@ impl BorderedBandMatrix {
         }
     }
 
-    /// With the factor L in place: x ← L⁻¹ x. The squared length of the answer is xᵀ A⁻¹ x.
+    /// With the factor L in place: x ← L⁻¹ x. The squared length of the result is xᵀ A⁻¹ x.
     pub(super) fn solve_lower(&self, x: &mut [f64]) {
         let (x_band, x_border) = x.split_at_mut(self.band);
         forward(&self.rows[..self.band], x_band);
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_is_not_positive_definite() {
+    fn rejects_a_matrix_that_is_not_positive_definite() {
         for at in [4, 10] {
             let (mut system, _) = example();
             system.add(at, at, -40.0);

@@ -1,14 +1,14 @@
-//! Largest tip deformations found on the first cycles from positions alone: section 3.2 of the paper made continuous.
+//! Largest tip deformations, identified from positions alone on the first cycles: section 3.2 of the paper, recursively.
 //!
-//! The worm is so slow that the contacts carry the pull at every moment: F = Σ kᵢ δᵢ + m g sin λ = 0. Equations (1) to (4)
-//! give every δᵢ once its bound is assumed, so the bounds sought are those with the least mean square of F over whole
-//! cycles, which is the square of its mean (7) plus its variance. Where the paper tries 7⁴ candidates, this runs
-//! Gauss and Newton's method: dδᵢ/dδmaxᵢ is +1 after the tip last slid forward and −1 after it last slid backward.
+//! The worm is so slow that the contacts carry the pull at every moment: F = Σ kᵢ δᵢ + m g sin λ = 0. With the bounds assumed, (1) to
+//! (4) give every δᵢ. The bounds sought therefore minimise the mean square of F over whole cycles, which is the square of its mean (7)
+//! plus its variance. Where the paper tries 7⁴ candidates, this uses the Gauss-Newton method: dδᵢ/dδmaxᵢ is +1 after the tip last slid
+//! forward and −1 after it last slid backward.
 //!
-//! # What positions cannot tell
-//! A tip that never slides backward has +1 all the time, and so has every other such tip: of their bounds only Σ kᵢ δmaxᵢ
-//! can be found. A weak pull towards the configured first guess shares that sum out, and the standard errors say how
-//! weakly the single bounds are known. On the level with equal cells this concerns all of them.
+//! # What positions cannot identify
+//! A tip that never slides backward has +1 all the time, and so has every other such tip: of their bounds only Σ kᵢ δmaxᵢ can be
+//! identified. A weak prior around the configured first guess distributes that sum, and the standard errors show how weakly the single
+//! bounds are known. On the level with equal cells this applies to all of them.
 
 use super::energy_balance::Tip;
 use super::fit::Fit;
@@ -22,34 +22,34 @@ type PerCell = SVector<f64, MAX_CELLS>;
 /// Information on the bounds, of fixed size so that nothing is allocated; the identity beyond the last cell.
 type Information = SMatrix<f64, MAX_CELLS, MAX_CELLS>;
 
-/// Whole cycles on which the bounds are found, the first of which only finds the contact points.
+/// Whole cycles used for the identification. The first one only determines the contact points.
 pub(super) const CYCLES: usize = 5;
-/// Cycles after which a first answer is worth more than the guess.
+/// Cycles after which a first result is better than the guess.
 const FIRST_SEARCH: usize = 3;
-/// Standard deviation of the first guess, as a share of it.
+/// Standard deviation of the first guess, as a fraction of it.
 const GUESS_SPREAD: f64 = 0.3;
 /// How far from the first guess a bound may lie, as factors.
 const RANGE: (f64, f64) = (0.1, 4.0);
-/// Starting points, as factors of the first guess.
+/// Starting points of the search, as factors of the first guess.
 const STARTS: [f64; 3] = [1.0, 0.7, 1.4];
 /// Iterations from each.
 const ITERATIONS: usize = 12;
-/// Slides that are not told from noise, in standard deviations of one measured position. Without it, noise at a tip that just
-/// fails to slide would pass for knowledge of its bound.
+/// Smallest slide that counts, in standard deviations of one measured position. Without this deadband, noise at a tip that is just
+/// short of sliding would count as information on its bound.
 const DEADBAND_SIGMAS: f64 = 0.5;
-/// Knots over which the errors of a fit hang together.
+/// Correlation length of the errors of a fit, in knots.
 const CORRELATED_KNOTS: f64 = 1.5;
 
-/// The search and the cycles it rests on.
+/// The search, and the cycles that it uses.
 #[derive(Debug, Clone)]
 pub(super) struct Identification {
     guess_m: Vec<f64>,
     bound_m: Vec<f64>,
-    stroke_cells: Vec<usize>, // whose step each step of the stored cycles was
+    stroke_cells: Vec<usize>, // the stepping cell of each step of a stored cycle
     path_m: Vec<f64>,         // [knot][cell], continuous over the stored cycles
     stored: usize,
     force_sigma_n: f64,
-    deadband_m: f64,                                      // slides up to this are taken for noise
+    deadband_m: f64,                                      // smaller slides are taken for noise
     information: Option<Cholesky<f64, Const<MAX_CELLS>>>, // after a search, as a factor
     force_n: Vec<f64>,
     slope: Vec<f64>, // [knot][cell], k dδ/dδmax
@@ -74,20 +74,20 @@ impl Identification {
         }
     }
 
-    /// Enough cycles are stored; the answer stays.
+    /// Enough cycles are stored: the result is final.
     pub(super) fn is_done(&self) -> bool {
         self.stored == CYCLES
     }
 
-    /// The next cycle does not join on to the stored ones. A finished search stays.
+    /// Discards the stored cycles, because the next one does not continue them. A final result stays.
     pub(super) fn interrupt(&mut self) {
         if !self.is_done() {
             self.stored = 0;
         }
     }
 
-    /// Stores the last cycle of a fit and searches when there are enough. True when there is a new answer.
-    pub(super) fn take_up(&mut self, fit: &Fit, tips: &[Tip]) -> bool {
+    /// Stores the last cycle of a fit and searches when there are enough. True when there is a new result.
+    pub(super) fn add_cycle(&mut self, fit: &Fit, tips: &[Tip]) -> bool {
         if self.is_done() {
             return false;
         }
@@ -118,7 +118,7 @@ impl Identification {
         true
     }
 
-    /// The bounds as far as found, m.
+    /// The bounds identified so far, m.
     pub(super) fn bound_m(&self) -> &[f64] {
         &self.bound_m
     }
@@ -159,7 +159,8 @@ impl Identification {
         self.bound_m.copy_from_slice(&bound_m[..tips.len()]);
     }
 
-    /// Twice the negative logarithm of the likelihood of some bounds; leaves F and its slopes behind.
+    /// χ² of the force balance and the prior for some bounds: minus twice their log-likelihood. Leaves F and its derivatives in
+    /// `force_n` and `slope`.
     fn chi_squared(&mut self, tips: &[Tip], bound_m: &[f64; MAX_CELLS]) -> f64 {
         let cells = tips.len();
         let pieces = cells * INTERVALS;
@@ -198,8 +199,8 @@ impl Identification {
         1.0 / (CORRELATED_KNOTS * self.force_sigma_n * self.force_sigma_n)
     }
 
-    /// Solves for the change of the bounds that would bring the misfit to its minimum if the slopes stayed; leaves the
-    /// information on the bounds behind. None when the bounds cannot be told at all.
+    /// The Gauss-Newton step. Leaves the Cholesky factor of the information matrix in `information`. None when that is not positive
+    /// definite.
     fn gauss_newton_step(&mut self, bound_m: &[f64; MAX_CELLS]) -> Option<PerCell> {
         let cells = self.guess_m.len();
         let pieces = cells * INTERVALS;

@@ -1,17 +1,18 @@
-//! At which gait phase a tracker sample was captured.
+//! The gait phase at which a tracker sample was captured.
 //!
-//! A sample reaches the estimator with the first tick after its capture, up to a tick late, and the cam has turned on. The
-//! tracker stamps captures with a clock of its own. Times here are those that the motor lived through (`motor_time`): a simulated tracker
-//! stands still when its motor does, and its samples are not old by that. The least difference ever seen between the tick's time and that stamp,
-//! let grow slowly because clocks drift, stands for a sample without delay; what a sample has beyond it is its age.
-//! A constant delay cannot be told from a difference of the clocks and stays in: 0.3 ms of it are 0.006 mm.
+//! A sample reaches the estimator with the first tick after its capture, up to a tick late, and the cam has turned on meanwhile. The
+//! tracker stamps captures with its own clock. The smallest difference seen so far between the tick's time and that stamp stands for a
+//! sample without delay; it is allowed to grow slowly, because clocks drift. What a sample has beyond it is its age. A constant delay
+//! cannot be told from an offset of the clocks and remains: 0.3 ms of it are 0.006 mm.
+//!
+//! Times here are motor times (`motor_time`): a simulated tracker stands still when its motor does, and its samples do not age.
 
 /// How far two crystal clocks may drift apart.
 const DRIFT: f64 = 1e-4;
-/// Age beyond which the clocks are taken to have jumped, s.
+/// Age from which a clock must have jumped, s.
 const JUMP_S: f64 = 0.2;
 
-/// The comparison of the two clocks and the tick before.
+/// Compares the two clocks and remembers the tick before.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Capture {
     min_lag_s: Option<(f64, f64)>, // and when
@@ -19,7 +20,7 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Notes a tick whose sample, if any, has been placed.
+    /// Records a tick, after [`place`](Self::place) has had its sample, if any.
     pub fn note_tick(&mut self, time_s: f64, phase: f64) {
         self.before = Some((time_s, phase));
     }

@@ -1,9 +1,9 @@
 //! Where the tips touch the canal now: equations (1) to (4) on filtered positions.
 //!
-//! A tip slides when its deformation passes the bound, and on noisy positions it seems to do so at every peak of the noise.
-//! Two things keep that from adding up. A tip counts as sliding only beyond the bound by one standard deviation of the filtered
-//! position, and at the end of its own step (1) puts the contact point where that position says, free of peaks. What is
-//! left of the error is taken out at the end of the cycle, when [`fit`](super::fit) has the better contact points.
+//! A tip slides when its deformation exceeds the bound, and on noisy positions it seems to do so at every peak of the noise. Two rules
+//! keep that from adding up. A tip counts as sliding only beyond the bound by one standard deviation of the filtered position, and at
+//! the end of its own step (1) gives the contact point from that position alone. The remaining error is removed at the end of the
+//! cycle, when [`fit`](super::fit) has better contact points.
 
 use super::energy_balance::Tip;
 use worm_physics::MAX_CELLS;
@@ -31,12 +31,12 @@ impl Contacts {
         }
     }
 
-    /// Other bounds, from now on. A tip that is known and beyond its new bound slides to it unseen.
+    /// Changes the bounds. A tip beyond its new bound then slides to it.
     pub(super) fn set_tips(&mut self, tips: &[Tip]) {
         self.tips.copy_from_slice(tips);
     }
 
-    /// Where the tips touch is no longer known. What they slid before stays counted.
+    /// Forgets the contact points, but not the distances slid so far.
     pub(super) fn forget(&mut self) {
         self.contact_m = [f64::NAN; MAX_CELLS];
         self.sliding_mask = 0;
@@ -83,7 +83,7 @@ impl Contacts {
         self.loss_j += stiffness_n_per_m * bound_m * slide_m.abs();
     }
 
-    /// Takes over contact points and totals that are known better; a `NaN` contact point is not known better.
+    /// Replaces contact points and totals by better ones; a contact point of `NaN` is left as it is.
     pub(super) fn correct(&mut self, contact_m: &[f64], forward_m: &[f64], backward_m: &[f64], loss_j: f64) {
         for cell in 0..self.tips.len() {
             if contact_m[cell].is_finite() {

@@ -1,9 +1,9 @@
 //! Where gait cycles begin and end.
 //!
-//! A cycle runs from one whole number of the phase to the next in the direction of the crawl. It may rest on the way: a pause
-//! belongs to the cycle in which it falls, with its time and its electrical energy, because both were spent on that
-//! cycle's advance. A hold that trembles by less than [`JITTER`] changes nothing. A larger turn back breaks the cycle: its tips
-//! have a path that no single pass over the phase can describe, so it is not reported, and the next one begins afresh.
+//! A cycle runs from one whole number of the phase to the next, in the direction of the crawl. It may pause: a pause belongs to the
+//! cycle in which it falls, with its time and its electrical energy, because both were spent on that cycle's advance. Jitter of a
+//! hold below [`JITTER`] changes nothing. A larger turn back breaks the cycle: no single pass over the phase describes the path of its
+//! tips, so it is not reported, and the next one starts afresh.
 
 /// How far the phase may turn back without breaking a cycle, cycles.
 const JITTER: f64 = 0.02;
@@ -15,13 +15,13 @@ const AT_REST: f64 = 1e-3;
 pub(super) enum Event {
     /// Nothing ended.
     Continues,
-    /// The open cycle still rests at its beginning.
+    /// The open cycle is still at rest at its beginning.
     AtRest,
-    /// A cycle ended at this share of the way from the last phase to this one, and the next began.
+    /// A cycle ended at this fraction of the way from the last phase to this one, and the next began.
     Ended {
         /// 0 to 1.
         fraction: f64,
-        /// The phase went through it in one direction.
+        /// The phase passed through it in one direction.
         whole: bool,
     },
     /// A cycle began, in another direction or after a jump; what was open is void.
@@ -41,7 +41,7 @@ pub(super) struct Cycles {
 }
 
 impl Cycles {
-    /// No phase known yet; `default_direction` is what a worm at rest is taken to be about to do.
+    /// No phase known yet; `default_direction` is assumed for a worm at rest.
     pub(super) fn new(default_direction: i32) -> Self {
         Self {
             default_direction,
@@ -54,7 +54,7 @@ impl Cycles {
         }
     }
 
-    /// Takes up a phase; it must be finite.
+    /// Follows the phase, which must be finite.
     pub(super) fn advance_to(&mut self, phase: f64) -> Event {
         let last = std::mem::replace(&mut self.last, phase);
         let Some(start) = self.start else {
@@ -96,7 +96,7 @@ impl Cycles {
             -1
         };
         self.begin(near as i64, direction, off.abs());
-        // Away from a whole number this is the rest of some cycle, which cannot be reported.
+        // Away from a whole number this is the remainder of a cycle, which cannot be reported.
         self.whole = off.abs() < JITTER;
         Event::Began
     }
@@ -123,7 +123,7 @@ impl Cycles {
         self.start.map(|start| self.done(phase, start))
     }
 
-    /// Nothing is known of the phase any more.
+    /// Forgets the phase.
     pub(super) fn forget(&mut self) {
         *self = Self::new(self.default_direction);
     }
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trembling_hold_on_the_boundary_ends_nothing_twice() {
+    fn jitter_on_the_boundary_ends_a_cycle_once() {
         let mut cycles = Cycles::new(1);
         let events = ends(&mut cycles, &[0.0, 0.5, 0.99, 1.001, 0.999, 1.001, 0.995, 1.0, 1.4]);
         assert_eq!(events.len(), 2);
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_back_breaks_the_cycle_and_turns_the_count() {
+    fn turning_back_breaks_the_cycle_and_reverses_the_direction() {
         let mut cycles = Cycles::new(1);
         let events = ends(&mut cycles, &[0.0, 0.4, 0.6, 0.4, 0.7, 1.0]);
         assert_eq!(
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_begins_in_the_middle_is_no_whole_cycle() {
+    fn a_start_in_mid_cycle_gives_no_whole_cycle() {
         let mut cycles = Cycles::new(1);
         let events = ends(&mut cycles, &[0.3, 0.6, 0.9, 1.0, 1.4, 1.8, 2.0, 17.4]);
         assert_eq!(

@@ -1,12 +1,11 @@
-//! Electrical energy into the motor and heat in its winding, by the trapezoidal rule over the time that the motor lived through
-//! (`motor_time`).
+//! Electrical energy into the motor and heat in its winding, by the trapezoidal rule over motor time (`motor_time`).
 //!
-//! Only readings of their own tick count; between two of them power is taken to run in a straight line. Over more than
-//! [`LONGEST_GAP_S`] without a reading nothing is counted, and the standard error grows by what a steady power would
-//! have made of the gap. The rest of the standard error is what the servo's registers resolve (0.1 V, 1 mA): steps that a
-//! nearly constant supply does not average out, so they count in full over the cycle.
+//! Only readings of their own tick count, and power is taken to be linear between two of them. Over more than [`LONGEST_GAP_S`] without
+//! a reading nothing is counted, and the standard error grows by the energy that a steady power would have taken in the gap. The rest of
+//! the standard error is the resolution of the servo's registers (0.1 V, 1 mA): a nearly constant supply does not average it out, so
+//! it counts in full over the cycle.
 //!
-//! A warm winding resists more: its temperature is taken to be the servo's, which is a few kelvin less than it is.
+//! A warm winding has a higher resistance. Its temperature is taken to be the servo's, which is a few kelvin too low.
 
 use crate::message::State;
 
@@ -17,7 +16,7 @@ const VOLTAGE_SIGMA_V: f64 = 0.029;
 /// Standard deviation of a current read in steps of 1 mA, A.
 const CURRENT_SIGMA_A: f64 = 0.29e-3;
 
-/// Resistance of copper grows by this share per kelvin …
+/// Resistance of copper grows by this fraction per kelvin …
 const COPPER_PER_K: f64 = 0.00393;
 /// … from the temperature at which the configured resistance holds, °C.
 const RESISTANCE_AT_C: f64 = 25.0;
@@ -59,7 +58,7 @@ struct Reading {
     motor_ns: u64,
     power_w: f64,
     copper_w: f64,
-    current_a: f64, // duty × current, what a volt more would add
+    current_a: f64, // duty × current: derivative of the power by the voltage
     winding_v: f64,
 }
 
@@ -80,7 +79,7 @@ impl Electrical {
         }
     }
 
-    /// Takes up a tick at `motor_ns` of the motor's time, if its motor readings are its own and make sense.
+    /// Adds a tick at motor time `motor_ns`, if its motor readings are new and valid.
     pub(super) fn update(&mut self, state: &State, motor_ns: u64) {
         let winding_v = state.bus_voltage_v * state.motor_duty;
         let resistance_ohm = self.resistance_at_ohm(state.motor_temperature_c);

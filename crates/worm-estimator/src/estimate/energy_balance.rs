@@ -1,21 +1,21 @@
-//! What a fitted cycle cost: contact points by (1) to (3) along the fit, losses (11, 12) and actuator work (13).
+//! The energy balance of a fitted cycle: contact points by (1) to (3) along the fit, losses (11, 12) and actuator work (13).
 //!
-//! Between two knots every position is a straight line, so tips start to slide at exact places and no noise is taken for
-//! motion: what a tip slides is the way between two contact points, each bound to the fit at one knot. That also gives the
-//! derivatives of every energy by every unknown of the fit, and with them the standard errors.
+//! Between two knots every position is a straight line, so a slide starts at a definite place and noise is not counted as motion: a tip
+//! slides by the distance between two contact points, each tied to the fit at one knot. That also gives the derivatives of every energy
+//! with respect to the unknowns of the fit, and with them the standard errors.
 
 use super::fit::Fit;
 use super::window::INTERVALS;
 use worm_physics::Ledger;
 use worm_physics::MAX_CELLS;
 
-/// Slides up to this many standard errors of the advance are not told from noise. Every peak that a fitted path has at a
-/// bound would count as a slide otherwise, and always as a positive one.
+/// Smallest slide that counts, in standard errors of the advance. Without this deadband every peak of a fitted path at a bound would
+/// count as a slide, and always as a positive one.
 const DEADBAND_SIGMAS: f64 = 1.3;
-/// The same without noise, strokes: by this much a fit overshoots a corner that lies between two knots.
+/// Lower limit of the deadband, strokes: by this much a fit overshoots a corner that lies between two knots.
 const MIN_DEADBAND: f64 = 2e-3;
 
-/// What a tip is, seen in the direction of the crawl.
+/// The parameters of a tip, seen in the direction of the crawl.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tip {
     pub(super) stiffness_n_per_m: f64,
@@ -24,7 +24,7 @@ pub(super) struct Tip {
     pub(super) weight_n: f64,
 }
 
-/// A contact point and the knot to which it is bound; none when it was brought along.
+/// A contact point and the knot that it is tied to; none when it comes from an earlier cycle.
 #[derive(Debug, Clone, Copy)]
 struct ContactPoint {
     at_m: f64, // NaN before it is known
@@ -32,7 +32,7 @@ struct ContactPoint {
     guessed: bool,
 }
 
-/// The account of one cycle, in the direction of the crawl.
+/// The energy balance of one cycle, in the direction of the crawl.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct EnergyBalance {
     pub(super) advance_m: f64,
@@ -49,7 +49,7 @@ pub(super) struct EnergyBalance {
     pub(super) contact_at_end_m: [f64; MAX_CELLS],
     /// Deformation of each tip at the cycle's end; `NaN` where not known.
     pub(super) deformation_at_end_m: [f64; MAX_CELLS],
-    /// Every contact point was known, or guessed, from the cycle's start: the account leaves nothing out.
+    /// Every contact point was known or guessed from the cycle's start: nothing is left out.
     pub(super) complete: bool,
     /// Every contact point was known from the cycle's start.
     pub(super) settled: bool,
@@ -71,13 +71,13 @@ impl EnergyBalance {
 pub(super) struct Start<'a> {
     /// Contact points, m; `NaN` where not known.
     pub(super) contact_m: &'a [f64],
-    /// Deformations of a worm that was laid down and stands, m.
+    /// Deformations of a worm that was laid down and is at rest, m.
     pub(super) resting_m: [f64; MAX_CELLS],
-    /// Such a worm it was.
+    /// The window starts with such a worm.
     pub(super) starts_at_rest: bool,
 }
 
-/// Keeps the account of the last cycle of a fit.
+/// Calculates the energy balance of the last cycle of a fit.
 #[derive(Debug, Clone)]
 pub(super) struct EnergyIntegrator {
     tips: Vec<Tip>,
@@ -85,8 +85,8 @@ pub(super) struct EnergyIntegrator {
     loss_gradient: Vec<f64>,
     actuator_gradient: Vec<f64>,
     advance_gradient: Vec<f64>,
-    sliding: Vec<Option<(f64, f64)>>, // sense of a tip that slid in the present step, and its way back since
-    deadband_m: f64,                  // slides up to this are not counted
+    sliding: Vec<Option<(f64, f64)>>, // direction of a tip that slid in the present step, and how far it went back since
+    deadband_m: f64,                  // smaller slides are not counted
     work_by_contact_n: Vec<f64>,      // derivative of the actuator work by each contact point
 }
 
@@ -109,9 +109,9 @@ impl EnergyIntegrator {
         }
     }
 
-    /// Accounts for the last cycle of the fit. Where a tip's contact point is not known at its start, the tip is taken to
-    /// carry its part of the weight if the worm was laid down and began to crawl; else the cycle is taken to be like any
-    /// other, so that the tip begins it as it ends it.
+    /// The energy balance of the last cycle of the fit. Where a tip's contact point is not known at the start, the tip is assumed to
+    /// carry its part of the weight if the worm has just begun to crawl from rest; otherwise the cycle is assumed to be periodic, so
+    /// the tip begins it as it ends it.
     pub(super) fn close(&mut self, fit: &Fit, tips: &[Tip], start: &Start<'_>) -> EnergyBalance {
         if start.starts_at_rest {
             return self.close_with_guess(fit, tips, start.contact_m, &start.resting_m);
@@ -123,14 +123,14 @@ impl EnergyIntegrator {
         let mut guess_m = balance.deformation_at_end_m;
         for (guess_m, resting_m) in guess_m.iter_mut().zip(start.resting_m) {
             if guess_m.is_nan() {
-                *guess_m = resting_m; // it has not made a step, so nothing tells how it stands
+                *guess_m = resting_m; // it has not made a step, so nothing else is known
             }
         }
         self.close_with_guess(fit, tips, start.contact_m, &guess_m)
     }
 
-    /// The account with a guess of the deformations with which tips of unknown contact point begin, `NaN` for none. A guess
-    /// holds until the end of the cell's own step, where (1) puts an end to it; its doubt goes into the standard errors.
+    /// The balance with a guess of the initial deformation of tips whose contact point is not known, `NaN` for none. A guess holds
+    /// until the end of the cell's own step, where (1) gives the contact point; its uncertainty goes into the standard errors.
     fn close_with_guess(&mut self, fit: &Fit, tips: &[Tip], contact_m: &[f64], guess_m: &[f64]) -> EnergyBalance {
         self.tips.copy_from_slice(tips);
         self.work_by_contact_n.fill(0.0);
@@ -201,7 +201,7 @@ impl EnergyIntegrator {
             balance.loss_sigma_j = fit
                 .standard_error(&mut self.loss_gradient)
                 .hypot((overshoot_variance_j2 + guess_j2).sqrt());
-            // A slide too small to be told leaves its contact point off by up to that, and the force all along the loading.
+            // A slide within the deadband leaves its contact point off by up to that, and the force throughout the loading.
             let deadband_variance_j2: f64 = self
                 .work_by_contact_n
                 .iter()
@@ -264,7 +264,7 @@ impl EnergyIntegrator {
         if piece.is_multiple_of(INTERVALS) {
             self.sliding[cell] = None;
         }
-        // Once a tip slides, small ways back within the same step are peaks of the fit too: the tip stays at its bound.
+        // Once a tip slides, small reversals within the same step are peaks of the fit, too: the tip stays at its bound.
         let back_m = match self.sliding[cell] {
             Some((sliding, back_m)) if sliding == sign && back_m - excess_m <= self.deadband_m => back_m,
             None if excess_m > self.deadband_m => 0.0,
@@ -306,11 +306,11 @@ impl EnergyIntegrator {
         let extension_m = fit.extension_m(piece);
         let before_m = fit.position_m(cell, piece) - contact.at_m;
         if before_m.is_nan() {
-            return; // the account is not complete, and will be kept once more with a guess
+            return; // the balance is not complete, and will be calculated again with a guess
         }
         let shift_m = fit.position_m(cell, piece + 1) - fit.position_m(cell, piece);
         let held_m = (before_m + shift_m).clamp(-bound_m, bound_m);
-        // Share of the piece in which the tip still loads; then it slides at its bound.
+        // Fraction of the piece in which the tip still loads; then it slides at its bound.
         let loading = if shift_m == 0.0 {
             1.0
         } else {

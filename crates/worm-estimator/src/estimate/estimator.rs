@@ -22,12 +22,12 @@ use crate::config::{Config, DeformationSource};
 use crate::message::{Cycle, Estimate, Mode, State};
 use worm_physics::MAX_CELLS;
 
-/// Steps of the gait without a believed position after which the contact points are lost.
+/// Steps of the gait without an accepted position after which the contact points are lost.
 const MAX_BLIND_STEPS: f64 = 0.5;
-/// Tracker periods that are no silence yet, however far the gait goes in them.
+/// Tracker periods that do not count as silence yet, however far the gait goes in them.
 const SHORTEST_SILENCE_PERIODS: f64 = 2.5;
 
-/// Account of the open cycle.
+/// The totals at the start of the open cycle.
 #[derive(Debug, Clone, Copy)]
 struct CycleStart {
     time_s: f64,
@@ -38,7 +38,7 @@ struct CycleStart {
     loss_j: f64,
 }
 
-/// The estimator of one worm. Feed it every state in order; gaps, repeats and nonsense are survived.
+/// The estimator of one worm. Feed it every state in order; it tolerates gaps, repeats and invalid values.
 #[derive(Debug, Clone)]
 pub struct Estimator {
     cells: usize,
@@ -54,7 +54,7 @@ pub struct Estimator {
     electrical: Electrical,
     window: Window,
     window_contact_m: [f64; MAX_CELLS], // at the window's start, in the direction of the crawl
-    window_is_complete: bool,           // no silence in the open cycle
+    window_is_complete: bool,           // the tracker was never silent in the open cycle
     has_crawled: bool,                  // a cycle has ended
     starts_at_rest: bool,               // the open cycle is the first, and began at rest
     fit: Fit,
@@ -65,18 +65,18 @@ pub struct Estimator {
     cycle_start: CycleStart,
     cycle_index: u64,
     last: Option<(u64, f64, f64)>, // sequence, time and phase of the last state
-    last_seen: Option<(f64, f64)>, // time and phase of the last believed position
+    last_seen: Option<(f64, f64)>, // time and phase of the last accepted position
     first_mean_m: f64,             // mean position when it was first known
-    entered: (f64, f64),           // step share at which the present step was entered, and the cell's lead then
+    entered: (f64, f64),           // fraction of the present step at which it was entered, and the cell's lead then
     estimate: Estimate,
     cycle: Cycle,
 }
 
 impl Estimator {
-    /// An estimator for the configured worm. All memory is taken here.
+    /// An estimator for the configured worm. All memory is allocated here.
     ///
     /// # Errors
-    /// [`EstimatorError`] when the configuration is not one that [`Config::load`] would have let through.
+    /// [`EstimatorError`] for a configuration that [`Config::load`] would have refused.
     pub fn new(config: &Config) -> Result<Self, EstimatorError> {
         if let Some(problem) = config.problems().into_iter().next() {
             return Err(EstimatorError::Config(problem));
@@ -134,17 +134,17 @@ impl Estimator {
         &self.estimate
     }
 
-    /// What the model does not explain of the last cycles; empty while the bounds are still being identified.
+    /// The residuals of the last cycles against the model; empty while the bounds are still being identified.
     pub fn residual_map(&self) -> &ResidualMap {
         self.mismatch.map()
     }
 
-    /// Something is wrong with the worm that has a name of its own: the open cycle does not enter the residual map.
+    /// Keeps the open cycle out of the residual map, because an alarm explains what is wrong with it.
     pub fn exclude_cycle(&mut self) {
         self.mismatch.disturb();
     }
 
-    /// Takes up one state.
+    /// Processes one state.
     pub fn update(&mut self, state: &State) -> Update<'_> {
         let time_s = state.time_ns as f64 * 1e-9;
         self.detect_restart(state, time_s);
@@ -202,7 +202,7 @@ impl Estimator {
         self.window.clear();
         self.window_contact_m = [f64::NAN; MAX_CELLS];
         self.window_is_complete = false;
-        // Where the open step began was not seen well enough for (1) to hold at its end.
+        // The start of the open step was not seen well enough to apply (1) at its end.
         self.entered = (f64::NAN, f64::NAN);
         if let Some(identification) = &mut self.identification {
             identification.interrupt();
@@ -254,7 +254,7 @@ impl Estimator {
         }
     }
 
-    /// A window that begins here, with the contact points of this moment.
+    /// Starts a window here, with the present contact points.
     fn begin_window(&mut self) {
         self.window.clear();
         self.window_is_complete = true;

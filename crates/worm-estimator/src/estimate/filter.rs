@@ -8,23 +8,23 @@
 //! dXᵢ = v du  (i ≠ c)        dX_c = (v + s) du
 //! ```
 //!
-//! v is what the quasi-static solver would calculate; here it is measured. s is the stroke of the cell in hand, carried from
-//! its last step, so a cell that lost a part of its stroke shows as a cell that lost it.
+//! The quasi-static solver would calculate v; here it is measured. s is the stroke of the stepping cell, carried over from
+//! its last step, so a cell with a shortened stroke shows.
 //!
 //! # Noise model
-//! v is a random walk in u, wide enough for the corners it has where a tip starts to slide, and forgotten at every step
-//! boundary, which the encoder tells exactly. s is a slower one. All cells together walk in time, for a worm may slip while
-//! its cam stands; each cell walks a little in u, for a body is not quite rigid.
+//! v is a random walk in u, wide enough for its corners where a tip starts to slide. It is reset at every step boundary, which the
+//! encoder gives exactly. s is a slower random walk. All cells together walk in time, because a worm may slip while its cam stands
+//! still; each cell walks a little in u, because a body is not quite rigid.
 //!
 //! # Observation
-//! Each position by itself, white noise of variance r. r is followed from the accepted innovations, within a factor
-//! of ten in standard deviation around the configured one.
+//! Each position separately, with white noise of variance r. r is adapted to the accepted innovations, within a factor of ten in
+//! standard deviation around the configured one.
 //!
 //! # What is not entirely sound
-//! - v has corners, not a random walk: behind a corner the filter lags by a few samples. The cycle report therefore does
-//!   not rest on this filter but on [`fit`](super::fit), which sees both sides of every corner.
+//! - v has corners, not a random walk: behind a corner the filter lags by a few samples. The cycle report therefore uses
+//!   [`fit`](super::fit) instead, which sees both sides of every corner.
 //! - A gate is not a likelihood. A position beyond it is dropped, unless most cells are off by the same amount twice
-//!   running (the body moved) or one cell stays off for [`REACQUIRE_AFTER`] samples (it moved, or its first sample was an outlier).
+//!   in a row (the body moved) or one cell stays off for [`REACQUIRE_AFTER`] samples (it moved, or its first sample was an outlier).
 //! - The stroke of a cell is carried to its next step without its correlations.
 
 use super::gait::StepSequence;
@@ -33,9 +33,9 @@ use worm_physics::MAX_CELLS;
 
 /// Positions, v and s.
 const DIMENSION: usize = MAX_CELLS + 2;
-/// Rejections in a row after which a cell's position is taken up anew.
+/// Rejections in a row after which a cell's position is reset to the measurement.
 pub(super) const REACQUIRE_AFTER: u32 = 8;
-/// Standard deviation of v at the start of a step, strokes per step: anything from standing to giving way altogether.
+/// Standard deviation of v at the start of a step, strokes per step: anything from standing still to giving way completely.
 const RATE_SPREAD: f64 = 0.5;
 /// Walk of v, strokes per step per √step: a corner of a quarter stroke per step within a quarter of a step.
 const RATE_WALK: f64 = 0.5;
@@ -47,9 +47,9 @@ const STROKE_WALK: f64 = 0.1;
 const CELL_WALK: f64 = 2e-3;
 /// Walk of the whole body in time, m/√s: a slip of the body by a millimetre in a quarter of a second is plausible.
 const BODY_WALK_M_PER_SQRT_S: f64 = 5e-4;
-/// Weight of one accepted innovation in the followed noise variance.
+/// Weight of one accepted innovation in the adapted noise variance.
 const NOISE_GAIN: f64 = 1.0 / 400.0;
-/// How far the followed variance may leave the configured one.
+/// Factor by which the adapted variance may differ from the configured one.
 const NOISE_RANGE: f64 = 100.0;
 
 /// The filter. Fixed size; phases are gait cycles times cells, so that a step is a unit.
@@ -125,7 +125,7 @@ impl BodyFilter {
         ((steps > at && steps >= boundary) || (steps < at && steps < boundary)).then_some(boundary)
     }
 
-    /// Goes over into the step beyond a boundary that [`predict`](Self::predict) has reached.
+    /// Enters the step beyond a boundary that [`predict`](Self::predict) has reached.
     pub(super) fn cross(&mut self, forward: bool) {
         self.enter(if forward { self.step + 1 } else { self.step - 1 });
     }
@@ -137,7 +137,7 @@ impl BodyFilter {
         let (v, s, cell) = (n, n + 1, self.stepping_cell());
         let du = steps - at;
         if du * self.sign < 0.0 {
-            self.forget_rate(); // The tips that slid now load, and the other way round.
+            self.forget_rate(); // The tips that slid now load, and vice versa.
         }
         if du != 0.0 {
             self.sign = du.signum();
@@ -174,14 +174,14 @@ impl BodyFilter {
         self.at = Some((steps, time_s));
     }
 
-    /// Takes up one tracker sample at the phase last predicted; `NaN` where a cell was not seen. Bit i of the answer is
-    /// set when cell i's position was believed.
+    /// Updates with one tracker sample at the phase last predicted; `NaN` where a cell was not seen. Bit i of the result is
+    /// set when cell i's position was accepted.
     pub(super) fn observe(&mut self, position_m: &[f64]) -> u32 {
         let n = self.gait.cells();
         let mut innovations = [f64::NAN; MAX_CELLS];
         for i in 0..n {
             if position_m[i].is_finite() && !self.known[i] {
-                self.take_up(i, position_m[i]);
+                self.reset_cell(i, position_m[i]);
             }
             innovations[i] = position_m[i] - self.state[i];
         }
@@ -196,7 +196,7 @@ impl BodyFilter {
             if square(innovation) > square(self.gate) * expected {
                 self.rejections[i] += 1;
                 if self.rejections[i] >= REACQUIRE_AFTER {
-                    self.take_up(i, position);
+                    self.reset_cell(i, position);
                 }
                 continue;
             }
@@ -244,7 +244,7 @@ impl BodyFilter {
                     && square(innovations[i] - median) < tolerance
             })
             .count();
-        // Two outliers may agree by chance; not twice running.
+        // Two outliers may agree by chance, but not twice in a row.
         let jump_m = (2 * together > seen).then_some(median);
         let before_m = std::mem::replace(&mut self.jump_m, jump_m);
         if let (Some(jump_m), Some(before_m)) = (jump_m, before_m)
@@ -258,8 +258,8 @@ impl BodyFilter {
         }
     }
 
-    /// Believes a position without regard to what was known of the cell.
-    fn take_up(&mut self, cell: usize, position_m: f64) {
+    /// Resets a cell to a measured position.
+    fn reset_cell(&mut self, cell: usize, position_m: f64) {
         let n = self.gait.cells();
         self.state[cell] = position_m;
         for j in 0..n + 2 {
@@ -287,7 +287,7 @@ impl BodyFilter {
         self.forget_rate();
     }
 
-    /// v at a step's start: what all contacts equally loaded would give, and a wide spread.
+    /// Resets v for the start of a step: the value for equally loaded contacts, with a wide spread.
     fn forget_rate(&mut self) {
         let n = self.gait.cells();
         self.clear_row(n);
@@ -302,7 +302,7 @@ impl BodyFilter {
         }
     }
 
-    /// The cell in whose step the filter is.
+    /// The cell that steps at the filter's phase.
     pub(super) fn stepping_cell(&self) -> usize {
         self.gait.cell_of_step(self.step)
     }
@@ -325,7 +325,7 @@ impl BodyFilter {
         self.covariance[cell][cell].max(0.0).sqrt()
     }
 
-    /// Standard deviation of one measured position as followed from the innovations, m.
+    /// Standard deviation of one measured position as adapted to the innovations, m.
     pub(super) fn noise_m(&self) -> f64 {
         self.variance.sqrt()
     }

@@ -1,4 +1,4 @@
-//! How the cells moved over a finished gait cycle: a penalised least-squares fit along the phase.
+//! The motion of the cells over a finished gait cycle: a penalised least-squares fit along the phase.
 //!
 //! # Unknowns
 //! In a window of one or two cycles, with knots at every [`INTERVALS`]th of a step, positions are
@@ -8,44 +8,44 @@
 //! Xᵢ = b + Lᵢⱼ (1 − τ) + Lᵢⱼ₊₁ τ + g            within it, τ from 0 to 1
 //! ```
 //!
-//! The body's translation b and the departure g of the stepping cell from a straight extension are continuous lines with a
-//! corner at every knot; g is 0 at both ends of a step. The levels L are free, so every stroke Lᵢⱼ₊₁ − Lᵢⱼ is measured,
-//! not assumed: a cell that jams shows as one. All cells measure b together, which takes most of the noise away.
+//! The body's translation b and the deviation g of the stepping cell from a uniform extension are piecewise linear with a corner at
+//! every knot; g is 0 at both ends of a step. The levels L are free, so every stroke Lᵢⱼ₊₁ − Lᵢⱼ is measured, not assumed: a jammed
+//! cell shows. All cells measure b together, which removes most of the noise.
 //!
 //! # Penalty
-//! A corner costs its size squared over its variance, and the variances follow the corners found (iteratively reweighted:
-//! few large corners rather than many small ones). At step boundaries, which the encoder tells exactly, b may turn at
-//! will. Nothing says where or how much it turns: friction may be anything.
+//! A corner costs its size squared over its variance, and the variances follow the corners found (iteratively reweighted least
+//! squares: few large corners rather than many small ones). At step boundaries, which the encoder gives exactly, the slope of b is
+//! free. Where and how much it changes is not prescribed: no friction law is assumed.
 //!
 //! # What is not entirely sound
-//! - Cells outside their own step are taken to keep their distances. What they do otherwise ends in the residuals, which
-//!   widen the standard errors.
-//! - The standard errors are those of the last reweighted problem, as if its corner variances had been known.
+//! - Cells outside their own step are assumed to keep their distances. Deviations from that end up in the residuals, which widen
+//!   the standard errors.
+//! - The standard errors are those of the last reweighted problem, as if its corner variances were known.
 
 use super::bordered_band::BorderedBandMatrix;
 use super::gait::StepSequence;
 use super::window::{CYCLES, INTERVALS, Window};
 
-/// First standard deviation of a corner of b within a step, strokes.
+/// Initial standard deviation of a corner of b within a step, strokes.
 const BODY_CORNER: f64 = 3e-3;
-/// Least standard deviation of a corner of b within a step, strokes.
+/// Smallest standard deviation of a corner of b within a step, strokes.
 const BODY_CORNER_FLOOR: f64 = 2e-4;
-/// The same for the standard errors: it stands for corners that were there and were not found.
+/// The same when standard errors are calculated: it allows for corners that were not found.
 const BODY_CORNER_DOUBT: f64 = 2e-3;
 /// Standard deviation of a corner of b at a step boundary, strokes: its rate may change by a whole stroke per step.
 const BOUNDARY_CORNER: f64 = 1.0 / INTERVALS as f64;
-/// Least and first standard deviation of a corner of g, strokes.
+/// Smallest and initial standard deviation of a corner of g, strokes.
 const CELL_CORNER_FLOOR: f64 = 5e-4;
-/// Standard deviation of what is to be 0, strokes.
+/// Standard deviation of unknowns that are held at 0, strokes.
 const PINNED: f64 = 1e-7;
-/// Standard deviation of a level, strokes: no opinion, but a cell never seen leaves the system solvable.
+/// Standard deviation of a level, strokes: uninformative, but it keeps the system solvable when a cell was never seen.
 const LEVEL_SPREAD: f64 = 30.0;
-/// Reweightings.
+/// Passes of the reweighting.
 const PASSES: usize = 4;
 /// Corners that a step typically has, for the degrees of freedom.
 const CORNERS_PER_STEP: f64 = 4.0;
 
-/// The fit and the memory it needs.
+/// The fit, and the memory that it needs.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     cells: usize,
@@ -93,8 +93,8 @@ impl Fit {
         self.solution.len()
     }
 
-    /// Fits the window, whose steps are those of `gait`; `noise_m` is the first guess at the noise of one position.
-    /// False when the samples do not determine a fit.
+    /// Fits the window, whose steps are those of `gait`; `noise_m` is the initial noise of one position. False when the samples do not
+    /// determine a fit.
     pub(super) fn run(&mut self, window: &Window, gait: &StepSequence, noise_m: f64) -> bool {
         for (cell, step) in self.step_of_cell.iter_mut().enumerate() {
             *step = gait.step_of_cell(cell);
@@ -155,7 +155,7 @@ impl Fit {
         (count, squares)
     }
 
-    /// Adds the penalty: that of the first pass, or one that follows the corners found, with this floor for those of b.
+    /// Adds the penalty: that of the first pass, or one that follows the corners found, with this lower limit for those of b.
     fn penalise(&mut self, floor: Option<f64>) {
         let knots = self.knots();
         let pinned = self.weight(PINNED);
@@ -208,7 +208,7 @@ impl Fit {
         }
     }
 
-    /// The noise of one position after the residuals, kept within a factor of ten of the first guess.
+    /// Estimates the noise of one position from the residuals, within a factor of ten of the initial one.
     fn follow_noise(&mut self, count: f64, squares: f64, noise_m: f64) {
         let size = self.data.size();
         let x = &self.solution[..size];

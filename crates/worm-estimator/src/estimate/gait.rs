@@ -20,7 +20,7 @@ impl StepSequence {
         }
     }
 
-    /// The gait as seen along the crawl: run in reverse (−1) it is seen from the other end, so that it too runs forward.
+    /// The gait seen along the crawl: a backward one (−1) is seen from the other end of the canal, so that it runs forward, too.
     pub(super) fn seen_along(mut self, direction: i32) -> Self {
         if direction < 0 {
             self.order[..self.cells].reverse();
@@ -32,12 +32,12 @@ impl StepSequence {
         self.cells
     }
 
-    /// The cell whose turn a step is; steps may be negative.
+    /// The cell that steps in a step; steps may be negative.
     pub(super) fn cell_of_step(&self, step: i64) -> usize {
         self.order[step.rem_euclid(self.cells as i64) as usize]
     }
 
-    /// Which step of a cycle is a cell's own.
+    /// The step of a cycle in which a cell steps.
     pub(super) fn step_of_cell(&self, cell: usize) -> usize {
         (0..self.cells)
             .find(|&step| self.order[step] == cell)

@@ -1,34 +1,34 @@
 //! What the worm does and what it costs, from the `state` topic alone: deformation, contact points, force, energy, cycles.
 //!
-//! Pure and streaming: the same code runs live and on a recording, and the same states give the same answers to the last bit.
-//! Equation numbers are those of Zarrouk, Sharf and Shoham 2016.
+//! The estimator is pure and streaming: the same code runs live and on a recording, and the same states give the same results to the
+//! last bit. Equation numbers are those of Zarrouk, Sharf and Shoham 2016.
 //!
-//! # The story
-//! The controller's ticks carry the gait phase, precisely, and now and then a tracker sample, noisy, late and with holes.
-//! `motor_time` knows how much of the time the motor lived through, `capture` finds the phase at which a sample was taken. `filter` makes of the samples where the cells are *now*, and
-//! throws out what cannot be. `contact` follows the tips on those positions; together they are the `estimate` topic.
+//! # How it works
+//! The controller's ticks carry the gait phase, precisely, and now and then a tracker sample, noisy, late and with gaps.
 //!
-//! Energies need better positions than a causal filter has, for noise at a sliding tip looks like sliding. So `window`
-//! keeps the samples of the open gait cycle and the one before, `cycles` tells when a cycle ends, `fit` then lays the
-//! cells' paths through all samples of both (solved by `bordered_band`), and `energy_balance` follows the tips along these paths:
-//! losses (11, 12), actuator work (13), and the standard error of each. `electrical` adds what the motor took,
-//! `prediction` what the model expects, and that is the `cycle` topic. Where the largest tip deformations are only
-//! guessed, `bounds` finds them on the first cycles.
+//! 1. `motor_time` finds how much time passed for the motor, and `capture` the phase at which a sample was taken.
+//! 2. `filter` estimates from the samples where the cells are *now*, and rejects outliers. `contact` follows the tips on those
+//!    positions. Together they are the `estimate` topic.
+//! 3. Energies need better positions than a causal filter has, for noise at a sliding tip looks like sliding. So `window` keeps the
+//!    samples of the open gait cycle and the one before. When `cycles` reports the end of a cycle, `fit` fits the cells' paths to all
+//!    samples of both (its normal equations are a `bordered_band` matrix), and `energy_balance` follows the tips along these paths:
+//!    losses (11, 12), actuator work (13), and the standard error of each.
+//! 4. `electrical` adds the motor's energy and `prediction` what the model expects. That is the `cycle` topic.
+//! 5. Where the largest tip deformations are only a guess, `bounds` identifies them on the first cycles.
+//! 6. `mismatch` runs the model beside the worm, cycle by cycle, and keeps a map of what it does not explain.
 //!
-//! `mismatch` runs the model beside the worm, cycle by cycle, and keeps a map of what it does not explain.
+//! A cycle may start before the contact points of the tips are known: the first from rest, or the first after the tracker was silent.
+//! It is reported with guessed contact points, `settled = 0`, and standard errors that include the uncertainty of the guess.
 //!
-//! A cycle at whose start the tips' contact points were not known (the first from rest, or the first after a silence of the
-//! tracker) is reported with a guess of them, `settled = 0`, and standard errors as large as the guess is doubtful.
+//! All positions are along the canal. Internally, `window`, `fit`, `energy_balance` and `bounds` look at a backward crawl from the
+//! other end of the canal, so that it runs forward, too.
 //!
-//! Everything is measured against the canal, along it; inside, `window`, `fit`, `energy_balance` and `bounds` see a
-//! backward crawl from its other end, so that it too runs forward.
-//!
-//! The [`alarm`]s watch all of it, each with a threshold that calibrates itself, and [`Observer`] is estimator and alarms
-//! together: what the estimator process runs on live states, and a recording's player on recorded ones.
+//! The [`alarm`]s monitor all of it, each with a threshold that calibrates itself. [`Observer`] is estimator and alarms together:
+//! the estimator process runs it on live states, a replay on recorded ones.
 //!
 //! # Cost
-//! A tick without a sample takes some tens of nanoseconds, one with a sample below a microsecond for four cells; the end of
-//! a cycle some 200 µs. Nothing is allocated after construction but in the model's prediction, once for each set of bounds.
+//! A tick without a sample takes some tens of nanoseconds, one with a sample less than a microsecond for four cells, and the end of a
+//! cycle some 200 µs. Nothing is allocated after construction, except in the model's prediction, once for each set of bounds.
 
 pub mod alarm;
 

@@ -1,17 +1,17 @@
-//! The time that the motor has lived through.
+//! Time as the motor had it.
 //!
-//! A servo on a bus lives while the computer pauses: it goes on turning and takes energy. A simulated one, whose own computer pauses,
-//! does not: for it a pause is no time at all. Whoever integrates over the motor's time must know the difference, and the
-//! servo's own clock (register 120, in [`State::motor_time_s`]) tells it. That clock is coarse, and cheap oscillators are off by
-//! per cents; so the computer's clock counts as a rule, and the servo's where the two disagree by more than these can explain.
+//! A real servo goes on while the computer pauses: it turns and takes energy. A simulated one, whose own computer pauses, does not.
+//! Whatever is integrated over the motor's time has to tell the two apart, and the servo's own clock (register 120, in
+//! [`State::motor_time_s`]) can. That clock is coarse, and cheap oscillators are off by per cents. So the computer's clock counts,
+//! except where the two disagree by more than these errors explain: there the servo's clock counts.
 
 use crate::message::State;
 
-/// How far the two clocks may disagree over one step between readings, ns: each reading is up to a tick and a millisecond old.
+/// How far the two clocks may disagree between two readings, ns: each reading is up to a tick and a millisecond old.
 const TOLERANCE_NS: i64 = 2_500_000;
-/// … and by which share of the step: what an oscillator without a crystal is off by.
+/// … plus this fraction of the time between them: the error of an oscillator without a crystal.
 const TOLERANCE_FRACTION: f64 = 0.03;
-/// How long after a gap it may still turn out that a reading was late rather than the motor standing still, ns.
+/// For this long after a gap, a next reading can still show that the one before was late and the motor did not stand still, ns.
 const LATE_READING_NS: u64 = 50_000_000;
 
 /// Follows the motor's time from state to state.
@@ -28,7 +28,7 @@ struct Reading {
     motor_s: f64,
 }
 
-/// A gap that the motor seems to have stood still in.
+/// A gap in which the motor seems to have stood still.
 #[derive(Debug, Clone, Copy)]
 struct SuspectedStandstill {
     until_ns: u64,
@@ -36,7 +36,7 @@ struct SuspectedStandstill {
 }
 
 impl MotorTime {
-    /// Takes a state; the motor's time at it, ns: the computer's less what the motor stood still.
+    /// Processes a state and returns the motor's time, ns: the computer's time less all standstills.
     pub fn update(&mut self, state: &State) -> u64 {
         if state.motor_is_new == 1 {
             let reading = Reading {
@@ -50,7 +50,7 @@ impl MotorTime {
         state.time_ns.saturating_add_signed(-self.standstill_ns)
     }
 
-    /// Nothing is known of the clocks any more; what the motor stood still stays.
+    /// Forgets both clocks, but not the standstills so far.
     pub fn forget(&mut self) {
         self.last = None;
         self.suspected = None;
@@ -73,7 +73,7 @@ impl MotorTime {
         } else if behind_ns < -tolerance_ns
             && let Some(doubt) = self.suspected.take_if(|doubt| to.time_ns <= doubt.until_ns)
         {
-            // The motor has made up for it: it had not stood still, its reading was late.
+            // The motor has caught up: it did not stand still, its reading was late.
             self.standstill_ns -= doubt.standstill_ns.min(-behind_ns);
         }
     }
@@ -83,7 +83,7 @@ impl MotorTime {
 mod tests {
     use super::*;
 
-    /// Lived time in ms after readings at these times of the computer's and the servo's clock, in ms.
+    /// Motor time in ms after readings at these times of the computer's and the servo's clock, in ms.
     fn motor_time_ms(readings: &[(u64, f64)]) -> u64 {
         let mut motor_time = MotorTime::default();
         let mut now_ns = 0;
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn the_servo_s_clock_tells_who_lived_through_a_gap() {
+    fn servo_clock_decides_whether_the_motor_stood_still_in_a_gap() {
         for (what, readings, expected) in [
             (
                 "a servo that goes on",

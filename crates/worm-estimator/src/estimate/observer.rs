@@ -1,24 +1,22 @@
-//! Estimator and alarms together: what an estimator process, or a recording that is played back, runs.
+//! Estimator and alarms together: what the estimator process runs, and a replay.
 
 use super::alarm::{self, AlarmChanges, AlarmMonitor};
 use super::{Estimator, EstimatorError, ResidualMap};
 use crate::config::Config;
 use crate::message::{Cycle, Estimate, State};
 
-/// What one state has brought.
+/// What one state gave.
 #[derive(Debug, Clone)]
 pub struct ObserverOutput {
-    /// The estimate, when the state carried a tracker sample.
+    /// The estimate, if the state carried a tracker sample.
     pub estimate: Option<Estimate>,
-    /// The gait cycle that ended.
+    /// The gait cycle that ended, if one did.
     pub cycle: Option<Cycle>,
     /// Alarms that were raised or cleared.
     pub alarms: AlarmChanges,
 }
 
-/// Follows one worm by its states.
-///
-/// Pure: the same states give the same reports, to the last bit.
+/// Follows one worm by its states. The same states give the same output, to the last bit.
 #[derive(Debug)]
 pub struct Observer {
     estimator: Estimator,
@@ -37,7 +35,7 @@ impl Observer {
         })
     }
 
-    /// Takes the controller's next state.
+    /// Processes the controller's next state.
     pub fn update(&mut self, state: &State) -> ObserverOutput {
         let update = self.estimator.update(state);
         let (estimate, cycle) = (update.estimate.copied(), update.cycle.copied());
@@ -58,7 +56,7 @@ impl Observer {
         }
     }
 
-    /// The newest estimate, with the alarms as they stand now: for a heartbeat while no sample comes.
+    /// The newest estimate with the present alarms: a heartbeat while no sample comes.
     pub fn latest(&self) -> Estimate {
         self.with_alarms(*self.estimator.latest())
     }

@@ -1,4 +1,4 @@
-//! What the model says a cycle should be, beside what was measured.
+//! What the model predicts for a cycle.
 
 use super::energy_balance::Tip;
 use crate::config::{Config, PhysicsError};
@@ -17,8 +17,8 @@ pub(super) struct Prediction {
     pub(super) backward_slide_m: [f64; MAX_CELLS],
 }
 
-/// The configured worm and its predictions crawling forward and backward, with every `[[effect]]`. What the estimator itself
-/// takes from here, tips and resting deformations, is the paper's.
+/// The configured worm, and its predictions forward and backward with every `[[effect]]`. The tips and resting deformations that
+/// the estimator itself uses follow the paper's theory alone.
 #[derive(Debug, Clone)]
 pub(super) struct Predictor {
     worm: Worm,
@@ -54,7 +54,7 @@ impl Predictor {
             .collect()
     }
 
-    /// Deformation of each tip of a worm that was laid down and stands, along the canal, m.
+    /// Deformation of each tip of a worm that was laid down and is at rest, along the canal, m.
     pub(super) fn resting_deformation_m(&self) -> [f64; MAX_CELLS] {
         let cells = self.worm.cells();
         let mut deformation_m = [f64::NAN; MAX_CELLS];
@@ -63,7 +63,7 @@ impl Predictor {
         deformation_m
     }
 
-    /// The worm that predictions are of.
+    /// The worm of the predictions.
     pub(super) fn worm(&self) -> &Worm {
         &self.worm
     }
@@ -73,10 +73,10 @@ impl Predictor {
         self.worm.weight_n()
     }
 
-    /// Takes up other bounds; the next prediction is calculated anew.
+    /// Changes the bounds; the next prediction is calculated anew.
     ///
     /// # Errors
-    /// [`WormError`] when a bound is no bound.
+    /// [`WormError`] when a bound is out of range.
     pub(super) fn set_bounds(&mut self, bound_m: &[f64]) -> Result<(), WormError> {
         self.worm = self.worm.clone().with_max_deformations_m(bound_m)?;
         self.is_found = true;
@@ -84,7 +84,7 @@ impl Predictor {
         Ok(())
     }
 
-    /// The steady cycle in a direction, calculated when first asked for.
+    /// The steady cycle in a direction, calculated on first use.
     pub(super) fn cycle(&mut self, direction: i32) -> Prediction {
         let (kept, sign) = if direction < 0 {
             (&mut self.backward, -1.0)

@@ -1,4 +1,4 @@
-//! The messages as they are before anything is known.
+//! The messages before anything is known.
 
 use crate::message::{Cycle, Estimate};
 use worm_physics::MAX_CELLS;

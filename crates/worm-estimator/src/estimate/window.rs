@@ -1,10 +1,10 @@
-//! The tracker samples of the open gait cycle and of the one before it, condensed.
+//! Sums over the tracker samples of the open gait cycle and of the one before it.
 //!
-//! The phase of a cycle is cut into [`INTERVALS`] pieces for each step. For each piece and cell the window keeps the six sums
-//! that a least-squares fit of anything linear within a piece can need, so its size depends neither on tracker rate nor on
-//! how long a cycle takes, and nothing is lost that [`fit`](super::fit) could use.
+//! The phase of a cycle is divided into [`INTERVALS`] pieces for each step. For each piece and cell the window keeps the six sums that a
+//! least-squares fit of anything linear within a piece needs, so its size depends neither on the tracker's rate nor on the duration of a
+//! cycle, and [`fit`](super::fit) loses nothing.
 //!
-//! Positions and phases are seen in the direction of the crawl: crawling backward, both have changed their sign.
+//! Positions and phases are seen in the direction of the crawl: crawling backward, both have the opposite sign.
 
 /// Pieces of a step.
 pub(super) const INTERVALS: usize = 16;
@@ -70,9 +70,9 @@ impl Window {
         self.last = None;
     }
 
-    /// Takes up a sample at a phase counted from the start of the open cycle, in cycles; `NaN` where a cell is not to be used.
+    /// Adds a sample at a phase counted from the start of the open cycle, in cycles; `NaN` where a cell is not to be used.
     ///
-    /// While the phase stands, one sample in a piece is enough: a rest must not outweigh the crawl.
+    /// While the phase stands still, one sample in a piece is enough: a rest must not outweigh the crawl.
     pub(super) fn add(&mut self, cycle_phase: f64, position_m: &[f64]) {
         let pieces = self.pieces() as f64;
         let at = (cycle_phase + (CYCLES - 1) as f64) * pieces;
@@ -115,7 +115,7 @@ impl Window {
         &self.sums[from * self.cells..][..self.cells]
     }
 
-    /// Samples taken up in the open cycle.
+    /// Samples in the open cycle.
     pub(super) fn samples(&self) -> u32 {
         self.samples[CYCLES - 1]
     }

@@ -1,16 +1,16 @@
-//! Battery low: what the battery holds is needed for the way home.
+//! Battery low: the remaining charge is needed for the way home.
 //!
-//! **Charge.** Between corrections the charge falls by what is drawn: the motor's power (duty × bus voltage × current), the
-//! hotel power, and what the battery's own resistance burns. The open-circuit voltage, bus voltage + current × inner
-//! resistance on a straight line from empty to full, corrects it: at first with the weight of a mean over the time since
-//! the start, so a usable value stands after a second; later with a time constant of [`CORRECTION_S`], so that neither a
-//! start of the motor nor the 0.1 V steps of the servo's reading show.
+//! **Charge.** Between corrections the charge falls by the energy drawn: the motor's power (duty × bus voltage × current), the hotel power,
+//! and the loss in the battery's internal resistance. The open-circuit voltage, bus voltage + current × internal resistance, taken as
+//! linear from empty to full, corrects it: at first with the weight of a mean over the time since the start, so a usable value is there
+//! after a second; later with a time constant of [`CORRECTION_S`], so that neither a start of the motor nor the 0.1 V steps of the
+//! servo's reading show.
 //!
-//! **Way home.** Distance from where the estimator first saw the worm × electrical energy per metre, hotel power included, as
-//! the last cycles paid it. Going home may be steeper or flatter than coming was; the last known cost stands for both. Before
-//! the first cycle that advanced the way home is at most a few strokes, and only the reserve counts.
+//! **Way home.** Distance from where the estimator first saw the worm × electrical energy per metre, hotel power included, over the last
+//! cycles. The way home may be steeper or flatter than the way out was; the last known cost is used for both. Before the first cycle that
+//! advanced, the way home is at most a few strokes, and only the reserve counts.
 //!
-//! The watched value is (charge − reserve) over the energy for the way home.
+//! The monitored value is (charge − reserve) over the energy for the way home.
 
 use super::cam_motion::{Tick, finite_or_zero};
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -24,9 +24,9 @@ const CORRECTION_S: f64 = 600.0;
 const USABLE_S: f64 = 1.0;
 /// Weight of the newest cycle in the cost per metre.
 const COST_WEIGHT: f64 = 0.1;
-/// A cycle longer than this many steady ones held the worm for a while: its cost is not that of the way.
+/// A cycle longer than this many steady ones contains a hold: its cost does not count.
 const LONGEST_CYCLE: f64 = 1.5;
-/// The cost is known once the weighted way is this share of the stroke.
+/// The cost is known once the weighted distance is this fraction of the stroke.
 const MIN_ADVANCE_FRACTION: f64 = 0.05;
 /// The alarm is over when the ratio is above the threshold by this factor.
 const CLEAR_FACTOR: f64 = 1.15;
@@ -91,7 +91,7 @@ impl BatteryLow {
         }
     }
 
-    /// Cost of a metre as the last cycles paid it, J/m, once they gained some way.
+    /// Cost per metre of the last cycles, J/m, once they advanced far enough.
     fn cost_j_per_m(&self) -> Option<f64> {
         (self.gained_m >= MIN_ADVANCE_FRACTION * self.stroke_m).then(|| self.paid_j / self.gained_m)
     }

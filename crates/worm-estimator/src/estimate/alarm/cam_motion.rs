@@ -1,7 +1,7 @@
-//! What the cam does: the gait phase, its direction, whether it stands, and whether its speed is steady.
+//! The motion of the cam: the gait phase, its direction, whether it stands still, and whether its speed is steady.
 //!
-//! The detectors share this view. Direction and rest are taken from the encoder, not from the mode, so a back-off or a
-//! cam turned by hand is seen for what it is.
+//! All detectors use it. Direction and rest are taken from the encoder, not from the mode, so a back-off or a cam turned by hand is seen
+//! for what it is.
 
 use crate::config::Config;
 use crate::estimate::MotorTime;
@@ -10,35 +10,35 @@ use crate::message::{Mode, State};
 /// Goal velocity of one count, turns/s: 0.229 rev/min (XL330-M288 e-manual, register 104).
 pub(super) const GOAL_UNIT_TURNS_PER_S: f64 = 0.229 / 60.0;
 
-/// The cam counts as standing while it stays this near to one angle, turns.
+/// The cam stands still while it stays this near to one angle, turns, …
 const REST_BAND_TURNS: f64 = 0.003;
 /// … for at least this long, s.
 const REST_TIME_S: f64 = 0.3;
-/// The direction has changed when the cam went back by this much, turns: beyond the give of a hold.
+/// The direction has changed when the cam went back by this much, turns: more than a hold gives way.
 const REVERSAL_TURNS: f64 = 0.02;
 /// The commanded speed is steady after this long without a change, s.
 const STEADY_TIME_S: f64 = 0.3;
-/// Changes of the commanded speed below this share are the controller's trimming.
+/// Changes of the commanded speed below this fraction are the controller's trimming, …
 const STEADY_FRACTION: f64 = 0.03;
 /// … and so are changes below this part of a register count.
 const STEADY_UNITS: f64 = 0.3;
-/// A steady speed that differs from the regime's by more than this share makes a new regime.
+/// A steady speed that differs from the regime's by more than this fraction makes a new regime.
 const REGIME_FRACTION: f64 = 0.05;
-/// Longest step of time that is integrated, s: beyond it states were lost or the controller paused.
+/// Longest time step that is integrated, s: beyond it states were lost or the controller paused.
 const LONGEST_STEP_S: f64 = 1.0;
 
-/// One tick as the detectors see it.
+/// One tick, as the detectors need it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tick {
     pub now_ns: u64,
     /// Since the previous tick, s; 0 in the first one and after a restart.
     pub step_s: f64,
-    /// The part of it in which the computer did not pause, s: in which the devices could have been heard.
+    /// The part of it in which the computer did not pause, s: in which the devices could be heard.
     pub present_s: f64,
-    /// What the motor lived through since its last reading before this tick, s: less than has passed where it stood still with its
-    /// computer.
+    /// Motor time since the last reading before this tick, s: less than the time that passed where a simulated motor stood still with
+    /// its computer.
     pub motor_s: f64,
-    /// The controller began anew: its sequence went back.
+    /// The controller restarted: its sequence went back.
     pub restarted: bool,
     /// Gait phase, cycles; `None` before it was read.
     pub phase: Option<f64>,
@@ -52,7 +52,7 @@ pub(super) struct Tick {
     pub steady: bool,
     /// The cam stands and is not commanded to crawl.
     pub still: bool,
-    /// Which way the cam last turned, +1 or −1.
+    /// Direction in which the cam last turned, +1 or −1.
     pub direction: f64,
     /// Grows whenever the direction changes.
     pub reversals: u32,
@@ -67,7 +67,7 @@ pub(super) struct Tick {
 pub(super) struct CamMotion {
     last: Option<(u64, u64)>, // sequence and time of the last tick
     motor_time: MotorTime,
-    read_ns: Option<u64>, // lived time of the last motor reading
+    read_ns: Option<u64>, // motor time of the last motor reading
     host_paused_ns: u64,
     phase: Option<f64>,
     rest_phase: f64,

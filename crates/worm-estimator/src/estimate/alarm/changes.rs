@@ -3,10 +3,10 @@
 use crate::message::{Alarm, AlarmKind};
 use std::ops::Deref;
 
-/// A controller restart clears what was raised before the update looks anew, so a kind can change twice.
+/// After a restart of the controller an update first clears what was raised, so a kind can change twice in it.
 const CAPACITY: usize = 2 * AlarmKind::ALL.len();
 
-/// The alarms raised or cleared in one update, in order; reads as a slice, and holds them without allocating.
+/// The alarms raised or cleared in one update, in order, as a slice and without allocation.
 #[derive(Debug, Clone, Copy)]
 pub struct AlarmChanges {
     alarms: [Alarm; CAPACITY],

@@ -1,29 +1,29 @@
-//! Page's cumulative sum for "the mean has risen", with honest small-sample limits.
+//! Page's CUSUM chart for "the mean has risen", with decision limits that hold for small samples.
 //!
-//! Each value enters as its excess over the usual, as a share of it. The sum S ← max(0, S + excess − k) drifts down while all is
-//! well and climbs after a rise; it alarms when S > h.
+//! Each value enters as its excess over the baseline, as a fraction of it. The sum S ← max(0, S + excess − k) drifts down while all is well
+//! and climbs after a rise; the chart alarms when S > h.
 //!
-//! - **usual**: the median of the first values, so that one outlier among them does no harm; it is refined until
-//!   [`LEARNED`] values are known and then stands still, so that a slow rise is not learned away.
-//! - **k** = half the shift that is worth an alarm (Page's choice for that shift), plus two standard errors of the
-//!   usual: from three values it is not well known, and the chart says so by asking for more.
-//! - **σ**: median absolute deviation of the first values, pooled with the stated standard error and a scatter of 2 %, which
-//!   weigh as much as four values.
-//! - **h** from Siegmund's approximation of the average run length (D. Siegmund, Sequential Analysis, 1985, ch. II):
+//! - **Baseline**: the median of the first values, so that one outlier among them does no harm. It is refined until [`LEARNED`] values are
+//!   known and then stays fixed, so that a slow rise is not learned.
+//! - **k**: half the shift that is worth an alarm (Page's choice for that shift), plus two standard errors of the baseline. A baseline
+//!   of three values is uncertain, so the chart asks for more.
+//! - **σ**: median absolute deviation of the first values, pooled with the stated standard error and a prior scatter of 2 %, which have
+//!   the weight of four values.
+//! - **h**: from Siegmund's approximation of the average run length (D. Siegmund, Sequential Analysis, 1985, ch. II):
 //!   ARL = (exp(2Δb) − 2Δb − 1)/(2Δ²) with Δ = half the shift over σ, b = h/σ + 1.166, for one false alarm in [`RUN_LENGTH`] values.
-//! - One value never alarms: an increment is cut at 0.6 h, so an outlier must be followed by a second.
+//! - One value never raises an alarm: an increment is limited to 0.6 h, so an outlier must be followed by a second one.
 
-/// Values from which on the usual stands still.
+/// Values after which the baseline stays fixed.
 const LEARNED: u32 = 30;
-/// Values between two false alarms, on average.
+/// Average number of values between two false alarms.
 const RUN_LENGTH: f64 = 1e6;
-/// Scatter that is assumed before it is known, share of the usual.
+/// Prior scatter, as a fraction of the baseline.
 const PRIOR_SCATTER: f64 = 0.02;
-/// How many values the assumed scatter weighs.
+/// Weight of the prior scatter, in values.
 const PRIOR_WEIGHT: f64 = 4.0;
-/// Largest increment, share of the decision limit.
+/// Largest increment, as a fraction of the decision limit.
 const LARGEST_INCREMENT: f64 = 0.6;
-/// The sum counts no further than this, in decision limits, so that it can fall back.
+/// Largest sum, in decision limits, so that it can fall again.
 const LARGEST_SUM: f64 = 1.5;
 /// Deviations are learned up to this many standard deviations.
 const LEARNED_SIGMAS: f64 = 3.0;
@@ -32,14 +32,14 @@ const MAD_TO_SIGMA: f64 = 1.4826;
 /// Most values that are kept for the first median (the largest `calibration_cycles`).
 const KEPT: usize = 100;
 
-/// Where the sum stands after a value.
+/// The sum after a value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CusumLevel {
-    /// Mean excess since the sum left zero, share of the usual.
+    /// Mean excess since the sum left zero, as a fraction of the baseline.
     pub excess: f64,
     /// The reference k that this mean must stay below.
     pub reference: f64,
-    /// The sum is beyond the decision limit.
+    /// The sum exceeds the decision limit.
     pub beyond: bool,
     /// The sum is back at zero.
     pub at_zero: bool,
@@ -55,7 +55,7 @@ pub(super) struct CusumChart {
     stated_sum: f64, // of the squared stated standard errors of the first values
     count: u32,
     baseline: f64,
-    sigma: f64, // share of the usual
+    sigma: f64, // as a fraction of the baseline
     sum: f64,
     risen_sum: f64, // of the excesses since the sum left zero
     risen_count: u32,
@@ -63,7 +63,7 @@ pub(super) struct CusumChart {
 }
 
 impl CusumChart {
-    /// A chart for a rise by `shift`, a share of the usual, that calibrates on `wanted` values.
+    /// A chart for a rise by `shift`, a fraction of the baseline, that calibrates on `wanted` values.
     pub(super) fn new(shift: f64, wanted: u32) -> Self {
         Self {
             shift,
@@ -80,13 +80,13 @@ impl CusumChart {
         }
     }
 
-    /// Calibrated, with a usual value that is clearly positive.
+    /// Calibrated, with a baseline that is clearly positive.
     pub(super) fn is_calibrated(&self) -> bool {
         self.baseline > 0.0 && self.sigma < 1.0 / 3.0
     }
 
-    /// Takes a value with its stated standard error and the least that is plausible as usual; tells nothing before
-    /// calibration. The value began at `began_ns`.
+    /// Adds a value with its stated standard error and the lowest plausible baseline; returns nothing before calibration. The value
+    /// began at `began_ns`.
     pub(super) fn add(
         &mut self,
         value: f64,
@@ -133,7 +133,7 @@ impl CusumChart {
         0.5 * self.shift + 2.0 * self.sigma / f64::from(self.count).sqrt()
     }
 
-    /// The decision limit h, share of the usual.
+    /// The decision limit h, as a fraction of the baseline.
     fn limit(&self) -> f64 {
         let drift = 0.5 * self.shift / self.sigma;
         let mut b = 1.0;

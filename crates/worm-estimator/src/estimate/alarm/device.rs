@@ -1,4 +1,4 @@
-//! Device fault: the servo reports a hardware error, heat or low voltage, or the controller stopped because of one.
+//! Device fault: the servo reports a hardware error, overheating or low voltage, or the controller stopped because of one.
 //!
 //! A hardware error bit or a controller fault about the servo raises the alarm at once; value is then the error register
 //! (or the fault's code) and threshold 0. Otherwise value and threshold are the temperature, °C: the servo reads it in
@@ -11,7 +11,7 @@ use crate::message::{Fault, Severity, State};
 
 /// How far below the threshold the servo must cool, °C.
 const COOL_C: f64 = 3.0;
-/// How long the servo must read hot, s: a heat that comes and goes in less is a misreading.
+/// How long the servo must read hot, s: anything shorter is a misreading.
 const HOT_S: f64 = 0.5;
 
 #[derive(Debug, Clone)]

@@ -1,9 +1,9 @@
 //! Energy over budget: cycles cost more than they should.
 //!
-//! Two of Page's charts (see [`super::page`]), one for the electrical energy of a cycle and one for its locomotion energy by
-//! equation (11); either may raise the alarm. Only whole, undisturbed cycles count: crawling at one steady speed from
-//! end to end, every tip's deformation known. What a cycle costs depends on speed and direction, so a new regime calibrates
-//! anew and the alarm is unarmed meanwhile; holding and going on at the same speed keeps what was learned.
+//! Two CUSUM charts (see [`super::cusum`]), one for the electrical energy of a cycle and one for its locomotion energy by equation (11);
+//! either may raise the alarm. Only whole, undisturbed cycles count: crawling at one steady speed from end to end, with every tip's
+//! deformation known. The cost of a cycle depends on speed and direction, so a new regime calibrates anew and the alarm is unarmed
+//! meanwhile; a hold that resumes at the same speed keeps the calibration.
 
 use super::cam_motion::Tick;
 use super::cusum::{CusumChart, CusumLevel};
@@ -11,9 +11,9 @@ use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Cycle, Severity};
 
-/// Least usual locomotion energy, share of the model's prediction: fewer is a bad calibration, not a good worm.
+/// Lowest baseline of the locomotion energy, as a fraction of the model's prediction: less is a bad calibration, not a good worm.
 const MIN_OF_PREDICTION: f64 = 0.5;
-/// A cycle whose duration is further than this share from the steady one was disturbed.
+/// A cycle whose duration differs from the steady one by more than this fraction was disturbed.
 const DURATION_FRACTION: f64 = 0.1;
 
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl EnergyOverBudget {
         }
     }
 
-    /// Every tick; `sound` when nothing else is wrong, so that the cycle may count.
+    /// Processes every tick; `sound` says that nothing else is wrong, so that the cycle may count.
     pub(super) fn update(&mut self, tick: &Tick, cycle: Option<&Cycle>, sound: bool) -> DetectorOutput {
         if tick.regime != self.regime {
             self.regime = tick.regime;
@@ -60,7 +60,7 @@ impl EnergyOverBudget {
             }
             self.disturbed = false;
         }
-        // A new regime has another usual: what was over the old budget says nothing about it.
+        // A new regime has another baseline: an excess over the old one says nothing about it.
         self.reading.map_or(DetectorOutput::Idle, DetectorOutput::Measured)
     }
 

@@ -1,11 +1,11 @@
 //! Jammed cell: a cell does not extend in its step.
 //!
-//! The extension of the stepping cell is its motion minus the mean motion of the others since its step began, equation
-//! (10): pure kinematics of the cam, free of how the tips hold. Nominally it is stroke × the share of the step that is
-//! done. What each cell really does in each part of its step and in each direction is calibrated on its first good steps
-//! at the present speed, so a late tracker or a cam that is not quite linear does not count. The cell is jammed while its
-//! extension falls short of the usual by more than `threshold` of it, and by more than noise (as learned) can make it; until its
-//! calibration is done the share that may be missing is half-way between `threshold` and all.
+//! The extension of the stepping cell is its displacement less the mean displacement of the others since its step began, equation (10).
+//! It is pure kinematics of the cam and does not depend on how the tips hold. Nominally it is the stroke × the fraction of the step that
+//! is done. The real extension of each cell in each part of its step and in each direction is calibrated on its first good steps at the
+//! present speed, so a delayed tracker or a cam that is not quite linear does no harm. The cell is jammed while its extension falls short of
+//! this baseline by more than `threshold` of it, and by more than (learned) noise can explain. Until the calibration is complete, the
+//! fraction that may be missing is half-way between `threshold` and all.
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -14,11 +14,11 @@ use crate::config::Config;
 use crate::message::Severity;
 use worm_physics::MAX_CELLS;
 
-/// Parts of a step in which the usual extension is known.
+/// Parts of a step, each with its own baseline.
 const PARTS: usize = 8;
-/// Share of the step that must be done before it is judged: before, latency and noise are as large as the motion.
+/// Fraction of the step that must be done before it is evaluated: earlier, latency and noise are as large as the motion.
 const EVALUATED_FROM: f64 = 0.3;
-/// A step is whole when it was seen from before this share …
+/// A step is complete when it was seen from before this fraction …
 const WHOLE_FROM: f64 = 0.15;
 /// … to beyond this one.
 const WHOLE_TO: f64 = 0.85;
@@ -26,11 +26,11 @@ const WHOLE_TO: f64 = 0.85;
 const CONFIRMATIONS: u32 = 3;
 /// A shortfall within this many standard deviations of an extension's error is noise …
 const NOISE_SIGMAS: f64 = 5.0;
-/// … but never one beyond this share of the stroke.
+/// … but never one beyond this fraction of the stroke.
 const LARGEST_NOISE_FRACTION: f64 = 0.7;
-/// Samples over which the error is learned, some 25 steps; it begins at twice what the configuration says.
+/// Samples over which the error is learned, some 25 steps; it starts at twice the configured one.
 const NOISE_MEMORY: f64 = 500.0;
-/// Whole good steps of the cell after which it is free again.
+/// Complete good steps of the cell after which it is free again.
 const GOOD_STEPS: u32 = 2;
 
 /// Extension over nominal extension in each part of a step.
@@ -70,12 +70,12 @@ struct Step {
     number: i64, // steps counted from phase 0
     cell: usize,
     start: Positions,
-    start_done: f64, // share of the step that was done at `start`
+    start_done: f64, // fraction of the step that was done at `start`
     began_ns: u64,
     seen_from: f64,
     seen_to: f64,
     short: u32,          // samples in a row that fell short
-    worst_fraction: f64, // largest share missing in the last part of the step
+    worst_fraction: f64, // fraction missing at the newest sample
     profile: Profile,
 }
 
@@ -83,8 +83,8 @@ struct Step {
 pub(super) struct JammedCell {
     fraction: f64,
     stroke_m: f64,
-    noise_m: f64,     // standard deviation of an extension by the configuration
-    variance_m2: f64, // of the extensions about their usual, as learned
+    noise_m: f64,     // standard deviation of an extension, from the configuration
+    variance_m2: f64, // of the extensions about their baseline, as learned
     cells: usize,
     order: [usize; MAX_CELLS],
     calibration_steps: u32,
@@ -223,7 +223,7 @@ impl JammedCell {
         step.worst_fraction = missing_fraction;
         if step.short >= CONFIRMATIONS {
             self.jammed = match self.jammed {
-                Some((cell, _)) if cell != step.cell => self.jammed, // the first one stays named
+                Some((cell, _)) if cell != step.cell => self.jammed, // the first one is the one reported
                 _ => Some((step.cell, 0)),
             };
         }
@@ -246,7 +246,7 @@ impl JammedCell {
         }
     }
 
-    /// A step ended: it may serve for calibration, and it tells whether a jammed cell is free again.
+    /// Ends a step: it may be used for calibration, and can show that a jammed cell is free again.
     fn finish(&mut self, tick: &Tick) {
         let Some(step) = self.step.take() else { return };
         let whole = step.seen_from <= WHOLE_FROM && step.seen_to >= WHOLE_TO;

@@ -1,4 +1,4 @@
-//! What a detector finds, and the latch that turns findings into one "raised" and one "cleared".
+//! The output of a detector, and the latch that turns it into one "raised" and one "cleared".
 
 use crate::message::{Alarm, AlarmKind, Severity};
 
@@ -7,24 +7,24 @@ use crate::message::{Alarm, AlarmKind, Severity};
 pub(super) enum ReadingState {
     /// Beyond the threshold, confirmed against noise by the detector.
     Bad,
-    /// Neither beyond the threshold nor clearly off it: changes nothing.
+    /// Neither beyond the threshold nor clearly on the good side: changes nothing.
     Between,
     /// Clearly on the good side.
     Good,
 }
 
-/// What a detector knows after an update.
+/// The output of a detector after an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum DetectorOutput {
-    /// It cannot tell: not calibrated, or nothing to compare. What is raised stays raised.
+    /// Not calibrated, or nothing to compare. A raised alarm stays raised.
     Unknown,
-    /// The worm does not do what is watched, so nothing can be wrong with it. What is raised will clear.
+    /// The worm does not do what is monitored, so nothing can be wrong with it. A raised alarm will clear.
     Idle,
-    /// It watches.
+    /// It is armed.
     Measured(Reading),
 }
 
-/// The watched quantity and how it stands.
+/// The monitored quantity and its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reading {
     pub value: f64,
@@ -33,21 +33,21 @@ pub(super) struct Reading {
     pub verdict: ReadingState,
     /// When the condition began, if it holds, ns.
     pub since_ns: u64,
-    /// The cell that is meant.
+    /// The cell concerned, if it is one.
     pub cell: Option<usize>,
     pub severity: Severity,
 }
 
 impl DetectorOutput {
-    pub(super) const fn watches(&self) -> bool {
+    pub(super) const fn is_armed(&self) -> bool {
         matches!(self, Self::Measured(_))
     }
 }
 
-/// How long a condition must hold before the latch follows it.
+/// On-delay and off-delay of an alarm.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Delays {
-    /// How long the verdict must be bad, ns; 0 where the detector confirms by itself.
+    /// How long the verdict must be bad, ns; 0 where the detector confirms it itself.
     pub raise_after_ns: u64,
     /// How long the verdict must be good, or the worm idle, ns.
     pub clear_after_ns: u64,
@@ -84,11 +84,11 @@ impl Latch {
         self.raised.is_some()
     }
 
-    /// Follows the newest finding; the change it made, if any, still without its number.
+    /// Processes the newest output of the detector; returns the change, if any, still without its number.
     pub(super) fn update(&mut self, now_ns: u64, phase: f64, finding: &DetectorOutput) -> Option<Alarm> {
         let watched_from_ns = *self.watched_from_ns.get_or_insert(now_ns);
         match (self.raised, finding) {
-            (None, DetectorOutput::Measured(reading)) if reading.verdict == ReadingState::Bad && is_sound(reading) => {
+            (None, DetectorOutput::Measured(reading)) if reading.verdict == ReadingState::Bad && is_finite(reading) => {
                 let from_ns = *self.bad_from_ns.get_or_insert(now_ns);
                 (now_ns.saturating_sub(from_ns) >= self.delays.raise_after_ns).then(|| {
                     let reading = Reading {
@@ -119,7 +119,7 @@ impl Latch {
                     return None;
                 }
                 let last = match finding {
-                    DetectorOutput::Measured(now) if is_sound(now) => Reading {
+                    DetectorOutput::Measured(now) if is_finite(now) => Reading {
                         value: now.value,
                         threshold: now.threshold,
                         ..raised
@@ -131,7 +131,7 @@ impl Latch {
         }
     }
 
-    /// Clears at once, for a new start; the change, if it was raised.
+    /// Clears at once, for a new start; returns the change, if it was raised.
     pub(super) fn reset(&mut self, now_ns: u64, phase: f64) -> Option<Alarm> {
         self.bad_from_ns = None;
         self.watched_from_ns = None;
@@ -161,7 +161,7 @@ impl Latch {
     }
 }
 
-/// No alarm rests on a value that is not a number.
-fn is_sound(reading: &Reading) -> bool {
+/// An alarm is never raised on a value that is not a number.
+fn is_finite(reading: &Reading) -> bool {
     reading.value.is_finite() && reading.threshold.is_finite()
 }

@@ -1,8 +1,8 @@
 //! Link fault: the servo does not answer, or answers badly.
 //!
-//! Failed exchanges over a sliding half second in which the computer did not pause, as a share of the exchanges in it. Counters are
-//! compared, so states that the estimator did not receive are counted all the same. An answer that comes late is none that failed:
-//! that is a busy computer, and `timing` tells it. The controller's own verdict, link lost, raises the alarm at once.
+//! Failed exchanges over a sliding half second in which the computer did not pause, as a fraction of all exchanges in it. Counters are
+//! compared, so states that the estimator did not receive are counted, too. A late answer is not a failure: it comes from a busy computer,
+//! and `timing` shows that. The controller's own fault "link lost" raises the alarm at once.
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -13,7 +13,7 @@ use crate::message::{Fault, Severity, State};
 const WINDOW_S: f64 = 0.5;
 /// Parts of the window; the oldest part falls out as a whole.
 const PARTS: usize = 10;
-/// Least share of the configured rate at which the loop ticks: see `control.adapt_rate`.
+/// Lowest fraction of the configured rate at which the loop ticks: see `control.adapt_rate`.
 const MIN_RATE_FRACTION: f64 = 0.125;
 
 #[derive(Debug, Clone)]

@@ -1,12 +1,12 @@
-//! Model mismatch: the worm makes a way, in some part of the gait or in the whole cycle, that the model does not explain.
+//! Model mismatch: the worm makes a displacement, in some part of the gait or in the whole cycle, that the model does not explain.
 //!
-//! The residual map is kept by the estimator (see [`crate::estimate::mismatch`], which also tells what is allowed for); this
-//! looks at it whenever it has changed. It is raised when something in the map is beyond `threshold`, in metres of way a cycle,
-//! with the confidence of the whole family, and cleared when nothing is beyond it any more. It watches while the map rests on
-//! enough cycles; bounds found anew, a reversal and a restart leave it blind until there are some again.
+//! The estimator keeps the residual map (see [`crate::estimate::mismatch`], which also lists what is allowed for); this detector evaluates it
+//! whenever it has changed. The alarm is raised when something in the map exceeds `threshold`, in metres a cycle, with the confidence of
+//! the whole family, and cleared when nothing exceeds it any more. It is armed while the map has enough cycles; new bounds, a reversal or a
+//! restart leave it unarmed until there are enough again.
 //!
-//! Value is the unexplained way, measured less modelled along the crawl. The cell is the one whose way shows it best, and the
-//! alarm's phase is the last at which the gait was where it shows: with the step order that tells whose step it was.
+//! The value is the unexplained displacement, measured less modelled, along the crawl. The cell is the one that shows it best, and the
+//! alarm's phase is the last one at which the gait passed the place where it shows: with the step order that tells whose step it was.
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -18,7 +18,7 @@ use crate::message::Severity;
 pub(super) struct ModelMismatch {
     threshold_m: f64,
     revision: u64,
-    place: Option<f64>, // gait phase of what was found last, 0 to 1
+    place: Option<f64>, // gait phase of the last mismatch, 0 to 1
     since_ns: u64,
     finding: DetectorOutput,
 }
@@ -42,7 +42,7 @@ impl ModelMismatch {
         self.finding
     }
 
-    /// The last gait phase, at or before this one, at which the gait was where the mismatch shows.
+    /// The last gait phase, at or before this one, at which the gait passed the place of the mismatch.
     pub(super) fn phase_before(&self, phase: f64) -> f64 {
         self.place.map_or(phase, |place| (phase - place).floor() + place)
     }

@@ -1,24 +1,24 @@
 //! The alarms: what is wrong with the worm, since when, and by how much.
 //!
-//! [`AlarmMonitor::update`] takes every state, with the estimate that a new tracker sample gave and the cycle that ended, and
-//! gives back the alarms that were raised or cleared. It owns no clock: time is [`State::time_ns`]. It allocates nothing.
+//! [`AlarmMonitor::update`] takes every state, with the estimate from a new tracker sample and the cycle that ended, if any, and returns the
+//! alarms that were raised or cleared. It has no clock: time is [`State::time_ns`]. It allocates nothing.
 //!
-//! Read in this order: `cam_motion` tells what the cam does and `sample` which positions to trust; each detector (`stall`,
-//! `jam`, `stride` with `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`)
-//! tells in its head how it decides; `latch` turns what they find into one "raised" and one "cleared".
+//! Reading order: `cam_motion` follows the cam and `sample` selects the positions to trust. Each detector (`stall`, `jam`, `stride` with
+//! `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`) describes its decision rule at
+//! the top of its file. `latch` turns their output into one "raised" and one "cleared".
 //!
-//! **Calibration.** What is usual is learned on the first `estimator.calibration_cycles` good cycles, in the gait's phase:
-//! extensions and energy for the present speed and direction, advance and retraction for each direction. Where a
-//! gross fault shows without calibration (a cell that does not move, a worm that does not advance, a long slide) the alarm
-//! watches from the start with a wide threshold; where it does not (energy) it is unarmed until then, and
-//! [`AlarmMonitor::armed_mask`] says so. Cycles in which something was wrong never serve as examples.
+//! **Calibration.** Baselines are learned on the first `estimator.calibration_cycles` good cycles, as functions of the gait phase:
+//! extensions and energy for the present speed and direction, advance and retraction for each direction. Where a gross fault shows without
+//! calibration (a cell that does not move, a worm that does not advance, a long slide) the alarm is armed from the start with a wide
+//! threshold. Where it does not (energy), it is unarmed until then, and [`AlarmMonitor::armed_mask`] says so. Cycles with a fault are never
+//! used for calibration.
 //!
-//! **Clearing.** An alarm is cleared when its condition was clearly over for a while. Stall, jam and lack of progress
-//! exist only while the worm is asked to move: they also clear two seconds after it no longer is, so that a reset of the
-//! fault that they caused is possible. Energy, battery and model mismatch keep their alarm through pauses.
+//! **Clearing.** An alarm is cleared when its condition has clearly been over for a while. Stall, jam and lack of progress can exist only
+//! while the worm is commanded to move: they also clear two seconds after it no longer is, so that the fault that they caused can be
+//! reset. Energy, battery and model mismatch keep their alarm through pauses.
 //!
-//! **Restart.** When the controller's sequence goes back everything raised is cleared and learned anew, except the charge of
-//! the battery, which did not change.
+//! **Restart.** When the controller's sequence goes back, everything raised is cleared and learned anew, except the charge of the battery,
+//! which did not change.
 
 mod battery;
 mod cam_motion;
@@ -50,20 +50,20 @@ use latch::{Delays, DetectorOutput, Latch};
 use sample::VisibleCells;
 use worm_physics::MAX_CELLS;
 
-/// What there is to see in one tick.
+/// The input of one tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Observation<'a> {
     /// The controller's state, every tick.
     pub state: &'a State,
-    /// What the estimator knows, when a new tracker sample came.
+    /// The estimate, if a new tracker sample came.
     pub estimate: Option<&'a Estimate>,
     /// The gait cycle that ended, if one did.
     pub cycle: Option<&'a Cycle>,
-    /// What the model does not explain, as of now.
+    /// The present residuals against the model.
     pub residuals: Option<&'a ResidualMap>,
 }
 
-/// Watches one worm for everything that [`AlarmKind`] names.
+/// Monitors one worm for every [`AlarmKind`].
 #[derive(Debug, Clone)]
 pub struct AlarmMonitor {
     cells: usize,
@@ -77,10 +77,10 @@ pub struct AlarmMonitor {
 
 const KINDS: usize = AlarmKind::ALL.len();
 
-/// A finding of a position detector is too old when no sample came for this long, s.
+/// Age from which the output of a position detector no longer counts, s.
 const STALE_S: f64 = 0.5;
 
-/// Everything that begins anew when the controller does.
+/// Everything that starts over when the controller does.
 #[derive(Debug, Clone)]
 struct Detectors {
     cam_motion: CamMotion,
@@ -100,7 +100,7 @@ struct Detectors {
 }
 
 impl AlarmMonitor {
-    /// A watch for a worm of a checked configuration, before its first tick.
+    /// A monitor for a worm of a checked configuration, before its first tick.
     pub fn new(config: &Config) -> Self {
         let detectors = Detectors {
             cam_motion: CamMotion::new(config),
@@ -132,7 +132,7 @@ impl AlarmMonitor {
         }
     }
 
-    /// Takes one tick and tells which alarms it raised or cleared.
+    /// Processes one tick and returns the alarms that it raised or cleared.
     pub fn update(&mut self, observation: &Observation<'_>) -> AlarmChanges {
         let state = observation.state;
         let mut changes = AlarmChanges::none();
@@ -150,7 +150,7 @@ impl AlarmMonitor {
         let findings = self.findings(&tick, observation, sound);
         self.armed_mask = 0;
         for (finding, latch) in findings.iter().zip(&mut self.latches) {
-            self.armed_mask |= u32::from(finding.watches()) << latch.kind().code();
+            self.armed_mask |= u32::from(finding.is_armed()) << latch.kind().code();
             let phase = match latch.kind() {
                 AlarmKind::ModelMismatch => self.detectors.mismatch.phase_before(state.phase),
                 _ => state.phase,
@@ -162,12 +162,12 @@ impl AlarmMonitor {
         changes
     }
 
-    /// Bit k set: the alarm with code k watches.
+    /// Bit k is set while the alarm with code k is armed.
     pub const fn armed_mask(&self) -> u32 {
         self.armed_mask
     }
 
-    /// Bit k set: the alarm with code k is raised.
+    /// Bit k is set while the alarm with code k is raised.
     pub fn raised_mask(&self) -> u32 {
         self.latches
             .iter()
@@ -175,7 +175,7 @@ impl AlarmMonitor {
             .sum()
     }
 
-    /// Whether no alarm stands that makes a cycle no example of how the worm crawls.
+    /// Whether no alarm is raised that makes a cycle unfit for calibration.
     pub fn is_sound(&self) -> bool {
         [
             AlarmKind::MotorStall,
@@ -197,7 +197,7 @@ impl AlarmMonitor {
         self.latches[kind as usize].is_raised()
     }
 
-    /// What every detector finds, in the order of [`AlarmKind::ALL`].
+    /// The output of every detector, in the order of [`AlarmKind::ALL`].
     fn findings(&mut self, tick: &Tick, observation: &Observation<'_>, sound: bool) -> [DetectorOutput; KINDS] {
         let Observation {
             state,
@@ -254,7 +254,7 @@ impl Detectors {
     }
 }
 
-/// How long each condition must hold, and be over. Where `raise_after_ns` is 0 the detector itself confirms.
+/// How long each condition must hold, and be over. Where `raise_after_ns` is 0, the detector confirms it itself.
 const fn delays_of(kind: AlarmKind) -> Delays {
     let (raise_after_s, clear_after_s) = match kind {
         AlarmKind::MotorStall => (0.0, 2.0),

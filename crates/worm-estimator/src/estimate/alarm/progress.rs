@@ -1,10 +1,10 @@
 //! No progress: the cam turns and the worm does not advance.
 //!
-//! The advance over the last whole cycle (see [`super::stride`]) is compared, 32 times a cycle, with `threshold` × the usual
-//! advance of this direction. Until that is calibrated, half the share of the model's prediction serves, and where that
-//! is missing or about nothing, 5 % of the stroke stands for "usual": a worm that gains less than a share of that per cycle
-//! does not progress, whatever the model says. When the worm slips from one moment to the next, the advance over the
-//! last cycle falls along a straight line, so the default share of 0.3 tells after 0.7 of a cycle.
+//! The advance over the last whole cycle (see [`super::stride`]) is compared, 32 times a cycle, with `threshold` × the baseline for this
+//! direction. Until that is calibrated, half of `threshold` × the model's prediction is used; where that is missing or near zero, 5 % of the
+//! stroke is the baseline: a worm that gains less than a fraction of that per cycle does not progress, whatever the model says. When a
+//! worm starts to slip suddenly, the advance over the last cycle falls along a straight line, so the default of 0.3 raises the alarm
+//! after 0.7 of a cycle.
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -12,17 +12,17 @@ use super::stride::{Baseline, Stride, Strides};
 use crate::config::Config;
 use crate::message::{Cycle, Severity};
 
-/// Least advance per cycle that counts as usual, share of the stroke.
+/// Lowest baseline of the advance per cycle, as a fraction of the stroke.
 const MIN_BASELINE_FRACTION: f64 = 0.05;
-/// Part of the threshold share that is asked of the model's prediction.
+/// Factor on the threshold when it is applied to the model's prediction.
 const TRUST_IN_MODEL: f64 = 0.5;
 /// Strides in a row below the limit.
 const CONFIRMATIONS: u32 = 2;
-/// A shortfall within this many standard deviations of the usual advance is scatter.
+/// A shortfall within this many standard deviations of the baseline is scatter.
 const SCATTER_SIGMAS: f64 = 5.0;
-/// The condition began when the advance last was above this share of the usual one.
+/// The condition began when the advance was last above this fraction of the baseline.
 const ONSET_FRACTION: f64 = 0.9;
-/// How far above the limit, on the way to the usual advance, the worm must be again.
+/// To clear, the advance must be above the limit by this fraction of the distance to the baseline.
 const CLEAR_FRACTION: f64 = 0.25;
 
 #[derive(Debug, Clone)]
@@ -51,19 +51,19 @@ impl NoProgress {
         }
     }
 
-    /// Takes note of the model's prediction.
+    /// Stores the model's prediction.
     pub(super) fn note_cycle(&mut self, cycle: &Cycle) {
         let predicted_m = cycle.predicted_advance_m.abs();
         self.predicted_m[usize::from(cycle.direction > 0)] = Some(predicted_m).filter(|metres| metres.is_finite());
     }
 
-    /// The usual advance of a direction, m, once it is calibrated.
+    /// The baseline of a direction, m, once it is calibrated.
     pub(super) fn baseline_m(&self, direction: f64) -> Option<f64> {
         let baseline = &self.baseline[usize::from(direction > 0.0)];
         baseline.is_known(self.calibration_cycles).then(|| baseline.mean_m())
     }
 
-    /// Takes a stride; `sound` when nothing else is wrong, so that it may serve for calibration.
+    /// Processes a stride; `sound` says that nothing else is wrong, so that it may be used for calibration.
     pub(super) fn update(
         &mut self,
         tick: &Tick,

@@ -1,4 +1,4 @@
-//! One tracker sample as the position detectors see it: filtered positions of the cells that are really being seen.
+//! One tracker sample for the position detectors: filtered positions of the cells that the tracker sees.
 
 use crate::message::{Estimate, State};
 use worm_physics::MAX_CELLS;
@@ -6,7 +6,7 @@ use worm_physics::MAX_CELLS;
 /// A filtered position is trusted while its cell was seen in one of this many newest samples.
 const TRUSTED_SAMPLES: u32 = 6;
 
-/// Which cells the tracker sees, so that a position that the filter only carries on is not taken for a measurement.
+/// Which cells the tracker sees, so that a position that the filter only predicts does not count as a measurement.
 #[derive(Debug, Clone)]
 pub(super) struct VisibleCells {
     unseen: [u32; MAX_CELLS], // samples since the cell was seen
@@ -16,7 +16,7 @@ pub(super) struct VisibleCells {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Positions {
     pub metres: [f64; MAX_CELLS],
-    /// Bit i set: `metres[i]` is finite and trusted.
+    /// Bit i is set when `metres[i]` is finite and trusted.
     pub mask: u32,
 }
 
@@ -64,7 +64,7 @@ impl Positions {
         self.mask >> cell & 1 == 1
     }
 
-    /// Mean displacement from `earlier` to here over the cells that are in both, m.
+    /// Mean displacement since `earlier` over the cells that are in both, m.
     pub(super) fn moved_since(&self, earlier: &Self) -> Option<f64> {
         self.moved_without(earlier, 0)
     }

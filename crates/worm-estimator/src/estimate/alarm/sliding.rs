@@ -1,15 +1,15 @@
 //! Sliding down: the worm moves down the canal.
 //!
-//! "Down" is where gravity pulls; on the level it is against the crawling direction. The excess over what is usual is
-//! compared with `threshold`, in metres, in one of three ways:
+//! "Down" is where gravity pulls; on the level it is against the crawling direction. The excess over the baseline is compared with
+//! `threshold`, in metres, in one of three ways:
 //!
 //! - **at rest** (cam still, in any mode, with or without torque): median displacement of the cells since rest began;
-//! - **crawling up or on the level**: how far the worm is below its highest point, less the retraction that is usual at
-//!   this gait phase (calibrated, before that half a stroke);
-//! - **crawling down**: way down in the last cycle (see [`super::stride`]) less the usual way per cycle; before it is
-//!   calibrated, and just after a reversal, a whole stroke, which is the most that a gait can gain.
+//! - **crawling up or on the level**: how far the worm is below its highest point, less the baseline of the retraction at this gait phase
+//!   (calibrated; before that, half a stroke);
+//! - **crawling down**: displacement down in the last cycle (see [`super::stride`]) less the baseline per cycle; before that is calibrated,
+//!   and just after a reversal, a whole stroke, which is the most that a gait can gain.
 //!
-//! It clears when the worm has not sunk further for a while, and then watches anew from there.
+//! It clears when the worm has not sunk further for a while, and then monitors from there.
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -25,7 +25,7 @@ const LEVEL_DEG: f64 = 0.5;
 const SMOOTHING: f64 = 0.2;
 /// Samples in a row beyond the threshold.
 const CONFIRMATIONS: u32 = 4;
-/// A movement within this many standard deviations of the mean position is noise.
+/// A displacement within this many standard deviations of the mean position is noise.
 const NOISE_SIGMAS: f64 = 4.0;
 /// Part of the threshold by which the worm must sink further to count as still sliding.
 const FURTHER_FRACTION: f64 = 0.25;
@@ -34,7 +34,7 @@ const OVER_S: f64 = 2.0;
 /// … and, while crawling, after this many cycles.
 const OVER_CYCLES: f64 = 1.2;
 
-/// The usual retraction at each phase of a cycle, m below the highest point.
+/// Baseline of the retraction at each phase of a cycle, m below the highest point.
 #[derive(Debug, Clone, Copy)]
 struct Retraction {
     sum_m: [f64; BINS],
@@ -57,9 +57,9 @@ pub(super) struct SlidingDown {
     smoothed: Positions,
     crawl_state: Option<CrawlState>,
     reversals: u32,
-    anchor: Positions, // where the present manner began
+    anchor: Positions, // where the present state of the crawl began
     anchor_phase: f64,
-    height_m: f64, // way up since then, summed sample by sample
+    height_m: f64, // displacement upward since then, summed sample by sample
     highest_m: f64,
     last: Positions,
     retraction: Retraction,
@@ -103,8 +103,8 @@ impl SlidingDown {
         }
     }
 
-    /// Takes a sample. `baseline_m` is the calibrated advance per cycle in the present direction, `sound` tells that nothing
-    /// else is wrong, so that the cycle may serve for calibration.
+    /// Processes a sample. `baseline_m` is the calibrated advance per cycle in the present direction; `sound` says that nothing else is
+    /// wrong, so that the cycle may be used for calibration.
     pub(super) fn update(
         &mut self,
         tick: &Tick,
@@ -173,7 +173,7 @@ impl SlidingDown {
     }
 
     fn rested(&mut self, up: f64) -> Option<f64> {
-        // Cells that come into sight during the rest join where they are first seen.
+        // Cells that become visible during the rest count from where they are first seen.
         let moved_m = self.smoothed.median_moved_since(&self.anchor);
         if moved_m.is_none() {
             self.anchor = self.smoothed;
@@ -211,7 +211,7 @@ impl SlidingDown {
             let baseline_m = baseline_m.filter(|_| strides.is_settled());
             return Some(displacement_m - baseline_m.unwrap_or(self.stroke_m));
         }
-        // No sample of one cycle ago: what was gained since the descent began, while that is less than a cycle ago.
+        // No sample of one cycle ago: the displacement since the descent began, if that is less than a cycle ago.
         if (phase - self.anchor_phase).abs() > 1.0 {
             self.start_here(tick);
         }

@@ -1,18 +1,17 @@
 //! Motor stall: the cam does not turn as commanded.
 //!
-//! The lag is ∫ (commanded − measured speed) dt, as share of a turn, with a leak that runs with the *commanded travel*,
-//! not with time:
+//! The lag is ∫ (commanded − measured speed) dt, in turns, with a leak that runs with the *commanded travel*, not with time:
 //!
 //! d lag = (commanded − measured) − lag · |commanded| / memory, memory = [`MEMORY`] thresholds.
 //!
-//! A cam that stands makes the lag grow to `memory`, so it passes the threshold after −5 ln(1 − 1/5) = 1.12 thresholds of
-//! commanded travel **at any speed**; a cam that turns a little too slowly by a share e settles at e · `memory`, so up
-//! to 20 % too slow is not a stall. What a sound servo lags behind does not count: a rising command is followed with the
-//! time constant [`SERVO_LAG_S`] and a falling one at once, whichever asks for less, and half a count of the goal
-//! register is the servo's own rounding. Time is what the motor lived through: a simulated one stands still in a pause of its computer.
+//! A cam that stands still makes the lag grow to `memory`, so it passes the threshold after −5 ln(1 − 1/5) = 1.12 thresholds of commanded
+//! travel **at any speed**. A cam that turns too slowly by a fraction e settles at e · `memory`, so up to 20 % too slow is not a stall. The
+//! normal lag of a servo does not count: a rising command is followed with the time constant [`SERVO_LAG_S`] and a falling one at once,
+//! whichever is less, and half a count of the goal register is the servo's own rounding. Time is motor time: a simulated motor stands still
+//! in a pause of its computer.
 //!
-//! While the commanded speed changes, twice the threshold is needed, unless the current says the motor works hard: the
-//! current only corroborates, the encoder decides.
+//! While the commanded speed changes, twice the threshold is needed, unless the current shows that the motor works hard: the current only
+//! corroborates, the encoder decides.
 
 use super::cam_motion::{GOAL_UNIT_TURNS_PER_S, Tick, finite_or_zero};
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -21,10 +20,10 @@ use crate::message::{Severity, State};
 
 /// Travel over which lag is forgotten, in thresholds.
 const MEMORY: f64 = 5.0;
-/// Time constant with which a sound servo follows a rising command, s, generously.
+/// Time constant with which a healthy servo follows a rising command, s, generously.
 const SERVO_LAG_S: f64 = 0.04;
-/// Commanded speed below which the threshold falls in proportion: at it the default threshold is passed after 70 ms, and
-/// what the cam was ahead, confirmation and the way to the motor fit into the rest of a tenth of a second.
+/// Commanded speed below which the threshold falls in proportion. At this speed the default threshold is passed after 70 ms, which
+/// leaves the rest of a tenth of a second for a lead of the cam, the confirmation and the command to the motor.
 const FULL_SPEED_TURNS_PER_S: f64 = 0.16;
 /// The threshold falls no further than this: eight counts of the encoder.
 const MIN_TURNS: f64 = 0.002;
@@ -32,15 +31,15 @@ const MIN_TURNS: f64 = 0.002;
 const MAX_AHEAD: f64 = 0.2;
 /// Readings in a row beyond the threshold.
 const CONFIRMATIONS: u32 = 3;
-/// The condition began when the lag last passed this share of the threshold.
+/// The condition began when the lag last passed this fraction of the threshold.
 const ONSET_FRACTION: f64 = 0.2;
-/// Share of the servo's current limit from which the motor works hard.
+/// Fraction of the servo's current limit from which the motor works hard.
 const HARD_WORK_FRACTION: f64 = 0.7;
-/// Nothing lags once no motion was commanded for this long, s.
+/// The lag is reset once no motion was commanded for this long, s.
 const SETTLED_S: f64 = 0.2;
 /// Longest pause between readings that is bridged, s; beyond it what was commanded meanwhile is not known.
 const LONGEST_GAP_S: f64 = 0.03;
-/// Faster than any servo turns a cam, turns/s: the encoder's zero was moved.
+/// Faster than any servo turns a cam, turns/s: the encoder's zero was changed.
 const IMPLAUSIBLE_TURNS_PER_S: f64 = 50.0;
 
 #[derive(Debug, Clone)]
@@ -48,7 +47,7 @@ pub(super) struct MotorStall {
     threshold_turns: f64,
     hard_work_a: f64,
     longest_gap_s: f64,
-    reference: f64, // the command that a sound servo must have followed by now, turns/s
+    reference: f64, // the speed that a healthy servo must have reached by now, turns/s
     side: f64,      // direction in which the lag counts, +1 or −1
     lag: f64,       // turns
     commanded: f64, // travel commanded since the last reading, turns
@@ -154,7 +153,7 @@ impl MotorStall {
         self.gap_s += tick.step_s;
     }
 
-    /// A servo that stood still with its computer was commanded nothing meanwhile.
+    /// A simulated servo that stood still with its computer was commanded nothing meanwhile.
     fn leave_out_standstill(&mut self, tick: &Tick) {
         if tick.motor_s < self.gap_s {
             self.commanded *= tick.motor_s / self.gap_s;

@@ -1,8 +1,8 @@
-//! How far the worm got in the last gait cycle, told many times a cycle.
+//! The advance over the last gait cycle, updated many times a cycle.
 //!
-//! Positions are stored at [`BINS`] phases; one cycle later, at the same phase, the whole periodic part of the motion
-//! cancels and the difference is the advance of the last cycle, whatever the shape of the gait. So nobody waits for the end
-//! of a cycle, and the usual advance is calibrated in phase for each direction by itself.
+//! Positions are stored at [`BINS`] phases. One cycle later, at the same phase, the periodic part of the motion cancels, and the difference
+//! is the advance of the last cycle, whatever the shape of the gait. So nothing has to wait for the end of a cycle, and the baseline of
+//! the advance can be calibrated for each direction.
 
 use super::cam_motion::Tick;
 use super::sample::Positions;
@@ -19,7 +19,7 @@ pub(super) struct Stride {
     pub cycles: f64,
 }
 
-/// What is usual in one direction.
+/// The baseline of the advance in one direction.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Baseline {
     strides: u32,
@@ -53,7 +53,7 @@ impl Baseline {
 pub(super) struct Strides {
     slots: [(i64, Positions); BINS], // bin counted from phase 0, and the positions on entering it
     bin: Option<i64>,
-    began_phase: f64, // where the unbroken travel in this direction began
+    began_phase: f64, // where the uninterrupted travel in this direction began
     reversals: u32,
     torque: bool,
     after_reversal: bool,
@@ -75,7 +75,7 @@ impl Strides {
         }
     }
 
-    /// Takes a sample; the stride, when the cam entered a new bin and the positions one cycle ago are known.
+    /// Processes a sample; returns the stride when the cam entered a new bin and the positions one cycle ago are known.
     pub(super) fn update(&mut self, tick: &Tick, positions: &Positions) -> Option<Stride> {
         let phase = tick.phase?;
         let bin = (phase * BINS as f64).floor() as i64;
@@ -92,7 +92,7 @@ impl Strides {
             return None;
         }
         if self.bin.is_some_and(|last| (bin - last) as f64 * tick.direction <= 0.0) {
-            return None; // in the same bin, or back in an earlier one by the give of a hold
+            return None; // in the same bin, or back in an earlier one because a hold gave way
         }
         self.bin = Some(bin);
         let slot = &mut self.slots[bin.rem_euclid(BINS as i64) as usize];
@@ -109,7 +109,7 @@ impl Strides {
         self.newest
     }
 
-    /// The newest stride, carried on by what the worm moved since: along the crawling direction, m.
+    /// The newest stride plus the displacement since, along the crawling direction, m.
     pub(super) fn advance_until(&self, tick: &Tick, positions: &Positions) -> Option<f64> {
         let since_m = positions.moved_since(&self.newest_at)?;
         Some(self.newest?.advance_m + since_m * tick.direction)
@@ -121,7 +121,7 @@ impl Strides {
         self.newest.is_some_and(|stride| stride.cycles >= needed)
     }
 
-    /// Whether a stride may serve as an example of what is usual.
+    /// Whether a stride may be used for calibration.
     pub(super) fn can_calibrate(&self) -> bool {
         self.newest.is_some_and(|stride| stride.cycles >= 2.0)
     }

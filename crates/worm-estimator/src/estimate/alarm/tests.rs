@@ -1,4 +1,4 @@
-//! The alarms against a simulated worm in virtual time: every fault is told, nothing else is.
+//! The alarms against a simulated worm in virtual time: every fault is reported, and nothing else.
 
 mod charts;
 mod fault_table;

@@ -1,9 +1,9 @@
 //! Tracker fault: no samples, many lost, or a cell that is not seen.
 //!
-//! Over a sliding two seconds in which the computer did not pause: the share of samples that did not arrive (missed between two reads, or never sent), and for
-//! each cell the share of arrived samples in which it was not seen; the worst of them is watched. A cell is named when all
-//! others are below half the threshold. No sample at all for the controller's tracker timeout raises the alarm at once,
-//! and so does the controller's own verdict that the tracker is stale.
+//! Over a sliding two seconds in which the computer did not pause: the fraction of samples that did not arrive (missed between two reads, or
+//! never sent), and for each cell the fraction of arrived samples in which it was not seen; the largest of them is monitored. A cell is named
+//! when all others are below half the threshold. No sample at all for the controller's tracker timeout raises the alarm at once, and so
+//! does the controller's own fault "tracker stale".
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -15,7 +15,7 @@ use worm_physics::MAX_CELLS;
 const WINDOW_S: f64 = 2.0;
 /// Parts of the window; the oldest part falls out as a whole.
 const PARTS: usize = 20;
-/// Share of the configured rate that counts as complete: a free-running tracker's clock differs, and parts are uneven.
+/// Fraction of the configured rate that counts as complete: a free-running tracker's clock differs, and parts are uneven.
 const COMPLETE_FRACTION: f64 = 0.95;
 
 /// Counts in one part of the window, or in all of them.
@@ -106,8 +106,8 @@ impl TrackerFault {
         self.silent_s += tick.present_s;
     }
 
-    /// The time in which samples were due that has become known with this tick, s. While the servo does not answer it is not known
-    /// whether its line or its computer is silent, and with it the tracker's; where they stood still no sample was due.
+    /// Time in which samples were due, as far as this tick shows, s. While the servo does not answer it is not known whether its line
+    /// is silent or a simulated device stands still; no sample is due from a device that stood still.
     fn due_s(&mut self, tick: &Tick) -> f64 {
         self.unanswered_s += tick.present_s;
         if !tick.phase_is_new {
@@ -118,7 +118,7 @@ impl TrackerFault {
 
     fn count(&mut self, state: &State) {
         let before = self.last_sample.unwrap_or(state.sample);
-        // No tracker sends more than this between two states; a larger jump is a counter that began anew.
+        // No tracker sends more than this between two states; a larger jump is a counter that was reset.
         let arrived = state.sample.saturating_sub(before).min(10_000);
         self.last_sample = Some(state.sample);
         if arrived == 0 && state.sample_is_new == 0 {
@@ -142,12 +142,12 @@ impl TrackerFault {
         }
     }
 
-    /// The largest share, and the cell if it is one cell's alone.
+    /// The largest fraction, and the cell if only one cell is affected.
     fn worst(&self) -> (f64, Option<usize>) {
         let window_s = self.filled_s.min(WINDOW_S);
         let due = COMPLETE_FRACTION * self.rate_hz * window_s;
         let full = self.rate_hz * WINDOW_S;
-        // Shares are of a full window, so that the first samples weigh no more than later ones.
+        // Fractions are of a full window, so that the first samples have no more weight than later ones.
         let absent = (due - self.whole.arrived as f64).max(0.0) / full;
         let mut worst = 0.0;
         let mut named = None;

@@ -1,4 +1,4 @@
-//! The end of a gait cycle: fit, energy balance, prediction, and what is corrected by them.
+//! The end of a gait cycle: fit, energy balance, prediction, and the corrections that follow.
 
 use super::Estimator;
 use crate::estimate::bounds::Identification;
@@ -10,7 +10,7 @@ use worm_physics::MAX_CELLS;
 const GUESSED_BOUND_FRACTION: f64 = 0.15;
 
 impl Estimator {
-    /// Closes the open cycle: fit, account, prediction.
+    /// Closes the open cycle: fit, energy balance, prediction.
     pub(super) fn close(&mut self, end_s: f64) {
         let direction = self.cycles.direction();
         let sign = f64::from(direction);
@@ -39,7 +39,7 @@ impl Estimator {
             self.correct_contacts(&balance, sign);
             self.window_contact_m = balance.contact_at_start_m;
             if self.bounds_are_known() {
-                self.mismatch.take_up(&self.window);
+                self.mismatch.add_cycle(&self.window);
             }
             self.window.next_cycle();
             self.identify(tips);
@@ -105,7 +105,7 @@ impl Estimator {
         cycle.energy_actuator_sigma_j = balance.actuator_sigma_j.hypot(from_bounds_j);
     }
 
-    /// Replaces what the live positions gave for this cycle by what the fit gave.
+    /// Replaces the results of the live positions for this cycle by those of the fit.
     fn correct_contacts(&mut self, balance: &EnergyBalance, sign: f64) {
         let (slid_forward_m, slid_backward_m) = balance.slides_along_canal_m(sign);
         let mut forward_m = *self.contacts.forward_m();
@@ -127,13 +127,13 @@ impl Estimator {
         let Some(identification) = &mut self.identification else {
             return;
         };
-        if identification.take_up(&self.fit, tips) && self.predictor.set_bounds(identification.bound_m()).is_ok() {
+        if identification.add_cycle(&self.fit, tips) && self.predictor.set_bounds(identification.bound_m()).is_ok() {
             for (tip, &bound_m) in self.tips.iter_mut().zip(identification.bound_m()) {
                 tip.bound_m = bound_m;
             }
             self.contacts.set_tips(&self.tips);
             self.mismatch.set_identified(self.predictor.worm());
-            // The window is accounted for from its start with the new bounds, so its contact points are found anew.
+            // With new bounds the contact points at the window's start have to be found anew.
             self.window_contact_m = [f64::NAN; MAX_CELLS];
             self.show_bounds();
         }

@@ -8,7 +8,7 @@ use worm_physics::MAX_CELLS;
 const FARTHEST_M: f64 = 1e5;
 
 impl Estimator {
-    /// Takes up the tracker sample of a state.
+    /// Processes the tracker sample of a state.
     pub(super) fn take_sample(&mut self, state: &State, time_s: f64, motor_s: f64) {
         let (captured_s, phase) = self.capture.place(state.sample_time_s, motor_s, state.phase);
         let mut position_m = [f64::NAN; MAX_CELLS];
@@ -41,7 +41,7 @@ impl Estimator {
         }
     }
 
-    /// Carries the filter to a phase, over the boundaries of steps, where (1) applies.
+    /// Predicts to a phase, across step boundaries, where (1) applies.
     fn predict(&mut self, phase: f64, time_s: f64) {
         let steps = phase * self.cells as f64;
         let near = self

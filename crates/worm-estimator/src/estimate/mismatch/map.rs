@@ -1,22 +1,21 @@
-//! The map and the test on it.
+//! The residual map and the test on it.
 //!
-//! The test asks whether an entry is larger than a threshold, not whether it is other than 0: no model is exact, and in the long run
-//! every deviation is significant. For each entry, and for the advance of the whole worm over a cycle, which adds up
-//! what is too small in every bin, the excess over the threshold is divided by the standard error. With Student's distribution
-//! and Bonferroni's share for each of the family's members, the chance that any of them is beyond while none truly is stays below
-//! [`FALSE_FRACTION`], whatever hangs together with what.
+//! The test asks whether an entry exceeds a threshold, not whether it differs from 0: no model is exact, and in the long run every
+//! deviation is significant. For each entry, and for the advance of the whole worm over a cycle, which adds up what is too small in every
+//! bin, the excess over the threshold is divided by the standard error. With Student's distribution and a Bonferroni correction, the
+//! probability that any of them exceeds it while none truly does stays below [`FALSE_FRACTION`], whatever their correlations.
 
 use super::BINS;
 use super::reference_model::{ALLOWANCES, Part, ReferenceModel};
 use super::weighted_mean::{MeanEstimate, WeightedMean};
 use worm_physics::MAX_CELLS;
 
-/// Chance of the whole family to be beyond by chance, at one look.
+/// Probability of a false alarm over the whole family, at one test.
 const FALSE_FRACTION: f64 = 0.05;
-/// Standard errors by which another cell than the stepping one must stand out to be named for what all show.
+/// Standard errors by which another cell than the stepping one must stand out to be named.
 const STANDS_OUT_SIGMAS: f64 = 4.0;
 
-/// Mean residual over the last cycles for each cell, step and phase bin: measured less modelled way.
+/// Mean residual over the last cycles for each cell, step and phase bin: measured less modelled displacement.
 #[derive(Debug, Clone)]
 pub struct ResidualMap {
     cells: usize,
@@ -24,7 +23,7 @@ pub struct ResidualMap {
     stepping: [usize; MAX_CELLS],
     means: Vec<WeightedMean>, // [step][bin][cell]
     advance: WeightedMean,
-    effects_m: [Vec<f64>; ALLOWANCES.len()], // of whole units of the allowed deviations
+    effects_m: [Vec<f64>; ALLOWANCES.len()], // for allowed deviations of 100 %
     allowed_m: Vec<f64>,                     // their best fit
     allowed_advance_m: f64,
     pooled: f64, // variance of one value, m²
@@ -34,41 +33,41 @@ pub struct ResidualMap {
 /// One entry of the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
-    /// The cell whose way it is, from 0.
+    /// The cell that is displaced, from 0.
     pub cell: usize,
-    /// The cell whose step it is, from 0.
+    /// The cell that steps, from 0.
     pub stepping_cell: usize,
     /// Phase bin of the step, 0 to [`BINS`] − 1, counted along the crawl.
     pub bin: usize,
     /// Gait phase of the middle of the bin, 0 to 1, as the cam turns.
     pub phase: f64,
-    /// Mean over the cycles of measured less modelled way in the bin, along the crawl, m.
+    /// Mean over the cycles of measured less modelled displacement in the bin, along the crawl, m.
     pub mean_m: f64,
-    /// The same without what the allowed deviations of stroke and stiffness explain, m.
+    /// The same, less what the allowed deviations of stroke and stiffness explain, m.
     pub unexplained_m: f64,
     /// Standard error of the two, from the scatter over the cycles, m.
     pub sigma_m: f64,
 }
 
 impl Residual {
-    /// What is unexplained, in standard errors; signed.
+    /// The unexplained part in standard errors, signed.
     pub fn significance(&self) -> f64 {
         self.unexplained_m / self.sigma_m
     }
 }
 
-/// The most significant thing that the model does not explain, and where it is.
+/// The most significant residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unexplained {
     /// The entry that shows it best.
     pub at: Residual,
-    /// How much way is unexplained, in that bin or in the advance of a whole cycle, m a cycle.
+    /// Unexplained displacement, in that bin or in the advance of a whole cycle, m a cycle.
     pub excess_m: f64,
-    /// The same in its standard errors.
+    /// The same in standard errors.
     pub significance: f64,
-    /// Whether it is beyond the threshold with the confidence of the whole family.
+    /// Whether it exceeds the threshold with the confidence of the whole family.
     pub is_significant: bool,
-    /// Whether nothing in the map is beyond the threshold, certain or not.
+    /// Whether nothing in the map exceeds the threshold, significantly or not.
     pub is_within: bool,
 }
 
@@ -89,7 +88,7 @@ impl ResidualMap {
         }
     }
 
-    /// Forgets everything; what deviations would do is asked of the model.
+    /// Clears the map, and calculates from the model what the allowed deviations would do.
     pub(super) fn clear(&mut self, direction: i32, model: &ReferenceModel) {
         self.direction = direction;
         for (step, cell) in self.stepping[..self.cells].iter_mut().enumerate() {
@@ -121,7 +120,7 @@ impl ResidualMap {
         self.revision += 1;
     }
 
-    /// Fits the allowed deviations by least squares, each to what it shows in by itself, and up to its limit.
+    /// Fits the allowed deviations by least squares, each to the part of the motion in which it shows, and within its limit.
     fn allow(&mut self) {
         self.allowed_m.fill(0.0);
         for (effect_m, allowance) in self.effects_m.iter().zip(&ALLOWANCES) {
@@ -148,7 +147,7 @@ impl ResidualMap {
         self.allowed_advance_m = self.allowed_m.iter().sum::<f64>() / self.cells as f64;
     }
 
-    /// What a quantity of the entries of a bin comes to in the body, or in the extension of the stepping cell.
+    /// A quantity of the entries of a bin: its mean over the body, or for the extension of the stepping cell.
     fn seen_in(&self, part: Part, bin: usize, of: &dyn Fn(usize) -> f64) -> f64 {
         let stepping = self.stepping[bin / BINS];
         let others = (0..self.cells).filter(|&cell| cell != stepping);
@@ -178,7 +177,7 @@ impl ResidualMap {
         self.means.len()
     }
 
-    /// Every entry that rests on enough cycles, in the order of steps, bins and cells.
+    /// Every entry with enough cycles, in the order of steps, bins and cells.
     pub fn entries(&self) -> impl Iterator<Item = Residual> + '_ {
         (0..self.size()).filter_map(|index| self.entry(index).map(|(residual, _)| residual))
     }
@@ -199,7 +198,7 @@ impl ResidualMap {
         Some((residual, known))
     }
 
-    /// The most significant thing that is unexplained against a threshold, m a cycle; none before there are enough cycles.
+    /// The most significant residual against a threshold in m a cycle; none before there are enough cycles.
     pub fn unexplained(&self, threshold_m: f64) -> Option<Unexplained> {
         let advance = self.advance.known(self.pooled)?;
         let advance_m = advance.mean - self.allowed_advance_m;
@@ -212,7 +211,7 @@ impl ResidualMap {
                 continue;
             };
             is_within &= residual.unexplained_m.abs() <= threshold_m;
-            // Beyond the threshold first; within it, the nearest to it.
+            // Those above the threshold first; below it, the most significant.
             let rank = known.beyond(residual.unexplained_m, threshold_m);
             let larger = |(max, _, than): &(f64, usize, Residual)| {
                 rank > *max || (rank == *max && residual.significance().abs() > than.significance().abs())
@@ -257,8 +256,8 @@ impl ResidualMap {
         self.named(bin)
     }
 
-    /// The entry of a bin that is to be named: that of the stepping cell, for a body that gives way moves all of them and the
-    /// stepping cell's tip is what it holds against; or another, when it clearly stands out.
+    /// The entry of a bin to report: that of the stepping cell, because a body that gives way moves all cells, and does so against the
+    /// stepping cell's tip; or another, if it clearly stands out.
     fn named(&self, bin: usize) -> Option<Residual> {
         let stepping = self
             .entry(bin * self.cells + self.stepping[bin / BINS])

@@ -1,46 +1,47 @@
-//! What the model does not explain: the residual of the crawl, kept as a map while the worm crawls.
+//! The residual map: what the model does not explain of the crawl.
 //!
-//! # The story
-//! Beside the estimator runs the configured worm as the model has it (`model`), over the same gait phase, on the bounds that
-//! are measured or were identified. At the end of each gait cycle the way that each cell was *seen* to make in each
-//! [`BINS`]th of a step is compared with the way that the model makes there, and the difference enters the [`map`](ResidualMap):
-//! for each cell, step and bin a mean that forgets slowly, with a standard error from its scatter over the cycles (`mean`).
-//! The alarm `model-mismatch` reads the map; so may anybody else, by [`Observer::residual_map`](super::Observer::residual_map).
+//! # How it works
+//! The model (`reference_model`) runs beside the estimator over the same gait phase, on bounds that are measured or were identified. At
+//! the end of each gait cycle the displacement of each cell that was *measured* in each [`BINS`]th of a step is compared with the model's,
+//! and the difference enters the [`map`](ResidualMap): for each cell, step and bin an exponentially weighted mean, with a standard error
+//! from its scatter over the cycles (`weighted_mean`). The alarm `model-mismatch` reads the map, and so can anything else, by
+//! [`Observer::residual_map`](super::Observer::residual_map).
 //!
-//! # How a way is measured
-//! From the raw samples of the `window`, not from the fit: the fit takes cells outside their own step to keep
-//! their distances, which is one of the things that may be wrong. Where a cell is at the edge of a bin is the mean residual of
-//! half a bin before and half a bin behind it, so an increment has the noise of some ten samples. The last edge of a cycle
-//! needs samples of the next; a cycle is therefore taken from the last bin of the one before to its own last but one.
+//! # How a displacement is measured
+//! From the raw samples of the `window`, not from the fit: the fit assumes that cells outside their own step keep their distances, which
+//! may be just what is wrong. The position of a cell at the edge of a bin is the mean residual of half a bin on each side of it, so an
+//! increment has the noise of some ten samples. The last edge of a cycle needs samples of the next one. A cycle is therefore taken from
+//! the last bin of the one before to its own last but one.
 //!
 //! # What is left out
-//! The first cycle after a start, a reversal or a silence of the tracker, and after new bounds: the model begins anew there, at
-//! rest, and the two need a cycle to meet. Every cycle in which the worm did not crawl all the time or another alarm stood, and
-//! the one after it. While the bounds are still being identified there is no map, and none of the other direction than
-//! theirs: a tip that never slid backward shows its bound only there, and then it is no more than a guess. A reversal begins
-//! another map.
+//! - The first cycle after a start, a reversal, a silence of the tracker or new bounds: the model starts again from rest, and the two need
+//!   a cycle to meet.
+//! - Every cycle in which the worm did not crawl all the time or another alarm was raised, and the one after it.
+//! - All cycles while the bounds are still being identified, and then those of the other direction than theirs: a tip that never slid
+//!   backward shows its bound only there, and until then it is a guess.
 //!
-//! # What is told
-//! Something is told when an entry, or the advance of a whole cycle, is larger than the threshold with the confidence of the
-//! whole family: a t-test of the excess over the threshold, on at least four cycles, with Bonferroni's share (`map`).
-//! Every cycle weighs 7/8 of the next, so a mismatch that was there from the start is told after five cycles, or a few
-//! more when it is just beyond; one that comes up later must first outweigh what was before, 8 to 13 cycles.
+//! A reversal starts another map.
 //!
-//! # What cannot be told, and what is allowed for
-//! Recalibration hides effects, so little of it is done.
+//! # The test
+//! The alarm is raised when an entry, or the advance of a whole cycle, is larger than the threshold with the confidence of the whole
+//! family: a t-test of the excess over the threshold, on at least four cycles, with a Bonferroni correction (`map`). Every cycle has 7/8
+//! of the weight of the next, so a mismatch that was there from the start is reported after five cycles, or a few more when it is just
+//! above the threshold. One that appears later must first outweigh what was before: 8 to 13 cycles.
 //!
-//! - A stroke a little off is the calibration of the cam, not of the worm. A common one within ±2 %, as the extension of the
-//!   stepping cells shows it, is taken off before the test.
-//! - So is a common stiffness within ±2.5 % at unchanged bounds, as the body shows it. On steep slopes that moves the worm as much
-//!   as a degree or two more of slope does; on the level it does nothing.
-//! - Friction is *not* adapted. On the level with equal cells a drag of 0.3 N, a slope of 5° and 9 % more friction all take
-//!   0.1 mm from each step, within the same quarter of it: no test on positions can allow for the last and tell the
-//!   first. A common 3 % makes some 0.14 mm a cycle and stays within the default threshold of 0.15 mm; 5 % makes 0.23 mm, as
-//!   a slope of 3° does, and both are told.
+//! # What cannot be detected, and what is allowed for
+//! Recalibration hides effects, so there is little of it.
 //!
-//! A worm whose friction is only roughly known should have its bounds identified (`worm.max_deformation = "identified"`). That
-//! allows for any offset, and hides with it what looks like one and was there from the beginning. A threshold of 0.0006 m
-//! instead is not reached by a common 10 %.
+//! - A slightly different stroke is a matter of the cam's calibration, not of the worm. A common one within ±2 %, as it shows in the
+//!   extension of the stepping cells, is subtracted before the test.
+//! - So is a common stiffness within ±2.5 % at unchanged bounds, as it shows in the body. On steep slopes that moves the worm as much as
+//!   a degree or two more of slope; on the level it does nothing.
+//! - Friction is *not* adapted. On the level with equal cells a drag of 0.3 N, a slope of 5° and 9 % more friction all take 0.1 mm from
+//!   each step, within the same quarter of it: no test on positions can allow for the last and detect the first. A common 3 % makes some
+//!   0.14 mm a cycle and stays within the default threshold of 0.15 mm; 5 % makes 0.23 mm, as a slope of 3° does, and both are reported.
+//!
+//! If the friction of a worm is only roughly known, have its bounds identified (`worm.max_deformation = "identified"`). That allows for any
+//! offset, and also hides whatever looks like one and was there from the beginning. Or set the threshold to 0.0006 m, which a common 10 %
+//! does not reach.
 
 mod map;
 mod reference_model;
@@ -60,10 +61,10 @@ use worm_physics::Worm;
 pub const BINS: usize = 4;
 /// Pieces of the window in a bin.
 const PIECES: usize = INTERVALS / BINS;
-/// Pieces on each side of an edge that tell where a cell is at it.
+/// Pieces on each side of an edge that give a cell's position at it.
 const SIDE: usize = PIECES / 2;
 
-/// Model and map, and which cycles may enter it.
+/// The model, the map, and which cycles may enter it.
 #[derive(Debug, Clone)]
 pub(super) struct Mismatch {
     model: ReferenceModel,
@@ -75,7 +76,7 @@ pub(super) struct Mismatch {
 }
 
 impl Mismatch {
-    /// Beside a worm as it is configured, in forward direction.
+    /// For the configured worm, in forward direction.
     pub(super) fn new(worm: &Worm) -> Self {
         let map = ResidualMap::new(worm.cells());
         let mut new = Self {
@@ -90,14 +91,14 @@ impl Mismatch {
         new
     }
 
-    /// Takes up bounds that were identified in the present direction: everything begins anew.
+    /// Starts over with bounds that were identified in the present direction.
     pub(super) fn set_identified(&mut self, worm: &Worm) {
         self.model.set_worm(worm);
         self.identified_in = Some(self.map.direction());
         self.clear(self.map.direction());
     }
 
-    /// The next cycle does not join on to the last, or runs the other way.
+    /// Starts a cycle that does not continue the last one, or runs in the other direction.
     pub(super) fn begin(&mut self, direction: i32) {
         if direction != self.map.direction() {
             self.clear(direction);
@@ -106,12 +107,12 @@ impl Mismatch {
         (self.disturbed, self.was_undisturbed) = (false, false);
     }
 
-    /// The open cycle is not to be judged.
+    /// Keeps the open cycle, and the one after it, out of the map.
     pub(super) fn disturb(&mut self) {
         self.disturbed = true;
     }
 
-    /// The open cycle has not begun: whatever was done before it does not disturb it.
+    /// The open cycle has not begun, so nothing has disturbed it yet.
     pub(super) fn rest(&mut self) {
         self.disturbed = false;
     }
@@ -121,7 +122,7 @@ impl Mismatch {
         &self.map
     }
 
-    /// The controller began anew, and with it the account of the crawl.
+    /// Starts over, because the controller did.
     pub(super) fn forget(&mut self) {
         self.clear(self.map.direction());
     }
@@ -131,14 +132,14 @@ impl Mismatch {
         self.map.clear(direction, &self.model);
     }
 
-    /// Takes up the cycle that has just ended, the newer one of the window.
-    pub(super) fn take_up(&mut self, window: &Window) {
+    /// Adds the cycle that has just ended, the newer one of the window.
+    pub(super) fn add_cycle(&mut self, window: &Window) {
         let undisturbed = !std::mem::replace(&mut self.disturbed, false);
         let both_undisturbed = std::mem::replace(&mut self.was_undisturbed, undisturbed) && undisturbed;
-        let is_told = self
+        let bounds_are_known = self
             .identified_in
             .is_none_or(|direction| direction == self.map.direction());
-        if !is_told
+        if !bounds_are_known
             || self.model.run_cycle().is_err()
             || !both_undisturbed
             || window.cycles() < 2
@@ -150,7 +151,7 @@ impl Mismatch {
         self.map.add(&self.step);
     }
 
-    /// The increments of the residual over the bins, from the last bin of the cycle before on.
+    /// Increments of the residual over the bins, from the last bin of the cycle before.
     fn measure(&mut self, window: &Window) {
         let cells = self.map.cells();
         let bins = cells * BINS;
@@ -165,7 +166,7 @@ impl Mismatch {
         }
     }
 
-    /// Residual of each cell at the beginning of a piece, m, but for a constant; `NaN` where it was not seen on both sides.
+    /// Residual of each cell at the beginning of a piece, m, up to a constant; `NaN` where it was not seen on both sides.
     fn edge(&self, window: &Window, piece: usize) -> [f64; MAX_CELLS] {
         let mut edge_m = [f64::NAN; MAX_CELLS];
         for (cell, edge_m) in edge_m[..self.map.cells()].iter_mut().enumerate() {

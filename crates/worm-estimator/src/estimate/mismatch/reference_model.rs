@@ -1,11 +1,11 @@
-//! The model beside the worm: the only place of the map that knows [`Motion`].
+//! The model that runs beside the worm. Nothing else of the map uses [`Motion`].
 
 use super::{BINS, PIECES, SIDE};
 use crate::estimate::window::{CYCLES, INTERVALS};
 use worm_physics::MAX_CELLS;
 use worm_physics::{Motion, SlidesDown, Worm, WormError};
 
-/// Common deviations that are allowed for, each up to a share.
+/// Deviations of all cells together that are allowed for, each up to a fraction.
 pub(super) const ALLOWANCES: [Allowance; 2] = [
     Allowance {
         max: 0.02,
@@ -29,7 +29,7 @@ pub(super) const ALLOWANCES: [Allowance; 2] = [
     },
 ];
 
-/// Cycles from rest after which a motion is taken to be steady.
+/// Cycles from rest after which a motion counts as steady.
 const SETTLING_CYCLES: usize = 4;
 
 /// A part of the motion.
@@ -43,23 +43,23 @@ pub(super) enum Part {
 
 /// A deviation of the whole worm.
 pub(super) struct Allowance {
-    /// How large it may be, as a share.
+    /// How large it may be, as a fraction.
     pub(super) max: f64,
-    /// By what it is found.
+    /// The part of the motion from which it is estimated.
     pub(super) shows_in: Part,
     deviate: fn(Worm, f64) -> Result<Worm, WormError>,
 }
 
-/// The model's worm, its motion since the last beginning, and its path over the two cycles of the window.
+/// The model's worm, its motion since the last start, and its path over the two cycles of the window.
 ///
-/// Like the window it sees everything along the crawl: crawling backward it is the mirrored worm, which runs forward.
+/// Like the window it looks along the crawl: a backward crawl is that of the mirrored worm, which runs forward.
 #[derive(Debug, Clone)]
 pub(super) struct ReferenceModel {
     forward: Worm,
     backward: Worm,
     is_backward: bool,
     motion: Motion,
-    cycles: u32,      // run since the beginning
+    cycles: u32,      // since the last start
     path_m: Vec<f64>, // [knot][cell] over the cycle before and the last
 }
 
@@ -81,7 +81,7 @@ impl ReferenceModel {
         self.forward = worm.clone();
     }
 
-    /// At rest again, to crawl in a direction.
+    /// Starts again from rest, in a direction.
     pub(super) fn begin(&mut self, direction: i32) {
         self.is_backward = direction < 0;
         self.motion = at_rest(self.worm());
@@ -109,7 +109,7 @@ impl ReferenceModel {
         Ok(())
     }
 
-    /// Cycles run since the beginning.
+    /// Cycles since the last start.
     pub(super) fn cycles(&self) -> u32 {
         self.cycles
     }
@@ -119,12 +119,12 @@ impl ReferenceModel {
         self.path_m[knot * self.worm().cells() + cell]
     }
 
-    /// The cell whose turn a step of the cycle is, in the present direction.
+    /// The cell that steps in a step of the cycle, in the present direction.
     pub(super) fn stepping_cell(&self, step: usize) -> usize {
         self.worm().step_order()[step]
     }
 
-    /// What a whole unit of an allowed deviation would add to each entry of the map, m; zeros where such a worm cannot hold.
+    /// What an allowed deviation of 100 % would add to each entry of the map, m; zeros where such a worm cannot hold.
     pub(super) fn effect_of(&self, allowance: &Allowance, effect_m: &mut [f64]) {
         effect_m.fill(0.0);
         let cells = self.worm().cells();

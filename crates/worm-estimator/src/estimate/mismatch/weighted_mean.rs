@@ -1,15 +1,15 @@
-//! A mean that forgets, and how well it is known.
+//! An exponentially weighted mean and its standard error.
 
-/// What is kept of the weight of the past with each new value: a memory of eight cycles.
+/// Factor on the weight of the past with each new value: a memory of eight cycles.
 const KEPT: f64 = 7.0 / 8.0;
-/// Values before which nothing is said.
+/// Fewest values for a mean.
 pub(super) const MIN_VALUES: u32 = 4;
-/// How many values the scatter of the whole map counts for in the scatter of one entry.
+/// Weight of the scatter of the whole map in the scatter of one entry, in values.
 const POOLED: f64 = 8.0;
 
 /// Weighted sums over the values of one entry.
 ///
-/// The scatter is taken from the differences of successive values, so a step from one level to another, which is what a fault is,
+/// The scatter is taken from the differences of successive values, so that a step from one level to another, as a fault makes it,
 /// hardly widens it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct WeightedMean {
@@ -22,7 +22,7 @@ pub(super) struct WeightedMean {
     scatter_weight: f64,
 }
 
-/// A mean and its standard error, with the degrees of freedom of that.
+/// A mean and its standard error, with the degrees of freedom of the latter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MeanEstimate {
     pub(super) mean: f64,
@@ -68,7 +68,7 @@ impl WeightedMean {
 }
 
 impl MeanEstimate {
-    /// How far a mean is beyond a bound, in standard deviations of a normal distribution with the same tail as Student's:
+    /// How far a mean exceeds a bound, in standard deviations of a normal distribution with the same tail as Student's:
     /// Wallace, Annals of Mathematical Statistics 30 (1959) 1124. 0 within the bound.
     pub(super) fn beyond(&self, mean: f64, bound: f64) -> f64 {
         let t = (mean.abs() - bound).max(0.0) / self.sigma;

@@ -7,7 +7,7 @@ use crate::message::{Alarm, AlarmKind, Mode};
 use AlarmKind::*;
 
 #[test]
-fn every_fault_is_told_in_time_with_its_cell() {
+fn every_fault_is_reported_in_time_with_its_cell() {
     println!("{:<40} {:>9} {:>9}  since", "fault", "delay s", "bound s");
     let mut failures = Vec::new();
     for case in table() {
