@@ -61,7 +61,10 @@ fn what_no_worm_could_have_recorded_is_refused() {
         "cell 4 (x4_m) is not seen from 0.975 s",
     );
     let scale = |recording: &mut Recording| recording.position_m.iter_mut().flatten().for_each(|m| *m *= 1e3);
-    assert_refused(scale, " m apart, which no worm does: the positions are evidently in millimetres");
+    assert_refused(
+        scale,
+        " m apart, which no worm does: the positions are evidently in millimetres",
+    );
     let own_origin = |recording: &mut Recording| {
         scale(recording);
         for series in &mut recording.position_m {
