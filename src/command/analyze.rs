@@ -1,7 +1,5 @@
 //! `wormd analyze`: section 3 of the paper on a recording, or on a campaign of several.
 
-mod text;
-
 use super::dataset::{READING, SourceArgs};
 use super::progress::Progress;
 use super::{Failure, log_line, print};
@@ -61,7 +59,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Failure> {
     if args.json {
         return print::line(as_json(&args.recording, &analyses, dataset.is_campaign)?);
     }
-    print::line(text::text(&analyses))
+    print::line(report::text(&analyses))
 }
 
 /// All warnings, each once: with its recording, unless all recordings share it.

@@ -1,12 +1,11 @@
 //! `wormd explain`: where model and recordings disagree, which physical effect the model misses, and what to try next.
 //!
-//! A campaign of recordings or of mere advances, one recording, or the worm that is crawling now (`live`) goes in; after a look at what is stated of it
-//! (`conditions`) it is searched. What comes out is kept in a folder (`folder`) and told in the terminal (`text`).
+//! It takes a campaign of recordings or of advances alone, one recording, or the worm that is crawling now (`live`). What is
+//! stated of them is checked first (`conditions`). The answer is kept in a folder (`folder`) and printed.
 
 mod conditions;
 mod folder;
 mod live;
-mod text;
 
 use super::dataset::{Dataset, READING, SourceArgs};
 use super::progress::Progress;
@@ -61,7 +60,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
         Ok(answer) => answer,
         Err((failure, stage)) => {
             if let Some(folder) = &folder {
-                // The reason why there is no answer is what to tell, whatever becomes of its file.
+                // The reason why there is no answer is the error to report, whether or not its file can be written.
                 let _ = folder.write_failure(&failure, stage, &dataset.runs());
             }
             return Err(failure);
@@ -74,7 +73,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     }
     let written = folder.as_ref().map(|folder| {
         progress.tell("report", 1.0);
-        // First what cannot be drawn again without another search; the page, which can fail for more reasons, is the last.
+        // First what would take another search to get back; the page, which can fail for more reasons, comes last.
         folder.write_answer(&answer)?;
         folder.write_model(&model.map_err(Failure::failed)?)?;
         folder.write_page(&answer, &title(&source))
@@ -86,7 +85,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     if args.json {
         print::line(serde_json::to_string(&answer).map_err(Failure::failed)?)?;
     } else {
-        print::line(text::text(&answer))?;
+        print::line(report::explain::text(&answer))?;
     }
     written.transpose()?;
     if let Some(folder) = &folder {
@@ -96,7 +95,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
 }
 
 impl ExplainArgs {
-    /// What is to be explained, and where it comes from.
+    /// The data to explain, and where they come from.
     fn read(&self, progress: &mut Progress) -> Result<(PathBuf, Dataset), Failure> {
         if let Some(recording) = &self.recording {
             return Ok((recording.clone(), self.source.read_also_advances(recording, progress)?));
@@ -117,24 +116,24 @@ impl ExplainArgs {
     }
 }
 
-/// The answer; or why there is none, and how far the search had come.
+/// The answer; or why there is none, and the stage that the search had reached.
 fn search(dataset: &Dataset, seed: u64, progress: &mut Progress) -> Result<Answer, (Failure, &'static str)> {
     let runs = dataset.runs();
     conditions::check(&runs, &dataset.config).map_err(|failure| (failure, "reading"))?;
     let mut stage = "gait";
-    let mut tell = |step: Step| {
+    let mut report_step = |step: Step| {
         stage = step.stage;
         progress.tell(stage, READING + (1.0 - READING) * step.fraction);
     };
     let answer = if dataset.advances.is_empty() {
-        explain(&runs, &dataset.config, &Options { seed }, &mut tell)
+        explain(&runs, &dataset.config, &Options { seed }, &mut report_step)
     } else {
-        explain_advances(&dataset.advances, &dataset.config, &mut tell)
+        explain_advances(&dataset.advances, &dataset.config, &mut report_step)
     };
     answer.map_err(|error| (Failure::unusable(error), stage))
 }
 
-/// What the page is called.
+/// The title of the page.
 fn title(source: &Path) -> String {
     source
         .file_stem()

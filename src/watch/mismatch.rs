@@ -1,4 +1,4 @@
-//! How a model mismatch is told to people: which cell, in whose step, where in the gait, and how much.
+//! A model mismatch in words: which cell, in whose step, where in the gait, and how much.
 
 use worm_estimator::message::{Alarm, AlarmKind};
 

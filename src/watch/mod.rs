@@ -1,8 +1,7 @@
-//! What a person sees of a running worm: the telemetry gathered into one picture, a terminal view, and the summary at the
-//! end.
+//! A running worm for people to watch: its telemetry, a terminal view of it, and the summary at the end.
 //!
-//! [`Telemetry`] takes the messages of the topics as they come, whoever reads them; [`view::draw`] paints it, and
-//! [`Summary`] is what remains of it, as text and as the JSON that scripts read.
+//! [`Telemetry`] gathers the messages of the topics, whoever reads them; [`view::draw`] paints it, and [`Summary`] sums it up
+//! as text and as the JSON that scripts read.
 
 pub(crate) mod mismatch;
 mod summary;

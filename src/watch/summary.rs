@@ -1,4 +1,4 @@
-//! What remains of a run: the summary that `wormd up` prints, as text and as JSON. The JSON names are a contract.
+//! The summary of a run that `wormd up` prints, as text and as JSON. The JSON names are a contract.
 
 use super::mismatch;
 use super::telemetry::Telemetry;
@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use worm_estimator::config::Worm;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Severity};
+use worm_estimator::time::seconds;
 
 /// A run in numbers.
 #[derive(Debug, Clone, Serialize)]
@@ -24,9 +25,9 @@ pub struct Summary {
     pub samples_lost: u64,
     /// Tracker samples that came and went between two reads.
     pub tracker_samples_missed: u64,
-    /// Exchanges that the servo never answered, or not usably.
+    /// Exchanges that the servo did not answer, or not usably.
     pub link_failures: u64,
-    /// Where the controller stood before the stop at the end.
+    /// The controller's mode before the stop at the end.
     pub mode: &'static str,
     /// The latched fault, `none` where there is none.
     pub fault: &'static str,
@@ -124,7 +125,7 @@ pub struct TimingSummary {
     pub compute_us: Percentiles,
     /// Publishing, µs.
     pub publish_us: Percentiles,
-    /// Waking who listens, µs.
+    /// Waking the listeners, µs.
     pub notify_us: Percentiles,
     /// Late ticks by culprit.
     pub culprits: BTreeMap<&'static str, u64>,
@@ -137,7 +138,7 @@ pub struct TimingSummary {
 }
 
 impl Summary {
-    /// What `telemetry` of a worm amounts to. `end_mode` is where it stood before it was stopped.
+    /// The summary of a worm's telemetry. `end_mode` is its mode before it was stopped.
     pub fn new(worm: &Worm, telemetry: &Telemetry, end_mode: Mode) -> Self {
         let start_ns = telemetry.first_state.map_or(0, |state| state.time_ns);
         let state = telemetry.state;
@@ -176,7 +177,7 @@ impl Summary {
 }
 
 fn seconds_since(start_ns: u64, time_ns: u64) -> f64 {
-    time_ns.saturating_sub(start_ns) as f64 * 1e-9
+    seconds(time_ns.saturating_sub(start_ns))
 }
 
 impl CycleSummary {
@@ -252,7 +253,7 @@ impl fmt::Display for MechanicalEnergy<'_> {
     }
 }
 
-/// What to know of a gait cycle beside its figures, to be set behind them.
+/// Remarks on a gait cycle, to follow its numbers.
 pub fn remarks(settled: bool, host_paused_s: f64) -> String {
     let mut remarks = String::new();
     if !settled {
@@ -363,7 +364,7 @@ impl fmt::Display for Summary {
         if self.fault != "none" {
             writeln!(
                 f,
-                "FAULT  {}: see the alarms and the log above, and mend the cause before the next start",
+                "FAULT  {}: see the alarms and the log above, and fix the cause before the next start",
                 self.fault
             )?;
         }

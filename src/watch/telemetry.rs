@@ -3,10 +3,10 @@
 use crate::latency::TickStats;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
 
-/// Everything that a watcher has heard so far.
+/// Everything received so far.
 #[derive(Debug, Clone, Default)]
 pub struct Telemetry {
-    /// The first state that was heard.
+    /// The first state that was received.
     pub first_state: Option<State>,
     /// The newest state.
     pub state: Option<State>,
@@ -18,7 +18,7 @@ pub struct Telemetry {
     pub cycles: Vec<Cycle>,
     /// All alarm changes.
     pub alarms: Vec<Alarm>,
-    /// Where the ticks' time went, and who made late ones late.
+    /// Where the ticks' time went, and what made late ones late.
     pub account: TickStats,
 }
 

@@ -8,8 +8,8 @@ use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Mode, Severity,
 use worm_physics::MAX_CELLS;
 use worm_physics::{Motion, Outcome, Worm, steady_cycle};
 
-/// What a watcher has heard of the paper's worm after `phase` gait cycles, by the model.
-fn heard(phase: f64) -> Telemetry {
+/// Telemetry of the paper's worm after `phase` gait cycles, by the model.
+fn received(phase: f64) -> Telemetry {
     let worm = Worm::paper();
     let mut motion = Motion::at_rest(&worm, &[0.12, 0.08, 0.04, 0.0]);
     let mut telemetry = Telemetry::default();
@@ -146,7 +146,7 @@ fn painted(width: u16, height: u16, telemetry: &Telemetry) -> String {
 
 #[test]
 fn the_picture_shows_what_was_heard() {
-    let picture = painted(110, 34, &heard(3.4));
+    let picture = painted(110, 34, &received(3.4));
     println!("{picture}");
     for part in [
         "worm1",
@@ -172,7 +172,7 @@ fn the_picture_shows_what_was_heard() {
 /// The terminal that everybody has shows the worm, its tips, its alarms and its cycles.
 #[test]
 fn the_usual_terminal_shows_the_worm() {
-    let picture = painted(80, 24, &heard(3.4));
+    let picture = painted(80, 24, &received(3.4));
     for part in [
         "▐1▌",
         "Ctrl-C",
@@ -190,7 +190,7 @@ fn the_usual_terminal_shows_the_worm() {
 /// What is not known yet is not shown as a number.
 #[test]
 fn an_unsettled_cycle_has_no_energy() {
-    let mut telemetry = heard(2.4);
+    let mut telemetry = received(2.4);
     let cycle = telemetry.cycles.last_mut().expect("two cycles");
     cycle.settled = 0;
     cycle.cot = 0.0;
@@ -207,13 +207,13 @@ fn an_unsettled_cycle_has_no_energy() {
 fn no_terminal_is_too_small() {
     for (width, height) in [(1, 1), (10, 3), (40, 12), (79, 24), (250, 80)] {
         painted(width, height, &Telemetry::default());
-        painted(width, height, &heard(1.5));
+        painted(width, height, &received(1.5));
     }
 }
 
 #[test]
 fn a_summary_is_what_was_heard() {
-    let summary = Summary::new(&WormConfig::default(), &heard(3.4), Mode::Crawling);
+    let summary = Summary::new(&WormConfig::default(), &received(3.4), Mode::Crawling);
     let json = serde_json::to_value(&summary).expect("serialises");
     assert_eq!(json["ticks"], 101);
     assert_eq!(json["cycles"].as_array().map(Vec::len), Some(3));
@@ -234,8 +234,8 @@ fn a_summary_is_what_was_heard() {
 
 /// A model mismatch says where it is, in the picture, in the summary and in its JSON; no other alarm has a place.
 #[test]
-fn a_mismatch_is_told_with_its_place() {
-    let mut telemetry = heard(7.4);
+fn a_mismatch_comes_with_its_place() {
+    let mut telemetry = received(7.4);
     telemetry.take_alarm(&Alarm {
         value: 3.1e-4,
         threshold: 1.5e-4,

@@ -1,4 +1,4 @@
-//! The live picture in a terminal: the canal with the worm in it, what each tip does, cycles, alarms and loop health.
+//! The live picture in a terminal: the worm in its canal, each tip, cycles, alarms and loop health.
 
 use super::mismatch;
 use super::telemetry::Telemetry;
@@ -10,12 +10,12 @@ use ratatui::widgets::{Block, Cell as TableCell, Paragraph, Row, Table};
 use std::collections::VecDeque;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Fault, Mode, Severity};
 
-/// What the picture needs to know of the worm beside its telemetry.
+/// What the picture shows of the worm besides its telemetry.
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// Name of the worm.
     pub name: String,
-    /// Where it is driven: the port, or "virtual worm".
+    /// The port that drives it, or "virtual worm".
     pub port: String,
     /// Slope of the canal, degrees.
     pub slope_deg: f64,
@@ -68,7 +68,7 @@ pub fn draw(frame: &mut Frame<'_>, subject: &Subject, telemetry: &Telemetry, log
     frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(" log ")), messages);
 }
 
-/// Lines of the parts of the picture. The moving worm comes first, then what its tips do; the log is the first to go.
+/// Heights of the parts of the picture, in lines. The worm comes first, then its tips; the log is the first to go.
 struct Heights {
     canal: u16,
     tips: u16,
@@ -76,7 +76,7 @@ struct Heights {
 }
 
 impl Heights {
-    /// Least lines for the cycles and the loop's health below the tips.
+    /// Fewest lines for the cycles and the loop's health below the tips.
     const BOTTOM: u16 = 6;
 
     fn of(height: u16, cells: u16) -> Self {
@@ -150,8 +150,11 @@ fn headline(subject: &Subject, telemetry: &Telemetry) -> Line<'static> {
 const MARGIN_M: f64 = 0.03;
 
 fn draw_canal(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
-    let way = if subject.backward { "left" } else { "right" };
-    let title = format!(" canal, {}° — mm, the worm crawls to the {way} ", subject.slope_deg);
+    let direction = if subject.backward { "left" } else { "right" };
+    let title = format!(
+        " canal, {}° — mm, the worm crawls to the {direction} ",
+        subject.slope_deg
+    );
     let block = Block::bordered()
         .title(title)
         .title_bottom(" Ctrl-C or q stops the worm ");
@@ -169,7 +172,7 @@ fn draw_canal(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &
     if columns < 20 || inner.height < 5 {
         return;
     }
-    // The window moves in whole steps of the ruler, so that the worm is seen to crawl and the canal does not flicker.
+    // The window moves in whole steps of the ruler, so that the worm visibly crawls and the canal does not flicker.
     let label_mm = label_distance_mm(front_m - rear_m + 2.0 * MARGIN_M, columns);
     let step_m = label_mm as f64 * 1e-3 / 5.0;
     let start_m = ((rear_m - MARGIN_M) / step_m).floor() * step_m;
@@ -233,7 +236,7 @@ fn cell_label(cell: usize) -> String {
     char::from_digit(cell as u32 + 1, 17).unwrap_or('?').to_string()
 }
 
-/// Number of a cell as everywhere else, with its label in the canal where that is another.
+/// Number of a cell as everywhere else, with its label in the canal where that differs.
 fn cell_number(cell: usize) -> String {
     if cell < 9 {
         cell_label(cell)
@@ -253,7 +256,7 @@ fn legend() -> Line<'static> {
     ])
 }
 
-/// Millimetres between the labels of a ruler of so many columns: the least that leaves them room.
+/// Millimetres between the labels of a ruler: the smallest distance that leaves them room in these columns.
 fn label_distance_mm(width_m: f64, columns: usize) -> i64 {
     const ROOM: f64 = 10.0;
     let min_mm = width_m * 1e3 * ROOM / columns as f64;

@@ -231,7 +231,13 @@ fn one_recording_is_explained_and_everything_is_kept() {
     assert!(output.status.success(), "{}", said(&output));
     let text = String::from_utf8_lossy(&output.stdout);
     let sentence = answer["sentence"].as_str().expect("a sentence");
-    for part in [sentence, "the gap", "held out, mm", "recalibrated", "noise floor"] {
+    for part in [
+        sentence,
+        "the gap",
+        "held-out cycles, mm",
+        "recalibrated",
+        "noise floor",
+    ] {
         assert!(text.contains(part), "no {part:?} in\n{text}");
     }
     for part in ["report.html", "model.toml", "model.diff"] {

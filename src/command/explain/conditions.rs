@@ -1,4 +1,4 @@
-//! Whether what is stated of a recording can be true of it, before a long search starts from it.
+//! Checks that what is stated of a recording can be true, before a long search starts from it.
 
 use crate::command::Failure;
 use worm_analysis::experiment::RecordedRun;
@@ -6,16 +6,16 @@ use worm_analysis::identify::{IdentifiedGait, Prior, gait};
 use worm_estimator::config::Config;
 use worm_physics::Worm;
 
-/// How far the mean cycle time may be from the stated one, as a share.
+/// How far the mean cycle time may be from the stated one, as a fraction.
 const CYCLE_FRACTION: f64 = 0.2;
 
-/// A worm that would slide down with this much more friction than is believed did not crawl there.
+/// A worm that would slide down even with this multiple of its nominal friction did not crawl there.
 const MORE_FRICTION: f64 = 1.5;
 
 /// Refuses a stated payload or cycle time that the recording contradicts.
 ///
 /// # Errors
-/// [`Failure::Unusable`] names the recording, what is stated and what is seen.
+/// [`Failure::Unusable`] names the recording, what is stated and what it shows.
 pub(super) fn check(runs: &[RecordedRun<'_>], config: &Config) -> Result<(), Failure> {
     let nominal = Worm::try_from(config).map_err(Failure::unusable)?;
     for run in runs {
@@ -33,11 +33,11 @@ fn check_cycle(run: &RecordedRun<'_>, config: &Config) -> Result<(), Failure> {
         step_order: &config.worm.step_order_from_zero(),
         phase: recording.gait_phase.as_deref(),
     };
-    // Without a gait the search has more to say.
+    // Without a gait, the search itself reports why.
     let gait = gait::find(&recording.time_s, &recording.position_m, &recording.filled(), prior).ok();
     let contradicts = |seen_s: f64| (seen_s - stated_s).abs() > CYCLE_FRACTION * stated_s;
     match gait.and_then(|gait| cycle_s(&gait, &recording.time_s)) {
-        // Where the worm rests between the cycles, its cam's turn may be stated, or the whole.
+        // Where the worm rests between the cycles, either the cam's turn or the whole cycle may be stated.
         Some([seen_s, turning_s]) if contradicts(seen_s) && contradicts(turning_s) => Err(Failure::unusable(format!(
             "{}: a gait cycle took {seen_s:.2} s, but cycle_s = {stated_s} is stated: give the time of this run, or leave \
              cycle_s out",
@@ -47,8 +47,8 @@ fn check_cycle(run: &RecordedRun<'_>, config: &Config) -> Result<(), Failure> {
     }
 }
 
-/// Mean time of the whole gait cycles, s, rests before and after them left out, and what it would be if every step took as long as
-/// the middle one of all, so that rests between the cycles are left out, too; none where there is no whole cycle.
+/// Mean time of the whole gait cycles, s, without rests before and after them; and what it would be if every step took the median
+/// time of a step, so without rests between the cycles, too. None where there is no whole cycle.
 fn cycle_s(gait: &IdentifiedGait, time_s: &[f64]) -> Option<[f64; 2]> {
     let (first, last) = (gait.phase.first()?.ceil(), gait.phase.last()?.floor());
     let begun_s = |phase: f64| time_s.get(gait.phase.partition_point(|at| *at <= phase)).copied();
@@ -61,8 +61,8 @@ fn cycle_s(gait: &IdentifiedGait, time_s: &[f64]) -> Option<[f64; 2]> {
     };
     let mut steps_s: Vec<f64> = (0..steps).map(step_s).collect::<Option<_>>()?;
     steps_s.sort_by(f64::total_cmp);
-    let middle_s = steps_s.get(steps / 2)?;
-    Some([(ended_s(last)? - begun_s(first)?) / (last - first), middle_s * cells])
+    let median_s = steps_s.get(steps / 2)?;
+    Some([(ended_s(last)? - begun_s(first)?) / (last - first), median_s * cells])
 }
 
 fn check_payload(run: &RecordedRun<'_>, nominal: &Worm) -> Result<(), Failure> {
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rest_between_the_cycles_is_told_from_the_turning() {
+    fn a_rest_between_the_cycles_is_separated_from_the_turning() {
         let (turn_s, dwell_s, rate_hz) = (2.5, 1.0, 120.0);
         let time_s: Vec<f64> = (0..3000).map(|sample| f64::from(sample) / rate_hz).collect();
         let phase = time_s.iter().map(|time_s| {

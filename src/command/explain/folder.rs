@@ -1,4 +1,4 @@
-//! The folder that an explanation is kept in. Files of an earlier one are replaced, each at once; other files are left alone.
+//! The folder of an explanation. Files of an earlier one are replaced, each at once; other files are left alone.
 
 use crate::command::Failure;
 use serde::Serialize;
@@ -10,11 +10,11 @@ use worm_analysis::explain::Answer;
 use worm_analysis::explain::model_update::{self, ModelText};
 use worm_analysis::report;
 
-/// A folder that can be written in.
+/// A folder that can be written to.
 pub(super) struct Folder(PathBuf);
 
 impl Folder {
-    /// Makes the folder if need be and tries whether it can be written in, so that nobody waits for a search in vain.
+    /// Makes the folder if necessary and checks that it can be written to, before a long search.
     ///
     /// # Errors
     /// [`Failure::Unusable`].
@@ -28,7 +28,7 @@ impl Folder {
         self.write_json(answer)
     }
 
-    /// `report.json` where there is no answer: why not, how far the search had come, and what it was made on.
+    /// `report.json` where there is no answer: why not, the stage that the search had reached, and its recordings.
     pub(super) fn write_failure(
         &self,
         failure: &Failure,

@@ -2,8 +2,8 @@
 
 use crate::command::dataset::READING;
 use crate::command::progress::Progress;
-use crate::command::record::{LOOK, Recorder};
 use crate::command::{Failure, end_on_signal_until};
+use crate::recorder::{POLL_INTERVAL, Recorder};
 use crate::topics::{Controller, Hub, Instance, RoleLock};
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -12,17 +12,17 @@ use worm_estimator::config::Config;
 use worm_estimator::message::{Fault, Mode, State};
 use worm_log::Channel;
 
-/// How long a worm may be silent before it counts as gone. Its controller speaks in every tick.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a worm may be silent before it counts as gone. Its controller publishes in every tick.
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Gait cycles recorded beyond the last whole one, so that its end is seen.
+/// Gait cycles recorded beyond the last whole one, so that its end is recorded.
 const MARGIN_CYCLES: f64 = 0.05;
 
 /// Records the crawling worm over `cycles` whole gait cycles into a log, which replaces an older one.
 ///
 /// # Errors
 /// [`Failure::Unusable`] when no worm of this name runs, or it does not crawl; [`Failure::Failed`] when it stops, falls silent or
-/// is no longer to be recorded before that, or the log cannot be written. What was recorded is kept.
+/// the user ends the recording before that, or the log cannot be written. What was recorded is kept.
 pub(super) fn record(
     config: &Config,
     text: Option<String>,
@@ -31,7 +31,7 @@ pub(super) fn record(
     progress: &mut Progress,
 ) -> Result<(), Failure> {
     let instance = Instance::of(config).map_err(Failure::unusable)?;
-    // While it is open others leave the worm's folder alone; with it goes a folder that was made in vain.
+    // While the hub is open, others leave the worm's folder alone; when it closes, an empty folder is removed.
     let _hub = Hub::open(&instance).map_err(Failure::failed)?;
     if RoleLock::<Controller>::holder(&instance).is_none() {
         let worm = &config.worm.name;
@@ -42,52 +42,54 @@ pub(super) fn record(
     let (end, over) = end_on_signal_until()?;
     let topics = [Channel::State, Channel::Estimate, Channel::Cycle, Channel::Alarm];
     let mut recorder = Recorder::open(config, text, &topics, log, true)?;
-    let mut watch = Watch::new(&config.worm.name, cycles);
+    let mut cycles_made = CycleProgress::new(&config.worm.name, cycles);
     let mut done = Ok(false);
     while matches!(done, Ok(false)) {
         if end.load(Ordering::Relaxed) {
-            done = Err(watch.ended_early("was no longer to be recorded", log));
+            done = Err(cycles_made.ended_early("was no longer to be recorded", log));
             break;
         }
-        std::thread::sleep(LOOK);
-        done = recorder.hear().and_then(|heard| watch.see(heard.state.as_ref(), log));
-        progress.tell("recording the worm", READING * watch.fraction());
+        std::thread::sleep(POLL_INTERVAL);
+        done = recorder
+            .poll()
+            .and_then(|polled| cycles_made.update(polled.state.as_ref(), log));
+        progress.tell("recording the worm", READING * cycles_made.fraction());
     }
     recorder.close()?;
-    // Nothing more needs an orderly end, and a search may take long.
+    // From here on a signal may end the process at once: the search may take long.
     over.store(true, Ordering::Relaxed);
     done.map(|_| ())
 }
 
-/// How far the recording is, by what the worm says of itself.
-struct Watch<'a> {
+/// Progress of the recording, from the worm's own states.
+struct CycleProgress<'a> {
     worm: &'a str,
     cycles: f64,
-    heard: Instant,
+    last_state: Instant,
     first_phase: Option<f64>,
     phase: f64,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> CycleProgress<'a> {
     fn new(worm: &'a str, cycles: u32) -> Self {
         Self {
             worm,
             cycles: f64::from(cycles),
-            heard: Instant::now(),
+            last_state: Instant::now(),
             first_phase: None,
             phase: f64::NAN,
         }
     }
 
-    /// Takes the newest state, if there is one, and says whether all cycles are recorded.
-    fn see(&mut self, state: Option<&State>, log: &Path) -> Result<bool, Failure> {
+    /// Takes the newest state, if there is one. Returns whether all cycles are recorded.
+    fn update(&mut self, state: Option<&State>, log: &Path) -> Result<bool, Failure> {
         let Some(state) = state else {
-            if self.heard.elapsed() < PATIENCE {
+            if self.last_state.elapsed() < SILENCE_TIMEOUT {
                 return Ok(false);
             }
             return Err(self.ended_early("fell silent", log));
         };
-        self.heard = Instant::now();
+        self.last_state = Instant::now();
         if state.mode != Mode::Crawling.code() {
             let mode = Mode::try_from(state.mode).map_or("unknown", Mode::name);
             let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
@@ -117,7 +119,7 @@ impl<'a> Watch<'a> {
 
     /// Gait cycles until the last whole one has ended, in either direction.
     fn wanted(&self) -> f64 {
-        // A cycle that had begun before the recording is not whole in it.
+        // The cycle in which the recording begins is not whole.
         1.0 + self.cycles + MARGIN_CYCLES
     }
 

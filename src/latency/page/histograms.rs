@@ -1,25 +1,27 @@
-//! Every duration as a histogram over its floor's, both axes logarithmic: one late tick among a million is seen.
+//! Every duration as a histogram over its floor's, both axes logarithmic, so that one late tick among a million shows.
 
-use super::words::{NOT_MEASURED, told};
+use super::words::{NOT_MEASURED, with_unit};
 use crate::latency::{Durations, Outcome};
 use worm_analysis::report::page::{Figure, Key, Mark, Panel};
-use worm_analysis::report::plot::{Axis, BLUE, Colour, DrawError, INK, MUTED, Row, Sheet, Stroke, VERMILION, draw};
+use worm_analysis::report::plot::{
+    Axis, BLUE, Colour, DrawError, INK, MUTED, Row, Sheet, Stroke, Svg, VERMILION, draw,
+};
 
 const LOOP: Colour = BLUE;
 const FLOOR: Colour = VERMILION;
-/// Opacity of the area, so that the floor's line is seen before it.
+/// Opacity of the area, so that the floor's line shows on it.
 const PALE: f64 = 0.3;
 
 /// Bars over the whole width of a picture.
 const BARS: usize = 90;
-/// Shortest duration that is told apart, µs: what is shorter stands in the first bar.
+/// Shortest duration that is resolved, µs: shorter ones are in the first bar.
 const SHORTEST_US: f64 = 0.01;
-/// Where the bars begin: low enough that a single one is seen.
+/// Where the bars begin: low enough that a count of one shows.
 const FOOT: f64 = 0.5;
-/// The axis of counts reaches at least so far, so that it has a scale.
+/// The axis of counts reaches at least this far, so that it has a scale.
 const MIN_TOP: f64 = 100.0;
 
-/// Room that the name of a percentile takes, as a share of the width: one that would stand in another's is left out.
+/// Room that the label of a percentile takes, as a fraction of the width: one that would overlap another is left out.
 const NAME: f64 = 0.06;
 
 /// One picture: a duration, and its floor where it has one.
@@ -28,7 +30,7 @@ struct Histogram<'a> {
     durations: &'a Durations,
     floor: Option<&'a Durations>,
     height: f64,
-    tells_percentiles: bool,
+    shows_percentiles: bool,
 }
 
 /// The wake lateness over the bare sleeper's.
@@ -38,27 +40,31 @@ pub(super) fn wake(outcome: &Outcome) -> Result<Figure, DrawError> {
         durations: &outcome.wake_us,
         floor: Some(&outcome.floor_wake_us),
         height: 270.0,
-        tells_percentiles: true,
+        shows_percentiles: true,
     };
     Ok(Figure {
         id: "wake",
-        title: "How late the loop runs, and how late a bare sleeper does".to_owned(),
+        title: "How late the loop runs, and how late a bare sleeper does",
         keys: keys("bare sleeper, in the same run"),
         panels: vec![histogram.panel()?],
         caption: "Where the line follows the edge of the area, the loop is as punctual as the machine lets it be; what the area \
-                  has beyond the line is what the loop adds. Single late ticks far out differ by chance. Both axes are \
-                  logarithmic: the height of a bar of one is seen beside one of a million."
+                  has beyond the line, the loop adds. Single late ticks far out differ by chance. Both axes are \
+                  logarithmic: a count of one shows beside a count of a million."
             .to_owned(),
     })
 }
 
-/// The parts of a tick, and what comes of it.
+/// The parts of a tick, and what follows it.
 pub(super) fn parts(outcome: &Outcome) -> Result<Figure, DrawError> {
     let alone = [
         ("bus exchange", &outcome.bus_us, None),
         ("computation and publishing", &outcome.own_work_us, None),
         ("tick period", &outcome.period_us, None),
-        ("waking who listens", &outcome.notify_us, Some(&outcome.floor_notify_us)),
+        (
+            "waking the listeners",
+            &outcome.notify_us,
+            Some(&outcome.floor_notify_us),
+        ),
         (
             "delivery, woken by the event",
             &outcome.delivery_us,
@@ -71,7 +77,7 @@ pub(super) fn parts(outcome: &Outcome) -> Result<Figure, DrawError> {
         ),
         ("from stall to alarm", &outcome.alarm_us, None),
     ];
-    // Nobody blocks the cam of a real worm: what is missing there is no gap.
+    // Nobody blocks the cam of a real worm, so a missing stall is no gap in the measurement.
     let shown = alone
         .into_iter()
         .filter(|(_, durations, _)| !durations.is_empty() || !std::ptr::eq(*durations, &outcome.alarm_us));
@@ -81,13 +87,13 @@ pub(super) fn parts(outcome: &Outcome) -> Result<Figure, DrawError> {
             durations,
             floor,
             height: 150.0,
-            tells_percentiles: false,
+            shows_percentiles: false,
         };
         histogram.panel()
     });
     Ok(Figure {
         id: "parts",
-        title: "The parts of a tick, and what comes of it".to_owned(),
+        title: "The parts of a tick, and what follows it",
         keys: keys("the same without wormd: bare notifier, bare iceoryx2 pairs"),
         panels: panels.collect::<Result<_, _>>()?,
         caption: "Delivery runs from before the state is published until a subscriber has it in hand: the estimator, which sleeps \
@@ -102,14 +108,11 @@ fn keys(floor: &str) -> Vec<Key> {
 
 impl Histogram<'_> {
     fn panel(&self) -> Result<Panel, DrawError> {
-        Ok(Panel {
-            title: self.title.to_owned(),
-            quantity: "how many, by µs, both logarithmic".to_owned(),
-            svg: self.picture()?,
-        })
+        let quantity = "count by µs, both logarithmic";
+        Ok(Panel::new(self.title, quantity, self.picture()?))
     }
 
-    fn picture(&self) -> Result<String, DrawError> {
+    fn picture(&self) -> Result<Svg, DrawError> {
         let both = || std::iter::once(self.durations).chain(self.floor);
         let ends = both().flat_map(Durations::bars).map(|(us, _)| us.max(SHORTEST_US));
         let (shortest, longest) = ends.fold((f64::INFINITY, 0.0f64), |(low, high), us| (low.min(us), high.max(us)));
@@ -129,19 +132,19 @@ impl Histogram<'_> {
         draw(&sheet, |_, plot| {
             let x = &sheet.x;
             if self.durations.is_empty() {
-                plot.words_behind(x.low(), MIN_TOP.sqrt(), MUTED, NOT_MEASURED)?;
+                plot.text_beside(x.low(), MIN_TOP.sqrt(), MUTED, NOT_MEASURED)?;
             }
             let outline = outline(&counts, x);
             plot.ribbon(outline.iter().map(|(x, y)| (*x, [FOOT, *y])), LOOP, PALE)?;
             plot.line(outline, Stroke::new(LOOP, 1.2))?;
             plot.line(self::outline(&floor, x), Stroke::new(FLOOR, 1.5))?;
-            let percentiles = self.durations.measured().filter(|_| self.tells_percentiles);
+            let percentiles = self.durations.measured().filter(|_| self.shows_percentiles);
             if let Some(us) = percentiles {
                 let mut named = f64::NEG_INFINITY;
                 for (name, us) in [("p50", us.p50), ("p99", us.p99), ("max", us.max)] {
-                    plot.upright(us, FOOT, sheet.rows[0].y.high(), Stroke::new(INK, 1.0).dashed())?;
+                    plot.vertical_line(us, FOOT, sheet.rows[0].y.high(), Stroke::new(INK, 1.0).dashed())?;
                     if fraction(us, x) - named > NAME {
-                        plot.name_above(us, INK, name)?;
+                        plot.label_above(us, INK, name)?;
                         named = fraction(us, x);
                     }
                 }
@@ -150,22 +153,22 @@ impl Histogram<'_> {
         })
     }
 
-    /// What the picture shows, for those who cannot see it.
+    /// What the picture shows, for readers who cannot see it.
     fn description(&self) -> String {
-        let tell = |durations: &Durations| match durations.measured() {
+        let summary = |durations: &Durations| match durations.measured() {
             Some(us) => format!(
                 "median {}, 99th percentile {}, largest {}",
-                told(us.p50),
-                told(us.p99),
-                told(us.max)
+                with_unit(us.p50),
+                with_unit(us.p99),
+                with_unit(us.max)
             ),
             None => NOT_MEASURED.to_owned(),
         };
-        let floor = self.floor.map(|floor| format!("; floor: {}", tell(floor)));
+        let floor = self.floor.map(|floor| format!("; floor: {}", summary(floor)));
         format!(
             "Histogram of {}: {}{}",
             self.title,
-            tell(self.durations),
+            summary(self.durations),
             floor.unwrap_or_default()
         )
     }

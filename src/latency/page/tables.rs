@@ -1,10 +1,9 @@
-//! The tables: all numbers, the culprits, the rates that were tried, and what was in force.
+//! The tables: all numbers, the culprits, the rates that were tried, and the settings.
 
 use super::words::{NOT_MEASURED, times, us};
 use crate::latency::attribution::meaning;
 use crate::latency::{Durations, Outcome};
-use worm_analysis::report::page::Page;
-use worm_analysis::report::table::Table;
+use worm_analysis::report::page::{Page, Table};
 use worm_estimator::number::{NONE, percent, shortest};
 
 /// Every duration at every percentile, each over its floor.
@@ -32,15 +31,15 @@ pub(super) fn measures(outcome: &Outcome) -> Table {
             table.rows.push(row(&name, floor, [String::new(), String::new()]));
         }
     }
-    table.note = Some(format!("{NONE} stands where nothing was measured."));
+    table.note = Some(format!("{NONE}: not measured."));
     table
 }
 
 fn row(name: &str, durations: &Durations, ratios: [String; 2]) -> Vec<String> {
     let mut row = vec![name.to_owned()];
     match durations.measured() {
-        Some(told) => {
-            row.extend([told.p50, told.p90, told.p99, told.p99_9, told.max].map(us));
+        Some(us_at) => {
+            row.extend([us_at.p50, us_at.p90, us_at.p99, us_at.p99_9, us_at.max].map(us));
             row.push(durations.count().to_string());
         }
         None => {
@@ -52,7 +51,7 @@ fn row(name: &str, durations: &Durations, ratios: [String; 2]) -> Vec<String> {
     row
 }
 
-/// Late ticks by who made them late.
+/// Late ticks by culprit.
 pub(super) fn add_culprits(page: &mut Page, outcome: &Outcome) {
     let blamed = outcome.blamed();
     let late: u64 = blamed.iter().map(|(_, ticks)| ticks).sum();
@@ -63,7 +62,7 @@ pub(super) fn add_culprits(page: &mut Page, outcome: &Outcome) {
         });
         return;
     }
-    let head = ["culprit", "what it means", "late ticks", "share"];
+    let head = ["culprit", "what it means", "late ticks", "fraction"];
     let mut table = Table::new("Late ticks by culprit", head);
     table.word_columns = 2;
     let rows = blamed.into_iter().map(|(culprit, ticks)| {
@@ -79,7 +78,7 @@ pub(super) fn add_culprits(page: &mut Page, outcome: &Outcome) {
     if pauses.count > 0 {
         table.note = Some(format!("{pauses}."));
     }
-    page.table(&table);
+    page.add(&table);
 }
 
 /// The rates that were tried.
@@ -93,7 +92,7 @@ pub(super) fn add_rates(page: &mut Page, outcome: &Outcome) {
         "sustained",
         "ticks",
         "overruns",
-        "share missed",
+        "fraction missed",
         "failed exchanges",
     ];
     let mut table = Table::new("Rates that were tried", head);
@@ -113,13 +112,13 @@ pub(super) fn add_rates(page: &mut Page, outcome: &Outcome) {
             ]
         })
         .collect();
-    page.table(&table);
+    page.add(&table);
 }
 
-/// What was in force, judged, and what cyclictest says of the machine.
+/// The settings that matter, judged, and what cyclictest measured.
 pub(super) fn add_settings(page: &mut Page, outcome: &Outcome) {
     if outcome.settings.is_empty() {
-        page.paragraph("What was in force was not looked at.");
+        page.paragraph("The settings were not checked.");
     } else {
         let head = ["", "found", "what to do"];
         let mut table = Table::new("What decides how late the loop can be", head);
@@ -133,7 +132,7 @@ pub(super) fn add_settings(page: &mut Page, outcome: &Outcome) {
         });
         table.rows = rows.collect();
         table.note = Some("✓ as it should be, ✗ not.".to_owned());
-        page.table(&table);
+        page.add(&table);
     }
     if let Some(found) = &outcome.cyclictest {
         let mut table = Table::new("Wake lateness by cyclictest, µs", ["called as", "min", "mean", "max"]);
@@ -143,6 +142,6 @@ pub(super) fn add_settings(page: &mut Page, outcome: &Outcome) {
             us(found.mean_us),
             us(found.max_us),
         ]);
-        page.table(&table);
+        page.add(&table);
     }
 }

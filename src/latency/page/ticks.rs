@@ -1,19 +1,18 @@
-//! The worst ticks: where the time of each went on the clock, who made it late, and what speaks for that.
+//! The worst ticks: where the time of each went, what made it late, and the evidence.
 
-use super::words::{NOT_MEASURED, told, us};
+use super::words::{NOT_MEASURED, us, with_unit};
 use crate::latency::{Outcome, Tick};
-use worm_analysis::report::page::{Figure, Key, Mark, Page, Panel};
-use worm_analysis::report::plot::{Axis, Colour, DrawError, INK, PAPER, Row, Sheet, Stroke, cell_colours, draw};
-use worm_analysis::report::table::Table;
+use worm_analysis::report::page::{Figure, Key, Mark, Page, Panel, Table};
+use worm_analysis::report::plot::{Axis, Colour, DrawError, INK, PAPER, Row, Sheet, Svg, cell_colours, draw};
 
-/// Height of a tick's bar with what is between it and the next, units.
+/// Height of a tick's bar with the space to the next, units.
 const ROW: f64 = 27.0;
 const HALF_BAR: f64 = 0.34;
-/// A tick that takes more than so many times the median of those shown is cut: beside it nobody would see the others.
+/// A tick longer than this multiple of the median of those shown is cut, so that the others remain visible.
 const CUT: f64 = 4.0;
-/// Room behind the longest bar for its length in words, as a share of the picture.
+/// Room beside the longest bar for its length as text, as a fraction of the picture.
 const BEHIND: f64 = 0.2;
-/// How wide the gap is in a bar that is cut, as a share of the picture.
+/// Width of the gap in a bar that is cut, as a fraction of the picture.
 const GAP: f64 = 0.008;
 
 /// The parts of a tick in the order in which they come, µs.
@@ -23,7 +22,7 @@ fn parts(tick: &Tick) -> [(&'static str, f64); 5] {
         ("bus", tick.bus_us),
         ("computation", tick.compute_us),
         ("publishing", tick.publish_us),
-        ("waking who listens", tick.notify_us),
+        ("waking the listeners", tick.notify_us),
     ]
 }
 
@@ -39,24 +38,24 @@ pub(super) fn add(page: &mut Page, outcome: &Outcome) -> Result<(), DrawError> {
     keys.push(Key::new(Mark::Dashed, INK, "next deadline"));
     page.figure(&Figure {
         id: "ticks",
-        title: "Where the time of the worst ticks went".to_owned(),
+        title: "Where the time of the worst ticks went",
         keys,
-        panels: vec![Panel {
-            title: "from the deadline to the end of the tick".to_owned(),
-            quantity: "µs".to_owned(),
-            svg: picture(outcome, ticks, &colours)?,
-        }],
-        caption: "The worst first, each with its number and who made it late, or who took most of it where it was in time. What \
+        panels: vec![Panel::new(
+            "from the deadline to the end of the tick",
+            "µs",
+            picture(outcome, ticks, &colours)?,
+        )],
+        caption: "The worst first, each with its number and what made it late, or what took most of it where it was in time. What \
                   reaches beyond the dashed line was late. A bar with a gap at its end goes on to the length beside it."
             .to_owned(),
     });
-    page.table(&table(ticks));
+    page.add(table(ticks));
     Ok(())
 }
 
-fn picture(outcome: &Outcome, ticks: &[Tick], colours: &[Colour]) -> Result<String, DrawError> {
+fn picture(outcome: &Outcome, ticks: &[Tick], colours: &[Colour]) -> Result<Svg, DrawError> {
     let period_us = 1e6 / outcome.rate_hz;
-    let drawable = ticks.iter().map(Tick::total_us).filter(|us| Axis::can_show(*us));
+    let drawable = ticks.iter().map(Tick::total_us).filter(|us| Axis::is_drawable(*us));
     let lengths_us: Vec<f64> = drawable.collect(); // falling
     let median_us = lengths_us.get(lengths_us.len() / 2).copied().unwrap_or(0.0);
     let longest_us = lengths_us.first().copied().unwrap_or(0.0);
@@ -67,7 +66,7 @@ fn picture(outcome: &Outcome, ticks: &[Tick], colours: &[Colour]) -> Result<Stri
         description: format!(
             "The {} worst ticks, {late} of them late, the worst of {}, by {}",
             ticks.len(),
-            told(longest_us),
+            with_unit(longest_us),
             ticks.first().map_or("none", |tick| tick.culprit.name())
         ),
         x_label: Some("µs after the deadline".to_owned()),
@@ -88,13 +87,15 @@ fn picture(outcome: &Outcome, ticks: &[Tick], colours: &[Colour]) -> Result<Stri
                 let gap_us = GAP * sheet.x.high();
                 plot.fill([end_us - 3.0 * gap_us, end_us - 2.0 * gap_us], across, PAPER, 1.0)?;
             }
-            plot.words_behind(from_us.min(end_us), row, INK, &told(from_us))?;
+            plot.text_beside(from_us.min(end_us), row, INK, &with_unit(from_us))?;
         }
-        // Pale under the dashes, so that they are seen on a dark bar.
-        let top = ticks.len() as f64 - 0.5;
-        plot.upright(period_us, -0.5, top, Stroke::new(PAPER, 3.0))?;
-        plot.upright(period_us, -0.5, top, Stroke::new(INK, 1.5).dashed())?;
-        plot.name_above(period_us, INK, &format!("next deadline: {}", told(period_us)))
+        let height = [-0.5, ticks.len() as f64 - 0.5];
+        plot.threshold(
+            period_us,
+            height,
+            INK,
+            &format!("next deadline: {}", with_unit(period_us)),
+        )
     })
 }
 
@@ -126,14 +127,14 @@ fn table(ticks: &[Tick]) -> Table {
         row.extend(if tick.late {
             [us(tick.waited_us), us(tick.stolen_us), tick.page_faults.to_string()]
         } else {
-            // Nobody looked: in a tick that is in time nothing is asked of the kernel.
+            // Unknown: the kernel is asked about late ticks only.
             [us(f64::NAN), us(f64::NAN), us(f64::NAN)]
         });
         table.rows.push(row);
     }
     table.note = Some(
-        "Without CPU: how long the loop could have run and was not let. Stolen: what the host took from this virtual machine, in \
-         steps of the kernel's clock tick. Both and the page faults are asked for in late ticks only."
+        "Without CPU: how long the loop was ready to run but had to wait. Stolen: what the host took from this virtual machine, in \
+         steps of the kernel's clock tick. Both and the page faults are read in late ticks only."
             .to_owned(),
     );
     table

@@ -1,22 +1,18 @@
-//! The head of the page: the answer, large, against what it aims at.
+//! The head of the page: the most important values, large, against their aims.
 
-use super::words::{NOT_MEASURED, duration, times, told};
+use super::words::{NOT_MEASURED, duration, times, with_unit};
 use crate::latency::{Durations, Outcome, Percentiles, ratio};
-use worm_analysis::report::page::escaped;
-use worm_analysis::report::tile::{Tile, push_row};
+use worm_analysis::report::page::{Tile, TileRow};
+use worm_analysis::report::plot::{ACCENT, Colour, GOOD};
 use worm_estimator::number::{NONE, count, percent, shortest};
 
-/// Dots before what reaches its aim and what does not: green and red as dark as each other are told apart by the words.
-const MET: &str = "#00734f";
-const MISSED: &str = "#c8102e";
-
-/// Most that the loop's wake lateness is to be, as a multiple of the bare sleeper's, at the median and the 99th percentile.
+/// Aims for the loop's wake lateness over the bare sleeper's, at the median and the 99th percentile.
 const WAKE_AIMS: [f64; 2] = [1.1, 1.25];
-/// Most that computation and publishing are to take at the 99th percentile, µs.
+/// Aim for computation and publishing at the 99th percentile, µs.
 const OWN_WORK_AIM_US: f64 = 20.0;
-/// Most that delivery is to take, as a multiple of what a bare pair takes, at the median.
+/// Aim for delivery over that of a bare pair, at the median.
 const DELIVERY_AIM: f64 = 1.2;
-/// Most of one CPU that the controller is to take, as a share.
+/// Aim for the controller's share of one CPU.
 const CPU_AIM: f64 = 0.05;
 
 type Percentile = fn(&Percentiles) -> f64;
@@ -41,17 +37,19 @@ pub(super) fn lead(outcome: &Outcome) -> String {
 }
 
 /// The rows of tiles.
-pub(super) fn html(outcome: &Outcome) -> String {
-    let mut html = "<section class=\"answer\">".to_owned();
-    let wake =
-        "<b>Wake lateness</b><small>how long after its deadline the loop runs; the floor is a bare sleeper</small>";
-    push_row(&mut html, wake, &wake_tiles(outcome), "");
-    let tick = "<b>The tick</b><small>what it takes, and what it misses</small>";
-    push_row(&mut html, tick, &tick_tiles(outcome), "");
-    let others = "<b>Who listens</b><small>how soon the others know</small>";
-    push_row(&mut html, others, &delivery_tiles(outcome), "");
-    html.push_str("</section>");
-    html
+pub(super) fn rows(outcome: &Outcome) -> Vec<TileRow> {
+    let row = |name: &str, note: &str, tiles| TileRow {
+        name: name.to_owned(),
+        note: note.to_owned(),
+        tiles,
+        ..TileRow::default()
+    };
+    let late = "how long after its deadline the loop runs; the floor is a bare sleeper";
+    vec![
+        row("Wake lateness", late, wake_tiles(outcome)),
+        row("The tick", "what it takes, and what it misses", tick_tiles(outcome)),
+        row("Listeners", "how soon they know", delivery_tiles(outcome)),
+    ]
 }
 
 fn wake_tiles(outcome: &Outcome) -> Vec<Tile> {
@@ -65,44 +63,44 @@ fn wake_tiles(outcome: &Outcome) -> Vec<Tile> {
 }
 
 fn tick_tiles(outcome: &Outcome) -> Vec<Tile> {
-    let own = outcome.own_work_us.measured().map(|us| us.p99);
-    let own_work = match own {
+    let own_work_name = "own work, 99th percentile";
+    let own_work = match outcome.own_work_us.measured().map(|us| us.p99) {
         Some(us) => {
             let (value, unit) = duration(us);
-            let (dot, verdict) = judged(us, OWN_WORK_AIM_US, &format!("{} µs", shortest(OWN_WORK_AIM_US)));
+            let (dot, verdict) = against_aim(us, OWN_WORK_AIM_US, &format!("{} µs", shortest(OWN_WORK_AIM_US)));
             let how = format!("computation and publishing; {verdict}");
-            tile(&format!("{dot}own work, 99th percentile"), value, unit, how)
+            with_dot(Some(dot), Tile::new(own_work_name, value, unit, how))
         }
-        None => not_measured("own work, 99th percentile"),
+        None => not_measured(own_work_name),
     };
     let overruns = if outcome.ticks == 0 {
         not_measured("overruns")
     } else {
         let due = outcome.ticks + outcome.overruns;
         let how = format!(
-            "{} of {due} deadlines; {} of wormd's own doing",
+            "{} of {due} deadlines; {} caused by wormd",
             percent(outcome.overruns as f64 / due as f64),
             outcome.overruns_of_product
         );
-        tile("overruns", outcome.overruns.to_string(), "", how)
+        Tile::new("overruns", outcome.overruns.to_string(), "", how)
     };
     vec![own_work, overruns, controller_cpu(outcome), highest_rate(outcome)]
 }
 
 fn controller_cpu(outcome: &Outcome) -> Tile {
+    let name = "controller's CPU";
     let fraction = outcome.controller_cpu_share;
     let text = percent(fraction);
     if text == NONE {
-        return not_measured("controller's CPU");
+        return not_measured(name);
     }
-    let (dot, verdict) = judged(fraction, CPU_AIM, &percent(CPU_AIM));
+    let (dot, verdict) = against_aim(fraction, CPU_AIM, &percent(CPU_AIM));
     let floor = match percent(outcome.floor_cpu_share) {
         none if none == NONE => String::new(),
         floor => format!("; the bare sleeper takes {floor}"),
     };
-    let value = text.trim_end_matches(" %").to_owned();
     let how = format!("of one CPU{floor}; {verdict}");
-    tile(&format!("{dot}controller's CPU"), value, "%", how)
+    with_dot(Some(dot), Tile::new(name, text.trim_end_matches(" %"), "%", how))
 }
 
 fn highest_rate(outcome: &Outcome) -> Tile {
@@ -110,15 +108,13 @@ fn highest_rate(outcome: &Outcome) -> Tile {
     match outcome.highest_rate_hz {
         Some(rate_hz) => {
             let how = format!("of {} tried", count(outcome.rate_trials.len(), "rate"));
-            tile(name, shortest(rate_hz), "Hz", how)
+            Tile::new(name, shortest(rate_hz), "Hz", how)
         }
         None if outcome.rate_trials.is_empty() => not_measured(name),
-        None => tile(
-            name,
-            NONE.to_owned(),
-            "",
-            format!("none of {} tried", count(outcome.rate_trials.len(), "rate")),
-        ),
+        None => {
+            let how = format!("none of {} tried", count(outcome.rate_trials.len(), "rate"));
+            Tile::new(name, NONE, "", how)
+        }
     }
 }
 
@@ -129,9 +125,9 @@ fn delivery_tiles(outcome: &Outcome) -> Vec<Tile> {
             let how = format!(
                 "from the blocked cam to the woken listener; longest of {} {}",
                 count(as_count(outcome.alarm_us.count()), "stall"),
-                told(us.max)
+                with_unit(us.max)
             );
-            tile("stall to alarm, median", value, unit, how)
+            Tile::new("stall to alarm, median", value, unit, how)
         }
         None => not_measured("stall to alarm, median"),
     };
@@ -161,41 +157,35 @@ fn over_floor(name: &str, loop_us: &Durations, floor_us: &Durations, of: Percent
     };
     let (value, unit) = duration(of(&us));
     let Some(floor) = floor_us.measured() else {
-        return tile(name, value, unit, "floor not measured".to_owned());
+        return Tile::new(name, value, unit, "floor not measured");
     };
     let ratio = ratio(loop_us, floor_us, of);
-    let (dot, verdict) = match (ratio, aim) {
-        (Some(ratio), Some(aim)) => {
-            let (dot, verdict) = judged(ratio, aim, &times(Some(aim)));
-            (dot, format!("; {verdict}"))
-        }
-        _ => (String::new(), String::new()),
-    };
-    let how = format!("{} × the floor's {}{verdict}", times(ratio), told(of(&floor)));
-    tile(&format!("{dot}{}", escaped(name)), value, unit, how)
+    let judged = ratio
+        .zip(aim)
+        .map(|(ratio, aim)| against_aim(ratio, aim, &times(Some(aim))));
+    let (dot, verdict) = judged.map_or((None, String::new()), |(dot, verdict)| {
+        (Some(dot), format!("; {verdict}"))
+    });
+    let how = format!("{} × the floor's {}{verdict}", times(ratio), with_unit(of(&floor)));
+    with_dot(dot, Tile::new(name, value, unit, how))
 }
 
-/// A dot, which is HTML, and the words for whether a value is within its aim.
-fn judged(value: f64, aim: f64, aim_in_words: &str) -> (String, String) {
-    let (colour, word) = if value <= aim { (MET, "met") } else { (MISSED, "missed") };
-    (
-        format!("<i style=\"--c:{colour}\"></i>"),
-        format!("aim {aim_in_words}: {word}"),
-    )
+/// A colour and the words for whether a value reaches its aim.
+fn against_aim(value: f64, aim: f64, aim_in_words: &str) -> (Colour, String) {
+    let (colour, word) = if value <= aim {
+        (GOOD, "met")
+    } else {
+        (ACCENT, "missed")
+    };
+    (colour, format!("aim {aim_in_words}: {word}"))
+}
+
+fn with_dot(dot: Option<Colour>, tile: Tile) -> Tile {
+    Tile { dot, ..tile }
 }
 
 fn not_measured(name: &str) -> Tile {
-    tile(name, NONE.to_owned(), "", NOT_MEASURED.to_owned())
-}
-
-/// A tile; `name` is HTML already.
-fn tile(name: &str, value: String, unit: &str, how: String) -> Tile {
-    Tile {
-        name: name.to_owned(),
-        value,
-        unit: unit.to_owned(),
-        how,
-    }
+    Tile::new(name, NONE, "", NOT_MEASURED)
 }
 
 fn as_count(number: u64) -> usize {

@@ -1,11 +1,11 @@
-//! Durations, ratios and rates as people read them.
+//! Durations and ratios as people read them.
 
 use worm_estimator::number::{fixed, significant};
 
-/// What stands where nothing was measured.
+/// Shown where nothing was measured.
 pub(super) const NOT_MEASURED: &str = "not measured";
 
-/// From here on, in µs, a duration is told in milliseconds.
+/// From here on, in µs, a duration is shown in milliseconds.
 const MILLISECONDS: f64 = 10_000.0;
 
 /// A duration with three digits, and its unit.
@@ -18,7 +18,7 @@ pub(super) fn duration(us: f64) -> (String, &'static str) {
 }
 
 /// The same as one text.
-pub(super) fn told(us: f64) -> String {
+pub(super) fn with_unit(us: f64) -> String {
     let (value, unit) = duration(us);
     format!("{value} {unit}")
 }
@@ -28,7 +28,7 @@ pub(super) fn us(us: f64) -> String {
     fixed(us, 1)
 }
 
-/// How many times something is something else.
+/// A ratio.
 pub(super) fn times(ratio: Option<f64>) -> String {
     fixed(ratio.unwrap_or(f64::NAN), 2)
 }

@@ -6,6 +6,7 @@ use super::follow_up::{Condition, ExtraRun};
 use std::panic::{self, AssertUnwindSafe};
 use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain;
+use worm_analysis::explain::answer::{ExperimentChange, RunChange};
 
 /// Standard errors to either end of a 90 % interval.
 const NINETY_PERCENT: f64 = 1.645;
@@ -97,29 +98,29 @@ fn proposal(next: &explain::answer::NextExperiment, campaign: &HiddenCampaign) -
         return Proposal::Measurement;
     };
     let usual = campaign.usual(slope_deg);
-    Proposal::Run(match next.change.as_str() {
-        "slope_deg" => Condition {
+    Proposal::Run(match next.change {
+        ExperimentChange::Run(RunChange::Slope) => Condition {
             slope_deg: value,
             ..usual
         },
-        "cycle_s" => Condition {
+        ExperimentChange::Run(RunChange::Cycle) => Condition {
             cycle_s: value,
             ..usual
         },
-        "payload_kg" => Condition {
+        ExperimentChange::Run(RunChange::Payload) => Condition {
             payload_kg: value,
             ..usual
         },
-        "start_m" => Condition {
+        ExperimentChange::Run(RunChange::Start) => Condition {
             start_shift_m: begun_m(campaign, slope_deg) + value,
             ..usual
         },
-        "cycles" => Condition { cycles: value, ..usual },
-        "dwell_s" => Condition {
+        ExperimentChange::Run(RunChange::Cycles) => Condition { cycles: value, ..usual },
+        ExperimentChange::Run(RunChange::Dwell) => Condition {
             dwell_s: value,
             ..usual
         },
-        _ => return Proposal::Measurement,
+        ExperimentChange::Measurement(_) => return Proposal::Measurement,
     })
 }
 

@@ -32,6 +32,7 @@ mod fit;
 #[cfg(test)]
 mod fixture;
 mod gap;
+mod hypothesis;
 mod local_restart;
 mod model_selection;
 pub mod model_update;
@@ -42,6 +43,7 @@ mod period;
 mod phase_correction;
 mod predict;
 mod prediction;
+mod residual;
 mod residual_map;
 mod scalar_data;
 mod score_test;

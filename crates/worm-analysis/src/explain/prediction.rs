@@ -1,7 +1,8 @@
 //! What a model predicts for recordings, without any search.
 
 use super::error::ExplainError;
-use super::predict::{Hypothesis, Scene};
+use super::hypothesis::Hypothesis;
+use super::predict::Scene;
 use super::search::prepare;
 use crate::experiment::RecordedRun;
 use worm_estimator::config::Config;

@@ -6,7 +6,7 @@ pub use write::write;
 
 use super::{Motor, Recording};
 use std::path::Path;
-use worm_estimator::estimate::{Capture, LivedTime};
+use worm_estimator::estimate::{Capture, MotorTime};
 use worm_estimator::message::{JsonMessage, State};
 use worm_log::{Channel, ReadError, nothing, scan};
 
@@ -76,7 +76,7 @@ struct ControllerRun {
     first_tick: u64,
     last_tick: u64,
     last_sample: u64,
-    lived: LivedTime,
+    lived: MotorTime,
     capture: Capture,
     /// Time, without pauses of the computer, and phase of each tick that read the motor.
     phases: Vec<(f64, f64)>,
@@ -92,7 +92,7 @@ impl ControllerRun {
             first_tick: state.sequence,
             last_tick: state.sequence,
             last_sample: state.sample,
-            lived: LivedTime::default(),
+            lived: MotorTime::default(),
             capture: Capture::default(),
             phases: Vec::new(),
             samples: Vec::new(),

@@ -11,11 +11,11 @@ pub fn make_directory(path: &Path) -> Result<(), ReportError> {
         path: path.to_owned(),
         problem: "the directory cannot be made",
         source,
-        remedy: "name a directory that exists or can be made, or mend its permissions",
+        remedy: "name a directory that exists or can be made, or correct its permissions",
     })
 }
 
-/// Tries whether a directory can be written, and leaves it as it was.
+/// Checks that a directory can be written, and leaves it as it was.
 pub fn try_directory(path: &Path) -> Result<(), ReportError> {
     let trial = path.join(format!(".{}.part", std::process::id()));
     let made = File::create(&trial).and_then(|_| fs::remove_file(&trial));
@@ -23,24 +23,24 @@ pub fn try_directory(path: &Path) -> Result<(), ReportError> {
         path: path.to_owned(),
         problem: "the directory cannot be written in",
         source,
-        remedy: "mend its permissions, or name another directory",
+        remedy: "correct its permissions, or name another directory",
     })
 }
 
-/// Writes a file beside its place and moves it there: who reads it sees the old one or the new one, never a part.
+/// Writes a file under another name and renames it: a reader sees the old file or the new one, never a part.
 pub fn replace(path: PathBuf, content: &[u8]) -> Result<PathBuf, ReportError> {
     let mut beside = path.clone().into_os_string();
     beside.push(format!(".{}.part", std::process::id()));
     let beside = PathBuf::from(beside);
     let written = write_synced(&beside, content).and_then(|()| fs::rename(&beside, &path));
     if let Err(source) = written {
-        // The first error is the one to tell; what cannot be written often cannot be removed either.
+        // The first error is the one to report; a file that cannot be written often cannot be removed either.
         let _ = fs::remove_file(&beside);
         return Err(ReportError::File {
             path,
             problem: "the file cannot be written",
             source,
-            remedy: "make room, mend the permissions of its directory, or name another directory",
+            remedy: "free some space, correct the permissions of its directory, or name another directory",
         });
     }
     Ok(path)

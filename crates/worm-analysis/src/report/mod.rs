@@ -1,30 +1,26 @@
 //! The report: one page with every figure and table of an experiment, and its series as CSV.
 //!
-//! [`write()`] takes what the analysis found on one recording, or on several of one worm, and leaves a directory with
+//! [`write()`] takes what the analysis found on one recording, or on several of one worm, and writes a directory with
 //! `report.html`, a file that fetches nothing and can be passed on as it is, and beside it `series.csv` and `cycles.csv`; with
-//! several runs these stand in `run-1`, `run-2`, … in the order given.
+//! several runs these are in `run-1`, `run-2`, … in the order given.
 //!
-//! # The map, in reading order
-//! - [`number`]: numbers as people read them.
+//! # Modules, in reading order
 //! - [`plot`]: pictures as inline SVG; what is not finite is never drawn.
-//! - [`page`], [`table`] and `tile`: the page, its style, figures, tables and large figures. These know nothing of worms.
-//! - `runs`, `figure`, `summary`, `tables`: what this report shows.
-//! - `sheets` and `file`: the CSV, and how files are replaced.
+//! - [`page`]: the page, its figures, tables and tiles. Neither knows anything of worms.
+//! - `runs`, `summary`, `figure`, `tables`: the contents of this report.
+//! - `sheets` and [`file`]: the CSV, and how files are replaced.
 //! - [`explain`]: another page, on the search for the effect that the model misses.
 
 pub mod explain;
 mod figure;
 pub mod file;
 
-pub use worm_estimator::number;
 pub mod page;
 pub mod plot;
 mod runs;
 mod sheets;
 mod summary;
-pub mod table;
 mod tables;
-pub mod tile;
 
 pub use file::replace as replace_file;
 
@@ -34,11 +30,12 @@ use plot::DrawError;
 use runs::Runs;
 use std::io;
 use std::path::{Path, PathBuf};
+use worm_estimator::number::in_words;
 
-/// Why there is no report.
+/// Why a report could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// There is nothing to report on.
+    /// There is no run to report on.
     #[error("a report needs at least one analysed recording: give one")]
     NoRuns,
     /// The runs are not of one worm.
@@ -56,11 +53,11 @@ pub enum ReportError {
     /// A directory or file cannot be written.
     #[error("{}: {problem}: {source}: {remedy}", path.display())]
     File {
-        /// Which.
+        /// Its path.
         path: PathBuf,
         /// What went wrong.
         problem: &'static str,
-        /// What the operating system said.
+        /// The operating system's error.
         source: io::Error,
         /// What to do.
         remedy: &'static str,
@@ -76,7 +73,7 @@ pub enum ReportError {
     Json(#[from] serde_json::Error),
 }
 
-/// What was written.
+/// The files of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     /// The page.
@@ -85,7 +82,7 @@ pub struct Written {
     pub sheets: Vec<PathBuf>,
 }
 
-/// Writes the report on the runs of one worm into a directory, which is made if need be. Files of an earlier report are
+/// Writes the report on the runs of one worm into a directory, which is made if necessary. Files of an earlier report are
 /// replaced, each at once; other files are left alone.
 ///
 /// # Errors
@@ -118,7 +115,14 @@ pub fn write(dir: &Path, title: &str, runs: &[Analysis]) -> Result<Written, Repo
     })
 }
 
-/// Makes the directory of a report and tries whether it can be written, so that nobody waits for an analysis in vain.
+/// What the report says, for the terminal: its lead and its tables, without figures and single cycles.
+pub fn text(runs: &[Analysis]) -> String {
+    let runs = Runs(runs);
+    let tables = tables::main(runs).map(|table| table.to_string());
+    [&[summary::lead(runs)], &tables[..]].concat().join("\n\n")
+}
+
+/// Makes the directory of a report and checks that it can be written, before a long analysis.
 ///
 /// # Errors
 /// [`ReportError::File`].
@@ -136,20 +140,21 @@ fn folders(runs: usize) -> Vec<String> {
 }
 
 fn compose(title: &str, runs: Runs<'_>, folders: &[String]) -> Result<String, DrawError> {
-    let mut page = Page::new(title);
-    summary::add(&mut page, title, runs)?;
+    let mut page = Page::new(title, &summary::lead(runs));
+    summary::add(&mut page, runs)?;
     page.heading("Figures");
     for figure in figure::all(runs)? {
         page.figure(&figure);
     }
     page.heading("Tables");
-    page.table(&tables::identification(runs));
-    page.table(&tables::mean_deformation(runs));
-    page.table(&tables::against_theory(runs));
+    let [identification, mean_deformation, against_theory, recordings] = tables::main(runs);
+    page.add(&identification);
+    page.add(&mean_deformation);
+    page.add(&against_theory);
     for (name, run) in runs.named() {
-        page.table(&tables::cycles(&name, run));
+        page.add(tables::cycles(&name, run));
     }
-    page.table(&tables::recordings(runs));
+    page.add(&recordings);
     page.heading("The series behind the figures");
     let places: Vec<String> = folders
         .iter()
@@ -164,7 +169,7 @@ fn compose(title: &str, runs: Runs<'_>, folders: &[String]) -> Result<String, Dr
     page.paragraph(&format!(
         "As CSV, {}: series.csv with every sample of positions, contact points, deformations, forces and energies, and cycles.csv \
          with every cycle. SI units stand in the names of the columns; an empty field is not known.",
-        number::in_words(&places)
+        in_words(&places)
     ));
     page.paragraph(
         "Equation, section, figure and table numbers are those of D. Zarrouk, I. Sharf, M. Shoham, Energetic analysis and \

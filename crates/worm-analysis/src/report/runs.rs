@@ -1,7 +1,7 @@
 //! The runs of a report: what they are called, and sentences over all of them.
 
-use super::number;
 use crate::experiment::Analysis;
+use worm_estimator::number;
 
 /// The runs in the order given, each with a short name.
 #[derive(Debug, Clone, Copy)]
@@ -23,16 +23,16 @@ impl<'a> Runs<'a> {
         self.0.first().map_or(0, |run| run.cells)
     }
 
-    /// What `tell` says of each run, in words: `6.8 mm at 0° and 4.6 mm at 30°`. Runs of which it says nothing are left
-    /// out; what is the same for all is said once.
-    pub fn tell(self, mut tell: impl FnMut(&Analysis) -> Option<String>) -> String {
-        told(&self.names(), self.0.iter().map(&mut tell))
+    /// What `describe` says of each run, in words: `6.8 mm at 0° and 4.6 mm at 30°`. Runs that it has no text for are left
+    /// out; a text that is the same for all comes once.
+    pub fn describe(self, mut describe: impl FnMut(&Analysis) -> Option<String>) -> String {
+        describe_each(&self.names(), self.0.iter().map(&mut describe))
     }
 
-    /// Where theory cannot say anything of the identified worm, as a clause to end a sentence with; empty where it can
+    /// Where theory predicts nothing for the identified worm, as a clause to end a sentence with; empty where it does
     /// everywhere.
     pub fn without_theory(self) -> String {
-        let slides_down = self.tell(|run| {
+        let slides_down = self.describe(|run| {
             let is_none = run.theory.identified.is_none();
             is_none.then(|| "the identified worm slides down in theory".to_owned())
         });
@@ -44,17 +44,17 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// What is said of each of the runs with these names, in words; see [`Runs::tell`].
-pub(super) fn told(names: &[String], said: impl IntoIterator<Item = Option<String>>) -> String {
-    let said: Vec<Option<String>> = said.into_iter().collect();
-    if let [first, rest @ ..] = &said[..]
+/// A text for each of the runs with these names, in words; see [`Runs::describe`].
+pub(super) fn describe_each(names: &[String], texts: impl IntoIterator<Item = Option<String>>) -> String {
+    let texts: Vec<Option<String>> = texts.into_iter().collect();
+    if let [first, rest @ ..] = &texts[..]
         && rest.iter().all(|other| other == first)
     {
         return first.clone().unwrap_or_default();
     }
-    let named = said.into_iter().zip(names);
+    let named = texts.into_iter().zip(names);
     let parts: Vec<String> = named
-        .filter_map(|(said, name)| said.map(|said| format!("{said} at {name}")))
+        .filter_map(|(text, name)| Some(format!("{} at {name}", text?)))
         .collect();
     number::in_words(&parts)
 }

@@ -1,7 +1,7 @@
 //! The series and the cycles of a run as CSV.
 //!
-//! `series.csv` names time, positions and gait phase as recordings do, so that it can be read as one. Numbers stand with all
-//! their digits; what is not known is an empty field.
+//! `series.csv` names time, positions and gait phase as recordings do, so that it can be read as one. Numbers have all their
+//! digits; an unknown value is an empty field.
 
 use crate::experiment::{Analysis, CycleValues};
 
@@ -30,7 +30,7 @@ pub(super) fn series(run: &Analysis) -> Result<Vec<u8>, csv::Error> {
         }
     }
     for (cell, values) in series.sliding.iter().enumerate() {
-        columns.push((format!("sliding{}", cell + 1), Column::Sense(values)));
+        columns.push((format!("sliding{}", cell + 1), Column::Sign(values)));
     }
     for (name, values) in [
         ("total_force_n", &series.total_force_n),
@@ -95,7 +95,7 @@ fn finished(writer: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
 enum Column<'a> {
     Values(&'a [f64]),
     Cell(&'a [usize]),
-    Sense(&'a [i8]),
+    Sign(&'a [i8]),
 }
 
 impl Column<'_> {
@@ -103,7 +103,7 @@ impl Column<'_> {
         let text = match self {
             Self::Values(values) => values.get(sample).map(|value| field(*value)),
             Self::Cell(cells) => cells.get(sample).map(|cell| (cell + 1).to_string()),
-            Self::Sense(signs) => signs.get(sample).map(i8::to_string),
+            Self::Sign(signs) => signs.get(sample).map(i8::to_string),
         };
         text.unwrap_or_default()
     }

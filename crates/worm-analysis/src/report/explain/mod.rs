@@ -1,61 +1,97 @@
-//! The page of `wormd explain`: which effect the model misses, how sure that is, and what to do next.
+//! What `wormd explain` shows: which effect the model misses, how sure that is, and what to do next.
 //!
-//! It is read from the top by someone who runs a worm: the answer in a sentence, then where the gap is, why this effect and no
+//! Someone who runs a worm reads it from the top: the answer in a sentence, then where the gap is, why this effect and no
 //! other, how the model follows the data before and after, what was changed in it, and which experiment comes next. A part
-//! that the search did not give says why it is not there.
+//! that the search did not give says why it is missing.
 //!
-//! # The map, in reading order
-//! - `words`: effects, parameters and runs in words, and quantities in the units that people read.
-//! - `verdict`: the answer, large.
-//! - `map`, `effects`, `overlay`, `gap`: the figures with their tables, in the order of the page.
-//! - `changes`: the recalibrated values and the difference of the model's text.
-//! - `next`: the next experiment.
-//! - `recordings`: what it all rests on.
+//! - [`view`]: the answer as headings, sentences and tables: all wording, and no drawing.
+//! - `figure`: the figures of the page.
+//! - [`page`] and [`text`]: the view as a page, and for the terminal.
 
-mod changes;
-mod effects;
-mod gap;
-mod map;
-mod next;
-mod overlay;
-mod recordings;
-mod verdict;
-mod words;
+mod figure;
+pub mod view;
 
 use super::page::Page;
 use super::plot::DrawError;
 use super::{ReportError, file};
 use crate::explain::Answer;
+use maud::html;
 use std::path::{Path, PathBuf};
+use view::{Block, View};
 
 /// The page on an answer, as the text of one self-contained HTML file.
 ///
 /// # Errors
 /// [`DrawError`] where a figure could not be drawn.
 pub fn page(answer: &Answer, title: &str) -> Result<String, DrawError> {
-    let mut page = Page::new(title).with_style(include_str!("style.css"));
-    verdict::add(&mut page, title, answer);
-    page.heading("Where is the gap?");
-    map::add(&mut page, answer)?;
-    page.heading("Which effect is it, and why not another?");
-    effects::add(&mut page, answer)?;
-    page.heading("The model before and after, against the data");
-    overlay::add(&mut page, answer)?;
-    page.heading("How the gap shrinks");
-    gap::add(&mut page, answer)?;
-    page.heading("What was recalibrated first");
-    changes::add_calibration(&mut page, answer);
-    page.heading("What changes in the model");
-    changes::add_diff(&mut page, answer);
-    page.heading("What to try next");
-    next::add(&mut page, answer);
-    page.heading("What it rests on");
-    recordings::add(&mut page, answer);
+    let view = View::of(answer);
+    let mut page = Page::new(title, &view.lead).with_style(include_str!("style.css"));
+    page.add(html! {
+        section class={ "verdict " (view.class) } {
+            p.badge { (view.badge) }
+            p.headline { (view.headline) }
+            p { (view.sentence) }
+        }
+    });
+    page.tiles(&view.rows);
+    page.paragraph_of("note", &view.note);
+    for section in &view.sections {
+        page.heading(section.heading);
+        for block in &section.blocks {
+            match block {
+                Block::Paragraph(text) => page.paragraph(text),
+                Block::Table(table) | Block::LongTable(table) => page.add(table),
+                Block::Figure(drawn) => page.figure(&figure::draw(*drawn, answer)?),
+                Block::Difference(lines) => page.add(html! {
+                    pre.diff {
+                        @for line in lines {
+                            @match line.kind {
+                                view::LineKind::Heading => s { (line.text) },
+                                view::LineKind::Added => ins { (line.text) },
+                                view::LineKind::Removed => del { (line.text) },
+                                view::LineKind::Kept => span { (line.text) },
+                            }
+                        }
+                    }
+                }),
+            }
+        }
+    }
+    page.warnings(&answer.warnings);
     Ok(page.finish())
 }
 
+/// The same for the terminal, without figures and long tables. Warnings are left to the caller, who logs them.
+pub fn text(answer: &Answer) -> String {
+    let view = View::of(answer);
+    let mut parts = vec![format!("{}. {}", view.badge, view.headline), view.sentence, view.lead];
+    parts.extend(view.rows.iter().map(|row| row.to_string()));
+    parts.push(view.note);
+    for section in view.sections {
+        let blocks = section.blocks.into_iter().filter_map(|block| match block {
+            Block::Paragraph(text) => Some(text),
+            Block::Table(table) => Some(table.to_string()),
+            Block::Difference(lines) => {
+                let lines = lines
+                    .iter()
+                    .map(|line| format!("  {}", line.text).trim_end().to_owned());
+                Some(lines.collect::<Vec<_>>().join("\n"))
+            }
+            Block::LongTable(_) | Block::Figure(_) => None,
+        });
+        let blocks: Vec<String> = blocks.collect();
+        if !blocks.is_empty() {
+            let underline = "─".repeat(section.heading.chars().count());
+            parts.push(format!("{}\n{underline}", section.heading));
+            parts.extend(blocks);
+        }
+    }
+    parts.retain(|part| !part.is_empty());
+    parts.join("\n\n")
+}
+
 /// Writes the page as `report.html` into a directory, which is made if need be. An earlier page is replaced at once; other
-/// files are left alone. Gives where the page is.
+/// files are left alone. Returns where the page is.
 ///
 /// # Errors
 /// [`ReportError::Drawing`] before anything is written; [`ReportError::File`].

@@ -4,16 +4,16 @@
 use super::window::{Window, of_cell};
 use super::{cell_keys, panel_per_run};
 use crate::experiment::Analysis;
-use crate::report::number::{fixed, list_or_range, mean};
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{fixed, list_or_range, mean};
 
 /// Most dots drawn for one cell.
 const DOTS: usize = 150;
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let panels = panel_per_run(runs, "way since the cycle began, mm", picture)?;
+    let panels = panel_per_run(runs, "displacement since the cycle began, mm", picture)?;
     let mut keys = cell_keys(runs.cells(), Mark::Thick);
     keys.extend([
         Key::new(Mark::Line, MUTED, "thin: the tip sticks"),
@@ -25,14 +25,14 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     ]);
     Ok(Figure {
         id: "closeup",
-        title: "One cycle in close-up: sticking and sliding".to_owned(),
+        title: "One cycle in close-up: sticking and sliding",
         keys,
         panels,
         caption: caption(runs),
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::of_cycles(run, 1);
     let series = &run.series;
     let from_start = |list, cell| window.points_from_start(of_cell(list, cell), 1e3);
@@ -47,7 +47,7 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
         lines.chain(measured(cell)).map(|(_, mm)| mm)
     });
     let sheet = Sheet {
-        description: format!("Way of each cell over {} at {name}", window.name()),
+        description: format!("Displacement of each cell over {} at {name}", window.name()),
         x_label: Some("time since the cycle began, s".to_owned()),
         x: window.time_axis(),
         rows: vec![Row::new(Axis::around(heights, 6), 330.0)],
@@ -55,7 +55,7 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
     let colours = cell_colours(run.cells);
     draw(&sheet, |_, plot| {
         window.draw_steps(plot, &colours, true)?;
-        plot.level(0.0, Stroke::new(MUTED, 0.75))?;
+        plot.horizontal_line(0.0, Stroke::new(MUTED, 0.75))?;
         for (cell, &colour) in colours.iter().enumerate() {
             let every = window.samples.len().div_ceil(DOTS).max(1);
             plot.dots(
@@ -76,7 +76,7 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
     })
 }
 
-/// Marks where each stepping cell has made twice its first estimate: it loads from −δmax to δmax before it slides.
+/// Marks where each stepping cell has moved by twice its first estimate: it loads from −δmax to δmax before it slides.
 fn draw_onsets(
     plot: &mut Plot<'_, '_, '_>,
     window: &Window<'_>,
@@ -103,12 +103,12 @@ fn draw_onsets(
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let shown = runs.tell(|run| Some(Window::of_cycles(run, 1).name()));
-    let first = runs.tell(|run| {
+    let shown = runs.describe(|run| Some(Window::of_cycles(run, 1).name()));
+    let first = runs.describe(|run| {
         let list_mm: Vec<f64> = run.first_estimate.max_deformation_m.iter().map(|m| m * 1e3).collect();
         Some(list_or_range(&list_mm, 2, "mm"))
     });
-    let apart = runs.tell(|run| {
+    let apart = runs.describe(|run| {
         distance_to_path_m(run).map(|m| format!("{} mm (noise: {} mm)", fixed(m * 1e3, 3), fixed(run.noise_m * 1e3, 3)))
     });
     let apart = if apart.is_empty() {
@@ -119,9 +119,9 @@ fn caption(runs: Runs<'_>) -> String {
     let without = runs.without_theory();
     format!(
         "After figure 4 of the paper; shown: {shown}. While a cell steps, the others are pushed back; as a rule they rest as \
-         soon as it slides forward. The ring marks where the stepping cell has made twice its first estimate, the way from −δmax \
-         to δmax (first estimates, cell 1 first: {first}). The lines are theory's path, fitted to the positions, with what worm \
-         and canal drift from it; the dots say how well it fits{without}.{apart}"
+         soon as it slides forward. The ring marks where the stepping cell has moved by twice its first estimate, from −δmax \
+         to δmax (first estimates, cell 1 first: {first}). The lines are theory's path, fitted to the positions, plus the drift of worm \
+         and canal from it; the dots show how well it fits{without}.{apart}"
     )
 }
 

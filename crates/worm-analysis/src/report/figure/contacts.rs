@@ -1,11 +1,10 @@
 //! Contact points of the tips, figure 5 of the paper.
 
 use super::window::{Window, of_cell};
-use super::{cell_keys, panel_per_run};
+use super::{cell_keys, panel_per_run, slides_in_words};
 use crate::experiment::Analysis;
-use crate::report::number::{fixed, mean};
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
 
 /// Cycles shown.
@@ -17,14 +16,14 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     keys.push(Key::new(Mark::Band, MUTED, "step of the cell of that colour"));
     Ok(Figure {
         id: "contacts",
-        title: "Where the tips touch the canal".to_owned(),
+        title: "Where the tips touch the canal",
         keys,
         panels,
         caption: caption(runs),
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::of_cycles(run, CYCLES);
     let contact = |cell| window.points_from_start(of_cell(&run.series.contact_m, cell), 1e3);
     let heights = (0..run.cells).flat_map(|cell| contact(cell).map(|(_, mm)| mm));
@@ -45,17 +44,11 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let shown = runs.tell(|run| Some(Window::of_cycles(run, CYCLES).name()));
-    let slides = runs.tell(|run| {
-        Some(format!(
-            "{} mm forward and {} mm backward",
-            fixed(mean(&run.mean.forward_slide_m) * 1e3, 2),
-            fixed(mean(&run.mean.backward_slide_m) * 1e3, 2)
-        ))
-    });
+    let shown = runs.describe(|run| Some(Window::of_cycles(run, CYCLES).name()));
+    let slides = runs.describe(|run| Some(slides_in_words(&run.mean)));
     format!(
         "After figure 5 of the paper; shown: {shown}. A level line is a tip that sticks; a rise is a tip that slides forward \
-         in its own step; a fall is one that is pushed or pulled back over the canal. A tip slides per cycle, in the mean over \
+         in its own step; a fall is one that is pushed or pulled back over the canal. Slides of a tip per cycle, averaged over \
          the cells: {slides}."
     )
 }

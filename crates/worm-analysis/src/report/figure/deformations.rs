@@ -3,14 +3,14 @@
 use super::panel_per_run;
 use super::window::{Window, of_cell};
 use crate::experiment::Analysis;
-use crate::report::number::list_or_range;
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, DrawError, MUTED, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::list_or_range;
 
 /// Cycles shown.
 const CYCLES: usize = 2;
-/// Height of all strips together, and the least and most that one may have, units.
+/// Height of all strips together, and the smallest and largest of one, units.
 const ALL_STRIPS: f64 = 330.0;
 const STRIP: [f64; 2] = [42.0, 100.0];
 
@@ -18,7 +18,7 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     let panels = panel_per_run(runs, "tip deformation, mm", picture)?;
     Ok(Figure {
         id: "deformations",
-        title: "How far each tip is bent".to_owned(),
+        title: "How far each tip is bent",
         keys: vec![
             Key::new(Mark::Line, MUTED, "thin: the tip sticks"),
             Key::new(Mark::Thick, MUTED, "thick: it slides"),
@@ -30,7 +30,7 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::of_cycles(run, CYCLES);
     let colours = cell_colours(run.cells);
     let deformation = |cell| window.points(of_cell(&run.series.deformation_m, cell), 1e3);
@@ -44,7 +44,7 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
             .map(|(_, mm)| mm)
             .chain([bound_mm(cell), -bound_mm(cell)])
     });
-    // One scale for all strips, so that a softer or weaker tip is seen to be one.
+    // One scale for all strips, so that a softer or weaker tip stands out.
     let y = Axis::around(heights, 4);
     let height = (ALL_STRIPS / run.cells.max(1) as f64).clamp(STRIP[0], STRIP[1]);
     let strip = |(cell, colour): (usize, &_)| Row {
@@ -60,10 +60,10 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
     };
     draw(&sheet, |cell, plot| {
         window.draw_steps(plot, &colours, cell == 0)?;
-        plot.level(0.0, Stroke::new(MUTED, 0.75))?;
+        plot.horizontal_line(0.0, Stroke::new(MUTED, 0.75))?;
         let colour = colours[cell];
         for bound_mm in [bound_mm(cell), -bound_mm(cell)] {
-            plot.level(bound_mm, Stroke::new(colour, 0.9).dashed())?;
+            plot.horizontal_line(bound_mm, Stroke::new(colour, 0.9).dashed())?;
         }
         plot.line(deformation(cell), Stroke::new(colour, 1.2))?;
         plot.line(window.where_sliding(cell, deformation(cell)), Stroke::new(colour, 3.6))
@@ -71,8 +71,8 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let shown = runs.tell(|run| Some(Window::of_cycles(run, CYCLES).name()));
-    let bounds = runs.tell(|run| {
+    let shown = runs.describe(|run| Some(Window::of_cycles(run, CYCLES).name()));
+    let bounds = runs.describe(|run| {
         let list_mm: Vec<f64> = run.max_deformation_m.iter().map(|m| m * 1e3).collect();
         Some(list_or_range(&list_mm, 2, "mm"))
     });

@@ -1,29 +1,27 @@
 //! Energy per cycle by both methods, against theory and rigid contacts, figure 8 of the paper.
 
+use super::bar::{Bar, theory_keys};
 use crate::experiment::{Analysis, CycleValues};
-use crate::report::number::{fixed, with_error};
 use crate::report::page::{Figure, Key, Mark, Panel};
-use crate::report::plot::{Axis, Colour, DrawError, INK, LIGHT, MID, MUTED, Row, SHADE, Sheet, Stroke, draw};
+use crate::report::plot::{Axis, Colour, DrawError, LIGHT, MID, MUTED, Row, SHADE, Sheet, Stroke, Svg, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{fixed, with_error};
 
-/// How bars stand, in places.
+/// Half the width of a bar and the distance between bars, in places.
 struct Layout {
     half_bar: f64,
     pitch: f64,
-    foot: f64,
 }
 
 /// The bars of a slope together at its place.
 const GROUPED: Layout = Layout {
     half_bar: 0.085,
     pitch: 0.2,
-    foot: 0.03,
 };
-/// Each bar at a place of its own, where there is but one slope.
+/// Each bar at a place of its own, where there is only one slope.
 const APART: Layout = Layout {
     half_bar: 0.3,
     pitch: 1.0,
-    foot: 0.08,
 };
 
 /// A way to count the energy of a cycle.
@@ -57,38 +55,33 @@ pub(super) const METHODS: [Method; 3] = [
 ];
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let mut keys: Vec<Key> = METHODS
+    let methods = METHODS
         .iter()
-        .map(|method| Key::new(Mark::Box, method.colour, method.name))
-        .collect();
-    keys.extend([
-        Key::new(Mark::Frame, MUTED, "rigid contacts, same advance"),
-        Key::new(Mark::Diamond, INK, "theory, identified worm"),
-        Key::new(Mark::Ring, INK, "theory, configured worm"),
-    ]);
+        .map(|method| Key::new(Mark::Box, method.colour, method.name));
+    let rigid = Key::new(Mark::Frame, MUTED, "rigid contacts, same advance");
+    let keys = methods.chain([rigid]).chain(theory_keys()).collect();
     Ok(Figure {
         id: "energy",
-        title: "What a cycle costs".to_owned(),
+        title: "What a cycle costs",
         keys,
-        panels: vec![Panel {
-            title: "energy per cycle".to_owned(),
-            quantity: if runs.0.len() > 1 { "mJ, by slope" } else { "mJ" }.to_owned(),
-            svg: picture(runs)?,
-        }],
+        panels: vec![Panel::new(
+            "energy per cycle",
+            if runs.0.len() > 1 { "mJ, by slope" } else { "mJ" },
+            picture(runs)?,
+        )],
         caption: caption(runs),
     })
 }
 
-fn picture(runs: Runs<'_>) -> Result<String, DrawError> {
-    let heights = runs.0.iter().flat_map(|run| {
-        let theory = run.theory.identified.iter().chain(&run.theory.nominal);
-        let theory = theory.map(|theory| theory.values.energy_actuator_positive_j * 1e3);
-        let measured = METHODS.iter().flat_map(|method| {
-            let (mean_j, std_j) = ((method.of)(&run.mean), (method.of)(&run.std));
-            [mean_j * 1e3, (mean_j + std_j) * 1e3, (mean_j - std_j) * 1e3]
-        });
-        theory.chain(measured).chain([0.0, run.rigid_energy_j * 1e3])
-    });
+fn picture(runs: Runs<'_>) -> Result<Svg, DrawError> {
+    let bars: Vec<[Bar; 3]> = runs
+        .0
+        .iter()
+        .map(|run| METHODS.each_ref().map(|method| Bar::of(run, method.of)))
+        .collect();
+    let rigid_mj = runs.0.iter().map(|run| run.rigid_energy_j * 1e3);
+    let heights = bars.iter().flatten().flat_map(Bar::heights);
+    let heights = heights.chain(rigid_mj.clone()).chain([0.0]);
     let (layout, first, places) = match runs.0 {
         [_] => {
             let methods = METHODS.iter().map(|method| method.short).chain(["rigid"]);
@@ -103,44 +96,33 @@ fn picture(runs: Runs<'_>) -> Result<String, DrawError> {
         rows: vec![Row::new(Axis::around(heights, 6), 320.0)],
     };
     draw(&sheet, |_, plot| {
-        plot.level(0.0, Stroke::new(MUTED, 1.0))?;
-        for (number, run) in runs.0.iter().enumerate() {
+        plot.horizontal_line(0.0, Stroke::new(MUTED, 1.0))?;
+        for (number, (bars, rigid_mj)) in bars.iter().zip(rigid_mj.clone()).enumerate() {
             let centre = |place: usize| number as f64 + first + place as f64 * layout.pitch;
-            for (place, method) in METHODS.iter().enumerate() {
-                let x = centre(place);
-                let ends = [x - layout.half_bar, x + layout.half_bar];
-                let mj = |values| (method.of)(values) * 1e3;
-                let (mean, std) = (mj(&run.mean), mj(&run.std));
-                plot.fill(ends, [0.0, mean], method.colour, 1.0)?;
-                plot.whisker(x, mean - std, mean + std, layout.foot)?;
-                if let Some(nominal) = &run.theory.nominal {
-                    plot.ring(x + 0.5 * layout.half_bar, mj(&nominal.values), INK)?;
-                }
-                if let Some(identified) = &run.theory.identified {
-                    plot.diamond(x - 0.5 * layout.half_bar, mj(&identified.values), INK)?;
-                }
+            for (place, (bar, method)) in bars.iter().zip(&METHODS).enumerate() {
+                bar.draw(plot, centre(place), layout.half_bar, method.colour, 1.0)?;
             }
             let x = centre(METHODS.len());
             let ends = [x - layout.half_bar, x + layout.half_bar];
-            plot.edge(ends, [0.0, run.rigid_energy_j * 1e3], Stroke::new(MUTED, 1.5))?;
+            plot.edge(ends, [0.0, rigid_mj], Stroke::new(MUTED, 1.5))?;
         }
         Ok(())
     })
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let told = |of: fn(&CycleValues) -> f64| {
-        runs.tell(|run| Some(format!("{} mJ", with_error(of(&run.mean) * 1e3, of(&run.std) * 1e3, 1))))
+    let measured = |of: fn(&CycleValues) -> f64| {
+        runs.describe(|run| Some(format!("{} mJ", with_error(of(&run.mean) * 1e3, of(&run.std) * 1e3, 1))))
     };
-    let losses = told(|values| values.energy_loss_j);
-    let net = told(|values| values.energy_actuator_net_j);
-    let theory = runs.tell(|run| {
+    let losses = measured(|values| values.energy_loss_j);
+    let net = measured(|values| values.energy_actuator_net_j);
+    let theory = runs.describe(|run| {
         let theory = run.theory.identified.as_ref()?;
         Some(format!("{} mJ", fixed(theory.values.energy_loss_j * 1e3, 1)))
     });
     let theory = if theory.is_empty() { "none".to_owned() } else { theory };
     let without = runs.without_theory();
-    let rigid = match runs.tell(|run| rigid_ratio(run).map(|ratio| format!("{} times", fixed(ratio, 2)))) {
+    let rigid = match runs.describe(|run| rigid_ratio(run).map(|ratio| format!("{} times", fixed(ratio, 2)))) {
         none if none.is_empty() => "Rigid contacts cannot be compared without an advance.".to_owned(),
         ratios => format!("Compliance costs {ratios} what rigid contacts would take for the same advance."),
     };

@@ -1,9 +1,10 @@
 //! The figures, one file for each family; their numbers are those of the paper.
 //!
-//! All draw the same things alike: a cell has one colour, a thin line sticks and a thick one slides, bars are what was
-//! measured, a diamond is theory with the worm identified here and a ring theory with the worm as configured.
+//! All share one style: a cell has one colour, a thin line sticks and a thick one slides, bars are measured values,
+//! a diamond is theory with the worm identified here and a ring theory with the worm as configured.
 
 mod balance;
+mod bar;
 mod closeup;
 mod contacts;
 mod deformations;
@@ -15,9 +16,10 @@ mod trend;
 mod window;
 
 use super::page::{Figure, Key, Mark, Panel};
-use super::plot::{DrawError, cell_colours};
+use super::plot::{DrawError, Svg, cell_colours};
 use super::runs::Runs;
-use crate::experiment::Analysis;
+use crate::experiment::{Analysis, CycleValues};
+use worm_estimator::number::{fixed, mean};
 
 pub(super) use energy::rigid_ratio;
 pub(super) use schematic::schematic;
@@ -40,15 +42,12 @@ pub(super) fn all(runs: Runs<'_>) -> Result<Vec<Figure>, DrawError> {
 fn panel_per_run(
     runs: Runs<'_>,
     quantity: &str,
-    picture: impl Fn(&str, &Analysis) -> Result<String, DrawError>,
+    picture: impl Fn(&str, &Analysis) -> Result<Svg, DrawError>,
 ) -> Result<Vec<Panel>, DrawError> {
     runs.named()
         .map(|(name, run)| {
-            Ok(Panel {
-                svg: picture(&name, run)?,
-                title: name,
-                quantity: quantity.to_owned(),
-            })
+            let svg = picture(&name, run)?;
+            Ok(Panel::new(name, quantity, svg))
         })
         .collect()
 }
@@ -60,4 +59,14 @@ fn cell_keys(cells: usize, mark: Mark) -> Vec<Key> {
         .enumerate()
         .map(|(cell, colour)| Key::new(mark, colour, format!("cell {}", cell + 1)))
         .collect()
+}
+
+/// The slides of a tip in a cycle, averaged over the cells.
+fn slides_in_words(values: &CycleValues) -> String {
+    let mm = |list_m: &[f64]| fixed(mean(list_m) * 1e3, 2);
+    format!(
+        "{} mm forward and {} mm backward",
+        mm(&values.forward_slide_m),
+        mm(&values.backward_slide_m)
+    )
 }

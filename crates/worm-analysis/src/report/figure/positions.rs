@@ -3,10 +3,10 @@
 use super::window::{Window, of_cell};
 use super::{cell_keys, panel_per_run};
 use crate::experiment::Analysis;
-use crate::report::number::{fixed, with_error};
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, DrawError, GRID, Row, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, DrawError, GRID, Row, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{fixed, with_error};
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     let panels = panel_per_run(runs, "position along the canal, mm", picture)?;
@@ -14,14 +14,14 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     keys.push(Key::new(Mark::Thick, GRID, "pale and wide: as measured"));
     Ok(Figure {
         id: "positions",
-        title: "The worm crawls: position of every cell".to_owned(),
+        title: "The worm crawls: position of every cell",
         keys,
         panels,
         caption: caption(runs),
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let window = Window::whole(run);
     let series = &run.series;
     let origin_m = origin_m(run);
@@ -50,7 +50,7 @@ fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
     })
 }
 
-/// Where the hindmost cell is first seen: the figure counts from there, for the zero of a tracker says nothing.
+/// Where the hindmost cell is first seen: the figure counts from there, because the zero of a tracker is arbitrary.
 fn origin_m(run: &Analysis) -> f64 {
     let window = Window::whole(run);
     let firsts = (0..run.cells).map(|cell| window.origin(of_cell(&run.series.position_m, cell)));
@@ -59,14 +59,14 @@ fn origin_m(run: &Analysis) -> f64 {
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let advance = runs.tell(|run| {
+    let advance = runs.describe(|run| {
         Some(format!(
             "{} mm",
             with_error(run.mean.advance_m * 1e3, run.std.advance_m * 1e3, 2)
         ))
     });
-    let noise = runs.tell(|run| Some(format!("{} mm", fixed(run.noise_m * 1e3, 3))));
-    let seen = runs.tell(|run| {
+    let noise = runs.describe(|run| Some(format!("{} mm", fixed(run.noise_m * 1e3, 3))));
+    let seen = runs.describe(|run| {
         let all = run.series.measured_m.iter().flatten().count();
         let missing = run
             .series
@@ -80,7 +80,7 @@ fn caption(runs: Runs<'_>) -> String {
     let gaps = if seen.is_empty() {
         String::new()
     } else {
-        format!(" Not seen were {seen} of the positions; there the pale trace breaks.")
+        format!(" The tracker missed {seen} of the positions; there the pale trace breaks.")
     };
     format!(
         "After figure 3 of the paper. Once in a cycle each cell steps forward relative to the others; in their steps it is pushed \

@@ -1,7 +1,7 @@
 //! A small picture of the worm in its canal.
 
 use crate::experiment::Analysis;
-use crate::report::plot::{DrawError, INK, MID, MUTED, Raw, Stroke, cell_colours};
+use crate::report::plot::{DrawError, INK, MID, MUTED, Raw, Stroke, Svg, cell_colours};
 
 /// Length of the canal shown, units; the picture is a little wider.
 const LENGTH: f64 = 150.0;
@@ -24,7 +24,7 @@ impl Canal {
 }
 
 /// The worm in its canal at its slope.
-pub(in crate::report) fn schematic(run: &Analysis) -> Result<String, DrawError> {
+pub(in crate::report) fn schematic(run: &Analysis) -> Result<Svg, DrawError> {
     let slope_rad = if run.slope_deg.is_finite() {
         run.slope_deg.to_radians()
     } else {

@@ -1,174 +1,60 @@
 //! Forward and backward slides per cycle against theory, figure 7 of the paper.
 
+use super::bar::{Bar, theory_keys};
+use super::slides_in_words;
 use crate::experiment::{Analysis, CycleValues};
-use crate::report::number::{count, fixed, mean};
 use crate::report::page::{Figure, Key, Mark, Panel};
-use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, SHADE, Sheet, Stroke, cell_colours, draw};
+use crate::report::plot::{Axis, Colour, DrawError, MUTED, Row, SHADE, Sheet, Stroke, Svg, cell_colours, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{count, fixed, mean};
 
 /// Half the width of a bar, in places.
 const HALF_BAR: f64 = 0.3;
-const FOOT: f64 = 0.08;
+/// Opacity of the forward and the backward slide.
+const OPACITY: [f64; 2] = [1.0, 0.55];
 const HEIGHT: f64 = 270.0;
 
-/// Least slide that is more than 0 as the figure says it, m.
-const SEEN_M: f64 = 5e-6;
+/// Smallest slide that does not round to 0, m.
+const MIN_SLIDE_M: f64 = 5e-6;
 
-/// A forward and a backward slide, mm; the backward one counted negative, as it is drawn.
-#[derive(Clone, Copy)]
-struct Pair {
-    forward_mm: f64,
-    backward_mm: f64,
-}
+/// Forward and backward slide averaged over the cells, m; the backward one negative, as it is drawn.
+const AVERAGES: [fn(&CycleValues) -> f64; 2] = [
+    |values| mean(&values.forward_slide_m),
+    |values| -mean(&values.backward_slide_m),
+];
 
-impl Pair {
-    fn of_cell(values: &CycleValues, cell: usize) -> Self {
-        let mm = |list: &[f64]| list.get(cell).map_or(f64::NAN, |slide_m| slide_m * 1e3);
-        Self {
-            forward_mm: mm(&values.forward_slide_m),
-            backward_mm: -mm(&values.backward_slide_m),
-        }
-    }
-
-    fn averaged(values: &CycleValues) -> Self {
-        Self {
-            forward_mm: mean(&values.forward_slide_m) * 1e3,
-            backward_mm: -mean(&values.backward_slide_m) * 1e3,
-        }
-    }
-
-    fn both(self) -> [f64; 2] {
-        [self.forward_mm, self.backward_mm]
-    }
-}
-
-/// What stands at one place: bars with whiskers, and theory.
+/// The forward and the backward slide at one place.
 struct Place {
     name: String,
     colour: Colour,
-    measured: Pair,
-    std: Pair,
-    identified: Option<Pair>,
-    nominal: Option<Pair>,
+    slides: [Bar; 2],
 }
 
 impl Place {
-    fn new(name: String, colour: Colour, run: &Analysis, pair: impl Fn(&CycleValues) -> Pair, std: Pair) -> Self {
+    fn of_cell(run: &Analysis, cell: usize, colour: Colour) -> Self {
+        let of_cell = |list_m: &[f64]| list_m.get(cell).copied().unwrap_or(f64::NAN);
+        Self {
+            name: (cell + 1).to_string(),
+            colour,
+            slides: [
+                Bar::of(run, |values| of_cell(&values.forward_slide_m)),
+                Bar::of(run, |values| -of_cell(&values.backward_slide_m)),
+            ],
+        }
+    }
+
+    fn averaged(name: String, run: &Analysis) -> Self {
+        // Not the mean of the cells' deviations, because the cells' slides depend on each other.
+        let settled = || run.cycles.iter().filter(|cycle| cycle.settled);
+        let bar = |average: fn(&CycleValues) -> f64| Bar {
+            std: deviation(settled().map(|cycle| average(&cycle.values) * 1e3)),
+            ..Bar::of(run, average)
+        };
         Self {
             name,
-            colour,
-            measured: pair(&run.mean),
-            std,
-            identified: run.theory.identified.as_ref().map(|theory| pair(&theory.values)),
-            nominal: run.theory.nominal.as_ref().map(|theory| pair(&theory.values)),
+            colour: SHADE,
+            slides: AVERAGES.map(bar),
         }
-    }
-
-    fn heights(&self) -> impl Iterator<Item = f64> {
-        let theory = self.identified.into_iter().chain(self.nominal).flat_map(Pair::both);
-        let whiskers = self.measured.both().into_iter().zip(self.std.both());
-        let whiskers = whiskers.flat_map(|(value, std)| [value, value - std.abs(), value + std.abs()]);
-        theory.chain(whiskers)
-    }
-
-    fn draw(&self, plot: &mut Plot<'_, '_, '_>, x: f64) -> Result<(), DrawError> {
-        let sides = self.measured.both().into_iter().zip(self.std.both());
-        for ((height, std), opacity) in sides.zip([1.0, 0.55]) {
-            plot.fill([x - HALF_BAR, x + HALF_BAR], [0.0, height], self.colour, opacity)?;
-            plot.whisker(x, height - std.abs(), height + std.abs(), FOOT)?;
-        }
-        if let Some(nominal) = self.nominal {
-            for height in nominal.both() {
-                plot.ring(x + 0.16, height, INK)?;
-            }
-        }
-        if let Some(identified) = self.identified {
-            for height in identified.both() {
-                plot.diamond(x - 0.16, height, INK)?;
-            }
-        }
-        Ok(())
-    }
-}
-
-pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
-    let averaged = |name, run| Place::new(name, SHADE, run, Pair::averaged, averaged_std(run));
-    let mut groups = Vec::new();
-    for (name, run) in runs.named() {
-        let places = cell_colours(run.cells).into_iter().enumerate().map(|(cell, colour)| {
-            let std = Pair::of_cell(&run.std, cell);
-            let pair = |values: &CycleValues| Pair::of_cell(values, cell);
-            Place::new((cell + 1).to_string(), colour, run, pair, std)
-        });
-        groups.push((name, places.collect::<Vec<_>>()));
-    }
-    // The mean of the cells is compared over the slopes; where there is but one, it stands beside the cells.
-    match (runs.0, &mut groups[..]) {
-        ([run], [(_, places)]) => places.push(averaged("mean".to_owned(), run)),
-        _ => {
-            let all = runs.named().map(|(name, run)| averaged(name, run)).collect();
-            groups.insert(0, ("mean of the cells".to_owned(), all));
-        }
-    }
-    // One scale for all panels, so that they can be compared.
-    let y = Axis::around(
-        groups
-            .iter()
-            .flat_map(|(_, places)| places)
-            .flat_map(Place::heights)
-            .chain([0.0]),
-        6,
-    );
-    let mut panels = Vec::new();
-    for (number, (title, places)) in groups.into_iter().enumerate() {
-        let by_slope = number == 0 && runs.0.len() > 1;
-        panels.push(Panel {
-            svg: picture(&title, &places, &y, (!by_slope).then_some("cell"))?,
-            title,
-            quantity: "slide per cycle, mm: forward up, backward down".to_owned(),
-        });
-    }
-    Ok(Figure {
-        id: "slides",
-        title: "How far the tips slide".to_owned(),
-        keys: vec![
-            Key::new(
-                Mark::Box,
-                SHADE,
-                "measured, in the colour of the cell; whiskers: standard deviation over the cycles",
-            ),
-            Key::new(Mark::Diamond, INK, "theory, identified worm"),
-            Key::new(Mark::Ring, INK, "theory, configured worm"),
-        ],
-        panels,
-        caption: caption(runs),
-    })
-}
-
-fn picture(name: &str, places: &[Place], y: &Axis, x_label: Option<&str>) -> Result<String, DrawError> {
-    let sheet = Sheet {
-        description: format!("Forward and backward slide per cycle, {name}"),
-        x_label: x_label.map(str::to_owned),
-        x: Axis::named(places.iter().map(|place| place.name.clone()).collect()),
-        rows: vec![Row::new(y.clone(), HEIGHT)],
-    };
-    draw(&sheet, |_, plot| {
-        plot.level(0.0, Stroke::new(MUTED, 1.0))?;
-        for (number, place) in places.iter().enumerate() {
-            place.draw(plot, number as f64)?;
-        }
-        Ok(())
-    })
-}
-
-/// Standard deviation over the settled cycles of the slides averaged over the cells: not the mean of the cells' deviations,
-/// for the cells' slides depend on each other.
-fn averaged_std(run: &Analysis) -> Pair {
-    let settled = || run.cycles.iter().filter(|cycle| cycle.settled);
-    let pairs: Vec<Pair> = settled().map(|cycle| Pair::averaged(&cycle.values)).collect();
-    Pair {
-        forward_mm: deviation(pairs.iter().map(|pair| pair.forward_mm)),
-        backward_mm: deviation(pairs.iter().map(|pair| pair.backward_mm)),
     }
 }
 
@@ -179,33 +65,75 @@ fn deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt()
 }
 
+pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
+    let of_cells = |run: &Analysis| {
+        let colours = cell_colours(run.cells).into_iter().enumerate();
+        let places = colours.map(|(cell, colour)| Place::of_cell(run, cell, colour));
+        places.collect::<Vec<_>>()
+    };
+    let mut groups: Vec<(String, Vec<Place>)> = runs.named().map(|(name, run)| (name, of_cells(run))).collect();
+    // The mean of the cells is compared over the slopes; where there is but one, it is beside the cells.
+    match (runs.0, &mut groups[..]) {
+        ([run], [(_, places)]) => places.push(Place::averaged("mean".to_owned(), run)),
+        _ => {
+            let all = runs.named().map(|(name, run)| Place::averaged(name, run)).collect();
+            groups.insert(0, ("mean of the cells".to_owned(), all));
+        }
+    }
+    // One scale for all panels, so that they can be compared.
+    let places = groups.iter().flat_map(|(_, places)| places);
+    let heights = places.flat_map(|place| &place.slides).flat_map(Bar::heights);
+    let y = Axis::around(heights.chain([0.0]), 6);
+    let mut panels = Vec::new();
+    for (number, (title, places)) in groups.into_iter().enumerate() {
+        let by_slope = number == 0 && runs.0.len() > 1;
+        let svg = picture(&title, &places, &y, (!by_slope).then_some("cell"))?;
+        panels.push(Panel::new(title, "slide per cycle, mm: forward up, backward down", svg));
+    }
+    let measured = "measured, in the colour of the cell; whiskers: standard deviation over the cycles";
+    let keys = [Key::new(Mark::Box, SHADE, measured)].into_iter().chain(theory_keys());
+    Ok(Figure {
+        id: "slides",
+        title: "How far the tips slide",
+        keys: keys.collect(),
+        panels,
+        caption: caption(runs),
+    })
+}
+
+fn picture(name: &str, places: &[Place], y: &Axis, x_label: Option<&str>) -> Result<Svg, DrawError> {
+    let sheet = Sheet {
+        description: format!("Forward and backward slide per cycle, {name}"),
+        x_label: x_label.map(str::to_owned),
+        x: Axis::named(places.iter().map(|place| place.name.clone()).collect()),
+        rows: vec![Row::new(y.clone(), HEIGHT)],
+    };
+    draw(&sheet, |_, plot| {
+        plot.horizontal_line(0.0, Stroke::new(MUTED, 1.0))?;
+        for (number, place) in places.iter().enumerate() {
+            for (bar, opacity) in place.slides.iter().zip(OPACITY) {
+                bar.draw(plot, number as f64, HALF_BAR, place.colour, opacity)?;
+            }
+        }
+        Ok(())
+    })
+}
+
 fn caption(runs: Runs<'_>) -> String {
-    let slides = |pair: Pair| {
-        format!(
-            "{} mm forward and {} mm backward",
-            fixed(pair.forward_mm, 2),
-            fixed(-pair.backward_mm, 2)
-        )
+    let measured = runs.describe(|run| Some(slides_in_words(&run.mean)));
+    let theory = match runs.describe(|run| Some(slides_in_words(&run.theory.identified.as_ref()?.values))) {
+        none if none.is_empty() => "there is no theory to compare".to_owned(),
+        theory => format!("theory predicts {theory} for the identified worm"),
     };
-    let measured = runs.tell(|run| Some(slides(Pair::averaged(&run.mean))));
-    let theory = runs.tell(|run| {
-        let theory = run.theory.identified.as_ref()?;
-        Some(slides(Pair::averaged(&theory.values)))
-    });
-    let theory = if theory.is_empty() {
-        "there is no theory to compare".to_owned()
-    } else {
-        format!("theory says for the identified worm {theory}")
-    };
-    let cycles = runs.tell(|run| {
+    let cycles = runs.describe(|run| {
         let settled = run.cycles.iter().filter(|cycle| cycle.settled).count();
         Some(count(settled, "settled cycle"))
     });
     let without = runs.without_theory();
     let max = most_backward(runs);
     format!(
-        "After figure 7 of the paper. Slide of a tip per cycle, over {cycles}. In the mean over the cells a tip \
-         slides {measured}; {theory}{without}.{max}"
+        "After figure 7 of the paper. Slide of a tip per cycle, over {cycles}. Averaged over the cells, a tip slides {measured}; \
+         {theory}{without}.{max}"
     )
 }
 
@@ -217,8 +145,8 @@ fn most_backward(runs: Runs<'_>) -> String {
     });
     let known = cells.filter(|(_, _, slide_m)| slide_m.is_finite());
     match known.max_by(|one, other| one.2.total_cmp(&other.2)) {
-        Some((name, cell, slide_m)) if slide_m >= SEEN_M => format!(
-            " Furthest back slides cell {}, by {} mm at {name}: the tip that holds least, or the one that is loaded most.",
+        Some((name, cell, slide_m)) if slide_m >= MIN_SLIDE_M => format!(
+            " Cell {} slides back furthest, by {} mm at {name}: its tip holds least, or is loaded most.",
             cell + 1,
             fixed(slide_m * 1e3, 2)
         ),

@@ -1,12 +1,12 @@
-//! Advance and energy over the cycles: does anything drift?
+//! Advance and energy over the cycles, to show any drift.
 
 use super::energy::METHODS;
 use super::panel_per_run;
 use crate::experiment::{Analysis, CycleResult};
-use crate::report::number::{count, fixed};
 use crate::report::page::{Figure, Key, Mark};
-use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, draw};
+use crate::report::plot::{Axis, Colour, DrawError, INK, MUTED, Plot, Row, Sheet, Stroke, Svg, draw};
 use crate::report::runs::Runs;
+use worm_estimator::number::{count, fixed};
 
 pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     let panels = panel_per_run(runs, "above: advance, mm; below: energy, mJ", picture)?;
@@ -22,14 +22,14 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Figure, DrawError> {
     ]);
     Ok(Figure {
         id: "trend",
-        title: "Cycle after cycle".to_owned(),
+        title: "Cycle after cycle",
         keys,
         panels,
         caption: caption(runs),
     })
 }
 
-fn picture(name: &str, run: &Analysis) -> Result<String, DrawError> {
+fn picture(name: &str, run: &Analysis) -> Result<Svg, DrawError> {
     let cycle_numbers = run.cycles.iter().map(|cycle| cycle.index as f64 + 1.0);
     let advances = run.cycles.iter().map(|cycle| cycle.values.advance_m * 1e3);
     let energies = METHODS.iter().flat_map(|method| {
@@ -69,7 +69,7 @@ fn draw_trend(
     of: impl Fn(&CycleResult) -> f64,
 ) -> Result<(), DrawError> {
     let points = || run.cycles.iter().map(|cycle| (cycle.index as f64 + 1.0, of(cycle)));
-    plot.level(mean, Stroke::new(colour, 1.2).dashed())?;
+    plot.horizontal_line(mean, Stroke::new(colour, 1.2).dashed())?;
     plot.line(points(), Stroke::new(colour, 1.4))?;
     for (cycle, (x, y)) in run.cycles.iter().zip(points()) {
         if cycle.settled {
@@ -82,14 +82,14 @@ fn draw_trend(
 }
 
 fn caption(runs: Runs<'_>) -> String {
-    let cycles = runs.tell(|run| {
+    let cycles = runs.describe(|run| {
         let settled = run.cycles.iter().filter(|cycle| cycle.settled).count();
         Some(format!(
             "{}, {settled} of them settled",
             count(run.cycles.len(), "cycle")
         ))
     });
-    let scatter = runs.tell(|run| {
+    let scatter = runs.describe(|run| {
         let fraction = 100.0 * run.std.energy_loss_j / run.mean.energy_loss_j.abs();
         fraction.is_finite().then(|| {
             if fraction < 0.05 {

@@ -1,12 +1,12 @@
-//! A look at a few cycles of a run, and what is drawn in each: steps, slides.
+//! A window of a few cycles of a run, with its steps and slides.
 
 use crate::experiment::Analysis;
 use crate::report::plot::{Axis, Colour, DrawError, Plot};
 use std::ops::Range;
 
-/// Share of the distance between samples by which a sample may miss a window's edge.
+/// How far a sample may miss a window's edge, as a fraction of the last cycle.
 const EDGE: f64 = 1e-6;
-/// Strength of the bands that mark steps.
+/// Opacity of the bands that mark steps.
 const BAND: f64 = 0.09;
 
 /// A few whole cycles of a run.
@@ -62,7 +62,7 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// What it shows, in words: `cycle 2`, `cycles 2 and 3`, `cycles 2 to 4`, counted from 1 as people do.
+    /// Its name: `cycle 2`, `cycles 2 and 3`, `cycles 2 to 4`, counted from 1.
     pub fn name(&self) -> String {
         match (self.first_cycle, self.cycles) {
             (None | Some(_), 0) | (None, _) => "the whole recording".to_owned(),
@@ -127,8 +127,8 @@ impl<'a> Window<'a> {
         steps
     }
 
-    /// Marks the steps with a pale band in the colour of the cell that makes it, and numbers them where asked to and where
-    /// there is room for every number.
+    /// Marks the steps with a pale band in the colour of the cell that makes it, and numbers them if `named` and there
+    /// is room for every number.
     pub fn draw_steps(&self, plot: &mut Plot<'_, '_, '_>, colours: &[Colour], named: bool) -> Result<(), DrawError> {
         let time_s = &self.run.series.time_s;
         let since_start_s = |at_s: f64| at_s.max(self.start_s).min(self.end_s) - self.start_s;
@@ -143,7 +143,7 @@ impl<'a> Window<'a> {
                 bands.push((cell, ends, colour));
             }
         }
-        // The steps at the window's ends may be cut short, so the longest tells how long a step is.
+        // The steps at the window's ends may be cut short, so the longest shows how long a step is.
         let longest_s = bands.iter().map(|(_, ends, _)| ends[1] - ends[0]).fold(0.0, f64::max);
         let named = named && plot.has_room(longest_s, colours.len().to_string().len());
         for (cell, ends, colour) in bands {

@@ -1,26 +1,26 @@
 //! Axes with round ticks whose labels all have the same decimals.
 
-use crate::report::number;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
+use worm_estimator::number;
 
 /// Values beyond this are not drawn: no quantity of a worm, in mm, mJ, N or s, comes near it.
 const LARGEST: f64 = 1e9;
-/// Narrowest axis, and as a share of the values on it: below that, ticks would differ by rounding only.
+/// Narrowest axis, and as a fraction of the values on it: below that, ticks would differ only by rounding.
 const NARROWEST: f64 = 1e-6;
-/// Places that a picture has room for at least, so that a single bar does not fill it.
+/// Smallest number of places that an axis has room for, so that a single bar does not fill the picture.
 const FEW_PLACES: f64 = 3.0;
-/// Room beyond the outermost values, as a share of their range.
+/// Room beyond the outermost values, as a fraction of their range.
 const MARGIN: f64 = 0.05;
-/// Room beyond the largest value of a logarithmic axis, as a share of its decades: what stands behind a bar must fit.
+/// Room beyond the largest value of a logarithmic axis, as a fraction of its decades: the text beside a bar must fit.
 const ROOM_BEHIND: f64 = 0.16;
 /// Most ticks of a logarithmic axis.
 const MAX_POWERS: usize = 6;
 /// Room beyond the outermost values of a logarithmic axis, as a factor.
 const LOGARITHMIC_MARGIN: f64 = 1.05;
-/// Room behind the end of a logarithmic axis for half of the tick's name there, as a share of its decades.
+/// Room beyond the end of a logarithmic axis for half of the tick's label there, as a fraction of its decades.
 const HALF_NAME: f64 = 0.02;
-/// Fewer powers of ten than this leave an axis without scale: then twice and five times a power are told, too.
+/// Fewer powers of ten than this leave an axis without scale: then twice and five times a power have ticks, too.
 const FEW_POWERS: usize = 3;
 
 /// An axis: what it spans, where its ticks are and what they are called.
@@ -84,7 +84,7 @@ impl Axis {
         }
     }
 
-    /// Rows with names, as a list is read: the first stands on top, at the highest place, the last at place 0.
+    /// Rows with names in reading order: the first on top, at the highest place, the last at place 0.
     pub fn listed(mut names: Vec<String>) -> Self {
         names.reverse();
         Self {
@@ -94,9 +94,9 @@ impl Axis {
         }
     }
 
-    /// Logarithmic from `min`, a power of ten, to the largest value that can be drawn and some room behind it.
+    /// Logarithmic from `min`, a power of ten, to the largest value that can be drawn and some room beyond it.
     pub fn powers_of_ten(min: f64, values: impl IntoIterator<Item = f64>) -> Self {
-        let drawable = values.into_iter().filter(|value| Self::can_show(*value));
+        let drawable = values.into_iter().filter(|value| Self::is_drawable(*value));
         let largest = drawable.fold(10.0 * min, f64::max);
         let decades = (largest / min).log10();
         let high = min * 10f64.powf(decades * (1.0 + ROOM_BEHIND));
@@ -115,7 +115,7 @@ impl Axis {
     /// Logarithmic around two positive values, out to the next of 1, 2 or 5 times a power of ten, with ticks at the powers of
     /// ten and thousands written as `k`. From 1 to 10 where the values are none that it can hold.
     pub fn logarithmic(min: f64, largest: f64) -> Self {
-        let can_hold = 0.0 < min && min <= largest && Self::can_show(largest);
+        let can_hold = 0.0 < min && min <= largest && Self::is_drawable(largest);
         let (low, high) = if can_hold {
             let low = 1.0 / round_step(LOGARITHMIC_MARGIN / min);
             (low, round_step(LOGARITHMIC_MARGIN * largest))
@@ -151,7 +151,7 @@ impl Axis {
     }
 
     /// Whether a value can be drawn at all.
-    pub fn can_show(value: f64) -> bool {
+    pub fn is_drawable(value: f64) -> bool {
         value.abs() <= LARGEST
     }
 
@@ -179,7 +179,7 @@ impl Axis {
         }
     }
 
-    /// Where a value lies between its ends, as a share; what a logarithmic axis cannot hold lies at its low end.
+    /// Where a value lies between its ends, as a fraction; what a logarithmic axis cannot hold lies at its low end.
     pub(super) fn fraction(&self, value: f64) -> f64 {
         if self.is_logarithmic {
             return (value.max(self.low) / self.low).log10() / (self.high / self.low).log10();
@@ -190,7 +190,7 @@ impl Axis {
 
 /// The range of what can be drawn, never empty.
 fn bounds(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
-    let drawable = values.into_iter().filter(|value| Axis::can_show(*value));
+    let drawable = values.into_iter().filter(|value| Axis::is_drawable(*value));
     let (low, high) = drawable.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
     });

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::decimate;
 use super::palette::{Colour, GRID, INK, MUTED, PAPER};
-use super::raw::{Raw, TEXT, dots, text_size, text_style};
+use super::raw::{Raw, Svg, TEXT, dots, text_size, text_style};
 use plotters::prelude::{
     Cartesian2d, ChartBuilder, ChartContext, Circle, DrawingAreaErrorKind, EmptyElement, LabelAreaPosition,
     PathElement, Polygon, Rectangle, SVGBackend, Text,
@@ -15,7 +15,7 @@ use plotters::style::{Color, IntoFont, ShapeStyle};
 /// Width of a sheet, in units; text and lines are sized for about that many CSS pixels.
 const WIDTH: f64 = 600.0;
 const LEFT: f64 = 50.0;
-/// Width of a character of a name to the left, and of what else stands there.
+/// Width of a character of a name to the left, and of the space beside it.
 const NAME_CHARACTER: f64 = 0.53 * TEXT;
 const BESIDE_NAME: f64 = 14.0;
 const RIGHT: f64 = 10.0;
@@ -25,7 +25,7 @@ const TICK_LABELS: f64 = 24.0;
 const X_LABEL: f64 = 20.0;
 const BETWEEN_ROWS: f64 = 16.0;
 
-/// A picture could not be drawn. Drawing into memory has no reason to fail; it is reported rather than trusted.
+/// A picture could not be drawn. Drawing into memory should not fail, but the backend may report that it did.
 #[derive(Debug, thiserror::Error)]
 #[error("a figure could not be drawn: {0}")]
 pub struct DrawError(String);
@@ -39,9 +39,9 @@ impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for DrawE
 /// A picture: rows above each other over one horizontal axis.
 #[derive(Debug, Clone)]
 pub struct Sheet {
-    /// What it shows, for those who cannot see it.
+    /// What it shows, for readers who cannot see it.
     pub description: String,
-    /// What the horizontal axis is called; none for named places.
+    /// Label of the horizontal axis; none for named places.
     pub x_label: Option<String>,
     /// The horizontal axis.
     pub x: Axis,
@@ -56,12 +56,12 @@ pub struct Row {
     pub y: Axis,
     /// Height of its plot, units.
     pub height: f64,
-    /// What it is called, to its right, and in which colour.
+    /// Its label, to its right, and the label's colour.
     pub label: Option<(String, Colour)>,
 }
 
 impl Row {
-    /// A row without a name.
+    /// A row without a label.
     pub fn new(y: Axis, height: f64) -> Self {
         Self { y, height, label: None }
     }
@@ -97,7 +97,7 @@ impl Stroke {
         Self { dashed: true, ..self }
     }
 
-    /// As `plotters` wants it.
+    /// The style for `plotters`.
     pub(super) fn style(self) -> ShapeStyle {
         self.colour.mix(self.opacity).stroke_width(dots(self.width) as u32)
     }
@@ -105,7 +105,7 @@ impl Stroke {
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;
 
-/// One row while it is being drawn. Places are given in the values of its axes; what lies at no finite place is left out.
+/// One row while it is being drawn. Places are in the units of its axes; what has no finite place is left out.
 pub struct Plot<'p, 'a, 'b> {
     chart: &'p mut Chart<'a, 'b>,
     x: &'p Axis,
@@ -123,7 +123,7 @@ impl Plot<'_, '_, '_> {
         for piece in decimate::pieces(points) {
             let mut piece = decimate::thinned(&piece, self.x, columns);
             if let [alone] = piece[..] {
-                piece.push(alone); // A line from a point to itself has round ends and is seen as a dot.
+                piece.push(alone); // A line from a point to itself has round ends and shows as a dot.
             }
             self.draw_piece(piece, stroke)?;
         }
@@ -142,23 +142,34 @@ impl Plot<'_, '_, '_> {
         Ok(())
     }
 
-    /// A level line over the whole width.
+    /// A horizontal line over the whole width.
     ///
     /// # Errors
     /// [`DrawError`].
-    pub fn level(&mut self, y: f64, stroke: Stroke) -> Result<(), DrawError> {
+    pub fn horizontal_line(&mut self, y: f64, stroke: Stroke) -> Result<(), DrawError> {
         self.line([(self.x.low(), y), (self.x.high(), y)], stroke)
     }
 
-    /// An upright line at a place, from one height to another.
+    /// A vertical line at a place, from one height to another.
     ///
     /// # Errors
     /// [`DrawError`].
-    pub fn upright(&mut self, x: f64, from: f64, to: f64, stroke: Stroke) -> Result<(), DrawError> {
-        if [x, from, to].into_iter().all(Axis::can_show) {
+    pub fn vertical_line(&mut self, x: f64, from: f64, to: f64, stroke: Stroke) -> Result<(), DrawError> {
+        if [x, from, to].into_iter().all(Axis::is_drawable) {
             self.draw_piece(vec![(x, from), (x, to)], stroke)?;
         }
         Ok(())
+    }
+
+    /// A named threshold: a dashed vertical line at a place, from one height to another.
+    ///
+    /// # Errors
+    /// [`DrawError`].
+    pub fn threshold(&mut self, x: f64, y: [f64; 2], colour: Colour, name: &str) -> Result<(), DrawError> {
+        // Pale under the dashes, so that they show on a dark bar.
+        self.vertical_line(x, y[0], y[1], Stroke::new(PAPER, 3.0))?;
+        self.vertical_line(x, y[0], y[1], Stroke::new(INK, 1.5).dashed())?;
+        self.label_above(x, colour, name)
     }
 
     /// Dots, of a radius in units.
@@ -185,7 +196,7 @@ impl Plot<'_, '_, '_> {
     /// # Errors
     /// [`DrawError`].
     pub fn ring(&mut self, x: f64, y: f64, colour: Colour) -> Result<(), DrawError> {
-        if Axis::can_show(x) && Axis::can_show(y) {
+        if Axis::is_drawable(x) && Axis::is_drawable(y) {
             let edge = Circle::new((x, y), dots(3.8), Stroke::new(colour, 1.5).style());
             let ground = Circle::new((x, y), dots(3.8), PAPER.filled());
             self.chart.draw_series([ground, edge])?;
@@ -198,7 +209,7 @@ impl Plot<'_, '_, '_> {
     /// # Errors
     /// [`DrawError`].
     pub fn diamond(&mut self, x: f64, y: f64, colour: Colour) -> Result<(), DrawError> {
-        if Axis::can_show(x) && Axis::can_show(y) {
+        if Axis::is_drawable(x) && Axis::is_drawable(y) {
             for (reach, colour) in [(6.0, PAPER), (4.6, colour)] {
                 let r = dots(reach);
                 let corners = Polygon::new(vec![(0, -r), (r, 0), (0, r), (-r, 0)], colour.filled());
@@ -214,7 +225,7 @@ impl Plot<'_, '_, '_> {
     /// # Errors
     /// [`DrawError`].
     pub fn fill(&mut self, x: [f64; 2], y: [f64; 2], colour: Colour, opacity: f64) -> Result<(), DrawError> {
-        if x.into_iter().chain(y).all(Axis::can_show) {
+        if x.into_iter().chain(y).all(Axis::is_drawable) {
             let corners = [(x[0].min(x[1]), y[0].max(y[1])), (x[0].max(x[1]), y[0].min(y[1]))];
             let rectangle = Rectangle::new(corners, colour.mix(opacity).filled());
             self.chart.draw_series(std::iter::once(rectangle))?;
@@ -227,7 +238,7 @@ impl Plot<'_, '_, '_> {
     /// # Errors
     /// [`DrawError`].
     pub fn edge(&mut self, x: [f64; 2], y: [f64; 2], stroke: Stroke) -> Result<(), DrawError> {
-        if x.into_iter().chain(y).all(Axis::can_show) {
+        if x.into_iter().chain(y).all(Axis::is_drawable) {
             let corners = vec![(x[0], y[0]), (x[0], y[1]), (x[1], y[1]), (x[1], y[0]), (x[0], y[0])];
             let path = PathElement::new(corners, stroke.style());
             self.chart.draw_series(std::iter::once(path))?;
@@ -235,27 +246,27 @@ impl Plot<'_, '_, '_> {
         Ok(())
     }
 
-    /// Whether a name of so many characters fits above a band so wide.
+    /// Whether a label of this many characters fits above a band of this width.
     pub fn has_room(&self, width: f64, characters: usize) -> bool {
         let units = width / (self.x.high() - self.x.low()) * self.width;
         units > 0.6 * TEXT * characters as f64 + 4.0
     }
 
-    /// A band over the whole height between two places, with a name above it.
+    /// A band over the whole height between two places, with a label above it.
     ///
     /// # Errors
     /// [`DrawError`].
     pub fn band(&mut self, x: [f64; 2], colour: Colour, opacity: f64, name: &str) -> Result<(), DrawError> {
         self.fill(x, [self.y.low(), self.y.high()], colour, opacity)?;
-        self.name_above(0.5 * (x[0] + x[1]), colour, name)
+        self.label_above(0.5 * (x[0] + x[1]), colour, name)
     }
 
-    /// A name above the plot.
+    /// A label above the plot.
     ///
     /// # Errors
     /// [`DrawError`].
-    pub fn name_above(&mut self, centre: f64, colour: Colour, name: &str) -> Result<(), DrawError> {
-        if Axis::can_show(centre) && !name.is_empty() {
+    pub fn label_above(&mut self, centre: f64, colour: Colour, name: &str) -> Result<(), DrawError> {
+        if Axis::is_drawable(centre) && !name.is_empty() {
             let style = text_style(colour, HPos::Center, VPos::Bottom, true);
             let text = Text::new(name.to_owned(), (0, -dots(2.0)), style);
             self.chart
@@ -264,14 +275,14 @@ impl Plot<'_, '_, '_> {
         Ok(())
     }
 
-    /// Words that begin just behind a place.
+    /// Text that begins just right of a place.
     ///
     /// # Errors
     /// [`DrawError`].
-    pub fn words_behind(&mut self, x: f64, y: f64, colour: Colour, words: &str) -> Result<(), DrawError> {
-        if Axis::can_show(x) && Axis::can_show(y) {
+    pub fn text_beside(&mut self, x: f64, y: f64, colour: Colour, text: &str) -> Result<(), DrawError> {
+        if Axis::is_drawable(x) && Axis::is_drawable(y) {
             let style = text_style(colour, HPos::Left, VPos::Center, false);
-            let text = Text::new(words.to_owned(), (dots(5.0), 0), style);
+            let text = Text::new(text.to_owned(), (dots(5.0), 0), style);
             self.chart
                 .draw_series(std::iter::once(EmptyElement::at((x, y)) + text))?;
         }
@@ -289,8 +300,8 @@ impl Plot<'_, '_, '_> {
         opacity: f64,
     ) -> Result<(), DrawError> {
         let points: Vec<(f64, [f64; 2])> = points.into_iter().collect();
-        let can_show = |(x, y): &(f64, [f64; 2])| [*x, y[0], y[1]].into_iter().all(Axis::can_show);
-        for piece in points.split(|point| !can_show(point)) {
+        let is_drawable = |(x, y): &(f64, [f64; 2])| [*x, y[0], y[1]].into_iter().all(Axis::is_drawable);
+        for piece in points.split(|point| !is_drawable(point)) {
             if piece.len() < 2 {
                 continue; // It has no width.
             }
@@ -302,13 +313,13 @@ impl Plot<'_, '_, '_> {
         Ok(())
     }
 
-    /// A whisker: an upright line from one height to another with feet.
+    /// A whisker: a vertical line from one height to another with feet.
     ///
     /// # Errors
     /// [`DrawError`].
     pub fn whisker(&mut self, x: f64, from: f64, to: f64, foot: f64) -> Result<(), DrawError> {
         let stroke = Stroke::new(INK, 1.2);
-        self.upright(x, from, to, stroke)?;
+        self.vertical_line(x, from, to, stroke)?;
         for y in [from, to] {
             self.line([(x - foot, y), (x + foot, y)], stroke)?;
         }
@@ -316,14 +327,14 @@ impl Plot<'_, '_, '_> {
     }
 }
 
-/// Draws a sheet: `paint` is called for each row with its number, topmost first. Gives inline SVG.
+/// Draws a sheet as inline SVG: `paint` is called for each row with its number, topmost first.
 ///
 /// # Errors
 /// [`DrawError`].
 pub fn draw(
     sheet: &Sheet,
     mut paint: impl FnMut(usize, &mut Plot<'_, '_, '_>) -> Result<(), DrawError>,
-) -> Result<String, DrawError> {
+) -> Result<Svg, DrawError> {
     let rows_height: f64 = sheet.rows.iter().map(|row| row.height + BETWEEN_ROWS).sum();
     let longest_name = sheet.rows.iter().map(|row| row.y.longest_name()).max().unwrap_or(0);
     let left = (NAME_CHARACTER * longest_name as f64 + BESIDE_NAME).clamp(LEFT, 0.5 * WIDTH);
@@ -347,7 +358,7 @@ pub fn draw(
                 .set_label_area_size(LabelAreaPosition::Left, dots(left))
                 .set_label_area_size(LabelAreaPosition::Bottom, dots(tick_labels))
                 .build_cartesian_2d(sheet.x.clone(), row.y.clone())?;
-            // Between named rows a grid has nothing to say.
+            // Between named rows a grid means nothing.
             draw_axes(&mut chart, is_last, row.y.longest_name() == 0)?;
             let mut plot = Plot {
                 chart: &mut chart,
@@ -358,13 +369,13 @@ pub fn draw(
             paint(number, &mut plot)?;
             if let Some((label, colour)) = &row.label {
                 let place = (WIDTH - right + 4.0, top + 0.5 * row.height);
-                raw.words(place, label, text_style(*colour, HPos::Left, VPos::Center, true))?;
+                raw.text(place, label, text_style(*colour, HPos::Left, VPos::Center, true))?;
             }
             top += row.height + BETWEEN_ROWS;
         }
         if let Some(x_label) = &sheet.x_label {
             let place = (0.5 * (left + WIDTH - right), height - 2.0);
-            raw.words(place, x_label, text_style(MUTED, HPos::Center, VPos::Bottom, false))?;
+            raw.text(place, x_label, text_style(MUTED, HPos::Center, VPos::Bottom, false))?;
         }
         Ok(())
     })

@@ -1,4 +1,4 @@
-//! As much of a line as a picture can show.
+//! Thins lines to what a picture can show.
 
 use super::axis::Axis;
 
@@ -7,7 +7,7 @@ pub(super) fn pieces(points: impl IntoIterator<Item = (f64, f64)>) -> Vec<Vec<(f
     let mut pieces = Vec::new();
     let mut piece = Vec::new();
     for (x, y) in points {
-        if Axis::can_show(x) && Axis::can_show(y) {
+        if Axis::is_drawable(x) && Axis::is_drawable(y) {
             piece.push((x, y));
         } else if !piece.is_empty() {
             pieces.push(std::mem::take(&mut piece));

@@ -11,23 +11,25 @@ pub const INK: Colour = RGBColor(0x22, 0x2b, 0x36);
 pub const MUTED: Colour = RGBColor(0x6a, 0x75, 0x82);
 /// Grid lines.
 pub const GRID: Colour = RGBColor(0xe6, 0xea, 0xee);
-/// First of the three bars that stand beside each other.
+/// First of three bars side by side.
 pub const SHADE: Colour = RGBColor(0x3d, 0x52, 0x66);
 /// Second of them.
 pub const MID: Colour = RGBColor(0x83, 0x98, 0xab);
 /// Third of them.
 pub const LIGHT: Colour = RGBColor(0xc4, 0xd0, 0xda);
-/// What is to be seen first among them.
+/// What should catch the eye among them.
 pub const ACCENT: Colour = RGBColor(0xc8, 0x10, 0x2e);
-/// The ground.
+/// A value that reaches its aim. It is as dark as [`ACCENT`], so words must tell the two apart as well.
+pub const GOOD: Colour = RGBColor(0x00, 0x73, 0x4f);
+/// The background.
 pub const PAPER: Colour = RGBColor(0xff, 0xff, 0xff);
 
-/// What is measured, where something else stands before it.
+/// Measured data with something else drawn over it.
 pub const BLUE: Colour = RGBColor(0x00, 0x72, 0xb2);
-/// What stands before it; the colour-blind tell the two apart.
+/// What is drawn over it; the colour-blind can tell the two apart.
 pub const VERMILION: Colour = RGBColor(0xd5, 0x5e, 0x00);
 
-/// Okabe and Ito's colours, which the colour-blind tell apart, without black and yellow.
+/// Okabe and Ito's colours, which the colour-blind can tell apart, without black and yellow.
 const FEW: [Colour; 6] = [
     BLUE,
     VERMILION,
@@ -37,7 +39,7 @@ const FEW: [Colour; 6] = [
     RGBColor(0x56, 0xb4, 0xe9),
 ];
 
-/// Stops of the viridis scale without its pale end, for more cells than anyone tells apart by hue.
+/// Stops of the viridis scale without its pale end, for more cells than can be told apart by hue.
 const MANY: [Colour; 6] = [
     RGBColor(0x44, 0x01, 0x54),
     RGBColor(0x41, 0x44, 0x87),
@@ -62,7 +64,7 @@ pub fn cell_colours(cells: usize) -> Vec<Colour> {
         .collect()
 }
 
-/// Stops of the diverging scale, from none to most, below and above zero: blue and orange, which the colour-blind tell apart,
+/// Stops of the diverging scale, from none to most, below and above zero: blue and orange, which the colour-blind can tell apart,
 /// each as dark as its counterpart.
 const BELOW: [Colour; 4] = [
     RGBColor(0xf7, 0xf7, 0xf7),
@@ -77,7 +79,7 @@ const ABOVE: [Colour; 4] = [
     RGBColor(0x7a, 0x2e, 0x04),
 ];
 
-/// Diverging colour of a value as a share of the largest, −1 to 1; grey where it is not known.
+/// Diverging colour of a value as a fraction of the largest, −1 to 1; grey where it is not known.
 pub fn diverging(fraction: f64) -> Colour {
     if fraction.is_nan() {
         return LIGHT;

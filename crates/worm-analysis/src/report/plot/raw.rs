@@ -1,11 +1,15 @@
-//! What a picture is before it has axes, and what all drawing shares: units, and the style of text.
+//! A picture without axes, and what all drawing shares: units and text style.
 
 use super::canvas::{DrawError, Stroke};
 use super::palette::Colour;
+use maud::{Markup, PreEscaped, html};
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, IntoDrawingArea, PathElement, Polygon, SVGBackend, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontStyle, IntoFont, TextStyle};
+
+/// A finished picture: inline SVG.
+pub type Svg = Markup;
 
 /// Dots of the drawing per unit of a sheet: the backend knows whole dots only.
 const DOTS: f64 = 4.0;
@@ -19,12 +23,12 @@ pub(super) fn dots(units: f64) -> i32 {
     (units * DOTS).round() as i32
 }
 
-/// Height of text as `plotters` wants it.
+/// Height of text for `plotters`.
 pub(super) fn text_size() -> f64 {
     TEXT * DOTS * TEXT_FACTOR
 }
 
-/// The style of text, and where it stands from its place.
+/// The style of text, and its alignment to its place.
 pub(super) fn text_style(colour: Colour, horizontal: HPos, vertical: VPos, bold: bool) -> TextStyle<'static> {
     let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
     ("sans-serif", text_size(), style)
@@ -40,13 +44,13 @@ pub(in crate::report) struct Raw<'b> {
 }
 
 impl Raw<'_> {
-    /// Draws a picture of a size in units. Gives inline SVG.
+    /// Draws a picture of a size in units, as inline SVG.
     pub(in crate::report) fn picture(
         description: &str,
         width: f64,
         height: f64,
         paint: impl FnOnce(&Raw<'_>) -> Result<(), DrawError>,
-    ) -> Result<String, DrawError> {
+    ) -> Result<Svg, DrawError> {
         let size = (dots(width) as u32, dots(height) as u32);
         let mut svg = String::new();
         let raw = Raw {
@@ -55,15 +59,14 @@ impl Raw<'_> {
         paint(&raw)?;
         raw.area.present()?;
         drop(raw);
-        // The page sizes its pictures itself, so the opening tag with the backend's fixed size makes way for another.
+        // The page sizes its pictures itself, so the outer tag with the backend's fixed size makes way for another.
         let inside = svg.split_once('>').map_or("", |(_, inside)| inside);
-        // The backend makes names safe but for control characters, which no page may hold; it ends its own lines with one.
-        let inside = inside.replace(|character: char| character.is_control() && character != '\n', " ");
-        let description = crate::report::page::escaped(description);
-        let (width, height) = size;
-        Ok(format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{description}\">{inside}"
-        ))
+        let inside = inside.trim_end().trim_end_matches("</svg>");
+        let view_box = format!("0 0 {} {}", size.0, size.1);
+        // The backend has escaped its text: this is the one place where markup is taken as it is.
+        Ok(html! {
+            svg.plot viewBox=(view_box) role="img" aria-label=(description) { (PreEscaped(inside)) }
+        })
     }
 
     /// A filled shape.
@@ -85,10 +88,10 @@ impl Raw<'_> {
         Ok(())
     }
 
-    /// Words at a place.
-    pub(super) fn words(&self, place: (f64, f64), words: &str, style: TextStyle<'_>) -> Result<(), DrawError> {
+    /// Text at a place.
+    pub(super) fn text(&self, place: (f64, f64), text: &str, style: TextStyle<'_>) -> Result<(), DrawError> {
         let place = (dots(place.0), dots(place.1));
-        self.area.draw(&Text::new(words.to_owned(), place, style))?;
+        self.area.draw(&Text::new(text.to_owned(), place, style))?;
         Ok(())
     }
 }

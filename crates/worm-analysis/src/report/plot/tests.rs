@@ -1,4 +1,4 @@
-//! What cannot be drawn leaves no trace in a picture.
+//! Values that cannot be drawn leave no trace in a picture.
 
 use super::{Axis, DrawError, INK, Plot, Row, Sheet, Stroke, draw};
 
@@ -11,7 +11,7 @@ fn picture(paint: impl Fn(&mut Plot<'_, '_, '_>) -> Result<(), DrawError>) -> St
         x: Axis::between(0.0, 10.0, 5),
         rows: vec![Row::new(Axis::between(-1.0, 1.0, 2), 100.0)],
     };
-    draw(&sheet, |_, plot| paint(plot)).expect("a picture")
+    draw(&sheet, |_, plot| paint(plot)).expect("a picture").into_string()
 }
 
 #[test]
@@ -22,12 +22,12 @@ fn what_is_not_finite_draws_nothing() {
             let drawn = picture(|plot| {
                 plot.line([(x, y)], STROKE())?;
                 plot.line([(x, y)], STROKE().dashed())?;
-                plot.upright(x, y, y, STROKE())?;
+                plot.vertical_line(x, y, y, STROKE())?;
                 plot.dots([(x, y)], INK, 2.0)?;
                 plot.ring(x, y, INK)?;
                 plot.diamond(x, y, INK)?;
                 plot.fill([1.0, x], [0.0, y], INK, 1.0)?;
-                plot.words_behind(x, y, INK, "words")?;
+                plot.text_beside(x, y, INK, "text")?;
                 plot.ribbon([(x, [y, 0.0]), (5.0, [0.0, y])], INK, 1.0)?;
                 plot.edge([1.0, x], [0.0, y], STROKE())?;
                 plot.whisker(x, y, y, 0.1)
@@ -35,8 +35,8 @@ fn what_is_not_finite_draws_nothing() {
             assert_eq!(drawn, empty, "at ({x}, {y})");
         }
         let drawn = picture(|plot| {
-            plot.level(bad, STROKE())?;
-            plot.name_above(bad, INK, "name")?;
+            plot.horizontal_line(bad, STROKE())?;
+            plot.label_above(bad, INK, "name")?;
             plot.band([1.0, bad], INK, 1.0, "name")
         });
         assert_eq!(drawn, empty, "with {bad}");

@@ -1,11 +1,12 @@
 //! The page of `wormd explain`: every verdict reads well, and what is missing or absurd does no harm.
 
 use super::answer;
+use std::collections::HashSet;
 use std::fs;
 use testkit::html;
 use worm_analysis::explain::Answer;
 use worm_analysis::report::ReportError;
-use worm_analysis::report::explain::{page, write};
+use worm_analysis::report::explain::{page, text, write};
 
 fn page_of(answer: &Answer) -> String {
     page(answer, "hidden worm").expect("a page")
@@ -77,8 +78,8 @@ fn every_page_is_well_formed_self_contained_and_free_of_nonsense() {
 }
 
 #[test]
-fn each_verdict_is_told_in_its_own_words() {
-    let told = [
+fn each_verdict_has_its_own_words() {
+    let expected = [
         (
             answer::explained(4),
             [
@@ -152,16 +153,59 @@ fn each_verdict_is_told_in_its_own_words() {
             ],
         ),
     ];
-    for (answer, sayings) in told {
+    for (answer, parts) in expected {
         let page = page_of(&answer);
-        for saying in sayings {
+        for part in parts {
             assert!(
-                page.contains(saying),
-                "{:?}: the page does not say {saying}",
+                page.contains(part),
+                "{:?}: the page does not say {part}",
                 answer.verdict
             );
         }
     }
+}
+
+/// The words of a page: what is between its tags.
+fn words_of(page: &str) -> HashSet<String> {
+    let body = page.split_once("<main>").expect("a body").1;
+    let texts = body.split('<').filter_map(|tag| Some(tag.split_once('>')?.1));
+    let text = texts.collect::<Vec<_>>().join(" ");
+    let text = text.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"");
+    text.replace("&amp;", "&")
+        .split_whitespace()
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn the_terminal_says_what_the_page_says_in_the_same_words() {
+    for (name, answer) in verdicts().into_iter().chain(odd_answers()) {
+        let words = words_of(&page_of(&answer));
+        let text = text(&answer);
+        for line in text.lines().filter(|line| !line.starts_with('─')) {
+            assert_eq!(line, line.trim_end(), "{name}");
+            for word in line.split_whitespace() {
+                // Only the terminal sets marks after a name, and cuts long tables.
+                let plain = word.trim_end_matches([',', '.']);
+                let is_known = words.contains(word) || words.contains(plain) || line.trim_start().starts_with('…');
+                assert!(is_known, "{name}: the page does not say {word:?} of {line:?}");
+            }
+        }
+        assert!(text.contains(&answer.sentence), "{name}: no sentence in\n{text}");
+    }
+}
+
+#[test]
+fn everything_that_was_found_is_in_the_text() {
+    let answer = Answer {
+        runs: Vec::new(),
+        calibration: answer::calibration()[..2].to_vec(),
+        threshold: 9.0,
+        remainder: answer::outside().remainder,
+        ..answer::ambiguous()
+    };
+    let expected = include_str!("ambiguous.txt");
+    assert_eq!(text(&answer), expected.trim_end());
 }
 
 #[test]

@@ -1,0 +1,126 @@
+//! How the gap shrinks, stage by stage, on cycles that nothing was fitted to.
+
+use super::{Block, FigureKind};
+use crate::explain::answer::{Stage, StageKind};
+use crate::explain::{Answer, Verdict};
+use crate::report::page::Table;
+use worm_estimator::number::fixed;
+
+/// A model of the shrinking gap, in words.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::report::explain) struct StageView {
+    /// Its name in the answer.
+    pub key: StageKind,
+    /// Its name for people.
+    pub name: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+}
+
+const fn stage_view(key: StageKind, name: &'static str, meaning: &'static str) -> StageView {
+    StageView { key, name, meaning }
+}
+
+/// The name of the noise floor, which is no model.
+pub(super) const FLOOR: StageView = stage_view(StageKind::Floor, "noise floor", "no model can do better");
+
+/// The models in reading order, as far as the answer has them.
+pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &Stage)> {
+    let named = match (answer.verdict, answer.effects.len()) {
+        (Verdict::Ambiguous, _) => ("with the first candidate", "the model with the first of the candidates"),
+        (_, 2..) => ("with the named effects", "the model with the effects named"),
+        _ => ("with the named effect", "the model with the effect named"),
+    };
+    let all = [
+        stage_view(StageKind::Baseline, "nominal model", "the model as configured"),
+        stage_view(
+            StageKind::Recalibrated,
+            "recalibrated model",
+            "its known quantities adjusted within their priors; what it leaves is the gap that counts",
+        ),
+        stage_view(StageKind::BestWrong, "best rival", "the best effect of another kind"),
+        stage_view(StageKind::Named, named.0, named.1),
+        stage_view(
+            StageKind::FreeForm,
+            "free-form correction",
+            "a correction of any form, fitted freely: about as much as can be closed",
+        ),
+    ];
+    let known = all
+        .into_iter()
+        .filter_map(|view| Some((view, stage_of(answer, view.key)?)));
+    known.collect()
+}
+
+/// A stage of the answer.
+pub(in crate::report::explain) fn stage_of<'a>(answer: &'a Answer, key: StageKind) -> Option<&'a Stage> {
+    answer.stages.iter().find(|stage| stage.stage == key)
+}
+
+impl StageView {
+    /// Its name with its effect: `best rival: payload`.
+    pub fn with_effect(&self, stage: &Stage) -> String {
+        match &stage.effect {
+            Some(effect) => format!("{}: {effect}", self.name),
+            None => self.name.to_owned(),
+        }
+    }
+}
+
+pub(super) fn blocks(answer: &Answer) -> Vec<Block> {
+    let stages = stages(answer);
+    if stages.is_empty() {
+        let why = "There are no stages to compare: the answer holds no model judged on held-out cycles.";
+        return vec![Block::paragraph(why)];
+    }
+    let first = if answer.is_by_advances() {
+        Block::paragraph("Nothing was held out of so few advances. What shrinks is the error of the model's advance.")
+    } else {
+        Block::Figure(FigureKind::Gap)
+    };
+    vec![first, Block::Table(table(answer, &stages))]
+}
+
+fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
+    let floor = stage_of(answer, FLOOR.key).map(|stage| (FLOOR, stage));
+    let stages = stages.iter().copied().chain(floor);
+    let advance_head = "error of the advance, mm a cycle";
+    let advance = |stage: &Stage| fixed(stage.advance_error_m * 1e3, 3);
+    let title = "The gap, stage by stage";
+    let (head, rows, note): (&[&str], Vec<_>, _) = if answer.is_by_advances() {
+        (
+            &["model", advance_head],
+            stages
+                .map(|(view, stage)| vec![view.with_effect(stage), advance(stage)])
+                .collect(),
+            "The error is the mean over the slopes.",
+        )
+    } else {
+        let row = |(view, stage): (StageView, &Stage)| {
+            vec![
+                view.with_effect(stage),
+                fixed(stage.fit_rms_m * 1e3, 3),
+                fixed(stage.held_out_rms_m * 1e3, 3),
+                advance(stage),
+                fixed(stage.energy_error_j * 1e3, 2),
+            ]
+        };
+        (
+            &[
+                "model",
+                "rms, fitted cycles, mm",
+                "rms, held-out cycles, mm",
+                advance_head,
+                "error of the energy (11), mJ a cycle",
+            ],
+            stages.map(row).collect(),
+            "Held-out cycles were kept out of every fit, so a model that merely bends to the data gains nothing there. Errors of \
+             advance and energy are means over the runs.",
+        )
+    };
+    Table {
+        rows,
+        note: Some(note.to_owned()),
+        ..Table::new(title, head.iter().copied())
+    }
+}
