@@ -1,27 +1,38 @@
 //! Commands a running worm: arms it, lets it crawl five centimetres or for a minute, whichever comes first, and stops it.
 //!
 //! ```sh
-//! cargo run --release -- virtual-worm --link /tmp/worm-port &
-//! cargo run --release -- control --port /tmp/worm-port &
-//! cargo run --release -- estimate --port /tmp/worm-port &
-//! cargo run --release --example drive
+//! wormd virtual-worm --link /tmp/worm-port &
+//! wormd control --port /tmp/worm-port &
+//! wormd estimate --port /tmp/worm-port &
+//! cargo run --release --example drive            # another worm: -- NAME
 //! ```
 //!
-//! A command is a request with an answer: what the controller refuses, it refuses with a reason. Whatever happens to this
-//! program, the controller keeps its own safety rules.
+//! A command is a request with an answer: the controller accepts it, or refuses it with a reason. A worm that crawls already,
+//! such as that of `wormd up`, refuses to be armed. Whatever happens to this program, the controller keeps its own safety rules.
 
 use std::error::Error;
+use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{Command, CommandKind, CommandOutcome, Cycle, Fault, Mode};
-use wormd::topics::{CommandClient, Hub, Instance};
+use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
 
 const DISTANCE_M: f64 = 0.05;
-const LONGEST: Duration = Duration::from_secs(60);
+const MAX_TIME: Duration = Duration::from_secs(60);
 /// How long the controller may take to answer; it does so in its next tick.
 const ANSWER_TIME: Duration = Duration::from_secs(1);
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    match drive() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn drive() -> Result<(), Box<dyn Error>> {
     let mut config = Config::default();
     if let Some(name) = std::env::args().nth(1) {
         config.worm.name = name;
@@ -33,16 +44,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     command(&client, CommandKind::Arm, 0.0)?;
     command(&client, CommandKind::Crawl, 0.4)?; // gait cycles per second
     let result = follow(&mut cycles);
-    // Stop first, then say what went wrong.
+    // Stop first, then report what went wrong.
     command(&client, CommandKind::Stop, 0.0)?;
-    result
+    println!("{:.0} mm crawled", 1e3 * result?);
+    Ok(())
 }
 
-/// Adds up the advance of each cycle.
-fn follow(cycles: &mut wormd::topics::Subscriber<Cycle>) -> Result<(), Box<dyn Error>> {
+/// Waits until the worm has crawled far enough or for long enough; returns the distance, m.
+fn follow(cycles: &mut Subscriber<Cycle>) -> Result<f64, Box<dyn Error>> {
     let begin = Instant::now();
     let mut travelled_m = 0.0;
-    while travelled_m < DISTANCE_M && begin.elapsed() < LONGEST {
+    while travelled_m < DISTANCE_M && begin.elapsed() < MAX_TIME {
         while let Some(cycle) = cycles.next()? {
             if cycle.advance_m.is_finite() {
                 travelled_m += cycle.advance_m;
@@ -51,7 +63,7 @@ fn follow(cycles: &mut wormd::topics::Subscriber<Cycle>) -> Result<(), Box<dyn E
         }
         std::thread::sleep(Duration::from_millis(50));
     }
-    Ok(())
+    Ok(travelled_m)
 }
 
 /// Sends one command and expects that it is accepted.

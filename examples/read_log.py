@@ -5,8 +5,8 @@
     python3 read_log.py run.mcap                        # the topics, and how many messages each holds
     python3 read_log.py run.mcap /cycle advance_m       # one field of one topic over time, as CSV
 
-Messages are JSON with a schema that tells meaning and unit of every field, so nothing else is needed. A log that was cut off
-by a crash is read to its last whole message, in the order of writing.
+Messages are JSON, with a schema that gives the meaning and the unit of every field. A log that was truncated by a crash is read
+to its last whole message, in the order of writing.
 """
 
 import json
@@ -22,25 +22,43 @@ def messages(file):
         for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
             yield channel.topic, message.log_time * 1e-9, json.loads(message.data)
     except (McapError, EOFError) as error:
-        print(f"cut off here: {error}", file=sys.stderr)
+        print(f"the log is cut off here: {str(error) or type(error).__name__}", file=sys.stderr)
+
+
+def print_counts(file):
+    counts = {}
+    for topic, _, _ in messages(file):
+        counts[topic] = counts.get(topic, 0) + 1
+    for topic, count in sorted(counts.items()):
+        print(f"{topic}: {count} messages")
+
+
+def print_field(file, topic, field):
+    is_first = True
+    for name, time_s, content in messages(file):
+        if name != topic:
+            continue
+        if field not in content:
+            sys.exit(f"{topic} has no field {field}; it has {', '.join(content)}")
+        if is_first:
+            print(f"time_s,{field}")
+            is_first = False
+        print(f"{time_s:.6f},{content[field]}")
+    if is_first:
+        sys.exit(f"there is no message on {topic}: call this program with the log alone to list its topics")
 
 
 def main():
     if len(sys.argv) not in (2, 4):
         sys.exit(__doc__)
-    with open(sys.argv[1], "rb") as file:
-        if len(sys.argv) == 2:
-            counts = {}
-            for topic, _, _ in messages(file):
-                counts[topic] = counts.get(topic, 0) + 1
-            for topic, count in sorted(counts.items()):
-                print(f"{topic}: {count} messages")
-        else:
-            _, wanted, field = sys.argv[1:]
-            print(f"time_s,{field}")
-            for topic, time_s, content in messages(file):
-                if topic == wanted:
-                    print(f"{time_s:.6f},{content[field]}")
+    try:
+        with open(sys.argv[1], "rb") as file:
+            if len(sys.argv) == 2:
+                print_counts(file)
+            else:
+                print_field(file, *sys.argv[2:])
+    except OSError as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@
 Prints one JSON object a line. A reader needs three things from wormd:
   - the folder and the prefix of the worm's shared memory (`join` below),
   - the name of the service, worm/<name>/state,
-  - the layout of the message and its type name, as in src/message/state.rs (`State` below).
+  - the layout of the message and its type name, as in crates/worm-estimator/src/message/state.rs
+    (`State` below).
 iceoryx2 compares name, size and alignment of the type, but not its fields: keep them in step with the Rust struct.
 It never disturbs the worm: a reader that falls behind loses samples, the controller does not wait.
 """
@@ -24,7 +25,7 @@ MAX_CELLS = 16
 
 
 class State(ctypes.Structure):
-    """What the controller saw and commanded in one tick; see src/message/state.rs for each field."""
+    """What the controller measured and commanded in one tick; crates/worm-estimator/src/message/state.rs documents each field."""
 
     _fields_ = [
         ("sequence", ctypes.c_uint64),
@@ -70,7 +71,7 @@ def join(worm, root):
     config = iox2.config.default()
     config.global_cfg.root_path = iox2.Path.new(folder)
     config.global_cfg.prefix = iox2.FileName.new(f"wormd_{worm}_{binascii.crc_hqx(root.encode(), 0):04x}_")
-    # Cleaning up after killed processes is wormd's business; it can take long.
+    # wormd cleans up after killed processes; doing it here too could take long.
     config.global_cfg.node.cleanup_dead_nodes_on_creation = False
     config.global_cfg.node.cleanup_dead_nodes_on_destruction = False
     config.global_cfg.service.cleanup_dead_nodes_on_open = False
@@ -78,7 +79,7 @@ def join(worm, root):
 
 
 def states(worm, root, timeout_s):
-    """Yields the worm's states as they come; ends when none came for `timeout_s`."""
+    """Yields the worm's states as they come; ends when none has come for `timeout_s`."""
     import iceoryx2 as iox2
 
     iox2.set_log_level(iox2.LogLevel.Error)
@@ -91,11 +92,11 @@ def states(worm, root, timeout_s):
         sys.exit(f"worm/{worm}/state: {error}: is the worm running, and of the same version as this program?")
     listener = event.listener_builder().create()
     subscriber = topic.subscriber_builder().history_request(1).create()
-    heard = time.monotonic()
-    while time.monotonic() - heard < timeout_s:
+    received_s = time.monotonic()
+    while time.monotonic() - received_s < timeout_s:
         listener.timed_wait(iox2.Duration.from_millis(100))
         while (sample := subscriber.receive()) is not None:
-            heard = time.monotonic()
+            received_s = time.monotonic()
             yield sample.payload().contents
             sample.delete()
 
@@ -105,7 +106,7 @@ def main():
     parser.add_argument("--worm", default="worm1", help="worm.name of the configuration")
     parser.add_argument("--root", default="/dev/shm/wormd", help="topics.root of the configuration")
     parser.add_argument("--count", type=int, default=10, help="how many states to print")
-    parser.add_argument("--timeout", type=float, default=5.0, help="give up after so many seconds without one")
+    parser.add_argument("--timeout", type=float, default=5.0, help="give up after this many seconds without one")
     parser.add_argument("--layout", action="store_true", help="print offset and size of each field, and end")
     arguments = parser.parse_args()
     if arguments.layout:
@@ -120,7 +121,7 @@ def main():
         positions_mm = [1e3 * state.position_m[cell] for cell in range(state.cell_count)]
         print(json.dumps({"sequence": state.sequence, "phase": state.phase, "positions_mm": positions_mm}), flush=True)
     if printed < arguments.count:
-        sys.exit(f"worm/{arguments.worm}/state: silent for {arguments.timeout} s: is its controller running?")
+        sys.exit(f"worm/{arguments.worm}/state: nothing published for {arguments.timeout} s: is its controller running?")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,16 @@
 //! Follows a running worm: one line for each gait cycle, and one for each alarm as it is raised or cleared.
 //!
 //! ```sh
-//! cargo run --release -- up --plain &            # or any other running worm
+//! wormd up --plain &                             # or any other running worm
 //! cargo run --release --example subscribe        # another worm: -- NAME, or -- NAME CONFIG.toml
 //! ```
 //!
-//! Sleeps until the estimator announces a new alarm, or for a tenth of a second. The worm never waits for a subscriber: one that
-//! reads too seldom loses the oldest messages, and [`wormd::topics::Subscriber::lost`] counts them.
+//! It sleeps until the estimator announces a new alarm, for a tenth of a second at most. The worm never waits for a subscriber:
+//! one that reads too seldom loses the oldest messages, and [`wormd::topics::Subscriber::lost`] counts them.
 
 use std::error::Error;
 use std::path::Path;
+use std::process::ExitCode;
 use std::time::Duration;
 use worm_estimator::config::Config;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, State};
@@ -17,9 +18,20 @@ use wormd::topics::{Hub, Instance};
 
 /// How long the worm may publish nothing before this program ends.
 const SILENCE: Duration = Duration::from_secs(3);
+/// Longest wait for an alarm before the other topics are read.
 const WAIT: Duration = Duration::from_millis(100);
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    match follow() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn follow() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let name = arguments.next();
     let mut config = match arguments.next() {
@@ -59,10 +71,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         let is_alive = states.latest()?.is_some() || announced > 0;
         silence = if is_alive { Duration::ZERO } else { silence + WAIT };
     }
-    println!(
-        "the worm {} has published nothing for {} s",
-        config.worm.name,
-        SILENCE.as_secs()
-    );
+    println!("{} has published nothing for {} s", config.worm.name, SILENCE.as_secs());
     Ok(())
 }

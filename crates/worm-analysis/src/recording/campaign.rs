@@ -15,7 +15,7 @@ const SLOPES_DEG: RangeInclusive<f64> = -90.0..=90.0;
 /// What a worm can carry on top of its own mass, kg.
 pub const PAYLOADS_KG: RangeInclusive<f64> = 0.0..=100.0;
 const CYCLES_S: RangeInclusive<f64> = 0.5..=120.0;
-/// The least standard error of an advance that anybody can claim, m.
+/// The smallest standard error that is accepted for an advance, m.
 const MIN_SIGMA_M: f64 = 1e-6;
 
 /// Why a campaign cannot be used.
@@ -26,10 +26,10 @@ pub enum CampaignError {
     Read {
         /// The campaign.
         file: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// The file says something that cannot be.
+    /// An invalid entry in the file.
     #[error("{}:{line}: {problem}: {remedy}", file.display())]
     Invalid {
         /// The campaign.
@@ -68,7 +68,7 @@ pub struct Campaign {
     pub file: PathBuf,
     /// The configuration's file; `None` for the worm of the paper.
     pub worm: Option<PathBuf>,
-    /// The worm as it is believed to be.
+    /// The nominal worm.
     pub config: Config,
     /// The text of the configuration's file; `None` for the worm of the paper.
     pub config_text: Option<String>,
@@ -170,7 +170,7 @@ impl Campaign {
                 return Err(reader.mixed(entry));
             }
             let run = reader.run(entry, recording)?;
-            let real_path = reader.find(recording, &run)?;
+            let real_path = reader.real_path(recording, &run)?;
             if let Some((earlier, _)) = runs.iter().find(|(_, other)| *other == real_path) {
                 let problem = if earlier.slope_deg == run.slope_deg {
                     format!("{} is listed twice", run.recording.display())
@@ -196,7 +196,7 @@ impl Campaign {
         })
     }
 
-    /// Opens all recordings, in the order of the runs, telling `progress` now and then which share was read, 0 to 1.
+    /// Opens all recordings, in the order of the runs, reporting to `progress` which fraction was read, 0 to 1.
     ///
     /// # Errors
     /// [`CampaignError`] for the first recording that cannot be used or has another number of cells than the worm.
@@ -247,7 +247,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A path as the file means it.
+    /// A path relative to the campaign's file.
     fn beside(&self, path: &Path) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(path)
     }
@@ -321,8 +321,8 @@ impl Reader<'_> {
         Err(self.invalid(value.span(), &format!("{key} = {}", value.get_ref()), &remedy))
     }
 
-    /// The recording's one true path.
-    fn find(&self, recording: &Spanned<PathBuf>, run: &CampaignRun) -> Result<PathBuf, CampaignError> {
+    /// The canonical path of a recording.
+    fn real_path(&self, recording: &Spanned<PathBuf>, run: &CampaignRun) -> Result<PathBuf, CampaignError> {
         run.recording.canonicalize().map_err(|error| {
             let problem = format!("{}: {error}", run.recording.display());
             let remedy = "give the recording's path relative to the campaign's file";
@@ -330,3 +330,6 @@ impl Reader<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

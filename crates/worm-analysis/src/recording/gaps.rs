@@ -1,15 +1,15 @@
-//! What was not seen: short gaps may be bridged, long ones would be invented.
+//! Positions that were not seen: short gaps are bridged, long ones refused, because bridging them would invent data.
 
 use super::series::Recording;
 use std::ops::Range;
 use worm_log::ReadError;
 
-/// Times computed from frame numbers differ by rounding; so much more than the longest gap is not longer.
+/// Times computed from frame numbers differ by rounding; a gap that exceeds the limit by less than this is within it, s.
 const TIME_ROUNDING_S: f64 = 1e-9;
 
 impl Recording {
     /// Positions with their gaps bridged by straight lines, `[cell][sample]`, m. What lies before a cell was first seen or
-    /// after it was last seen stays `NaN`. The recording keeps what was measured apart from what was bridged.
+    /// after it was last seen stays `NaN`. The recording itself stays as it was measured.
     pub fn filled(&self) -> Vec<Vec<f64>> {
         let mut position_m = self.position_m.clone();
         for series in &mut position_m {
@@ -18,14 +18,14 @@ impl Recording {
         position_m
     }
 
-    /// Checks that no cell is out of sight, and no sample missing, for longer than `max_gap_s`.
+    /// Checks that no cell is unseen for longer than `max_gap_s`.
     ///
     /// # Errors
     /// [`ReadError`] with the cell and the times between which it is not seen.
     pub fn check_gaps(&self, max_gap_s: f64) -> Result<(), ReadError> {
         for (cell, series) in self.position_m.iter().enumerate() {
-            if let Some(gap) = holes(series)
-                .map(|hole| self.gap(&hole))
+            if let Some(gap) = unseen_runs(series)
+                .map(|run| self.gap(&run))
                 .find(|gap| is_longer(gap.to_s - gap.from_s, max_gap_s))
             {
                 return Err(gap.refusal(self, cell, max_gap_s));
@@ -34,16 +34,17 @@ impl Recording {
         Ok(())
     }
 
-    fn gap(&self, hole: &Range<usize>) -> Gap {
+    fn gap(&self, run: &Range<usize>) -> Gap {
         Gap {
-            from_s: self.time_s[hole.start.saturating_sub(1)],
-            to_s: self.time_s[hole.end.min(self.samples() - 1)],
-            at_edge: hole.start == 0 || hole.end == self.samples(),
+            from_s: self.time_s[run.start.saturating_sub(1)],
+            to_s: self.time_s[run.end.min(self.samples() - 1)],
+            at_edge: run.start == 0 || run.end == self.samples(),
         }
     }
 }
 
-/// A time for which a cell is not seen; `from_s` and `to_s` are when it is seen next to it, or the recording's ends.
+/// A time during which a cell is not seen: from the last sample before it in which it is seen to the first after it, or to the
+/// recording's ends.
 struct Gap {
     from_s: f64,
     to_s: f64,
@@ -69,18 +70,18 @@ impl Gap {
     }
 }
 
-/// Whether a time is longer than the longest gap, by more than rounding.
+/// Whether a time exceeds the longest permitted gap by more than rounding.
 pub(super) fn is_longer(time_s: f64, max_gap_s: f64) -> bool {
     time_s > max_gap_s + TIME_ROUNDING_S
 }
 
-/// The next tenth of a second above.
+/// The next tenth of a second above `time_s`.
 pub(super) fn round_up(time_s: f64) -> f64 {
     (time_s * 10.0).floor() / 10.0 + 0.1
 }
 
 /// Runs of values that were not seen.
-pub(super) fn holes(values: &[f64]) -> impl Iterator<Item = Range<usize>> {
+pub(super) fn unseen_runs(values: &[f64]) -> impl Iterator<Item = Range<usize>> {
     let mut at = 0;
     std::iter::from_fn(move || {
         let start = at + values[at..].iter().position(|value| value.is_nan())?;
@@ -90,16 +91,19 @@ pub(super) fn holes(values: &[f64]) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Replaces what was not seen by straight lines between what was; the edges stay as they are.
+/// Interpolates unseen values linearly between the seen ones; unseen values at either end stay as they are.
 pub(super) fn bridge(time_s: &[f64], values: &mut [f64]) {
-    let inner: Vec<_> = holes(values)
-        .filter(|hole| hole.start > 0 && hole.end < values.len())
+    let inner: Vec<_> = unseen_runs(values)
+        .filter(|run| run.start > 0 && run.end < values.len())
         .collect();
-    for hole in inner {
-        let (before, after) = (hole.start - 1, hole.end);
+    for run in inner {
+        let (before, after) = (run.start - 1, run.end);
         let slope = (values[after] - values[before]) / (time_s[after] - time_s[before]);
-        for index in hole {
+        for index in run {
             values[index] = values[before] + slope * (time_s[index] - time_s[before]);
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,15 +1,15 @@
-//! Motion capture as it comes: named markers in space.
+//! Motion capture: named markers in space.
 
-/// Tracks of markers in space, before anyone knows which of them are a worm's cells.
+/// Tracks of markers in space, before it is known which of them are a worm's cells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Markers {
-    /// What the markers are called.
+    /// Names of the markers.
     pub names: Vec<String>,
     /// Time of each sample, s, strictly increasing.
     pub time_s: Vec<f64>,
     /// Positions in the laboratory's space, m: `position_m[marker][sample]`; `NaN` in all three where not seen.
     pub position_m: Vec<Vec<[f64; 3]>>,
-    /// What the reader found remarkable.
+    /// What the reader noticed.
     pub warnings: Vec<String>,
 }
 

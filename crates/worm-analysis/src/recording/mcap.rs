@@ -13,27 +13,28 @@ use worm_log::{Channel, ReadError, nothing, scan};
 /// Reads a log's states as a recording: one sample for each new sample of the tracker.
 ///
 /// Time is that of the tracker's own clock. The gait phase is that at the capture, between the motor readings before and after
-/// it: a tick whose reading failed repeats an old phase, and says nothing. Where the controller was started anew, its clocks and counts begin anew too, so only the longest stretch is taken.
+/// it: a tick whose reading failed repeats an old phase and is ignored. Where the controller was restarted, its
+/// clocks and counts restart too, so only the longest run is taken.
 ///
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is no log of a worm, is of another version, or has no samples.
 pub fn read(path: &Path) -> Result<Recording, ReadError> {
-    let mut stretches: Vec<Stretch> = Vec::new();
+    let mut runs: Vec<ControllerRun> = Vec::new();
     let contents = scan(path, |channel, text| {
         if channel != Channel::State {
             return Ok(());
         }
         let state = State::read_json(text)?;
-        match stretches.last_mut() {
-            Some(stretch) if stretch.goes_on_with(&state) => stretch.take(&state),
-            _ => stretches.push(Stretch::begin(&state)),
+        match runs.last_mut() {
+            Some(run) if run.continues_with(&state) => run.push(&state),
+            _ => runs.push(ControllerRun::begin(&state)),
         }
         Ok(())
     })?;
     let mut warnings = contents.warnings;
-    let count = stretches.len();
-    let longest = stretches.into_iter().max_by_key(|stretch| stretch.samples.len());
-    let longest = longest.filter(|stretch| !stretch.samples.is_empty()).ok_or_else(|| {
+    let count = runs.len();
+    let longest = runs.into_iter().max_by_key(|run| run.samples.len());
+    let longest = longest.filter(|run| !run.samples.is_empty()).ok_or_else(|| {
         let (problem, remedy) = if count == 0 {
             ("holds no message", "record the topic `state`")
         } else {
@@ -57,36 +58,36 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
     Ok(longest.into_recording(path, warnings))
 }
 
-/// Farthest that a capture may be from a motor reading for its gait phase to be known, s.
-const FARTHEST_S: f64 = 0.1;
-/// How long before the first motor reading a capture still has its phase, s: what the comparison of the clocks leaves.
+/// Longest time between a capture and the nearest motor reading for which its gait phase is known, s.
+const MAX_PHASE_GAP_S: f64 = 0.1;
+/// How long before the first motor reading a capture is still given its phase, s: the error of the clocks' comparison.
 const BEFORE_FIRST_S: f64 = 1e-3;
 
 /// One new sample, with the motor as it was in the tick that brought it.
 struct Sample {
     time_s: f64,
-    captured_s: f64, // of the time that the motor lived through
+    captured_s: f64, // without the time during which the computer was paused
     state: State,
 }
 
 /// The states of one run of the controller.
-struct Stretch {
+struct ControllerRun {
     cells: usize,
     first_tick: u64,
     last_tick: u64,
     last_sample: u64,
     lived: MotorTime,
     capture: Capture,
-    /// Lived time and phase of each tick that read the motor.
+    /// Time, without pauses of the computer, and phase of each tick that read the motor.
     phases: Vec<(f64, f64)>,
     samples: Vec<Sample>,
     /// New samples without a time, or with one that does not grow.
     without_time: usize,
 }
 
-impl Stretch {
+impl ControllerRun {
     fn begin(state: &State) -> Self {
-        let mut stretch = Self {
+        let mut run = Self {
             cells: state.cell_count as usize,
             first_tick: state.sequence,
             last_tick: state.sequence,
@@ -97,16 +98,16 @@ impl Stretch {
             samples: Vec::new(),
             without_time: 0,
         };
-        stretch.take(state);
-        stretch
+        run.push(state);
+        run
     }
 
-    /// A tick that is there twice is no new beginning.
-    fn goes_on_with(&self, state: &State) -> bool {
+    /// Whether a state belongs to the same run; a repeated tick does.
+    fn continues_with(&self, state: &State) -> bool {
         state.sequence >= self.last_tick && state.sample >= self.last_sample && state.cell_count as usize == self.cells
     }
 
-    fn take(&mut self, state: &State) {
+    fn push(&mut self, state: &State) {
         let is_repeated = state.sequence == self.last_tick && state.sequence != self.first_tick;
         (self.last_tick, self.last_sample) = (state.sequence, state.sample);
         let time_s = self.lived.update(state) as f64 * 1e-9;
@@ -124,7 +125,7 @@ impl Stretch {
                 self.without_time += 1;
             }
         }
-        // A log made from a recording without motor has a phase of its own.
+        // A log made from a recording without motor state still has a phase.
         let is_read = state.motor_is_new == 1 || state.motor_angle_rad.is_nan();
         let is_later = self.phases.last().is_none_or(|(last_s, _)| time_s > *last_s);
         if state.phase.is_finite() && is_read && is_later {
@@ -132,14 +133,14 @@ impl Stretch {
         }
     }
 
-    /// The gait phase at a lived time; `NaN` too far from any motor reading.
+    /// The gait phase at a time without pauses; `NaN` too far from any motor reading.
     fn phase_at(&self, at_s: f64) -> f64 {
         let next = self.phases.partition_point(|(time_s, _)| *time_s < at_s);
         let Some(&(after_s, after)) = self.phases.get(next) else {
             return f64::NAN;
         };
         match next.checked_sub(1).and_then(|before| self.phases.get(before)) {
-            Some((before_s, before)) if (after_s - at_s).min(at_s - before_s) <= FARTHEST_S => {
+            Some((before_s, before)) if (after_s - at_s).min(at_s - before_s) <= MAX_PHASE_GAP_S => {
                 after - (after - before) * (after_s - at_s) / (after_s - before_s)
             }
             None if after_s - at_s <= BEFORE_FIRST_S => after,

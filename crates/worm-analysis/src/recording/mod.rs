@@ -1,23 +1,25 @@
 //! Recordings: what a worm did, from motion capture or from its own log.
 //!
-//! A [`Recording`] holds cell positions over time and, where they are known, gait phase and motor state. All formats end up in
-//! it, so that whatever looks at a recording need not know where it comes from.
+//! A [`Recording`] holds cell positions over time and, where they are known, gait phase and motor state. Every format is read
+//! into it, so that an analysis need not know where a recording comes from.
 //!
-//! # The story
-//! [`open`] looks at a file's first bytes and finds its format. A table of this project's own and a log of the worm give
-//! positions along the canal as they are. Motion capture gives markers in space: `projection` finds the canal in their motion,
-//! leaves out what does not crawl, and tells which marker it took for which cell. Whatever the format, the recording is then
-//! cut to the time that was asked for and looked through: time must run, every cell must be seen without long gaps, something
-//! must move, and lengths must be ones that a worm can have. What is merely remarkable becomes a warning; what would make any
-//! result a guess is refused with its place and a remedy.
+//! # How a file becomes a recording
+//! 1. [`open`] recognises the format from the file's first bytes.
+//! 2. The reader of that format parses it. This project's own CSV and a log of the worm give positions along the canal.
+//!    Motion capture gives markers in space: `projection` finds the canal in their motion, leaves out what does not crawl,
+//!    and reports which marker it took for which cell.
+//! 3. The recording is cut to the time requested.
+//! 4. `sanity_check` examines it, whatever the format: time must increase, no cell may be unseen for too long, something must
+//!    move, and lengths must be ones that a worm can have. What is only unusual becomes a warning. What would turn a result
+//!    into a guess is refused, with its place and a remedy.
 //!
-//! # The map, in reading order
+//! # Modules, in the order to read them
 //! - `series`: [`Recording`] and [`ReadError`].
 //! - `open`: the format by content, [`OpenOptions`].
-//! - `table`: CSV in; `write`: CSV out.
-//! - `vicon` and `c3d`: motion capture, as `markers` in space; `projection`: from space onto the canal.
-//! - [`mcap`]: the log of a live worm, in and out, and its replay through the estimator.
-//! - `gaps`: what was not seen; `sanity_check`: what every recording must satisfy.
+//! - `table` reads CSV, `write` writes it.
+//! - `vicon` and `c3d` read motion capture as `markers` in space; `projection` takes them onto the canal.
+//! - [`mcap`]: a recording from the log of a live worm, and a log from a recording.
+//! - `gaps`: positions that were not seen; `sanity_check`: what every recording must satisfy.
 //! - `campaign`: several recordings of one worm.
 
 mod c3d;

@@ -1,4 +1,4 @@
-//! One way in for all formats.
+//! Opens a recording of any format.
 
 use super::options::OpenOptions;
 use super::series::Recording;
@@ -19,7 +19,7 @@ const FORMATS: &str = "give a CSV as in the recording format, a Vicon Nexus CSV,
 /// `NaN`; [`Recording::filled`] bridges them.
 ///
 /// # Errors
-/// [`ReadError`] when the file cannot be read, is damaged, contradicts itself or leaves anything to guess.
+/// [`ReadError`] when the file cannot be read, is damaged, contradicts itself or is ambiguous.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, ReadError> {
     open_with_progress(path, options, &mut |_fraction| {})
 }
@@ -73,11 +73,11 @@ pub fn open_with_progress(
         }
         Format::Mcap => mcap::read(path)?,
     };
-    let whole_s = recording.time_s.first().copied().zip(recording.time_s.last().copied());
+    let full_range_s = recording.time_s.first().copied().zip(recording.time_s.last().copied());
     if options.from_s.is_some() || options.to_s.is_some() {
         recording.cut(options.from_s, options.to_s);
     }
-    sanity_check::check(&mut recording, options, whole_s)?;
+    sanity_check::check(&mut recording, options, full_range_s)?;
     Ok(recording)
 }
 
@@ -93,7 +93,7 @@ enum Format {
 }
 
 impl Format {
-    /// By content first, for extensions lie; by extension where a damaged file no longer shows what it is.
+    /// By content first, since an extension may be wrong; by extension where a damaged file no longer shows its format.
     fn of(path: &Path, head: &[u8]) -> Result<Self, ReadError> {
         if head.is_empty() {
             return Err(ReadError::whole(path, "is empty", FORMATS));
@@ -102,12 +102,12 @@ impl Format {
         let is_named = |name: &str| extension.as_deref().is_some_and(|extension| extension == name);
         if head.starts_with(MCAP_MAGIC) || is_named("mcap") {
             Ok(Self::Mcap)
-        } else if is_named("c3d") || c3d::begins_like_one(head) {
+        } else if is_named("c3d") || c3d::is_recognised(head) {
             Ok(Self::C3d)
         } else if head.contains(&0) {
-            let problem = "is neither text nor a format that is known here";
+            let problem = "is neither text nor a known format";
             Err(ReadError::whole(path, problem, FORMATS))
-        } else if vicon::begins_like_one(head) {
+        } else if vicon::is_recognised(head) {
             Ok(Self::Vicon)
         } else {
             Ok(Self::Table)

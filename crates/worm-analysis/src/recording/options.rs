@@ -11,9 +11,9 @@ pub struct OpenOptions {
     pub from_s: Option<f64>,
     /// Leave out what lies after this time, s.
     pub to_s: Option<f64>,
-    /// Longest time for which a cell may be out of sight, s.
+    /// Longest time for which a cell may be unseen, s.
     pub max_gap_s: f64,
-    /// Direction up the canal in the space of the markers; without it, it is found from their motion.
+    /// Direction up the canal in the space of the markers; `None`: found from their motion.
     pub axis: Option<Axis>,
 }
 
@@ -29,7 +29,7 @@ impl Default for OpenOptions {
 }
 
 impl OpenOptions {
-    /// Refuses times that make no sense.
+    /// Refuses times that cannot be used.
     ///
     /// # Errors
     /// [`ReadError`] that names the argument and the remedy.
@@ -57,3 +57,6 @@ impl OpenOptions {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

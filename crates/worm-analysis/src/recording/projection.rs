@@ -1,10 +1,11 @@
 //! From markers in space onto the canal.
 //!
 //! The canal is straight and the worm moves along it, so the direction in which all markers are displaced is the canal's,
-//! wherever on its cell each marker sits: the axis is the principal direction of the markers' displacements, each from its own
-//! mean. It points the way the worm got ahead. Markers that stand still or go elsewhere are no cells and are left out; the
-//! others are numbered down the canal, for cell 1 leads. Every choice is told in a warning, and one that the motion does not
-//! decide is refused: `--axis` then says which way is up.
+//! wherever on its cell each marker sits: the axis is the first principal component of the markers' displacements, each from
+//! its own mean. It points in the direction of the worm's net displacement. Markers that stand still, or move far less or far
+//! more than the others, are not cells and are left out; the others are numbered down the canal, because cell 1 leads. Every
+//! choice is reported in a warning. Where the motion does not determine the axis, the file is refused, and `--axis` must give
+//! it.
 
 use super::markers::Markers;
 use super::series::Recording;
@@ -16,13 +17,14 @@ use std::str::FromStr;
 use worm_log::ReadError;
 use worm_physics::MAX_CELLS;
 
-/// A marker whose way is less than this share of the usual one, or the other way round, does not crawl with the others.
+/// A marker that moves over less than this fraction of the median range, or whose own range exceeds the median as much, does
+/// not crawl with the others.
 const CRAWLING_FRACTION: f64 = 0.2;
-/// A line is clear when nothing spreads more than this share across it.
+/// The markers move along a line when the second principal component is at most this fraction of the first.
 const CLEAR_FRACTION: f64 = 0.5;
-/// The worm got ahead clearly when it did by this share of the range in which its cells moved.
-const AHEAD_FRACTION: f64 = 0.2;
-/// Motion across the canal, as a share of that along it, that is worth a warning.
+/// The direction of travel is clear when the net displacement is at least this fraction of the range of the cells' motion.
+const MIN_NET_FRACTION: f64 = 0.2;
+/// Motion across the canal, as a fraction of that along it, above which a warning is given.
 const STRAIGHT_FRACTION: f64 = 0.05;
 const AXIS_REMEDY: &str = "give the direction up the canal with --axis x, -x, y, -y, z, -z or a vector dx,dy,dz";
 
@@ -30,7 +32,7 @@ const AXIS_REMEDY: &str = "give the direction up the canal with --axis x, -x, y,
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis(Vector3<f64>);
 
-/// A text that names no direction.
+/// A text that is not a direction.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0:?} is no direction: give x, -x, y, -y, z, -z, or three numbers dx,dy,dz that are not all 0")]
 pub struct AxisError(String);
@@ -65,11 +67,11 @@ impl FromStr for Axis {
     }
 }
 
-/// Chooses the cells among the markers and lays them onto the canal; `axis` overrules what their motion tells.
+/// Chooses the cells among the markers and projects them onto the canal; without `axis` it is found from their motion.
 ///
 /// # Errors
-/// [`ReadError`] when the motion does not tell which way the canal goes, or fewer than 2 or more than [`MAX_CELLS`] markers
-/// crawl.
+/// [`ReadError`] when the motion does not determine the direction of the canal, or fewer than 2 or more than [`MAX_CELLS`]
+/// markers crawl.
 pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> Result<Recording, ReadError> {
     let mut warnings = std::mem::take(&mut markers.warnings);
     leave_out_unseen(&mut markers, &mut warnings);
@@ -77,7 +79,7 @@ pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> 
         let remedy = "export the trajectories of the markers on the cells";
         return Err(ReadError::whole(path, "no marker is ever seen", remedy));
     }
-    leave_out_strangers(&mut markers, &mut warnings);
+    leave_out_still_or_stray(&mut markers, &mut warnings);
     let cells = markers.names.len();
     if !(2..=MAX_CELLS).contains(&cells) {
         return Err(ReadError::whole(
@@ -109,9 +111,9 @@ pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> 
     warnings.push(format!(
         "cells by marker: {}; up the canal is {}",
         numbered.join(", "),
-        in_words(&direction)
+        as_text(&direction)
     ));
-    warnings.extend(crooked(&markers, &direction));
+    warnings.extend(off_axis_warning(&markers, &direction));
     Ok(Recording {
         source: path.to_path_buf(),
         cell_names,
@@ -126,13 +128,13 @@ pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> 
     })
 }
 
-fn in_words(direction: &Vector3<f64>) -> String {
+fn as_text(direction: &Vector3<f64>) -> String {
     // Adding 0 turns a negative zero into a plain one.
     let [x, y, z] = [direction.x, direction.y, direction.z].map(|part| (part * 1e3).round() / 1e3 + 0.0);
     format!("{x},{y},{z}")
 }
 
-fn keep(markers: &mut Markers, kept: &[bool]) {
+fn retain(markers: &mut Markers, kept: &[bool]) {
     let mut of_names = kept.iter();
     markers.names.retain(|_| of_names.next().is_some_and(|kept| *kept));
     let mut of_positions = kept.iter();
@@ -150,15 +152,15 @@ fn leave_out_unseen(markers: &mut Markers, warnings: &mut Vec<String>) {
     for (name, _) in markers.names.iter().zip(&seen).filter(|(_, seen)| !**seen) {
         warnings.push(format!("marker {name} is never seen and was left out"));
     }
-    keep(markers, &seen);
+    retain(markers, &seen);
 }
 
 fn component(series: &[[f64; 3]], index: usize) -> impl Iterator<Item = f64> {
     series.iter().map(move |position_m| position_m[index])
 }
 
-/// Leaves out what stands still, and what moves far less or far more than is usual among what moves.
-fn leave_out_strangers(markers: &mut Markers, warnings: &mut Vec<String>) {
+/// Leaves out markers that stand still, and those that move far less or far more than the median of the moving ones.
+fn leave_out_still_or_stray(markers: &mut Markers, warnings: &mut Vec<String>) {
     let spread_m: Vec<Vector3<f64>> = markers
         .position_m
         .iter()
@@ -191,10 +193,10 @@ fn leave_out_strangers(markers: &mut Markers, warnings: &mut Vec<String>) {
             spread_m.norm() * 1e3
         ));
     }
-    keep(markers, &kept);
+    retain(markers, &kept);
 }
 
-/// Each marker's positions from its own mean, pooled.
+/// Displacements of all markers, each from its own mean, pooled.
 fn displacements(markers: &Markers) -> impl Iterator<Item = Vector3<f64>> {
     markers.position_m.iter().flat_map(|series| {
         let seen = || {
@@ -208,7 +210,7 @@ fn displacements(markers: &Markers) -> impl Iterator<Item = Vector3<f64>> {
     })
 }
 
-/// The principal direction of the displacements, pointing the way the worm got ahead.
+/// The first principal component of the displacements, in the direction of the net displacement.
 fn find_axis(markers: &Markers, path: &Path) -> Result<Axis, ReadError> {
     let refuse = |problem: String| Err(ReadError::whole(path, problem, AXIS_REMEDY));
     let scatter: Matrix3<f64> = displacements(markers)
@@ -222,12 +224,12 @@ fn find_axis(markers: &Markers, path: &Path) -> Result<Axis, ReadError> {
         return refuse("the markers do not move along one line, so the canal cannot be found from them".to_owned());
     }
     let direction: Vector3<f64> = eigen.eigenvectors.column(order[0]).into_owned();
-    let ahead: Vec<f64> = markers
+    let net: Vec<f64> = markers
         .position_m
         .iter()
-        .map(|series| got_ahead_m(series, &direction))
+        .map(|series| net_displacement_m(series, &direction))
         .collect();
-    let ahead_m = ahead.iter().sum::<f64>() / ahead.len() as f64;
+    let net_m = net.iter().sum::<f64>() / net.len() as f64;
     let ranges = markers.position_m.iter().map(|series| {
         spread(
             series
@@ -236,17 +238,17 @@ fn find_axis(markers: &Markers, path: &Path) -> Result<Axis, ReadError> {
         )
     });
     let range_m = quantile(ranges, 0.5).unwrap_or(0.0);
-    if ahead_m.abs() < AHEAD_FRACTION * range_m {
+    if net_m.abs() < MIN_NET_FRACTION * range_m {
         return refuse(format!(
             "the worm got ahead by {:.2} mm only, too little to tell which way it crawls",
-            ahead_m.abs() * 1e3
+            net_m.abs() * 1e3
         ));
     }
-    Ok(Axis(direction * ahead_m.signum()))
+    Ok(Axis(direction * net_m.signum()))
 }
 
-/// How far a marker got along a direction, from the first tenth of what was seen of it to the last, m.
-fn got_ahead_m(series: &[[f64; 3]], direction: &Vector3<f64>) -> f64 {
+/// Displacement of a marker along a direction from the mean of its first seen tenth to the mean of its last, m.
+fn net_displacement_m(series: &[[f64; 3]], direction: &Vector3<f64>) -> f64 {
     let seen: Vec<f64> = series
         .iter()
         .map(|position_m| Vector3::from(*position_m).dot(direction))
@@ -257,8 +259,8 @@ fn got_ahead_m(series: &[[f64; 3]], direction: &Vector3<f64>) -> f64 {
     mean(&seen[seen.len() - tenth..]) - mean(&seen[..tenth])
 }
 
-/// What to say of motion across the canal.
-fn crooked(markers: &Markers, direction: &Vector3<f64>) -> Option<String> {
+/// A warning where the markers move across the canal more than they should.
+fn off_axis_warning(markers: &Markers, direction: &Vector3<f64>) -> Option<String> {
     let (mut along_m2, mut across_m2, mut count) = (0.0, 0.0, 0.0f64);
     for displacement_m in displacements(markers) {
         let along_m = displacement_m.dot(direction);
@@ -275,3 +277,6 @@ fn crooked(markers: &Markers, direction: &Vector3<f64>) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests;

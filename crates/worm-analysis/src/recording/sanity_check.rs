@@ -1,30 +1,30 @@
-//! What every recording must satisfy, wherever it comes from, so that no result is made of nothing.
+//! What every recording must satisfy, whatever its format.
 
-use super::gaps::{bridge, holes, is_longer, round_up};
+use super::gaps::{bridge, is_longer, round_up, unseen_runs};
 use super::options::OpenOptions;
 use super::series::Recording;
 use super::statistics::{moves, quantile, spread};
 use worm_log::ReadError;
 
-/// Fewest samples that can show anything.
+/// Fewest samples that are analysed.
 const MIN_SAMPLES: usize = 10;
 /// No worm's neighbouring cells are this far apart, or move this far against each other, m: stroke and spacing are at most
 /// 1 m, and a worm of some millimetres that is written down in millimetres has numbers beyond this.
 const TOO_LARGE_M: f64 = 5.0;
-/// A jump in time of so many usual periods is a hole.
-const HOLE_PERIODS: f64 = 5.0;
+/// A time step of more than so many median periods is a gap.
+const MAX_STEP_PERIODS: f64 = 5.0;
 
-/// Checks a recording that has just been read and cut, and bridges short holes in its phase. `whole_s` is the time of the first
-/// and the last sample before the cut.
+/// Checks a recording that has just been read and cut, and bridges short gaps in its phase. `full_range_s` is the time of
+/// the first and the last sample before the cut.
 ///
 /// # Errors
-/// [`ReadError`] for a recording that no worm could have made, or that leaves too much unseen.
+/// [`ReadError`] for a recording that no worm could have made, or in which too much is unseen.
 pub(super) fn check(
     recording: &mut Recording,
     options: &OpenOptions,
-    whole_s: Option<(f64, f64)>,
+    full_range_s: Option<(f64, f64)>,
 ) -> Result<(), ReadError> {
-    check_samples(recording, options, whole_s)?;
+    check_samples(recording, options, full_range_s)?;
     check_seen(recording)?;
     check_time(recording, options.max_gap_s)?;
     recording.check_gaps(options.max_gap_s)?;
@@ -35,12 +35,16 @@ pub(super) fn check(
     Ok(())
 }
 
-fn check_samples(recording: &Recording, options: &OpenOptions, whole_s: Option<(f64, f64)>) -> Result<(), ReadError> {
+fn check_samples(
+    recording: &Recording,
+    options: &OpenOptions,
+    full_range_s: Option<(f64, f64)>,
+) -> Result<(), ReadError> {
     let samples = recording.samples();
     if samples >= MIN_SAMPLES {
         return Ok(());
     }
-    let (left, remedy) = match (options.from_s.or(options.to_s), whole_s) {
+    let (left, remedy) = match (options.from_s.or(options.to_s), full_range_s) {
         (Some(_), Some((first_s, last_s))) => (
             " between --from and --to",
             format!("give a longer time; times count as in the file, here from {first_s:.3} to {last_s:.3} s"),
@@ -69,7 +73,7 @@ fn check_seen(recording: &Recording) -> Result<(), ReadError> {
 fn check_time(recording: &Recording, max_gap_s: f64) -> Result<(), ReadError> {
     let steps = || recording.time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let period_s = quantile(steps(), 0.5).unwrap_or(0.0);
-    let longest_s = max_gap_s.max(HOLE_PERIODS * period_s);
+    let longest_s = max_gap_s.max(MAX_STEP_PERIODS * period_s);
     match recording
         .time_s
         .windows(2)
@@ -90,30 +94,30 @@ fn check_time(recording: &Recording, max_gap_s: f64) -> Result<(), ReadError> {
     }
 }
 
-/// The phase is a clock: short holes are bridged, anything else is refused.
+/// Bridges short gaps in the phase and refuses longer ones.
 fn complete_phase(recording: &mut Recording, max_gap_s: f64) -> Result<(), ReadError> {
     let Some(phase) = &mut recording.gait_phase else {
         return Ok(());
     };
     let time_s = &recording.time_s;
     let last = time_s.len() - 1;
-    let long = holes(phase).find(|hole| {
-        let is_edge = hole.start == 0 || hole.end > last;
-        is_edge || is_longer(time_s[hole.end] - time_s[hole.start - 1], max_gap_s)
+    let too_long = unseen_runs(phase).find(|run| {
+        let is_edge = run.start == 0 || run.end > last;
+        is_edge || is_longer(time_s[run.end] - time_s[run.start - 1], max_gap_s)
     });
-    if let Some(hole) = long {
+    if let Some(run) = too_long {
         return Err(ReadError::at(
             &recording.source,
             "gait_phase",
             format!(
                 "there is no phase from {:.3} s to {:.3} s",
-                time_s[hole.start],
-                time_s[hole.end - 1]
+                time_s[run.start],
+                time_s[run.end - 1]
             ),
             "cut the recording with --from and --to, or take the column out: the phase is then found from the positions",
         ));
     }
-    let bridged: usize = holes(phase).map(|hole| hole.len()).sum();
+    let bridged: usize = unseen_runs(phase).map(|run| run.len()).sum();
     if bridged > 0 {
         bridge(time_s, phase);
         let note = format!("gait_phase is missing in {bridged} samples and was interpolated there");
@@ -122,7 +126,7 @@ fn complete_phase(recording: &mut Recording, max_gap_s: f64) -> Result<(), ReadE
     Ok(())
 }
 
-/// Distances between cells, which no choice of origin changes, tell metres from millimetres.
+/// Tells metres from millimetres by the distances between cells, which do not depend on the origin.
 fn check_lengths(recording: &Recording) -> Result<(), ReadError> {
     let pairs = || {
         recording
@@ -136,11 +140,11 @@ fn check_lengths(recording: &Recording) -> Result<(), ReadError> {
             .filter_map(|distances| quantile(distances.map(f64::abs), 0.5))
             .collect(),
     );
-    let play_m = median_of(pairs().map(spread).collect());
+    let relative_motion_m = median_of(pairs().map(spread).collect());
     let problem = if apart_m > TOO_LARGE_M {
         format!("neighbouring cells are {apart_m:.1} m apart")
-    } else if play_m > TOO_LARGE_M {
-        format!("neighbouring cells move by {play_m:.1} m against each other")
+    } else if relative_motion_m > TOO_LARGE_M {
+        format!("neighbouring cells move by {relative_motion_m:.1} m against each other")
     } else {
         return Ok(());
     };
@@ -162,7 +166,7 @@ fn check_motion(recording: &Recording) -> Result<(), ReadError> {
     ))
 }
 
-/// Cell 1 leads, unless somebody numbered them the other way round or gave each cell an origin of its own.
+/// Warns where cell 1 lies lowest: cells numbered the other way round, or each with an origin of its own.
 fn note_order(recording: &mut Recording) {
     let middle: Vec<f64> = recording
         .position_m
@@ -177,3 +181,6 @@ fn note_order(recording: &mut Recording) {
         recording.warnings.push(note);
     }
 }
+
+#[cfg(test)]
+mod tests;

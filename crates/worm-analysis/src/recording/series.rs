@@ -1,4 +1,4 @@
-//! The recording itself: series over time that belong together.
+//! The recording itself: series over a common time.
 
 use std::path::PathBuf;
 use worm_physics::MAX_CELLS;
@@ -17,7 +17,7 @@ pub struct Motor {
 }
 
 impl Motor {
-    /// What the four series are called in a file, in the order of [`series`](Self::series).
+    /// Column names of the four series in a file, in the order of [`series`](Self::series).
     pub const COLUMNS: [&'static str; 4] = [
         "motor_angle_rad",
         "motor_velocity_rad_s",
@@ -44,9 +44,9 @@ impl Motor {
 /// Cell positions over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// Where it comes from, as people and errors call it.
+    /// Where it comes from, as errors and reports name it.
     pub source: PathBuf,
-    /// What each cell is called there: `x1_m`, a marker's name. Cell 1 first.
+    /// Name of each cell there: `x1_m`, or a marker's name. Cell 1 first.
     pub cell_names: Vec<String>,
     /// Time of each sample, s, strictly increasing.
     pub time_s: Vec<f64>,
@@ -56,7 +56,7 @@ pub struct Recording {
     pub gait_phase: Option<Vec<f64>>,
     /// Motor state, where it was recorded.
     pub motor: Option<Motor>,
-    /// What the reader found remarkable: ignored columns, markers left out, a cut-off end.
+    /// What the reader noticed: ignored columns, markers left out, a truncated end.
     pub warnings: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ impl Recording {
         self.time_s.len()
     }
 
-    /// A cell as errors and warnings call it; `cell` counts from 0.
+    /// Name of a cell in errors and warnings; `cell` counts from 0.
     pub(crate) fn name_of(&self, cell: usize) -> String {
         match self.cell_names.get(cell) {
             Some(name) => format!("cell {} ({name})", cell + 1),
@@ -100,3 +100,6 @@ impl Recording {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,7 +1,7 @@
 //! Recordings as CSV: one row for each sample, SI units named in the header.
 //!
 //! `time_s` and `x1_m` … `xn_m` must be there, `gait_phase` and the motor's columns may. Columns come in any order, unknown
-//! ones are passed over with a warning, lines that begin with `#` are comments, and an empty field or `nan` was not seen.
+//! ones are ignored with a warning, lines that begin with `#` are comments, and an empty field or `nan` means not seen.
 
 use super::series::{Motor, Recording};
 use super::text::Text;
@@ -11,8 +11,8 @@ use std::path::Path;
 use worm_log::ReadError;
 use worm_physics::MAX_CELLS;
 
-/// Longest piece of a file that is shown in an error.
-const SHOWN: usize = 32;
+/// Most characters of a file that are quoted in an error.
+const MAX_QUOTED: usize = 32;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,10 +26,10 @@ enum Column {
     Unknown,
 }
 
-/// Reads all rows. Whether they make sense together is for others to check.
+/// Reads all rows. Whether they can be of a worm is checked elsewhere (`sanity_check`).
 ///
 /// # Errors
-/// [`ReadError`] with line and column for a header or a row that is not as it must be.
+/// [`ReadError`] with line and column for an invalid header or row.
 pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording, ReadError> {
     let mut rows = Rows {
         path,
@@ -46,7 +46,7 @@ pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording,
         let remedy = "give a file with a header row and samples";
         return Err(ReadError::whole(path, "holds nothing but comments", remedy));
     }
-    let mut recording = rows.take_header(&record)?;
+    let mut recording = rows.read_header(&record)?;
     let mut values = vec![f64::NAN; rows.columns.len()];
     let mut line = 0;
     while rows.next(&mut record)? {
@@ -114,7 +114,7 @@ impl<R: Read> Rows<'_, R> {
         })
     }
 
-    /// The line that was read last, from 1. The text hands every line over with its end, so the reader stands behind it.
+    /// The line that was read last, from 1. [`Text`] terminates every line, so the reader stands behind it.
     fn line(&self) -> u64 {
         self.reader.position().line().saturating_sub(1)
     }
@@ -141,8 +141,8 @@ impl<R: Read> Rows<'_, R> {
         ))
     }
 
-    /// Understands the header row; the recording has its series, all of them empty.
-    fn take_header(&mut self, header: &ByteRecord) -> Result<Recording, ReadError> {
+    /// Parses the header row; returns a recording with its series, all of them empty.
+    fn read_header(&mut self, header: &ByteRecord) -> Result<Recording, ReadError> {
         let names: Vec<String> = header
             .iter()
             .map(|name| String::from_utf8_lossy(name).trim().to_owned())
@@ -158,10 +158,10 @@ impl<R: Read> Rows<'_, R> {
         let mut warnings = Vec::new();
         for (index, name) in names.iter().enumerate() {
             let column = column_of(name);
-            if let Some(unit) = foreign_unit(name) {
+            if let Some(unit) = unit_problem(name) {
                 return self.refuse(
                     index,
-                    format!("the column {} {unit}", shown(name)),
+                    format!("the column {} {unit}", quoted(name)),
                     "convert positions to metres and name the columns x1_m, x2_m, …",
                 );
             }
@@ -169,7 +169,7 @@ impl<R: Read> Rows<'_, R> {
                 _ if column == Column::Unknown => warnings.push(format!(
                     "column {} ({}) is not known and not used",
                     index + 1,
-                    shown(name)
+                    quoted(name)
                 )),
                 Some(first) => {
                     return self.refuse(
@@ -192,7 +192,7 @@ impl<R: Read> Rows<'_, R> {
             return self.refuse_line(
                 format!(
                     "there is no column time_s; the columns are {}",
-                    shown(&names.join(", "))
+                    quoted(&names.join(", "))
                 ),
                 "name the column of times time_s, in seconds",
             );
@@ -214,7 +214,7 @@ impl<R: Read> Rows<'_, R> {
         })
     }
 
-    /// The cells must be numbered from 1 without a hole.
+    /// Number of cells, which must be numbered from 1 without a gap.
     fn count_cells(&self, names: &[String]) -> Result<usize, ReadError> {
         let mut numbers: Vec<usize> = self
             .columns
@@ -229,7 +229,7 @@ impl<R: Read> Rows<'_, R> {
         let remedy = "name the cells' columns x1_m, x2_m, … without a hole, cell 1 leads";
         match (numbers.last(), missing) {
             (None, _) => self.refuse_line(
-                format!("there is no column x1_m; the columns are {}", shown(&names.join(", "))),
+                format!("there is no column x1_m; the columns are {}", quoted(&names.join(", "))),
                 remedy,
             ),
             (Some(last), Some((expected, _))) => {
@@ -244,7 +244,7 @@ impl<R: Read> Rows<'_, R> {
         }
     }
 
-    /// Understands one row.
+    /// Parses one row into `values`.
     fn parse(&self, record: &ByteRecord, last_s: Option<f64>, values: &mut [f64]) -> Result<(), ReadError> {
         if record.len() < values.len() {
             return self.refuse(
@@ -263,7 +263,7 @@ impl<R: Read> Rows<'_, R> {
                 index,
                 format!(
                     "the row has more fields than the header, such as {}",
-                    shown(&String::from_utf8_lossy(extra))
+                    quoted(&String::from_utf8_lossy(extra))
                 ),
                 "separate fields by commas and write numbers with a point",
             );
@@ -282,7 +282,7 @@ impl<R: Read> Rows<'_, R> {
                     );
                 }
                 None => {
-                    let text = shown(&String::from_utf8_lossy(field));
+                    let text = quoted(&String::from_utf8_lossy(field));
                     return self.refuse(
                         index,
                         format!("{text} is not a number"),
@@ -325,7 +325,7 @@ fn column_of(name: &str) -> Column {
     }
 }
 
-/// Takes `x12_m` apart into 12 and `_m`.
+/// Splits `x12_m` into 12 and `_m`.
 fn cell_number(name: &str) -> Option<(usize, &str)> {
     let rest = name.strip_prefix('x')?;
     let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
@@ -337,8 +337,8 @@ fn cell_number(name: &str) -> Option<(usize, &str)> {
     Some((cell, unit))
 }
 
-/// What is wrong with a column that evidently holds a cell's positions, but not in metres.
-fn foreign_unit(name: &str) -> Option<&'static str> {
+/// The problem with a column that evidently holds a cell's positions, but not in metres.
+fn unit_problem(name: &str) -> Option<&'static str> {
     match cell_number(&name.to_ascii_lowercase())?.1 {
         "_mm" | " (mm)" | " [mm]" | "mm" => Some("is in millimetres"),
         "_cm" | " (cm)" | " [cm]" | "cm" => Some("is in centimetres"),
@@ -348,7 +348,7 @@ fn foreign_unit(name: &str) -> Option<&'static str> {
     }
 }
 
-/// A number, or `NaN` for what was not seen; `None` for anything else.
+/// A number, or `NaN` for an empty field; `None` for anything else.
 fn parse_field(field: &[u8]) -> Option<f64> {
     match std::str::from_utf8(field).ok()?.trim() {
         "" => Some(f64::NAN),
@@ -356,11 +356,14 @@ fn parse_field(field: &[u8]) -> Option<f64> {
     }
 }
 
-/// A piece of a file in quotes, cut where it is long or not for a terminal.
-pub(super) fn shown(text: &str) -> String {
-    let mut piece: String = text.chars().filter(|c| !c.is_control()).take(SHOWN).collect();
+/// A piece of a file in quotes, shortened, without control characters.
+pub(super) fn quoted(text: &str) -> String {
+    let mut piece: String = text.chars().filter(|c| !c.is_control()).take(MAX_QUOTED).collect();
     if piece.len() < text.len() {
         piece.push('…');
     }
     format!("\"{piece}\"")
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,12 +1,12 @@
-//! Text as it comes from other people's programs, on its way to a parser.
+//! Text from other programs, made ready for a parser.
 
 use std::io::{self, Read};
 
 /// Bytes between two calls of the progress callback.
 const REPORT_EVERY: u64 = 64 * 1024;
 
-/// Passes text on with plain line ends, the last line included, and tells how far it is. With one kind of line end, line
-/// numbers are what an editor shows.
+/// A reader that drops carriage returns, terminates an unterminated last line, and reports progress. Line numbers are then those
+/// that an editor shows.
 pub(super) struct Text<'a, R> {
     inner: R,
     total: u64,
@@ -18,7 +18,7 @@ pub(super) struct Text<'a, R> {
 }
 
 impl<'a, R: Read> Text<'a, R> {
-    /// Text of about `total` bytes; `progress` is told the share that was read.
+    /// Text of about `total` bytes; `progress` receives the fraction that was read.
     pub(super) fn new(inner: R, total: u64, progress: &'a mut dyn FnMut(f64)) -> Self {
         Self {
             inner,
@@ -31,7 +31,7 @@ impl<'a, R: Read> Text<'a, R> {
         }
     }
 
-    /// Whether the text ended without a line end, as a file does that was cut off; known at its end.
+    /// Whether the text ended without a line end, as a truncated file does; known once all is read.
     pub(super) fn is_unterminated(&self) -> bool {
         self.unterminated
     }
@@ -71,7 +71,7 @@ impl<R: Read> Read for Text<'_, R> {
     }
 }
 
-/// Moves all other bytes to the front and returns their number.
+/// Moves all bytes but carriage returns to the front and returns their number.
 fn drop_carriage_returns(bytes: &mut [u8]) -> usize {
     let Some(first) = bytes.iter().position(|&byte| byte == b'\r') else {
         return bytes.len();
@@ -85,3 +85,6 @@ fn drop_carriage_returns(bytes: &mut [u8]) -> usize {
     }
     kept
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,13 +13,13 @@
 //! are read. Where the computer's language asks for it, fields are separated by semicolons and numbers have a decimal comma.
 
 use super::markers::{Markers, UNSEEN, metres_in};
-use super::table::shown;
+use super::table::quoted;
 use super::text::Text;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use worm_log::ReadError;
 
-/// What sections are called; a file begins with one of them.
+/// Titles of sections; a file begins with one of them.
 const SECTIONS: [&str; 6] = [
     "Trajectories",
     "Devices",
@@ -29,14 +29,14 @@ const SECTIONS: [&str; 6] = [
     "Events",
 ];
 const TRAJECTORIES: &str = "Trajectories";
-/// Highest rate that is believed, Hz.
+/// Highest rate that is accepted, Hz.
 const MAX_RATE_HZ: f64 = 1e5;
 /// Longest line that is read, bytes: thousands of markers.
 const MAX_LINE: u64 = 1 << 20;
 const EXPORT_AGAIN: &str = "export the trajectories again, as ASCII with rate, names and units";
 
-/// Whether a file begins as one of these.
-pub(super) fn begins_like_one(head: &[u8]) -> bool {
+/// Whether a file begins as a Vicon export.
+pub(super) fn is_recognised(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
     let first = text.trim_start_matches('\u{feff}').lines().find(|line| !is_blank(line));
     first.is_some_and(|line| SECTIONS.contains(&section_name(line)))
@@ -53,9 +53,9 @@ fn section_name(line: &str) -> &str {
 /// Reads the section of trajectories.
 ///
 /// # Errors
-/// [`ReadError`] with the line that is not as it must be.
+/// [`ReadError`] with the line that is invalid.
 pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Markers, ReadError> {
-    let mut lines = Lines {
+    let mut lines = LineReader {
         path,
         reader: BufReader::new(text),
         line: String::new(),
@@ -76,14 +76,14 @@ pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Markers, R
     read_samples(&mut lines, header)
 }
 
-struct Lines<'p, 't, R> {
+struct LineReader<'p, 't, R> {
     path: &'p Path,
     reader: BufReader<Text<'t, R>>,
     line: String,
     number: usize,
 }
 
-impl<R: Read> Lines<'_, '_, R> {
+impl<R: Read> LineReader<'_, '_, R> {
     /// Goes to the next line; false at the end.
     fn next(&mut self) -> Result<bool, ReadError> {
         let mut bytes = std::mem::take(&mut self.line).into_bytes();
@@ -102,8 +102,8 @@ impl<R: Read> Lines<'_, '_, R> {
         Ok(count > 0)
     }
 
-    /// Goes to the next line, which must be there and not be blank.
-    fn need(&mut self, what: &str) -> Result<(), ReadError> {
+    /// Goes to the next line, which must exist and not be blank.
+    fn next_required(&mut self, what: &str) -> Result<(), ReadError> {
         if self.next()? && !is_blank(&self.line) {
             return Ok(());
         }
@@ -120,7 +120,7 @@ impl<R: Read> Lines<'_, '_, R> {
     }
 }
 
-/// What stands above the samples.
+/// The rows above the samples.
 struct Header {
     rate_hz: f64,
     separator: char,
@@ -130,20 +130,20 @@ struct Header {
 }
 
 impl Header {
-    fn read<R: Read>(lines: &mut Lines<'_, '_, R>) -> Result<Self, ReadError> {
-        lines.need("the rate")?;
+    fn read<R: Read>(lines: &mut LineReader<'_, '_, R>) -> Result<Self, ReadError> {
+        lines.next_required("the rate")?;
         let rate = section_name(&lines.line).replace(',', ".");
         let rate_hz = rate
             .parse::<f64>()
             .ok()
             .filter(|rate_hz| *rate_hz > 0.0 && *rate_hz <= MAX_RATE_HZ);
         let Some(rate_hz) = rate_hz else {
-            return lines.refuse(format!("{} is no rate in Hz", shown(&lines.line)), EXPORT_AGAIN);
+            return lines.refuse(format!("{} is no rate in Hz", quoted(&lines.line)), EXPORT_AGAIN);
         };
-        lines.need("the row of marker names")?;
+        lines.next_required("the row of marker names")?;
         let names_at = lines.number;
         let names_line = lines.line.clone();
-        lines.need("the row Frame, Sub Frame, X, Y, Z")?;
+        lines.next_required("the row Frame, Sub Frame, X, Y, Z")?;
         let separator = if lines.line.contains(';') { ';' } else { ',' };
         let fields: Vec<&str> = lines.line.split(separator).map(clean).collect();
         let columns = fields
@@ -156,7 +156,7 @@ impl Header {
             && (columns - 2).is_multiple_of(3)
             && fields[2..columns].chunks(3).all(|axes| axes == ["X", "Y", "Z"]);
         if !is_header {
-            let problem = format!("{} is not the row Frame, Sub Frame, X, Y, Z, …", shown(&lines.line));
+            let problem = format!("{} is not the row Frame, Sub Frame, X, Y, Z, …", quoted(&lines.line));
             return lines.refuse(problem, EXPORT_AGAIN);
         }
         let markers = (columns - 2) / 3;
@@ -173,7 +173,7 @@ impl Header {
                 EXPORT_AGAIN,
             ));
         };
-        lines.need("the row of units")?;
+        lines.next_required("the row of units")?;
         let units: Vec<&str> = lines.line.split(separator).map(clean).collect();
         let mut metres = Vec::with_capacity(markers);
         for (marker, name) in names.iter().enumerate() {
@@ -182,7 +182,7 @@ impl Header {
             match unit.and_then(|unit| metres_in(unit)) {
                 Some(length_m) => metres.push(length_m),
                 None => {
-                    let problem = format!("{} gives marker {} no unit mm, cm or m", shown(&lines.line), name);
+                    let problem = format!("{} gives marker {} no unit mm, cm or m", quoted(&lines.line), name);
                     return lines.refuse(problem, EXPORT_AGAIN);
                 }
             }
@@ -200,7 +200,7 @@ fn clean(field: &str) -> &str {
     field.trim().trim_matches('"').trim()
 }
 
-fn read_samples<R: Read>(lines: &mut Lines<'_, '_, R>, header: Header) -> Result<Markers, ReadError> {
+fn read_samples<R: Read>(lines: &mut LineReader<'_, '_, R>, header: Header) -> Result<Markers, ReadError> {
     let mut markers = Markers {
         position_m: vec![Vec::new(); header.names.len()],
         ..Markers::default()
@@ -240,14 +240,14 @@ struct Sample {
     position_m: Vec<[f64; 3]>,
 }
 
-fn parse_sample<R: Read>(lines: &Lines<'_, '_, R>, header: &Header) -> Result<Sample, ReadError> {
+fn parse_sample<R: Read>(lines: &LineReader<'_, '_, R>, header: &Header) -> Result<Sample, ReadError> {
     let mut fields = lines.line.split(header.separator).map(clean);
     let mut whole = |what: &str| {
         let field = fields.next().unwrap_or("");
         // Frames beyond this have no exact time.
         let number = field.parse::<i64>().ok().filter(|number| number.abs() < 1 << 52);
         number.map_or_else(
-            || lines.refuse(format!("{} is no {what} number", shown(field)), EXPORT_AGAIN),
+            || lines.refuse(format!("{} is no {what} number", quoted(field)), EXPORT_AGAIN),
             Ok,
         )
     };
@@ -275,13 +275,13 @@ fn parse_sample<R: Read>(lines: &Lines<'_, '_, R>, header: &Header) -> Result<Sa
                 Ok(number) if !number.is_infinite() => number * metres,
                 _ => {
                     return lines.refuse(
-                        format!("{axis_name} of {name}: {} is not a number", shown(field)),
+                        format!("{axis_name} of {name}: {} is not a number", quoted(field)),
                         EXPORT_AGAIN,
                     );
                 }
             };
         }
-        // A marker is seen with all its coordinates or not at all.
+        // A marker with a missing coordinate was not seen.
         position_m.push(if position.iter().any(|part| part.is_nan()) {
             UNSEEN
         } else {
@@ -289,7 +289,7 @@ fn parse_sample<R: Read>(lines: &Lines<'_, '_, R>, header: &Header) -> Result<Sa
         });
     }
     if let Some(extra) = fields.find(|field| !field.is_empty()) {
-        let problem = format!("the row has more fields than markers, such as {}", shown(extra));
+        let problem = format!("the row has more fields than markers, such as {}", quoted(extra));
         return lines.refuse(problem, "with a decimal comma, fields must be separated by semicolons");
     }
     Ok(Sample { frame, position_m })

@@ -4,10 +4,10 @@ use super::series::{Motor, Recording};
 use std::io::{self, Write};
 
 /// Writes a recording as CSV. Numbers are as short as possible without loss, so that reading it back gives the same values;
-/// what was not seen is empty; optional columns are there where they are known.
+/// what was not seen is empty; optional columns are written where they are known.
 ///
 /// # Errors
-/// What `out` says.
+/// When `out` cannot be written.
 pub fn write_csv(recording: &Recording, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
@@ -44,7 +44,7 @@ pub fn write_csv(recording: &Recording, out: &mut impl Write) -> io::Result<()> 
             if value.is_nan() {
                 write!(out, ",")?;
             } else {
-                // Unlike the plain format, this one writes 1e-300 as it is here.
+                // Unlike `{}`, `{:?}` writes 1e-300 in this short form.
                 write!(out, ",{value:?}")?;
             }
         }
@@ -53,7 +53,7 @@ pub fn write_csv(recording: &Recording, out: &mut impl Write) -> io::Result<()> 
     Ok(())
 }
 
-/// A name that stays within its comment.
+/// A name without line ends, so that it stays within its comment.
 fn one_line(text: &str) -> String {
     text.replace(char::is_control, " ")
 }

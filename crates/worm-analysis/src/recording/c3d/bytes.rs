@@ -1,6 +1,6 @@
-//! Bytes of a file that may be cut off or damaged: every access is checked.
+//! Bytes of a file that may be truncated or damaged: every access is checked.
 
-/// How the computer that wrote a file ordered bytes and wrote numbers.
+/// Byte order and number format of the computer that wrote a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Processor {
     /// Little-endian, IEEE 754.

@@ -1,15 +1,15 @@
 //! Motion capture as C3D, the binary format of the biomechanics laboratories.
 //!
 //! A file is made of blocks of 512 bytes: a header, the `parameters`, and frames of points and analogue samples. Only the
-//! points are read. The format is read here rather than by the crate `c3dio`, which trusts what a header says: on a damaged
-//! file it indexes out of bounds or takes memory without limit, and beyond 65,535 frames (nine minutes at 120 Hz) it miscounts.
-//! A test holds this reader against it on a whole file.
+//! points are read. The crate `c3dio` is not used because it trusts the header: on a damaged file it indexes out of
+//! bounds or allocates without limit, and beyond 65,535 frames (nine minutes at 120 Hz) it miscounts. A test compares this
+//! reader with it on an intact file.
 
 mod bytes;
 mod parameters;
 
 use super::markers::{Markers, UNSEEN, metres_in};
-use super::table::shown;
+use super::table::quoted;
 use bytes::{Bytes, Processor};
 use parameters::Parameters;
 use std::path::Path;
@@ -19,20 +19,20 @@ const BLOCK: usize = 512;
 /// The second byte of every C3D file.
 const KEY: u8 = 0x50;
 const MAX_RATE_HZ: f64 = 1e5;
-/// Where the header's count of frames ends.
+/// Largest count of frames that the header can hold.
 const MAX_COUNT: usize = 65_535;
 const EXPORT_AGAIN: &str = "export or copy the file again";
 
-/// Whether a file begins as one of these.
-pub(super) fn begins_like_one(head: &[u8]) -> bool {
-    // A printable first byte would be text that happens to have a P in second place.
+/// Whether a file begins as a C3D file.
+pub(super) fn is_recognised(head: &[u8]) -> bool {
+    // A printable first byte would be text whose second character happens to be a P.
     matches!(head, [block, KEY, ..] if *block < b' ')
 }
 
 /// Reads all points.
 ///
 /// # Errors
-/// [`ReadError`] for a file that is cut off, damaged, or leaves rate or unit open.
+/// [`ReadError`] for a file that is cut off, damaged, or has no valid rate or unit.
 pub(super) fn read(path: &Path, file: &[u8]) -> Result<Markers, ReadError> {
     let refuse = |problem: &str| ReadError::whole(path, problem, EXPORT_AGAIN);
     let [parameter_block, KEY, ..] = *file else {
@@ -52,24 +52,24 @@ pub(super) fn read(path: &Path, file: &[u8]) -> Result<Markers, ReadError> {
     let layout = Layout::of(&header, &parameters, file).map_err(|problem| refuse(&problem))?;
     let metres = unit_m(&parameters, path)?;
     let mut markers = layout.read(bytes, metres);
-    if layout.left_over > 0 {
+    if layout.unread > 0 {
         markers.warnings.push(format!(
             "the file holds {} frames more than it says; they were not read",
-            layout.left_over
+            layout.unread
         ));
     }
     markers.names = names(&parameters, layout.points);
     Ok(markers)
 }
 
-/// What the first block says.
+/// The first block.
 struct Header {
     points: usize,
     analog_per_frame: usize,
     frames: usize,
-    /// Whether the last frame's number is beyond what the header can hold, so that `frames` tells nothing.
+    /// Whether the last frame's number exceeds what the header can hold, so that `frames` is meaningless.
     is_full: bool,
-    /// Negative where values are floating point; otherwise what one unit of an integer is worth.
+    /// Negative where values are floating point; otherwise the length of one integer unit.
     scale: f32,
     data_block: usize,
     rate_hz: f64,
@@ -90,15 +90,15 @@ impl Header {
     }
 }
 
-/// Where the points are, all of it inside the file.
+/// Where the points are; checked to lie inside the file.
 struct Layout {
     points: usize,
     frames: usize,
     /// Whole frames that follow the last one.
-    left_over: usize,
+    unread: usize,
     begin: usize,
     frame_length: usize,
-    /// Metres and such in one integer; `None` for floating point.
+    /// Length of one integer unit, in the file's unit; `None` for floating point.
     integer_scale: Option<f64>,
     rate_hz: f64,
 }
@@ -133,7 +133,7 @@ impl Layout {
         let there = data.len() / frame_length;
         let mut frames = count_frames(header, parameters)?;
         if frames == MAX_COUNT && there > frames {
-            // The count is full, so only the file's length tells; zeros fill up its last block.
+            // The count is full, so the file's length decides; its last block is padded with zeros.
             let is_empty = |frame: &&[u8]| frame.iter().all(|byte| *byte == 0);
             frames = there
                 - data
@@ -146,13 +146,13 @@ impl Layout {
         if frames > there {
             return Err(format!("is cut off: it says {frames} frames and holds {there}"));
         }
-        // The last block is filled up, and that is less than a block.
+        // The padding of the last block is less than a block.
         let padding = BLOCK.div_ceil(frame_length);
-        let left_over = there - frames;
+        let unread = there - frames;
         Ok(Self {
             points: header.points,
             frames,
-            left_over: if left_over > padding { left_over } else { 0 },
+            unread: if unread > padding { unread } else { 0 },
             begin,
             frame_length,
             integer_scale,
@@ -207,10 +207,10 @@ impl Layout {
     }
 }
 
-/// The header counts to [`MAX_COUNT`]. Longer recordings tell their length in one of three other places, or nowhere.
+/// The header counts to [`MAX_COUNT`]. Longer recordings give their length in one of three other places, or nowhere.
 fn count_frames(header: &Header, parameters: &Parameters<'_>) -> Result<usize, String> {
-    let first = parameters.long("TRIAL", "ACTUAL_START_FIELD");
-    let last = parameters.long("TRIAL", "ACTUAL_END_FIELD");
+    let first = parameters.two_words("TRIAL", "ACTUAL_START_FIELD");
+    let last = parameters.two_words("TRIAL", "ACTUAL_END_FIELD");
     let by_fields = first.zip(last).map(|(first, last)| last - first + 1.0);
     let by_parameters = by_fields
         .or_else(|| parameters.number("POINT", "LONG_FRAMES"))
@@ -239,7 +239,7 @@ fn unit_m(parameters: &Parameters<'_>, path: &Path) -> Result<f64, ReadError> {
     let problem = match &unit {
         Some(unit) => match metres_in(unit) {
             Some(metres) => return Ok(metres),
-            None => format!("{} is no unit mm, cm or m", shown(unit)),
+            None => format!("{} is no unit mm, cm or m", quoted(unit)),
         },
         None => "the unit of the points is not given".to_owned(),
     };

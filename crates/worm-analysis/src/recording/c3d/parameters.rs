@@ -10,7 +10,7 @@ pub(super) struct Parameters<'b> {
     groups: HashMap<String, i8>,
 }
 
-/// One parameter: its elements, not yet understood.
+/// One parameter: its elements, not yet decoded.
 #[derive(Debug, Clone)]
 struct Value<'b> {
     /// −1 text, 1 byte, 2 integer, 4 floating point.
@@ -20,8 +20,7 @@ struct Value<'b> {
 }
 
 impl<'b> Parameters<'b> {
-    /// Walks through the section that begins at `at` with its four-byte header. `None` where it runs out of the file or in
-    /// circles.
+    /// Walks through the section that begins at `at` with its four-byte header. `None` where it leaves the file.
     pub(super) fn read(file: Bytes<'b>, at: usize) -> Option<Self> {
         let mut parameters = Self::default();
         let mut at = at.checked_add(4)?;
@@ -46,7 +45,7 @@ impl<'b> Parameters<'b> {
             if to_next == 0 {
                 return Some(parameters);
             }
-            // At least its own two bytes, so that the walk gets on.
+            // At least its own two bytes, so that the loop ends.
             at = next_at + to_next.max(2);
         }
     }
@@ -68,12 +67,12 @@ impl<'b> Parameters<'b> {
     }
 
     /// A frame number in two words, low word first.
-    pub(super) fn long(&self, group: &str, name: &str) -> Option<f64> {
+    pub(super) fn two_words(&self, group: &str, name: &str) -> Option<f64> {
         let value = self.get(group, name).filter(|value| value.kind == 2)?;
         Some(f64::from(value.data.u16(0)?) + 65536.0 * f64::from(value.data.u16(2)?))
     }
 
-    /// The texts of a parameter, without the blanks around them.
+    /// The texts of a parameter, trimmed.
     pub(super) fn texts(&self, group: &str, name: &str) -> Option<Vec<String>> {
         let value = self.get(group, name).filter(|value| value.kind == -1)?;
         let length = value.dimensions.first().copied().unwrap_or(1).max(1);

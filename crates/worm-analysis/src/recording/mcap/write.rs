@@ -1,4 +1,4 @@
-//! A recording as a log: what a worm would have published.
+//! A recording as a log, as a live worm would have published it.
 
 use crate::recording::Recording;
 use std::fs::File;
@@ -38,7 +38,7 @@ pub fn write(recording: &Recording, config: &Config, text: Option<&str>, path: &
     file.sync_all().map_err(refused)
 }
 
-/// When the first state is said to have been, ns: 0 would stand for a state that rests on nothing.
+/// Time of the first state, ns: 0 would mean that there is no state.
 const BEGIN_NS: u64 = 1_000_000_000;
 
 fn state(recording: &Recording, sample: usize) -> State {
