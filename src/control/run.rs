@@ -1,8 +1,9 @@
 //! The real-time loop: sleeps until each deadline, exchanges, ticks, publishes. All behaviour is in
 //! [`Controller::tick`]; here is only I/O, and the account of where the time went.
 
-use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
+use super::controller::Controller;
 use super::hardware::Drive;
+use super::interface::{Inputs, Outputs, Service, ServiceOutcome};
 use super::journal::{Entry, Journal};
 use super::presence::{Looks, SHORTEST_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
