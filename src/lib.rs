@@ -59,7 +59,7 @@ mod estimator;
 mod failure;
 pub mod latency;
 pub mod link;
-pub mod logging;
+mod logging;
 mod preflight;
 mod print;
 pub mod realtime;

@@ -7,9 +7,6 @@ use crate::link::ServoReading;
 use worm_estimator::config::{Config, Limits};
 use worm_estimator::message::Fault;
 
-/// What the bus watchdog register reads after it has stopped the motor (XL330-M288 e-manual, register 98).
-const WATCHDOG_TRIPPED: u8 = 0xFF;
-
 /// Time over which the bus voltage is averaged, s: motor current steps pull it down for milliseconds.
 const VOLTAGE_AVERAGING_S: f64 = 0.1;
 
@@ -90,7 +87,7 @@ impl Safety {
         if servo.alert {
             return Some(Fault::ServoHardware);
         }
-        if servo.watchdog == WATCHDOG_TRIPPED {
+        if servo.watchdog_latched() {
             // The silence that tripped it was the computer's own where most of it was a pause.
             let by_pause = 2 * watched.paused_ns >= self.watchdog_ns;
             return Some(if by_pause {

@@ -7,7 +7,7 @@ use dynamixel_bus::packet::{Decoder, DeviceId, Instruction, InstructionPacket, M
 use worm_estimator::config::Config;
 
 /// A controller in virtual time.
-pub(super) struct LogWriter {
+pub(super) struct DeviceHarness {
     pub(super) devices: Devices,
     pub(super) now_s: f64,
 }
@@ -22,26 +22,34 @@ pub(super) fn id(id: u8) -> DeviceId {
     DeviceId::new(id).expect("a valid ID")
 }
 
-pub(super) fn desk_with(config: &Config, faults: &[&str]) -> LogWriter {
+pub(super) fn harness_with(config: &Config, faults: &[&str]) -> DeviceHarness {
     let faults = faults.iter().map(|text| text.parse().expect("a fault")).collect();
     let options = Options {
         faults,
         ..Options::default()
     };
-    LogWriter {
+    DeviceHarness {
         devices: Devices::new(config, &options).expect("devices"),
         now_s: 0.0,
     }
 }
 
-pub(super) fn writer(faults: &[&str]) -> LogWriter {
-    desk_with(&Config::default(), faults)
+pub(super) fn harness(faults: &[&str]) -> DeviceHarness {
+    harness_with(&Config::default(), faults)
 }
 
-impl LogWriter {
+impl DeviceHarness {
+    /// Sends bytes, and returns what comes back at once.
+    pub(super) fn send(&mut self, bytes: &[u8]) -> Vec<u8> {
+        self.devices.receive(bytes, self.now_s).expect("a worm");
+        let mut answer = Vec::new();
+        self.devices.take_due(self.now_s, &mut answer);
+        answer
+    }
+
     /// What comes back within 2 ms, in bytes.
     pub(super) fn exchange(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let mut answer = self.devices.handle(bytes, self.now_s).expect("a worm");
+        let mut answer = self.send(bytes);
         for _ in 0..20 {
             self.now_s += 1e-4;
             self.devices.advance_to(self.now_s).expect("a worm");

@@ -120,24 +120,6 @@ impl Devices {
         self.bus.next_due_s()
     }
 
-    /// Bytes in, bytes out: [`receive`](Self::receive), then [`take_due`](Self::take_due). An answer that a return delay or
-    /// a fault holds back comes out of a later call.
-    ///
-    /// # Errors
-    /// [`WormError`] never for a checked configuration.
-    pub fn handle(&mut self, bytes: &[u8], now_s: f64) -> Result<Vec<u8>, WormError> {
-        self.receive(bytes, now_s)?;
-        let mut out = Vec::new();
-        self.take_due(now_s, &mut out);
-        Ok(out)
-    }
-
-    /// Forgets bytes and answers on the line: the controller has gone.
-    pub fn disconnect(&mut self) {
-        self.decoder.clear();
-        self.bus.line().clear();
-    }
-
     /// Baud rate that the servo is set to, bit/s.
     pub fn baud(&self) -> u32 {
         self.bus.baud()

@@ -172,11 +172,6 @@ impl Motor {
         self.case_c
     }
 
-    /// Temperature of the winding, °C.
-    pub fn winding_c(&self) -> f64 {
-        self.winding_c
-    }
-
     /// Scales dry and viscous friction inside.
     pub fn set_friction_scale(&mut self, scale: f64) {
         self.dry_scale = scale;
@@ -471,7 +466,7 @@ mod tests {
         motor.set_friction_scale(1e5);
         let e = run(&mut motor, Drive::Velocity(GAIT), 0.0, 30.0, 1e-3);
         assert!((1.1..1.5).contains(&motor.current_a()), "{}", motor.current_a());
-        assert!(motor.winding_c() > motor.case_c() && motor.case_c() > 30.0);
+        assert!(motor.winding_c > motor.case_c() && motor.case_c() > 30.0);
         assert!(motor.bus_v() < 4.8);
         assert!((e.electrical_j - e.copper_j).abs() < 1e-6);
     }

@@ -172,11 +172,6 @@ impl Plant {
         self.steps as f64 * self.step_s
     }
 
-    /// Length of a step, s.
-    pub fn step_s(&self) -> f64 {
-        self.step_s
-    }
-
     /// The motor.
     pub fn motor(&self) -> &Motor {
         &self.motor
