@@ -1,5 +1,5 @@
 //! What the loop has to tell, without a log call in a tick: entries go through a bounded queue to a thread that logs. The same
-//! thread reads the loop's counters every now and then, for the [evidence](super::evidence) in late ticks.
+//! thread reads the loop's counters every now and then, for the [evidence](super::sched_counters) in late ticks.
 
 use super::sched_counters::{Counters, Counts, Snapshot};
 use crate::logging::Summed;
