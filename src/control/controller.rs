@@ -1,10 +1,10 @@
 //! The tick: inputs and time in, outputs out. All of the controller's behaviour and none of its I/O.
 
 use super::interface::{Inputs, Outputs, Service, ServiceOutcome};
-use super::presence::{Passed, Presence};
+use super::loop_clock::{ClockStep, LoopClock};
 use super::ramp::{CountRounding, Ramp};
 use super::resume::Resume;
-use super::safety::{Safety, Watched};
+use super::safety::{Safety, SafetyInputs};
 use super::state_assembler::StateAssembler;
 use crate::link::ServoReading;
 use std::f64::consts::TAU;
@@ -48,7 +48,7 @@ pub struct Controller {
     require_estimator: bool,
     policies: [Policy; AlarmKind::ALL.len()],
 
-    presence: Presence,
+    loop_clock: LoopClock,
     assembler: StateAssembler,
     safety: Safety,
     ramp: Ramp,
@@ -90,7 +90,7 @@ impl Controller {
             back_off_cycles: config.control.back_off_cycles,
             require_estimator: config.control.require_estimator,
             policies,
-            presence: Presence::default(),
+            loop_clock: LoopClock::default(),
             assembler: StateAssembler::new(config),
             safety: Safety::new(config),
             ramp: Ramp::at_rest(gait_velocity_rad_s.abs() / config.gait.ramp_s),
@@ -128,11 +128,11 @@ impl Controller {
 
     /// One tick. All times in it are of the loop's own clock, which stands still while the computer pauses.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
-        let Passed {
+        let ClockStep {
             present_ns: now_ns,
             step_ns,
             pause_ns,
-        } = self.presence.advance(inputs.now_ns, inputs.absent_ns);
+        } = self.loop_clock.advance(inputs.now_ns, inputs.absent_ns);
         let dt_s = seconds(step_ns);
 
         self.assembler.state.link_failures += u64::from(inputs.lost_exchanges);
@@ -208,7 +208,7 @@ impl Controller {
     }
 
     fn check_safety(&mut self, inputs: &Inputs<'_>, now_ns: u64, dt_s: f64) {
-        let fault = self.safety.check(&Watched {
+        let fault = self.safety.check(&SafetyInputs {
             now_ns,
             dt_s,
             // A reading from before a service says nothing about the servo after it.
@@ -235,7 +235,7 @@ impl Controller {
                 .safety
                 .persists(Fault::TrackerStale, now_ns, inputs.servo, &self.assembler);
         if inputs.end || inputs.command.is_some() {
-            self.resume.give_up();
+            self.resume.cancel();
         } else if self.resume.is_due(now_ns, pause_ns, is_disarmed && devices_answer) {
             self.pending = Some(Service::Arm);
         }
@@ -263,7 +263,7 @@ impl Controller {
                 }
             }
             // A disarmed worm stays disarmed, a faulty one in its fault; the loop has logged the reason.
-            ServiceOutcome::Failed(Service::Arm) => self.resume.give_up(),
+            ServiceOutcome::Failed(Service::Arm) => self.resume.cancel(),
             ServiceOutcome::Failed(Service::Disarm) => {
                 self.disarm_failures += 1;
                 self.disarm_due_ns = Some(now_ns + RETRY_NS);
@@ -447,7 +447,7 @@ impl Controller {
     fn fill_state(&mut self, now_ns: u64, velocity_rad_s: f64) -> State {
         let state = &mut self.assembler.state;
         state.time_ns = now_ns;
-        state.host_paused_ns = self.presence.paused_ns();
+        state.host_paused_ns = self.loop_clock.paused_ns();
         state.goal_velocity_rad_s = velocity_rad_s;
         state.mode = self.mode.code();
         state.fault = self.fault.code();

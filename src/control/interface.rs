@@ -8,7 +8,7 @@ use worm_estimator::message::{Alarm, Command, Reply, State};
 pub struct Inputs<'a> {
     /// When the exchange with the bus ended, and the service behind it if there was one, ns of `CLOCK_MONOTONIC`.
     pub now_ns: u64,
-    /// How long the loop could not run since the last tick although it was due, ns: silence in that time is nobody's fault.
+    /// How long the loop could not run since the last tick although it was due, ns: silence in that time does not count.
     pub absent_ns: u64,
     /// Earlier exchanges that are known by now to have had no answer.
     pub lost_exchanges: u32,

@@ -8,7 +8,7 @@
 //! 2. The link exchanges the goal velocity for readings.
 //! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](worm_estimator::message::State), the next
 //!    goal and, rarely, a [`Service`]. It enforces the limits (`safety`) and ramps (`ramp`), assembles
-//!    the state (`state_assembler`), and handles pauses of the computer (`presence`, `resume`). Time is an argument, so all of it is
+//!    the state (`state_assembler`), and handles pauses of the computer (`loop_clock`, `resume`). Time is an argument, so all of it is
 //!    tested in virtual time.
 //! 4. The loop publishes, wakes the listeners, executes a service if one is due, and finishes the tick on the schedule. The kernel's
 //!    counters (`sched_counters`) show what made a late tick late; the `journal` logs from a thread of its own.
@@ -17,7 +17,7 @@ mod controller;
 mod hardware;
 mod interface;
 mod journal;
-mod presence;
+mod loop_clock;
 mod ramp;
 mod rate;
 mod resume;

@@ -63,7 +63,7 @@ impl Policy {
 
 /// What is in force for one thread and the memory of its process.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct InForce {
+pub struct EffectiveSettings {
     /// Scheduling policy, by sched_getscheduler(2).
     pub policy: Policy,
     /// Priority under SCHED_FIFO and SCHED_RR, 1 to 99; 0 under the others. By sched_getparam(2).
@@ -83,7 +83,7 @@ pub struct InForce {
     pub timer_slack_ns: Option<u64>,
 }
 
-impl InForce {
+impl EffectiveSettings {
     /// Of the main thread of a process; of another thread, given its thread id.
     ///
     /// # Errors
@@ -156,7 +156,7 @@ impl InForce {
     }
 }
 
-impl fmt::Display for InForce {
+impl fmt::Display for EffectiveSettings {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = if self.all_cpus { " (all)" } else { "" };
         write!(
@@ -200,8 +200,8 @@ fn memory_bytes(status: &str, key: &str) -> u64 {
 mod tests {
     use super::*;
 
-    fn read_back() -> InForce {
-        InForce::of_this_thread().expect("/proc tells of this thread")
+    fn read_back() -> EffectiveSettings {
+        EffectiveSettings::of_this_thread().expect("/proc tells of this thread")
     }
 
     /// A thread of its own, since what is asked for stays in force until its end.
@@ -229,8 +229,8 @@ mod tests {
     #[test]
     fn a_process_that_is_gone_is_an_error() {
         // Beyond the largest process id that Linux has.
-        assert!(InForce::of_process(1 << 23).is_err());
-        assert!(InForce::of_process(u32::MAX).is_err());
+        assert!(EffectiveSettings::of_process(1 << 23).is_err());
+        assert!(EffectiveSettings::of_process(u32::MAX).is_err());
     }
 
     #[test]
@@ -248,7 +248,7 @@ mod tests {
             cpu: Some(3),
             lock_memory: true,
         };
-        let given = InForce {
+        let given = EffectiveSettings {
             policy: Policy::Fifo,
             priority: 80,
             cpus: vec![3],
@@ -268,7 +268,7 @@ mod tests {
             given.shortfalls(&wanted, 10),
             ["SCHED_FIFO 80 in place of SCHED_FIFO 70"]
         );
-        let refused = InForce {
+        let refused = EffectiveSettings {
             policy: Policy::Other,
             priority: 0,
             cpus: vec![0, 1, 2, 3],

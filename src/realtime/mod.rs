@@ -2,7 +2,7 @@
 //!
 //! 1. [`request()`] asks for what the configuration names. Every request is answered with a [`Grant`] that says what was
 //!    asked, and what to do about a refusal. A refusal never ends the process: the worm still runs, and its operator is told.
-//! 2. [`InForce`] is read back from the kernel, of this thread or of any process: what it has, whoever asked for it.
+//! 2. [`EffectiveSettings`] is read back from the kernel, of this thread or of any process: what it has, whoever asked for it.
 //! 3. [`CpuWitness`] goes and sees whether all CPUs run: a host can take each of them away by itself.
 //! 4. [`machine`] looks at what no process can ask for: the kernel, the CPUs, and what else runs on them.
 //!
@@ -14,7 +14,7 @@ pub mod machine;
 mod request;
 mod witness;
 
-pub use effective::{InForce, Policy};
+pub use effective::{EffectiveSettings, Policy};
 pub use request::{Grant, Refusal, request};
 pub use witness::{CpuWitness, visit_every_cpu};
 

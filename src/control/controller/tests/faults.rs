@@ -74,8 +74,8 @@ fn a_reset_is_refused_while_the_cause_is_there_and_starts_from_the_measured_posi
 }
 
 #[test]
-fn a_reset_forgets_what_the_servo_said_before_it() {
-    // The reading of the tick in which the servo is prepared anew was taken before that.
+fn a_reset_ignores_readings_from_before_it() {
+    // The reading of the tick that prepares the servo again was taken before that.
     let troubles: [fn(&mut Rig, bool); 3] = [
         |rig, bad| rig.servo.alert = bad,
         |rig, bad| rig.servo.watchdog = if bad { 0xFF } else { 5 },

@@ -1,4 +1,4 @@
-//! The controller in virtual time, against a servo that does what it is told unless a test says otherwise.
+//! The controller in virtual time, against a servo that obeys unless a test says otherwise.
 
 mod faults;
 mod modes;
@@ -128,7 +128,7 @@ impl Rig {
         }
     }
 
-    /// The computer does not run the loop for so long, and nobody answers in the first tick behind it.
+    /// The computer does not run the loop for `ms`, and no device answers in the first tick after it.
     fn pause(&mut self, ms: u64) {
         self.now_ns += ms * MS;
         self.absent_ns = ms * MS;

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_pause_of_the_computer_is_nobody_s_silence() {
+fn a_pause_of_the_computer_is_not_silence() {
     let mut rig = Rig::crawling("");
     for pause_ms in [300, 20, 90, 600, 300] {
         rig.pause(pause_ms);
@@ -12,7 +12,7 @@ fn a_pause_of_the_computer_is_nobody_s_silence() {
     }
     let state = rig.tick(None).state;
     assert_eq!(state.host_paused_ns, 1310 * MS);
-    // What is silent besides is still told in its time, and only the computer's own time is left out.
+    // Real silence is still detected in time; only the pause is left out.
     rig.servo_answers = false;
     rig.run(50);
     rig.pause(300);
@@ -37,7 +37,7 @@ fn a_ramp_goes_on_after_a_pause_where_it_was() {
 }
 
 #[test]
-fn a_pause_that_outlasts_the_watchdog_is_told_as_what_it_was() {
+fn a_pause_that_outlasts_the_watchdog_is_reported_as_a_pause() {
     for (pause_ms, fault) in [
         (150, Fault::HostPaused),
         (50, Fault::HostPaused),
@@ -66,7 +66,7 @@ fn a_pause_that_outlasts_the_watchdog_is_told_as_what_it_was() {
     assert_eq!(rig.controller.fault(), Fault::HostPaused);
 }
 
-/// Lets a pause trip the watchdog, and two seconds pass in which the servo can be prepared anew.
+/// Trips the watchdog with a pause, then runs for two seconds, in which the servo can be prepared again.
 fn trip(rig: &mut Rig, meanwhile: impl Fn(&mut Rig)) {
     rig.pause(150);
     rig.servo.watchdog = 0xFF;
@@ -85,13 +85,13 @@ fn the_worm_crawls_on_by_itself_only_where_that_is_safe() {
         ("nothing else is wrong", RESUME, |_| {}, Mode::Crawling),
         ("it is not allowed", "", |_| {}, Mode::Fault),
         (
-            "an alarm stands that stops the worm",
+            "an alarm is raised that stops the worm",
             RESUME,
             |rig| rig.raise(AlarmKind::JammedCell),
             Mode::Fault,
         ),
         (
-            "an alarm stands that only warns",
+            "an alarm is raised that only warns",
             RESUME,
             |rig| rig.raise(AlarmKind::EnergyOverBudget),
             Mode::Crawling,
