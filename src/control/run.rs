@@ -276,7 +276,7 @@ impl Loop {
         let period_ns = self.schedule.period_ns();
         let witness = &self.witness;
         self.silence
-            .uncharged_ns(period_ns, answered || is_gone, || witness.ask())
+            .uncharged_ns(period_ns, answered || is_gone, || witness.check())
     }
 
     fn note_port(&mut self, is_gone: bool) {

@@ -1,4 +1,4 @@
-//! What a process really has, read back from the kernel: not what it asked for, and whoever asked for it.
+//! What a process really has, read back from the kernel rather than taken from its requests.
 
 use super::cpus;
 use nix::sched::CpuSet;
@@ -61,7 +61,7 @@ impl Policy {
     }
 }
 
-/// What is in force for one thread and the memory of its process.
+/// The effective scheduling of one thread and memory of its process.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectiveSettings {
     /// Scheduling policy, by sched_getscheduler(2).
@@ -79,7 +79,7 @@ pub struct EffectiveSettings {
     /// Memory in use, bytes: VmRSS of the same.
     pub resident_bytes: u64,
     /// How late the kernel may fire a timer to save a wake, ns: /proc/PID/timerslack_ns. Real-time policies have none, and
-    /// newer kernels say so with 0. Absent: another's is told only to those with CAP_SYS_NICE.
+    /// newer kernels then report 0. Absent: reading that of another process needs CAP_SYS_NICE.
     pub timer_slack_ns: Option<u64>,
 }
 
@@ -87,7 +87,7 @@ impl EffectiveSettings {
     /// Of the main thread of a process; of another thread, given its thread id.
     ///
     /// # Errors
-    /// When there is no such process, or it may not be looked at.
+    /// When there is no such process, or it may not be inspected.
     pub fn of_process(pid: u32) -> io::Result<Self> {
         let id = libc::pid_t::try_from(pid).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
         let (policy, priority) = scheduler(id)?;
@@ -201,10 +201,10 @@ mod tests {
     use super::*;
 
     fn read_back() -> EffectiveSettings {
-        EffectiveSettings::of_this_thread().expect("/proc tells of this thread")
+        EffectiveSettings::of_this_thread().expect("/proc shows this thread")
     }
 
-    /// A thread of its own, since what is asked for stays in force until its end.
+    /// A thread of its own, since requests stay in effect until its end.
     #[test]
     fn what_a_thread_asked_for_is_read_back() {
         let thread = std::thread::spawn(|| {

@@ -1,4 +1,4 @@
-//! What a process asks of the operating system, and the answer to each request.
+//! What a process requests from the operating system, and the outcome of each request.
 
 use super::{EffectiveSettings, cpus};
 use nix::sys::mman::{MlockAllFlags, mlockall};
@@ -10,7 +10,7 @@ use worm_estimator::config::Realtime;
 /// One request to the operating system and its outcome.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Grant {
-    /// What was asked for, for a person: `SCHED_FIFO priority 80`.
+    /// The request in words: `SCHED_FIFO priority 80`.
     pub request: String,
     /// Why it was refused; absent: granted.
     pub refusal: Option<Refusal>,

@@ -13,7 +13,7 @@ fn blocks_of_a_tick_say_what_the_plant_does() {
     let mut harness = harness(&[]);
     harness.crawl(105);
     harness.wait(1.0);
-    let (_, block) = harness.tell(
+    let (_, block) = harness.ask_one(
         SERVO,
         Instruction::Read {
             address: 98,
@@ -27,7 +27,7 @@ fn blocks_of_a_tick_say_what_the_plant_does() {
     assert!((reading.velocity_rad_s - 2.518).abs() < 0.03, "{reading:?}");
     assert!((reading.current_a - plant.motor().current_a()).abs() < 0.02);
     assert!((reading.voltage_v - 5.0).abs() < 0.11 && reading.moving && reading.duty > 0.2);
-    let (_, block) = harness.tell(
+    let (_, block) = harness.ask_one(
         TRACKER,
         Instruction::Read {
             address: 128,
@@ -69,7 +69,7 @@ fn extended_position_mode_arrives() {
     harness.wait(3.0);
     assert!((harness.read(register::PRESENT_POSITION) - 6000).abs() < 20);
     assert_eq!(harness.write(register::TORQUE_ENABLE, 0), 0);
-    assert_eq!(harness.tell(SERVO, Instruction::ClearMultiTurn).0, 0);
+    assert_eq!(harness.ask_one(SERVO, Instruction::ClearMultiTurn).0, 0);
     assert!((harness.read(register::PRESENT_POSITION) - (6000 - 4096)).abs() < 20);
 }
 
@@ -115,17 +115,17 @@ fn hardware_error_raises_the_alert_and_shuts_down_until_a_reboot() {
     let mut harness = harness(&["hardware-error:bits=0x20@1..2"]);
     harness.crawl(105);
     harness.wait(0.9);
-    assert_eq!(harness.tell(SERVO, Instruction::Ping).0, 0);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).0, 0);
     harness.wait(0.2);
-    assert_eq!(harness.tell(SERVO, Instruction::Ping).0, 0x80);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).0, 0x80);
     assert_eq!(harness.read(register::HARDWARE_ERROR_STATUS), 0x20);
     assert_eq!(harness.read(register::TORQUE_ENABLE), 0);
     assert_eq!(harness.write(register::TORQUE_ENABLE, 1), 0x80 | 1);
     harness.wait(1.0);
-    assert_eq!(harness.tell(SERVO, Instruction::Reboot).0, 0x80);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Reboot).0, 0x80);
     assert_eq!(harness.ask(SERVO, Instruction::Ping), [], "it starts");
     harness.wait(0.2);
-    assert_eq!(harness.tell(SERVO, Instruction::Ping).0, 0);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).0, 0);
     assert_eq!(harness.write(register::TORQUE_ENABLE, 1), 0);
 }
 
@@ -206,11 +206,11 @@ fn faults_of_the_line() {
 #[test]
 fn faults_of_sight_and_identity() {
     let mut harness = harness(&["blind:cell=3", "wrong-model:number=1190"]);
-    assert_eq!(harness.tell(SERVO, Instruction::Ping).1[..2], 1190u16.to_le_bytes());
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).1[..2], 1190u16.to_le_bytes());
     harness.wait(0.1);
     assert_eq!(
         harness
-            .tell(
+            .ask_one(
                 TRACKER,
                 Instruction::Read {
                     address: 137,

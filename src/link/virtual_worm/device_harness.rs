@@ -12,7 +12,7 @@ pub(super) struct DeviceHarness {
     pub(super) now_s: f64,
 }
 
-/// What one device said: its error byte and its data.
+/// The answer of one device: its error byte and its data.
 pub(super) type Answer = (u8, Vec<u8>);
 
 pub(super) const SERVO: u8 = 1;
@@ -69,8 +69,8 @@ impl DeviceHarness {
         statuses(&bytes)
     }
 
-    /// The only answer of one device.
-    pub(super) fn tell(&mut self, recipient: u8, instruction: Instruction<'_>) -> Answer {
+    /// Asks one device, which must give exactly one answer.
+    pub(super) fn ask_one(&mut self, recipient: u8, instruction: Instruction<'_>) -> Answer {
         let mut answers = self.ask(recipient, instruction);
         assert_eq!(answers.len(), 1, "{instruction:?}: {answers:?}");
         let (from, answer) = answers.remove(0);
@@ -82,11 +82,11 @@ impl DeviceHarness {
         let bytes = value.to_le_bytes();
         let data = &bytes[..usize::from(register.size)];
         let address = register.address;
-        self.tell(SERVO, Instruction::Write { address, data }).0
+        self.ask_one(SERVO, Instruction::Write { address, data }).0
     }
 
     pub(super) fn read(&mut self, register: Register) -> i64 {
-        let (_, data) = self.tell(
+        let (_, data) = self.ask_one(
             SERVO,
             Instruction::Read {
                 address: register.address,

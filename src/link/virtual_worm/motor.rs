@@ -36,7 +36,7 @@ mod heat {
     pub(super) const HEATED_S: f64 = 1.0;
 }
 
-/// What the bridge is told to do.
+/// Command of the bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
     /// Nothing: the winding is open and the motor free.
@@ -167,7 +167,7 @@ impl Motor {
         self.bus_v
     }
 
-    /// Temperature of the servo's case, which its register tells, °C.
+    /// Temperature of the servo's case, as its register reports it, °C.
     pub fn case_c(&self) -> f64 {
         self.case_c
     }

@@ -81,7 +81,7 @@ impl Plant {
         })
     }
 
-    /// What the servo's bridge is told from now on.
+    /// Sets what the servo commands its bridge from now on.
     pub fn set_drive(&mut self, drive: Drive, gains: Gains) {
         self.drive = drive;
         self.gains = gains;

@@ -13,8 +13,8 @@ use dynamixel_bus::packet::{
 fn pings_are_answered_in_the_order_of_the_ids() {
     let mut harness = harness(&[]);
     let identity = |model: u16, firmware: u8| (0, [&model.to_le_bytes()[..], &[firmware]].concat());
-    assert_eq!(harness.tell(SERVO, Instruction::Ping), identity(1200, 53));
-    assert_eq!(harness.tell(TRACKER, Instruction::Ping), identity(tracker::MODEL, 1));
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping), identity(1200, 53));
+    assert_eq!(harness.ask_one(TRACKER, Instruction::Ping), identity(tracker::MODEL, 1));
     let all = [(SERVO, identity(1200, 53)), (TRACKER, identity(tracker::MODEL, 1))];
     assert_eq!(harness.ask(254, Instruction::Ping), all);
     assert_eq!(harness.ask(7, Instruction::Ping), []);
@@ -55,7 +55,7 @@ fn access_rules() {
         (84, &[1, 0, 0], 7),          // one and into a gap
     ];
     for &(address, data, expected) in writes {
-        let (error, _) = harness.tell(SERVO, Instruction::Write { address, data });
+        let (error, _) = harness.ask_one(SERVO, Instruction::Write { address, data });
         assert_eq!(error, expected, "{data:?} at {address}");
     }
     for (address, length, expected, len) in [
@@ -65,12 +65,12 @@ fn access_rules() {
         (148, 1, 7, 0),
         (0, 0, 5, 0),
     ] {
-        let (error, data) = harness.tell(SERVO, Instruction::Read { address, length });
+        let (error, data) = harness.ask_one(SERVO, Instruction::Read { address, length });
         assert_eq!((error, data.len()), (expected, len), "{length} at {address}");
     }
     assert_eq!(
         harness
-            .tell(
+            .ask_one(
                 TRACKER,
                 Instruction::Write {
                     address: 128,
@@ -80,12 +80,12 @@ fn access_rules() {
             .0,
         7
     );
-    assert_eq!(harness.tell(TRACKER, Instruction::ClearMultiTurn).0, 2);
+    assert_eq!(harness.ask_one(TRACKER, Instruction::ClearMultiTurn).0, 2);
     // Nothing of a refused write happens.
     let before = harness.read(register::GOAL_VELOCITY);
     assert_eq!(
         harness
-            .tell(
+            .ask_one(
                 SERVO,
                 Instruction::Write {
                     address: 104,
@@ -140,10 +140,14 @@ fn status_return_level_says_what_is_answered() {
 #[test]
 fn registered_writes_wait_for_the_action() {
     let mut harness = harness(&[]);
-    assert_eq!(harness.tell(SERVO, Instruction::Action).0, 2, "nothing is registered");
+    assert_eq!(
+        harness.ask_one(SERVO, Instruction::Action).0,
+        2,
+        "nothing is registered"
+    );
     assert_eq!(
         harness
-            .tell(
+            .ask_one(
                 SERVO,
                 Instruction::RegWrite {
                     address: 65,
@@ -158,7 +162,9 @@ fn registered_writes_wait_for_the_action() {
     assert_eq!(harness.ask(254, Instruction::Action), [], "a broadcast is not answered");
     assert_eq!(harness.read(Register::new(65, 1, "LED")), 1);
     assert_eq!(
-        harness.tell(SERVO, Instruction::RegWrite { address: 0, data: &[1] }).0,
+        harness
+            .ask_one(SERVO, Instruction::RegWrite { address: 0, data: &[1] })
+            .0,
         7
     );
 }
@@ -228,26 +234,26 @@ fn factory_reset_and_backup() {
     assert_eq!(harness.write(register::VELOCITY_LIMIT, 200), 0);
     assert_eq!(
         harness
-            .tell(SERVO, Instruction::ControlTableBackup(BackupAction::Store))
+            .ask_one(SERVO, Instruction::ControlTableBackup(BackupAction::Store))
             .0,
         0
     );
     assert_eq!(harness.write(register::ID, 5), 0);
-    assert_eq!(harness.tell(5, Instruction::FactoryReset(ResetScope::AllButId)).0, 0);
+    assert_eq!(harness.ask_one(5, Instruction::FactoryReset(ResetScope::AllButId)).0, 0);
     harness.wait(0.2);
     assert_eq!(
-        harness.tell(5, Instruction::Read { address: 44, length: 2 }),
+        harness.ask_one(5, Instruction::Read { address: 44, length: 2 }),
         (0, vec![189, 1])
     );
     assert_eq!(
         harness
-            .tell(5, Instruction::ControlTableBackup(BackupAction::Restore))
+            .ask_one(5, Instruction::ControlTableBackup(BackupAction::Restore))
             .0,
         0
     );
     harness.wait(0.2);
     assert_eq!(
-        harness.tell(1, Instruction::Read { address: 44, length: 2 }),
+        harness.ask_one(1, Instruction::Read { address: 44, length: 2 }),
         (0, vec![200, 0])
     );
     assert_eq!(
