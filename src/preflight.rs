@@ -2,7 +2,7 @@
 
 use crate::control::{Drive, link_settings};
 use crate::realtime::machine::{self, Setting};
-use crate::realtime::{self, InForce};
+use crate::realtime::{self, EffectiveSettings};
 use crate::topics::{Hub, Instance};
 use serde::Serialize;
 use std::path::Path;
@@ -108,9 +108,9 @@ fn check_config(source: &str, config: &Config, report: &mut CheckReport) {
 fn check_realtime(wanted: &Realtime, report: &mut CheckReport) {
     let trial = {
         let wanted = wanted.clone();
-        move || (realtime::request(&wanted, 0), InForce::of_this_thread())
+        move || (realtime::request(&wanted, 0), EffectiveSettings::of_this_thread())
     };
-    let Ok((grants, in_force)) = std::thread::spawn(trial).join() else {
+    let Ok((grants, effective)) = std::thread::spawn(trial).join() else {
         report.note(
             Level::Error,
             "scheduler",
@@ -130,16 +130,16 @@ fn check_realtime(wanted: &Realtime, report: &mut CheckReport) {
             ),
         }
     }
-    match in_force {
-        Ok(in_force) => {
-            let shortfalls = in_force.shortfalls(wanted, 0);
+    match effective {
+        Ok(effective) => {
+            let shortfalls = effective.shortfalls(wanted, 0);
             if shortfalls.is_empty() {
-                report.good("in force", in_force.to_string());
+                report.good("in force", effective.to_string());
             } else {
                 report.note(
                     Level::Warning,
                     "in force",
-                    in_force.to_string(),
+                    effective.to_string(),
                     format!("less than configured: {}", shortfalls.join("; ")),
                 );
             }

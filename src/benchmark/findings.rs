@@ -3,7 +3,7 @@
 use super::floor::FloorOutcome;
 use crate::latency::outcome::{Cyclictest, RateTrial};
 use crate::latency::{Durations, TickStats};
-use crate::realtime::InForce;
+use crate::realtime::EffectiveSettings;
 
 /// A rate counts as sustained when at most this fraction of its deadlines is missed, and at most this fraction of its exchanges
 /// fails.
@@ -30,7 +30,7 @@ pub(super) struct Findings {
     pub(super) controller_cpu_share: f64,
     pub(super) estimator_cpu_share: f64,
     /// What the operating system really gave the loop.
-    pub(super) in_force: Option<InForce>,
+    pub(super) effective: Option<EffectiveSettings>,
     /// The rates that were tried.
     pub(super) rates: Vec<RateTrial>,
     pub(super) cyclictest: Option<Cyclictest>,

@@ -11,7 +11,7 @@ use super::testbed::{Testbed, estimator_realtime};
 use super::{cyclictest, rates};
 use crate::failure::Failure;
 use crate::latency::{Deliveries, Durations, TickStats};
-use crate::realtime::{InForce, monotonic_ns};
+use crate::realtime::{EffectiveSettings, monotonic_ns};
 use crate::supervisor::child_process::Log;
 use crate::supervisor::telemetry_receiver::TelemetryReceiver;
 use crate::topics::{Hub, Instance, Subscriber};
@@ -88,7 +88,7 @@ pub(super) fn run(
                 .to_owned(),
         );
     }
-    findings.in_force = InForce::of_process(testbed.controller.id()).ok();
+    findings.effective = EffectiveSettings::of_process(testbed.controller.id()).ok();
     let measurement = Measurement {
         benchmark,
         log,

@@ -4,7 +4,7 @@ use super::findings::{Findings, MAX_MISSED_FRACTION};
 use super::settings::Benchmark;
 use crate::failure::Failure;
 use crate::latency::{Outcome, Percentiles, ratio};
-use crate::realtime::{InForce, machine};
+use crate::realtime::{EffectiveSettings, machine};
 
 /// With fewer ticks the percentiles of the tail are meaningless.
 const FEW_TICKS: u64 = 2_000;
@@ -15,7 +15,7 @@ pub(super) fn outcome(benchmark: &Benchmark, findings: Findings, problem: Option
     if let Some(problem) = problem {
         warnings.push(problem.to_string());
     }
-    let refused = refused(benchmark, findings.in_force.as_ref());
+    let refused = refused(benchmark, findings.effective.as_ref());
     warnings.extend(refused.iter().map(|what| format!("in force for the loop: {what}")));
     // The bare sleeper requested the same as the loop, and knows the reasons of the refusals.
     warnings.extend(findings.floor.refusals.iter().cloned());
@@ -51,8 +51,8 @@ pub(super) fn outcome(benchmark: &Benchmark, findings: Findings, problem: Option
         .map(|trial| trial.rate_hz)
         .reduce(f64::max);
     let mut settings = machine::settings(benchmark.config.realtime.cpu);
-    if let Some(in_force) = &findings.in_force {
-        settings.insert(0, in_force_setting(in_force, &refused));
+    if let Some(effective) = &findings.effective {
+        settings.insert(0, effective_setting(effective, &refused));
     }
     // Without a measurement the shares are unknown.
     let fraction = |fraction: f64| if findings.measured_s > 0.0 { fraction } else { f64::NAN };
@@ -101,13 +101,13 @@ pub(super) fn outcome(benchmark: &Benchmark, findings: Findings, problem: Option
         highest_rate_hz,
         rate_trials: findings.rates,
         scheduler: findings
-            .in_force
+            .effective
             .as_ref()
-            .map_or("unknown".to_owned(), InForce::scheduler_text),
+            .map_or("unknown".to_owned(), EffectiveSettings::scheduler_text),
         memory_locked: findings
-            .in_force
+            .effective
             .as_ref()
-            .is_some_and(|in_force| in_force.memory_locked),
+            .is_some_and(|effective| effective.memory_locked),
         settings,
         cyclictest: findings.cyclictest,
         warnings,
@@ -115,20 +115,22 @@ pub(super) fn outcome(benchmark: &Benchmark, findings: Findings, problem: Option
 }
 
 /// What the loop was to get from the operating system and did not.
-fn refused(benchmark: &Benchmark, in_force: Option<&InForce>) -> Vec<String> {
-    in_force.map_or_else(Vec::new, |in_force| in_force.shortfalls(&benchmark.config.realtime, 0))
+fn refused(benchmark: &Benchmark, effective: Option<&EffectiveSettings>) -> Vec<String> {
+    effective.map_or_else(Vec::new, |effective| {
+        effective.shortfalls(&benchmark.config.realtime, 0)
+    })
 }
 
-fn in_force_setting(in_force: &InForce, refused: &[String]) -> machine::Setting {
+fn effective_setting(effective: &EffectiveSettings, refused: &[String]) -> machine::Setting {
     let subject = "in force for the loop";
     if refused.is_empty() {
-        machine::Setting::good(subject, in_force.to_string())
+        machine::Setting::good(subject, effective.to_string())
     } else {
         let remedy = format!(
             "less than asked for ({}): `wormd check` tells the remedy",
             refused.join("; ")
         );
-        machine::Setting::bad(subject, in_force.to_string(), remedy)
+        machine::Setting::bad(subject, effective.to_string(), remedy)
     }
 }
 

@@ -1,87 +1,27 @@
-//! The tick: inputs and time in, outputs out. All of the controller's behaviour, none of its I/O.
+//! The tick: inputs and time in, outputs out. All of the controller's behaviour and none of its I/O.
 
-use super::presence::{Passed, Presence};
+use super::interface::{Inputs, Outputs, Service, ServiceOutcome};
+use super::loop_clock::{ClockStep, LoopClock};
 use super::ramp::{CountRounding, Ramp};
 use super::resume::Resume;
-use super::safety::{Safety, Watched};
+use super::safety::{Safety, SafetyInputs};
 use super::state_assembler::StateAssembler;
-use crate::link::{ServoReading, TrackerReading};
+use crate::link::ServoReading;
 use std::f64::consts::TAU;
 use worm_estimator::config::{Config, Policy};
 use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Fault, Mode, Reply, State};
-
-/// What a tick is given.
-#[derive(Debug, Clone, Copy)]
-pub struct Inputs<'a> {
-    /// When the exchange with the bus ended, and the service behind it if there was one, ns of `CLOCK_MONOTONIC`.
-    pub now_ns: u64,
-    /// For how long since the tick before the loop could not run though it had to, ns: nobody can be blamed for silence then.
-    pub absent_ns: u64,
-    /// Earlier exchanges of which it is known now that the servo never answers.
-    pub lost_exchanges: u32,
-    /// The servo's answer, if it came.
-    pub servo: Option<&'a ServoReading>,
-    /// The tracker's answer, if it came.
-    pub tracker: Option<&'a TrackerReading>,
-    /// A command that arrived, if any.
-    pub command: Option<Command>,
-    /// Alarm changes that arrived since the last tick.
-    pub alarms: &'a [Alarm],
-    /// Whether an estimate arrived since the last tick.
-    pub estimate_arrived: bool,
-    /// The process was asked to end.
-    pub end: bool,
-    /// What became of the service that the last tick asked for, if it asked for one.
-    pub service: Option<ServiceOutcome>,
-    /// The servo's hardware error status, where it has been read since the last tick.
-    pub hardware_error: Option<u8>,
-}
-
-/// Work on the bus beyond the tick's exchange. It takes several milliseconds, so it happens only while the worm stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Service {
-    /// Prepare the servo as at start-up (which clears a tripped watchdog), then switch torque on.
-    Arm,
-    /// Switch torque off.
-    Disarm,
-}
-
-/// What became of a [`Service`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ServiceOutcome {
-    /// Done, and read back.
-    Done(Service),
-    /// Failed; the loop has logged why.
-    Failed(Service),
-}
-
-/// What a tick gives.
-#[derive(Debug, Clone, Copy)]
-pub struct Outputs {
-    /// What is published.
-    pub state: State,
-    /// Goal velocity for the next exchange, servo counts of 0.229 rev/min.
-    pub goal_counts: i32,
-    /// Work on the bus that must happen before the next exchange.
-    pub service: Option<Service>,
-    /// The answer to this tick's command.
-    pub reply: Option<Reply>,
-    /// The pause of the computer that ended in this tick, ns; 0 where there was none.
-    pub host_paused_ns: u64,
-    /// The process may end: it was asked to, and the motor is off (or cannot be reached).
-    pub finished: bool,
-}
+use worm_estimator::time::seconds;
 
 /// Goal velocity per count, rad/s (XL330-M288 e-manual, register 104: 0.229 rev/min).
 const RAD_S_PER_COUNT: f64 = 0.229 * TAU / 60.0;
 
-/// Cam velocity below which the motor counts as standing, rad/s: two counts.
-const STANDING_RAD_S: f64 = 2.0 * RAD_S_PER_COUNT;
+/// Cam velocity below which the motor counts as standing still, rad/s: two counts.
+const STANDSTILL_RAD_S: f64 = 2.0 * RAD_S_PER_COUNT;
 
-/// Longest wait for the cam to stand before torque goes off, ns.
-const STANDSTILL_PATIENCE_NS: u64 = 500_000_000;
+/// Longest wait for the cam to stand still before torque goes off, ns.
+const STANDSTILL_TIMEOUT_NS: u64 = 500_000_000;
 
-/// Pause between attempts to switch torque off on a servo that does not answer, ns.
+/// Interval of the attempts to switch torque off on a servo that does not answer, ns.
 const RETRY_NS: u64 = 500_000_000;
 
 /// Attempts to switch torque off before an ending process gives up; the servo's own watchdog then stops the motor.
@@ -108,7 +48,7 @@ pub struct Controller {
     require_estimator: bool,
     policies: [Policy; AlarmKind::ALL.len()],
 
-    presence: Presence,
+    loop_clock: LoopClock,
     assembler: StateAssembler,
     safety: Safety,
     ramp: Ramp,
@@ -117,20 +57,20 @@ pub struct Controller {
     mode: Mode,
     fault: Fault,
     fault_alarm: Option<AlarmKind>,
-    /// How long the computer has paused since the servo last answered in a tick without a pause, ns; kept as it was when a fault was
+    /// How long the computer has paused since the servo last answered in a tick without a pause, ns; frozen when a fault is
     /// latched.
     paused_unanswered_ns: u64,
     resume: Resume,
-    /// Cam angle that a hold keeps; unset while the ramp still runs out.
+    /// Cam angle that a hold keeps; none until the ramp has come to rest.
     hold_angle_rad: Option<f64>,
     /// Cam angle at which a back-off ends.
     back_off_until_rad: Option<f64>,
     mode_since_ns: u64,
     armed_ns: u64,
     estimate_seen_ns: Option<u64>,
-    /// The service that is under way, so that none is asked for twice.
+    /// The service that the next output requests.
     pending: Option<Service>,
-    /// Torque must still be switched off, not before this time.
+    /// When to switch torque off; none when it is off, or is to stay on.
     disarm_due_ns: Option<u64>,
     disarm_failures: u32,
 }
@@ -150,7 +90,7 @@ impl Controller {
             back_off_cycles: config.control.back_off_cycles,
             require_estimator: config.control.require_estimator,
             policies,
-            presence: Presence::default(),
+            loop_clock: LoopClock::default(),
             assembler: StateAssembler::new(config),
             safety: Safety::new(config),
             ramp: Ramp::at_rest(gait_velocity_rad_s.abs() / config.gait.ramp_s),
@@ -171,7 +111,7 @@ impl Controller {
         }
     }
 
-    /// Where the state machine stands.
+    /// The mode of the state machine.
     pub fn mode(&self) -> Mode {
         self.mode
     }
@@ -186,14 +126,14 @@ impl Controller {
         self.paused_unanswered_ns
     }
 
-    /// One tick. All of it goes by the loop's own clock, which stands still while the computer pauses.
+    /// One tick. All times in it are of the loop's own clock, which stands still while the computer pauses.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
-        let Passed {
+        let ClockStep {
             present_ns: now_ns,
             step_ns,
             pause_ns,
-        } = self.presence.advance(inputs.now_ns, inputs.absent_ns);
-        let dt_s = step_ns as f64 * 1e-9;
+        } = self.loop_clock.advance(inputs.now_ns, inputs.absent_ns);
+        let dt_s = seconds(step_ns);
 
         self.assembler.state.link_failures += u64::from(inputs.lost_exchanges);
         self.assembler.take_servo(inputs.now_ns, now_ns, inputs.servo);
@@ -214,14 +154,14 @@ impl Controller {
         if self.has_torque() {
             self.check_safety(inputs, now_ns, dt_s);
         }
-        // What is read in the tick of the pause itself may have been said before it.
+        // A reading in the tick of the pause itself may be older than the pause.
         if self.mode != Mode::Fault && inputs.servo.is_some() && pause_ns == 0 {
             self.paused_unanswered_ns = 0;
         }
         for alarm in inputs.alarms {
             self.take_alarm(alarm, now_ns);
         }
-        self.resume_by_itself(now_ns, pause_ns, inputs);
+        self.resume_after_pause(now_ns, pause_ns, inputs);
         let reply = inputs
             .command
             .map(|command| self.take_command(&command, now_ns, inputs.servo));
@@ -259,19 +199,19 @@ impl Controller {
         self.fault = fault;
         self.fault_alarm = alarm;
         self.ramp.halt();
-        self.ask_for_disarm(now_ns);
+        self.request_disarm(now_ns);
     }
 
-    fn ask_for_disarm(&mut self, now_ns: u64) {
+    fn request_disarm(&mut self, now_ns: u64) {
         self.disarm_due_ns = Some(now_ns);
         self.disarm_failures = 0;
     }
 
     fn check_safety(&mut self, inputs: &Inputs<'_>, now_ns: u64, dt_s: f64) {
-        let fault = self.safety.check(&Watched {
+        let fault = self.safety.check(&SafetyInputs {
             now_ns,
             dt_s,
-            // What the servo said before a service is not what it says after it.
+            // A reading from before a service says nothing about the servo after it.
             servo: inputs.servo.filter(|_| inputs.service.is_none()),
             assembler: &self.assembler,
             estimate_seen_ns: self.estimate_seen_ns,
@@ -287,15 +227,15 @@ impl Controller {
         }
     }
 
-    /// Prepares the servo anew after a pause of the computer, where the configuration asks for it and it is safe.
-    fn resume_by_itself(&mut self, now_ns: u64, pause_ns: u64, inputs: &Inputs<'_>) {
+    /// Prepares the servo again after a pause of the computer, if this is configured and safe.
+    fn resume_after_pause(&mut self, now_ns: u64, pause_ns: u64, inputs: &Inputs<'_>) {
         let is_disarmed = self.mode == Mode::Fault && self.disarm_due_ns.is_none() && self.pending.is_none();
         let devices_answer = inputs.servo.is_some_and(|servo| !servo.alert)
             && !self
                 .safety
                 .persists(Fault::TrackerStale, now_ns, inputs.servo, &self.assembler);
         if inputs.end || inputs.command.is_some() {
-            self.resume.give_up();
+            self.resume.cancel();
         } else if self.resume.is_due(now_ns, pause_ns, is_disarmed && devices_answer) {
             self.pending = Some(Service::Arm);
         }
@@ -322,8 +262,8 @@ impl Controller {
                     self.enter(Mode::Disarmed, now_ns);
                 }
             }
-            // A disarmed worm stays disarmed, a faulty one faulty; the loop has told why.
-            ServiceOutcome::Failed(Service::Arm) => self.resume.give_up(),
+            // A disarmed worm stays disarmed, a faulty one in its fault; the loop has logged the reason.
+            ServiceOutcome::Failed(Service::Arm) => self.resume.cancel(),
             ServiceOutcome::Failed(Service::Disarm) => {
                 self.disarm_failures += 1;
                 self.disarm_due_ns = Some(now_ns + RETRY_NS);
@@ -336,7 +276,7 @@ impl Controller {
     }
 
     fn take_alarm(&mut self, alarm: &Alarm, now_ns: u64) {
-        // A kind that this version does not know has no policy here either.
+        // Unknown kinds, of a newer estimator, have no policy.
         let Ok(kind) = AlarmKind::try_from(alarm.kind) else {
             return;
         };
@@ -347,7 +287,7 @@ impl Controller {
         match self.policies[kind.code() as usize] {
             Policy::Stop if self.mode != Mode::Stopping => self.enter_fault(Fault::Alarm, Some(kind), now_ns),
             Policy::Hold if is_crawling => self.enter(Mode::Holding, now_ns),
-            // One back-off at a time: an alarm that comes while backing off finds the worm already doing what can be done.
+            // An alarm during a back-off does not begin another one.
             Policy::BackOff if is_crawling && self.back_off_until_rad.is_none() => self.begin_back_off(),
             _ => {}
         }
@@ -362,7 +302,7 @@ impl Controller {
     fn take_command(&mut self, command: &Command, now_ns: u64, servo: Option<&ServoReading>) -> Reply {
         let verdict = match CommandKind::try_from(command.kind) {
             Err(_) => CommandOutcome::Unknown,
-            Ok(kind) => self.carry_out(kind, command.cycles_per_s, now_ns, servo),
+            Ok(kind) => self.execute(kind, command.cycles_per_s, now_ns, servo),
         };
         Reply {
             sequence: self.assembler.state.sequence,
@@ -373,7 +313,7 @@ impl Controller {
         }
     }
 
-    fn carry_out(
+    fn execute(
         &mut self,
         kind: CommandKind,
         cycles_per_s: f64,
@@ -440,7 +380,7 @@ impl Controller {
         self.pending = self.pending.filter(|service| *service == Service::Disarm);
     }
 
-    /// The cam velocity that the mode asks for in this tick, rad/s.
+    /// The cam velocity commanded in this tick, rad/s.
     fn command_velocity(&mut self, now_ns: u64, dt_s: f64) -> f64 {
         let angle_rad = self.assembler.state.motor_angle_rad;
         match self.mode {
@@ -461,18 +401,18 @@ impl Controller {
             Mode::Stopping => {
                 self.ramp.aim(0.0);
                 let velocity_rad_s = self.ramp.advance(dt_s);
-                let standing =
-                    self.ramp.is_at_rest() && self.assembler.state.motor_velocity_rad_s.abs() < STANDING_RAD_S;
-                let patience_is_over = now_ns.saturating_sub(self.mode_since_ns) > STANDSTILL_PATIENCE_NS;
-                if self.disarm_due_ns.is_none() && (standing || (self.ramp.is_at_rest() && patience_is_over)) {
-                    self.ask_for_disarm(now_ns);
+                let is_standing =
+                    self.ramp.is_at_rest() && self.assembler.state.motor_velocity_rad_s.abs() < STANDSTILL_RAD_S;
+                let is_timed_out = now_ns.saturating_sub(self.mode_since_ns) > STANDSTILL_TIMEOUT_NS;
+                if self.disarm_due_ns.is_none() && (is_standing || (self.ramp.is_at_rest() && is_timed_out)) {
+                    self.request_disarm(now_ns);
                 }
                 velocity_rad_s
             }
         }
     }
 
-    /// A hold first lets the ramp run out, then keeps the angle at which the cam came to stand.
+    /// A hold first ramps down, then keeps the angle at which the cam came to rest.
     fn hold_velocity(&mut self, angle_rad: f64, dt_s: f64) -> f64 {
         let Some(hold_rad) = self.hold_angle_rad else {
             self.ramp.aim(0.0);
@@ -488,7 +428,7 @@ impl Controller {
 
     fn due_service(&mut self, now_ns: u64) -> Option<Service> {
         if self.disarm_due_ns.is_some_and(|due_ns| now_ns >= due_ns) {
-            // Not again before the outcome of this one is known.
+            // Not again until the outcome of this one is known.
             self.disarm_due_ns = Some(u64::MAX);
             self.pending = None;
             return Some(Service::Disarm);
@@ -507,7 +447,7 @@ impl Controller {
     fn fill_state(&mut self, now_ns: u64, velocity_rad_s: f64) -> State {
         let state = &mut self.assembler.state;
         state.time_ns = now_ns;
-        state.host_paused_ns = self.presence.paused_ns();
+        state.host_paused_ns = self.loop_clock.paused_ns();
         state.goal_velocity_rad_s = velocity_rad_s;
         state.mode = self.mode.code();
         state.fault = self.fault.code();

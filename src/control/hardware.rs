@@ -18,7 +18,7 @@ pub enum DriveError {
     /// The port cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The devices on it are not as they must be.
+    /// The devices on it failed the start-up checks.
     #[error("{path}: {source}", path = path.display())]
     Startup {
         /// The port.
@@ -26,7 +26,7 @@ pub enum DriveError {
         /// What is wrong.
         source: StartupError,
     },
-    /// A device did not do what it was told.
+    /// A device did not obey.
     #[error("{path}: {source}", path = path.display())]
     Operation {
         /// The port.
@@ -34,12 +34,12 @@ pub enum DriveError {
         /// What is wrong.
         source: OperationError,
     },
-    /// The configuration names a device ID that cannot be one.
-    #[error("device ID {0} is not from 0 to 252: mend servo.id or tracker.id")]
+    /// The configuration names an invalid device ID.
+    #[error("device ID {0} is not from 0 to 252: correct servo.id or tracker.id")]
     BadId(u8),
 }
 
-/// What the link must know of the worm in `config`.
+/// The link settings of the worm in `config`.
 ///
 /// # Errors
 /// [`DriveError::BadId`] for an ID that no device can have.
@@ -68,8 +68,8 @@ pub fn link_settings(config: &Config, baud: u32) -> Result<LinkSettings, DriveEr
 
 /// The open port with a servo and a tracker on it that have passed the start-up checks.
 ///
-/// Dropping it stops the motor, whatever the reason: an orderly end, an error, a panic. A process that is killed has no such
-/// moment; then the servo's own watchdog stops the motor.
+/// Dropping it stops the motor, after an orderly end as after an error or a panic. When the process is killed instead, the servo's
+/// own watchdog stops the motor.
 pub struct Drive {
     path: PathBuf,
     settings: LinkSettings,
@@ -104,7 +104,7 @@ impl Drive {
         ))
     }
 
-    /// One exchange: the goal goes out, readings come in, until `deadline` at the latest. It allocates nothing.
+    /// One exchange: sends the goal and receives the readings, until `deadline` at the latest. Allocates nothing.
     pub fn exchange(&mut self, goal_counts: i32, deadline: Instant) -> ExchangeOutcome {
         let outcome = self
             .bus
@@ -118,12 +118,12 @@ impl Drive {
         self.is_gone
     }
 
-    /// What the link has counted.
+    /// The link's counters.
     pub fn counters(&self) -> LinkCounters {
         self.bus.link_counters()
     }
 
-    /// Carries out a service. Gives the servo's hardware error status where it was read.
+    /// Executes a service. Returns the servo's hardware error status if it was read.
     ///
     /// # Errors
     /// [`DriveError`]; the motor is then off, or cannot be reached.
@@ -187,7 +187,7 @@ impl Drop for Drive {
             return;
         }
         let servo = self.settings.servo_id;
-        // Both are tried whatever becomes of the other; should neither arrive, the servo's watchdog stops the motor.
+        // Both are tried, even if one fails; if neither arrives, the servo's watchdog stops the motor.
         let stopped = self.bus.stop_motor(servo);
         let torque_off = self.bus.set_torque(servo, false);
         if let Err(error) = stopped.and(torque_off) {

@@ -1,5 +1,5 @@
-//! What the loop has to tell, without a log call in a tick: entries go through a bounded queue to a thread that logs. The same
-//! thread reads the loop's counters every now and then, for the [evidence](super::evidence) in late ticks.
+//! The loop's log, without a log call in a tick: entries go through a bounded queue to a thread that logs. The same thread reads
+//! the loop's counters regularly, as [evidence](super::sched_counters) for late ticks.
 
 use super::sched_counters::{Counters, Counts, Snapshot};
 use crate::logging::Summed;
@@ -11,13 +11,13 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use worm_estimator::message::{Culprit, Fault, Mode};
 
-/// Entries that may wait; more are dropped and counted.
+/// Length of the queue; further entries are dropped and counted.
 const CAPACITY: usize = 256;
 
-/// How often the logging thread looks, and reads the counters. A person reads the log; the topics are for those in a hurry.
+/// How often the logging thread empties the queue and reads the counters. The log is for people; programs read the topics.
 const POLL: Duration = Duration::from_millis(20);
 
-/// One thing that happened in a tick.
+/// An event in a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Entry {
     ModeChanged {
@@ -62,8 +62,8 @@ pub(super) struct Journal {
 }
 
 impl Journal {
-    /// Starts the logging thread of the calling thread's loop. It runs under the ordinary scheduler as long as this is called
-    /// before real-time priority is requested.
+    /// Starts the logging thread for the loop in the calling thread. Call it before requesting real-time priority, so that the
+    /// logging thread keeps the ordinary scheduler.
     pub(super) fn start() -> std::io::Result<Self> {
         let shared = Arc::new(Shared {
             queue: ArrayQueue::new(CAPACITY),
@@ -83,23 +83,23 @@ impl Journal {
         })
     }
 
-    /// Notes an entry; never blocks, never allocates.
+    /// Adds an entry; never blocks, never allocates.
     pub(super) fn note(&self, entry: Entry) {
         if self.shared.queue.push(entry).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Tells how many ticks the loop has run.
+    /// Sets how many ticks the loop has run.
     pub(super) fn count_ticks(&self, ticks: u64) {
         self.shared.ticks.store(ticks, Ordering::Relaxed);
     }
 
-    /// What the kernel has counted in tick number `tick`, which ends now. For late ticks alone: it costs system calls.
+    /// What the kernel has counted in tick number `tick`, which ends now. Only for late ticks: it costs system calls.
     pub(super) fn evidence(&self, tick: u64) -> Counts {
         let now = self.shared.counters.read();
         let evidence = self.shared.snapshot.evidence(tick, now);
-        // The next late tick may come before the logging thread looks again; this one's causes are not its.
+        // The next late tick may come before the logging thread reads again; it must not inherit the causes of this one.
         self.shared.snapshot.store(tick, now);
         evidence
     }
@@ -109,7 +109,7 @@ impl Drop for Journal {
     fn drop(&mut self) {
         self.shared.end.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
-            // A logging thread that panicked has said so itself.
+            // A panic of the logging thread has been reported by the panic itself.
             let _ = thread.join();
         }
     }
@@ -153,7 +153,7 @@ fn write_entries(shared: &Shared) {
         if dropped > 0 {
             tracing::warn!(
                 dropped,
-                "log entries were dropped: the loop had more to tell than could be written"
+                "log entries were dropped: the loop logged faster than the entries could be written"
             );
         }
         if is_over {
@@ -178,7 +178,7 @@ fn log_mode(from: Mode, to: Mode, fault: Fault, alarm: u32) {
     if to == Mode::Fault {
         let alarm =
             worm_estimator::message::AlarmKind::try_from(alarm).map_or("", worm_estimator::message::AlarmKind::name);
-        tracing::error!(%fault, alarm, "the worm was stopped while {from}: mend the cause, then `wormd command reset`");
+        tracing::error!(%fault, alarm, "the worm was stopped while {from}: remove the cause, then `wormd command reset`");
     } else {
         tracing::info!("{from} -> {to}");
     }
@@ -230,7 +230,7 @@ impl Pauses {
     }
 }
 
-/// What recurs, each kind summed by itself.
+/// Recurring events, each kind summed by itself.
 #[derive(Default)]
 struct Recurring {
     late: Summed<LateTicks>,
@@ -262,7 +262,7 @@ impl Recurring {
         });
     }
 
-    /// One line says what the computer holds and what to set; that it comes and goes is summed.
+    /// The first change says which rate the computer sustains and what to set; further changes are summed.
     fn take_rate(&mut self, configured_hz: f64, held_hz: f64) {
         if std::mem::replace(&mut self.told_of_rate, true) {
             self.changes_of_rate.add(|(count, newest_hz)| {

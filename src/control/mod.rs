@@ -3,20 +3,21 @@
 //!
 //! In the order in which one tick runs:
 //!
-//! 1. [`Schedule`] says when the tick is due; the loop in [`run()`] sleeps until then. `rate` slows it down where the computer cannot
-//!    hold the configured rate.
+//! 1. [`Schedule`] says when the tick is due; the loop in [`run()`] sleeps until then. `rate` slows it down when the computer cannot
+//!    sustain the configured rate.
 //! 2. The link exchanges the goal velocity for readings.
 //! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](worm_estimator::message::State), the next
-//!    goal and, rarely, a [`Service`]. It knows the limits (`safety`), the ramps (`ramp`), how readings become
-//!    messages (`state_assembler`), and which part of the time the loop was there at all (`presence`, `resume`); it takes time as an
-//!    argument, so all of it is tested in virtual time.
-//! 4. The loop publishes, wakes who listens, carries out a service if one is due, and finishes the tick on the schedule. A tick
-//!    that was late gets its culprit, by what the kernel has counted (`sched_counters`); what there is to log goes to the `journal`.
+//!    goal and, rarely, a [`Service`]. It enforces the limits (`safety`) and ramps (`ramp`), assembles
+//!    the state (`state_assembler`), and handles pauses of the computer (`loop_clock`, `resume`). Time is an argument, so all of it is
+//!    tested in virtual time.
+//! 4. The loop publishes, wakes the listeners, executes a service if one is due, and finishes the tick on the schedule. The kernel's
+//!    counters (`sched_counters`) show what made a late tick late; the `journal` logs from a thread of its own.
 
 mod controller;
 mod hardware;
+mod interface;
 mod journal;
-mod presence;
+mod loop_clock;
 mod ramp;
 mod rate;
 mod resume;
@@ -26,7 +27,8 @@ mod sched_counters;
 mod schedule;
 mod state_assembler;
 
-pub use controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
+pub use controller::Controller;
 pub use hardware::{Drive, DriveError, link_settings};
+pub use interface::{Inputs, Outputs, Service, ServiceOutcome};
 pub use run::{Ending, RunError, run};
 pub use schedule::{Schedule, bus_allowed_ns};

@@ -21,7 +21,7 @@ impl Ramp {
         self.target_rad_s = target_rad_s;
     }
 
-    /// Stands still at once: for faults, where the motor is stopped by more than a ramp.
+    /// Stops at once: for faults, in which torque goes off.
     pub(super) fn halt(&mut self) {
         self.velocity_rad_s = 0.0;
         self.target_rad_s = 0.0;
@@ -46,9 +46,9 @@ impl Ramp {
     }
 }
 
-/// Rounds velocities to whole counts so that their mean is exact: what one tick rounds off, the next ones make good.
+/// Rounds velocities to whole counts so that their mean is exact: later ticks make up for what one tick rounded off.
 ///
-/// One count is 0.229 rev/min, a tenth of the speed of a slow gait; plain rounding would make such a gait wrong by per cents.
+/// One count is 0.229 rev/min, a tenth of the speed of a slow gait; plain rounding would make such a gait wrong by several per cent.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct CountRounding {
     owed_counts: f64,
@@ -57,7 +57,7 @@ pub(super) struct CountRounding {
 impl CountRounding {
     pub(super) fn round(&mut self, counts: f64) -> i32 {
         if counts == 0.0 {
-            // Standing still means standing still: nothing is owed across a stop.
+            // Standing still means a goal of exactly 0: no remainder survives a stop.
             self.owed_counts = 0.0;
             return 0;
         }

@@ -1,20 +1,21 @@
-//! Which rate the computer and its link hold: a loop that misses deadlines again and again goes on at a steady fraction of its rate.
+//! Adapts the rate to what the computer and its link sustain: a loop that keeps missing deadlines continues at a steady fraction of
+//! its rate.
 //!
-//! Deadlines that are missed here and there cost nothing but those samples, and an answer that is late now and then is used a tick
-//! later. But a loop that misses every third one runs in bursts; at half the rate it is steady again. So the share of deadlines that
-//! were missed, or whose answer was late, is looked at over [`WINDOW_TICKS`], and a share beyond [`TOO_MANY`] doubles the period. Pauses of the computer do not count: a slower loop would not help against them. After a time in
-//! which nearly nothing was missed the next faster rate is tried, and after each trial that failed twice as late.
+//! An occasional missed deadline costs only its sample, and an occasional late answer is used one tick later. But a loop that misses
+//! every third deadline runs in bursts; at half the rate it is steady again. So a fraction beyond [`MAX_MISSED`] of deadlines that
+//! were missed, or whose answer was late, within [`WINDOW_TICKS`] doubles the period. Pauses of the computer do not count: a slower
+//! loop would not help. After a time with almost no misses the next faster rate is tried; each failed trial doubles that time.
 
-/// Ticks and missed deadlines over which the share is taken.
+/// Ticks and missed deadlines in one window.
 const WINDOW_TICKS: u64 = 5_000;
-/// Share of deadlines that may be missed.
-const TOO_MANY: f64 = 0.2;
-/// Share that is next to nothing.
+/// Fraction of deadlines that may be missed.
+const MAX_MISSED: f64 = 0.2;
+/// Fraction that counts as almost none.
 const NEARLY_NONE: f64 = 0.02;
-/// Windows in a row with next to nothing missed before a faster rate is tried.
-const FIRST_PATIENCE: u32 = 8;
-/// It never waits for longer.
-const LONGEST_PATIENCE: u32 = 512;
+/// Consecutive windows with almost no misses before a faster rate is tried.
+const FIRST_WAIT: u32 = 8;
+/// Longest such wait, windows.
+const MAX_WAIT: u32 = 512;
 /// Slowest rate, as a divider of the configured one.
 const LARGEST_DIVIDER: u64 = 8;
 
@@ -31,7 +32,7 @@ pub(super) struct RateKeeper {
 }
 
 impl RateKeeper {
-    /// Keeps to `rate_hz`, or to a fraction of it that is not below `min_hz`; to `rate_hz` alone where `adapts` is false.
+    /// Starts at `rate_hz`, and never falls below `min_hz`; stays at `rate_hz` if `adapts` is false.
     pub(super) fn new(rate_hz: f64, min_hz: f64, adapts: bool) -> Self {
         let mut largest = 1;
         while adapts && largest < LARGEST_DIVIDER && rate_hz / (2 * largest) as f64 >= min_hz {
@@ -43,12 +44,12 @@ impl RateKeeper {
             deadlines: 0,
             missed: 0,
             quiet_windows: 0,
-            timeout: FIRST_PATIENCE,
+            timeout: FIRST_WAIT,
             is_trial: false,
         }
     }
 
-    /// Takes a tick that has cost `skipped` further deadlines, and whose answer came late or not. The new divider, where it changes.
+    /// Takes a tick that cost `skipped` further deadlines, and whether its answer came late. Returns the divider when it changes.
     pub(super) fn take(&mut self, skipped: u64, is_late: bool) -> Option<u64> {
         self.deadlines += 1 + skipped;
         self.missed += skipped + u64::from(is_late);
@@ -57,10 +58,10 @@ impl RateKeeper {
         }
         let fraction = self.missed as f64 / self.deadlines as f64;
         (self.deadlines, self.missed) = (0, 0);
-        if fraction > TOO_MANY {
+        if fraction > MAX_MISSED {
             self.quiet_windows = 0;
             if std::mem::take(&mut self.is_trial) {
-                self.timeout = (2 * self.timeout).min(LONGEST_PATIENCE);
+                self.timeout = (2 * self.timeout).min(MAX_WAIT);
             }
             return self.change(2 * self.divider);
         }

@@ -1,10 +1,11 @@
 //! The real-time loop: sleeps until each deadline, exchanges, ticks, publishes. All behaviour is in
-//! [`Controller::tick`]; here is only I/O, and the account of where the time went.
+//! [`Controller::tick`]; this file has only I/O, and the record of where the time went.
 
-use super::controller::{Controller, Inputs, Outputs, Service, ServiceOutcome};
+use super::controller::Controller;
 use super::hardware::Drive;
+use super::interface::{Inputs, Outputs, Service, ServiceOutcome};
 use super::journal::{Entry, Journal};
-use super::presence::{Looks, SHORTEST_PAUSE_NS, Silence, absent_ns};
+use super::loop_clock::{ExchangeTimes, MIN_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
 use super::sched_counters::{Counts, Parts, find_culprit};
 use super::schedule::{Schedule, bus_allowed_ns};
@@ -18,13 +19,14 @@ use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
 
-/// Alarm changes that one tick takes at most; more wait for the next tick.
+/// Maximum number of alarm changes that one tick reads; more wait for the next tick.
 const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
 
-/// The witness runs so far below the loop: never in its way, and above all that could keep a device's answer back.
+/// The witness's priority lies this far below the loop's: never in its way, and above everything that could delay a device's
+/// answer.
 const WITNESS_BELOW_LOOP: u8 = 5;
 
-/// Stack that is made ready before the first tick, bytes: many times what a tick uses.
+/// Stack that is touched before the first tick, bytes: many times what a tick uses.
 const STACK_BYTES: usize = 256 * 1024;
 
 /// Why the loop could not start.
@@ -38,7 +40,7 @@ pub enum RunError {
     Thread(std::io::Error),
 }
 
-/// The loop's ends of the topics.
+/// The loop's ports on the topics.
 struct Ports {
     state: Publisher<State>,
     state_event: Notifier<State>,
@@ -60,8 +62,8 @@ impl Ports {
         })
     }
 
-    /// What has arrived since the last tick. A topic that cannot be read counts as silent: the safety rules know what to
-    /// do about silence.
+    /// Reads the alarms that arrived since the last tick. A topic that cannot be read counts as silent, which the safety rules
+    /// handle.
     fn take_alarms(&mut self, into: &mut [Alarm; ALARMS_PER_TICK]) -> usize {
         let mut count = 0;
         while count < into.len() {
@@ -73,7 +75,7 @@ impl Ports {
     }
 }
 
-/// What the loop leaves behind.
+/// Totals of the loop at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ending {
     /// Ticks that were run.
@@ -88,7 +90,7 @@ pub struct Ending {
 /// up, with what the operating system granted.
 ///
 /// # Errors
-/// [`RunError`] when the loop could not start. Once it runs, troubles are faults and alarms, not errors.
+/// [`RunError`] when the loop could not start. Once it runs, problems are faults and alarms, not errors.
 pub fn run(
     config: &Config,
     drive: &mut Drive,
@@ -135,7 +137,7 @@ pub fn run(
     })
 }
 
-/// The slowest rate that the loop may fall back to: it still sees every sample of the tracker, and silences in time.
+/// The slowest rate that the loop may fall back to: it still reads every sample of the tracker, and detects silences in time.
 fn slowest_rate_hz(config: &Config) -> f64 {
     let shortest_s = config
         .control
@@ -157,9 +159,9 @@ struct Loop {
     alarms: [Alarm; ALARMS_PER_TICK],
     /// What the last tick decided.
     last: Option<Outputs>,
-    /// What the last tick's publishing took.
+    /// How long the last tick's publishing took.
     publish_ns: u64,
-    /// What the last tick took behind its exchange, without a service.
+    /// How long the last tick worked after its exchange, without a service.
     work_ns: u64,
     host_pauses: u64,
     unpublished: u64,
@@ -172,10 +174,10 @@ struct Loop {
 struct Times {
     deadline: u64,
     woken: u64,
-    /// What the devices were given for their answer.
+    /// How long the devices had for their answer.
     bus_allowed: u64,
     exchanged: u64,
-    /// As `exchanged`, or after the service, if one was carried out.
+    /// As `exchanged`, or after the service, if one was executed.
     resumed: u64,
     computed: u64,
     published: u64,
@@ -199,7 +201,7 @@ impl Loop {
         self.note_port(drive.is_gone());
         let exchanged = monotonic_ns();
         let absent_ns = absent_ns(
-            &Looks {
+            &ExchangeTimes {
                 deadline,
                 woken,
                 bus_allowed,
@@ -219,7 +221,7 @@ impl Loop {
         let estimate_arrived = matches!(self.ports.estimates.latest(), Ok(Some(_)));
         let (command, responder) = split(self.ports.commands.take());
         let inputs = Inputs {
-            // A service takes long, and nobody was asked for a reading meanwhile: silences begin behind it.
+            // A service takes long, and no reading is requested meanwhile: silences count from its end.
             now_ns: resumed,
             absent_ns,
             lost_exchanges: outcome.lost,
@@ -240,8 +242,7 @@ impl Loop {
         let published_state = self.ports.state.publish(&outputs.state);
         self.count_unpublished(published_state);
         let published = monotonic_ns();
-        // A system call for each listener, none without: whoever wants to be woken by every tick pays for it here. A listener
-        // that cannot be woken is no trouble of the loop's.
+        // One system call for each listener, none without. A listener that cannot be woken is not the loop's problem.
         let _ = self.ports.state_event.notify();
         let notified = monotonic_ns();
         if let (Some(responder), Some(reply)) = (responder, &outputs.reply) {
@@ -269,13 +270,13 @@ impl Loop {
         outputs.finished
     }
 
-    /// How much of this tick a silent servo is not to be charged with: all of it while a CPU of this computer does not run, which the
-    /// answer may be waiting for.
+    /// How much of this tick is not charged to a silent servo: all of it while a CPU of this computer does not run, since the answer
+    /// may be waiting for that CPU.
     fn unanswerable_ns(&mut self, answered: bool, is_gone: bool) -> u64 {
         let period_ns = self.schedule.period_ns();
         let witness = &self.witness;
         self.silence
-            .uncharged_ns(period_ns, answered || is_gone, || witness.ask())
+            .uncharged_ns(period_ns, answered || is_gone, || witness.check())
     }
 
     fn note_port(&mut self, is_gone: bool) {
@@ -303,8 +304,8 @@ impl Loop {
         self.unpublished += u64::from(outcome.is_err());
     }
 
-    /// Ends the tick on the schedule and publishes where its time went. A tick in which a service was carried out has
-    /// paused on purpose, while the worm stood: it is no overrun.
+    /// Ends the tick on the schedule and publishes where its time went. A tick with a service has paused on purpose, while the worm
+    /// stood still: it is no overrun.
     fn finish(&mut self, times: Times, served: bool, host_paused_ns: u64, late_answer: bool) {
         let period_ns = self.schedule.period_ns();
         let skipped = if served {
@@ -324,8 +325,8 @@ impl Loop {
                 pause_ns: host_paused_ns,
                 evidence,
             });
-        } else if skipped > 0 && times.notified - times.resumed < SHORTEST_PAUSE_NS {
-            // A pause in the middle of the tick's own work shows, as what it is, in the next one.
+        } else if skipped > 0 && times.notified - times.resumed < MIN_PAUSE_NS {
+            // A pause in the middle of the tick's own work is reported as a pause by the next tick.
             let late_us = (times.notified - times.deadline) / 1000;
             self.journal.note(Entry::Overrun {
                 sequence: self.ticks,
@@ -358,8 +359,8 @@ impl Loop {
         let end = monotonic_ns();
         self.publish_ns = end - times.notified + times.published - times.computed;
         self.work_ns = end - times.resumed;
-        // What a pause has cost says nothing about the rate; the tick behind it is the first that does.
-        let is_paused = host_paused_ns > 0 || self.work_ns >= SHORTEST_PAUSE_NS;
+        // The deadlines that a pause cost say nothing about the rate.
+        let is_paused = host_paused_ns > 0 || self.work_ns >= MIN_PAUSE_NS;
         let (skipped, late_answer) = if is_paused { (0, false) } else { (skipped, late_answer) };
         if let Some(divider) = self.rate.take(skipped, late_answer) {
             self.schedule.slow_down(divider);
@@ -370,7 +371,7 @@ impl Loop {
         }
     }
 
-    /// Finds who made a tick late.
+    /// Finds the cause of a late tick.
     fn explain_late_tick(&self, times: &Times) -> (Culprit, Counts) {
         let evidence = self.journal.evidence(self.ticks);
         let parts = Parts {
@@ -391,7 +392,7 @@ fn prefault_stack() {
     std::hint::black_box(&mut stack);
 }
 
-/// Carries out a service and tells what became of it. Logging is in order here: the worm stands.
+/// Executes a service and returns its outcome. Logging is allowed here, because the worm stands still.
 fn serve(drive: &mut Drive, service: Service) -> (ServiceOutcome, Option<u8>) {
     match drive.serve(service) {
         Ok(hardware_error) => (ServiceOutcome::Done(service), hardware_error),
@@ -407,7 +408,7 @@ fn split(
 ) -> (Option<worm_estimator::message::Command>, Option<Responder>) {
     match taken {
         Ok(Some((command, responder))) => (Some(command), Some(responder)),
-        // Requests that cannot be read are requests that nobody answers; their sender is told by its time-out.
+        // A request that cannot be read is not answered; its sender times out.
         Ok(None) | Err(_) => (None, None),
     }
 }

@@ -1,19 +1,16 @@
-//! Limits and patience: which readings, or whose silence, stop the worm.
+//! Limits and time-outs: the readings and silences that stop the worm.
 //!
-//! Every time here is of the loop's own clock (`presence`): a pause of the computer is nobody's silence.
+//! All times are of the loop's own clock (`loop_clock`): a pause of the computer does not count as silence.
 
 use super::state_assembler::StateAssembler;
 use crate::link::ServoReading;
 use worm_estimator::config::{Config, Limits};
 use worm_estimator::message::Fault;
 
-/// What the bus watchdog register reads after it has stopped the motor (XL330-M288 e-manual, register 98).
-const WATCHDOG_TRIPPED: u8 = 0xFF;
-
 /// Time over which the bus voltage is averaged, s: motor current steps pull it down for milliseconds.
 const VOLTAGE_AVERAGING_S: f64 = 0.1;
 
-/// Watches the limits while the motor has torque. It only finds reasons; latching the first is the state machine's work.
+/// Checks the limits while the motor has torque. The state machine latches the first fault.
 #[derive(Debug, Clone)]
 pub(super) struct Safety {
     limits: Limits,
@@ -26,8 +23,8 @@ pub(super) struct Safety {
     voltage_v: Option<f64>,
 }
 
-/// What the limits are held against in one tick.
-pub(super) struct Watched<'a> {
+/// What the limits are checked against in one tick.
+pub(super) struct SafetyInputs<'a> {
     pub(super) now_ns: u64,
     pub(super) dt_s: f64,
     pub(super) servo: Option<&'a ServoReading>,
@@ -59,47 +56,47 @@ impl Safety {
         }
     }
 
-    /// Forgets what earlier readings have built up: torque comes on anew.
+    /// Resets what earlier readings have accumulated: torque was switched on again.
     pub(super) fn rearm(&mut self) {
         self.over_current_since_ns = None;
         self.voltage_v = None;
     }
 
     /// The first reason to stop, if any, the most telling one first.
-    pub(super) fn check(&mut self, watched: &Watched<'_>) -> Option<Fault> {
-        if let Some(servo) = watched.servo
-            && let Some(fault) = self.check_servo(servo, watched)
+    pub(super) fn check(&mut self, inputs: &SafetyInputs<'_>) -> Option<Fault> {
+        if let Some(servo) = inputs.servo
+            && let Some(fault) = self.check_servo(servo, inputs)
         {
             return Some(fault);
         }
         let silent_for = |seen_ns: Option<u64>, since_ns: u64| {
-            watched.now_ns.saturating_sub(seen_ns.unwrap_or(since_ns).max(since_ns))
+            inputs.now_ns.saturating_sub(seen_ns.unwrap_or(since_ns).max(since_ns))
         };
-        if silent_for(watched.assembler.servo_seen_ns, watched.armed_ns) > self.link_timeout_ns {
+        if silent_for(inputs.assembler.servo_seen_ns, inputs.armed_ns) > self.link_timeout_ns {
             return Some(Fault::LinkLost);
         }
-        let since_ns = watched.crawling_since_ns?;
-        if silent_for(watched.assembler.sample_seen_ns, since_ns) > self.tracker_timeout_ns {
+        let since_ns = inputs.crawling_since_ns?;
+        if silent_for(inputs.assembler.sample_seen_ns, since_ns) > self.tracker_timeout_ns {
             return Some(Fault::TrackerStale);
         }
-        let estimator_is_silent = silent_for(watched.estimate_seen_ns, since_ns) > self.estimator_timeout_ns;
+        let estimator_is_silent = silent_for(inputs.estimate_seen_ns, since_ns) > self.estimator_timeout_ns;
         (self.require_estimator && estimator_is_silent).then_some(Fault::EstimatorSilent)
     }
 
-    fn check_servo(&mut self, servo: &ServoReading, watched: &Watched<'_>) -> Option<Fault> {
+    fn check_servo(&mut self, servo: &ServoReading, inputs: &SafetyInputs<'_>) -> Option<Fault> {
         if servo.alert {
             return Some(Fault::ServoHardware);
         }
-        if servo.watchdog == WATCHDOG_TRIPPED {
-            // The silence that tripped it was the computer's own where most of it was a pause.
-            let by_pause = 2 * watched.paused_ns >= self.watchdog_ns;
+        if servo.watchdog_latched() {
+            // The computer caused the silence if most of it was a pause.
+            let by_pause = 2 * inputs.paused_ns >= self.watchdog_ns;
             return Some(if by_pause {
                 Fault::HostPaused
             } else {
                 Fault::WatchdogTripped
             });
         }
-        // The watchdog was set when torque came on; zero is what a servo reads that has started anew since.
+        // The watchdog was set when torque came on; it reads zero after a restart of the servo.
         if servo.watchdog == 0 {
             return Some(Fault::ServoRestarted);
         }
@@ -108,7 +105,7 @@ impl Safety {
         }
         let voltage_v = match self.voltage_v {
             None => servo.voltage_v,
-            Some(mean_v) => mean_v + (servo.voltage_v - mean_v) * (watched.dt_s / VOLTAGE_AVERAGING_S).min(1.0),
+            Some(mean_v) => mean_v + (servo.voltage_v - mean_v) * (inputs.dt_s / VOLTAGE_AVERAGING_S).min(1.0),
         };
         self.voltage_v = Some(voltage_v);
         if voltage_v < self.limits.voltage_v {
@@ -118,12 +115,12 @@ impl Safety {
             self.over_current_since_ns = None;
             return None;
         }
-        let since_ns = *self.over_current_since_ns.get_or_insert(watched.now_ns);
-        let too_long = watched.now_ns.saturating_sub(since_ns) > seconds_to_ns(self.limits.current_time_s);
+        let since_ns = *self.over_current_since_ns.get_or_insert(inputs.now_ns);
+        let too_long = inputs.now_ns.saturating_sub(since_ns) > seconds_to_ns(self.limits.current_time_s);
         too_long.then_some(Fault::OverCurrent)
     }
 
-    /// Whether `fault`'s cause is still there, so that a reset would be in vain.
+    /// Whether the cause of `fault` is still present, so that a reset would fail.
     pub(super) fn persists(
         &self,
         fault: Fault,
@@ -136,7 +133,7 @@ impl Safety {
             Fault::OverTemperature => servo.is_none_or(|servo| servo.temperature_c > self.limits.temperature_c),
             Fault::UnderVoltage => servo.is_none_or(|servo| servo.voltage_v < self.limits.voltage_v),
             Fault::TrackerStale => age_ns(assembler.sample_seen_ns) > self.tracker_timeout_ns,
-            // A lost link may need the port to be opened again, which is what a reset does; the rest is past by nature.
+            // A lost link may need the port to be reopened, which a reset does; the other causes do not last.
             _ => false,
         }
     }

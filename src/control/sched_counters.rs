@@ -1,24 +1,24 @@
-//! Who made a tick late: what the kernel counts of the loop's thread, and the verdict.
+//! The kernel's counters of the loop's thread, and from them the cause of a late tick.
 //!
-//! The counters cost system calls, and a tick in time makes none for them. So the logging thread reads them every few
-//! milliseconds, and the loop reads them in a late tick alone: what was counted in between happened in that tick, or in the few
-//! before it. For waiting, which no tick is quite free of, the usual share of those few is taken off.
+//! Reading the counters costs system calls, which a tick in time does not make. So the logging thread reads them every few
+//! milliseconds, and the loop only in a late tick: the difference happened in that tick, or in the few before it. Every tick waits
+//! a little for the CPU, so the usual waiting time of those few is subtracted.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use worm_estimator::message::Culprit;
 
-/// Lengths of the kernel's steps of stolen time, ns: `USER_HZ` is 100 on every Linux that wormd runs on.
+/// Resolution of the kernel's stolen time, ns: `USER_HZ` is 100 on every Linux that wormd runs on.
 const STOLEN_STEP_NS: u64 = 10_000_000;
 
-/// Bytes of a counter file that are read: the first line of `/proc/stat`, all of the thread's files.
+/// Bytes read of a counter file: the first line of `/proc/stat`, all of the thread's files.
 const READ_BYTES: usize = 512;
 
-/// What the kernel has counted since the thread, or the machine, began.
+/// The kernel's counters since the thread, or the machine, started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Counts {
-    /// Time that the thread could have run and had no CPU, ns (`run_delay` of `schedstat`).
+    /// Time in which the thread was runnable but had no CPU, ns (`run_delay` of `schedstat`).
     pub waited_ns: u64,
     /// Time that the host took from this machine's CPUs, ns.
     pub stolen_ns: u64,
@@ -148,7 +148,7 @@ pub(super) struct Parts {
     pub publish: u64,
 }
 
-/// Who made a late tick late: the part that took longest, unless what the kernel counted tells of one behind it.
+/// The cause of a late tick: its longest part, unless the kernel's counters show a cause behind that.
 ///
 /// A thread that waited for half of that part was kept from running. A page fault explains a computation or publishing that
 /// took long, for these touch memory and do nothing else that takes long. Stolen time is counted in steps so coarse that any is

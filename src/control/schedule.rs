@@ -1,9 +1,10 @@
-//! Absolute deadlines: when the next tick is due, and which ticks a late one has cost.
+//! Absolute deadlines: when the next tick is due, and which deadlines a late tick has cost.
 
-/// Even a tick that was woken late gives the bus this share of a period to answer.
+/// Even a tick that was woken late gives the bus this fraction of a period to answer.
 const MIN_BUS_SHARE: f64 = 0.3;
 
-/// How long the devices may take for their answer in a tick that was woken so late, ns; `wait_fraction` of the period where it was not.
+/// How long the devices may take for their answer in a tick that was woken late by this much, ns; `wait_fraction` of the period in
+/// a tick in time.
 pub fn bus_allowed_ns(wait_fraction: f64, period_ns: u64, wake_lateness_ns: u64) -> u64 {
     let period = period_ns as f64;
     let min_ns = (MIN_BUS_SHARE * period) as u64;
@@ -54,7 +55,7 @@ impl Schedule {
         self.period_ns = self.configured_ns * divider.max(1);
     }
 
-    /// Ends a tick at `now_ns` and gives the number of deadlines that it cost. The next deadline is then the first one of
+    /// Ends a tick at `now_ns` and returns the number of deadlines that it cost. The next deadline is then the first one of
     /// the grid that has not passed.
     pub fn finish(&mut self, now_ns: u64) -> u64 {
         let late_ns = now_ns.saturating_sub(self.deadline_ns);

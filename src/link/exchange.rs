@@ -85,19 +85,19 @@ pub struct ExchangeOutcome {
     pub sent_bytes: u32,
     /// Bytes received.
     pub received_bytes: u32,
-    /// This exchange and those right before it in which no byte came. Where they do not end the worm is gone, though the
-    /// port is there: switched off, or its cable is out.
+    /// Consecutive exchanges without any byte, up to this one. Many of them mean that the worm is gone although the port is
+    /// present: it is switched off, or the cable is unplugged.
     pub silent_in_a_row: u32,
 }
 
 impl ExchangeOutcome {
-    /// Both devices' data came.
+    /// Whether both devices' data arrived.
     #[must_use]
     pub const fn is_complete(&self) -> bool {
         self.servo.is_ok() && self.tracker.is_ok()
     }
 
-    /// The port is gone: it is to be opened again.
+    /// Whether the port is gone and has to be opened again.
     #[must_use]
     pub const fn is_disconnected(&self) -> bool {
         matches!(self.servo, Err(ReadFailure::Port(PortError::Disconnected)))
@@ -135,28 +135,28 @@ impl ReadFailure {
     }
 }
 
-/// Most bytes of late answers that are looked at: those of a tenth of a second at 1 kHz. What is beyond is thrown away.
+/// Maximum number of bytes of late answers that are decoded: those of a tenth of a second at 1 kHz. The rest is discarded.
 const LATE_LIMIT: usize = 16 * 1024;
 
-/// Questions that may be without an answer before the oldest counts as lost: those of a tenth of a second at 1 kHz.
+/// Requests without an answer before the oldest counts as lost: those of a tenth of a second at 1 kHz.
 const MAX_OWED: u32 = 100;
 
-/// What has been read so far.
-struct Harvest {
+/// The answers received so far.
+struct Answers {
     servo: Result<ServoReading, ReadFailure>,
     tracker: Result<TrackerReading, ReadFailure>,
     /// Whole answers of the servo.
     servo_answers: u32,
 }
 
-impl Harvest {
+impl Answers {
     const NOTHING: Self = Self {
         servo: Err(ReadFailure::Silent),
         tracker: Err(ReadFailure::Silent),
         servo_answers: 0,
     };
 
-    /// Takes a block of either device. Whether it was one that was asked for.
+    /// Takes a block of either device, or counts why it is none.
     fn take(&mut self, plan: &ExchangePlan, id: DeviceId, flags: StatusFlags, data: &[u8], counters: &mut BusCounters) {
         let failure = flags.error.map_or(ReadFailure::Malformed, ReadFailure::Refused);
         if flags.error.is_none() && data.is_empty() {
@@ -234,7 +234,7 @@ impl Harvest {
         }
     }
 
-    /// Each device has said something, be it a refusal.
+    /// Whether each device has answered, with data or a refusal.
     fn is_answered(&self) -> bool {
         self.servo != Err(ReadFailure::Silent) && self.tracker != Err(ReadFailure::Silent)
     }
@@ -248,7 +248,7 @@ impl<P: Port> WormBus<P> {
     pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
         let before = self.bus.counters();
         self.exchange_counters.exchanges += 1;
-        let mut late = Harvest::NOTHING;
+        let mut late = Answers::NOTHING;
         if self.answers_owed > 0 {
             // A port that fails here fails in the exchange, too.
             let _ = self.bus.take_late_packets(LATE_LIMIT, |packet, counters| match packet {
@@ -258,7 +258,7 @@ impl<P: Port> WormBus<P> {
             });
         }
         let lost = self.count_lost(late.servo_answers);
-        let mut harvest = Harvest::NOTHING;
+        let mut harvest = Answers::NOTHING;
         let end = match plan.read {
             ReadPlan::FastBulk | ReadPlan::Bulk => {
                 self.exchange_bulk(plan, goal_velocity_rad_s, deadline, &mut harvest)
@@ -319,7 +319,7 @@ impl<P: Port> WormBus<P> {
         plan: &ExchangePlan,
         goal_velocity_rad_s: f64,
         deadline: Instant,
-        harvest: &mut Harvest,
+        harvest: &mut Answers,
     ) -> Result<(), TransactionError> {
         let wire = plan.spans().map(ReadSpan::to_wire);
         let spans = ReadSpans::from_valid(&wire);
@@ -364,7 +364,7 @@ impl<P: Port> WormBus<P> {
         plan: &ExchangePlan,
         goal_velocity_rad_s: f64,
         deadline: Instant,
-        harvest: &mut Harvest,
+        harvest: &mut Answers,
     ) -> Result<(), TransactionError> {
         let goal = goal_counts(goal_velocity_rad_s);
         let now = Instant::now();
@@ -383,7 +383,7 @@ impl<P: Port> WormBus<P> {
         plan: &ExchangePlan,
         device: DeviceId,
         deadline: Instant,
-        harvest: &mut Harvest,
+        harvest: &mut Answers,
     ) -> Result<(), TransactionError> {
         let end = self.bus.receive_until(deadline, |packet, counters| {
             if let Packet::Status(status) = packet {

@@ -3,19 +3,18 @@
 //! From the wire up:
 //!
 //! 1. [`packet`] turns bytes into valid values and back (Protocol 2.0), for both ends of the line.
-//! 2. [`servo`] and [`tracker`] say where in a device's control table things stand, what a count is worth, and turn a
-//!    tick's block into a [`ServoReading`] and a [`TrackerReading`] in SI units.
-//! 3. A [`Port`] sends, and waits no longer than it is told. [`Tty`] is the operating system's: opened for one controller
-//!    alone, its USB latency timer found and mended. [`FaultInjector`] makes any port a bad one, from a seed.
-//! 4. A [`Bus`] asks one question at a time on a port: ping, read, write, sync and bulk read, reboot. It counts what goes
-//!    wrong by kind ([`BusCounters`]).
-//! 5. [`prepare`] makes a worm ready at start-up: right devices, right settings, motor at rest, watchdog set. What it finds
-//!    out of order it mends and tells ([`Finding`]), or refuses with a reason ([`StartupError`]).
-//! 6. [`WormBus::exchange`] is what each tick does then: one write with the goal velocity and the question for both devices'
-//!    blocks, then the answers until the deadline. It allocates nothing, logs nothing, and uses a partial answer for what it
-//!    holds.
-//! 7. [`WormBus::set_torque`], [`WormBus::stop_motor`], [`WormBus::rearm_watchdog`] and [`WormBus::reboot_servo`] are what a controller
-//!    does between ticks; each change is read back.
+//! 2. [`servo`] and [`tracker`] have the addresses and units of the devices' control tables, and turn a tick's block into a
+//!    [`ServoReading`] and a [`TrackerReading`] in SI units.
+//! 3. A [`Port`] sends, and receives until a deadline. [`Tty`] is the operating system's port: opened exclusively, with its USB
+//!    latency timer corrected. [`FaultInjector`] adds reproducible faults to any port.
+//! 4. A [`Bus`] performs one transaction at a time on a port: ping, read, write, sync and bulk read, reboot. It counts failures by
+//!    kind ([`BusCounters`]).
+//! 5. [`prepare`] makes a worm ready at start-up: right devices, right settings, motor at rest, watchdog set. It corrects wrong
+//!    settings and reports them ([`Finding`]), or refuses with a reason ([`StartupError`]).
+//! 6. [`WormBus::exchange`] is the transaction of each tick: one write with the goal velocity and the request for both devices'
+//!    blocks, then the answers until the deadline. It allocates nothing, logs nothing, and uses what a partial answer contains.
+//! 7. [`WormBus::set_torque`], [`WormBus::stop_motor`], [`WormBus::rearm_watchdog`] and [`WormBus::reboot_servo`] serve between ticks;
+//!    each change is verified by reading back.
 //! 8. [`virtual_worm`] is the other end of the line: the same devices, simulated on a pseudo-terminal.
 //!
 //! ```no_run
@@ -37,10 +36,9 @@
 //!
 //! Times are deadlines on the monotonic clock. Only ports wait; a port in memory makes every test of the link instant.
 //!
-//! What cannot be told: an answer that comes later than the next question looks like the answer to that question, for the
-//! protocol numbers nothing. It is taken for it when it is received first; of two that are there together the newer one has
-//! the last word. When the goal has changed meanwhile, [`ExchangeOutcome::goal_taken`] gives it away; the tracker's sample
-//! counter may, too.
+//! A limit of the protocol: it does not number packets, so an answer that arrives after the next request looks like the answer to
+//! that one. If it is received first, it is taken for it; if both are present, the newer one counts. When the goal has changed
+//! meanwhile, [`ExchangeOutcome::goal_taken`] reveals the mix-up; so may the tracker's sample counter.
 
 mod counters;
 mod exchange;

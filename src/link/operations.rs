@@ -73,8 +73,8 @@ impl<P: Port> WormBus<P> {
         self.set_register(servo, register::GOAL_VELOCITY, 0)
     }
 
-    /// Clears a latched bus watchdog and sets it again, with the goal at zero in between, lest the motor goes on with the goal
-    /// it had. Returns whether it was latched.
+    /// Clears a latched bus watchdog and sets it again, with the goal at zero in between, so that the motor does not continue with
+    /// its old goal. Returns whether it was latched.
     ///
     /// # Errors
     /// [`OperationError`]

@@ -93,12 +93,6 @@ pub mod scale {
         (velocity_rad_s / VELOCITY_RAD_S).round() as i32
     }
 
-    /// The nearest position count, likewise.
-    #[must_use]
-    pub fn position_counts(position_rad: f64) -> i32 {
-        (position_rad / POSITION_RAD).round() as i32
-    }
-
     /// Watchdog counts, rounded up so that it never bites early: 1 to 127, that is 20 ms to 2.54 s.
     #[must_use]
     pub const fn watchdog_counts(watchdog_ms: u32) -> u8 {

@@ -1,9 +1,10 @@
-//! From a port to a worm that is ready to tick: who is there, is it what the config says, is it set up, can it be mended.
+//! From a port to a worm that is ready to tick: which devices answer, are they the configured ones, are they set up, can wrong
+//! settings be corrected.
 //!
 //! 1. **Who answers?** Servo and tracker are pinged. When the servo is silent, the usual baud rates are tried and the bus is
-//!    asked who is there, so that the error names the cause.
-//! 2. **Is the motor at rest?** Torque off before anything else is judged; settings are locked otherwise, too. While this goes
-//!    on the servo answers writes (status return level 2), so that a refusal has a reason.
+//!    scanned, so that the error names the cause.
+//! 2. **Is the motor at rest?** Torque goes off before anything else is checked; it would lock the settings, too. During the checks
+//!    the servo answers writes (status return level 2), so that a refusal has a reason.
 //! 3. **Are they the right ones, and set up?** Model numbers; no hardware error; cells of the tracker; mode, limits, return
 //!    delay. A setting that is right is not written: EEPROM wears.
 //! 4. **Ready to tick:** status return level 1 (answer reads only, see the exchange), goal zero, watchdog cleared and set.
@@ -23,7 +24,7 @@ use super::{
 const ANSWER_READS: u32 = 1;
 /// Status return level at which everything is answered.
 const ANSWER_ALL: u32 = 2;
-/// Until the line is quiet after something that may or may not be answered.
+/// Time for an answer that may or may not come.
 const QUIET_TIME: Duration = Duration::from_millis(20);
 /// How often the status return level is written before it counts as refused.
 const STATUS_LEVEL_ATTEMPTS: usize = 3;
@@ -32,7 +33,7 @@ const READ_ATTEMPTS: usize = 5;
 /// Servos of the 330 size, whose firmware up to 51 latches the bus watchdog without stopping the motor (ROBOTIS forum, topic
 /// 4814): XL330-M077 and -M288, XC330-T181, -T288, -M181, -M288.
 const MODELS_OF_SIZE_330: [u16; 6] = [1190, 1200, 1210, 1220, 1230, 1240];
-const LAST_FIRMWARE_WITH_LAME_WATCHDOG: u8 = 51;
+const LAST_FIRMWARE_WITH_WATCHDOG_DEFECT: u8 = 51;
 
 /// What the link has to know of a worm. The config fills it in.
 #[derive(Debug, Clone, PartialEq)]
@@ -158,7 +159,7 @@ pub enum StartupError {
     Port(#[from] PortError),
 }
 
-/// Checks servo and tracker and makes them ready to tick. What was out of order goes into `findings`, mended or not, also when
+/// Checks servo and tracker and makes them ready to tick. What was wrong goes into `findings`, corrected or not, even when
 /// an error ends the check.
 ///
 /// # Errors
@@ -170,14 +171,14 @@ pub fn prepare<P: Port>(
 ) -> Result<Prepared, StartupError> {
     let (servo_id, tracker_id) = (settings.servo_id, settings.tracker_id);
     let servo = identify_servo(bus, settings)?;
-    // Whatever else is wrong: first the motor comes to rest.
+    // The motor comes to rest first, whatever else is wrong.
     set_status_level(bus, servo_id, ANSWER_ALL)?;
     unlock(bus, servo_id, findings)?;
     let errors = bus.hardware_errors(servo_id)?;
     if !errors.is_none() {
         return Err(StartupError::HardwareError(errors));
     }
-    warn_of_lame_watchdog(servo, findings);
+    warn_of_watchdog_defect(servo, findings);
 
     let tracker = identify(bus, settings, "tracker", tracker_id, settings.tracker_model)?;
     let tracker_cells = bus.register(tracker_id, tracker::register::CELL_COUNT)? as u8;
@@ -271,8 +272,8 @@ fn who_is_there<P: Port>(bus: &mut WormBus<P>) -> String {
     }
 }
 
-fn warn_of_lame_watchdog(servo: Identity, findings: &mut Vec<Finding>) {
-    if MODELS_OF_SIZE_330.contains(&servo.model) && servo.firmware <= LAST_FIRMWARE_WITH_LAME_WATCHDOG {
+fn warn_of_watchdog_defect(servo: Identity, findings: &mut Vec<Finding>) {
+    if MODELS_OF_SIZE_330.contains(&servo.model) && servo.firmware <= LAST_FIRMWARE_WITH_WATCHDOG_DEFECT {
         findings.push(Finding::open(
             format!(
                 "with firmware {} a servo of this size may turn on when its bus watchdog latches",
@@ -287,13 +288,13 @@ fn warn_of_lame_watchdog(servo: Identity, findings: &mut Vec<Finding>) {
 fn set_status_level<P: Port>(bus: &mut WormBus<P>, servo: DeviceId, level: u32) -> Result<(), StartupError> {
     let register = register::STATUS_RETURN_LEVEL;
     for _ in 0..STATUS_LEVEL_ATTEMPTS {
-        // Whether this write is answered depends on the level before. A receipt is let pass by, lest the next question
-        // collides with it.
+        // Whether this write is answered depends on the previous level. The pause lets an answer pass, so that it does not collide
+        // with the next request.
         bus.set_writes_are_answered(false);
         bus.write_register(servo, register, level, Instant::now() + REPLY_TIME)
             .map_err(|error| OperationError::Transaction { register, error })?;
         bus.settle(Instant::now() + QUIET_TIME)?;
-        // At level 0 a read is not answered; then the write has got lost.
+        // At level 0 a read is not answered: then the write got lost.
         if bus.read_register(servo, register, Instant::now() + REPLY_TIME) == Ok(level) {
             bus.set_writes_are_answered(level == ANSWER_ALL);
             return Ok(());

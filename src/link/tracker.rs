@@ -133,12 +133,6 @@ impl TrackerReading {
         })
     }
 
-    /// Whether cell `cell` was seen in this capture.
-    #[must_use]
-    pub const fn is_valid(&self, cell: usize) -> bool {
-        cell < MAX_CELLS && self.valid & (1 << cell) != 0
-    }
-
     /// The block that says this: the tracker's side of [`from_block`](Self::from_block). Positions are rounded to µm.
     #[must_use]
     pub fn to_block(&self) -> [u8; MAX_BLOCK_LEN] {

@@ -11,7 +11,7 @@ pub struct WormBus<P> {
     pub(super) exchange_counters: ExchangeCounters,
     /// Exchanges to which the servo's answer may still come.
     pub(super) answers_owed: u32,
-    /// An answer of the servo came in the last exchange, be it to an earlier one.
+    /// Whether an answer of the servo arrived in the last exchange, even if to an earlier request.
     pub(super) was_answered: bool,
     /// Exchanges since a device last sent anything.
     pub(super) silent_in_a_row: u32,

@@ -1,4 +1,4 @@
-//! What a process really has, read back from the kernel: not what it asked for, and whoever asked for it.
+//! What a process really has, read back from the kernel rather than taken from its requests.
 
 use super::cpus;
 use nix::sched::CpuSet;
@@ -61,9 +61,9 @@ impl Policy {
     }
 }
 
-/// What is in force for one thread and the memory of its process.
+/// The effective scheduling of one thread and memory of its process.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct InForce {
+pub struct EffectiveSettings {
     /// Scheduling policy, by sched_getscheduler(2).
     pub policy: Policy,
     /// Priority under SCHED_FIFO and SCHED_RR, 1 to 99; 0 under the others. By sched_getparam(2).
@@ -79,15 +79,15 @@ pub struct InForce {
     /// Memory in use, bytes: VmRSS of the same.
     pub resident_bytes: u64,
     /// How late the kernel may fire a timer to save a wake, ns: /proc/PID/timerslack_ns. Real-time policies have none, and
-    /// newer kernels say so with 0. Absent: another's is told only to those with CAP_SYS_NICE.
+    /// newer kernels then report 0. Absent: reading that of another process needs CAP_SYS_NICE.
     pub timer_slack_ns: Option<u64>,
 }
 
-impl InForce {
+impl EffectiveSettings {
     /// Of the main thread of a process; of another thread, given its thread id.
     ///
     /// # Errors
-    /// When there is no such process, or it may not be looked at.
+    /// When there is no such process, or it may not be inspected.
     pub fn of_process(pid: u32) -> io::Result<Self> {
         let id = libc::pid_t::try_from(pid).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
         let (policy, priority) = scheduler(id)?;
@@ -156,7 +156,7 @@ impl InForce {
     }
 }
 
-impl fmt::Display for InForce {
+impl fmt::Display for EffectiveSettings {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = if self.all_cpus { " (all)" } else { "" };
         write!(
@@ -200,11 +200,11 @@ fn memory_bytes(status: &str, key: &str) -> u64 {
 mod tests {
     use super::*;
 
-    fn read_back() -> InForce {
-        InForce::of_this_thread().expect("/proc tells of this thread")
+    fn read_back() -> EffectiveSettings {
+        EffectiveSettings::of_this_thread().expect("/proc shows this thread")
     }
 
-    /// A thread of its own, since what is asked for stays in force until its end.
+    /// A thread of its own, since requests stay in effect until its end.
     #[test]
     fn what_a_thread_asked_for_is_read_back() {
         let thread = std::thread::spawn(|| {
@@ -229,8 +229,8 @@ mod tests {
     #[test]
     fn a_process_that_is_gone_is_an_error() {
         // Beyond the largest process id that Linux has.
-        assert!(InForce::of_process(1 << 23).is_err());
-        assert!(InForce::of_process(u32::MAX).is_err());
+        assert!(EffectiveSettings::of_process(1 << 23).is_err());
+        assert!(EffectiveSettings::of_process(u32::MAX).is_err());
     }
 
     #[test]
@@ -248,7 +248,7 @@ mod tests {
             cpu: Some(3),
             lock_memory: true,
         };
-        let given = InForce {
+        let given = EffectiveSettings {
             policy: Policy::Fifo,
             priority: 80,
             cpus: vec![3],
@@ -268,7 +268,7 @@ mod tests {
             given.shortfalls(&wanted, 10),
             ["SCHED_FIFO 80 in place of SCHED_FIFO 70"]
         );
-        let refused = InForce {
+        let refused = EffectiveSettings {
             policy: Policy::Other,
             priority: 0,
             cpus: vec![0, 1, 2, 3],

@@ -10,14 +10,14 @@ use serde::Serialize;
 use std::fs::File;
 use std::io::Read;
 
-/// One of the computer's settings, judged.
+/// One of the computer's settings, and whether it suits the loop.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Setting {
-    /// What was looked at: `kernel`, `CPU governor`.
+    /// What was checked: `kernel`, `CPU governor`.
     pub subject: &'static str,
-    /// What was found, for a person.
+    /// What was found, in words.
     pub found: String,
-    /// Whether it is as a loop in time needs it.
+    /// Whether it suits a real-time loop.
     pub good: bool,
     /// What to do about it: commands, kernel options, keys; null where nothing needs doing.
     pub remedy: Option<String>,

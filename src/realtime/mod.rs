@@ -1,12 +1,12 @@
-//! What a process asks of the operating system to be in time, what it really has, and how the computer is set for it.
+//! What a process requests from the operating system to meet deadlines, what it really gets, and how the computer is set up for it.
 //!
-//! 1. [`request()`] asks for what the configuration names. Every request is answered with a [`Grant`] that says what was
-//!    asked, and what to do about a refusal. A refusal never ends the process: the worm still runs, and its operator is told.
-//! 2. [`InForce`] is read back from the kernel, of this thread or of any process: what it has, whoever asked for it.
-//! 3. [`CpuWitness`] goes and sees whether all CPUs run: a host can take each of them away by itself.
-//! 4. [`machine`] looks at what no process can ask for: the kernel, the CPUs, and what else runs on them.
+//! 1. [`request()`] makes the configured requests. Each returns a [`Grant`] with the request and, if it was refused, the remedy. A
+//!    refusal never ends the process: the worm still runs, and its operator is warned.
+//! 2. [`EffectiveSettings`] are read back from the kernel, for this thread or any process: what it has, whoever requested it.
+//! 3. [`CpuWitness`] checks whether all CPUs run: the host of a virtual machine can take each of them away.
+//! 4. [`machine`] checks what no process can request: the kernel, the CPUs, and what else runs on them.
 //!
-//! [`monotonic_ns`] and [`sleep_until`] are the clock that all of it is for.
+//! [`monotonic_ns`] and [`sleep_until`] are the clock of all deadlines.
 
 mod cpus;
 mod effective;
@@ -14,7 +14,7 @@ pub mod machine;
 mod request;
 mod witness;
 
-pub use effective::{InForce, Policy};
+pub use effective::{EffectiveSettings, Policy};
 pub use request::{Grant, Refusal, request};
 pub use witness::{CpuWitness, visit_every_cpu};
 
@@ -25,7 +25,7 @@ pub fn monotonic_ns() -> u64 {
     clock_ns(ClockId::CLOCK_MONOTONIC)
 }
 
-/// CPU time that the calling thread has taken, ns.
+/// CPU time that the calling thread has used, ns.
 pub fn thread_cpu_ns() -> u64 {
     clock_ns(ClockId::CLOCK_THREAD_CPUTIME_ID)
 }

@@ -1,6 +1,6 @@
-//! What a process asks of the operating system, and the answer to each request.
+//! What a process requests from the operating system, and the outcome of each request.
 
-use super::{InForce, cpus};
+use super::{EffectiveSettings, cpus};
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 use std::fmt;
@@ -10,7 +10,7 @@ use worm_estimator::config::Realtime;
 /// One request to the operating system and its outcome.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Grant {
-    /// What was asked for, for a person: `SCHED_FIFO priority 80`.
+    /// The request in words: `SCHED_FIFO priority 80`.
     pub request: String,
     /// Why it was refused; absent: granted.
     pub refusal: Option<Refusal>,
@@ -70,7 +70,7 @@ pub fn request(wanted: &Realtime, priority_offset: u8) -> Vec<Grant> {
         grants.push(Grant {
             request: format!("pinned to CPU {cpu}"),
             refusal: pin(cpu).err().map(|error| {
-                let allowed = InForce::of_this_thread().map(|in_force| in_force.cpus);
+                let allowed = EffectiveSettings::of_this_thread().map(|effective| effective.cpus);
                 pin_refusal(cpu, &cpus::online(), &allowed.unwrap_or_default(), &error)
             }),
         });

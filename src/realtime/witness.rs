@@ -1,8 +1,8 @@
 //! Whether all CPUs of this computer run.
 //!
-//! The host of a virtual machine takes away one CPU at a time, and a thread that runs on another one notices nothing: a device's answer is
-//! stuck with whoever would have passed it on, and the device looks silent. The kernel counts stolen time only when the CPU is back.
-//! But a thread can go and see: it moves to each CPU in turn, and comes back when all of them have run it.
+//! The host of a virtual machine can take away a single CPU. A thread on another CPU does not notice, except that a device's answer
+//! waits for the missing CPU, so that the device looks silent. The kernel counts stolen time only when the CPU is back. But a
+//! thread can find out: it moves to each CPU in turn, and returns when all of them have run it.
 
 use super::request::set_fifo;
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
@@ -15,15 +15,14 @@ use std::thread::JoinHandle;
 /// The calling thread.
 const THIS_THREAD: Pid = Pid::from_raw(0);
 
-/// Runs on each CPU in turn that the calling thread may use. Returns when all of them have run it, which takes as long as the longest
-/// of them is away.
+/// Runs on each CPU in turn that the calling thread may use. Returns when all of them have run it: as soon as the last one is back.
 pub fn visit_every_cpu() {
     let Ok(allowed) = sched_getaffinity(THIS_THREAD) else {
         return;
     };
     for cpu in 0..CpuSet::count() {
         let mut alone = CpuSet::new();
-        // A CPU that has gone meanwhile cannot be visited, nor can it hold anybody up.
+        // A CPU that went off line meanwhile cannot be visited, and delays nothing.
         if allowed.is_set(cpu).unwrap_or(false) && alone.set(cpu).is_ok() {
             let _ = sched_setaffinity(THIS_THREAD, &alone);
         }
@@ -70,8 +69,9 @@ impl CpuWitness {
         })
     }
 
-    /// Has the thread set out, unless it is still on its way. Whether it had come back: then every CPU has run since it was asked last.
-    pub fn ask(&self) -> bool {
+    /// Starts a new round of the thread, unless one is under way. Returns whether the last round was complete: then every CPU has run
+    /// since the previous call.
+    pub fn check(&self) -> bool {
         let asked = self.shared.asked.load(Ordering::Relaxed);
         if self.shared.seen.load(Ordering::Acquire) != asked {
             return false;
@@ -119,8 +119,8 @@ mod tests {
         visit_every_cpu();
         assert_eq!(sched_getaffinity(THIS_THREAD), Ok(before));
         let witness = CpuWitness::start(0).expect("a thread");
-        assert!(witness.ask(), "nobody has asked before");
-        while !witness.ask() {
+        assert!(witness.check(), "no round is under way yet");
+        while !witness.check() {
             std::thread::yield_now();
         }
     }

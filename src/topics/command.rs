@@ -18,7 +18,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{Command, Reply};
 
-/// How often a client looks for its answer.
+/// How often a client polls for its answer.
 const POLL: Duration = Duration::from_micros(500);
 
 /// A command that could not be taken, or an answer that could not be given.

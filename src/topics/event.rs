@@ -56,7 +56,7 @@ impl<T: Announced> Notifier<T> {
     /// Wakes the listeners, after the value was published. Returns how many there are.
     ///
     /// # Errors
-    /// [`NotifyError`] when iceoryx2 could not tell them.
+    /// [`NotifyError`] when iceoryx2 could not notify them.
     pub fn notify(&self) -> Result<usize, NotifyError> {
         self.port
             .notify()

@@ -36,11 +36,11 @@ impl Hub {
     /// Opens every service of the worm, and creates those that are missing.
     ///
     /// A process that was killed while it started can have left files that make iceoryx2 0.10 hang, or refuse, at every
-    /// later start. So starts go one after another, under a lock; each participant holds a shared lock for as long as it
+    /// later start. So starts are serialised by a lock; each participant holds a shared lock for as long as it
     /// or one of its ports lives; and
-    /// - who starts *alone* (nobody holds that lock, and no process maps the worm's memory) removes whatever is there,
-    /// - who starts *beside peers* removes only half-made segments that no process has open, and what dead nodes held,
-    /// - opening has a time limit; if it fails and nobody else is left, everything is removed and it is tried once more,
+    /// - a process that starts *alone* (no other holds that lock or maps the worm's memory) removes everything that is there,
+    /// - one that starts *beside peers* removes only incomplete segments that no process has open, and what dead nodes held,
+    /// - opening has a time limit; if it fails and no other process is left, everything is removed and opening is retried once,
     /// - and otherwise the error names the processes to stop.
     ///
     /// iceoryx2's own messages go to `tracing`, errors only; the environment variable `IOX2_LOG_LEVEL` shows more.

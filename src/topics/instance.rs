@@ -87,7 +87,7 @@ impl Instance {
     }
 
     /// The namespace of the worm `name` under `root`; creates the folders where they are missing: the worm's for its user
-    /// alone (0700), the root for every user whom its own parent lets create folders (1777 in `/dev/shm`), else 0755.
+    /// alone (0700), the root for every user if its own parent allows that (1777 in `/dev/shm`), else 0755.
     ///
     /// # Errors
     /// [`InstanceError`] when a folder cannot be used; its text says why and what to do.
@@ -158,7 +158,7 @@ impl Instance {
             .map_err(unusable)?;
         let (owner, mode) = match self.folder.symlink_metadata() {
             Ok(metadata) => (metadata.uid(), metadata.mode() & 0o777),
-            // Removed again by a process that was just leaving: whoever takes a lock creates it anew.
+            // A leaving process has just removed it; the next lock creates it again.
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
             Err(error) => return Err(unusable(error)),
         };

@@ -70,16 +70,6 @@ impl<T: Topic> Publisher<T> {
         send(self.loan()?.write_payload(*value))
     }
 
-    /// Publishes what `fill` writes, in the shared memory itself. The slot holds zeros before.
-    ///
-    /// # Errors
-    /// As [`Publisher::publish`].
-    pub fn publish_with(&self, fill: impl FnOnce(&mut T)) -> Result<(), PublishError> {
-        let mut sample = self.loan()?.write_payload(zeroed());
-        fill(sample.payload_mut());
-        send(sample)
-    }
-
     fn loan(&self) -> Result<SampleMutUninit<Ipc, MaybeUninit<T>, ()>, PublishError> {
         let topic = T::NAME;
         self.port
@@ -103,9 +93,4 @@ fn send<T: Topic>(sample: SampleMut<Ipc, T, ()>) -> Result<(), PublishError> {
         Ok(_) => Ok(()),
         Err(reason) => Err(PublishError::Send { topic: T::NAME, reason }),
     }
-}
-
-fn zeroed<T: Topic>() -> T {
-    // SAFETY: every pattern of bytes is a valid `T`, zeros too, as `Carried` demands.
-    unsafe { std::mem::zeroed() }
 }

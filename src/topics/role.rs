@@ -127,7 +127,7 @@ impl<R: Role> Drop for RoleLock<R> {
 /// Removes the lock files of roles whose holders were killed.
 pub(super) fn remove_abandoned(instance: &Instance) {
     for path in NAMES.iter().map(|name| instance.lock_path(name)) {
-        // A lock that somebody holds is not abandoned; and locking makes the file where there is none.
+        // A lock that a process holds is not abandoned. (Locking creates a missing file.)
         if path.exists()
             && let Ok(Some(file)) = LockFile::try_lock(&path, LockKind::Exclusive)
         {

@@ -1,4 +1,4 @@
-//! Starting against what killed processes left behind.
+//! Starting in spite of what killed processes left behind.
 
 use super::instance::Instance;
 use super::lock::{LockError, LockFile, LockKind};
@@ -29,7 +29,7 @@ pub enum StartError {
         worm: String,
         /// How long this one waited.
         waited: Duration,
-        /// Who takes part.
+        /// The processes that use the topics.
         peers: Vec<Peer>,
     },
     /// A step hung or failed, and there are peers whose memory must not be wiped.
@@ -39,7 +39,7 @@ pub enum StartError {
         worm: String,
         /// The step that failed, and why.
         reason: String,
-        /// Who must be stopped.
+        /// The processes to stop.
         peers: Vec<Peer>,
     },
     /// What killed processes left behind cannot be removed.
@@ -67,7 +67,7 @@ impl fmt::Display for Remedy<'_> {
     }
 }
 
-/// This process takes part in the worm's topics. While it does, nobody wipes them.
+/// This process uses the worm's topics. While it does, no other process wipes them.
 ///
 /// Every port and the hub hold it, declared after their iceoryx2 parts, so that those are gone before it is.
 #[derive(Debug)]
@@ -83,7 +83,7 @@ impl Presence {
 }
 
 impl Drop for Presence {
-    /// The last to leave takes along what is left: empty folders, and what killed peers had.
+    /// The last process removes what is left: empty folders, and what killed peers had.
     fn drop(&mut self) {
         let Ok(Some(start)) = LockFile::try_lock(&self.instance.lock_path("start"), LockKind::Exclusive) else {
             return;
@@ -114,8 +114,8 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
         if !alone {
             match stale_resources::remove_stillborn(instance) {
                 Ok(0) => {}
-                Ok(count) => tracing::info!("removed {count} half-made segments of killed processes"),
-                Err(error) => tracing::debug!("looking for half-made segments: {error}"),
+                Ok(count) => tracing::info!("removed {count} incomplete segments of killed processes"),
+                Err(error) => tracing::debug!("looking for incomplete segments: {error}"),
             }
         }
         let reason = match within(limit, instance) {
@@ -127,7 +127,7 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
             }
             Err(reason) => reason,
         };
-        // Peers may have left meanwhile; once alone, the wipe mends what stood in the way.
+        // Peers may have left meanwhile; once alone, this process wipes what was in the way.
         alone = alone || lock.try_change(LockKind::Exclusive);
         if retried || !alone {
             return Err(StartError::Blocked {
@@ -144,7 +144,7 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
     }
 }
 
-/// Starts go one after another, so that none sees another's half-made files.
+/// Starts go one after another, so that none sees another's incomplete files.
 fn wait_for_start_lock(instance: &Instance, limit: Duration) -> Result<LockFile, StartError> {
     wait_for_lock(instance, "start", limit, |path| {
         LockFile::try_lock(path, LockKind::Exclusive)
@@ -161,7 +161,7 @@ fn enter(instance: &Instance, limit: Duration) -> Result<(LockFile, bool), Start
     })
 }
 
-/// Tries for a lock until it is had or the limit has passed, and then says who has it.
+/// Tries to take a lock until the limit has passed; the error then names the processes that hold it.
 fn wait_for_lock<T>(
     instance: &Instance,
     name: &str,
@@ -171,8 +171,8 @@ fn wait_for_lock<T>(
     let path = instance.lock_path(name);
     let begun = Instant::now();
     loop {
-        if let Some(had) = attempt(&path)? {
-            return Ok(had);
+        if let Some(lock) = attempt(&path)? {
+            return Ok(lock);
         }
         if begun.elapsed() > limit {
             return Err(StartError::Busy {
@@ -185,7 +185,7 @@ fn wait_for_lock<T>(
     }
 }
 
-/// Wipes the instance unless a process that knows nothing of our locks uses it; says whether it did.
+/// Wipes the instance unless a process that ignores our locks uses it; returns whether it did.
 fn wipe_if_unused(instance: &Instance) -> Result<bool, StartError> {
     let peers = stale_resources::peers(instance);
     if let Some(peer) = peers.first() {
@@ -197,23 +197,23 @@ fn wipe_if_unused(instance: &Instance) -> Result<bool, StartError> {
         source,
     })?;
     tracing::info!(
-        "removed what killed processes had left of the topics of {}",
+        "removed what killed processes had left behind of the topics of {}",
         instance.worm()
     );
     Ok(true)
 }
 
-/// Opens the services in a thread of their own, because iceoryx2 can wait for ever for a file that nobody will finish.
+/// Opens the services in a thread of their own, because iceoryx2 can wait forever for a file that no process will complete.
 ///
-/// The hub's parts may change threads; ports, which may not, come later. A thread that hangs is left behind: it sleeps,
-/// and ends by itself when the file that it waits for is removed.
+/// The services may change threads; ports, which may not, are created later. A thread that hangs is abandoned: it sleeps, and ends
+/// when the file that it waits for is removed.
 fn within(limit: Duration, instance: &Instance) -> Result<Services, String> {
     let (sender, receiver) = mpsc::channel();
     let instance = instance.clone();
     thread::Builder::new()
         .name("topics-start".to_owned())
         .spawn(move || {
-            // Nobody listens any more after the limit; the services are then dropped here.
+            // After the limit there is no receiver any more, and the services are dropped here.
             let _ = sender.send(open::open(&instance));
         })
         .map_err(|error| format!("no thread could be started ({error})"))?;

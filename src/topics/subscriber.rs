@@ -85,7 +85,7 @@ impl<T: Topic> Subscriber<T> {
         Ok(newest.map(Sample::new))
     }
 
-    /// Values received so far, those passed over by [`Subscriber::latest`] among them.
+    /// Values received so far, including those that [`Subscriber::latest`] skipped.
     pub fn received(&self) -> u64 {
         self.count.received
     }
@@ -116,7 +116,7 @@ impl<T: Topic> Sample<'_, T> {
     }
 }
 
-/// What came and what did not.
+/// Counts the samples that arrived, and by the gaps in their numbers those that did not.
 #[derive(Debug, Default)]
 struct Count {
     received: u64,
@@ -125,7 +125,7 @@ struct Count {
 }
 
 impl Count {
-    /// Counts one sample; a number that goes back means that the publisher started anew.
+    /// Takes a sample that arrived; a number that goes back means that the publisher restarted.
     fn add(&mut self, number: Option<u64>) {
         self.received += 1;
         if let (Some(number), Some(last)) = (number, self.last)

@@ -10,10 +10,10 @@ use worm_estimator::config::Config;
 
 #[test]
 fn blocks_of_a_tick_say_what_the_plant_does() {
-    let mut writer = writer(&[]);
-    writer.crawl(105);
-    writer.wait(1.0);
-    let (_, block) = writer.tell(
+    let mut harness = harness(&[]);
+    harness.crawl(105);
+    harness.wait(1.0);
+    let (_, block) = harness.ask_one(
         SERVO,
         Instruction::Read {
             address: 98,
@@ -22,12 +22,12 @@ fn blocks_of_a_tick_say_what_the_plant_does() {
     );
     let block: [u8; 49] = block.try_into().expect("49 bytes");
     let reading = ServoReading::from_block(&block, false);
-    let plant = writer.devices.plant();
+    let plant = harness.devices.plant();
     assert!((reading.position_rad - plant.motor().angle_rad()).abs() < 0.01);
     assert!((reading.velocity_rad_s - 2.518).abs() < 0.03, "{reading:?}");
     assert!((reading.current_a - plant.motor().current_a()).abs() < 0.02);
     assert!((reading.voltage_v - 5.0).abs() < 0.11 && reading.moving && reading.duty > 0.2);
-    let (_, block) = writer.tell(
+    let (_, block) = harness.ask_one(
         TRACKER,
         Instruction::Read {
             address: 128,
@@ -36,10 +36,14 @@ fn blocks_of_a_tick_say_what_the_plant_does() {
     );
     let seen = TrackerReading::from_block(&block).expect("a block");
     assert_eq!((seen.cell_count, seen.valid), (4, 0b1111));
-    for (seen_m, true_m) in seen.positions_m.iter().zip(writer.devices.plant().body().positions_m()) {
+    for (seen_m, true_m) in seen
+        .positions_m
+        .iter()
+        .zip(harness.devices.plant().body().positions_m())
+    {
         assert!((seen_m - true_m).abs() < 1e-3);
     }
-    assert_eq!(writer.devices.crawl_began_s().map(|s| s < 0.01), Some(true));
+    assert_eq!(harness.devices.crawl_began_s().map(|s| s < 0.01), Some(true));
 }
 
 #[test]
@@ -47,82 +51,82 @@ fn positive_may_be_backward_and_home_anywhere() {
     let mut config = Config::default();
     config.servo.positive_is_forward = false;
     config.servo.home_position = 5000;
-    let mut writer = desk_with(&config, &[]);
-    assert_eq!(writer.read(register::PRESENT_POSITION), 5000 - 4096);
-    writer.crawl(-100);
-    writer.wait(1.0);
-    assert!(writer.devices.plant().motor().velocity_rad_per_s() > 2.0, "forward");
-    assert!(writer.read(register::PRESENT_POSITION) < 0);
-    assert!(writer.read(register::PRESENT_CURRENT) < 0);
+    let mut harness = harness_with(&config, &[]);
+    assert_eq!(harness.read(register::PRESENT_POSITION), 5000 - 4096);
+    harness.crawl(-100);
+    harness.wait(1.0);
+    assert!(harness.devices.plant().motor().velocity_rad_per_s() > 2.0, "forward");
+    assert!(harness.read(register::PRESENT_POSITION) < 0);
+    assert!(harness.read(register::PRESENT_CURRENT) < 0);
 }
 
 #[test]
 fn extended_position_mode_arrives() {
-    let mut writer = writer(&[]);
-    assert_eq!(writer.write(register::OPERATING_MODE, 4), 0);
-    assert_eq!(writer.write(register::TORQUE_ENABLE, 1), 0);
-    assert_eq!(writer.write(Register::new(116, 4, "goal position"), 6000), 0);
-    writer.wait(3.0);
-    assert!((writer.read(register::PRESENT_POSITION) - 6000).abs() < 20);
-    assert_eq!(writer.write(register::TORQUE_ENABLE, 0), 0);
-    assert_eq!(writer.tell(SERVO, Instruction::ClearMultiTurn).0, 0);
-    assert!((writer.read(register::PRESENT_POSITION) - (6000 - 4096)).abs() < 20);
+    let mut harness = harness(&[]);
+    assert_eq!(harness.write(register::OPERATING_MODE, 4), 0);
+    assert_eq!(harness.write(register::TORQUE_ENABLE, 1), 0);
+    assert_eq!(harness.write(Register::new(116, 4, "goal position"), 6000), 0);
+    harness.wait(3.0);
+    assert!((harness.read(register::PRESENT_POSITION) - 6000).abs() < 20);
+    assert_eq!(harness.write(register::TORQUE_ENABLE, 0), 0);
+    assert_eq!(harness.ask_one(SERVO, Instruction::ClearMultiTurn).0, 0);
+    assert!((harness.read(register::PRESENT_POSITION) - (6000 - 4096)).abs() < 20);
 }
 
 #[test]
 fn watchdog_stops_the_motor_and_locks_the_goal_until_it_is_cleared() {
-    let mut writer = writer(&[]);
-    writer.crawl(105);
-    assert_eq!(writer.write(register::BUS_WATCHDOG, 5), 0); // 100 ms
+    let mut harness = harness(&[]);
+    harness.crawl(105);
+    assert_eq!(harness.write(register::BUS_WATCHDOG, 5), 0); // 100 ms
     for _ in 0..100 {
-        writer.wait(0.01);
-        writer.ask(TRACKER, Instruction::Ping); // any instruction packet on the bus will do
+        harness.wait(0.01);
+        harness.ask(TRACKER, Instruction::Ping); // any instruction packet on the bus will do
     }
-    assert_eq!(writer.read(register::BUS_WATCHDOG), 5);
-    writer.wait(0.09);
-    assert!(writer.devices.plant().motor().velocity_rad_per_s() > 2.0);
-    writer.wait(0.2);
-    assert_eq!(writer.devices.plant().motor().velocity_rad_per_s(), 0.0);
-    assert_eq!(writer.read(register::BUS_WATCHDOG) as u8, WATCHDOG_LATCHED);
-    assert_eq!(writer.write(register::GOAL_VELOCITY, 105), 4);
-    assert_eq!(writer.write(register::BUS_WATCHDOG, 5), 4);
-    assert_eq!(writer.write(register::BUS_WATCHDOG, 0), 0);
-    writer.wait(0.2);
+    assert_eq!(harness.read(register::BUS_WATCHDOG), 5);
+    harness.wait(0.09);
+    assert!(harness.devices.plant().motor().velocity_rad_per_s() > 2.0);
+    harness.wait(0.2);
+    assert_eq!(harness.devices.plant().motor().velocity_rad_per_s(), 0.0);
+    assert_eq!(harness.read(register::BUS_WATCHDOG) as u8, WATCHDOG_LATCHED);
+    assert_eq!(harness.write(register::GOAL_VELOCITY, 105), 4);
+    assert_eq!(harness.write(register::BUS_WATCHDOG, 5), 4);
+    assert_eq!(harness.write(register::BUS_WATCHDOG, 0), 0);
+    harness.wait(0.2);
     assert_eq!(
-        writer.devices.plant().motor().velocity_rad_per_s(),
+        harness.devices.plant().motor().velocity_rad_per_s(),
         0.0,
         "it waits for a new goal"
     );
-    assert_eq!(writer.write(register::GOAL_VELOCITY, 105), 0);
-    writer.wait(0.2);
-    assert!(writer.devices.plant().motor().velocity_rad_per_s() > 2.0);
+    assert_eq!(harness.write(register::GOAL_VELOCITY, 105), 0);
+    harness.wait(0.2);
+    assert!(harness.devices.plant().motor().velocity_rad_per_s() > 2.0);
 }
 
 #[test]
 fn watchdog_bites_only_while_torque_is_on() {
-    let mut writer = writer(&[]);
-    assert_eq!(writer.write(register::BUS_WATCHDOG, 1), 0);
-    writer.wait(1.0);
-    assert_eq!(writer.read(register::BUS_WATCHDOG), 1);
+    let mut harness = harness(&[]);
+    assert_eq!(harness.write(register::BUS_WATCHDOG, 1), 0);
+    harness.wait(1.0);
+    assert_eq!(harness.read(register::BUS_WATCHDOG), 1);
 }
 
 #[test]
 fn hardware_error_raises_the_alert_and_shuts_down_until_a_reboot() {
-    let mut writer = writer(&["hardware-error:bits=0x20@1..2"]);
-    writer.crawl(105);
-    writer.wait(0.9);
-    assert_eq!(writer.tell(SERVO, Instruction::Ping).0, 0);
-    writer.wait(0.2);
-    assert_eq!(writer.tell(SERVO, Instruction::Ping).0, 0x80);
-    assert_eq!(writer.read(register::HARDWARE_ERROR_STATUS), 0x20);
-    assert_eq!(writer.read(register::TORQUE_ENABLE), 0);
-    assert_eq!(writer.write(register::TORQUE_ENABLE, 1), 0x80 | 1);
-    writer.wait(1.0);
-    assert_eq!(writer.tell(SERVO, Instruction::Reboot).0, 0x80);
-    assert_eq!(writer.ask(SERVO, Instruction::Ping), [], "it starts");
-    writer.wait(0.2);
-    assert_eq!(writer.tell(SERVO, Instruction::Ping).0, 0);
-    assert_eq!(writer.write(register::TORQUE_ENABLE, 1), 0);
+    let mut harness = harness(&["hardware-error:bits=0x20@1..2"]);
+    harness.crawl(105);
+    harness.wait(0.9);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).0, 0);
+    harness.wait(0.2);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).0, 0x80);
+    assert_eq!(harness.read(register::HARDWARE_ERROR_STATUS), 0x20);
+    assert_eq!(harness.read(register::TORQUE_ENABLE), 0);
+    assert_eq!(harness.write(register::TORQUE_ENABLE, 1), 0x80 | 1);
+    harness.wait(1.0);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Reboot).0, 0x80);
+    assert_eq!(harness.ask(SERVO, Instruction::Ping), [], "it starts");
+    harness.wait(0.2);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).0, 0);
+    assert_eq!(harness.write(register::TORQUE_ENABLE, 1), 0);
 }
 
 #[test]
@@ -132,28 +136,28 @@ fn heat_stall_and_weak_supply_are_hardware_errors() {
         ("stall@0.5", 0x20),
         ("sag:volts=2@0.5", 1),
     ] {
-        let mut writer = writer(&[fault]);
-        writer.crawl(105);
-        writer.wait(5.0);
-        assert_eq!(writer.read(register::HARDWARE_ERROR_STATUS), bits, "{fault}");
+        let mut harness = harness(&[fault]);
+        harness.crawl(105);
+        harness.wait(5.0);
+        assert_eq!(harness.read(register::HARDWARE_ERROR_STATUS), bits, "{fault}");
     }
 }
 
 #[test]
 fn brownout_loses_torque_goal_watchdog_and_turns() {
-    let mut writer = writer(&["reboot:off=0.2@5"]);
-    writer.crawl(105);
-    assert_eq!(writer.write(register::BUS_WATCHDOG, 127), 0);
+    let mut harness = harness(&["reboot:off=0.2@5"]);
+    harness.crawl(105);
+    assert_eq!(harness.write(register::BUS_WATCHDOG, 127), 0);
     for _ in 0..54 {
-        writer.wait(0.1);
-        writer.ask(TRACKER, Instruction::Ping);
+        harness.wait(0.1);
+        harness.ask(TRACKER, Instruction::Ping);
     }
-    let counts = [register::TORQUE_ENABLE, register::GOAL_VELOCITY, register::BUS_WATCHDOG].map(|r| writer.read(r));
+    let counts = [register::TORQUE_ENABLE, register::GOAL_VELOCITY, register::BUS_WATCHDOG].map(|r| harness.read(r));
     assert_eq!(counts, [0, 0, 0]);
-    assert_eq!(writer.read(register::OPERATING_MODE), 1, "EEPROM is kept");
-    let position = writer.read(register::PRESENT_POSITION);
+    assert_eq!(harness.read(register::OPERATING_MODE), 1, "EEPROM is kept");
+    let position = harness.read(register::PRESENT_POSITION);
     assert!((0..4096).contains(&position), "{position}");
-    assert!(writer.devices.plant().motor().angle_rad() > 2.0 * std::f64::consts::PI);
+    assert!(harness.devices.plant().motor().angle_rad() > 2.0 * std::f64::consts::PI);
 }
 
 #[test]
@@ -167,14 +171,14 @@ fn empty_battery_silences_the_servo() {
         hotel_power_w: 0.5,
         reserve_share: 0.1,
     });
-    let mut writer = desk_with(&config, &["battery:charge=0.0002@1"]);
-    writer.crawl(105);
-    writer.wait(0.9);
-    assert_eq!(writer.ask(SERVO, Instruction::Ping).len(), 1);
-    writer.wait(5.0);
-    assert_eq!(writer.ask(SERVO, Instruction::Ping), []);
+    let mut harness = harness_with(&config, &["battery:charge=0.0002@1"]);
+    harness.crawl(105);
+    harness.wait(0.9);
+    assert_eq!(harness.ask(SERVO, Instruction::Ping).len(), 1);
+    harness.wait(5.0);
+    assert_eq!(harness.ask(SERVO, Instruction::Ping), []);
     assert_eq!(
-        writer.ask(TRACKER, Instruction::Ping).len(),
+        harness.ask(TRACKER, Instruction::Ping).len(),
         1,
         "the tracker has its own supply"
     );
@@ -183,30 +187,30 @@ fn empty_battery_silences_the_servo() {
 #[test]
 fn faults_of_the_line() {
     let answered = |fault: &str| {
-        let mut writer = writer(&[fault]);
+        let mut harness = harness(&[fault]);
         (0..400)
-            .filter(|_| writer.ask(SERVO, Instruction::Ping).len() == 1)
+            .filter(|_| harness.ask(SERVO, Instruction::Ping).len() == 1)
             .count()
     };
     assert!((340..380).contains(&answered("drop:share=0.1")));
     assert!((340..380).contains(&answered("corrupt:share=0.1")));
     assert_eq!(answered("silence:device=servo"), 0);
-    let mut writer = writer(&["delay:ms=3"]);
-    assert_eq!(writer.ask(SERVO, Instruction::Ping), []);
-    writer.wait(0.002);
+    let mut harness = harness(&["delay:ms=3"]);
+    assert_eq!(harness.ask(SERVO, Instruction::Ping), []);
+    harness.wait(0.002);
     let mut late = Vec::new();
-    writer.devices.take_due(writer.now_s, &mut late);
+    harness.devices.take_due(harness.now_s, &mut late);
     assert_eq!(statuses(&late).len(), 1);
 }
 
 #[test]
 fn faults_of_sight_and_identity() {
-    let mut writer = writer(&["blind:cell=3", "wrong-model:number=1190"]);
-    assert_eq!(writer.tell(SERVO, Instruction::Ping).1[..2], 1190u16.to_le_bytes());
-    writer.wait(0.1);
+    let mut harness = harness(&["blind:cell=3", "wrong-model:number=1190"]);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Ping).1[..2], 1190u16.to_le_bytes());
+    harness.wait(0.1);
     assert_eq!(
-        writer
-            .tell(
+        harness
+            .ask_one(
                 TRACKER,
                 Instruction::Read {
                     address: 137,
@@ -235,12 +239,12 @@ fn faults_that_do_not_fit_the_worm_are_refused() {
 
 #[test]
 fn stall_at_a_time_counts_from_the_crawl() {
-    let mut writer = writer(&["stall@1"]);
-    writer.wait(3.0);
-    writer.crawl(105);
-    writer.wait(0.9);
-    assert!(writer.devices.plant().motor().velocity_rad_per_s() > 2.0);
-    writer.wait(0.2);
-    assert_eq!(writer.devices.plant().motor().velocity_rad_per_s(), 0.0);
-    assert!(scale::CURRENT_A * writer.read(register::PRESENT_CURRENT) as f64 > 1.0);
+    let mut harness = harness(&["stall@1"]);
+    harness.wait(3.0);
+    harness.crawl(105);
+    harness.wait(0.9);
+    assert!(harness.devices.plant().motor().velocity_rad_per_s() > 2.0);
+    harness.wait(0.2);
+    assert_eq!(harness.devices.plant().motor().velocity_rad_per_s(), 0.0);
+    assert!(scale::CURRENT_A * harness.read(register::PRESENT_CURRENT) as f64 > 1.0);
 }

@@ -133,7 +133,7 @@ impl Body {
     /// Takes the drag of a sliding body off the pull.
     fn relieve(&mut self, relief_n: f64) -> Result<(), WormError> {
         self.relief_n = relief_n;
-        // The balance exists, so this cannot fail; if it did, the next advance would say so again.
+        // The balance exists, so this cannot fail; if it did, the next advance would fail, too.
         let _balanced = self.motion.take_up(&relieved(&self.physics, relief_n)?);
         Ok(())
     }

@@ -15,7 +15,7 @@ use dynamixel_bus::packet::{
 use worm_estimator::config::Config;
 use worm_physics::WormError;
 
-/// How often faults and the servo's supervision are looked at, s.
+/// Interval at which faults and the servo's supervision are evaluated, s.
 const SLICE_S: f64 = 1e-3;
 
 /// Both devices, the machine between them, and the line back to the controller.
@@ -117,7 +117,7 @@ impl Bus {
     pub(super) fn take(&mut self, packet: Result<Packet<'_>, DecodeError>) {
         match packet {
             Ok(Packet::Instruction(packet)) => {
-                self.servo.hear(self.now_s);
+                self.servo.note_instruction(self.now_s);
                 self.obey(&packet);
             }
             Ok(Packet::Status(_) | Packet::FastReply(_)) => {} // an echo
@@ -127,7 +127,7 @@ impl Bus {
                 }
             }
             Err(DecodeError::Instruction { recipient, error }) => {
-                self.servo.hear(self.now_s);
+                self.servo.note_instruction(self.now_s);
                 let error = match error {
                     MalformedInstruction::UnknownCode { .. } => StatusError::Instruction,
                     MalformedInstruction::Parameters { .. } => StatusError::DataLength,
@@ -142,7 +142,7 @@ impl Bus {
         }
     }
 
-    /// The device with this ID, if it can hear.
+    /// The device with this ID, if it can receive.
     fn device(&self, id: DeviceId) -> Option<Device> {
         let servo_hears = !self.conditions.wire.servo_silent && self.servo.is_awake(self.now_s);
         if servo_hears && self.servo.id() == id {
@@ -156,7 +156,7 @@ impl Bus {
         }
     }
 
-    /// Every device that can hear, by ID.
+    /// Every device that can receive, by ID.
     fn devices(&self) -> Vec<(DeviceId, Device)> {
         let mut ids = vec![self.servo.id(), self.tracker.id()];
         ids.sort_unstable();
@@ -200,7 +200,7 @@ impl Bus {
             (Instruction::FactoryReset(ResetScope::All), Recipient::All) => {}
             (instruction, Recipient::All) => {
                 for (_, device) in self.devices() {
-                    // A broadcast is not answered, so nobody learns of an error.
+                    // A broadcast is not answered, so an error is not reported.
                     let _unanswered = self.change(device, instruction);
                 }
             }
@@ -209,7 +209,7 @@ impl Bus {
 
     fn write_silently(&mut self, id: DeviceId, address: u16, data: &[u8]) {
         if let Some(device) = self.device(id) {
-            // Sync and bulk writes are not answered, so nobody learns of an error.
+            // Sync and bulk writes are not answered, so an error is not reported.
             let _unanswered = self.change(device, Instruction::Write { address, data });
         }
     }
@@ -273,7 +273,7 @@ impl Bus {
     /// Fast sync and bulk reads: one answer, which ends before the first device that stays silent.
     fn fast_read(&mut self, spans: impl Iterator<Item = ReadSpan> + Clone) {
         let mut out = [0; MAX_PACKET_LEN];
-        // A reply that no packet can hold is asked of nobody: nobody answers.
+        // No device answers a request whose reply would exceed a packet.
         let Ok(mut writer) = FastReplyWriter::new(&mut out, spans.clone().map(|span| span.length)) else {
             return;
         };

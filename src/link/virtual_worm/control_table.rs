@@ -141,7 +141,7 @@ impl ControlTable {
             .ok_or(StatusError::Access)
     }
 
-    /// The registers that a write would set, with their values, after the rules that need nothing but the table.
+    /// The registers that a write would set, with their values, after the rules that need only the table.
     ///
     /// # Errors
     /// [`StatusError::Access`] for a gap, a read-only register, one behind the table, and EEPROM while `torque_on`;

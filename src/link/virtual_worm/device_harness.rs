@@ -7,12 +7,12 @@ use dynamixel_bus::packet::{Decoder, DeviceId, Instruction, InstructionPacket, M
 use worm_estimator::config::Config;
 
 /// A controller in virtual time.
-pub(super) struct LogWriter {
+pub(super) struct DeviceHarness {
     pub(super) devices: Devices,
     pub(super) now_s: f64,
 }
 
-/// What one device said: its error byte and its data.
+/// The answer of one device: its error byte and its data.
 pub(super) type Answer = (u8, Vec<u8>);
 
 pub(super) const SERVO: u8 = 1;
@@ -22,26 +22,34 @@ pub(super) fn id(id: u8) -> DeviceId {
     DeviceId::new(id).expect("a valid ID")
 }
 
-pub(super) fn desk_with(config: &Config, faults: &[&str]) -> LogWriter {
+pub(super) fn harness_with(config: &Config, faults: &[&str]) -> DeviceHarness {
     let faults = faults.iter().map(|text| text.parse().expect("a fault")).collect();
     let options = Options {
         faults,
         ..Options::default()
     };
-    LogWriter {
+    DeviceHarness {
         devices: Devices::new(config, &options).expect("devices"),
         now_s: 0.0,
     }
 }
 
-pub(super) fn writer(faults: &[&str]) -> LogWriter {
-    desk_with(&Config::default(), faults)
+pub(super) fn harness(faults: &[&str]) -> DeviceHarness {
+    harness_with(&Config::default(), faults)
 }
 
-impl LogWriter {
+impl DeviceHarness {
+    /// Sends bytes, and returns what comes back at once.
+    pub(super) fn send(&mut self, bytes: &[u8]) -> Vec<u8> {
+        self.devices.receive(bytes, self.now_s).expect("a worm");
+        let mut answer = Vec::new();
+        self.devices.take_due(self.now_s, &mut answer);
+        answer
+    }
+
     /// What comes back within 2 ms, in bytes.
     pub(super) fn exchange(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let mut answer = self.devices.handle(bytes, self.now_s).expect("a worm");
+        let mut answer = self.send(bytes);
         for _ in 0..20 {
             self.now_s += 1e-4;
             self.devices.advance_to(self.now_s).expect("a worm");
@@ -61,8 +69,8 @@ impl LogWriter {
         statuses(&bytes)
     }
 
-    /// The only answer of one device.
-    pub(super) fn tell(&mut self, recipient: u8, instruction: Instruction<'_>) -> Answer {
+    /// Asks one device, which must give exactly one answer.
+    pub(super) fn ask_one(&mut self, recipient: u8, instruction: Instruction<'_>) -> Answer {
         let mut answers = self.ask(recipient, instruction);
         assert_eq!(answers.len(), 1, "{instruction:?}: {answers:?}");
         let (from, answer) = answers.remove(0);
@@ -74,11 +82,11 @@ impl LogWriter {
         let bytes = value.to_le_bytes();
         let data = &bytes[..usize::from(register.size)];
         let address = register.address;
-        self.tell(SERVO, Instruction::Write { address, data }).0
+        self.ask_one(SERVO, Instruction::Write { address, data }).0
     }
 
     pub(super) fn read(&mut self, register: Register) -> i64 {
-        let (_, data) = self.tell(
+        let (_, data) = self.ask_one(
             SERVO,
             Instruction::Read {
                 address: register.address,

@@ -1,7 +1,7 @@
 //! Servo and tracker on their bus, without a port and without a clock: bytes and a time in, bytes out.
 //!
 //! On a shared bus the order of the answers is the protocol's: to a broadcast ping by ID, to sync and bulk reads in the
-//! order of the request. There each device waits until it has heard the one before it, so **those behind a silent device
+//! order of the request. There each device waits for the one before it, so **those behind a silent device
 //! stay silent**, in plain reads as in fast ones, where the joint answer then ends early.
 //!
 //! A damaged instruction is answered with a CRC error by the device whose ID it bears, an unknown one with an instruction
@@ -47,9 +47,9 @@ pub enum DevicesError {
 #[derive(Debug, Clone)]
 pub struct Devices {
     decoder: Decoder,
-    heard_byte_s: f64,
+    last_byte_s: f64,
     bus: Bus,
-    /// When the worm began to crawl on the clock of whoever runs the devices in real time, ns.
+    /// When the worm began to crawl on the clock of the real-time server, ns.
     pub(super) crawl_began_ns: Option<u64>,
 }
 
@@ -76,7 +76,7 @@ impl Devices {
         }
         Ok(Self {
             decoder: Decoder::new(),
-            heard_byte_s: 0.0,
+            last_byte_s: 0.0,
             bus: Bus::new(config, options)?,
             crawl_began_ns: None,
         })
@@ -96,10 +96,10 @@ impl Devices {
     /// [`WormError`] never for a checked configuration.
     pub fn receive(&mut self, mut bytes: &[u8], now_s: f64) -> Result<(), WormError> {
         self.bus.advance_to(now_s)?;
-        if now_s - self.heard_byte_s > IDLE_S {
+        if now_s - self.last_byte_s > IDLE_S {
             self.decoder.clear();
         }
-        self.heard_byte_s = now_s;
+        self.last_byte_s = now_s;
         while !bytes.is_empty() {
             let taken = self.decoder.push(bytes);
             bytes = &bytes[taken..];
@@ -118,24 +118,6 @@ impl Devices {
     /// When the next answer is due, s.
     pub fn next_due_s(&self) -> Option<f64> {
         self.bus.next_due_s()
-    }
-
-    /// Bytes in, bytes out: [`receive`](Self::receive), then [`take_due`](Self::take_due). An answer that a return delay or
-    /// a fault holds back comes out of a later call.
-    ///
-    /// # Errors
-    /// [`WormError`] never for a checked configuration.
-    pub fn handle(&mut self, bytes: &[u8], now_s: f64) -> Result<Vec<u8>, WormError> {
-        self.receive(bytes, now_s)?;
-        let mut out = Vec::new();
-        self.take_due(now_s, &mut out);
-        Ok(out)
-    }
-
-    /// Forgets bytes and answers on the line: the controller has gone.
-    pub fn disconnect(&mut self) {
-        self.decoder.clear();
-        self.bus.line().clear();
     }
 
     /// Baud rate that the servo is set to, bit/s.

@@ -17,7 +17,7 @@ pub enum FaultError {
     /// No such kind.
     #[error("there is no fault \"{kind}\": use one of {known}")]
     UnknownKind {
-        /// What was asked for.
+        /// The given name.
         kind: String,
         /// All there are.
         known: String,

@@ -158,7 +158,7 @@ pub(super) const KINDS: &[FaultKind] = &[
     ),
     kind(
         "silence",
-        "a device neither hears nor answers",
+        "a device neither receives nor answers",
         &[Parameter {
             name: "device",
             domain: Domain::Word(DEVICES),
@@ -194,7 +194,7 @@ pub(super) const KINDS: &[FaultKind] = &[
     ),
     FaultKind {
         name: "reboot",
-        meaning: "the servo loses power for so long, and with it torque, watchdog and goal",
+        meaning: "the servo loses power for this long, and with it torque, watchdog and goal",
         parameters: &[number("off", 0.0, 60.0, "s", Some(0.05))],
         lasts: Some(0),
         apply: |c, _| c.servo.unpowered = true,

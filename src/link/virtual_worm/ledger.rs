@@ -1,4 +1,4 @@
-//! The truth about energy and way, as no estimator can know it: kept by the plant, told at the end.
+//! The ground truth about energy and distance, which no estimator knows: kept by the plant, reported at the end.
 
 use super::motor::StepEnergy;
 use serde::Serialize;

@@ -58,11 +58,6 @@ impl Line {
         self.waiting.front().map(|&(due_s, _)| due_s)
     }
 
-    /// Forgets what waits, as a line does whose other end is closed.
-    pub(super) fn clear(&mut self) {
-        self.waiting.clear();
-    }
-
     fn happens(&mut self, fraction: f64) -> bool {
         // Nothing is drawn for what cannot happen, so that one more kind of fault does not change the others.
         fraction > 0.0 && draw(&mut self.rng) < fraction

@@ -1,25 +1,24 @@
 //! The virtual worm: servo, tracker, motor, body and canal, simulated, so that everything above the serial port can be
-//! run, tested and rehearsed without a robot, and held against a truth that no estimator can see.
+//! run and tested without a robot, and compared with a ground truth that no estimator can see.
 //!
 //! From the physics out to the port:
 //!
 //! 1. A [`supply`] feeds a [`motor`], solved exactly within each step; the motor turns the cam of a [`body`], the
-//!    quasi-static motion of [`model`](worm_physics) under every `[[effect]]`, with friction that scatters from cycle to cycle; a camera ([`camera`])
+//!    quasi-static motion of [`worm_physics`] under every `[[effect]]`, with friction that scatters from cycle to cycle; a camera ([`camera`])
 //!    sees the cells. [`Plant`] steps them together and keeps the [`ledger`] of where the energy went. No clock, no I/O.
 //! 2. `servo` and `tracker` are the devices: control tables with the manual's access rules, modes, watchdog, shutdown.
 //!    [`Devices`] puts both on a bus: bytes and a time in, bytes out. Still no clock.
 //! 3. [`Server`] gives them a clock and a pseudo-terminal; [`VirtualWorm`] runs it in a thread, `wormd virtual-worm` in a
 //!    process.
 //!
-//! What goes wrong is asked for as a [`Fault`], which changes [`conditions`], the parameters of all of the above: see
-//! [`fault`] for the grammar and [`Fault::help`] for the list.
+//! A [`Fault`] changes the [`conditions`], the parameters of all of the above: see [`fault`] for the grammar and [`Fault::help`] for the list.
 //!
 //! # Limits
-//! Of the effects, `sensor-latency` cannot be negative here, for no camera sees what is still to come. `motor-droop` slows the
-//! velocity that the servo is told to keep.
+//! Of the effects, `sensor-latency` cannot be negative here, because a real-time simulation does not know the future. `motor-droop` reduces
+//! the velocity that the servo is commanded to keep.
 //!
-//! The winding's inductance, the play of the gears and the time of bytes on a real wire are left out. The servo's EEPROM
-//! lasts as long as the process. Positions, currents and voltages are quantised as the registers are; currents and
+//! Not modelled: the winding's inductance, the backlash of the gears and the time of bytes on a real wire. The servo's EEPROM lives
+//! as long as the process. Positions, currents and voltages are quantised as the registers are; currents and
 //! voltages carry no noise.
 
 pub mod body;

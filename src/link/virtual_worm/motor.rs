@@ -36,7 +36,7 @@ mod heat {
     pub(super) const HEATED_S: f64 = 1.0;
 }
 
-/// What the bridge is told to do.
+/// Command of the bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
     /// Nothing: the winding is open and the motor free.
@@ -167,14 +167,9 @@ impl Motor {
         self.bus_v
     }
 
-    /// Temperature of the servo's case, which its register tells, °C.
+    /// Temperature of the servo's case, as its register reports it, °C.
     pub fn case_c(&self) -> f64 {
         self.case_c
-    }
-
-    /// Temperature of the winding, °C.
-    pub fn winding_c(&self) -> f64 {
-        self.winding_c
     }
 
     /// Scales dry and viscous friction inside.
@@ -471,7 +466,7 @@ mod tests {
         motor.set_friction_scale(1e5);
         let e = run(&mut motor, Drive::Velocity(GAIT), 0.0, 30.0, 1e-3);
         assert!((1.1..1.5).contains(&motor.current_a()), "{}", motor.current_a());
-        assert!(motor.winding_c() > motor.case_c() && motor.case_c() > 30.0);
+        assert!(motor.winding_c > motor.case_c() && motor.case_c() > 30.0);
         assert!(motor.bus_v() < 4.8);
         assert!((e.electrical_j - e.copper_j).abs() < 1e-6);
     }

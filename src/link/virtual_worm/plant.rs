@@ -81,7 +81,7 @@ impl Plant {
         })
     }
 
-    /// What the servo's bridge is told from now on.
+    /// Sets what the servo commands its bridge from now on.
     pub fn set_drive(&mut self, drive: Drive, gains: Gains) {
         self.drive = drive;
         self.gains = gains;
@@ -170,11 +170,6 @@ impl Plant {
     /// Time of the plant, s: the last step's end.
     pub fn time_s(&self) -> f64 {
         self.steps as f64 * self.step_s
-    }
-
-    /// Length of a step, s.
-    pub fn step_s(&self) -> f64 {
-        self.step_s
     }
 
     /// The motor.

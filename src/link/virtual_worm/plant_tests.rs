@@ -169,7 +169,7 @@ fn conditions_do_what_they_say() {
     assert!(plant.motor().case_c() > 85.0);
 }
 
-/// With effects the body crawls as the model says it must; the account closes all the same.
+/// With effects the body crawls as the model says it must; the energy balance still closes.
 #[test]
 fn effects_act_on_the_body() {
     for (name, parameters) in [

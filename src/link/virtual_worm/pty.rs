@@ -89,7 +89,7 @@ impl Pty {
         }
     }
 
-    /// Sends bytes. Those that find no room, because nobody reads, are lost, as on a wire.
+    /// Sends bytes. When the buffer is full because the peer does not read, they are lost, as on a wire.
     pub(super) fn write(&self, mut bytes: &[u8]) -> io::Result<()> {
         while !bytes.is_empty() {
             match nix::unistd::write(&self.master, bytes) {
@@ -127,7 +127,7 @@ pub struct PortLink {
 }
 
 impl PortLink {
-    /// Makes `path` a link to `target` in one step, so that nobody ever finds it missing; an older link gives way.
+    /// Makes `path` a link to `target` in one step, so that it is never missing; replaces an older link.
     ///
     /// # Errors
     /// [`PtyError::NotALink`] when something else is there, [`PtyError::Link`] when the system refuses.

@@ -3,10 +3,10 @@
 //! The loop sleeps until bytes come, an answer is due or a little time has passed; then the plant catches up with the
 //! clock. It never spins. Plant and devices know of none of this.
 //!
-//! A real worm does not stop when a computer does. But this one lives on the computer that drives it, and when that computer
-//! pauses, because it is busy or its host is, neither the controller nor this process can tell how the other fared. So the world's
-//! clock follows real time as long as this process runs in time, and a gap in which it did not is no time at all, for
-//! the physics as for the servo's bus watchdog.
+//! A real worm does not stop when a computer does. But this one runs on the computer that drives it, and when that computer pauses,
+//! because it or its host is busy, controller and virtual worm pause at different times. So the clock of the simulated world
+//! follows real time only while this process runs in time; a gap in which it did not run does not exist for the physics or the
+//! servo's bus watchdog.
 
 use super::devices::{Devices, DevicesError};
 use super::options::Options;
@@ -25,19 +25,19 @@ use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_physics::WormError;
 
-/// Longest sleep while a controller talks.
+/// Longest sleep while a controller sends.
 const SLEEP_BUSY: Duration = Duration::from_millis(1);
-/// Longest sleep while nobody talks, and with it the time until a stop is noticed.
+/// Longest sleep while no controller sends, and so the delay with which a stop is noticed.
 const SLEEP_IDLE: Duration = Duration::from_millis(10);
-/// After so long without a byte nobody talks.
+/// Silence after which the line counts as idle.
 const IDLE_AFTER: Duration = Duration::from_millis(100);
-/// After so long without a byte the peer is taken for gone.
+/// Silence after which the peer counts as gone.
 const GONE_AFTER: Duration = Duration::from_secs(1);
-/// After so long without a byte from a controller that talked it is looked whether all CPUs of the computer run.
-const DOUBT_AFTER: Duration = Duration::from_millis(20);
-/// A look that comes later than planned by no more than this was late, and the world catches up; beyond it this process did not
-/// run, and the world has stood still. It is half of the shortest bus watchdog.
-const LATEST_LOOK: Duration = Duration::from_millis(10);
+/// Silence of an active controller after which the server checks whether all CPUs of the computer run.
+const CHECK_CPUS_AFTER: Duration = Duration::from_millis(20);
+/// Up to this delay a wake-up was merely late, and the world catches up; beyond it this process did not run, and the world stood
+/// still. Half of the shortest bus watchdog.
+const MAX_DELAY: Duration = Duration::from_millis(10);
 
 /// Why the virtual worm cannot run, or had to end.
 #[derive(Debug, thiserror::Error)]
@@ -102,12 +102,12 @@ impl Server {
         let failed = |doing| move |source| ServerError::Line { doing, source };
         let mut clock = WorldClock::started();
         let mut standstills = Summed::default();
-        let mut heard = Duration::ZERO;
+        let mut last_byte = Duration::ZERO;
         let mut peer_gone = true;
         let mut incoming = [0; 4096];
         let mut outgoing = Vec::with_capacity(4096);
         while !stop.load(Ordering::Relaxed) {
-            let busy = clock.world.saturating_sub(heard) < IDLE_AFTER;
+            let busy = clock.world.saturating_sub(last_byte) < IDLE_AFTER;
             let mut sleep = if busy { SLEEP_BUSY } else { SLEEP_IDLE };
             if let Some(due_s) = self.devices.next_due_s() {
                 let due = Duration::from_secs_f64(due_s.max(0.0));
@@ -118,8 +118,8 @@ impl Server {
                 Ok(_) | Err(Errno::EINTR) => {}
                 Err(errno) => return Err(failed("wait")(errno.into())),
             }
-            let silent = clock.world.saturating_sub(heard);
-            if !peer_gone && silent > DOUBT_AFTER {
+            let silent = clock.world.saturating_sub(last_byte);
+            if !peer_gone && silent > CHECK_CPUS_AFTER {
                 // The controller may have its CPU taken away while this process runs on another. Then this comes back late, and
                 // the world stands still for the gap.
                 visit_every_cpu();
@@ -134,7 +134,7 @@ impl Server {
             let now = clock.world;
             let now_s = now.as_secs_f64();
             if count > 0 {
-                heard = now;
+                last_byte = now;
                 peer_gone = false;
             }
             if count > 0 && self.peer_speaks_our_baud().map_err(failed("read its settings"))? {
@@ -151,7 +151,7 @@ impl Server {
             outgoing.clear();
             self.devices.take_due(now_s, &mut outgoing);
             self.pty.write(&outgoing).map_err(failed("send"))?;
-            if !peer_gone && now - heard > GONE_AFTER {
+            if !peer_gone && now - last_byte > GONE_AFTER {
                 peer_gone = true;
                 self.pty.forget_exclusive();
             }
@@ -186,7 +186,7 @@ impl WorldClock {
     fn advance(&mut self, now: Instant, planned: Duration) -> Option<Duration> {
         let gap = now - std::mem::replace(&mut self.looked, now);
         let late = gap.saturating_sub(planned);
-        if late <= LATEST_LOOK {
+        if late <= MAX_DELAY {
             self.world += gap;
             return None;
         }

@@ -3,7 +3,7 @@
 //! It obeys velocity mode, position and extended position mode, and PWM mode; torque, limits, shutdown and bus watchdog
 //! are the manual's. Where the manual is silent:
 //! - The unit of the velocity gains' time is open; the loop settles in about 20 ms with the factory's gains.
-//! - Switching torque on, and the watchdog, set the velocity goal to 0, so that nothing moves before it is told.
+//! - Switching torque on, and the watchdog, set the velocity goal to 0, so that nothing moves without a new command.
 //! - A position goal is pursued by a velocity goal in proportion to the error. Profiles are kept but not followed, except
 //!   that the profile velocity bounds the velocity of the position modes.
 //! - An overload is a motor that stands at full duty for 2 s; an input voltage error is one that lasts 0.1 s.
@@ -50,7 +50,7 @@ pub(super) struct Servo {
     conditions: ServoConditions,
     starved: bool, // below the brownout voltage
     boots_until_s: f64,
-    heard_at_s: f64,
+    instruction_at_s: f64,
     shut_down: bool,
     voltage_bad_since_s: Option<f64>,
     overloaded_since_s: Option<f64>,
@@ -76,7 +76,7 @@ impl Servo {
             conditions: ServoConditions::default(),
             starved: false,
             boots_until_s: 0.0,
-            heard_at_s: 0.0,
+            instruction_at_s: 0.0,
             shut_down: false,
             voltage_bad_since_s: None,
             overloaded_since_s: None,
@@ -116,7 +116,7 @@ impl Servo {
         !self.conditions.unpowered && !self.starved && now_s >= self.boots_until_s
     }
 
-    /// Whether it has ever been told to move and obeyed.
+    /// Whether it has ever moved on command.
     pub(super) fn has_moved(&self) -> bool {
         self.moved_once
     }
@@ -126,9 +126,9 @@ impl Servo {
         [low, high, self.table.get(FIRMWARE_VERSION) as u8]
     }
 
-    /// Takes note that an instruction packet was on the bus: all the bus watchdog asks for.
-    pub(super) fn hear(&mut self, now_s: f64) {
-        self.heard_at_s = now_s;
+    /// Notes that an instruction packet was on the bus, which resets the bus watchdog.
+    pub(super) fn note_instruction(&mut self, now_s: f64) {
+        self.instruction_at_s = now_s;
     }
 
     pub(super) fn set_conditions(&mut self, conditions: ServoConditions, plant: &mut Plant, now_s: f64) {
@@ -183,7 +183,7 @@ impl Servo {
         let watchdog = self.table.get(BUS_WATCHDOG);
         let armed = (1..=127).contains(&watchdog) && self.torque_on();
         let patience_s = f64::from(watchdog * scale::WATCHDOG_MS) * 1e-3;
-        if armed && now_s - self.heard_at_s >= patience_s {
+        if armed && now_s - self.instruction_at_s >= patience_s {
             self.table.set(BUS_WATCHDOG, i64::from(WATCHDOG_LATCHED));
             self.stand(plant);
         }

@@ -46,7 +46,7 @@ pub(super) fn count(online: &[usize]) -> Option<Setting> {
 }
 
 /// When the kernel lets a woken thread run. `version` is of `uname -v`, `realtime` of /sys/kernel/realtime, `modes` of
-/// /sys/kernel/debug/sched/preempt with the one in force in parentheses, `options` the kernel's command line.
+/// /sys/kernel/debug/sched/preempt with the active one in parentheses, `options` the kernel's command line.
 pub(super) fn kernel(version: &str, realtime: Option<&str>, modes: Option<&str>, options: &str) -> Setting {
     let is = |word| version.split_whitespace().any(|part| part == word);
     if realtime == Some("1") || is("PREEMPT_RT") || version.contains("PREEMPT RT") {
@@ -241,8 +241,8 @@ pub(super) fn throttling(runtime_us: i64, period_us: i64) -> Setting {
     }
 }
 
-/// Whether a host lies under this computer, by /proc/cpuinfo, and what it took, by /proc/stat. Absent: the processor does not
-/// tell, as ARM's.
+/// Whether a host lies under this computer, by /proc/cpuinfo, and what it took, by /proc/stat. Absent if the processor does
+/// not report it, as ARM's does not.
 pub(super) fn virtual_machine(cpu: Option<usize>, cpuinfo: &str, stat: &str) -> Option<Setting> {
     let subject = "virtual machine";
     let flags = cpuinfo.lines().find(|line| line.starts_with("flags"))?;

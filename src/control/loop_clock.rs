@@ -1,21 +1,21 @@
-//! Which part of the time the loop was there to hear a device.
+//! The loop's own clock, which stands still while the computer pauses.
 //!
-//! A computer that is busy, or whose host takes its CPUs away, does not run the loop for a while. That time is the computer's:
-//! nobody was asked in it, and nobody could have been heard. So every silence, be it the servo's, the tracker's or the
-//! estimator's, is measured on a clock that stands still meanwhile. Where the computer is quiet this clock is the computer's own.
+//! A computer that is busy, or whose host takes its CPUs away, does not run the loop for a while. In that time no device was asked,
+//! and none could have been received. So the silences of servo, tracker and estimator are measured on a clock that stands still
+//! meanwhile. Without pauses it agrees with the computer's clock.
 
 use worm_estimator::config::Config;
 
-/// An absence of this length is a pause of the computer, an event of its own; below it the tick was merely late. Ten times what a
-/// loaded computer without a real-time kernel takes to run a woken thread, and half of the shortest bus watchdog, ns.
-pub(super) const SHORTEST_PAUSE_NS: u64 = 10_000_000;
+/// An absence of at least this length is a pause of the computer, an event of its own; below it the tick was merely late. Ten times
+/// what a loaded computer without a real-time kernel takes to run a woken thread, and half of the shortest bus watchdog, ns.
+pub(super) const MIN_PAUSE_NS: u64 = 10_000_000;
 
-/// What one tick found.
+/// How one tick advanced the clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Passed {
+pub(super) struct ClockStep {
     /// Time on the loop's own clock, ns.
     pub present_ns: u64,
-    /// By how much it has grown since the tick before, ns.
+    /// How far it advanced since the tick before, ns.
     pub step_ns: u64,
     /// The pause of the computer that ended in this tick, ns; 0 where there was none.
     pub pause_ns: u64,
@@ -23,15 +23,15 @@ pub(super) struct Passed {
 
 /// The loop's own clock, and the pauses that it left out.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Presence {
+pub(super) struct LoopClock {
     last_ns: Option<u64>,
     present_ns: u64,
     paused_ns: u64,
 }
 
-impl Presence {
+impl LoopClock {
     /// Takes a tick at `now_ns` of the computer's clock, in or before which the loop was kept from running for `absent_ns`.
-    pub(super) fn advance(&mut self, now_ns: u64, absent_ns: u64) -> Passed {
+    pub(super) fn advance(&mut self, now_ns: u64, absent_ns: u64) -> ClockStep {
         let elapsed_ns = self.last_ns.map_or(0, |last_ns| now_ns.saturating_sub(last_ns));
         if self.last_ns.replace(now_ns).is_none() {
             self.present_ns = now_ns;
@@ -39,9 +39,9 @@ impl Presence {
         let absent_ns = absent_ns.min(elapsed_ns);
         let step_ns = elapsed_ns - absent_ns;
         self.present_ns += step_ns;
-        let pause_ns = if absent_ns >= SHORTEST_PAUSE_NS { absent_ns } else { 0 };
+        let pause_ns = if absent_ns >= MIN_PAUSE_NS { absent_ns } else { 0 };
         self.paused_ns += pause_ns;
-        Passed {
+        ClockStep {
             present_ns: self.present_ns,
             step_ns,
             pause_ns,
@@ -54,10 +54,10 @@ impl Presence {
     }
 }
 
-/// After so long without an answer it is looked whether all CPUs of the computer run, ns.
-const DOUBT_AFTER_NS: u64 = 20_000_000;
+/// Silence after which the loop checks whether all CPUs of the computer run, ns.
+const CHECK_CPUS_AFTER_NS: u64 = 20_000_000;
 
-/// A servo that does not answer: is it silent, or is the computer?
+/// Decides whether a missing answer is charged to the servo or to the computer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Silence {
     silent_ns: u64,
@@ -66,8 +66,8 @@ pub(super) struct Silence {
 }
 
 impl Silence {
-    /// No silence yet. Whatever the computer does, a servo is not excused for longer than twice the time after which its link
-    /// counts as lost.
+    /// No silence yet. A servo is excused for at most twice the time after which its link counts as lost, whatever the computer
+    /// does.
     pub(super) fn new(config: &Config) -> Self {
         Self {
             silent_ns: 0,
@@ -76,15 +76,15 @@ impl Silence {
         }
     }
 
-    /// How much of a tick of `period_ns` is not to be charged to the servo. `all_cpus_run` tells whether the last look at the CPUs is over,
-    /// and begins the next; it is asked only where somebody is silent.
+    /// How much of a tick of `period_ns` is not charged to the servo. `all_cpus_run` returns whether the last check of the CPUs is
+    /// complete, and starts the next; it is called only during a silence.
     pub(super) fn uncharged_ns(&mut self, period_ns: u64, answered: bool, all_cpus_run: impl FnOnce() -> bool) -> u64 {
         if answered {
             (self.silent_ns, self.uncharged_ns) = (0, 0);
             return 0;
         }
         self.silent_ns += period_ns;
-        if self.silent_ns < DOUBT_AFTER_NS || all_cpus_run() || self.uncharged_ns >= self.max_uncharged_ns {
+        if self.silent_ns < CHECK_CPUS_AFTER_NS || all_cpus_run() || self.uncharged_ns >= self.max_uncharged_ns {
             return 0;
         }
         self.uncharged_ns += period_ns;
@@ -92,9 +92,9 @@ impl Silence {
     }
 }
 
-/// When a tick looked at the computer's clock, as far as the loop's absence shows there, ns.
+/// Times of one tick on the computer's clock that show an absence of the loop, ns.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Looks {
+pub(super) struct ExchangeTimes {
     /// The tick's deadline, and when it really began.
     pub deadline: u64,
     pub woken: u64,
@@ -105,14 +105,14 @@ pub(super) struct Looks {
     pub work_before: u64,
 }
 
-/// How long the loop was kept from running between the end of the exchange before and the end of this one, in whole periods:
-/// what is less has cost no tick.
-pub(super) fn absent_ns(looks: &Looks, period_ns: u64) -> u64 {
-    let woken_late = looks.woken.saturating_sub(looks.deadline);
-    let answered_late = (looks.exchanged - looks.woken).saturating_sub(looks.bus_allowed);
+/// How long the loop could not run between the end of the previous exchange and the end of this one, in whole periods: a shorter
+/// absence has cost no tick.
+pub(super) fn absent_ns(times: &ExchangeTimes, period_ns: u64) -> u64 {
+    let woken_late = times.woken.saturating_sub(times.deadline);
+    let answered_late = (times.exchanged - times.woken).saturating_sub(times.bus_allowed);
     let whole_periods = |ns: u64| ns / period_ns * period_ns;
-    // The work of the tick before may have run past this one's deadline, which the schedule then moved on.
-    whole_periods(woken_late + answered_late) + whole_periods(looks.work_before)
+    // The previous tick's work may have run past this deadline, which the schedule then moved on.
+    whole_periods(woken_late + answered_late) + whole_periods(times.work_before)
 }
 
 #[cfg(test)]
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn the_clock_stands_still_while_the_computer_does() {
-        let mut presence = Presence::default();
+        let mut loop_clock = LoopClock::default();
         // (computer's clock, absence; the loop's clock, pause; all ms)
         let table = [
             (1000, 0, 1000, 0),
@@ -135,12 +135,12 @@ mod tests {
             (1318, 50, 1003, 1),
         ];
         for (now, absent, present, pause) in table {
-            let passed = presence.advance(now * MS, absent * MS);
+            let passed = loop_clock.advance(now * MS, absent * MS);
             assert_eq!(passed.present_ns, present * MS, "at {now} ms");
             let expected = if pause >= 10 { pause * MS } else { 0 };
             assert_eq!(passed.pause_ns, expected, "at {now} ms");
         }
-        assert_eq!(presence.paused_ns(), 310 * MS);
+        assert_eq!(loop_clock.paused_ns(), 310 * MS);
     }
 
     #[test]
@@ -150,17 +150,17 @@ mod tests {
             let uncharged = (0..ticks).map(|_| silence.uncharged_ns(MS, answered, || all_cpus_run));
             uncharged.sum::<u64>() / MS
         };
-        assert_eq!(uncharged_ms(19, false, false), 0, "nobody has looked yet");
+        assert_eq!(uncharged_ms(19, false, false), 0, "too short to check");
         assert_eq!(uncharged_ms(100, false, true), 0, "a computer that runs");
         assert_eq!(uncharged_ms(60, false, false), 60, "a CPU is away");
         assert_eq!(uncharged_ms(500, false, false), 140, "twice link_timeout_s in all");
         assert_eq!(uncharged_ms(1, true, false), 0);
-        assert_eq!(uncharged_ms(100, false, false), 81, "an answer begins it anew");
+        assert_eq!(uncharged_ms(100, false, false), 81, "an answer resets it");
     }
 
     #[test]
     fn only_what_the_loop_could_not_help_is_absence() {
-        let looks = |woken_us: u64, bus_us: u64, work_before_us: u64| Looks {
+        let times = |woken_us: u64, bus_us: u64, work_before_us: u64| ExchangeTimes {
             deadline: 5_000_000,
             woken: 5_000_000 + woken_us * 1_000,
             bus_allowed: 700_000,
@@ -178,7 +178,7 @@ mod tests {
             (60, 90, 45_000, 45),
         ] {
             assert_eq!(
-                absent_ns(&looks(woken, bus, work_before), MS),
+                absent_ns(&times(woken, bus, work_before), MS),
                 absent * MS,
                 "{woken} {bus} {work_before}"
             );

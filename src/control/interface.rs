@@ -1,0 +1,66 @@
+//! What goes into a tick and what comes out of it.
+
+use crate::link::{ServoReading, TrackerReading};
+use worm_estimator::message::{Alarm, Command, Reply, State};
+
+/// Inputs of one tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Inputs<'a> {
+    /// When the exchange with the bus ended, and the service behind it if there was one, ns of `CLOCK_MONOTONIC`.
+    pub now_ns: u64,
+    /// How long the loop could not run since the last tick although it was due, ns: silence in that time does not count.
+    pub absent_ns: u64,
+    /// Earlier exchanges that are known by now to have had no answer.
+    pub lost_exchanges: u32,
+    /// The servo's answer, if it came.
+    pub servo: Option<&'a ServoReading>,
+    /// The tracker's answer, if it came.
+    pub tracker: Option<&'a TrackerReading>,
+    /// A command that arrived, if any.
+    pub command: Option<Command>,
+    /// Alarm changes that arrived since the last tick.
+    pub alarms: &'a [Alarm],
+    /// Whether an estimate arrived since the last tick.
+    pub estimate_arrived: bool,
+    /// Whether the process was asked to end.
+    pub end: bool,
+    /// The outcome of the service that the last tick requested, if any.
+    pub service: Option<ServiceOutcome>,
+    /// The servo's hardware error status, if it was read since the last tick.
+    pub hardware_error: Option<u8>,
+}
+
+/// Work on the bus beyond the tick's exchange. It takes several milliseconds, so it is done only while the worm stands still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Service {
+    /// Prepare the servo as at start-up (which clears a tripped watchdog), then switch torque on.
+    Arm,
+    /// Switch torque off.
+    Disarm,
+}
+
+/// Outcome of a [`Service`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ServiceOutcome {
+    /// Done, and verified by reading back.
+    Done(Service),
+    /// Failed; the loop has logged why.
+    Failed(Service),
+}
+
+/// Outputs of one tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Outputs {
+    /// The state to publish.
+    pub state: State,
+    /// Goal velocity for the next exchange, servo counts of 0.229 rev/min.
+    pub goal_counts: i32,
+    /// Work on the bus to do before the next exchange.
+    pub service: Option<Service>,
+    /// The answer to this tick's command.
+    pub reply: Option<Reply>,
+    /// The pause of the computer that ended in this tick, ns; 0 where there was none.
+    pub host_paused_ns: u64,
+    /// Whether the process may end: it was asked to, and the motor is off (or cannot be reached).
+    pub finished: bool,
+}
