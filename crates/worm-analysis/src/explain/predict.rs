@@ -192,7 +192,7 @@ impl<'a> Clock<'a> {
         let phase = self.recorded_at(sample);
         self.phase_correction
             .as_ref()
-            .map_or(phase, |phase_correction| phase_correction.mended(phase))
+            .map_or(phase, |phase_correction| phase_correction.corrected(phase))
     }
 
     fn recorded_at(&mut self, sample: usize) -> f64 {

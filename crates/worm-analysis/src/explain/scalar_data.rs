@@ -38,13 +38,13 @@ use worm_estimator::config::Config;
 use worm_physics::effect::Effect;
 
 /// Fewest advances that say anything of more than the stroke.
-const LEAST: usize = 2;
+const MIN_ADVANCES: usize = 2;
 /// Severities that are tried out before a fit, in notable changes from nothing to either side, and how many fits then begin from the
 /// most promising.
-const TRIED: [f64; 10] = [0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0];
-const BEGUN: usize = 2;
+const SEVERITIES: [f64; 10] = [0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0];
+const STARTS: usize = 2;
 /// Misfit that one may promise beyond the most promising.
-const HOPELESS: f64 = 20.0;
+const MAX_EXCESS: f64 = 20.0;
 /// An effect that changes no advance by more than this, m, at any of these is not seen in advances.
 const VISIBLE_M: f64 = 1e-6;
 
@@ -63,28 +63,28 @@ pub fn explain_advances(
     config: &Config,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Answer, ExplainError> {
-    let mut tell = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
-    if advances.len() < LEAST {
+    let mut report = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
+    if advances.len() < MIN_ADVANCES {
         return Err(ExplainError::FewAdvances { found: advances.len() });
     }
-    tell("recalibration", 0.0);
+    report("recalibration", 0.0);
     let table = Table::new(advances, config)?;
     let nuisances = nuisances(config.worm.cells, advances.len());
     let plain = Hypothesis::new(&nuisances, &[]);
     let nominal = table.evaluate(&plain, &plain.neutral());
     let recalibrated = table.fit(&plain, &plain.neutral());
-    tell("refit", 0.1);
+    report("refit", 0.1);
     let hypothesised = hypotheses(config.worm.cells, false);
-    let mut finds: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
+    let mut candidates: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
     // A few at a time, so that a person sees how far it is.
     for some in hypothesised.chunks(8) {
         let some = some.par_iter();
-        finds.par_extend(some.map(|&hypothesised| refit(&table, &nominal, &recalibrated, hypothesised)));
-        tell("refit", 0.1 + 0.8 * finds.len() as f64 / hypothesised.len() as f64);
+        candidates.par_extend(some.map(|&hypothesised| refit(&table, &nominal, &recalibrated, hypothesised)));
+        report("refit", 0.1 + 0.8 * candidates.len() as f64 / hypothesised.len() as f64);
     }
-    tell("judgement", 0.9);
-    let screening = screening(&hypothesised, &finds);
-    let judged = model_selection::judge(&table, &recalibrated, finds.into_iter().flatten().collect());
+    report("judgement", 0.9);
+    let screening = screening(&hypothesised, &candidates);
+    let judged = model_selection::judge(&table, &recalibrated, candidates.into_iter().flatten().collect());
     Ok(assemble(&table, config, &nominal, &recalibrated, screening, &judged))
 }
 
@@ -101,28 +101,28 @@ fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
 /// it.
 fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hypothesised) -> Option<Candidate> {
     let hypothesis = Hypothesis::new(&recalibrated.hypothesis.free, &[hypothesised]);
-    let tried = tried(hypothesised.effect);
-    if !tried
+    let trial_values = trial_values(hypothesised.effect);
+    if !trial_values
         .iter()
         .any(|values| table.shows(&hypothesis, nominal, values, VISIBLE_M))
     {
         return None;
     }
-    let mut promising: Vec<(f64, Vec<f64>)> = tried
+    let mut promising: Vec<(f64, Vec<f64>)> = trial_values
         .iter()
         .filter_map(|values| table.promise(&hypothesis, nominal, values))
         .collect();
     promising.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let should_abort = promising.first()?.0 + HOPELESS;
+    let limit = promising.first()?.0 + MAX_EXCESS;
     let mut fits: Vec<Fit> = promising
         .iter()
-        .take(BEGUN)
-        .filter(|(promised, _)| *promised < should_abort)
+        .take(STARTS)
+        .filter(|(promised, _)| *promised < limit)
         .map(|(_, from)| table.fit(&hypothesis, from))
         .collect();
     if fits.iter().all(|fit| fit.chi_squared > recalibrated.chi_squared) {
         // From nothing: an effect that is free to do nothing never fits worse than none.
-        fits.push(table.fit(&hypothesis, &[&recalibrated.at[..], &tried[0]].concat()));
+        fits.push(table.fit(&hypothesis, &[&recalibrated.at[..], &trial_values[0]].concat()));
     }
     let fit = fits
         .into_iter()
@@ -136,9 +136,9 @@ fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hyp
 }
 
 /// Values of an effect's parameters to try, with severities on either side of neutral.
-fn tried(effect: &Effect) -> Vec<Vec<f64>> {
+fn trial_values(effect: &Effect) -> Vec<Vec<f64>> {
     let severity = effect.severity();
-    let sides = TRIED.iter().flat_map(|&notable| [notable, -notable]);
+    let sides = SEVERITIES.iter().flat_map(|&notable| [notable, -notable]);
     sides
         .map(|notable| severity.neutral + notable * severity.notable)
         .filter(|value| (severity.min..=severity.max).contains(value))
@@ -147,21 +147,21 @@ fn tried(effect: &Effect) -> Vec<Vec<f64>> {
 }
 
 /// What became of every hypothesis, best first, and of the effects that were none.
-fn screening(hypothesised: &[Hypothesised], finds: &[Option<Candidate>]) -> Vec<Screened> {
+fn screening(hypothesised: &[Hypothesised], candidates: &[Option<Candidate>]) -> Vec<Screened> {
     let mut rows: Vec<Screened> = hypothesised
         .iter()
-        .zip(finds)
-        .map(|(hypothesised, find)| Screened {
+        .zip(candidates)
+        .map(|(hypothesised, candidate)| Screened {
             name: hypothesised.effect.name.to_owned(),
             cell: hypothesised.cell.map(|cell| cell + 1),
-            score: find.as_ref().map_or(0.0, |find| find.improvement),
-            improvement: find
+            score: candidate.as_ref().map_or(0.0, |candidate| candidate.improvement),
+            improvement: candidate
                 .as_ref()
-                .filter(|find| find.fit.converged)
-                .map(|find| find.improvement),
-            outcome: match find {
+                .filter(|candidate| candidate.fit.converged)
+                .map(|candidate| candidate.improvement),
+            outcome: match candidate {
                 None => ScreeningOutcome::NotVisible,
-                Some(find) if find.fit.converged => ScreeningOutcome::Refitted,
+                Some(candidate) if candidate.fit.converged => ScreeningOutcome::Refitted,
                 Some(_) => ScreeningOutcome::DidNotConverge,
             },
         })
@@ -184,7 +184,7 @@ fn assemble(
         .iter()
         .zip(&judged.probability)
         .flat_map(|(kind, &probability)| {
-            let mut named = named_effects(&kind.find, probability, f64::NAN, f64::NAN);
+            let mut named = named_effects(&kind.candidate, probability, f64::NAN, f64::NAN);
             // The values are still those of one cell, and say of which.
             named
                 .iter_mut()
@@ -207,13 +207,13 @@ fn assemble(
         stage(StageKind::Recalibrated, None, recalibrated),
     ];
     let wrong = judged.others.first();
-    stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.find.fit)));
+    stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.candidate.fit)));
     let best = judged.set.first();
-    stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.find.fit)));
+    stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.candidate.fit)));
     // Where none is named for sure, what goes into the model is what is sure of it.
     let kept = best
         .filter(|_| judged.is_proven)
-        .map_or(recalibrated, |kind| &kind.find.fit);
+        .map_or(recalibrated, |kind| &kind.candidate.fit);
     let runs = table.advances.iter().enumerate().map(|(run, advance)| RunSummary {
         recording: name(advance),
         slope_deg: advance.slope_deg,
@@ -227,7 +227,7 @@ fn assemble(
         advance_m: [
             advance.advance_m,
             table.advance_m(run, recalibrated),
-            best.map_or(f64::NAN, |kind| table.advance_m(run, &kind.find.fit)),
+            best.map_or(f64::NAN, |kind| table.advance_m(run, &kind.candidate.fit)),
         ],
         advance_sigma_m: Some(advance.sigma_m),
     });

@@ -17,7 +17,11 @@ pub(super) fn sentence(
 ) -> String {
     match verdict {
         Verdict::Agrees => {
-            let best = judged.all.iter().map(|find| find.improvement).fold(0.0, f64::max);
+            let best = judged
+                .all
+                .iter()
+                .map(|candidate| candidate.improvement)
+                .fold(0.0, f64::max);
             let why = if best > threshold {
                 "what improves the fit by more is too weak to be told, is not kept on data left out, or closes next to nothing of the gap"
             } else {
@@ -37,8 +41,8 @@ pub(super) fn sentence(
         Verdict::OutsideLibrary => {
             let nearest = judged.candidates.first().map_or_else(
                 || "none that is strong enough to be told keeps what it promises on data left out".to_owned(),
-                |find| {
-                    let names: Vec<&str> = find
+                |candidate| {
+                    let names: Vec<&str> = candidate
                         .hypothesised
                         .iter()
                         .map(|hypothesised| hypothesised.effect.name)

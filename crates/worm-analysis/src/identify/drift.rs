@@ -64,16 +64,16 @@ impl Drift {
                 put(0.0);
                 continue;
             }
-            let surprise = value - expected;
-            put(surprise * self.scale[at]);
-            expected += self.gain[at] * surprise;
+            let whitened = value - expected;
+            put(whitened * self.scale[at]);
+            expected += self.gain[at] * whitened;
         }
     }
 
     /// Twice the negative logarithm of the likelihood of a series, but for a constant.
     pub fn chi_squared(&self, series: impl IntoIterator<Item = f64>) -> f64 {
         let mut chi_squared = 0.0;
-        self.whiten(series, |surprise| chi_squared += surprise * surprise);
+        self.whiten(series, |whitened| chi_squared += whitened * whitened);
         let spreads = self.scale.iter().filter(|&&scale| scale > 0.0);
         chi_squared - 2.0 * spreads.map(|scale| scale.ln()).sum::<f64>()
     }

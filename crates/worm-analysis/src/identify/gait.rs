@@ -100,7 +100,7 @@ pub fn find(
         }
     }
     finder.fit_kinematics();
-    let off_m = finder.rest_m();
+    let off_m = finder.residual_m();
     if prior.phase.is_some() {
         finder.check_phase(off_m, noise_m)?;
     } else if finder.cells() == 2 && off_m > EVEN.0 * noise_m + EVEN.1 * finder.stroke_m {
@@ -203,10 +203,10 @@ impl<'a> Finder<'a> {
         for sample in 0..samples {
             self.resting(sample, &mut rows);
             if !rows.is_empty() {
-                let ways = rows
+                let displacements = rows
                     .iter()
                     .map(|&(cell, at_m, made)| at_m - self.place_m[cell] - self.stroke_m * made);
-                (body_m[sample], seen[sample]) = (ways.sum::<f64>() / rows.len() as f64, rows.len());
+                (body_m[sample], seen[sample]) = (displacements.sum::<f64>() / rows.len() as f64, rows.len());
             }
         }
         IdentifiedGait {

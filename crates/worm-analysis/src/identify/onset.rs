@@ -37,12 +37,12 @@ pub fn find(gait: &IdentifiedGait) -> Vec<Onset> {
         let slot = steps.floor();
         let part = (((steps - slot) * PARTS as f64) as usize).min(PARTS - 1);
         match &mut begin {
-            Some((open, ways)) if *open == slot as i64 => ways.push((part, gait.body_m[sample])),
+            Some((open, displacements)) if *open == slot as i64 => displacements.push((part, gait.body_m[sample])),
             _ => {
-                if let Some((open, ways)) = begin.take() {
+                if let Some((open, displacements)) = begin.take() {
                     add(
                         &mut sums[gait.step_order[open.rem_euclid(cells as i64) as usize]],
-                        &ways,
+                        &displacements,
                     );
                 }
                 begin = Some((slot as i64, vec![(part, gait.body_m[sample])]));
@@ -53,15 +53,19 @@ pub fn find(gait: &IdentifiedGait) -> Vec<Onset> {
 }
 
 /// Adds one step, its ways counted from its mean, so that what happened before it does not matter.
-fn add(sums: &mut [(f64, f64); PARTS], ways: &[(usize, f64)]) {
-    let whole = ways.first().is_some_and(|first| first.0 < PARTS / 6)
-        && ways.last().is_some_and(|last| last.0 >= PARTS - PARTS / 6);
+fn add(sums: &mut [(f64, f64); PARTS], displacements: &[(usize, f64)]) {
+    let whole = displacements.first().is_some_and(|first| first.0 < PARTS / 6)
+        && displacements.last().is_some_and(|last| last.0 >= PARTS - PARTS / 6);
     if !whole {
         return;
     }
-    let late: Vec<f64> = ways.iter().filter(|way| way.0 >= PARTS / 2).map(|way| way.1).collect();
+    let late: Vec<f64> = displacements
+        .iter()
+        .filter(|displacement| displacement.0 >= PARTS / 2)
+        .map(|displacement| displacement.1)
+        .collect();
     let base_m = late.iter().sum::<f64>() / late.len().max(1) as f64;
-    for &(part, displacement_m) in ways {
+    for &(part, displacement_m) in displacements {
         sums[part].0 += displacement_m - base_m;
         sums[part].1 += 1.0;
     }

@@ -115,13 +115,13 @@ fn filter(time_s: &[f64], readings: &[Option<(f64, f64)>], wander: f64, passes: 
         (state, covariance) = (predicted, predicted_covariance);
         if let Some((value, variance)) = reading {
             let spread = predicted_covariance[(0, 0)] + variance;
-            let surprise = value - predicted[0];
-            let strangeness = (surprise * surprise / spread).min(STRANGE);
+            let whitened = value - predicted[0];
+            let strangeness = (whitened * whitened / spread).min(STRANGE);
             log_likelihood -= 0.5 * (strangeness + spread.ln());
             // A reading that cannot be is passed over; should it have been right, the next ones bring it back.
             if strangeness < STRANGE {
                 let gain = predicted_covariance.column(0) / spread;
-                state += gain * surprise;
+                state += gain * whitened;
                 covariance -= gain * predicted_covariance.row(0);
             }
         }

@@ -1,6 +1,6 @@
 //! The residual's own mean cycle: what a model of any form could add.
 
-use super::{Cycle, Left, Squares, advance_m, settled_cycles, within_cycles};
+use super::{CellResiduals, Cycle, Squares, advance_m, settled_cycles, within_cycles};
 use crate::explain::noise::BINS_PER_STEP;
 use crate::explain::observed::Observed;
 
@@ -19,14 +19,19 @@ pub(super) fn bins(observed: &Observed<'_>) -> usize {
 }
 
 /// Mean residual of each cell in each bin, m: `[cycle][cell × bins + bin]`; `NaN` where not seen.
-pub(super) fn binned(observed: &Observed<'_>, cycles: &[Cycle], left: &Left, bins: usize) -> Vec<Vec<f64>> {
+pub(super) fn binned(
+    observed: &Observed<'_>,
+    cycles: &[Cycle],
+    residuals: &CellResiduals,
+    bins: usize,
+) -> Vec<Vec<f64>> {
     let cells = observed.cells();
     let of_cycle = |cycle: &Cycle| {
         let (mut sum_m, mut seen) = (vec![0.0; cells * bins], vec![0.0; cells * bins]);
         for sample in cycle.samples.clone() {
             let bin = place(observed, cycle, sample, bins).clamp(0.0, bins as f64 - 1.0) as usize;
             for cell in 0..cells {
-                let own_m = left.own_m[sample * cells + cell];
+                let own_m = residuals.own_m[sample * cells + cell];
                 if own_m.is_finite() {
                     sum_m[cell * bins + bin] += own_m;
                     seen[cell * bins + bin] += 1.0;
@@ -44,14 +49,14 @@ fn place(observed: &Observed<'_>, cycle: &Cycle, sample: usize, bins: usize) -> 
 }
 
 /// The residual without its mean cycle, and without the trend of it where there are cycles enough.
-pub(super) fn all(observed: &Observed<'_>, left: &Left) -> Left {
+pub(super) fn all(observed: &Observed<'_>, residuals: &CellResiduals) -> CellResiduals {
     let has_trend = settled_cycles(observed).len() >= TREND_CYCLES;
-    without(observed, left, has_trend, |_, _| true)
+    without(observed, residuals, has_trend, |_, _| true)
 }
 
 /// Squares within cycles of what [`all`] left, with what it took of the cycles' own scatter given back: the share of its terms
 /// among the cycles, of what varies from bin to bin; what varies within bins it did not take.
-pub(super) fn floor(observed: &Observed<'_>, scatter: &Left) -> Squares {
+pub(super) fn floor(observed: &Observed<'_>, scatter: &CellResiduals) -> Squares {
     let cycles = settled_cycles(observed);
     let bins = bins(observed);
     let terms = if cycles.len() >= TREND_CYCLES { 2.0 } else { 1.0 };
@@ -64,32 +69,37 @@ pub(super) fn floor(observed: &Observed<'_>, scatter: &Left) -> Squares {
         }
     }
     let taken_m2 = square_sum / count * terms / (cycles.len() as f64 - terms);
-    let left = within_cycles(observed, scatter, |_| true);
+    let residuals = within_cycles(observed, scatter, |_| true);
     Squares {
-        sum: left.sum + left.count * taken_m2,
-        ..left
+        sum: residuals.sum + residuals.count * taken_m2,
+        ..residuals
     }
 }
 
 /// The residual without the mean cycle of the others, blocks of cycles taken out one after the other; with the trend of the
 /// others, where they are enough and it is asked for.
-pub(super) fn held_out(observed: &Observed<'_>, left: &Left, with_trend: bool) -> Left {
+pub(super) fn held_out(observed: &Observed<'_>, residuals: &CellResiduals, with_trend: bool) -> CellResiduals {
     let has_trend = with_trend && settled_cycles(observed).len() >= TREND_CYCLES + BLOCK;
-    without(observed, left, has_trend, |of, other| of / BLOCK != other / BLOCK)
+    without(observed, residuals, has_trend, |of, other| of / BLOCK != other / BLOCK)
 }
 
 /// Takes from each cycle the mean cycle of those that count for it, by their numbers among the settled ones.
-fn without(observed: &Observed<'_>, left: &Left, has_trend: bool, counts: impl Fn(usize, usize) -> bool) -> Left {
+fn without(
+    observed: &Observed<'_>,
+    residuals: &CellResiduals,
+    has_trend: bool,
+    counts: impl Fn(usize, usize) -> bool,
+) -> CellResiduals {
     let cells = observed.cells();
     let cycles = settled_cycles(observed);
     let bins = bins(observed);
-    let mut shapes = binned(observed, &cycles, left, bins);
+    let mut shapes = binned(observed, &cycles, residuals, bins);
     shapes.iter_mut().for_each(|shape| about_mean(shape, bins));
-    let advance_m = advance_m(observed, left);
-    let mut free = left.clone();
+    let advance_m = advance_m(observed, residuals);
+    let mut free = residuals.clone();
     for (number, cycle) in cycles.iter().enumerate() {
         let others: Vec<usize> = (0..cycles.len()).filter(|&other| counts(number, other)).collect();
-        let shape = foretold(&shapes, &others, number, has_trend);
+        let shape = predicted_shape(&shapes, &others, number, has_trend);
         for sample in cycle.samples.clone() {
             let place = place(observed, cycle, sample, bins);
             for cell in 0..cells {
@@ -111,7 +121,7 @@ fn about_mean(shape: &mut [f64], bins: usize) {
 }
 
 /// A cycle's shape by the others', m; `NaN` where none of them saw.
-fn foretold(shapes: &[Vec<f64>], others: &[usize], number: usize, has_trend: bool) -> Vec<f64> {
+fn predicted_shape(shapes: &[Vec<f64>], others: &[usize], number: usize, has_trend: bool) -> Vec<f64> {
     let entries = shapes.first().map_or(0, Vec::len);
     (0..entries)
         .map(|entry| {
@@ -145,15 +155,15 @@ fn between(shape: &[f64], place: f64) -> f64 {
 
 /// The way of the body that the mean residual cycle adds to a model's, at every sample, m: what it gains in each cycle, and what
 /// repeats on it.
-pub(super) fn mean_displacement_m(observed: &Observed<'_>, left: &Left) -> Vec<f64> {
+pub(super) fn mean_displacement_m(observed: &Observed<'_>, residuals: &CellResiduals) -> Vec<f64> {
     let cells = observed.cells();
     let cycles = settled_cycles(observed);
     let bins = bins(observed);
-    let mut shapes = binned(observed, &cycles, left, bins);
+    let mut shapes = binned(observed, &cycles, residuals, bins);
     shapes.iter_mut().for_each(|shape| about_mean(shape, bins));
-    let everyone: Vec<usize> = (0..cycles.len()).collect();
-    let shape = foretold(&shapes, &everyone, 0, false);
-    let advance_m = advance_m(observed, left);
+    let all_cycles: Vec<usize> = (0..cycles.len()).collect();
+    let shape = predicted_shape(&shapes, &all_cycles, 0, false);
+    let advance_m = advance_m(observed, residuals);
     let repeats_m: Vec<f64> = (0..bins)
         .map(|bin| {
             let of_cells = (0..cells)

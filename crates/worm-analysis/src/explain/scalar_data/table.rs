@@ -52,7 +52,7 @@ impl<'a> Table<'a> {
             if !(advance.sigma_m > 0.0 && advance.sigma_m.is_finite() && advance.advance_m.is_finite()) {
                 return Err(ExplainError::NoSigma { recording });
             }
-            if table.said(run, &plain, &[]).is_none() {
+            if table.predict_m(run, &plain, &[]).is_none() {
                 return Err(ExplainError::SlidesDown { recording, slope_deg });
             }
         }
@@ -72,7 +72,7 @@ impl<'a> Table<'a> {
     }
 
     /// Advance of a run, m; none where the worm slides down.
-    fn said(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<f64> {
+    fn predict_m(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<f64> {
         let advance = &self.advances[run];
         let physics = self.physics(run, (advance.slope_deg, advance.payload_kg), hypothesis, at);
         let outcome = steady_cycle_of(&physics, advance.cycle_s.unwrap_or(self.cycle_s));
@@ -91,7 +91,7 @@ impl<'a> Table<'a> {
 
     /// Advance of a run by a fitted model, m; `NaN` where it slides down.
     pub fn advance_m(&self, run: usize, fit: &Fit) -> f64 {
-        self.said(run, &fit.hypothesis, &fit.at).unwrap_or(f64::NAN)
+        self.predict_m(run, &fit.hypothesis, &fit.at).unwrap_or(f64::NAN)
     }
 
     /// Mean over the runs of how far the advance is off, m.
@@ -106,7 +106,7 @@ impl<'a> Table<'a> {
         let at = [&nominal.at, values].concat();
         let is_steady = self.physics(NEW_RUN, (0.0, 0.0), hypothesis, &at).is_periodic();
         let changes = |run: usize| {
-            self.said(run, hypothesis, &at)
+            self.predict_m(run, hypothesis, &at)
                 .is_none_or(|with_m| (with_m - self.advance_m(run, nominal)).abs() > min_m)
         };
         is_steady && (0..self.advances.len()).any(changes)
@@ -140,8 +140,9 @@ impl<'a> Table<'a> {
     /// What is left of one advance, in its standard errors.
     fn residual(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> f64 {
         let advance = &self.advances[run];
-        self.said(run, hypothesis, at)
-            .map_or(IMPOSSIBLE, |said_m| (said_m - advance.advance_m) / advance.sigma_m)
+        self.predict_m(run, hypothesis, at).map_or(IMPOSSIBLE, |predicted_m| {
+            (predicted_m - advance.advance_m) / advance.sigma_m
+        })
     }
 
     fn under<'t>(&'t self, hypothesis: &'t Hypothesis) -> UnderHypothesis<'t> {

@@ -101,7 +101,7 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// What theory leaves of the measured way of a run, m; none where the worm could not have made it.
-    pub(super) fn rest_m(&self, run: usize, at: &[f64]) -> Option<Vec<f64>> {
+    pub(super) fn residual_m(&self, run: usize, at: &[f64]) -> Option<Vec<f64>> {
         let theory_m = self.theory_m(run, at)?;
         let measured_m = &self.runs[run].run.gait.body_m;
         Some(
@@ -133,24 +133,24 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// Square sum of the surprises alone.
-    pub(super) fn data_misfit(&self) -> f64 {
-        self.misfit_at(&self.parameters)
+    pub(super) fn data_chi_squared(&self) -> f64 {
+        self.chi_squared_at(&self.parameters)
     }
 
     /// Square sum of the surprises with other parameters.
-    pub(super) fn misfit_at(&self, at: &[f64]) -> f64 {
-        let mut surprises = Vec::with_capacity(self.rows());
+    pub(super) fn chi_squared_at(&self, at: &[f64]) -> f64 {
+        let mut whitened_residuals = Vec::with_capacity(self.rows());
         for run in 0..self.runs.len() {
-            self.surprises(run, at, &mut surprises);
+            self.whitened_residuals(run, at, &mut whitened_residuals);
         }
-        surprises.iter().map(|surprise| surprise * surprise).sum()
+        whitened_residuals.iter().map(|whitened| whitened * whitened).sum()
     }
 
     /// Mean square of the surprises.
     pub(super) fn misfit_ratio(&self) -> f64 {
         let seen = |data: &RunData<'_>| data.variance_m2.iter().filter(|variance| variance.is_finite()).count();
         let samples: usize = self.runs.iter().map(seen).sum();
-        self.data_misfit() / (samples.saturating_sub(self.parameters.len()).max(1)) as f64
+        self.data_chi_squared() / (samples.saturating_sub(self.parameters.len()).max(1)) as f64
     }
 
     pub(super) fn rows(&self) -> usize {
@@ -158,10 +158,10 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// Appends the surprises of a run.
-    pub(super) fn surprises(&self, run: usize, at: &[f64], out: &mut Vec<f64>) {
+    pub(super) fn whitened_residuals(&self, run: usize, at: &[f64], out: &mut Vec<f64>) {
         let data = &self.runs[run];
-        match self.rest_m(run, at) {
-            Some(rest_m) => data.drift.whiten(rest_m, |surprise| out.push(surprise)),
+        match self.residual_m(run, at) {
+            Some(residual_m) => data.drift.whiten(residual_m, |whitened| out.push(whitened)),
             None => out.extend(std::iter::repeat_n(IMPOSSIBLE, data.variance_m2.len())),
         }
     }
@@ -201,7 +201,7 @@ impl<'a> BoundsProblem<'a> {
             if parameter
                 .is_none_or(|parameter| parameter < shared || (first..first + self.cells()).contains(&parameter))
             {
-                self.surprises(run, at, &mut all);
+                self.whitened_residuals(run, at, &mut all);
             } else {
                 all.extend(std::iter::repeat_n(0.0, data.variance_m2.len()));
             }
