@@ -24,7 +24,7 @@ use worm_estimator::config::Config;
 
 /// Places listed at most.
 const PLACES: usize = 12;
-/// Share of the held-out gap that the best effect must close to be named.
+/// Fraction of the held-out gap that the best effect must close to be named.
 const CLOSES: f64 = 0.15;
 /// Improvement from which a motor that droops is named: chance reaches 4 one time in twenty, and there is one such quantity.
 const DROOPS: f64 = 16.0;
@@ -79,7 +79,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         if place == 0 {
             effects = found;
         } else {
-            // What the first answer names already is no rival of it.
+            // An effect that the first answer names is no rival of it.
             let is_new = |effect: &NamedEffect| {
                 !effects
                     .iter()

@@ -1,9 +1,9 @@
-//! The next experiment: which one change of a run would best tell apart what this campaign could not.
+//! The next experiment: the one change of a run that would best decide what this campaign could not.
 //!
-//! Every change is tried out on paper: the run is simulated under each rival's fitted physics, seen through the noise that the
-//! campaign had, and the rivals' predictions are compared with everything free in them still free (see [`trial`]). What counts is
-//! the distance between the two nearest; more than enough is not better, so a cheaper run that settles it goes before a dearer
-//! one that settles it twice. Where no run tells the rivals apart, a measurement on the bench is proposed.
+//! Every change is simulated under each rival's fitted physics, with the noise of the campaign, and the predictions are compared with
+//! everything free in them still free (see [`trial`]). The figure of merit is the distance between the two nearest predictions. More than
+//! enough is not better, so a cheaper run that decides comes before a dearer one that decides twice over. Where no run
+//! separates the rivals, a measurement on the bench is proposed.
 
 mod change;
 mod trial;
@@ -17,28 +17,28 @@ use rayon::prelude::*;
 use trial::{Adjustment, RunOutcome, Trial, empty_recording, plain_distance};
 use worm_physics::effect::Setting;
 
-/// Distance that settles a question, and least distance of a run that is worth it, standard deviations.
+/// Distance that decides, and smallest distance of a run that is worth making, standard deviations.
 const SETTLES: f64 = 5.0;
 const WORTH_IT: f64 = 3.0;
-/// Changes of one kind that are looked at closely.
+/// Changes of one kind that are evaluated in full.
 const CLOSE_LOOKS: usize = 2;
-/// Share of the stroke that every rival's worm must advance in a cycle: one that hardly gets on is no experiment.
+/// Fraction of the stroke that every rival's worm must advance in a cycle: one that hardly advances is no experiment.
 pub(super) const MIN_ADVANCE: f64 = 0.05;
 
-/// A change with what it would show.
+/// A change with the separation it would give.
 struct ScoredChange {
     change: Change,
     separation: f64,
 }
 
 impl ScoredChange {
-    /// What it is worth for what it costs; more than enough is worth no more.
+    /// Separation for its cost; more than enough is worth no more.
     fn worth(&self) -> f64 {
         self.separation.min(SETTLES) / cost(self.change.what)
     }
 }
 
-/// The run that best tells apart rivals that were fitted and have their derivatives; none with fewer than two.
+/// The run that best separates rivals, fitted with derivatives; none with fewer than two.
 ///
 /// `cycle_s` is the usual time of a gait cycle.
 pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
@@ -64,7 +64,7 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
     possible.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut best: Option<ScoredChange> = None;
     for what in BY_COST {
-        // The dearer kinds could not be worth more than one that settles it already.
+        // Dearer kinds cannot be worth more than one that decides already.
         if best.as_ref().is_some_and(|best| best.worth() > SETTLES / cost(what)) {
             break;
         }
@@ -89,7 +89,7 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
     }
 }
 
-/// What every rival says of a run; none where the worm of one does not hold.
+/// Predictions of every rival for a run; none where the worm of one does not hold.
 fn predict_all(trial: &Trial<'_>, candidates: &[&Fit]) -> Option<Vec<RunOutcome>> {
     candidates.iter().map(|rival| trial.predict(rival)).collect()
 }
@@ -105,7 +105,7 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
     let empty_recording = empty_recording(problem, change);
     let trial = Trial::new(problem, change, &empty_recording)?;
     let outcomes = predict_all(&trial, candidates)?;
-    // What recalibration does hardly depends on the effect beside it, so one rival's derivatives serve all: the quickest one's.
+    // Derivatives of nuisances hardly depend on the effect beside them, so those of one rival serve all: the quickest to simulate.
     let quick = candidates
         .iter()
         .position(|rival| trial.is_periodic(rival))
@@ -150,7 +150,7 @@ fn same(candidates: &[&Fit], (rival, quantity): (usize, usize), other: usize) ->
     others.iter().position(|free| is_nuisance && free.what == what)
 }
 
-/// A run as the answer tells it.
+/// The proposal of a run.
 fn proposal(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &ScoredChange) -> Option<NextExperiment> {
     let empty_recording = empty_recording(problem, &best.change);
     let trial = Trial::new(problem, &best.change, &empty_recording)?;
@@ -183,7 +183,7 @@ fn proposal(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &ScoredChan
     })
 }
 
-/// How a prediction differs from the first one: in its advance, and within a cycle.
+/// Difference of a prediction from the first one: in its advance, and within a cycle.
 fn difference_in_words(trial: &Trial<'_>, mine: &RunOutcome, first: &RunOutcome, first_name: &str) -> String {
     let farther_m = mine.advance_m - first.advance_m;
     let phase = trial.phase();
@@ -211,7 +211,7 @@ fn difference_in_words(trial: &Trial<'_>, mine: &RunOutcome, first: &RunOutcome,
     )
 }
 
-/// A measurement that tells what no crawl does; none where no rival supposes anything.
+/// A measurement on the bench, where no run decides; none where no rival has an effect.
 fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
     let hypothesised = candidates
         .iter()
@@ -235,7 +235,7 @@ fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
     })
 }
 
-/// What a rival supposes, by name.
+/// Names of the effects of a rival.
 fn name(rival: &Fit) -> String {
     let names: Vec<String> = rival.hypothesis.hypothesised.iter().map(name_of).collect();
     if names.is_empty() {
@@ -252,7 +252,7 @@ fn name_of(hypothesised: &Hypothesised) -> String {
     }
 }
 
-/// The values that a rival found.
+/// The fitted values of a rival.
 fn values(rival: &Fit) -> String {
     let value = |setting: &Setting| {
         let with_value = setting.effect().parameters.iter().zip(setting.values());

@@ -1,17 +1,16 @@
-//! How far each model is off, stage by stage, from the believed one down to the noise floor.
+//! How far each model is off, stage by stage, from the nominal one down to the noise floor.
 //!
 //! # The figures
-//! - *rms*: of every cell's residual within a cycle, its mean in that cycle taken out; so a body that went astray earlier does not
-//!   count, and a wrong advance does. Over the settled whole cycles, all cells, all runs.
-//! - *advance*: how much more the worm advances in a cycle than the model, from residuals at the same phase of different cycles, by
-//!   a straight line over the cycles through all phases and cells.
-//! - *energy*: per cycle by (11). Nobody measured it; the reference is what the contacts of the best model take when they are
-//!   carried along the measured path, that model's way with its smoothed residual on it, as [`crate::experiment`] accounts for a
-//!   recording.
+//! - *rms*: of every cell's residual within a cycle, its mean in that cycle removed; so earlier errors of the body do not count, and a
+//!   wrong advance does. Over the settled whole cycles, all cells, all runs.
+//! - *advance*: how much more the worm advances in a cycle than the model: the slope of a straight line over the cycles through
+//!   residuals at the same phase, common to all phases and cells.
+//! - *energy*: per cycle by (11). Nobody measured it; the reference is the energy that the contacts of the best model take along the
+//!   measured path, which is that model's path plus its smoothed residual, as [`crate::experiment`] computes it for a recording.
 //!
 //! # The two ends
-//! The *free form* adds to the recalibrated model whatever its residual does in the mean over the cycles: about as much as any
-//! law that repeats could close. The *floor* is how single cycles scatter about that: no model of what repeats goes below.
+//! The *free form* adds the mean cycle of its residual to the recalibrated model: about as much as any periodic law could explain.
+//! The *floor* is the scatter of single cycles about that: no periodic model falls below it.
 
 mod energy;
 mod free_form;
@@ -26,23 +25,23 @@ use super::residual::Residual;
 pub(super) use mean_cycle::cycles;
 use std::ops::Range;
 
-/// Share of a cycle by which the last one may fall short and still be whole.
+/// Fraction of a cycle that the last one may lack and still count as whole.
 const SHORT: f64 = 0.05;
-/// Share of a cycle by which the first settled sample may miss the cycle's beginning.
+/// Fraction of a cycle by which the first settled sample may miss the start of the cycle.
 const LATE: f64 = 0.1;
 /// Mean of the absolute value of a normal quantity, in standard deviations.
 const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
 
-/// A campaign with the energy that its motion took by the best model's contacts: what the stages are measured by.
+/// A campaign with the energy that its motion took by the contacts of the best model: the reference for all stages.
 pub(super) struct Measured<'p, 's, 'a> {
     problem: &'p FitProblem<'s, 'a>,
     /// Of each run's settled cycles, J; none where the best model cannot make the run.
     energy_j: Vec<Option<Vec<f64>>>,
-    /// What the best model leaves of each run; none where it cannot make it.
+    /// Residuals of the best model in each run; none where it cannot make the run.
     residuals: Vec<Option<CellResiduals>>,
 }
 
-/// What a model leaves of a run: every cell's residual, m, `[sample][cell]`, flat; `NaN` where not seen.
+/// Every cell's residual in a run, m, `[sample][cell]`, flat, and the body's, m; `NaN` where not seen.
 #[derive(Debug, Clone)]
 struct CellResiduals {
     own_m: Vec<f64>,
@@ -76,7 +75,7 @@ struct Cycle {
     samples: Range<usize>,
 }
 
-/// A mean of squares under way.
+/// A running mean of squares.
 #[derive(Debug, Clone, Copy, Default)]
 struct Squares {
     sum: f64,
@@ -89,14 +88,14 @@ impl Squares {
         self.count += other.count;
     }
 
-    /// `NaN` of nothing.
+    /// `NaN` without values.
     fn rms(self) -> f64 {
         (self.sum / self.count).sqrt()
     }
 }
 
 impl<'p, 's, 'a> Measured<'p, 's, 'a> {
-    /// The reference by the best fit there is.
+    /// The reference by the best fit.
     pub fn new(problem: &'p FitProblem<'s, 'a>, best: &Fit) -> Self {
         let runs = 0..problem.scene.observed.len();
         let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(problem, run, best)).collect();
@@ -112,9 +111,9 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         }
     }
 
-    /// The stage of a model, fitted to everything in `all`. In each of `folds` it was fitted without the cycles for which the list
-    /// of their run says so, numbered by whole cycles from the first sample; without folds it was fitted to nothing, and is
-    /// off by as much everywhere. Figures are `NaN` where the model cannot make a run.
+    /// The stage of a model. `all` is its fit to all data; each of `folds` is its fit without some cycles, marked in the list of their
+    /// run, which counts whole cycles from the first sample. Without folds it was fitted to nothing, and all data are held out.
+    /// Figures are `NaN` where the model cannot make a run.
     pub fn stage(&self, stage: StageKind, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
         let residuals = self.residuals(all);
         let fit_rms_m = self.rms(&residuals, |_, _| true);
@@ -135,9 +134,9 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         }
     }
 
-    /// The stage of the recalibrated model with whatever its residual does in the mean over a run's cycles: fitted with all of them,
-    /// held out in blocks with the others, there with a trend over the cycles where that foretells them better. It knows no cause: its
-    /// energy is what the recalibrated contacts take on its way.
+    /// The stage of the recalibrated model plus the mean cycle of its residual in each run: over all cycles for the fit, over the others
+    /// for cycles that are held out in blocks, there with a trend over the cycles where that predicts them better. Its energy is what
+    /// the recalibrated contacts take along its path.
     pub fn free_form_stage(&self, recalibrated: &Fit) -> Stage {
         let residuals = self.residuals(recalibrated);
         let all = self.free_forms(&residuals, free_form::all);
@@ -163,8 +162,8 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         }
     }
 
-    /// The noise floor: how single cycles scatter about their mean and trend, by the best model's residual, corrected for what mean
-    /// and trend took with them; and how far chance puts the mean of as many cycles off the truth.
+    /// The noise floor: the scatter of single cycles about their mean and trend, by the residual of the best model, corrected for the
+    /// degrees of freedom of mean and trend; and the expected error of a mean over as many cycles.
     pub fn floor_stage(&self) -> Stage {
         let scatter = self.free_forms(&self.residuals, free_form::all);
         let mut squares = Squares::default();
@@ -233,13 +232,13 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         self.squares(residuals, counts).rms()
     }
 
-    /// `NaN` where a run has no figure.
+    /// Mean over all runs; `NaN` where a run has no figure.
     fn mean_over_runs(&self, of: impl Fn(usize) -> Option<f64>) -> f64 {
         let sum: f64 = (0..self.runs()).map(|run| of(run).unwrap_or(f64::NAN)).sum();
         sum / self.runs() as f64
     }
 
-    /// How far a model's energy per cycle is off the reference's, J.
+    /// Error of a model's energy per cycle against the reference, J.
     fn energy_error_j(&self, of: impl Fn(usize) -> Option<Vec<f64>>) -> f64 {
         self.mean_over_runs(|run| Some((mean(&of(run)?) - mean(self.energy_j[run].as_ref()?)).abs()))
     }
@@ -256,7 +255,7 @@ fn deviation(values: &[f64]) -> f64 {
     (squares / (values.len() as f64 - 1.0)).sqrt()
 }
 
-/// The whole cycles, counted from the first sample, in which the crawl is settled.
+/// The whole cycles of the settled crawl, counted from the first sample.
 fn settled_cycles(observed: &Observed<'_>) -> Vec<Cycle> {
     let phase = &observed.phase;
     let since_first = |sample: usize| phase[sample] - phase[0];
@@ -272,7 +271,7 @@ fn settled_cycles(observed: &Observed<'_>) -> Vec<Cycle> {
         .collect()
 }
 
-/// A series at the beginnings of these cycles and at the end of the last, in straight lines between samples.
+/// A series at the starts of these cycles and at the end of the last, linear between samples.
 fn at_boundaries(observed: &Observed<'_>, cycles: &[Cycle], series: &[f64]) -> Vec<f64> {
     let phase = &observed.phase;
     let indices = cycles.iter().map(|cycle| cycle.index);

@@ -12,7 +12,7 @@ use worm_estimator::config::Config;
 use worm_physics::effect::Setting;
 use worm_physics::{Physics, Worm};
 
-/// Times that noise and recalibration are found from one another.
+/// How often noise and recalibration are repeated, each with the result of the other.
 const NOISE_ROUNDS: usize = 2;
 
 /// Prepares the runs of a campaign.
@@ -67,7 +67,7 @@ fn same_order(first: &Observed<'_>, other: &Observed<'_>) -> Result<(), ExplainE
     })
 }
 
-/// Takes the worm for one laid down where its first cycle looks more like it.
+/// Assumes that the worm was laid down at the start where its first cycle fits that better.
 fn judge_start(observed: &mut Observed<'_>, physics: &Physics) {
     let first_cycle = |observed: &Observed<'_>| {
         let predicted = predict(observed, physics, 0.4, physics.is_periodic())?;
@@ -93,7 +93,7 @@ fn judge_start(observed: &mut Observed<'_>, physics: &Physics) {
     observed.assume_laid_down(is_laid_down);
 }
 
-/// Noise and recalibrated model, from one another.
+/// Alternates between measuring the noise and recalibrating the model.
 pub(super) fn recalibrate<'s, 'a>(
     scene: &'s Scene<'a>,
     base: &Hypothesis,

@@ -8,20 +8,20 @@ use super::parameter::{Hypothesised, What};
 use super::score_test::{self, Screening};
 use std::collections::BTreeSet;
 
-/// Effects that are refitted, and cells of one effect, where the next one's score comes near the best one's.
+/// Effects that are refitted; cells of one effect that are; and how near the next cell must come to the best, as a fraction of its gain.
 pub(super) const REFITTED: usize = 8;
 const CELLS_REFITTED: usize = 2;
 const NEXT_CELL: f64 = 0.5;
 /// Effects that are refitted on top of a single one, and how many of those that screened best are tried roughly before.
 const PAIRED: usize = 3;
 const SCREENED_FOR_PAIRS: usize = 8;
-/// Improvement from which it is worth looking for a better valley.
+/// Improvement from which it is worth looking for a better minimum.
 const MIN_TO_LEAP: f64 = 10.0;
 
 /// Refits every effect, roughly from several starts, and the best of them to the end; best first.
 ///
-/// The starts are what the screening found about the recalibrated model, and strong effects about the believed one: a strong
-/// effect drives the recalibration into a corner from which it cannot be seen.
+/// The starts are those of the screening about the recalibrated model, and strong effects about the nominal one: a strong effect
+/// drives the recalibration into a corner from which screening cannot see it.
 pub(super) fn refit(
     problem: &FitProblem<'_, '_>,
     base: &Fit,
@@ -89,8 +89,8 @@ fn choose(rough: Vec<Fit>, base: &Fit, max: usize) -> Vec<Fit> {
     chosen
 }
 
-/// A single effect fitted anew from where it lies in a pair, where that is a better fit: what a pair gains may be owed to a better
-/// valley of its first effect, and not to the second.
+/// A single effect refitted from its values in a pair, where that is a better fit: the pair's gain may come from a better minimum of its
+/// first effect, and not from the second.
 pub(super) fn alone(
     problem: &FitProblem<'_, '_>,
     recalibrated: &Fit,
@@ -115,7 +115,7 @@ pub(super) fn alone(
     (candidate.improvement > single.improvement).then_some(candidate)
 }
 
-/// Pairs of effects: each of the best single ones with what screens best, and above the threshold, on top of it.
+/// Pairs of effects: each of the best single ones with those that screen best on top of it, and above the threshold.
 pub(super) fn pair_up<'f>(
     problem: &FitProblem<'_, '_>,
     recalibrated: &Fit,

@@ -1,21 +1,19 @@
-//! What a table of advances says, where nobody recorded positions.
+//! The search where only advances per cycle are known, and no positions.
 //!
-//! # The story
-//! Often a few scalars are all there is: on this slope the worm advances so much in a cycle. They are worth asking, but they are few,
-//! and with a dozen things that are not quite known of any worm, much explains them. So the model is recalibrated against them within
-//! the same priors as against recordings, and where it then still misses them by more than chance, every effect of the library that
-//! changes the advance of a steady crawl is fitted on top. The answer is the set of all that bring the model within chance, and what
-//! to record to decide between them. A single one is named only where it is alone *and* there are more scalars than
-//! quantities that they have to settle; three scalars never are.
+//! Often a few scalars are all there is: the advance per cycle on some slopes. They are few, and with a dozen quantities of any worm
+//! uncertain, much explains them. So the model is recalibrated against them within the same priors as against recordings. Where it
+//! still misses them by more than chance, every effect of the library that changes the advance of a steady crawl is fitted on top.
+//! The answer is the set of all effects that bring the model within chance, and what to record to decide between them. A single effect
+//! is named only where it is alone *and* there are more scalars than quantities that they have to determine; three scalars never are.
 //!
-//! What needs positions stays empty in the [`Answer`]: the places of disagreement, maps, cycles, and everything held out.
+//! What needs positions stays empty in the [`Answer`]: places of disagreement, maps, cycles, and all held-out figures.
 //!
-//! Pure, like the search of recordings, and deterministic without a seed.
+//! Pure, like the search on recordings, and deterministic without a seed.
 //!
-//! # The map
-//! - `table`: the scalars, what a hypothesis says of them, and its least-squares fit.
-//! - `model_selection`: chance, the set, the verdict and its words.
-//! - `next`: what to record.
+//! # Modules
+//! - `table`: the scalars, what a hypothesis predicts of them, and its fit.
+//! - `model_selection`: chance, the set, the verdict and its sentence.
+//! - `next_experiment`: what to record.
 
 mod model_selection;
 mod next_experiment;
@@ -37,18 +35,18 @@ use table::Table;
 use worm_estimator::config::Config;
 use worm_physics::effect::Effect;
 
-/// Fewest advances that say anything of more than the stroke.
+/// Fewest advances that depend on more than the stroke.
 const MIN_ADVANCES: usize = 2;
-/// Severities that are tried out before a fit, in notable changes from nothing to either side, and how many fits then begin from the
-/// most promising.
+/// Severities that are tried before a fit, in notable changes from neutral to either side, and how many fits then start from the most
+/// promising.
 const SEVERITIES: [f64; 10] = [0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0];
 const STARTS: usize = 2;
-/// Misfit that one may promise beyond the most promising.
+/// Chi-squared by which a start may be worse than the most promising one.
 const MAX_EXCESS: f64 = 20.0;
-/// An effect that changes no advance by more than this, m, at any of these is not seen in advances.
+/// An effect that changes no advance by more than this, m, at any of these does not show in advances.
 const VISIBLE_M: f64 = 1e-6;
 
-/// What an advance is called where a recording has its file's name.
+/// Name of an advance, in the place of a recording's file name.
 fn name(advance: &Advance) -> String {
     format!("the advance measured at {}°", advance.slope_deg).replace('-', "−")
 }
@@ -76,7 +74,7 @@ pub fn explain_advances(
     report("refit", 0.1);
     let hypothesised = hypotheses(config.worm.cells, false);
     let mut candidates: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
-    // A few at a time, so that a person sees how far it is.
+    // A few at a time, to report progress.
     for some in hypothesised.chunks(8) {
         let some = some.par_iter();
         candidates.par_extend(some.map(|&hypothesised| refit(&table, &nominal, &recalibrated, hypothesised)));
@@ -88,7 +86,7 @@ pub fn explain_advances(
     Ok(assemble(&table, config, &nominal, &recalibrated, screening, &judged))
 }
 
-/// What of the nuisances an advance knows of: neither the clock nor what damps and softens the first moment of a slide.
+/// The nuisances that change an advance: neither the clock nor those of the first moment of a slide.
 fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
     let within_a_cycle =
         |nuisance: Nuisance| matches!(nuisance, Nuisance::Damping | Nuisance::Presliding | Nuisance::Viscosity);
@@ -97,8 +95,8 @@ fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
     all
 }
 
-/// An effect fitted on top of the recalibrated model, from the most promising of many severities; none where advances do not show
-/// it.
+/// An effect fitted on top of the recalibrated model, from the most promising of many severities; none where it does not show in
+/// advances.
 fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hypothesised) -> Option<Candidate> {
     let hypothesis = Hypothesis::new(&recalibrated.hypothesis.free, &[hypothesised]);
     let trial_values = trial_values(hypothesised.effect);
@@ -121,7 +119,7 @@ fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hyp
         .map(|(_, from)| table.fit(&hypothesis, from))
         .collect();
     if fits.iter().all(|fit| fit.chi_squared > recalibrated.chi_squared) {
-        // From nothing: an effect that is free to do nothing never fits worse than none.
+        // From neutral: an effect that is free to do nothing never fits worse than none.
         fits.push(table.fit(&hypothesis, &[&recalibrated.at[..], &trial_values[0]].concat()));
     }
     let fit = fits
@@ -185,7 +183,7 @@ fn assemble(
         .zip(&judged.probability)
         .flat_map(|(kind, &probability)| {
             let mut named = named_effects(&kind.candidate, probability, f64::NAN, f64::NAN);
-            // The values are still those of one cell, and say of which.
+            // The parameters are still those of one cell, and name it.
             named
                 .iter_mut()
                 .filter(|_| kind.is_any_cell())
@@ -210,7 +208,7 @@ fn assemble(
     stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.candidate.fit)));
     let best = judged.set.first();
     stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.candidate.fit)));
-    // Where none is named for sure, what goes into the model is what is sure of it.
+    // An effect that is not proven is not written into the model.
     let kept = best
         .filter(|_| judged.is_proven)
         .map_or(recalibrated, |kind| &kind.candidate.fit);

@@ -16,12 +16,12 @@ use worm_estimator::config::Config;
 
 /// Single effects from which pairs are tried where the best leaves a gap; from the best alone where it leaves none.
 const PAIR_SEEDS: usize = 2;
-/// How much larger an improvement must be than what chance reaches one time in twenty, and how large at least: real pads, cams and
-/// tips leave a little of their own. Chosen on the development split.
+/// Factor on the improvement that chance reaches one time in twenty, and the smallest threshold: real pads, cams and tips are not quite
+/// those of the model. Chosen on the development split.
 const SAFETY: f64 = 2.5;
 const MIN_IMPROVEMENT: f64 = 26.0;
 
-/// What may be chosen of the search.
+/// Options of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Seed of everything drawn: the same input and seed give the same answer.
@@ -34,7 +34,7 @@ impl Default for Options {
     }
 }
 
-/// Finds the effect that the model misses.
+/// Searches for the effect that the model lacks.
 ///
 /// # Errors
 /// [`ExplainError`] names the recording and the remedy.

@@ -13,14 +13,14 @@ const MARGIN: usize = 1;
 /// First part at which the break may lie.
 const EARLIEST: usize = 3;
 
-/// What inspection tells of one cell's steps.
+/// What inspection of one cell's steps shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onset {
     /// Share of the step at which the others stop moving back, that is, forward sliding begins.
     pub fraction: f64,
     /// How far the others have been pushed back by then, m.
     pub retraction_m: f64,
-    /// The first estimate of the largest tip deformation, m: half the way that the cell has made by then.
+    /// The first estimate of the largest tip deformation, m: half the displacement of the cell by then.
     pub max_deformation_m: f64,
 }
 

@@ -6,7 +6,7 @@ use crate::explain::parameter::{Hypothesised, What};
 use crate::explain::speed_droop::SpeedDroop;
 use worm_physics::effect::MOTOR_DROOP;
 
-/// The effects of a find, as people read them.
+/// The effects of a candidate.
 pub(in crate::explain) fn named_effects(
     candidate: &Candidate,
     probability: f64,
@@ -73,7 +73,7 @@ pub(super) fn droop_effect(speed_droop: &SpeedDroop) -> NamedEffect {
             cell: None,
         }],
         cell: None,
-        // It shows in time: the gap in positions neither opens nor closes by it.
+        // It shows in time and does not change the gap in positions.
         closure: f64::NAN,
         margin: f64::NAN,
         probability: 1.0 / (1.0 + (-0.5 * speed_droop.improvement).exp()),

@@ -50,7 +50,7 @@ fn advance_m(observed: &Observed<'_>, position_m: impl Fn(usize, usize) -> f64) 
         if after == observed.samples() {
             break;
         }
-        // Both samples of a pair must show every cell; what the later one is past the cycle is taken off in proportion.
+        // Both samples of a pair must show every cell; the part of the displacement past one cycle is removed in proportion.
         let displacement_m = mean_m(after) - mean_m(sample);
         if displacement_m.is_finite() {
             sum_m += displacement_m / (observed.phase[after] - observed.phase[sample]);

@@ -6,7 +6,7 @@ use crate::explain::fit::FitProblem;
 use crate::explain::gap::Measured;
 use crate::explain::model_selection::Candidate;
 
-/// The gap, stage by stage, and what share of it each candidate closes.
+/// The gap, stage by stage, and what fraction of it each candidate closes.
 pub(super) struct Gap {
     pub stages: Vec<Stage>,
     pub closure: Vec<f64>,

@@ -1,7 +1,7 @@
-//! A run that was not made yet, under each rival: what each says of it, and how far apart they would be seen to be.
+//! A run that was not made yet, under each rival: what each predicts, and how well data would separate the predictions.
 //!
-//! The distance between two rivals is what the data of the new run would say against the wrong one, which may turn everything
-//! that is free in it as far as the campaign so far allows (its own normal matrix is the prior), and the error of the new run's slope.
+//! The distance between two rivals is the chi-squared of the data of the new run against the wrong one, which may adjust everything that
+//! is free in it as far as the campaign allows (its own normal matrix is the prior), and the slope error of the new run.
 
 use super::super::fit::{Fit, FitProblem};
 use super::super::noise::RunNoise;
@@ -15,17 +15,17 @@ use crate::least_squares::dot;
 use crate::recording::Recording;
 use nalgebra::{DMatrix, DVector};
 
-/// Fastest sampling that is simulated, Hz, and most samples in a cycle: more only repeat each other.
+/// Fastest sampling that is simulated, Hz, and most samples in a cycle: more add nothing.
 const RATE_HZ: f64 = 120.0;
 const SAMPLES_PER_CYCLE: f64 = 120.0;
 /// Time at rest before the first step, s.
 const REST_S: f64 = 0.3;
 /// Cycles after which the advance counts.
 const SETTLING_CYCLES: f64 = 2.0;
-/// The slope error of the new run stands in the place of the first run's.
+/// The slope error of the new run takes the place of the first run's.
 const FRESH_SLOPE: What = What::Nuisance(Nuisance::SlopeOf(0));
 
-/// The recording that a change would give, without positions, and which share of the camera's samples it has, as one in so many.
+/// The recording that a change would give, without positions, and how many samples of the camera there are for each of its own.
 pub(super) fn empty_recording(problem: &FitProblem<'_, '_>, change: &Change) -> (Recording, f64) {
     let base = &problem.scene.observed[change.base];
     let time_s = &base.run.recording.time_s;
@@ -51,23 +51,23 @@ pub(super) fn empty_recording(problem: &FitProblem<'_, '_>, change: &Change) -> 
     (recording, own_hz / rate_hz)
 }
 
-/// A run to come.
+/// A run that may be made.
 pub(super) struct Trial<'r> {
     scene: Scene<'r>,
     noise: RunNoise,
 }
 
-/// What one rival says of it.
+/// What one rival predicts for it.
 pub(super) struct RunOutcome {
     pub predicted: Predicted,
     /// Advance of a settled cycle, m.
     pub advance_m: f64,
-    /// Everything in units of what noise would do, of variance 1.
+    /// The predicted positions, whitened: noise has variance 1.
     whitened: Vec<f64>,
 }
 
 impl<'r> Trial<'r> {
-    /// The run of a change; none where the canal cannot lie like that.
+    /// The run with a change; none where the slope is out of range.
     pub fn new(
         problem: &FitProblem<'_, '_>,
         change: &Change,
@@ -110,12 +110,12 @@ impl<'r> Trial<'r> {
         &self.scene.observed[0].phase
     }
 
-    /// Whether a rival's crawl repeats itself, and so is simulated quickly.
+    /// Whether a rival's crawl is periodic, and so quick to simulate.
     pub fn is_periodic(&self, rival: &Fit) -> bool {
         self.scene.physics(0, &rival.hypothesis, &rival.at).0.is_periodic()
     }
 
-    /// What a rival says; none where its worm does not hold.
+    /// Prediction of a rival; none where its worm does not hold.
     pub fn predict(&self, rival: &Fit) -> Option<RunOutcome> {
         self.predict_at(rival, &on_new_run(rival))
     }
@@ -154,7 +154,7 @@ impl<'r> Trial<'r> {
             .collect()
     }
 
-    /// How what a rival says changes with one of its quantities.
+    /// Derivative of a rival's prediction with respect to one of its quantities.
     pub fn derivative(&self, rival: &Fit, outcome: &RunOutcome, quantity: usize) -> Vec<f64> {
         let free = &rival.hypothesis.free[quantity];
         let mut at = on_new_run(rival);
@@ -165,7 +165,7 @@ impl<'r> Trial<'r> {
                 let pairs = beside.whitened.iter().zip(&outcome.whitened);
                 pairs.map(|(beside, here)| (beside - here) / step).collect()
             }
-            // A worm that would not hold tells nothing of how little it takes.
+            // No derivative where the worm would not hold.
             None => vec![0.0; outcome.whitened.len()],
         }
     }
@@ -184,7 +184,7 @@ fn on_new_run(rival: &Fit) -> Vec<f64> {
     .collect()
 }
 
-/// Distance between what two rivals say, in standard deviations, nothing turned.
+/// Distance between two predictions without any adjustment, in standard deviations.
 pub(super) fn plain_distance(a: &RunOutcome, b: &RunOutcome) -> f64 {
     difference(a, b).iter().map(|off| off * off).sum::<f64>().sqrt()
 }
@@ -193,19 +193,19 @@ fn difference(a: &RunOutcome, b: &RunOutcome) -> Vec<f64> {
     a.whitened.iter().zip(&b.whitened).map(|(a, b)| a - b).collect()
 }
 
-/// What a rival may turn to come nearer to what is seen.
+/// What a rival may adjust to come nearer to the data.
 pub(super) struct Adjustment {
     columns: Vec<Vec<f64>>,
     inverse: DMatrix<f64>,
 }
 
 impl Adjustment {
-    /// From the derivatives of the quantities that matter; none where nothing is known of one.
+    /// From the derivatives of the relevant quantities; none where the normal matrix is singular.
     pub fn new(rival: &Fit, columns: Vec<Vec<f64>>) -> Option<Self> {
         let relevant_quantities = Trial::relevant_quantities(rival);
         let count = rival.at.len();
         let normal = rival.normal(None);
-        // The first run's slope error stays what the campaign says of it, and the new run's is one more quantity behind all.
+        // The first run's slope error keeps its place, and the new run's is one more quantity at the end.
         let place = |quantity: usize| {
             if rival.hypothesis.free[quantity].what == FRESH_SLOPE {
                 count
@@ -233,7 +233,7 @@ impl Adjustment {
         Some(Self { columns, inverse })
     }
 
-    /// What is left of the distance between two rivals when the one of this reach turns what it can, in standard deviations.
+    /// Distance between two predictions after the rival of this adjustment has adjusted what it can, in standard deviations.
     pub fn distance(&self, a: &RunOutcome, b: &RunOutcome) -> f64 {
         let difference = difference(a, b);
         let products = DVector::from_iterator(

@@ -1,10 +1,10 @@
-//! The residual's own mean cycle: what a model of any form could add.
+//! The mean cycle of the residual: what a model of any form could add.
 
 use super::{CellResiduals, Cycle, Squares, advance_m, settled_cycles, within_cycles};
 use crate::explain::noise::BINS_PER_STEP;
 use crate::explain::observed::Observed;
 
-/// Samples that a bin has at least, in the mean.
+/// Fewest samples in a bin, on average.
 const SAMPLES_PER_BIN: f64 = 3.0;
 /// Cycles from which the mean cycle has a trend.
 const TREND_CYCLES: usize = 5;
@@ -43,19 +43,19 @@ pub(super) fn binned(
     cycles.iter().map(of_cycle).collect()
 }
 
-/// Where in its cycle a sample is, in bins.
+/// Position of a sample in its cycle, in bins.
 fn place(observed: &Observed<'_>, cycle: &Cycle, sample: usize, bins: usize) -> f64 {
     (observed.phase[sample] - observed.phase[0] - cycle.index as f64) * bins as f64
 }
 
-/// The residual without its mean cycle, and without the trend of it where there are cycles enough.
+/// The residual without its mean cycle, and without the trend of it where there are enough cycles.
 pub(super) fn all(observed: &Observed<'_>, residuals: &CellResiduals) -> CellResiduals {
     let has_trend = settled_cycles(observed).len() >= TREND_CYCLES;
     without(observed, residuals, has_trend, |_, _| true)
 }
 
-/// Squares within cycles of what [`all`] left, with what it took of the cycles' own scatter given back: the share of its terms
-/// among the cycles, of what varies from bin to bin; what varies within bins it did not take.
+/// Squares within cycles of what [`all`] leaves, corrected for its degrees of freedom: it removed a fraction, its terms over the number
+/// of cycles, of the scatter that varies from bin to bin, and nothing of what varies within bins.
 pub(super) fn floor(observed: &Observed<'_>, scatter: &CellResiduals) -> Squares {
     let cycles = settled_cycles(observed);
     let bins = bins(observed);
@@ -76,14 +76,14 @@ pub(super) fn floor(observed: &Observed<'_>, scatter: &CellResiduals) -> Squares
     }
 }
 
-/// The residual without the mean cycle of the others, blocks of cycles taken out one after the other; with the trend of the
-/// others, where they are enough and it is asked for.
+/// The residual of each block of cycles without the mean cycle of all others, and without their trend where `with_trend` and there are
+/// enough of them.
 pub(super) fn held_out(observed: &Observed<'_>, residuals: &CellResiduals, with_trend: bool) -> CellResiduals {
     let has_trend = with_trend && settled_cycles(observed).len() >= TREND_CYCLES + BLOCK;
     without(observed, residuals, has_trend, |of, other| of / BLOCK != other / BLOCK)
 }
 
-/// Takes from each cycle the mean cycle of those that count for it, by their numbers among the settled ones.
+/// Subtracts from each cycle the mean cycle of those that count for it, by their indices among the settled ones.
 fn without(
     observed: &Observed<'_>,
     residuals: &CellResiduals,
@@ -111,7 +111,7 @@ fn without(
     free
 }
 
-/// Takes each cell's mean out of a cycle.
+/// Subtracts each cell's mean over a cycle.
 fn about_mean(shape: &mut [f64], bins: usize) {
     for cell in shape.chunks_exact_mut(bins) {
         let seen = cell.iter().filter(|own_m| own_m.is_finite());
@@ -120,7 +120,7 @@ fn about_mean(shape: &mut [f64], bins: usize) {
     }
 }
 
-/// A cycle's shape by the others', m; `NaN` where none of them saw.
+/// A cycle's shape predicted from those of others, m; `NaN` where none of them has a value.
 fn predicted_shape(shapes: &[Vec<f64>], others: &[usize], number: usize, has_trend: bool) -> Vec<f64> {
     let entries = shapes.first().map_or(0, Vec::len);
     (0..entries)
@@ -143,7 +143,7 @@ fn predicted_shape(shapes: &[Vec<f64>], others: &[usize], number: usize, has_tre
         .collect()
 }
 
-/// A shape between the middles of its bins, in straight lines that run on at the ends; `NaN` where it is not known.
+/// A shape, linear between the centres of its bins and extrapolated at the ends; `NaN` where it is not known.
 fn between(shape: &[f64], place: f64) -> f64 {
     if shape.len() < 2 {
         return shape.first().copied().unwrap_or(f64::NAN);
@@ -153,8 +153,8 @@ fn between(shape: &[f64], place: f64) -> f64 {
     shape[low] + fraction * (shape[low + 1] - shape[low])
 }
 
-/// The way of the body that the mean residual cycle adds to a model's, at every sample, m: what it gains in each cycle, and what
-/// repeats on it.
+/// Displacement of the body that the mean residual cycle adds to a model's, at every sample, m: the gain per cycle, and the periodic
+/// part.
 pub(super) fn mean_displacement_m(observed: &Observed<'_>, residuals: &CellResiduals) -> Vec<f64> {
     let cells = observed.cells();
     let cycles = settled_cycles(observed);

@@ -1,4 +1,4 @@
-//! What to record, so that positions decide what advances could not.
+//! What to record, so that positions decide what advances cannot.
 //!
 //! Which tips slide and when is in the positions of any run. The slope is the one on which the candidates' advances also lie
 //! farthest apart, so that one run does both.
@@ -10,7 +10,7 @@ use super::model_selection::Judged;
 use super::table::Table;
 use worm_physics::Cycle;
 
-/// Candidates that are told what they predict.
+/// Most candidates whose predictions are listed.
 const MAX_PREDICTIONS: usize = 8;
 
 /// The run to record; none where model and advances agree or one effect is named.
@@ -18,7 +18,7 @@ pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) ->
     if matches!(judged.verdict, Verdict::Agrees | Verdict::Explained) {
         return None;
     }
-    // Where nothing stands in the set, what comes nearest has its say; and always the model without any effect.
+    // Where the set is empty, the nearest effects predict; and always the model without any effect.
     let nearest = if judged.set.is_empty() {
         &judged.others
     } else {
@@ -61,7 +61,7 @@ pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) ->
     })
 }
 
-/// What every rival says of a slope; none where one of them hardly gets on, for that is no experiment.
+/// Predictions of every rival for a slope; none where one of them hardly advances, for that is no experiment.
 fn predict_all(table: &Table<'_>, slope_deg: f64, rivals: &[(String, &Fit)]) -> Option<Vec<(Cycle, f64)>> {
     let min_m = MIN_ADVANCE * table.worm.stroke_m();
     let predicted = rivals.iter().map(|(_, fit)| table.on_slope(slope_deg, fit));

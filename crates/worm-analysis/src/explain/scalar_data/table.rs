@@ -23,10 +23,10 @@ const DESCENTS: usize = 3;
 const GAIN: f64 = 0.03;
 /// Residual of an advance that the worm could not have made.
 const IMPOSSIBLE: f64 = 1e3;
-/// A run that is none of the table's, to which no run's slope error belongs.
+/// Index of a run outside the table, to which no run's slope error applies.
 const NEW_RUN: usize = usize::MAX;
 
-/// Advances, and the worm that is believed to have made them.
+/// Advances, and the nominal worm.
 pub(super) struct Table<'a> {
     pub advances: &'a [Advance],
     pub worm: Worm,
@@ -71,7 +71,7 @@ impl<'a> Table<'a> {
         Physics::of(worm).with(&self.settings).with(&hypothesis.settings(at))
     }
 
-    /// Advance of a run, m; none where the worm slides down.
+    /// Predicted advance of a run, m; none where the worm slides down.
     fn predict_m(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<f64> {
         let advance = &self.advances[run];
         let physics = self.physics(run, (advance.slope_deg, advance.payload_kg), hypothesis, at);
@@ -101,7 +101,7 @@ impl<'a> Table<'a> {
         off_m.sum::<f64>() / self.advances.len() as f64
     }
 
-    /// Whether an effect with some values leaves a steady crawl, and another advance than the believed one.
+    /// Whether an effect with some values leaves a steady crawl, with another advance than the nominal one.
     pub fn shows(&self, hypothesis: &Hypothesis, nominal: &Fit, values: &[f64], min_m: f64) -> bool {
         let at = [&nominal.at, values].concat();
         let is_steady = self.physics(NEW_RUN, (0.0, 0.0), hypothesis, &at).is_periodic();
@@ -112,8 +112,8 @@ impl<'a> Table<'a> {
         is_steady && (0..self.advances.len()).any(changes)
     }
 
-    /// About the misfit that an effect with some values would leave, were the recalibration to do no more than it does about the
-    /// believed worm, and where everything would lie then; none where the worm slides down.
+    /// Chi-squared that an effect with some values would leave after recalibration, to first order about the nominal worm, and the values
+    /// of all quantities then; none where the worm slides down.
     pub fn promise(&self, hypothesis: &Hypothesis, nominal: &Fit, values: &[f64]) -> Option<(f64, Vec<f64>)> {
         let mut at = [&nominal.at, values].concat();
         let runs = self.advances.len();
@@ -137,7 +137,7 @@ impl<'a> Table<'a> {
         Some((left.dot(&whitened), at))
     }
 
-    /// What is left of one advance, in its standard errors.
+    /// Residual of one advance, in its standard errors.
     fn residual(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> f64 {
         let advance = &self.advances[run];
         self.predict_m(run, hypothesis, at).map_or(IMPOSSIBLE, |predicted_m| {

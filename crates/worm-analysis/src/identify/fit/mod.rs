@@ -1,8 +1,8 @@
-//! The continuous estimator of the largest tip deformations: theory laid through everything that was seen.
+//! The continuous estimator of the largest tip deformations: theory fitted to everything that was seen.
 //!
-//! The exact model, started with assumed deformations and run with assumed bounds, says how the body goes; what it leaves of
-//! the measured way is noise and drift. Levenberg and Marquardt's method finds the bounds, the mass where a slope
-//! lets it be seen, and the deformations at the start of each run that leave the least. Unlike the balance of (5) to (7), which
+//! The exact model, started with assumed deformations and run with assumed bounds, predicts the displacement of the body; the residual is
+//! noise and drift. [Least squares](crate::least_squares) finds the bounds, the mass where a slope shows it, and the deformations at the
+//! start of each run that leave the least. Unlike the balance of (5) to (7), which
 //! looks at forces that follow from noisy positions, it uses all that the bounds cause: when sliding begins, how far the body
 //! is pushed back, how far the worm gets. Several runs of one worm share bounds and mass.
 //!
@@ -25,7 +25,7 @@ use crate::least_squares::{self, Derivatives, LeastSquares, Method, normal_matri
 use problem::{BoundsProblem, DAMPING, IMPOSSIBLE};
 use worm_physics::{Worm, WormError};
 
-/// Rise of the misfit, beyond one for each cell, up to which a worm counts as laid down.
+/// Rise of chi-squared, beyond one for each cell, up to which a worm counts as laid down.
 const LAID_DOWN_RISE: f64 = 16.0;
 /// Drifts that are tried, as standard deviations after one cycle, m: from `.0` on, each `.1` times the one before.
 const DRIFTS: (f64, f64, usize) = (2e-7, 2.0, 14);
@@ -95,7 +95,7 @@ pub struct FittedRun {
     pub laid_down: bool,
     /// Standard deviation that the drift gathers in a cycle, m.
     pub drift_per_cycle_m: f64,
-    /// Way of the body by theory at each sample, drift left out, m, from an origin that makes the drift's mean vanish.
+    /// Displacement of the body by theory at each sample, without drift, m, from an origin that makes the drift's mean vanish.
     pub theory_m: Vec<f64>,
     /// The drift at each sample, m.
     pub drift_m: Vec<f64>,
@@ -194,7 +194,7 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// Minimises the misfit from where the parameters are; returns it.
+    /// Minimises chi-squared from the current parameters; returns it.
     fn minimise(&mut self) -> f64 {
         let estimate = least_squares::minimise(self, self.parameters.clone(), None, &DESCENT);
         self.parameters = estimate.at;
@@ -205,7 +205,7 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// Takes the drift that makes the present misfit of each run most likely.
+    /// Finds the drift that makes the present residual of each run most likely.
     fn find_drift(&mut self) {
         for run in 0..self.runs.len() {
             let Some(residual_m) = self.residual_m(run, &self.parameters) else {
