@@ -1,4 +1,4 @@
-//! What comes out of the analysis of a recording. As JSON, its names are a contract.
+//! The result of an analysis. Its names in JSON are a contract.
 
 use serde::Serialize;
 
@@ -12,7 +12,7 @@ pub enum PhaseSource {
     Positions,
 }
 
-/// What was found on one recording. Lists over cells begin with cell 1.
+/// The result for one recording. Lists over cells begin with cell 1.
 #[derive(Debug, Clone, Serialize)]
 pub struct Analysis {
     /// The recording, as it was named.
@@ -43,7 +43,7 @@ pub struct Analysis {
     pub max_deformation_m: Vec<f64>,
     /// Their standard errors, m.
     pub max_deformation_sigma_m: Vec<f64>,
-    /// Whether the tips were found to have been laid down unloaded at the recording's start, which then tells more about them.
+    /// Whether the tips were laid down unloaded at the start of the recording, which makes the estimates more exact.
     pub laid_down: bool,
     /// Time mean of Σ δᵢ over whole cycles (8), m.
     pub mean_deformation_m: f64,
@@ -53,7 +53,7 @@ pub struct Analysis {
     pub mass_sigma_kg: Option<f64>,
     /// Time mean of the total force kt Σ δᵢ + m g sin λ (5) with the configured mass, N: 0 where momentum is balanced.
     pub momentum_violation_n: f64,
-    /// Damping ratio of the body on its contacts, by how it swings when a tip begins to slide.
+    /// Damping ratio of the body on its contacts, from its oscillation when a tip begins to slide.
     pub damping_ratio: f64,
     /// Variance that theory leaves of the measured way, over what noise and drift explain: 1 where theory holds.
     pub misfit_ratio: f64,
@@ -63,11 +63,11 @@ pub struct Analysis {
     pub mean: CycleValues,
     /// Standard deviation over the settled cycles.
     pub std: CycleValues,
-    /// What theory says.
+    /// What theory predicts.
     pub theory: Theory,
     /// Energy that rigid contacts would take over the measured mean advance, J.
     pub rigid_energy_j: f64,
-    /// What a reader of these figures should know.
+    /// Limitations of these figures.
     pub warnings: Vec<String>,
     /// The series behind the figures, sample by sample.
     #[serde(skip)]
@@ -77,7 +77,7 @@ pub struct Analysis {
 /// Largest tip deformations by inspection, section 3.2.1.
 #[derive(Debug, Clone, Serialize)]
 pub struct FirstEstimate {
-    /// Half the way that each cell makes in its step until the others stop moving back, m.
+    /// Half the displacement of each cell in its step until the others stop moving back, m.
     pub max_deformation_m: Vec<f64>,
 }
 
@@ -161,7 +161,7 @@ impl CycleValues {
     }
 }
 
-/// What theory says of a steady cycle.
+/// What theory predicts for a steady cycle.
 #[derive(Debug, Clone, Serialize)]
 pub struct Theory {
     /// The worm with the deformations and stroke found here; none where it slides down.
@@ -176,7 +176,7 @@ pub struct TheoryCycle {
     /// Its figures.
     #[serde(flatten)]
     pub values: CycleValues,
-    /// Largest tip deformations that it rests on, m.
+    /// Largest tip deformations that it is based on, m.
     pub max_deformation_m: Vec<f64>,
     /// Energy that the same worm on rigid contacts would take over the same advance, J.
     pub rigid_energy_j: f64,
@@ -193,7 +193,7 @@ pub struct Series {
     pub stepping_cell: Vec<usize>,
     /// Measured positions, m; `NaN` where not seen.
     pub measured_m: Vec<Vec<f64>>,
-    /// Positions freed of noise, m.
+    /// Positions without noise, m.
     pub position_m: Vec<Vec<f64>>,
     /// Where each tip touches the canal (1 to 3), m.
     pub contact_m: Vec<Vec<f64>>,

@@ -1,4 +1,4 @@
-//! From recordings to figures.
+//! The analysis of recordings.
 
 mod theory;
 
@@ -18,11 +18,11 @@ const PAYLOADS_KG: std::ops::RangeInclusive<f64> = 0.0..=100.0;
 const STROKE_FACTOR: f64 = 2.0;
 /// The same factor between a metre and a millimetre.
 const MILLIMETRES: std::ops::Range<f64> = 300.0..3000.0;
-/// Standard error of a largest tip deformation, m, beyond which it is said that the data do not tell it.
+/// Standard error of a largest tip deformation, m, from which a warning says that the data do not determine it.
 const UNKNOWN_M: f64 = 1e-4;
-/// Misfit over what noise and drift explain that is worth a word.
+/// Ratio of the residual to what noise and drift explain, from which there is a warning.
 const NOTABLE_MISFIT: f64 = 1.5;
-/// How far the mean cycle time may be from the stated one, as a share.
+/// How far the mean cycle time may be from the stated one, as a fraction.
 const CYCLE_FRACTION: f64 = 0.2;
 
 /// One recording and the conditions that it was made under.
@@ -38,12 +38,12 @@ pub struct RecordedRun<'a> {
     pub cycle_s: Option<f64>,
 }
 
-/// How far an analysis is.
+/// Progress of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// What is being done.
+    /// Current stage.
     pub stage: &'static str,
-    /// Share of everything that is done, 0 to 1.
+    /// Fraction done, 0 to 1.
     pub fraction: f64,
 }
 

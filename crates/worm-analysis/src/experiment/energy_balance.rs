@@ -1,8 +1,8 @@
-//! The tips followed along a worm's path: contact points, deformations, slides, energy, cycle by cycle (1 to 4, 10 to 13).
+//! Follows the tips along a worm's path: contact points, deformations, slides, energy, cycle by cycle (1 to 4, 10 to 13).
 //!
-//! The path is that of the fit: theory's way of the body with the drift on it, the cells where the gait has them. It is free of
-//! noise, so a tip slides where the worm's did and not with every peak of the noise; and where theory and worm
-//! part, the drift follows the worm.
+//! The path is that of the fit: the displacement of the body by theory plus the drift, with the cells where the gait has them. It is free
+//! of noise, so a tip slides where the worm's did and not with every peak of the noise; where theory and worm differ, the drift
+//! follows the worm.
 
 use super::analysis::{CycleResult, CycleValues, Series};
 use crate::identify::gait::steps_made;
@@ -11,7 +11,7 @@ use crate::identify::{FittedRun, IdentifiedGait};
 use crate::recording::Recording;
 use worm_physics::{Ledger, SlidesDown, Worm};
 
-/// Parts into which a step is cut at least, so that forces run straight in each.
+/// Fewest parts of a step, so that forces are linear in each.
 const PARTS: f64 = 64.0;
 /// Distance from the bound, as a share of the bound, that counts as sliding in the series.
 const SLIDING: f64 = 1e-9;
@@ -21,7 +21,7 @@ const SLIDING: f64 = 1e-9;
 pub(super) struct EnergyBalance {
     /// Whole gait cycles.
     pub cycles: Vec<CycleResult>,
-    /// Everything at every sample.
+    /// The series at every sample.
     pub series: Series,
     /// Samples from the beginning of the first settled cycle to the end of the last.
     pub settled: std::ops::Range<usize>,

@@ -1,12 +1,11 @@
-//! Section 3 of the paper on recordings: what the worm did, what it cost, and what theory says.
+//! Section 3 of the paper on recordings: what the worm did, the energy it took, and what theory predicts.
 //!
-//! # The story
-//! [`analyze`] takes recordings and the conditions they were made under. [`identify`](crate::identify) finds gait, largest tip
-//! deformations and the path of the worm; `energy_balance` follows the tips along that path, and books slides and energy cycle by
-//! cycle; theory, of the worm found and of the worm configured, stands beside it. All of it is an [`Analysis`], which
+//! [`analyze`] takes recordings and the conditions under which they were made. [`identify`](crate::identify) finds gait, largest tip
+//! deformations and the path of the worm; `energy_balance` follows the tips along that path and sums up slides and energy cycle by
+//! cycle. The steady cycles of the identified and of the configured worm stand beside it. The result is an [`Analysis`], which
 //! [`report`](crate::report) draws and the command line prints as JSON.
 //!
-//! Pure: recordings in, figures out; knows of no files.
+//! Pure: recordings in, figures out, no files.
 
 mod analysis;
 mod analyze;

@@ -1,7 +1,7 @@
-//! A recording from the model: what motion capture would have seen of the configured worm.
+//! A recording made by the model: what motion capture would show of the configured worm.
 //!
-//! The cam turns evenly, or as fast as a motor that droops under load lets it; [`Locomotion`] carries the cells under every
-//! `[[effect]]`; each position is seen as the sensor sees it, then gets its noise or is lost. The same seed gives the same recording.
+//! The cam turns evenly, or as fast as a motor that droops under load lets it. [`Locomotion`] moves the cells under every `[[effect]]`.
+//! Each position is measured as the configured sensor would, then gets noise or is lost. The same seed gives the same recording.
 
 use crate::recording::Recording;
 use rand::{RngExt, SeedableRng};

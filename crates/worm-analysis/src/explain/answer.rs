@@ -1,11 +1,11 @@
-//! What the search found: the JSON contract of `wormd explain`, and what its page is drawn from.
+//! The result of the search: the JSON contract of `wormd explain`, and what its page draws.
 //!
-//! Cells count from 1 here, as people read them; phases count gait cycles from the start of one, 0 to 1.
+//! Cells count from 1 here. Phases are fractions of a gait cycle, 0 to 1.
 
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// The outcome in a word.
+/// The verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -22,9 +22,9 @@ pub enum Verdict {
 /// The whole answer.
 #[derive(Debug, Clone, Serialize)]
 pub struct Answer {
-    /// The outcome in a word.
+    /// The verdict.
     pub verdict: Verdict,
-    /// The outcome in a sentence or two.
+    /// The verdict in a sentence or two.
     pub sentence: String,
     /// The effects that explain the data: one, or a pair that acts together; empty unless explained or ambiguous.
     pub effects: Vec<NamedEffect>,
@@ -37,18 +37,18 @@ pub struct Answer {
     pub stages: Vec<Stage>,
     /// What is left, where nothing explains it.
     pub remainder: Option<Remainder>,
-    /// What would best settle what is open.
+    /// The experiment that would best decide between what is left open.
     pub next_experiment: Option<NextExperiment>,
-    /// The recalibrated model: what was free within its prior, and where it came to lie.
+    /// The recalibrated model: what was free within its prior, and the values found.
     pub calibration: Vec<Calibrated>,
     /// The screening of the whole library, most significant first.
     pub screening: Vec<Screened>,
-    /// Improvement, in units of the log likelihood ratio, that the best of the whole library would reach by chance alone one
-    /// time in twenty.
+    /// Improvement that an effect must exceed: what the best of the whole library reaches by chance one time in twenty, with a
+    /// margin. In units of twice the log likelihood.
     pub threshold: f64,
     /// The recordings.
     pub runs: Vec<RunSummary>,
-    /// What the user should know.
+    /// Limitations of this answer.
     pub warnings: Vec<String>,
     /// Series and maps for figures; not part of the JSON.
     #[serde(skip)]
@@ -56,7 +56,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Whether it rests on advances alone, without a recording.
+    /// Whether it is based on advances alone, without a recording.
     pub fn is_by_advances(&self) -> bool {
         !self.runs.is_empty() && self.runs.iter().all(|run| run.advance_sigma_m.is_some())
     }
@@ -67,16 +67,16 @@ impl Answer {
 pub struct NamedEffect {
     /// Its name in the library.
     pub name: String,
-    /// Effects or descriptions that no positions can tell from it.
+    /// Names and descriptions of what no positions can distinguish from it.
     pub twins: Vec<String>,
     /// Its parameters.
     pub parameters: Vec<FoundParameter>,
-    /// The cell where one is meant, from 1.
+    /// The cell it acts on, from 1; none for all.
     pub cell: Option<usize>,
     /// The other effects of the same answer, in words: a pair explains the data only together.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub together_with: Vec<String>,
-    /// Share of the gap after recalibration that it closes, down to the noise floor, on cycles that it was not fitted to.
+    /// Fraction of the gap after recalibration that it closes, down to the noise floor, on cycles that it was not fitted to.
     pub closure: f64,
     /// Its closure less that of the best effect of another kind.
     pub margin: f64,
@@ -84,18 +84,18 @@ pub struct NamedEffect {
     pub probability: f64,
     /// Improvement over the recalibrated model: rise of twice the log likelihood.
     pub improvement: f64,
-    /// Which experiment tells it from its neighbours.
+    /// Which experiment distinguishes it from its neighbours.
     pub separated_by: String,
 }
 
 impl NamedEffect {
-    /// Its name, and its cell where one is meant.
+    /// Its name, and its cell where it acts on one.
     pub fn in_words(&self) -> String {
         with_cell(&self.name, self.cell)
     }
 }
 
-/// An effect with its cell, from 1, where one is meant: `unequal-clamping of cell 2`.
+/// An effect with its cell, from 1, where it acts on one: `unequal-clamping of cell 2`.
 pub fn with_cell(name: &str, cell: Option<usize>) -> String {
     match cell {
         Some(cell) => format!("{name} of cell {cell}"),
@@ -118,7 +118,7 @@ pub fn answers_in_words(rivals: &[NamedEffect]) -> Vec<String> {
     answers.into_iter().map(|(_, words)| words).collect()
 }
 
-/// A parameter as found.
+/// A parameter and the value found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FoundParameter {
     /// Name in files.
@@ -129,7 +129,7 @@ pub struct FoundParameter {
     pub sigma: f64,
     /// Its unit; empty for none.
     pub unit: String,
-    /// The cell where one is meant, from 1.
+    /// The cell it acts on, from 1; none for all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell: Option<usize>,
 }
@@ -145,7 +145,7 @@ pub struct Place {
     pub phase: f64,
     /// Slope of the run, degrees.
     pub slope_deg: f64,
-    /// Way that the cell makes in the bin beyond the model's, m in each cycle.
+    /// Displacement of the cell within the bin beyond the model's, m in each cycle.
     pub residual_m: f64,
     /// That in standard errors, by bootstrap over blocks of cycles.
     pub significance: f64,
@@ -190,13 +190,13 @@ pub struct Stage {
 /// What no effect explains.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Remainder {
-    /// In words: which cells, phases and slopes, which period.
+    /// In words: cells, phases, slopes and period.
     pub description: String,
-    /// Share of the gap that stays open after the best effect.
+    /// Fraction of the gap that stays open after the best effect.
     pub open_share: f64,
-    /// Every how many cycles it comes back, where it does so in time.
+    /// Period in cycles, where it repeats in time.
     pub period_cycles: Option<f64>,
-    /// Every how much canal it comes back, m, where it does so along the way.
+    /// Period along the canal, m, where it repeats in space.
     pub period_m: Option<f64>,
     /// Where it is largest.
     pub places: Vec<Place>,
@@ -253,12 +253,11 @@ pub enum ExperimentChange {
 pub struct NextExperiment {
     /// What to change, or to measure.
     pub change: ExperimentChange,
-    /// To which value; none for a measurement.
+    /// The new value; none for a measurement.
     pub value: Option<f64>,
     /// Unit of the value.
     pub unit: String,
-    /// Slope of the run to be made, degrees: that of the run to be repeated where something else is changed; none for a
-    /// measurement.
+    /// Slope of the run to make, degrees; that of the run to repeat where something else is changed. None for a measurement.
     pub slope_deg: Option<f64>,
     /// In words, with how to do it.
     pub description: String,
@@ -268,7 +267,7 @@ pub struct NextExperiment {
     pub separation_sigma: Option<f64>,
 }
 
-/// What an effect predicts of an experiment.
+/// What an effect predicts for an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Prediction {
     /// The effect.
@@ -284,7 +283,7 @@ pub struct Prediction {
 pub struct Calibrated {
     /// What it is.
     pub name: String,
-    /// The value believed.
+    /// The nominal value.
     #[serde(rename = "believed")]
     pub nominal: f64,
     /// The value found.
@@ -293,7 +292,7 @@ pub struct Calibrated {
     pub sigma: f64,
     /// Its unit; empty for none.
     pub unit: &'static str,
-    /// It lies at the end of what its prior allows.
+    /// It lies on a limit of its prior.
     pub at_limit: bool,
 }
 
@@ -316,17 +315,17 @@ pub enum ScreeningOutcome {
 pub struct Screened {
     /// The effect.
     pub name: String,
-    /// The cell where one is meant, from 1.
+    /// The cell it acts on, from 1; none for all.
     pub cell: Option<usize>,
     /// Expected rise of twice the log likelihood, to first order.
     pub score: f64,
-    /// Rise of twice the log likelihood after the refit, where it was refitted; none where it did not converge.
+    /// Rise of twice the log likelihood by the refit; none where it was not refitted or did not converge.
     pub improvement: Option<f64>,
     /// What became of it.
     pub outcome: ScreeningOutcome,
 }
 
-/// A recording of the campaign.
+/// A run of the campaign.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunSummary {
     /// Where it comes from.
@@ -341,28 +340,28 @@ pub struct RunSummary {
     pub cycle_s: f64,
     /// Whether the gait phase was recorded.
     pub phase_recorded: bool,
-    /// Whether the worm was laid down where the recording begins.
+    /// Whether the recording starts with the worm just laid down.
     pub laid_down: bool,
     /// Standard deviation of one position, m.
     pub noise_m: f64,
-    /// Random walk that the body makes in a cycle beyond any model, m.
+    /// Standard deviation of the random walk that the body makes in a cycle beyond any model, m.
     pub drift_per_cycle_m: f64,
     /// Mean advance per cycle: measured, by the recalibrated model, by the named one (where there is one), m.
     pub advance_m: [f64; 3],
-    /// Standard error of the measured one, m, where it alone was given, without a recording; whatever needs positions then has
-    /// no value.
+    /// Standard error of the measured advance, m, where the run is known by its advance alone; figures that need positions are
+    /// then `NaN`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub advance_sigma_m: Option<f64>,
 }
 
-/// What the page draws beyond the JSON.
+/// Series and maps that the page draws, beyond the JSON.
 #[derive(Debug, Clone, Default)]
 pub struct Figures {
     /// One map for each run: residual of the recalibrated model.
     pub maps_before: Vec<ResidualMap>,
     /// The same for the named model, where there is one.
     pub maps_after: Vec<ResidualMap>,
-    /// Each run's way of the body within a cycle.
+    /// Each run's displacement of the body within a cycle.
     pub cycles: Vec<CycleSeries>,
     /// The old model's text and the new one's difference to it, as lines with ' ', '-' or '+' before them.
     pub model_diff: Vec<String>,
@@ -377,11 +376,11 @@ pub struct ResidualMap {
     pub stepping_cell: Vec<usize>,
     /// Phase at the middle of each bin.
     pub phase: Vec<f64>,
-    /// Way beyond the model's in the bin, mean over the cycles, m: `[cell][bin]`.
+    /// Displacement within the bin beyond the model's, mean over the cycles, m: `[cell][bin]`.
     pub residual_m: Vec<Vec<f64>>,
-    /// That in standard errors: `[cell][bin]`; `NaN` where too few cycles tell.
+    /// That in standard errors: `[cell][bin]`; `NaN` where too few cycles were seen.
     pub significance: Vec<Vec<f64>>,
-    /// What the largest significance on all maps of the campaign stays below by chance, nineteen times in twenty.
+    /// The significance that the largest on all maps of the campaign stays below by chance nineteen times in twenty.
     pub limit: f64,
 }
 
@@ -397,7 +396,7 @@ pub struct CycleSeries {
     pub measured_m: Vec<f64>,
     /// Standard deviation over the cycles, m.
     pub scatter_m: Vec<f64>,
-    /// By the believed model, m.
+    /// By the nominal model, m.
     pub baseline_m: Vec<f64>,
     /// By the recalibrated model, m.
     pub recalibrated_m: Vec<f64>,

@@ -1,19 +1,19 @@
-//! What a hypothesis says of data that it was not fitted to.
+//! How well a hypothesis predicts data that it was not fitted to.
 //!
-//! Whole slopes are left out one after the other, and blocks of neighbouring cycles on all slopes. For each the fit is made
-//! anew by Gauss-Newton steps on what remains, and the residuals that it leaves on what was left out are simulated exactly. Every
-//! sample is left out once in each way; the mean over both ways counts.
+//! The data are partitioned in two ways: by slopes, and by blocks of neighbouring cycles on all slopes. Each part is left out in turn;
+//! the hypothesis is refitted to the rest by Gauss-Newton steps, and its residuals on the part left out are simulated exactly. The
+//! score is the mean over both partitions.
 //!
 //! # The score
-//! What was left out has conditions of its own that nothing else tells, such as how its slope was off. So the score is twice the
-//! negative logarithm of the probability that the fit gives to the data left out, with all that it does not know: with residuals r
-//! there, derivatives J, and C the covariance that what remains leaves,
+//! Data left out have conditions of their own that the rest does not determine, such as the error of their slope. So the score is
+//! twice the negative logarithm of the probability density that the fit predicts for them, its uncertainty included. With residuals
+//! r there, derivatives J, and C the covariance that the rest leaves,
 //!
 //! ```text
 //! rᵀ (1 + J C Jᵀ)⁻¹ r + log det (1 + J C Jᵀ) = |r|² − gᵀ N⁻¹ g + log (det N / det C⁻¹),   N = C⁻¹ + Jᵀ J,   g = Jᵀ r
 //! ```
-//! An effect that could have been anything gives little to any outcome, and so pays for its freedom. Added is what the values of the
-//! whole fit cost by their priors: of two hypotheses that say the same of the data, that which need be less extreme is the likelier.
+//! A vague effect predicts everything with a low density and so pays for its freedom. The priors' part of chi-squared of the whole
+//! fit is added: of two hypotheses that predict the same, the one with less extreme values is more likely.
 
 use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 /// Blocks of neighbouring cycles.
 const BLOCKS: usize = 3;
-/// Steps of the fit anew.
+/// Steps of each refit.
 const STEPS: usize = 2;
 
 /// What is left out at once.
@@ -36,20 +36,23 @@ pub(super) struct Fold {
 /// A fit, and what was left out for it, as [`Fold::left_out`] says.
 pub(super) type FitWithout = (Fit, Vec<Vec<bool>>);
 
-/// A hypothesis on data that it was not fitted to.
+/// How a hypothesis does on data that it was not fitted to.
 #[derive(Debug, Clone)]
 pub(super) struct HeldOut {
-    /// The score: as a misfit, mean over the ways of leaving out.
+    /// The score, as a chi-squared: mean over the partitions.
     pub chi_squared: f64,
-    /// The fit anew without each fold.
+    /// The refit without each fold.
     pub fits: Vec<FitWithout>,
 }
 
 impl HeldOut {
-    /// The fits of each way of leaving out: every sample is left out once in each.
-    pub fn ways(&self) -> Vec<&[FitWithout]> {
+    /// The refits of each partition: every sample is left out once in each.
+    pub fn partitions(&self) -> Vec<&[FitWithout]> {
         let (slopes, blocks) = self.fits.split_at(self.fits.len().saturating_sub(BLOCKS));
-        [slopes, blocks].into_iter().filter(|way| !way.is_empty()).collect()
+        [slopes, blocks]
+            .into_iter()
+            .filter(|partition| !partition.is_empty())
+            .collect()
     }
 }
 
@@ -105,7 +108,7 @@ impl Fold {
     }
 }
 
-/// Holds a fitted hypothesis, whose derivatives are there, against every fold.
+/// Scores a fitted hypothesis, which has its derivatives, on every fold.
 pub(super) fn hold_out(problem: &FitProblem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
     let refit = |fold: &Fold| {
         let stays = fold.stays(problem);
@@ -119,9 +122,9 @@ pub(super) fn hold_out(problem: &FitProblem<'_, '_>, fit: &Fit, folds: &[Fold]) 
     };
     let anew: Vec<(f64, FitWithout)> = folds.par_iter().map(refit).collect();
     let slopes = folds.len() - BLOCKS;
-    let ways = if slopes > 0 { 2.0 } else { 1.0 };
+    let partitions = if slopes > 0 { 2.0 } else { 1.0 };
     HeldOut {
-        chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / ways
+        chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / partitions
             + prior_chi_squared(&fit.hypothesis.quantities(), &fit.at),
         fits: anew.into_iter().map(|(_, without)| without).collect(),
     }

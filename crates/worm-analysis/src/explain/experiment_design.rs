@@ -1,9 +1,9 @@
-//! The next experiment: which one change of a run would best tell apart what this campaign could not.
+//! The next experiment: the one change of a run that would best decide what this campaign could not.
 //!
-//! Every change is tried out on paper: the run is simulated under each rival's fitted physics, seen through the noise that the
-//! campaign had, and the rivals' predictions are compared with everything free in them still free (see [`trial`]). What counts is
-//! the distance between the two nearest; more than enough is not better, so a cheaper run that settles it goes before a dearer
-//! one that settles it twice. Where no run tells the rivals apart, a measurement on the bench is proposed.
+//! Every change is simulated under each rival's fitted physics, with the noise of the campaign, and the predictions are compared with
+//! everything free in them still free (see [`trial`]). The figure of merit is the distance between the two nearest predictions. More than
+//! enough is not better, so a cheaper run that decides comes before a dearer one that decides twice over. Where no run
+//! separates the rivals, a measurement on the bench is proposed.
 
 mod change;
 mod trial;
@@ -14,31 +14,31 @@ use super::parameter::{Hypothesised, What};
 pub(super) use change::SLOPES_DEG;
 use change::{BY_COST, Change, changes, cost};
 use rayon::prelude::*;
-use trial::{Reach, Said, Trial, blank, plain_distance};
+use trial::{Adjustment, RunOutcome, Trial, empty_recording, plain_distance};
 use worm_physics::effect::Setting;
 
-/// Distance that settles a question, and least distance of a run that is worth it, standard deviations.
+/// Distance that decides, and smallest distance of a run that is worth making, standard deviations.
 const SETTLES: f64 = 5.0;
 const WORTH_IT: f64 = 3.0;
-/// Changes of one kind that are looked at closely.
+/// Changes of one kind that are evaluated in full.
 const CLOSE_LOOKS: usize = 2;
-/// Share of the stroke that every rival's worm must advance in a cycle: one that hardly gets on is no experiment.
+/// Fraction of the stroke that every rival's worm must advance in a cycle: one that hardly advances is no experiment.
 pub(super) const MIN_ADVANCE: f64 = 0.05;
 
-/// A change with what it would show.
-struct Weighed {
+/// A change with the separation it would give.
+struct ScoredChange {
     change: Change,
     separation: f64,
 }
 
-impl Weighed {
-    /// What it is worth for what it costs; more than enough is worth no more.
+impl ScoredChange {
+    /// Separation for its cost; more than enough is worth no more.
     fn worth(&self) -> f64 {
         self.separation.min(SETTLES) / cost(self.change.what)
     }
 }
 
-/// The run that best tells apart rivals that were fitted and have their derivatives; none with fewer than two.
+/// The run that best separates rivals, fitted with derivatives; none with fewer than two.
 ///
 /// `cycle_s` is the usual time of a gait cycle.
 pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
@@ -47,12 +47,13 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
     }
     let changes = changes(problem.scene, cycle_s);
     let plain_distance_of = |change: &Change| {
-        let blank = blank(problem, change);
-        let said = ask_all(&Trial::new(problem, change, &blank)?, candidates)?;
-        let crawls = |said: &Said| said.advance_m > MIN_ADVANCE * problem.scene.nominal[0].worm.stroke_m();
-        said.iter()
+        let empty_recording = empty_recording(problem, change);
+        let outcomes = predict_all(&Trial::new(problem, change, &empty_recording)?, candidates)?;
+        let crawls = |outcome: &RunOutcome| outcome.advance_m > MIN_ADVANCE * problem.scene.nominal[0].worm.stroke_m();
+        outcomes
+            .iter()
             .all(crawls)
-            .then(|| nearest(&said, |a, b| plain_distance(&said[a], &said[b])))
+            .then(|| nearest(&outcomes, |a, b| plain_distance(&outcomes[a], &outcomes[b])))
     };
     let plain: Vec<Option<f64>> = changes.par_iter().map(plain_distance_of).collect();
     let mut possible: Vec<(f64, Change)> = plain
@@ -61,9 +62,9 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         .filter_map(|(distance, change)| Some((distance?, change)))
         .collect();
     possible.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut best: Option<Weighed> = None;
+    let mut best: Option<ScoredChange> = None;
     for what in BY_COST {
-        // The dearer kinds could not be worth more than one that settles it already.
+        // Dearer kinds cannot be worth more than one that decides already.
         if best.as_ref().is_some_and(|best| best.worth() > SETTLES / cost(what)) {
             break;
         }
@@ -72,46 +73,46 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
             let Some(separation) = separation(problem, candidates, &change) else {
                 continue;
             };
-            let weighed = Weighed { change, separation };
+            let scored = ScoredChange { change, separation };
             let is_better = best.as_ref().is_none_or(|best| {
-                let order = weighed.worth().total_cmp(&best.worth());
+                let order = scored.worth().total_cmp(&best.worth());
                 order.then(separation.total_cmp(&best.separation)).is_gt()
             });
             if is_better {
-                best = Some(weighed);
+                best = Some(scored);
             }
         }
     }
     match best.filter(|best| best.separation >= WORTH_IT) {
-        Some(best) => in_answer(problem, candidates, &best),
+        Some(best) => proposal(problem, candidates, &best),
         None => on_the_bench(candidates),
     }
 }
 
-/// What every rival says of a run; none where the worm of one does not hold.
-fn ask_all(trial: &Trial<'_>, candidates: &[&Fit]) -> Option<Vec<Said>> {
-    candidates.iter().map(|rival| trial.ask(rival)).collect()
+/// Predictions of every rival for a run; none where the worm of one does not hold.
+fn predict_all(trial: &Trial<'_>, candidates: &[&Fit]) -> Option<Vec<RunOutcome>> {
+    candidates.iter().map(|rival| trial.predict(rival)).collect()
 }
 
 /// The smallest distance between any two rivals.
-fn nearest(said: &[Said], distance: impl Fn(usize, usize) -> f64) -> f64 {
-    let pairs = (0..said.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+fn nearest(outcomes: &[RunOutcome], distance: impl Fn(usize, usize) -> f64) -> f64 {
+    let pairs = (0..outcomes.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
     pairs.map(|(a, b)| distance(a, b)).fold(f64::INFINITY, f64::min)
 }
 
 /// Distance between the two nearest predictions of a run, standard deviations, whichever of the two is true.
 fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change) -> Option<f64> {
-    let blank = blank(problem, change);
-    let trial = Trial::new(problem, change, &blank)?;
-    let said = ask_all(&trial, candidates)?;
-    // What recalibration does hardly depends on the effect beside it, so one rival's derivatives serve all: the quickest one's.
+    let empty_recording = empty_recording(problem, change);
+    let trial = Trial::new(problem, change, &empty_recording)?;
+    let outcomes = predict_all(&trial, candidates)?;
+    // Derivatives of nuisances hardly depend on the effect beside them, so those of one rival serve all: the quickest to simulate.
     let quick = candidates
         .iter()
         .position(|rival| trial.is_periodic(rival))
         .unwrap_or(0);
     let tasks: Vec<(usize, usize)> = (0..candidates.len())
         .flat_map(|rival| {
-            Trial::matter(candidates[rival])
+            Trial::relevant_quantities(candidates[rival])
                 .into_iter()
                 .map(move |quantity| (rival, quantity))
         })
@@ -119,7 +120,7 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
         .collect();
     let columns: Vec<Vec<f64>> = tasks
         .par_iter()
-        .map(|&(rival, quantity)| trial.derivative(candidates[rival], &said[rival], quantity))
+        .map(|&(rival, quantity)| trial.derivative(candidates[rival], &outcomes[rival], quantity))
         .collect();
     let column = |rival: usize, quantity: usize| {
         let bought = tasks.iter().position(|&task| {
@@ -128,16 +129,16 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
         });
         bought.map(|task| columns[task].clone())
     };
-    let reaches: Vec<Reach> = (0..candidates.len())
+    let adjustments: Vec<Adjustment> = (0..candidates.len())
         .map(|rival| {
-            let matter = Trial::matter(candidates[rival]);
-            let columns = matter.into_iter().map(|quantity| column(rival, quantity));
-            Reach::new(candidates[rival], columns.collect::<Option<_>>()?)
+            let relevant_quantities = Trial::relevant_quantities(candidates[rival]);
+            let columns = relevant_quantities.into_iter().map(|quantity| column(rival, quantity));
+            Adjustment::new(candidates[rival], columns.collect::<Option<_>>()?)
         })
         .collect::<Option<_>>()?;
-    Some(nearest(&said, |a, b| {
-        let by_a = reaches[a].distance(&said[a], &said[b]);
-        by_a.min(reaches[b].distance(&said[a], &said[b]))
+    Some(nearest(&outcomes, |a, b| {
+        let by_a = adjustments[a].distance(&outcomes[a], &outcomes[b]);
+        by_a.min(adjustments[b].distance(&outcomes[a], &outcomes[b]))
     }))
 }
 
@@ -149,22 +150,25 @@ fn same(candidates: &[&Fit], (rival, quantity): (usize, usize), other: usize) ->
     others.iter().position(|free| is_nuisance && free.what == what)
 }
 
-/// A run as the answer tells it.
-fn in_answer(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &Weighed) -> Option<NextExperiment> {
-    let blank = blank(problem, &best.change);
-    let trial = Trial::new(problem, &best.change, &blank)?;
-    let said = ask_all(&trial, candidates)?;
+/// The proposal of a run.
+fn proposal(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &ScoredChange) -> Option<NextExperiment> {
+    let empty_recording = empty_recording(problem, &best.change);
+    let trial = Trial::new(problem, &best.change, &empty_recording)?;
+    let outcomes = predict_all(&trial, candidates)?;
     let slope = format!("{}°", best.change.slope_deg).replace('-', "−");
     let predictions = candidates
         .iter()
-        .zip(&said)
+        .zip(&outcomes)
         .enumerate()
         .map(|(number, (rival, mine))| Prediction {
             effect: name(rival),
             advance_m: Some(mine.advance_m),
             description: match number {
                 0 => format!("at {slope}"),
-                _ => format!("at {slope}, {}", beside(&trial, mine, &said[0], &name(candidates[0]))),
+                _ => format!(
+                    "at {slope}, {}",
+                    difference_in_words(&trial, mine, &outcomes[0], &name(candidates[0]))
+                ),
             },
         });
     let what = best.change.what;
@@ -179,8 +183,8 @@ fn in_answer(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &Weighed) 
     })
 }
 
-/// How a prediction differs from the first one: in its advance, and within a cycle.
-fn beside(trial: &Trial<'_>, mine: &Said, first: &Said, first_name: &str) -> String {
+/// Difference of a prediction from the first one: in its advance, and within a cycle.
+fn difference_in_words(trial: &Trial<'_>, mine: &RunOutcome, first: &RunOutcome, first_name: &str) -> String {
     let farther_m = mine.advance_m - first.advance_m;
     let phase = trial.phase();
     let end = phase[phase.len() - 1];
@@ -207,7 +211,7 @@ fn beside(trial: &Trial<'_>, mine: &Said, first: &Said, first_name: &str) -> Str
     )
 }
 
-/// A measurement that tells what no crawl does; none where no rival supposes anything.
+/// A measurement on the bench, where no run decides; none where no rival has an effect.
 fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
     let hypothesised = candidates
         .iter()
@@ -231,7 +235,7 @@ fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
     })
 }
 
-/// What a rival supposes, by name.
+/// Names of the effects of a rival.
 fn name(rival: &Fit) -> String {
     let names: Vec<String> = rival.hypothesis.hypothesised.iter().map(name_of).collect();
     if names.is_empty() {
@@ -248,7 +252,7 @@ fn name_of(hypothesised: &Hypothesised) -> String {
     }
 }
 
-/// The values that a rival found.
+/// The fitted values of a rival.
 fn values(rival: &Fit) -> String {
     let value = |setting: &Setting| {
         let with_value = setting.effect().parameters.iter().zip(setting.values());

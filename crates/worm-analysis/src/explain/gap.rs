@@ -1,17 +1,16 @@
-//! How far each model is off, stage by stage, from the believed one down to the noise floor.
+//! How far each model is off, stage by stage, from the nominal one down to the noise floor.
 //!
 //! # The figures
-//! - *rms*: of every cell's residual within a cycle, its mean in that cycle taken out; so a body that went astray earlier does not
-//!   count, and a wrong advance does. Over the settled whole cycles, all cells, all runs.
-//! - *advance*: how much more the worm advances in a cycle than the model, from residuals at the same phase of different cycles, by
-//!   a straight line over the cycles through all phases and cells.
-//! - *energy*: per cycle by (11). Nobody measured it; the reference is what the contacts of the best model take when they are
-//!   carried along the measured path, that model's way with its smoothed residual on it, as [`crate::experiment`] accounts for a
-//!   recording.
+//! - *rms*: of every cell's residual within a cycle, its mean in that cycle removed; so earlier errors of the body do not count, and a
+//!   wrong advance does. Over the settled whole cycles, all cells, all runs.
+//! - *advance*: how much more the worm advances in a cycle than the model: the slope of a straight line over the cycles through
+//!   residuals at the same phase, common to all phases and cells.
+//! - *energy*: per cycle by (11). Nobody measured it; the reference is the energy that the contacts of the best model take along the
+//!   measured path, which is that model's path plus its smoothed residual, as [`crate::experiment`] computes it for a recording.
 //!
 //! # The two ends
-//! The *free form* adds to the recalibrated model whatever its residual does in the mean over the cycles: about as much as any
-//! law that repeats could close. The *floor* is how single cycles scatter about that: no model of what repeats goes below.
+//! The *free form* adds the mean cycle of its residual to the recalibrated model: about as much as any periodic law could explain.
+//! The *floor* is the scatter of single cycles about that: no periodic model falls below it.
 
 mod energy;
 mod free_form;
@@ -26,30 +25,30 @@ use super::residual::Residual;
 pub(super) use mean_cycle::cycles;
 use std::ops::Range;
 
-/// Share of a cycle by which the last one may fall short and still be whole.
+/// Fraction of a cycle that the last one may lack and still count as whole.
 const SHORT: f64 = 0.05;
-/// Share of a cycle by which the first settled sample may miss the cycle's beginning.
+/// Fraction of a cycle by which the first settled sample may miss the start of the cycle.
 const LATE: f64 = 0.1;
 /// Mean of the absolute value of a normal quantity, in standard deviations.
 const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
 
-/// A campaign with the energy that its motion took by the best model's contacts: what the stages are measured by.
+/// A campaign with the energy that its motion took by the contacts of the best model: the reference for all stages.
 pub(super) struct Measured<'p, 's, 'a> {
     problem: &'p FitProblem<'s, 'a>,
     /// Of each run's settled cycles, J; none where the best model cannot make the run.
     energy_j: Vec<Option<Vec<f64>>>,
-    /// What the best model leaves of each run; none where it cannot make it.
-    left: Vec<Option<Left>>,
+    /// Residuals of the best model in each run; none where it cannot make the run.
+    residuals: Vec<Option<CellResiduals>>,
 }
 
-/// What a model leaves of a run: every cell's residual, m, `[sample][cell]`, flat; `NaN` where not seen.
+/// Every cell's residual in a run, m, `[sample][cell]`, flat, and the body's, m; `NaN` where not seen.
 #[derive(Debug, Clone)]
-struct Left {
+struct CellResiduals {
     own_m: Vec<f64>,
     body_m: Vec<f64>,
 }
 
-impl Left {
+impl CellResiduals {
     fn new(observed: &Observed<'_>, predicted: &Predicted) -> Self {
         let residual = Residual::new(observed, predicted);
         let cells = observed.cells();
@@ -76,7 +75,7 @@ struct Cycle {
     samples: Range<usize>,
 }
 
-/// A mean of squares under way.
+/// A running mean of squares.
 #[derive(Debug, Clone, Copy, Default)]
 struct Squares {
     sum: f64,
@@ -89,39 +88,39 @@ impl Squares {
         self.count += other.count;
     }
 
-    /// `NaN` of nothing.
+    /// `NaN` without values.
     fn rms(self) -> f64 {
         (self.sum / self.count).sqrt()
     }
 }
 
 impl<'p, 's, 'a> Measured<'p, 's, 'a> {
-    /// The reference by the best fit there is.
+    /// The reference by the best fit.
     pub fn new(problem: &'p FitProblem<'s, 'a>, best: &Fit) -> Self {
         let runs = 0..problem.scene.observed.len();
-        let left: Vec<Option<Left>> = runs.map(|run| Left::of(problem, run, best)).collect();
-        let energy = |(run, left): (usize, &Option<Left>)| {
-            let drift_m = problem.noise[run].drift.smooth(&left.as_ref()?.body_m);
+        let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(problem, run, best)).collect();
+        let energy = |(run, residuals): (usize, &Option<CellResiduals>)| {
+            let drift_m = problem.noise[run].drift.smooth(&residuals.as_ref()?.body_m);
             let walk = energy::carried(problem, run, best, &drift_m)?;
             Some(walk.energy_j(&problem.scene.observed[run]))
         };
         Self {
             problem,
-            energy_j: left.iter().enumerate().map(energy).collect(),
-            left,
+            energy_j: residuals.iter().enumerate().map(energy).collect(),
+            residuals,
         }
     }
 
-    /// The stage of a model, fitted to everything in `all`. In each of `folds` it was fitted without the cycles for which the list
-    /// of their run says so, numbered by whole cycles from the first sample; without folds it was fitted to nothing, and is
-    /// off by as much everywhere. Figures are `NaN` where the model cannot make a run.
+    /// The stage of a model. `all` is its fit to all data; each of `folds` is its fit without some cycles, marked in the list of their
+    /// run, which counts whole cycles from the first sample. Without folds it was fitted to nothing, and all data are held out.
+    /// Figures are `NaN` where the model cannot make a run.
     pub fn stage(&self, stage: StageKind, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
-        let left = self.left(all);
-        let fit_rms_m = self.rms(&left, |_, _| true);
+        let residuals = self.residuals(all);
+        let fit_rms_m = self.rms(&residuals, |_, _| true);
         let mut held_out = Squares::default();
         for (fit, out) in folds {
             let is_out = |run: usize, cycle: usize| out.get(run).and_then(|run| run.get(cycle)) == Some(&true);
-            held_out.add(self.squares(&self.left(fit), is_out));
+            held_out.add(self.squares(&self.residuals(fit), is_out));
         }
         let energy_j = |run: usize| energy::own(self.problem, run, all).map(|walk| walk.energy_j(self.observed(run)));
         Stage {
@@ -129,23 +128,28 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
             effect,
             fit_rms_m,
             held_out_rms_m: if folds.is_empty() { fit_rms_m } else { held_out.rms() },
-            advance_error_m: self.mean_over_runs(|run| Some(advance_m(self.observed(run), left[run].as_ref()?).abs())),
+            advance_error_m: self
+                .mean_over_runs(|run| Some(advance_m(self.observed(run), residuals[run].as_ref()?).abs())),
             energy_error_j: self.energy_error_j(energy_j),
         }
     }
 
-    /// The stage of the recalibrated model with whatever its residual does in the mean over a run's cycles: fitted with all of them,
-    /// held out in blocks with the others, there with a trend over the cycles where that foretells them better. It knows no cause: its
-    /// energy is what the recalibrated contacts take on its way.
+    /// The stage of the recalibrated model plus the mean cycle of its residual in each run: over all cycles for the fit, over the others
+    /// for cycles that are held out in blocks, there with a trend over the cycles where that predicts them better. Its energy is what
+    /// the recalibrated contacts take along its path.
     pub fn free_form_stage(&self, recalibrated: &Fit) -> Stage {
-        let left = self.left(recalibrated);
-        let all = self.free_forms(&left, free_form::all);
-        let alone = self.free_forms(&left, |observed, left| free_form::held_out(observed, left, false));
-        let trend = self.free_forms(&left, |observed, left| free_form::held_out(observed, left, true));
-        let rms = |left: &[Option<Left>]| self.rms(left, |_, _| true);
+        let residuals = self.residuals(recalibrated);
+        let all = self.free_forms(&residuals, free_form::all);
+        let alone = self.free_forms(&residuals, |observed, residuals| {
+            free_form::held_out(observed, residuals, false)
+        });
+        let trend = self.free_forms(&residuals, |observed, residuals| {
+            free_form::held_out(observed, residuals, true)
+        });
+        let rms = |residuals: &[Option<CellResiduals>]| self.rms(residuals, |_, _| true);
         let energy_j = |run: usize| {
             let observed = self.observed(run);
-            let beyond_m = free_form::mean_displacement_m(observed, left[run].as_ref()?);
+            let beyond_m = free_form::mean_displacement_m(observed, residuals[run].as_ref()?);
             Some(energy::carried(self.problem, run, recalibrated, &beyond_m)?.energy_j(observed))
         };
         Stage {
@@ -158,14 +162,14 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         }
     }
 
-    /// The noise floor: how single cycles scatter about their mean and trend, by the best model's residual, corrected for what mean
-    /// and trend took with them; and how far chance puts the mean of as many cycles off the truth.
+    /// The noise floor: the scatter of single cycles about their mean and trend, by the residual of the best model, corrected for the
+    /// degrees of freedom of mean and trend; and the expected error of a mean over as many cycles.
     pub fn floor_stage(&self) -> Stage {
-        let scatter = self.free_forms(&self.left, free_form::all);
+        let scatter = self.free_forms(&self.residuals, free_form::all);
         let mut squares = Squares::default();
         for (run, scatter) in scatter.iter().enumerate() {
             squares.add(match scatter {
-                Some(left) => free_form::floor(self.observed(run), left),
+                Some(residuals) => free_form::floor(self.observed(run), residuals),
                 None => Squares {
                     sum: f64::NAN,
                     count: 0.0,
@@ -194,21 +198,27 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         &self.problem.scene.observed[run]
     }
 
-    fn left(&self, fit: &Fit) -> Vec<Option<Left>> {
-        (0..self.runs()).map(|run| Left::of(self.problem, run, fit)).collect()
-    }
-
-    fn free_forms(&self, left: &[Option<Left>], without: impl Fn(&Observed<'_>, &Left) -> Left) -> Vec<Option<Left>> {
-        let runs = left.iter().enumerate();
-        runs.map(|(run, left)| Some(without(self.observed(run), left.as_ref()?)))
+    fn residuals(&self, fit: &Fit) -> Vec<Option<CellResiduals>> {
+        (0..self.runs())
+            .map(|run| CellResiduals::of(self.problem, run, fit))
             .collect()
     }
 
-    fn squares(&self, left: &[Option<Left>], counts: impl Fn(usize, usize) -> bool) -> Squares {
+    fn free_forms(
+        &self,
+        residuals: &[Option<CellResiduals>],
+        without: impl Fn(&Observed<'_>, &CellResiduals) -> CellResiduals,
+    ) -> Vec<Option<CellResiduals>> {
+        let runs = residuals.iter().enumerate();
+        runs.map(|(run, residuals)| Some(without(self.observed(run), residuals.as_ref()?)))
+            .collect()
+    }
+
+    fn squares(&self, residuals: &[Option<CellResiduals>], counts: impl Fn(usize, usize) -> bool) -> Squares {
         let mut squares = Squares::default();
-        for (run, left) in left.iter().enumerate() {
-            squares.add(match left {
-                Some(left) => within_cycles(self.observed(run), left, |cycle| counts(run, cycle)),
+        for (run, residuals) in residuals.iter().enumerate() {
+            squares.add(match residuals {
+                Some(residuals) => within_cycles(self.observed(run), residuals, |cycle| counts(run, cycle)),
                 None => Squares {
                     sum: f64::NAN,
                     count: 0.0,
@@ -218,17 +228,17 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         squares
     }
 
-    fn rms(&self, left: &[Option<Left>], counts: impl Fn(usize, usize) -> bool) -> f64 {
-        self.squares(left, counts).rms()
+    fn rms(&self, residuals: &[Option<CellResiduals>], counts: impl Fn(usize, usize) -> bool) -> f64 {
+        self.squares(residuals, counts).rms()
     }
 
-    /// `NaN` where a run has no figure.
+    /// Mean over all runs; `NaN` where a run has no figure.
     fn mean_over_runs(&self, of: impl Fn(usize) -> Option<f64>) -> f64 {
         let sum: f64 = (0..self.runs()).map(|run| of(run).unwrap_or(f64::NAN)).sum();
         sum / self.runs() as f64
     }
 
-    /// How far a model's energy per cycle is off the reference's, J.
+    /// Error of a model's energy per cycle against the reference, J.
     fn energy_error_j(&self, of: impl Fn(usize) -> Option<Vec<f64>>) -> f64 {
         self.mean_over_runs(|run| Some((mean(&of(run)?) - mean(self.energy_j[run].as_ref()?)).abs()))
     }
@@ -245,7 +255,7 @@ fn deviation(values: &[f64]) -> f64 {
     (squares / (values.len() as f64 - 1.0)).sqrt()
 }
 
-/// The whole cycles, counted from the first sample, in which the crawl is settled.
+/// The whole cycles of the settled crawl, counted from the first sample.
 fn settled_cycles(observed: &Observed<'_>) -> Vec<Cycle> {
     let phase = &observed.phase;
     let since_first = |sample: usize| phase[sample] - phase[0];
@@ -261,7 +271,7 @@ fn settled_cycles(observed: &Observed<'_>) -> Vec<Cycle> {
         .collect()
 }
 
-/// A series at the beginnings of these cycles and at the end of the last, in straight lines between samples.
+/// A series at the starts of these cycles and at the end of the last, linear between samples.
 fn at_boundaries(observed: &Observed<'_>, cycles: &[Cycle], series: &[f64]) -> Vec<f64> {
     let phase = &observed.phase;
     let indices = cycles.iter().map(|cycle| cycle.index);
@@ -282,13 +292,16 @@ fn at_boundaries(observed: &Observed<'_>, cycles: &[Cycle], series: &[f64]) -> V
 }
 
 /// Squares of every cell's residual within the cycles that count, about its mean in each.
-fn within_cycles(observed: &Observed<'_>, left: &Left, counts: impl Fn(usize) -> bool) -> Squares {
+fn within_cycles(observed: &Observed<'_>, residuals: &CellResiduals, counts: impl Fn(usize) -> bool) -> Squares {
     let cells = observed.cells();
     let mut squares = Squares::default();
     for cycle in settled_cycles(observed).iter().filter(|cycle| counts(cycle.index)) {
         for cell in 0..cells {
             let own_m = || {
-                let of_cell = cycle.samples.clone().map(|sample| left.own_m[sample * cells + cell]);
+                let of_cell = cycle
+                    .samples
+                    .clone()
+                    .map(|sample| residuals.own_m[sample * cells + cell]);
                 of_cell.filter(|own_m| own_m.is_finite())
             };
             let seen = own_m().count() as f64;
@@ -305,10 +318,10 @@ fn within_cycles(observed: &Observed<'_>, left: &Left, counts: impl Fn(usize) ->
 }
 
 /// How much more the worm advances in a cycle than the model has it, m: mean over the cells; `NaN` where no phase is seen twice.
-fn advance_m(observed: &Observed<'_>, left: &Left) -> f64 {
+fn advance_m(observed: &Observed<'_>, residuals: &CellResiduals) -> f64 {
     let cycles = settled_cycles(observed);
     let bins = free_form::bins(observed);
-    let binned = free_form::binned(observed, &cycles, left, bins);
+    let binned = free_form::binned(observed, &cycles, residuals, bins);
     let of_cell = |cell: usize| {
         let (mut along, mut across) = (0.0, 0.0);
         for bin in 0..bins {

@@ -1,11 +1,10 @@
-//! The written-back model: the believed `worm.toml` with what the search found in it.
+//! The updated model: the nominal `worm.toml` with the result of the search in it.
 //!
-//! Two things change in the file. Recalibrated values take the place of the believed ones in `[worm]`, and every effect that
-//! was named is added as an `[[effect]]` at the end, with a comment that tells its twins and what would tell them apart.
-//! Everything else stays as it was, order and comments included, so that the difference between the two files is the
-//! answer.
+//! Two things change in the file. Recalibrated values replace the nominal ones in `[worm]`, and every effect that was named is
+//! appended as an `[[effect]]`, with a comment that lists its twins and the experiment that would separate them. Everything else stays as
+//! it was, order and comments included, so that the difference between the two files is the answer.
 //!
-//! What belongs to a run or to the measurement (`slope of run 1`, `clock`) is no property of the worm and is not written.
+//! Quantities of a run or of the measurement (`slope of run 1`, `clock`) are no property of the worm and are not written.
 
 mod diff;
 mod entry;
@@ -17,16 +16,16 @@ use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, TomlError, Value};
 use worm_estimator::config::{Config, ConfigError, PerCell};
 
-/// What the new file is called, in errors and in the difference.
+/// Name of the new file, in errors and in the difference.
 pub const FILE: &str = "model.toml";
 
-/// Cells that differ by less than this share have one common value.
+/// Cells that differ by less than this fraction get one common value.
 const ALIKE: f64 = 1e-3;
 
 /// Why no model was written back.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteBackError {
-    /// The believed model's text cannot be edited.
+    /// The text of the nominal model is not TOML.
     #[error("the believed model is no TOML: {0}: give the text that it was read from")]
     Syntax(#[from] TomlError),
     /// The answer speaks of a cell that the worm does not have.
@@ -44,7 +43,7 @@ pub enum WriteBackError {
     Refused(#[from] ConfigError),
 }
 
-/// The new file and what is new in it.
+/// The new file and its difference to the old one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ModelText {
     /// The new file.
@@ -55,7 +54,7 @@ pub struct ModelText {
     pub unified: String,
 }
 
-/// Writes what was found into the believed model: `config_text` is what `config` was read from, [`Config::COMMENTED`] where
+/// Writes the result into the nominal model: `config_text` is what `config` was read from, [`Config::COMMENTED`] where
 /// there was no file.
 ///
 /// # Errors
@@ -72,7 +71,7 @@ pub fn model(config_text: &str, config: &Config, answer: &Answer) -> Result<Mode
         // `[[effect]]` cannot follow `effect = [{ … }]`.
         if let Some(effect) = document.get_mut("effect") {
             let inline = std::mem::take(effect);
-            // In a checked configuration nothing but an empty list is none of tables.
+            // In a valid configuration only an empty list is no list of tables.
             *effect = inline.into_array_of_tables().map_or(Item::None, Item::ArrayOfTables);
         }
     }
@@ -89,7 +88,7 @@ pub fn model(config_text: &str, config: &Config, answer: &Answer) -> Result<Mode
     })
 }
 
-/// What the worm's values are to be multiplied by, cell by cell, and the stroke.
+/// Factors on the worm's values, cell by cell, and the stroke.
 struct Factors {
     friction: Vec<Factor>,
     stiffness: Vec<Factor>,

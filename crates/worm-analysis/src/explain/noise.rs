@@ -1,10 +1,10 @@
 //! The noise floor: how well the worm repeats its own cycles.
 //!
-//! What remains of a run once its mean cycle (and an even trend of it over the cycles) is taken out is noise by any model's
-//! measure: camera noise, in part correlated from sample to sample, and a random walk of the body, since every step is a little
-//! different from the last. Both are measured here, after a *free form* (one value for each phase bin) took out whatever any
-//! model could explain, so a missing effect does not count as noise. Correlation is allowed for by the variance of sums over a step:
-//! where sums vary more than independent samples would, all weights are smaller by that.
+//! What remains of a run once its mean cycle (and a linear trend of it over the cycles) is removed is noise for any model: camera noise,
+//! partly correlated from sample to sample, and a random walk of the body, since every step differs a little from the last. Both are
+//! measured after a *free form* (one value for each phase bin) removed whatever any model could explain, so a missing effect does not
+//! count as noise. The variance of sums over a step accounts for correlation: where sums vary more than those of independent samples
+//! would, all weights are reduced accordingly.
 
 use super::observed::Observed;
 use super::residual::Residual;
@@ -25,7 +25,7 @@ pub(super) struct RunNoise {
     position_m2: f64,
     /// The same for the settled crawl alone.
     settled: Drift,
-    /// What a whitened surprise of the body is multiplied with for correlation.
+    /// Factor on the whitened residuals of the body, for their correlation.
     pub body_scale: f64,
     /// One over the standard deviation of a cell's relative position, correlation counted, 1/m.
     pub relative_scale: f64,
@@ -34,7 +34,7 @@ pub(super) struct RunNoise {
 }
 
 impl RunNoise {
-    /// The noise of a run by what some hypothesis leaves of it.
+    /// The noise of a run, by its residual under some hypothesis.
     pub fn measure(observed: &Observed<'_>, residual: &Residual) -> Self {
         let free = free_form(observed, residual);
         let cells = observed.cells();
@@ -45,7 +45,7 @@ impl RunNoise {
         } else {
             1.0
         };
-        let lost = cycles / (cycles - terms).max(1.0); // variance that the free form took with it
+        let lost = cycles / (cycles - terms).max(1.0); // variance that the free form removed with it
         let (mut squares, mut equations) = (0.0, 0.0);
         for sample in from..observed.samples() {
             let row = &free.relative_m[sample * cells..(sample + 1) * cells];
@@ -111,14 +111,14 @@ impl RunNoise {
             settled,
             body_scale,
             relative_scale: 1.0 / (position_m2 * along.max(1.0)).sqrt(),
-            // Each counts as much as its share of the misfit: the weights are smaller where noise is correlated.
+            // Each counts by its part of chi-squared: the weights are smaller where noise is correlated.
             free_quantities: terms
                 * (BINS_PER_STEP * cells) as f64
                 * (body_scale.powi(2) + (cells as f64 - 1.0) / along.max(1.0)),
         }
     }
 
-    /// The noise of another run of the same worm before the same camera, which keeps one sample in `thinned` and sees every cell.
+    /// The noise of another run of the same worm before the same camera, which keeps one sample in `thinned` and shows every cell.
     pub fn of_another(&self, observed: &Observed<'_>, thinned: f64) -> Self {
         let variance_m2: Vec<f64> = (0..observed.samples())
             .map(|sample| {
@@ -141,7 +141,7 @@ impl RunNoise {
         }
     }
 
-    /// How much of the misfit of a residual a free form would take away beyond chance.
+    /// How much of the chi-squared of a residual a free form would remove beyond chance.
     pub fn explainable(&self, observed: &Observed<'_>, residual: &Residual) -> f64 {
         let from = observed.settled_from() * observed.cells();
         let chi_squared = |residual: &Residual| {
@@ -180,7 +180,7 @@ impl RunNoise {
         }));
     }
 
-    /// Standard deviation that the body's random walk gathers in a cycle, m.
+    /// Standard deviation of the body's random walk after one cycle, m.
     pub fn drift_per_cycle_m(&self) -> f64 {
         self.drift.per_cycle_m2().sqrt()
     }
@@ -206,7 +206,7 @@ pub(super) fn bin_of(observed: &Observed<'_>, sample: usize, bins_per_step: usiz
     (observed.phase[sample] * (observed.cells() * bins_per_step) as f64).floor() as i64
 }
 
-/// What is left when each phase bin may have a way of its own, with an even trend over the cycles.
+/// What remains when each phase bin has a displacement of its own, with a linear trend over the cycles.
 fn free_form(observed: &Observed<'_>, residual: &Residual) -> Residual {
     let cells = observed.cells();
     let mut free = Residual {
@@ -222,7 +222,7 @@ fn free_form(observed: &Observed<'_>, residual: &Residual) -> Residual {
     free
 }
 
-/// Takes the mean cycle and its trend out of a series: of its increments from bin to bin where it runs on, else of its values.
+/// Removes the mean cycle and its trend from a series: from its increments from bin to bin where it accumulates, else from its values.
 fn flatten(observed: &Observed<'_>, series: Vec<f64>, runs_on: bool) -> Vec<f64> {
     let per_cycle = (observed.cells() * BINS_PER_STEP) as i64;
     let from = observed.settled_from();
@@ -273,7 +273,7 @@ fn flatten(observed: &Observed<'_>, series: Vec<f64>, runs_on: bool) -> Vec<f64>
             shape[bin] += shape[bin - 1];
         }
     }
-    // Between the middles of bins in straight lines.
+    // Linear between the centres of bins.
     let middles: Vec<f64> = (0..bins)
         .map(|bin| {
             if count[bin] > 0.0 {

@@ -1,4 +1,4 @@
-//! The recordings as the search sees them: which sample is in which phase, which count, and how noisy they are.
+//! The recordings as the search sees them: the phase of each sample, which samples count, and their noise.
 
 use super::error::ExplainError;
 use crate::experiment::RecordedRun;
@@ -6,20 +6,21 @@ use crate::identify::clean::leave_out_outliers;
 use crate::identify::{GaitError, IdentifiedGait, Prior, gait};
 use worm_estimator::config::Config;
 
-/// Cycles at the start that do not count where the worm was not seen laid down: the tips' state is not known there.
+/// Cycles at the start that do not count unless the worm was just laid down: the state of the tips is unknown there.
 const FORGOTTEN_CYCLES: f64 = 2.0;
 /// Whole cycles that must count in a run.
 pub(super) const MIN_CYCLES: usize = 3;
-/// Phase, cycles, within which of a whole step a recording must begin to show a worm laid down.
+/// How close to a whole step a recording must begin to show a worm just laid down, cycles.
 const AT_BEGIN: f64 = 0.02;
-/// Way, as a share of the stroke, that a cell falls behind the others over a recording from which it is worth a second look.
+/// Displacement by which a cell falls behind the others over a recording, as a fraction of the stroke, from which the gait is
+/// identified again without it.
 const FALLS_BEHIND: f64 = 0.05;
 /// How far the stroke seen may be from the configured one, as a factor.
 const STROKE_FACTOR: f64 = 2.0;
-/// Time at rest before the first step that counts, s, and the time a worm just laid down sinks into its tips.
+/// Time at rest before the first step that counts, s, and the time for which a worm just laid down settles on its tips, s.
 const REST_S: f64 = 0.1;
 const SINKING_S: f64 = 0.05;
-/// Phase gone through from which the worm counts as moving, cycles.
+/// Phase after which the worm counts as moving, cycles.
 const MOVES: f64 = 0.005;
 
 /// One recording, prepared.
@@ -37,9 +38,9 @@ pub(super) struct Observed<'a> {
     pub first_m: Vec<f64>,
     /// Standard deviation of the white part of one position, m.
     pub noise_m: f64,
-    /// The recording may show a worm that was laid down.
+    /// The recording may start with the worm just laid down.
     pub may_be_laid_down: bool,
-    /// The worm is taken for one laid down.
+    /// The worm is assumed to have been laid down where the recording starts.
     pub laid_down: bool,
     /// First sample that counts.
     pub counts_from: usize,
@@ -120,7 +121,7 @@ impl<'a> Observed<'a> {
         self.phase.len()
     }
 
-    /// Takes the worm for one that was laid down at the start, or for one in the middle of its crawl.
+    /// Assumes that the worm was laid down at the start, or that it was crawling already.
     pub fn assume_laid_down(&mut self, laid_down: bool) {
         self.laid_down = laid_down;
         let first = self.phase[0];
@@ -134,7 +135,7 @@ impl<'a> Observed<'a> {
         };
     }
 
-    /// First sample from which the crawl is settled: what the worm repeats is measured from here on.
+    /// First sample of the settled crawl.
     pub fn settled_from(&self) -> usize {
         let first = self.phase[0];
         let forgotten = if self.laid_down { 1.0 } else { FORGOTTEN_CYCLES };
@@ -157,7 +158,7 @@ impl<'a> Observed<'a> {
     }
 }
 
-/// The gait, also of a worm one of whose cells falls behind the others cycle by cycle.
+/// The gait, also of a worm with a cell that falls behind the others cycle by cycle.
 fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, GaitError> {
     let recording = run.recording;
     let step_order = config.worm.step_order_from_zero();
@@ -170,7 +171,7 @@ fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, Ga
     };
     let filled_m = recording.filled();
     let found = find(&recording.position_m, &filled_m);
-    // Against what clock the falling behind is measured first: the phase where there is one, else time.
+    // The clock by which cells fall behind: the phase where there is one, else time.
     let clock: Vec<f64> = match (&found, &recording.gait_phase) {
         (Ok(gait), _) => gait.phase.clone(),
         (Err(_), Some(phase)) => phase.clone(),
@@ -201,7 +202,7 @@ fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, Ga
     find(&straighten(&recording.position_m), &straighten(&filled_m)).or(found)
 }
 
-/// What each cell gains on the mean of all in a cycle, m: the median over all pairs of samples a cycle apart.
+/// How far each cell moves ahead of the mean of all in a cycle, m: the median over all pairs of samples a cycle apart.
 fn falling_behind_m(filled_m: &[Vec<f64>], clock: &[f64]) -> Vec<f64> {
     let mut gains_m: Vec<Vec<f64>> = vec![Vec::new(); filled_m.len()];
     let mut after = 0;

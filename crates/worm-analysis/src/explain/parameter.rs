@@ -1,14 +1,14 @@
-//! What the search may turn: nuisances within their priors, and the parameters of effects.
+//! What the search may vary: nuisances within their priors, and the parameters of effects.
 //!
-//! Recalibration hides effects: with friction, stiffness and stroke free to follow the data, much of an effect disappears into them. So
-//! they are free, within what is honestly not known of a worm that was built and measured with care, and what is left after them
-//! is the gap. The priors are normal about the believed value and end at a limit; a value that lies at its limit is told.
+//! Recalibration hides effects: with friction, stiffness and stroke free, much of an effect disappears into them. So these are free only
+//! within what is not known of a worm that was built and measured with care, and what remains after fitting them is the gap. The
+//! priors are normal about the nominal value, with limits; a value on its limit is reported.
 
 use crate::least_squares::Quantity;
 use worm_physics::Worm;
 use worm_physics::effect::{Effect, Parameter};
 
-/// What a nuisance is about.
+/// A quantity that is not known exactly and that no effect is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Nuisance {
     /// Logarithm of a factor on the friction of all tips.
@@ -25,13 +25,13 @@ pub(super) enum Nuisance {
     StrokeOf(usize),
     /// Error of one run's slope, degrees.
     SlopeOf(usize),
-    /// Age of the positions against the recorded phase, s.
+    /// Delay of the positions against the recorded phase, s.
     Clock,
     /// Logarithm of the damping ratio of the body on its tips.
     Damping,
     /// Stiffness of the pads over that of the bristles that their tips hold on by.
     Presliding,
-    /// Share of a step in which a cell comes to speed.
+    /// Fraction of a step in which a cell comes to speed.
     Rounding,
     /// Resistance of the contacts to each cell's velocity, N s/m.
     Viscosity,
@@ -120,7 +120,7 @@ impl Nuisance {
         }
     }
 
-    /// Puts its value into the worm of a run, where it concerns the worm.
+    /// Applies its value to the worm of a run, where it concerns the worm.
     pub fn apply(self, value: f64, run: usize, worm: &mut Worm) {
         match self {
             Self::Friction => worm.scale_friction(None, value.exp()),
@@ -136,8 +136,8 @@ impl Nuisance {
 }
 
 impl Free {
-    /// A parameter of an effect: no prior but its range, but for the first one, its severity. That is drawn to neutral weakly: data
-    /// that know nothing of it obey, so what only the data left out would show is not kept when they are left out.
+    /// A parameter of an effect. Shape parameters have no prior but their range. The severity has a weak one about neutral, so that it
+    /// returns there when the data that show it are left out.
     pub fn of_effect(place: usize, number: usize, parameter: &Parameter) -> Self {
         Self {
             what: What::Effect {
@@ -159,7 +159,7 @@ impl Free {
     }
 }
 
-/// An effect supposed to act, for one cell or for all that it concerns.
+/// An effect assumed to act, on one cell or on all that it concerns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hypothesised {
     pub effect: &'static Effect,

@@ -1,10 +1,9 @@
-//! Whether what is left of the body's way comes back: every so many cycles, or every so many millimetres of canal.
+//! Whether the residual of the body repeats: after so many cycles, or after so many millimetres of canal.
 //!
-//! The way that the body makes in each cycle beyond the model's is laid against a wave over the cycles' number, and over where the
-//! worm was, with an amplitude, a phase and a mean of its own in every run (Zechmeister and Kürster 2009: cycles are few and uneven
-//! in place, and the mean of few periods is not that of the wave).
-//! The largest share of its scatter that a wave takes away is held against what it takes when the cycles of each run change
-//! places, which keeps their scatter and loses any wave.
+//! The displacement of the body in each cycle beyond the model's is fitted by a sine over the number of the cycle, and over the place of
+//! the worm, with its own amplitude, phase and mean in every run (generalised Lomb-Scargle, Zechmeister and Kürster 2009: cycles are few
+//! and unevenly spaced, and the mean of few periods is not that of the wave). The largest fraction of the variance that a sine
+//! explains is compared with what it explains after shuffling the cycles of each run.
 
 use super::fit::{Fit, FitProblem};
 use super::residual::Residual;
@@ -14,27 +13,27 @@ use rand::seq::SliceRandom;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Fewest cycles of a run that say anything of a wave.
+/// Fewest cycles of a run that can show a wave.
 const MIN_CYCLES: usize = 6;
 /// Shortest period, in cycles and, along the canal, in mean advances of a cycle: places are uneven enough to see below two.
 const SHORTEST: (f64, f64) = (2.0, 0.5);
-/// Frequencies for each that a run can tell from the next.
+/// Oversampling of the frequencies that a run can resolve.
 const OVERSAMPLED: f64 = 12.0;
-/// How often the cycles change places, and how many of these may do as well.
+/// How often the cycles are shuffled, and in how many of these a sine may do as well.
 const SHUFFLES: usize = 200;
 const AS_GOOD: usize = 2;
 const SEED: u64 = 0x7065_7269;
 
-/// How what is left repeats.
+/// How the residual repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Period {
-    /// In time, cycles.
+    /// Period in time, cycles.
     pub cycles: Option<f64>,
-    /// Along the canal, m.
+    /// Period along the canal, m.
     pub displacement_m: Option<f64>,
 }
 
-/// One run's ways, each at a place or time.
+/// One run's displacements, each with its time and place.
 #[derive(Debug, Clone, Default)]
 struct Series {
     cycle: Vec<f64>,
@@ -42,10 +41,10 @@ struct Series {
     displacement_m: Vec<f64>, // mean taken out
 }
 
-/// The period of what a fit leaves; the clearer one where both in time and along the canal are beyond chance.
+/// The period of the residual of a fit; the clearer one where both in time and along the canal are beyond chance.
 pub(super) fn period(problem: &FitProblem<'_, '_>, fit: &Fit) -> Period {
     let runs = 0..problem.scene.observed.len();
-    let series: Vec<Series> = runs.filter_map(|run| ways(problem, run, fit)).collect();
+    let series: Vec<Series> = runs.filter_map(|run| displacements(problem, run, fit)).collect();
     period_of(&series)
 }
 
@@ -75,8 +74,8 @@ fn period_of(series: &[Series]) -> Period {
     }
 }
 
-/// What the body makes in each settled cycle of a run beyond the model's way.
-fn ways(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
+/// Displacement of the body in each settled cycle of a run beyond the model's.
+fn displacements(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
     let observed = &problem.scene.observed[run];
     let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
     let left = Residual::new(observed, &predicted);
@@ -84,7 +83,7 @@ fn ways(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
     let first = observed.phase.get(from)?;
     let count = observed.whole_cycles();
     let cells = observed.cells() as f64;
-    // Means over a cycle: of what is left of the body's way, and of its place.
+    // Means over a cycle: of the residual of the body, and of its place.
     let mut means: Vec<(f64, f64, f64)> = vec![(0.0, 0.0, 0.0); count];
     for sample in from..observed.samples() {
         let cycle = (observed.phase[sample] - first).floor() as usize;
@@ -112,7 +111,7 @@ fn ways(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
     (series.displacement_m.len() >= MIN_CYCLES).then_some(series)
 }
 
-/// Period and share of the scatter of the wave that takes away most; none where chance does as well.
+/// Period of the sine that explains most of the variance, and the fraction; none where chance does as well.
 fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], longest: f64, shortest: f64) -> Option<(f64, f64)> {
     if series.is_empty() || !(longest > shortest && shortest > 0.0) {
         return None;
@@ -122,18 +121,20 @@ fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], longest: f64, sh
     let frequencies: Vec<f64> = (OVERSAMPLED as usize..=count)
         .map(|number| number as f64 * step)
         .collect();
-    let best = |ways: &[Vec<f64>]| {
-        let fraction = |&frequency: &f64| (frequency, fraction(series, &at, ways, frequency));
+    let best = |displacements: &[Vec<f64>]| {
+        let fraction = |&frequency: &f64| (frequency, fraction(series, &at, displacements, frequency));
         let fractions = frequencies.iter().map(fraction);
         fractions.fold((0.0, 0.0), |best, one| if one.1 > best.1 { one } else { best })
     };
-    let mut ways: Vec<Vec<f64>> = series.iter().map(|one| one.displacement_m.clone()).collect();
-    let found = best(&ways);
+    let mut displacements: Vec<Vec<f64>> = series.iter().map(|one| one.displacement_m.clone()).collect();
+    let found = best(&displacements);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let mut as_good = 0;
     for _ in 0..SHUFFLES {
-        ways.iter_mut().for_each(|ways| ways.shuffle(&mut rng));
-        as_good += usize::from(best(&ways).1 >= found.1);
+        displacements
+            .iter_mut()
+            .for_each(|displacements| displacements.shuffle(&mut rng));
+        as_good += usize::from(best(&displacements).1 >= found.1);
         if as_good > AS_GOOD {
             return None;
         }
@@ -142,12 +143,12 @@ fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], longest: f64, sh
 }
 
 /// Share of the square sum of all ways that waves of one frequency take away.
-fn fraction(series: &[Series], at: &impl Fn(&Series) -> &[f64], ways: &[Vec<f64>], frequency: f64) -> f64 {
+fn fraction(series: &[Series], at: &impl Fn(&Series) -> &[f64], displacements: &[Vec<f64>], frequency: f64) -> f64 {
     let (mut whole, mut taken) = (0.0, 0.0);
-    for (one, ways) in series.iter().zip(ways) {
+    for (one, displacements) in series.iter().zip(displacements) {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
-        for (at, displacement_m) in at(one).iter().zip(ways) {
+        for (at, displacement_m) in at(one).iter().zip(displacements) {
             let (sin, cos) = (TAU * frequency * at).sin_cos();
             let wave = Vector3::new(cos, sin, 1.0);
             normal += wave * wave.transpose();
@@ -174,9 +175,10 @@ mod tests {
             .map(|advance_m| {
                 let cycle: Vec<f64> = (0..11).map(f64::from).collect();
                 let place_m: Vec<f64> = cycle.iter().map(|cycle| advance_m * cycle).collect();
-                let ways = cycle.iter().zip(&place_m);
-                let mut displacement_m: Vec<f64> =
-                    ways.map(|(&cycle, &m)| wave(cycle, m) + 0.25e-4 * noise()).collect();
+                let displacements = cycle.iter().zip(&place_m);
+                let mut displacement_m: Vec<f64> = displacements
+                    .map(|(&cycle, &m)| wave(cycle, m) + 0.25e-4 * noise())
+                    .collect();
                 let mean_m = displacement_m.iter().sum::<f64>() / 11.0;
                 displacement_m
                     .iter_mut()

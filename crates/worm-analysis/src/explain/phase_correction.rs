@@ -1,19 +1,19 @@
-//! What comes of reading the phase off the positions as if one cell stepped at a time, where two do for part of each step.
+//! Corrects a phase that was identified as if one cell stepped at a time, where two do for part of each step.
 //!
-//! The phase that fits best, with the way of the body free, is the one in which the cell in the middle of its step is right. With
-//! overlap o and n cells, what is read while the cam is in step k + t is k + x, a polygon with
+//! With the displacement of the body free, the phase that fits best is the one in which the cell in the middle of its step is right.
+//! With overlap o and n cells, the phase found while the cam is in step k + t is k + x, piecewise linear with
 //!
 //! | t | −o/2 | 0 | 1 − o | 1 − o/2 |
 //! |---|---|---|---|---|
 //! | x | d n/(n − 1) | 2 d | 1 − 2 d | 1 − d n/(n − 1) |
 //!
-//! and d = o / (2 (1 + o)), how far two cells are from their ends when the one takes over from the other.
+//! and d = o / (2 (1 + o)), the distance of two cells from their ends when one takes over from the other.
 
-/// Phases read with an overlap that the reader did not know of.
+/// The correction for one overlap.
 #[derive(Debug)]
 pub(super) struct PhaseCorrection {
     cells: f64,
-    /// Phase read and phase of the cam, both in steps since the step's beginning.
+    /// Phase found and phase of the cam, both in steps since the start of the step.
     knots: [(f64, f64); 4],
 }
 
@@ -34,8 +34,8 @@ impl PhaseCorrection {
         }
     }
 
-    /// The cam's phase where this one was read, cycles.
-    pub fn mended(&self, phase: f64) -> f64 {
+    /// The cam's phase where this one was found, cycles.
+    pub fn corrected(&self, phase: f64) -> f64 {
         let steps = phase * self.cells;
         let step = steps.floor();
         let [first, .., last] = self.knots;
@@ -93,10 +93,10 @@ mod tests {
                     continue;
                 }
                 let phase = read(steps, overlap) / CELLS as f64;
-                let mended = phase_correction.mended(phase) * CELLS as f64;
+                let corrected = phase_correction.corrected(phase) * CELLS as f64;
                 assert!(
-                    (mended - steps).abs() < 3.0 / f64::from(FINE),
-                    "overlap {overlap}, cam at {steps} steps: {mended}"
+                    (corrected - steps).abs() < 3.0 / f64::from(FINE),
+                    "overlap {overlap}, cam at {steps} steps: {corrected}"
                 );
             }
         }

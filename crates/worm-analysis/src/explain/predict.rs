@@ -8,20 +8,20 @@ use worm_physics::{Crawl, Mechanics, Physics, Worm};
 
 /// Cycles that are run before a recording that begins in the middle of a crawl.
 const LEAD_CYCLES: f64 = 5.0;
-/// Cycles after which a worm that was laid down crawls periodically, well below what can be seen.
+/// Cycles after which a worm that was laid down crawls periodically to within far less than the noise.
 const SETTLING_CYCLES: f64 = 5.0;
-/// What is seen of it before it is repeated, cycles, and in how many parts of a sample.
+/// Cycles of the crawl that are kept before it is repeated, and parts of a sample in which they are kept.
 const SEEN_CYCLES: f64 = 1.1;
 const PARTS_SEEN: usize = 4;
 
-/// The runs and what is believed of the worm in each.
+/// The runs, and the nominal worm in each.
 pub(super) struct Scene<'a> {
     pub observed: Vec<Observed<'a>>,
-    /// The believed physics of each run.
+    /// Nominal physics of each run.
     pub nominal: Vec<Physics>,
 }
 
-/// What a hypothesis says of one run.
+/// The prediction for one run.
 #[derive(Debug, Clone)]
 pub(super) struct Predicted {
     /// `[sample][cell]`, flat, m.
@@ -57,7 +57,7 @@ impl Scene<'_> {
     }
 }
 
-/// A worm under way at the first sample of a recording.
+/// The crawl at the first sample of a recording.
 pub(super) fn start(observed: &Observed<'_>, mechanics: &Mechanics, phase: f64, damping: f64) -> Option<Crawl> {
     let first_m = &observed.first_m;
     if observed.laid_down {
@@ -81,7 +81,7 @@ pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, 
     let mechanics = Mechanics::new(physics);
     let cells = observed.cells();
     let time_s = &observed.run.recording.time_s;
-    // What is seen now happened the latency ago.
+    // A position shows the worm as it was one latency ago.
     let mut clock = Clock::new(time_s, &observed.phase, physics.view.latency_s);
     if !observed.phase_recorded && physics.laws.overlap > 0.0 {
         clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, cells));
@@ -120,7 +120,7 @@ pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, 
     Some(Predicted { position_m })
 }
 
-/// A cycle of a periodic crawl, seen closely and then repeated.
+/// A cycle of a periodic crawl, kept in fine steps and then repeated.
 #[derive(Default)]
 struct CycleSeen {
     phase: Vec<f64>,
@@ -134,7 +134,7 @@ impl CycleSeen {
         self.position_m.extend_from_slice(positions_m);
     }
 
-    /// Position of a cell at a phase that was seen, m, between what was seen in straight lines.
+    /// Position of a cell at a phase within the cycle kept, m, by linear interpolation.
     fn at_m(&self, phase: f64, cell: usize, cells: usize) -> f64 {
         let high = self
             .phase
@@ -151,7 +151,7 @@ impl CycleSeen {
         at_m(low) + fraction * (at_m(high) - at_m(low))
     }
 
-    /// Appends the positions at a later phase, as in the cycle that was seen.
+    /// Appends the positions at a later phase, as in the cycle kept.
     fn repeat(&mut self, phase: f64, cells: usize, out: &mut Vec<f64>) {
         let end = self.phase[self.phase.len() - 1];
         if self.advance_m.is_empty() {
@@ -167,7 +167,7 @@ impl CycleSeen {
     }
 }
 
-/// The gait phase a while before each sample.
+/// The gait phase one latency before each sample.
 struct Clock<'a> {
     time_s: &'a [f64],
     phase: &'a [f64],
@@ -192,7 +192,7 @@ impl<'a> Clock<'a> {
         let phase = self.recorded_at(sample);
         self.phase_correction
             .as_ref()
-            .map_or(phase, |phase_correction| phase_correction.mended(phase))
+            .map_or(phase, |phase_correction| phase_correction.corrected(phase))
     }
 
     fn recorded_at(&mut self, sample: usize) -> f64 {
@@ -209,12 +209,12 @@ impl<'a> Clock<'a> {
         }
         let (low, high) = (self.after - 1, self.after);
         let fraction = (at_s - self.time_s[low]) / (self.time_s[high] - self.time_s[low]);
-        // Before the first sample and after the last, the phase is taken to have gone on as it was.
+        // Before the first sample and after the last, the phase is extrapolated.
         self.phase[low] + fraction.clamp(-10.0, 11.0) * (self.phase[high] - self.phase[low])
     }
 }
 
-/// The worm of a run, believed.
+/// The nominal worm of a run.
 pub(super) fn nominal(observed: &Observed<'_>, worm: Worm, payload_kg: f64) -> Worm {
     let mut worm = worm
         .with_step_order(&observed.step_order)

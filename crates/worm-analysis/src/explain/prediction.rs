@@ -3,7 +3,7 @@
 use super::error::ExplainError;
 use super::hypothesis::Hypothesis;
 use super::predict::Scene;
-use super::search::prepare;
+use super::prepare::prepare;
 use crate::experiment::RecordedRun;
 use worm_estimator::config::Config;
 

@@ -1,15 +1,15 @@
-//! Where model and data disagree: the residual by cell and phase, with what chance alone would make of it.
+//! Where model and data disagree: the residual by cell and phase, with its significance.
 //!
 //! # The map
-//! A step is cut into bins. Within a cycle, the way that a cell makes in a bin beyond the model's is the difference of its mean
-//! residual there and in the bin before; so neither an offset nor a body that went astray earlier counts, and what begins with a
-//! bin is seen in it. The map holds the mean of that way over the settled cycles, in metres and in standard errors. Where the
-//! phase was not recorded, what the stepping cell does relative to the others went into the phase; it is shown by the body's way.
+//! A step is divided into bins. Within a cycle, the residual displacement of a cell in a bin is the difference of its mean residual there
+//! and in the bin before. So neither an offset nor an earlier error of the body counts, and what starts in a bin shows there. The map
+//! holds the mean over the settled cycles, in metres and in standard errors. Where the phase was not recorded, the motion of the
+//! stepping cell relative to the others went into the phase; the map shows the body's displacement for it.
 //!
-//! # What is beyond chance
-//! Cycles are drawn anew in blocks, all cells and bins of a cycle together, so that whatever they have in common stays: that gives
-//! the standard error of each mean, and how large the largest on the whole map becomes by chance. Few cycles know their own
-//! scatter badly; so the variance of each bin leans on that of the whole map, and the limit is that of Student's distribution.
+//! # Beyond chance
+//! A bootstrap draws cycles in blocks, all cells and bins of a cycle together, which keeps their correlation. It gives the standard error
+//! of each mean, and how large the largest on the whole map becomes by chance. A variance estimated from few cycles is itself
+//! uncertain; so the variance of each bin is shrunk towards that of the whole map, and the limit is that of Student's distribution.
 
 use super::answer::{Place, ResidualMap};
 use super::fit::{Fit, FitProblem};
@@ -20,19 +20,19 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Bins of a step.
 const BINS_PER_STEP: usize = 6;
-/// Cycles that must tell of a bin.
+/// Fewest cycles that must show a bin.
 const MIN_CYCLES: usize = 3;
 /// Consecutive cycles that are drawn together.
 const BLOCK: usize = 2;
-/// How often the cycles are drawn anew.
+/// Bootstrap resamples.
 const RESAMPLES: usize = 400;
 /// Seed of the draws.
 const SEED: u64 = 0x6d61_7073;
-/// Share of campaigns without any disagreement that may show one.
+/// Fraction of campaigns without disagreement that may show one.
 const FALSE_ALARMS: f64 = 0.05;
-/// How many degrees of freedom the variance of the whole map counts for beside a bin's own.
+/// Degrees of freedom for which the variance of the whole map counts beside a bin's own.
 const SHARED_FREEDOM: f64 = 6.0;
-/// Share of the limit from which the median of the cells is a residual of the body.
+/// Fraction of the limit from which the median of the cells is a residual of the body.
 const OF_BODY: f64 = 0.5;
 /// Phase, in bins, by which a recording may begin after the first bin or end before the last.
 const SLACK: f64 = 0.1;
@@ -55,28 +55,28 @@ pub(super) fn map(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Residu
     let Some(predicted) = problem.scene.predict(run, &fit.hypothesis, &fit.at) else {
         return map;
     };
-    let ways = Ways::new(observed, &Residual::new(observed, &predicted));
-    let mean_m = ways.mean_m(&vec![1; ways.cycles.len()]);
-    let told = ways.told_by();
-    let draws = ways.draws(&mean_m, SEED.wrapping_add(run as u64));
-    let sigma_m = standard_errors(&draws, &told);
+    let displacements = BinDisplacements::new(observed, &Residual::new(observed, &predicted));
+    let mean_m = displacements.mean_m(&vec![1; displacements.cycles.len()]);
+    let counts = displacements.cycle_counts();
+    let draws = displacements.draws(&mean_m, SEED.wrapping_add(run as u64));
+    let sigma_m = standard_errors(&draws, &counts);
     for (entry, (&mean_m, &sigma_m)) in mean_m.iter().zip(&sigma_m).enumerate() {
         let (cell, bin) = (entry / bins, entry % bins);
         map.residual_m[cell][bin] = mean_m;
         map.significance[cell][bin] = mean_m / sigma_m;
     }
-    let freedom = own_freedom(ways.cycles.len() as f64) + SHARED_FREEDOM;
+    let freedom = own_freedom(displacements.cycles.len() as f64) + SHARED_FREEDOM;
     map.limit = limit(&draws, &sigma_m, freedom, problem.scene.observed.len());
     map
 }
 
-/// Ways beyond the model's of every cell in every bin, cycle by cycle.
-struct Ways {
+/// Residual displacement of every cell in every bin, cycle by cycle.
+struct BinDisplacements {
     /// `[cycle][cell × bins + bin]`, m; `NaN` where not seen.
     cycles: Vec<Vec<f64>>,
 }
 
-impl Ways {
+impl BinDisplacements {
     fn new(observed: &Observed<'_>, residual: &Residual) -> Self {
         let cells = observed.cells();
         let per_cycle = cells * BINS_PER_STEP;
@@ -117,14 +117,14 @@ impl Ways {
             let body_m = known.iter().sum::<f64>() / known.len() as f64;
             let ((place, steps), (_, stepped)) = (stepping(bin), stepping(bin - 1));
             for (cell, displacement_m) in displacement_m.into_iter().enumerate() {
-                let tells = observed.phase_recorded || (cell != steps && cell != stepped);
-                cycles[bin / per_cycle][cell * per_cycle + place] = if tells { displacement_m } else { body_m };
+                let is_known = observed.phase_recorded || (cell != steps && cell != stepped);
+                cycles[bin / per_cycle][cell * per_cycle + place] = if is_known { displacement_m } else { body_m };
             }
         }
         Self { cycles }
     }
 
-    /// Mean over the cycles, each counted as often as `times` says, m; `NaN` where none of them tells.
+    /// Mean over the cycles, each counted `times` times, m; `NaN` where none of them shows the entry.
     fn mean_m(&self, times: &[usize]) -> Vec<f64> {
         let entries = self.cycles.first().map_or(0, Vec::len);
         let (mut sum_m, mut count) = (vec![0.0; entries], vec![0.0; entries]);
@@ -140,14 +140,14 @@ impl Ways {
         sum_m.iter().zip(&count).map(|(sum_m, count)| sum_m / count).collect()
     }
 
-    /// How many cycles tell of each entry.
-    fn told_by(&self) -> Vec<usize> {
+    /// How many cycles show each entry.
+    fn cycle_counts(&self) -> Vec<usize> {
         let entries = self.cycles.first().map_or(0, Vec::len);
-        let tells = |entry: usize| self.cycles.iter().filter(move |cycle| cycle[entry].is_finite());
-        (0..entries).map(|entry| tells(entry).count()).collect()
+        let is_known = |entry: usize| self.cycles.iter().filter(move |cycle| cycle[entry].is_finite());
+        (0..entries).map(|entry| is_known(entry).count()).collect()
     }
 
-    /// How far the means lie from `mean_m` when the cycles are drawn anew in blocks, the last running on into the first, m:
+    /// Deviations of the means from `mean_m` when the cycles are resampled in blocks, the last followed by the first, m:
     /// `[draw][entry]`.
     fn draws(&self, mean_m: &[f64], seed: u64) -> Vec<Vec<f64>> {
         let cycles = self.cycles.len();
@@ -172,26 +172,26 @@ impl Ways {
     }
 }
 
-/// How many degrees of freedom a variance from blocks of so many cycles has: two thirds of what single cycles would give.
+/// Degrees of freedom of a variance from blocks of cycles: two thirds of what single cycles would give.
 fn own_freedom(cycles: f64) -> f64 {
     2.0 / 3.0 * (cycles - BLOCK as f64)
 }
 
-/// Standard error of each entry, m; `NaN` where too few cycles tell.
-fn standard_errors(draws: &[Vec<f64>], told: &[usize]) -> Vec<f64> {
-    let own_m2: Vec<f64> = told
+/// Standard error of each entry, m; `NaN` where too few cycles show it.
+fn standard_errors(draws: &[Vec<f64>], counts: &[usize]) -> Vec<f64> {
+    let own_m2: Vec<f64> = counts
         .iter()
         .enumerate()
-        .map(|(entry, &told)| {
-            if told < MIN_CYCLES {
+        .map(|(entry, &counts)| {
+            if counts < MIN_CYCLES {
                 return f64::NAN;
             }
             let off_m = draws.iter().map(|draw| draw[entry]).filter(|off_m| off_m.is_finite());
             let (squares, count) = off_m.fold((0.0, 0.0), |(squares, count), off_m| {
                 (squares + off_m * off_m, count + 1.0)
             });
-            // Drawn from the cycles at hand, blocks scatter about their mean and not about the true one.
-            squares / count * told as f64 / (told - BLOCK) as f64
+            // Resampled blocks scatter about the mean of the sample and not about the true one.
+            squares / count * counts as f64 / (counts - BLOCK) as f64
         })
         .collect();
     let mut sorted: Vec<f64> = own_m2.iter().copied().filter(|m2| m2.is_finite()).collect();
@@ -199,15 +199,15 @@ fn standard_errors(draws: &[Vec<f64>], told: &[usize]) -> Vec<f64> {
     let shared_m2 = sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN);
     own_m2
         .iter()
-        .zip(told)
-        .map(|(own_m2, &told)| {
-            let freedom = own_freedom(told as f64);
+        .zip(counts)
+        .map(|(own_m2, &counts)| {
+            let freedom = own_freedom(counts as f64);
             ((freedom * own_m2 + SHARED_FREEDOM * shared_m2) / (freedom + SHARED_FREEDOM)).sqrt()
         })
         .collect()
 }
 
-/// What the largest significance stays below by chance, where `maps` are looked at together.
+/// The significance that the largest on `maps` together stays below by chance.
 fn limit(draws: &[Vec<f64>], sigma_m: &[f64], freedom: f64, maps: usize) -> f64 {
     let largest = |draw: &Vec<f64>| {
         let off = draw.iter().zip(sigma_m).map(|(off_m, sigma_m)| (off_m / sigma_m).abs());
@@ -225,12 +225,12 @@ fn limit(draws: &[Vec<f64>], sigma_m: &[f64], freedom: f64, maps: usize) -> f64 
     (freedom * ((stretched * stretched / freedom).exp() - 1.0)).sqrt()
 }
 
-/// The places beyond chance on all maps, most significant first, at most so many.
+/// The places beyond chance on all maps, most significant first, at most `max`.
 ///
-/// Listed is what exceeds its map's limit: what the largest significance on all maps together, drawn anew under the bootstrap
-/// as if there were no disagreement, exceeds in one campaign of twenty. Where the cells show the same, it is the body that is
-/// off: it is listed once, for the cell that steps, as the cell shows it that tells it best; cells that are off against the body
-/// are listed beside it. Neighbouring bins of one cell and one stepping cell with the same sign are one place, told by the strongest.
+/// Listed is what exceeds its map's limit: the significance that the largest on all maps together exceeds in one campaign of twenty
+/// without disagreement. Where the cells agree, the body is off: it is listed once, for the cell that steps, with the values of the
+/// most significant cell; cells that are off relative to the body are listed beside it. Neighbouring bins of one cell and one
+/// stepping cell with the same sign are one place, with the values of the most significant bin.
 pub(super) fn places(maps: &[ResidualMap], max: usize) -> Vec<Place> {
     let mut places: Vec<Place> = maps.iter().flat_map(places_of).collect();
     places.sort_by(|a, b| b.significance.abs().total_cmp(&a.significance.abs()));
@@ -241,7 +241,7 @@ pub(super) fn places(maps: &[ResidualMap], max: usize) -> Vec<Place> {
 fn places_of(map: &ResidualMap) -> Vec<Place> {
     let cells = map.residual_m.len();
     let mut places: Vec<Place> = Vec::new();
-    // The place that each cell had in the bin before, by its number.
+    // Index of the place that each cell had in the bin before.
     let mut before: Vec<Option<usize>> = vec![None; cells];
     for (bin, (&stepping_cell, &phase)) in map.stepping_cell.iter().zip(&map.phase).enumerate() {
         let mut here: Vec<Option<usize>> = vec![None; cells];
@@ -271,7 +271,7 @@ fn places_of(map: &ResidualMap) -> Vec<Place> {
     places
 }
 
-/// Cell from 0, residual and significance of whatever is beyond chance in a bin.
+/// Cell from 0, residual and significance of all that is beyond chance in a bin.
 fn beyond_chance(map: &ResidualMap, bin: usize, stepping: usize) -> Vec<(usize, f64, f64)> {
     let cells = 0..map.residual_m.len();
     let entry = |cell: usize| (cell, map.residual_m[cell][bin], map.significance[cell][bin]);

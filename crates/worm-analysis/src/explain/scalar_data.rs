@@ -1,21 +1,19 @@
-//! What a table of advances says, where nobody recorded positions.
+//! The search where only advances per cycle are known, and no positions.
 //!
-//! # The story
-//! Often a few scalars are all there is: on this slope the worm advances so much in a cycle. They are worth asking, but they are few,
-//! and with a dozen things that are not quite known of any worm, much explains them. So the model is recalibrated against them within
-//! the same priors as against recordings, and where it then still misses them by more than chance, every effect of the library that
-//! changes the advance of a steady crawl is fitted on top. The answer is the set of all that bring the model within chance, and what
-//! to record to decide between them. A single one is named only where it is alone *and* there are more scalars than
-//! quantities that they have to settle; three scalars never are.
+//! Often a few scalars are all there is: the advance per cycle on some slopes. They are few, and with a dozen quantities of any worm
+//! uncertain, much explains them. So the model is recalibrated against them within the same priors as against recordings. Where it
+//! still misses them by more than chance, every effect of the library that changes the advance of a steady crawl is fitted on top.
+//! The answer is the set of all effects that bring the model within chance, and what to record to decide between them. A single effect
+//! is named only where it is alone *and* there are more scalars than quantities that they have to determine; three scalars never are.
 //!
-//! What needs positions stays empty in the [`Answer`]: the places of disagreement, maps, cycles, and everything held out.
+//! What needs positions stays empty in the [`Answer`]: places of disagreement, maps, cycles, and all held-out figures.
 //!
-//! Pure, like the search of recordings, and deterministic without a seed.
+//! Pure, like the search on recordings, and deterministic without a seed.
 //!
-//! # The map
-//! - `table`: the scalars, what a hypothesis says of them, and its least-squares fit.
-//! - `model_selection`: chance, the set, the verdict and its words.
-//! - `next`: what to record.
+//! # Modules
+//! - `table`: the scalars, what a hypothesis predicts of them, and its fit.
+//! - `model_selection`: chance, the set, the verdict and its sentence.
+//! - `next_experiment`: what to record.
 
 mod model_selection;
 mod next_experiment;
@@ -37,18 +35,18 @@ use table::Table;
 use worm_estimator::config::Config;
 use worm_physics::effect::Effect;
 
-/// Fewest advances that say anything of more than the stroke.
-const LEAST: usize = 2;
-/// Severities that are tried out before a fit, in notable changes from nothing to either side, and how many fits then begin from the
-/// most promising.
-const TRIED: [f64; 10] = [0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0];
-const BEGUN: usize = 2;
-/// Misfit that one may promise beyond the most promising.
-const HOPELESS: f64 = 20.0;
-/// An effect that changes no advance by more than this, m, at any of these is not seen in advances.
+/// Fewest advances that depend on more than the stroke.
+const MIN_ADVANCES: usize = 2;
+/// Severities that are tried before a fit, in notable changes from neutral to either side, and how many fits then start from the most
+/// promising.
+const SEVERITIES: [f64; 10] = [0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0];
+const STARTS: usize = 2;
+/// Chi-squared by which a start may be worse than the most promising one.
+const MAX_EXCESS: f64 = 20.0;
+/// An effect that changes no advance by more than this, m, at any of these does not show in advances.
 const VISIBLE_M: f64 = 1e-6;
 
-/// What an advance is called where a recording has its file's name.
+/// Name of an advance, in the place of a recording's file name.
 fn name(advance: &Advance) -> String {
     format!("the advance measured at {}°", advance.slope_deg).replace('-', "−")
 }
@@ -63,32 +61,32 @@ pub fn explain_advances(
     config: &Config,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Answer, ExplainError> {
-    let mut tell = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
-    if advances.len() < LEAST {
+    let mut report = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
+    if advances.len() < MIN_ADVANCES {
         return Err(ExplainError::FewAdvances { found: advances.len() });
     }
-    tell("recalibration", 0.0);
+    report("recalibration", 0.0);
     let table = Table::new(advances, config)?;
     let nuisances = nuisances(config.worm.cells, advances.len());
     let plain = Hypothesis::new(&nuisances, &[]);
     let nominal = table.evaluate(&plain, &plain.neutral());
     let recalibrated = table.fit(&plain, &plain.neutral());
-    tell("refit", 0.1);
+    report("refit", 0.1);
     let hypothesised = hypotheses(config.worm.cells, false);
-    let mut finds: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
-    // A few at a time, so that a person sees how far it is.
+    let mut candidates: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
+    // A few at a time, to report progress.
     for some in hypothesised.chunks(8) {
         let some = some.par_iter();
-        finds.par_extend(some.map(|&hypothesised| refit(&table, &nominal, &recalibrated, hypothesised)));
-        tell("refit", 0.1 + 0.8 * finds.len() as f64 / hypothesised.len() as f64);
+        candidates.par_extend(some.map(|&hypothesised| refit(&table, &nominal, &recalibrated, hypothesised)));
+        report("refit", 0.1 + 0.8 * candidates.len() as f64 / hypothesised.len() as f64);
     }
-    tell("judgement", 0.9);
-    let screening = screening(&hypothesised, &finds);
-    let judged = model_selection::judge(&table, &recalibrated, finds.into_iter().flatten().collect());
+    report("judgement", 0.9);
+    let screening = screening(&hypothesised, &candidates);
+    let judged = model_selection::judge(&table, &recalibrated, candidates.into_iter().flatten().collect());
     Ok(assemble(&table, config, &nominal, &recalibrated, screening, &judged))
 }
 
-/// What of the nuisances an advance knows of: neither the clock nor what damps and softens the first moment of a slide.
+/// The nuisances that change an advance: neither the clock nor those of the first moment of a slide.
 fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
     let within_a_cycle =
         |nuisance: Nuisance| matches!(nuisance, Nuisance::Damping | Nuisance::Presliding | Nuisance::Viscosity);
@@ -97,32 +95,32 @@ fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
     all
 }
 
-/// An effect fitted on top of the recalibrated model, from the most promising of many severities; none where advances do not show
-/// it.
+/// An effect fitted on top of the recalibrated model, from the most promising of many severities; none where it does not show in
+/// advances.
 fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hypothesised) -> Option<Candidate> {
     let hypothesis = Hypothesis::new(&recalibrated.hypothesis.free, &[hypothesised]);
-    let tried = tried(hypothesised.effect);
-    if !tried
+    let trial_values = trial_values(hypothesised.effect);
+    if !trial_values
         .iter()
         .any(|values| table.shows(&hypothesis, nominal, values, VISIBLE_M))
     {
         return None;
     }
-    let mut promising: Vec<(f64, Vec<f64>)> = tried
+    let mut promising: Vec<(f64, Vec<f64>)> = trial_values
         .iter()
         .filter_map(|values| table.promise(&hypothesis, nominal, values))
         .collect();
     promising.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let should_abort = promising.first()?.0 + HOPELESS;
+    let limit = promising.first()?.0 + MAX_EXCESS;
     let mut fits: Vec<Fit> = promising
         .iter()
-        .take(BEGUN)
-        .filter(|(promised, _)| *promised < should_abort)
+        .take(STARTS)
+        .filter(|(promised, _)| *promised < limit)
         .map(|(_, from)| table.fit(&hypothesis, from))
         .collect();
     if fits.iter().all(|fit| fit.chi_squared > recalibrated.chi_squared) {
-        // From nothing: an effect that is free to do nothing never fits worse than none.
-        fits.push(table.fit(&hypothesis, &[&recalibrated.at[..], &tried[0]].concat()));
+        // From neutral: an effect that is free to do nothing never fits worse than none.
+        fits.push(table.fit(&hypothesis, &[&recalibrated.at[..], &trial_values[0]].concat()));
     }
     let fit = fits
         .into_iter()
@@ -136,9 +134,9 @@ fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hyp
 }
 
 /// Values of an effect's parameters to try, with severities on either side of neutral.
-fn tried(effect: &Effect) -> Vec<Vec<f64>> {
+fn trial_values(effect: &Effect) -> Vec<Vec<f64>> {
     let severity = effect.severity();
-    let sides = TRIED.iter().flat_map(|&notable| [notable, -notable]);
+    let sides = SEVERITIES.iter().flat_map(|&notable| [notable, -notable]);
     sides
         .map(|notable| severity.neutral + notable * severity.notable)
         .filter(|value| (severity.min..=severity.max).contains(value))
@@ -147,21 +145,21 @@ fn tried(effect: &Effect) -> Vec<Vec<f64>> {
 }
 
 /// What became of every hypothesis, best first, and of the effects that were none.
-fn screening(hypothesised: &[Hypothesised], finds: &[Option<Candidate>]) -> Vec<Screened> {
+fn screening(hypothesised: &[Hypothesised], candidates: &[Option<Candidate>]) -> Vec<Screened> {
     let mut rows: Vec<Screened> = hypothesised
         .iter()
-        .zip(finds)
-        .map(|(hypothesised, find)| Screened {
+        .zip(candidates)
+        .map(|(hypothesised, candidate)| Screened {
             name: hypothesised.effect.name.to_owned(),
             cell: hypothesised.cell.map(|cell| cell + 1),
-            score: find.as_ref().map_or(0.0, |find| find.improvement),
-            improvement: find
+            score: candidate.as_ref().map_or(0.0, |candidate| candidate.improvement),
+            improvement: candidate
                 .as_ref()
-                .filter(|find| find.fit.converged)
-                .map(|find| find.improvement),
-            outcome: match find {
+                .filter(|candidate| candidate.fit.converged)
+                .map(|candidate| candidate.improvement),
+            outcome: match candidate {
                 None => ScreeningOutcome::NotVisible,
-                Some(find) if find.fit.converged => ScreeningOutcome::Refitted,
+                Some(candidate) if candidate.fit.converged => ScreeningOutcome::Refitted,
                 Some(_) => ScreeningOutcome::DidNotConverge,
             },
         })
@@ -184,8 +182,8 @@ fn assemble(
         .iter()
         .zip(&judged.probability)
         .flat_map(|(kind, &probability)| {
-            let mut named = named_effects(&kind.find, probability, f64::NAN, f64::NAN);
-            // The values are still those of one cell, and say of which.
+            let mut named = named_effects(&kind.candidate, probability, f64::NAN, f64::NAN);
+            // The parameters are still those of one cell, and name it.
             named
                 .iter_mut()
                 .filter(|_| kind.is_any_cell())
@@ -207,13 +205,13 @@ fn assemble(
         stage(StageKind::Recalibrated, None, recalibrated),
     ];
     let wrong = judged.others.first();
-    stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.find.fit)));
+    stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.candidate.fit)));
     let best = judged.set.first();
-    stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.find.fit)));
-    // Where none is named for sure, what goes into the model is what is sure of it.
+    stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.candidate.fit)));
+    // An effect that is not proven is not written into the model.
     let kept = best
         .filter(|_| judged.is_proven)
-        .map_or(recalibrated, |kind| &kind.find.fit);
+        .map_or(recalibrated, |kind| &kind.candidate.fit);
     let runs = table.advances.iter().enumerate().map(|(run, advance)| RunSummary {
         recording: name(advance),
         slope_deg: advance.slope_deg,
@@ -227,7 +225,7 @@ fn assemble(
         advance_m: [
             advance.advance_m,
             table.advance_m(run, recalibrated),
-            best.map_or(f64::NAN, |kind| table.advance_m(run, &kind.find.fit)),
+            best.map_or(f64::NAN, |kind| table.advance_m(run, &kind.candidate.fit)),
         ],
         advance_sigma_m: Some(advance.sigma_m),
     });

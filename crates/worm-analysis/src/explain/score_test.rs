@@ -1,12 +1,11 @@
-//! The whole library at a glance: a score for every effect, and what score the best of them would reach by chance.
+//! A score for every effect of the library, and the score that the best of them would reach by chance.
 //!
-//! At the recalibrated model, each effect is switched on in a few strengths (and shapes, where it has one) by a simulation each.
-//! What that changes in the residuals, with everything that the nuisances could make of it projected out, is the effect's
-//! direction; the score is how much of the misfit lies along it: the rise of twice the log likelihood if the change were
-//! proportional to the strength.
+//! At the recalibrated model, each effect is simulated at a few strengths (and shapes, where it has one). The change in the residuals,
+//! with everything that the nuisances could explain projected out, is the effect's direction. The score is how much of chi-squared lies
+//! along it: the rise of twice the log likelihood if the change were proportional to the strength.
 //!
-//! The best of many effects finds something in mere noise too. So noise is drawn on all directions together, with the
-//! correlations they have, and the largest score noted: what it stays below nineteen times in twenty is the threshold.
+//! The best of many effects fits noise, too. So noise is drawn on all directions together, with their correlations, and the threshold
+//! is what the largest score stays below nineteen times in twenty.
 
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
@@ -22,13 +21,13 @@ use worm_physics::effect::{Effect, LIBRARY, Scope};
 /// Strengths that are tried, in notable changes; a single one where an effect has a place, for there are many places to try.
 const STRENGTHS: [f64; 4] = [1.0, 4.0, 12.0, 36.0];
 const STRENGTHS_AT_A_PLACE: [f64; 1] = [4.0];
-/// Trials of an effect from which fits begin.
+/// Best trials of an effect from which fits start.
 const STARTS: usize = 2;
-/// Strength of an effect from which a fit begins where nothing is known, in notable changes.
+/// Strength of an effect from which a fit starts where nothing is known, in notable changes.
 const STRONG: f64 = 8.0;
 /// Draws of noise for the threshold.
 const DRAWS: usize = 4000;
-/// Share of the draws that the threshold lies above.
+/// Fraction of the draws that lie below the threshold.
 const CONFIDENCE: f64 = 0.95;
 /// One effect on one cell, or on all that it concerns, screened.
 #[derive(Debug, Clone)]
@@ -40,7 +39,7 @@ pub(super) struct Screening {
     pub starts: Vec<Vec<f64>>,
 }
 
-/// Everything that may be supposed in a campaign.
+/// Every hypothesis about a single effect that the data of a campaign can show.
 pub(super) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<Hypothesised> {
     let mut all = Vec::new();
     for &effect in &LIBRARY {
@@ -96,7 +95,7 @@ pub(super) fn strong(effect: &Effect) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Where nuisances and effects that are already supposed lead, so that it can be taken out.
+/// The directions of the nuisances and of effects that are in the fit already, to be projected out.
 struct Projection<'f> {
     fit: &'f Fit,
     open: Vec<usize>,
@@ -116,8 +115,8 @@ impl<'f> Projection<'f> {
         Self { fit, open, inverse }
     }
 
-    /// How a direction lies to those that are taken out.
-    fn shadow(&self, direction: &[f64]) -> DVector<f64> {
+    /// Products of a direction with those that are projected out.
+    fn products(&self, direction: &[f64]) -> DVector<f64> {
         let columns = self
             .open
             .iter()
@@ -125,9 +124,9 @@ impl<'f> Projection<'f> {
         DVector::from_iterator(self.open.len(), columns)
     }
 
-    /// Scalar product of what is left of two directions.
-    fn product(&self, a: &[f64], a_shadow: &DVector<f64>, b: &[f64], b_shadow: &DVector<f64>) -> f64 {
-        dot(a, b, None) - a_shadow.dot(&(&self.inverse * b_shadow))
+    /// Scalar product of two directions after the projection.
+    fn product(&self, a: &[f64], a_products: &DVector<f64>, b: &[f64], b_products: &DVector<f64>) -> f64 {
+        dot(a, b, None) - a_products.dot(&(&self.inverse * b_products))
     }
 }
 
@@ -137,11 +136,11 @@ struct Tried {
     values: Vec<f64>,
     score: f64,
     fraction: f64,
-    /// The direction and its shadow, for the weakest trial of each shape and sense.
+    /// The direction, its products and its square, for the weakest trial of each shape and sign.
     direction: Option<(Vec<f64>, DVector<f64>, f64)>,
 }
 
-/// Screens effects on top of a fit, whose derivatives must be there; best first, with the threshold of chance.
+/// Screens effects on top of a fit with derivatives. Returns them best first, with the threshold of chance.
 pub(super) fn screen(
     problem: &FitProblem<'_, '_>,
     fit: &Fit,
@@ -149,7 +148,7 @@ pub(super) fn screen(
     seed: u64,
 ) -> (Vec<Screening>, f64) {
     let projection = Projection::new(fit);
-    let residual_shadow = projection.shadow(&fit.residual);
+    let residual_products = projection.products(&fit.residual);
     let canal_m = canal(problem);
     let tasks: Vec<(usize, Vec<f64>, bool)> = hypothesised
         .iter()
@@ -168,7 +167,7 @@ pub(super) fn screen(
             })
         })
         .collect();
-    let try_out = |(number, values, is_weakest): &(usize, Vec<f64>, bool)| {
+    let evaluate = |(number, values, is_weakest): &(usize, Vec<f64>, bool)| {
         let hypothesised = hypothesised[*number];
         let mut all = fit.hypothesis.hypothesised.clone();
         all.push(hypothesised);
@@ -180,24 +179,24 @@ pub(super) fn screen(
         for (value, here) in direction.iter_mut().zip(&fit.residual) {
             *value -= here;
         }
-        let shadow = projection.shadow(&direction);
-        let own = projection.product(&direction, &shadow, &direction, &shadow);
+        let products = projection.products(&direction);
+        let own = projection.product(&direction, &products, &direction, &products);
         let whole = dot(&direction, &direction, None);
-        // What the nuisances imitate entirely shows nothing.
+        // The nuisances explain such an effect completely.
         if !(own > 1e-6 * whole && own > 1e-9) {
             return None;
         }
-        let along = projection.product(&direction, &shadow, &fit.residual, &residual_shadow);
+        let along = projection.product(&direction, &products, &fit.residual, &residual_products);
         let fraction = -along / own;
         Some(Tried {
             hypothesised: *number,
             values: values.clone(),
             score: if fraction > 0.0 { along * along / own } else { 0.0 },
             fraction,
-            direction: is_weakest.then_some((direction, shadow, own)),
+            direction: is_weakest.then_some((direction, products, own)),
         })
     };
-    let tried: Vec<Tried> = tasks.par_iter().filter_map(try_out).collect();
+    let tried: Vec<Tried> = tasks.par_iter().filter_map(evaluate).collect();
     let threshold = threshold(&projection, &tried, seed);
     let mut screened: Vec<Screening> = hypothesised
         .iter()
@@ -229,7 +228,7 @@ pub(super) fn screen(
     (screened, threshold)
 }
 
-/// Quantities of effects in a hypothesis.
+/// Number of quantities that belong to effects of a hypothesis.
 pub(super) fn effect_quantities(hypothesis: &Hypothesis) -> usize {
     hypothesis
         .hypothesised
@@ -238,7 +237,7 @@ pub(super) fn effect_quantities(hypothesis: &Hypothesis) -> usize {
         .sum()
 }
 
-/// Where tips have been, m.
+/// The stretch of canal where tips have been, m.
 fn canal(problem: &FitProblem<'_, '_>) -> (f64, f64) {
     let seen = problem
         .scene
@@ -253,7 +252,7 @@ fn canal(problem: &FitProblem<'_, '_>) -> (f64, f64) {
     (min - 0.02, max)
 }
 
-/// What the best score stays below by chance, nineteen times in twenty.
+/// The score that the best stays below by chance nineteen times in twenty.
 fn threshold(projection: &Projection<'_>, tried: &[Tried], seed: u64) -> f64 {
     let directions: Vec<&(Vec<f64>, DVector<f64>, f64)> =
         tried.iter().filter_map(|tried| tried.direction.as_ref()).collect();
@@ -262,10 +261,10 @@ fn threshold(projection: &Projection<'_>, tried: &[Tried], seed: u64) -> f64 {
         return 0.0;
     }
     let correlations = |row: usize| -> Vec<f64> {
-        let (a, a_shadow, a_own) = directions[row];
+        let (a, a_products, a_own) = directions[row];
         let with_others = directions[..=row].iter();
         with_others
-            .map(|(b, b_shadow, b_own)| projection.product(a, a_shadow, b, b_shadow) / (a_own * b_own).sqrt())
+            .map(|(b, b_products, b_own)| projection.product(a, a_products, b, b_products) / (a_own * b_own).sqrt())
             .collect()
     };
     let rows: Vec<Vec<f64>> = (0..count).into_par_iter().map(correlations).collect();
@@ -282,7 +281,7 @@ fn threshold(projection: &Projection<'_>, tried: &[Tried], seed: u64) -> f64 {
         .map(|_| {
             let noise = DVector::from_iterator(count, (0..count).map(|_| StandardNormal.sample(&mut rng)));
             let scores = &lower * noise;
-            // A direction counts one way only: the other way is a trial of its own, where there is one.
+            // A direction counts with its own sign only: the opposite sign, where it is possible, is a trial of its own.
             scores
                 .iter()
                 .fold(0.0, |max: f64, &score: &f64| max.max(score.max(0.0).powi(2)))

@@ -1,16 +1,16 @@
-//! The motor that droops: what load does to time, not to positions.
+//! Motor droop: what load does to time, not to positions.
 //!
-//! A motor that loses speed under load leaves the crawl as it is and makes it later. What shows it is how long the steps
-//! take against the force that the stepping cell needs: by how much longer on a steep canal than on the level, and by how much
-//! longer in the heavy part of a step.
+//! A motor that slows down under load leaves the positions of the crawl as they are and delays them. It shows in how long the steps take
+//! against the force that the stepping cell needs: how much longer on a steep canal than on the level, and how much longer in the heavy
+//! part of a step.
 //!
-//! # What is compared
-//! Each step is cut into sixths. The logarithm of how long one takes, as the median of all cycles of a run, is a profile that all
-//! runs share (cam and motor), plus ln(1 + d F) with F the mean force in it by the fitted model, plus what a motor does
-//! anyhow: a speed of its own on every run, swings once a step and once a turn that no two runs need have alike, and chance. All
-//! of these are normal with the spreads below, so one generalised least-squares misfit tells for each d how well it fits.
-//! Sixths, since a swing once a step imitates anything that thirds could show within one; on the speeds of whole runs alone
-//! little can be built, for the mean force grows by a third from the level to 45°.
+//! # The model
+//! Each step is divided into sixths. The logarithm of the duration of one, as the median over the cycles of a run, is a profile common to
+//! all runs (cam and motor), plus ln(1 + d F) with F the mean force in it by the fitted model, plus what a motor does anyway: a speed
+//! of its own in every run, swings once a step and once a turn that differ from run to run, and noise. All of these are normal with
+//! the standard deviations below, so a generalised least-squares chi-squared measures how well each d fits. Sixths, since a swing once
+//! a step can imitate any pattern of thirds. The mean speeds of whole runs show little: the mean force grows by only a third from the
+//! level to 45°.
 
 use super::fit::Fit;
 use super::observed::{MIN_CYCLES, Observed};
@@ -29,31 +29,31 @@ const SWING_PER_STEP: f64 = 0.1;
 const SWING_PER_TURN: f64 = 0.05;
 /// Spread of one part beyond that: swings multiply.
 const SWING_OF_PART: f64 = 0.004;
-/// The same where the phase was found from the positions: what gives way under load shifts it within a step.
+/// The same where the phase was found from the positions: compliance shifts it within a step under load.
 const FOUND_PHASE: f64 = 0.05;
-/// Spread of the profile that all runs share: nothing is known of it.
+/// Spread of the profile that all runs share: it is unknown.
 const SHARED: f64 = 1.0;
-/// Largest correlation from one cycle to the next that is believed of so few cycles.
+/// Largest correlation from one cycle to the next that so few cycles can establish.
 const MAX_CORRELATION: f64 = 0.8;
 /// Standard deviation over median deviation, of the normal distribution.
 const BY_MEDIAN: f64 = 1.4826;
 /// Variance of a median over that of a mean.
 const MEDIAN_COST: f64 = 1.57;
-/// Share of the usual speed below which the motor rests: a dwell is no droop.
+/// Fraction of the usual speed below which the motor rests: a dwell is no droop.
 const RESTS: f64 = 0.1;
-/// Share of a part over which the speed is looked at for that.
+/// Fraction of a part over which the speed is averaged for that.
 const REST_WINDOW: f64 = 0.25;
-/// Cycles that the model crawls before its forces count, and looks at them in each part.
+/// Cycles that the model crawls before its forces count, and samples of them in each part.
 const SETTLING_CYCLES: usize = 3;
 const LOOKS: usize = 10;
-/// Values of the slowdown that are tried before the best is polished, and steps of that.
+/// Values of the slowdown on the initial grid, and Gauss-Newton steps from the best of them.
 const TRIALS: usize = 60;
 const POLISHING: usize = 20;
 
-/// What the times say of a motor that slows down under load.
+/// The slowdown of the motor under load, by the times of its steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpeedDroop {
-    /// d of speed = speed₀ / (1 + d F), beyond what is believed of it, 1/N.
+    /// d of speed = speed₀ / (1 + d F), beyond the nominal one, 1/N.
     pub slowdown_per_n: f64,
     /// Its standard error, 1/N.
     pub sigma: f64,
@@ -63,13 +63,13 @@ pub(super) struct SpeedDroop {
 
 /// How long the parts of a run's cycle take, and under what force.
 struct Paced {
-    /// Logarithm of the duration over the believed one, of each part from phase 0.
+    /// Logarithm of the duration over the nominal one, of each part from phase 0.
     late: Vec<f64>,
     /// Variance of each.
     variance: f64,
-    /// Mean force in each part, never below nothing, N.
+    /// Mean force in each part, 0 or more, N.
     force_n: Vec<f64>,
-    /// What is believed of the slowdown, 1/N.
+    /// Nominal slowdown, 1/N.
     nominal_per_n: f64,
 }
 
@@ -94,13 +94,13 @@ pub(super) fn speed_droop(scene: &Scene<'_>, fit: &Fit, cycle_s_nominal: &[f64])
     likeliest(&paced, MOTOR_DROOP.severity().max)
 }
 
-/// The likeliest slowdown from none to the most.
+/// The most likely slowdown from 0 to a maximum.
 fn likeliest(paced: &[Paced], max_per_n: f64) -> Option<SpeedDroop> {
     let factor = covariance(paced)?.cholesky()?;
     let whitened = |per_n: f64| whiten(&factor, left(paced, per_n));
     let chi_squared = |per_n: f64| whitened(per_n).norm_squared();
     let min = chi_squared(0.0);
-    // Denser towards none, where small slowdowns differ.
+    // Denser towards 0, where small differences matter.
     let trials = (0..=TRIALS).map(|trial| max_per_n * (trial as f64 / TRIALS as f64).powi(3));
     let (mut best, mut per_n) = trials
         .map(|per_n| (chi_squared(per_n), per_n))
@@ -126,7 +126,7 @@ fn likeliest(paced: &[Paced], max_per_n: f64) -> Option<SpeedDroop> {
     })
 }
 
-/// What a slowdown leaves of the lateness of all runs.
+/// Residual of the lateness of all runs under a slowdown.
 fn left(paced: &[Paced], per_n: f64) -> DVector<f64> {
     each_part(paced, |run, late, force_n| {
         late - ((run.nominal_per_n + per_n) * force_n).ln_1p()
@@ -176,7 +176,7 @@ fn covariance(paced: &[Paced]) -> Option<DMatrix<f64>> {
     ))
 }
 
-/// How much longer than believed each part of a cycle takes, as a logarithm, and the variance of that; none with too few cycles.
+/// How much longer than nominal each part of a cycle takes, as a logarithm, and the variance of that; none with too few cycles.
 fn lateness(observed: &Observed<'_>, cycle_s: f64) -> Option<(Vec<f64>, f64)> {
     let parts = PARTS * observed.cells();
     let from = observed.settled_from();
@@ -196,7 +196,7 @@ fn lateness(observed: &Observed<'_>, cycle_s: f64) -> Option<(Vec<f64>, f64)> {
         let place = (first as i64 + number as i64).rem_euclid(parts as i64) as usize;
         by_part[place].push(((pair[1] - pair[0]) / nominal_s).ln());
     }
-    // A part that took no time was not seen.
+    // A part of no duration was not seen.
     if by_part.iter().flatten().any(|late| !late.is_finite()) {
         return None;
     }
@@ -204,7 +204,7 @@ fn lateness(observed: &Observed<'_>, cycle_s: f64) -> Option<(Vec<f64>, f64)> {
     let off = |part: usize, cycle: usize| by_part[part][cycle] - late[part];
     let all_off = (0..parts).flat_map(|part| (0..cycles).map(move |cycle| off(part, cycle).abs()));
     let spread = BY_MEDIAN * median(all_off.collect());
-    // The motor wanders slowly: cycles that follow each other are alike.
+    // The speed of the motor drifts slowly: neighbouring cycles are correlated.
     let blocks: Vec<f64> = (0..cycles)
         .map(|cycle| median((0..parts).map(|part| off(part, cycle)).collect()))
         .collect();
@@ -222,7 +222,7 @@ fn lateness(observed: &Observed<'_>, cycle_s: f64) -> Option<(Vec<f64>, f64)> {
 /// Time in which the motor turned, up to each sample, s.
 fn moving_s(time_s: &[f64], phase: &[f64], parts: usize) -> Vec<f64> {
     let last = time_s.len() - 1;
-    let usual = (phase[last] - phase[0]) / last as f64; // a sample; with rests in it, that only finds fewer of them
+    let usual = (phase[last] - phase[0]) / last as f64; // per sample; rests lower it, and then fewer of them are found
     let window = ((REST_WINDOW / parts as f64 / usual).ceil() as usize).clamp(1, last);
     let mut rests = vec![false; last];
     for at in 0..=last - window {
@@ -263,8 +263,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
-/// Mean force of the stepping cell's actuator in each part of a settled cycle by the fitted model, N, and the slowdown that is
-/// believed already, 1/N; none where the worm slides down.
+/// Mean force of the stepping cell's actuator in each part of a settled cycle by the fitted model, N, and the nominal
+/// slowdown, 1/N; none where the worm slides down.
 fn forces(scene: &Scene<'_>, run: usize, fit: &Fit) -> Option<(Vec<f64>, f64)> {
     let observed = &scene.observed[run];
     let (physics, damping) = scene.physics(run, &fit.hypothesis, &fit.at);

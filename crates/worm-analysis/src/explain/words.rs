@@ -5,7 +5,7 @@ use super::fit::{Fit, FitProblem};
 use super::model_selection::Judged;
 use super::parameter::What;
 
-/// The outcome in a sentence or two. `refused` is the share of the held-out gap that the best effect closes where it is too
+/// The verdict in a sentence or two. `refused` is the fraction of the held-out gap that the best effect closes, where that is too
 /// little to name it.
 pub(super) fn sentence(
     verdict: Verdict,
@@ -17,9 +17,13 @@ pub(super) fn sentence(
 ) -> String {
     match verdict {
         Verdict::Agrees => {
-            let best = judged.all.iter().map(|find| find.improvement).fold(0.0, f64::max);
+            let best = judged
+                .all
+                .iter()
+                .map(|candidate| candidate.improvement)
+                .fold(0.0, f64::max);
             let why = if best > threshold {
-                "what improves the fit by more is too weak to be told, is not kept on data left out, or closes next to nothing of the gap"
+                "what improves the fit by more is too weak to matter, is not kept on held-out data, or closes next to nothing of the gap"
             } else {
                 "no effect of the library does"
             };
@@ -36,9 +40,9 @@ pub(super) fn sentence(
         ),
         Verdict::OutsideLibrary => {
             let nearest = judged.candidates.first().map_or_else(
-                || "none that is strong enough to be told keeps what it promises on data left out".to_owned(),
-                |find| {
-                    let names: Vec<&str> = find
+                || "none that is strong enough to matter keeps its improvement on held-out data".to_owned(),
+                |candidate| {
+                    let names: Vec<&str> = candidate
                         .hypothesised
                         .iter()
                         .map(|hypothesised| hypothesised.effect.name)
@@ -75,7 +79,7 @@ fn closing(effects: &[NamedEffect]) -> String {
     }
 }
 
-/// What nothing explains, in words.
+/// What no effect explains, in words.
 pub(super) fn remainder(judged: &Judged, places: &[Place]) -> String {
     let whole = format!("{:.0} % of the gap stays open", 100.0 * judged.open_share);
     match places.first() {
@@ -92,7 +96,7 @@ pub(super) fn remainder(judged: &Judged, places: &[Place]) -> String {
     }
 }
 
-/// What the user should know.
+/// Limitations of the answer.
 pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<String> {
     let observed = &problem.scene.observed;
     let mut warnings: Vec<String> = observed

@@ -1,11 +1,11 @@
-//! What can be told of positions before the gait is known: their noise, their outliers, and where there are any.
+//! What positions show before the gait is known: their noise, their outliers, and the usable range.
 
 use super::running_median::running_median;
 
-/// Samples of the running median that outliers are told by.
+/// Samples of the running median that outliers are compared with.
 const MEDIAN_SAMPLES: usize = 5;
-/// Distance from the running median, in standard deviations of the noise, that makes an outlier, besides what a corner of the
-/// path may show: this share of the stroke.
+/// Distance from the running median that makes an outlier, in standard deviations of the noise and as a fraction of the largest change
+/// between samples, besides the error of the median at a corner of the path.
 const OUTLIER: (f64, f64) = (8.0, 0.06);
 
 /// Standard deviation of the noise on one position, m, by second differences: robust against everything that moves smoothly.
@@ -28,7 +28,7 @@ pub(crate) fn noise_by_differences(measured_m: &[Vec<f64>]) -> f64 {
     *median / (0.674_489_75 * 6f64.sqrt())
 }
 
-/// Replaces outliers by `NaN`; how many there were.
+/// Replaces outliers by `NaN` and returns how many there were.
 pub(crate) fn leave_out_outliers(series: &mut [f64], filled: &[f64], noise_m: f64) -> usize {
     let seen: Vec<usize> = (0..series.len()).filter(|&sample| filled[sample].is_finite()).collect();
     let values: Vec<f64> = seen.iter().map(|&sample| filled[sample]).collect();
@@ -36,7 +36,7 @@ pub(crate) fn leave_out_outliers(series: &mut [f64], filled: &[f64], noise_m: f6
         return 0;
     }
     let mut middle = running_median(&values, MEDIAN_SAMPLES);
-    // At the ends the window shrinks to the value itself, which would never be found out: the whole window nearest judges it.
+    // At the ends the window shrinks to the value itself, which would never count as an outlier: the nearest whole window serves there.
     let half = MEDIAN_SAMPLES / 2;
     if values.len() >= MEDIAN_SAMPLES {
         let last = middle.len() - 1 - half;
@@ -55,7 +55,7 @@ pub(crate) fn leave_out_outliers(series: &mut [f64], filled: &[f64], noise_m: f6
             .copied()
             .unwrap_or(0.0)
     };
-    // At a corner the running median cuts by what the cell moves in half its window.
+    // At a corner the running median is off by what the cell moves in half its window.
     let allowed_m = OUTLIER.0 * noise_m + reach(MEDIAN_SAMPLES / 2) + OUTLIER.1 * reach(1);
     let mut outliers = 0;
     for (&sample, middle_m) in seen.iter().zip(middle) {

@@ -1,9 +1,9 @@
-//! The misfit between theory and a worm: noise, and a slow drift that theory does not know.
+//! The residual between theory and a worm: noise, and a slow drift that theory does not explain.
 //!
-//! No worm repeats its cycles exactly, so what theory says of the body's way goes astray by a little in every step, and stays
-//! astray. The drift is a random walk in the gait phase. Seen through it, the measured ways are far from independent; a scalar
-//! Kalman filter turns them into surprises that are, so that least squares on the surprises weighs every sample by what it
-//! tells. Run back again (Rauch, Tung, Striebel) it gives the drift itself.
+//! No worm repeats its cycles exactly, so the predicted displacement of the body is off by a little after every step, and stays off. The
+//! drift is a random walk in the gait phase. It makes the measured displacements far from independent; a scalar Kalman filter turns
+//! them into innovations that are, so that least squares on the innovations weights every sample correctly. Run backward as well
+//! (Rauch, Tung, Striebel) it gives the drift itself.
 
 /// A random walk under noise, for given samples.
 #[derive(Debug, Clone)]
@@ -11,7 +11,7 @@ pub(crate) struct Drift {
     per_cycle_m2: f64,
     step_m2: Vec<f64>, // variance that the walk gathers before each sample
     gain: Vec<f64>,    // 0 where nothing was seen
-    scale: Vec<f64>,   // one over the standard deviation of each surprise, 0 where there is none
+    scale: Vec<f64>,   // one over the standard deviation of each innovation, 0 where there is none
     left_m2: Vec<f64>, // variance of the drift after each sample
 }
 
@@ -42,7 +42,7 @@ impl Drift {
                     drift.scale[at] = 1.0 / spread_m2.sqrt();
                     left_m2 *= 1.0 - drift.gain[at];
                 } else {
-                    // Where the walk begins is not known: the first sample tells that, and nothing else.
+                    // The start of the walk is unknown: the first sample determines it, and nothing else.
                     (drift.gain[at], left_m2) = (1.0, variance_m2[at]);
                 }
             }
@@ -51,12 +51,12 @@ impl Drift {
         drift
     }
 
-    /// What variance it gathers in a cycle, m².
+    /// Variance that it gathers in a cycle, m².
     pub fn per_cycle_m2(&self) -> f64 {
         self.per_cycle_m2
     }
 
-    /// The surprises of a series, each with variance 1 if the series is drift and noise; 0 where there is none. Linear.
+    /// The innovations of a series, each with variance 1 if the series is drift and noise; 0 where there is none. Linear.
     pub fn whiten(&self, series: impl IntoIterator<Item = f64>, mut put: impl FnMut(f64)) {
         let mut expected = 0.0;
         for (at, value) in series.into_iter().enumerate() {
@@ -64,21 +64,21 @@ impl Drift {
                 put(0.0);
                 continue;
             }
-            let surprise = value - expected;
-            put(surprise * self.scale[at]);
-            expected += self.gain[at] * surprise;
+            let whitened = value - expected;
+            put(whitened * self.scale[at]);
+            expected += self.gain[at] * whitened;
         }
     }
 
-    /// Twice the negative logarithm of the likelihood of a series, but for a constant.
+    /// Twice the negative logarithm of the likelihood of a series, up to a constant.
     pub fn chi_squared(&self, series: impl IntoIterator<Item = f64>) -> f64 {
         let mut chi_squared = 0.0;
-        self.whiten(series, |surprise| chi_squared += surprise * surprise);
+        self.whiten(series, |whitened| chi_squared += whitened * whitened);
         let spreads = self.scale.iter().filter(|&&scale| scale > 0.0);
         chi_squared - 2.0 * spreads.map(|scale| scale.ln()).sum::<f64>()
     }
 
-    /// The drift in a series, freed of noise, at every sample.
+    /// The drift in a series, without noise, at every sample.
     pub fn smooth(&self, series: &[f64]) -> Vec<f64> {
         let mut drift_m = Vec::with_capacity(series.len());
         let mut expected = 0.0;

@@ -1,9 +1,9 @@
-//! What the cells do relative to one another, and what is left: the way of the body.
+//! The motion of the cells relative to one another, and the rest: the displacement of the body.
 //!
 //! The cam fixes the relative positions of the cells by the gait phase alone, whatever the contacts do. So the position of
 //! cell i is cᵢ + Ls gᵢ(p) + b, with cᵢ its place in the body, Ls the stroke, gᵢ(p) how many steps it has made at phase p,
-//! parts included, and b the way of the body, common to all. n cells give n equations a sample for two unknowns, p and b. Where
-//! no phase was recorded, it is found here; b is what the contacts are responsible for, and all that
+//! parts included, and b the displacement of the body, common to all. n cells give n equations a sample for two unknowns, p and b. Where
+//! no phase was recorded, it is found here. The contacts determine b, and it is all that
 //! [`fit`](super::fit) looks at.
 
 mod follow;
@@ -14,9 +14,9 @@ use super::clean::{leave_out_outliers, noise_by_differences, usable_range};
 use super::gait_error::GaitError;
 use super::steps::{self, Step};
 
-/// Times that kinematics and phase are found from one another.
+/// How often kinematics and phase are found from one another.
 const ROUNDS: usize = 4;
-/// What two cells may stand off an even motor, likewise.
+/// How far two cells may be off an even motor: in standard deviations of the noise, and as a fraction of the stroke.
 const EVEN: (f64, f64) = (5.0, 0.03);
 /// Least number of whole cycles.
 const MIN_CYCLES: f64 = 2.0;
@@ -38,9 +38,9 @@ pub struct IdentifiedGait {
     pub place_m: Vec<f64>,
     /// Standard deviation of one measured position, m.
     pub noise_m: f64,
-    /// Way of the body b at each sample, m; `NaN` where no cell was seen.
+    /// Displacement of the body b at each sample, m; `NaN` where no cell was seen.
     pub body_m: Vec<f64>,
-    /// How many cells it rests on in each sample: those seen, no outliers, and standing still in the body.
+    /// How many cells it is based on in each sample: those seen, no outliers, and at rest in the body.
     pub seen: Vec<usize>,
     /// Positions left out as outliers.
     pub outliers: usize,
@@ -52,7 +52,7 @@ pub(crate) fn steps_made(cells: usize, place: usize, phase: f64) -> f64 {
     cycle + ((phase - cycle) * cells as f64 - place as f64).clamp(0.0, 1.0)
 }
 
-/// What is known of the gait before the positions are looked at.
+/// What is known of the gait before the positions are used.
 #[derive(Debug, Clone, Copy)]
 pub struct Prior<'a> {
     /// The configured step order, from 0: where the cells follow one another in the same cyclic order, it says which is first.
@@ -94,13 +94,13 @@ pub fn find(
     }
     for _ in 0..ROUNDS {
         finder.fit_kinematics();
-        // The one distance of two cells fits any phase as well as the next.
+        // Two cells have one distance, which fits any phase.
         if prior.phase.is_none() && finder.cells() > 2 {
             finder.follow_phase();
         }
     }
     finder.fit_kinematics();
-    let off_m = finder.rest_m();
+    let off_m = finder.residual_m();
     if prior.phase.is_some() {
         finder.check_phase(off_m, noise_m)?;
     } else if finder.cells() == 2 && off_m > EVEN.0 * noise_m + EVEN.1 * finder.stroke_m {
@@ -181,7 +181,7 @@ impl<'a> Finder<'a> {
             knots.push((self.time_s[from], (slot + low) / cells as f64));
             knots.push((self.time_s[to], (slot + high) / cells as f64));
         }
-        // Where a step ends after the next begins, they meet half-way.
+        // Where a step ends after the next begins, both knots move to the middle.
         for at in (1..knots.len().saturating_sub(1)).step_by(2) {
             if knots[at].0 > knots[at + 1].0 {
                 let middle = 0.5 * (knots[at].0 + knots[at + 1].0);
@@ -203,10 +203,10 @@ impl<'a> Finder<'a> {
         for sample in 0..samples {
             self.resting(sample, &mut rows);
             if !rows.is_empty() {
-                let ways = rows
+                let displacements = rows
                     .iter()
                     .map(|&(cell, at_m, made)| at_m - self.place_m[cell] - self.stroke_m * made);
-                (body_m[sample], seen[sample]) = (ways.sum::<f64>() / rows.len() as f64, rows.len());
+                (body_m[sample], seen[sample]) = (displacements.sum::<f64>() / rows.len() as f64, rows.len());
             }
         }
         IdentifiedGait {

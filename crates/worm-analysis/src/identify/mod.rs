@@ -1,12 +1,11 @@
 //! Largest tip deformations from positions alone: section 3.2 of the paper.
 //!
-//! # The story
-//! [`gait`] finds which cell steps when, and takes what the cells do relative to one another out of the positions; what
-//! remains is the way of the body, the contacts' doing. [`onset`] reads from it the first estimate (3.2.1). [`search`] is the
-//! paper's exhaustive search (3.2.3), [`fit`] the continuous estimator that uses everything the bounds cause, and tells how well
-//! it knows them.
+//! [`gait`] finds which cell steps when, and removes the motion of the cells relative to one another from the positions. What remains is
+//! the displacement of the body, for which the contacts are responsible. [`onset`] reads the first estimate from it (3.2.1). [`search`]
+//! is the paper's exhaustive search (3.2.3); [`fit`] is the continuous estimator, which uses everything that the bounds cause and
+//! reports standard errors.
 //!
-//! Pure: series in, figures out; knows of no files.
+//! Pure: series in, figures out, no files.
 
 pub(crate) mod clean;
 pub(crate) mod drift;

@@ -13,14 +13,14 @@ const MARGIN: usize = 1;
 /// First part at which the break may lie.
 const EARLIEST: usize = 3;
 
-/// What inspection tells of one cell's steps.
+/// What inspection of one cell's steps shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onset {
     /// Share of the step at which the others stop moving back, that is, forward sliding begins.
     pub fraction: f64,
     /// How far the others have been pushed back by then, m.
     pub retraction_m: f64,
-    /// The first estimate of the largest tip deformation, m: half the way that the cell has made by then.
+    /// The first estimate of the largest tip deformation, m: half the displacement of the cell by then.
     pub max_deformation_m: f64,
 }
 
@@ -37,12 +37,12 @@ pub fn find(gait: &IdentifiedGait) -> Vec<Onset> {
         let slot = steps.floor();
         let part = (((steps - slot) * PARTS as f64) as usize).min(PARTS - 1);
         match &mut begin {
-            Some((open, ways)) if *open == slot as i64 => ways.push((part, gait.body_m[sample])),
+            Some((open, displacements)) if *open == slot as i64 => displacements.push((part, gait.body_m[sample])),
             _ => {
-                if let Some((open, ways)) = begin.take() {
+                if let Some((open, displacements)) = begin.take() {
                     add(
                         &mut sums[gait.step_order[open.rem_euclid(cells as i64) as usize]],
-                        &ways,
+                        &displacements,
                     );
                 }
                 begin = Some((slot as i64, vec![(part, gait.body_m[sample])]));
@@ -53,15 +53,19 @@ pub fn find(gait: &IdentifiedGait) -> Vec<Onset> {
 }
 
 /// Adds one step, its ways counted from its mean, so that what happened before it does not matter.
-fn add(sums: &mut [(f64, f64); PARTS], ways: &[(usize, f64)]) {
-    let whole = ways.first().is_some_and(|first| first.0 < PARTS / 6)
-        && ways.last().is_some_and(|last| last.0 >= PARTS - PARTS / 6);
+fn add(sums: &mut [(f64, f64); PARTS], displacements: &[(usize, f64)]) {
+    let whole = displacements.first().is_some_and(|first| first.0 < PARTS / 6)
+        && displacements.last().is_some_and(|last| last.0 >= PARTS - PARTS / 6);
     if !whole {
         return;
     }
-    let late: Vec<f64> = ways.iter().filter(|way| way.0 >= PARTS / 2).map(|way| way.1).collect();
+    let late: Vec<f64> = displacements
+        .iter()
+        .filter(|displacement| displacement.0 >= PARTS / 2)
+        .map(|displacement| displacement.1)
+        .collect();
     let base_m = late.iter().sum::<f64>() / late.len().max(1) as f64;
-    for &(part, displacement_m) in ways {
+    for &(part, displacement_m) in displacements {
         sums[part].0 += displacement_m - base_m;
         sums[part].1 += 1.0;
     }

@@ -2,8 +2,8 @@
 //! candidates for each cell, 0.1 mm apart around the first estimate, on the samples as they are.
 //!
 //! For each candidate the contact points follow by (1) to (3) and the deformation by (4), cell by cell. The total force
-//! F = Σ kᵢ δᵢ + m g sin λ must have the time mean 0 (5 to 7) and the least variance; the paper does not say how it weighed the
-//! two, and here the mean square of F is least, which is the square of its mean plus its variance.
+//! F = Σ kᵢ δᵢ + m g sin λ must have the time mean 0 (5 to 7) and the smallest variance; the paper does not say how it weighs the two.
+//! Here the mean square of F is minimised, which is the square of its mean plus its variance.
 //!
 //! # Cost
 //! A cell's deformation depends on its own candidate alone, so 7 n series are computed, not 7ⁿ, and the mean square of a sum of

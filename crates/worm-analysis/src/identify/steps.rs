@@ -89,7 +89,7 @@ pub(super) fn find(
 
 /// A cell that does not step while the others crawl on: against their mean it goes straight away, with little to and fro.
 fn left_behind(relative_m: &[Vec<f64>]) -> Option<GaitError> {
-    let ways: Vec<(f64, f64)> = relative_m
+    let displacements: Vec<(f64, f64)> = relative_m
         .iter()
         .map(|series_m| {
             let smooth_m = running_median(series_m, MEDIAN_SAMPLES);
@@ -102,8 +102,11 @@ fn left_behind(relative_m: &[Vec<f64>]) -> Option<GaitError> {
             Some((displacement_m.abs(), swing(&bent_m)))
         })
         .collect::<Option<_>>()?;
-    let (cell, &(displacement_m, swing_m)) = ways.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
-    let mut swings: Vec<f64> = ways.iter().map(|way| way.1).collect();
+    let (cell, &(displacement_m, swing_m)) = displacements
+        .iter()
+        .enumerate()
+        .min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
+    let mut swings: Vec<f64> = displacements.iter().map(|displacement| displacement.1).collect();
     swings.sort_by(f64::total_cmp);
     let usual_m = swings[swings.len() / 2];
     (swing_m < LEFT_BEHIND.0 * usual_m && displacement_m > LEFT_BEHIND.1 * usual_m)

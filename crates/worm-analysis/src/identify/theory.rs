@@ -1,23 +1,22 @@
-//! Theory's way of the body, with what little inertia does to it.
+//! Displacement of the body by theory, with the small effect of inertia.
 //!
-//! The worm is slow, and the quasi-static [`Motion`] is right but for a few milliseconds: whenever a tip begins to slide or a
-//! step ends, the mean velocity of the cells changes, and the mass cannot follow at once. It swings about the quasi-static way
-//! on the contacts' stiffness, z″ + 2ζω z′ + ω² z = −x″ with ω² = K/m, K the stiffness of all contacts but the sliding one.
-//! At 2.5 s a cycle that is up to a tenth of a millimetre, seen at every corner of the way; taken for quasi-static it would be
-//! mistaken for other bounds. Mass and stiffness are known, the damping ratio ζ is found.
+//! The worm is slow, and the quasi-static [`Motion`] is right except for a few milliseconds: whenever a tip begins to slide or a step
+//! ends, the mean velocity of the cells changes, and the mass cannot follow at once. It oscillates about the quasi-static path on the
+//! stiffness of the contacts, z″ + 2ζω z′ + ω² z = −x″ with ω² = K/m, K the stiffness of all contacts but the sliding one. At 2.5 s a
+//! cycle that is up to a tenth of a millimetre at every corner of the path, and would bias the bounds if it were ignored. Mass and
+//! stiffness are known; the damping ratio ζ is fitted.
 
 use worm_physics::{Motion, SlidesDown, Worm};
 
-/// Largest damping ratio: the swing is then gone before it could be seen, and the motion quasi-static.
+/// Largest damping ratio: the oscillation then dies out before it could be seen, and the motion is quasi-static.
 const LARGEST_RATIO: f64 = 100.0;
-/// Distance of the damping ratio from 1, critical damping, within which it is taken for less: there the closed forms would divide
-/// nothing by nothing.
+/// Distance of the damping ratio from 1, critical damping, within which it is reduced: the closed forms would divide 0 by 0 there.
 const CRITICAL: f64 = 1e-3;
 
-/// Longest time that is taken at once, s: a small part of a swing.
+/// Longest time step, s: a small part of an oscillation.
 const LONGEST_STEP_S: f64 = 2.5e-3;
 
-/// The way of the body by theory, streamed.
+/// The displacement of the body by theory, streamed.
 #[derive(Debug, Clone)]
 pub(crate) struct TheoryBody<'a> {
     worm: &'a Worm,
@@ -28,7 +27,7 @@ pub(crate) struct TheoryBody<'a> {
     velocity_m_s: f64, // its velocity
 }
 
-/// A damped oscillator that is pushed, below or above critical damping.
+/// A driven damped oscillator, below or above critical damping.
 #[derive(Debug, Clone, Copy)]
 struct Swing {
     decay_per_s: f64, // ζω

@@ -1,14 +1,14 @@
-//! A quantity that runs on smoothly, from noisy readings: a Kalman filter with a velocity that wanders, run forward and back
-//! (Rauch, Tung, Striebel). How much the velocity wanders is what makes the readings most likely.
+//! Smooths a quantity that changes steadily: a Kalman filter with a random-walk velocity, run forward and backward (Rauch, Tung,
+//! Striebel). The variance of the velocity's steps is the one that makes the readings most likely.
 
 use nalgebra::{Matrix2, Vector2};
 
-/// How much the velocity wanders: variance that it gathers in a second, from the quietest to the wildest, in units²/s³.
+/// Process noise of the velocity that is tried: variance gathered in a second, units²/s³.
 const WANDERS: [f64; 9] = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
-/// Square of a surprise, in variances, from which a reading is not believed.
+/// Square of an innovation, in variances, from which a reading is rejected.
 const STRANGE: f64 = 25.0;
-/// Standard deviation of the velocity at the beginning, units/s, at least; elsewise as large as the mean velocity itself, so that
-/// a first reading far off does not send the track away.
+/// Smallest standard deviation of the initial velocity, units/s; otherwise it is the mean velocity, so that a first reading far off does
+/// not mislead the filter.
 const FIRST_VELOCITY: f64 = 0.1;
 
 /// A smoothed series.
@@ -115,13 +115,13 @@ fn filter(time_s: &[f64], readings: &[Option<(f64, f64)>], wander: f64, passes: 
         (state, covariance) = (predicted, predicted_covariance);
         if let Some((value, variance)) = reading {
             let spread = predicted_covariance[(0, 0)] + variance;
-            let surprise = value - predicted[0];
-            let strangeness = (surprise * surprise / spread).min(STRANGE);
+            let whitened = value - predicted[0];
+            let strangeness = (whitened * whitened / spread).min(STRANGE);
             log_likelihood -= 0.5 * (strangeness + spread.ln());
             // A reading that cannot be is passed over; should it have been right, the next ones bring it back.
             if strangeness < STRANGE {
                 let gain = predicted_covariance.column(0) / spread;
-                state += gain * surprise;
+                state += gain * whitened;
                 covariance -= gain * predicted_covariance.row(0);
             }
         }

@@ -100,9 +100,12 @@ fn a_payload_tells_a_wrong_slope_from_a_constant_drag() {
         "{next:?}"
     );
     assert!(next.separation_sigma.is_some_and(|sigma| sigma > 3.0), "{next:?}");
-    let effects: Vec<&str> = next.predictions.iter().map(|said| &*said.effect).collect();
+    let effects: Vec<&str> = next.predictions.iter().map(|prediction| &*prediction.effect).collect();
     assert_eq!(effects, ["slope-error", "constant-drag"]);
-    assert!(next.predictions.iter().all(|said| said.advance_m.is_some()), "{next:?}");
+    assert!(
+        next.predictions.iter().all(|prediction| prediction.advance_m.is_some()),
+        "{next:?}"
+    );
 }
 
 #[test]

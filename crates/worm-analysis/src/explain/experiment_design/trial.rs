@@ -1,7 +1,7 @@
-//! A run that was not made yet, under each rival: what each says of it, and how far apart they would be seen to be.
+//! A run that was not made yet, under each rival: what each predicts, and how well data would separate the predictions.
 //!
-//! The distance between two rivals is what the data of the new run would say against the wrong one, which may turn everything
-//! that is free in it as far as the campaign so far allows (its own normal matrix is the prior), and the error of the new run's slope.
+//! The distance between two rivals is the chi-squared of the data of the new run against the wrong one, which may adjust everything that
+//! is free in it as far as the campaign allows (its own normal matrix is the prior), and the slope error of the new run.
 
 use super::super::fit::{Fit, FitProblem};
 use super::super::noise::RunNoise;
@@ -15,18 +15,18 @@ use crate::least_squares::dot;
 use crate::recording::Recording;
 use nalgebra::{DMatrix, DVector};
 
-/// Fastest sampling that is simulated, Hz, and most samples in a cycle: more only repeat each other.
+/// Fastest sampling that is simulated, Hz, and most samples in a cycle: more add nothing.
 const RATE_HZ: f64 = 120.0;
 const SAMPLES_PER_CYCLE: f64 = 120.0;
 /// Time at rest before the first step, s.
 const REST_S: f64 = 0.3;
 /// Cycles after which the advance counts.
 const SETTLING_CYCLES: f64 = 2.0;
-/// The slope error of the new run stands in the place of the first run's.
+/// The slope error of the new run takes the place of the first run's.
 const FRESH_SLOPE: What = What::Nuisance(Nuisance::SlopeOf(0));
 
-/// The recording that a change would give, without positions, and which share of the camera's samples it has, as one in so many.
-pub(super) fn blank(problem: &FitProblem<'_, '_>, change: &Change) -> (Recording, f64) {
+/// The recording that a change would give, without positions, and how many samples of the camera there are for each of its own.
+pub(super) fn empty_recording(problem: &FitProblem<'_, '_>, change: &Change) -> (Recording, f64) {
     let base = &problem.scene.observed[change.base];
     let time_s = &base.run.recording.time_s;
     let own_hz = (time_s.len() - 1) as f64 / (time_s[time_s.len() - 1] - time_s[0]);
@@ -51,23 +51,23 @@ pub(super) fn blank(problem: &FitProblem<'_, '_>, change: &Change) -> (Recording
     (recording, own_hz / rate_hz)
 }
 
-/// A run to come.
+/// A run that may be made.
 pub(super) struct Trial<'r> {
     scene: Scene<'r>,
     noise: RunNoise,
 }
 
-/// What one rival says of it.
-pub(super) struct Said {
+/// What one rival predicts for it.
+pub(super) struct RunOutcome {
     pub predicted: Predicted,
     /// Advance of a settled cycle, m.
     pub advance_m: f64,
-    /// Everything in units of what noise would do, of variance 1.
+    /// The predicted positions, whitened: noise has variance 1.
     whitened: Vec<f64>,
 }
 
 impl<'r> Trial<'r> {
-    /// The run of a change; none where the canal cannot lie like that.
+    /// The run with a change; none where the slope is out of range.
     pub fn new(
         problem: &FitProblem<'_, '_>,
         change: &Change,
@@ -110,17 +110,17 @@ impl<'r> Trial<'r> {
         &self.scene.observed[0].phase
     }
 
-    /// Whether a rival's crawl repeats itself, and so is simulated quickly.
+    /// Whether a rival's crawl is periodic, and so quick to simulate.
     pub fn is_periodic(&self, rival: &Fit) -> bool {
         self.scene.physics(0, &rival.hypothesis, &rival.at).0.is_periodic()
     }
 
-    /// What a rival says; none where its worm does not hold.
-    pub fn ask(&self, rival: &Fit) -> Option<Said> {
-        self.ask_at(rival, &as_new(rival))
+    /// Prediction of a rival; none where its worm does not hold.
+    pub fn predict(&self, rival: &Fit) -> Option<RunOutcome> {
+        self.predict_at(rival, &on_new_run(rival))
     }
 
-    fn ask_at(&self, rival: &Fit, at: &[f64]) -> Option<Said> {
+    fn predict_at(&self, rival: &Fit, at: &[f64]) -> Option<RunOutcome> {
         let observed = &self.scene.observed[0];
         let (physics, _) = self.scene.physics(0, &rival.hypothesis, at);
         physics.clamped_worm().check_hold().ok()?;
@@ -138,7 +138,7 @@ impl<'r> Trial<'r> {
             .phase
             .partition_point(|&phase| phase < SETTLING_CYCLES)
             .min(last);
-        Some(Said {
+        Some(RunOutcome {
             advance_m: (mean_m(last) - mean_m(from)) / (observed.phase[last] - observed.phase[from]),
             predicted,
             whitened,
@@ -146,7 +146,7 @@ impl<'r> Trial<'r> {
     }
 
     /// Which quantities of a rival matter in the new run.
-    pub fn matter(rival: &Fit) -> Vec<usize> {
+    pub fn relevant_quantities(rival: &Fit) -> Vec<usize> {
         let of_old_run = |what: What| matches!(what, What::Nuisance(Nuisance::SlopeOf(run)) if run != 0);
         let free = rival.hypothesis.free.iter().enumerate();
         free.filter(|(_, free)| !of_old_run(free.what))
@@ -154,25 +154,25 @@ impl<'r> Trial<'r> {
             .collect()
     }
 
-    /// How what a rival says changes with one of its quantities.
-    pub fn derivative(&self, rival: &Fit, said: &Said, quantity: usize) -> Vec<f64> {
+    /// Derivative of a rival's prediction with respect to one of its quantities.
+    pub fn derivative(&self, rival: &Fit, outcome: &RunOutcome, quantity: usize) -> Vec<f64> {
         let free = &rival.hypothesis.free[quantity];
-        let mut at = as_new(rival);
+        let mut at = on_new_run(rival);
         let step = free.quantity.inward_step(at[quantity]);
         at[quantity] += step;
-        match self.ask_at(rival, &at) {
+        match self.predict_at(rival, &at) {
             Some(beside) => {
-                let pairs = beside.whitened.iter().zip(&said.whitened);
+                let pairs = beside.whitened.iter().zip(&outcome.whitened);
                 pairs.map(|(beside, here)| (beside - here) / step).collect()
             }
-            // A worm that would not hold tells nothing of how little it takes.
-            None => vec![0.0; said.whitened.len()],
+            // No derivative where the worm would not hold.
+            None => vec![0.0; outcome.whitened.len()],
         }
     }
 }
 
 /// A rival's values with the slope of the new run as stated.
-fn as_new(rival: &Fit) -> Vec<f64> {
+fn on_new_run(rival: &Fit) -> Vec<f64> {
     let free = rival.hypothesis.free.iter().zip(&rival.at);
     free.map(|(free, &at)| {
         if free.what == FRESH_SLOPE {
@@ -184,28 +184,28 @@ fn as_new(rival: &Fit) -> Vec<f64> {
     .collect()
 }
 
-/// Distance between what two rivals say, in standard deviations, nothing turned.
-pub(super) fn plain_distance(a: &Said, b: &Said) -> f64 {
+/// Distance between two predictions without any adjustment, in standard deviations.
+pub(super) fn plain_distance(a: &RunOutcome, b: &RunOutcome) -> f64 {
     difference(a, b).iter().map(|off| off * off).sum::<f64>().sqrt()
 }
 
-fn difference(a: &Said, b: &Said) -> Vec<f64> {
+fn difference(a: &RunOutcome, b: &RunOutcome) -> Vec<f64> {
     a.whitened.iter().zip(&b.whitened).map(|(a, b)| a - b).collect()
 }
 
-/// What a rival may turn to come nearer to what is seen.
-pub(super) struct Reach {
+/// What a rival may adjust to come nearer to the data.
+pub(super) struct Adjustment {
     columns: Vec<Vec<f64>>,
     inverse: DMatrix<f64>,
 }
 
-impl Reach {
-    /// From the derivatives of the quantities that matter; none where nothing is known of one.
+impl Adjustment {
+    /// From the derivatives of the relevant quantities; none where the normal matrix is singular.
     pub fn new(rival: &Fit, columns: Vec<Vec<f64>>) -> Option<Self> {
-        let matter = Trial::matter(rival);
+        let relevant_quantities = Trial::relevant_quantities(rival);
         let count = rival.at.len();
         let normal = rival.normal(None);
-        // The first run's slope error stays what the campaign says of it, and the new run's is one more quantity behind all.
+        // The first run's slope error keeps its place, and the new run's is one more quantity at the end.
         let place = |quantity: usize| {
             if rival.hypothesis.free[quantity].what == FRESH_SLOPE {
                 count
@@ -215,11 +215,11 @@ impl Reach {
         };
         let mut matrix = DMatrix::identity(count + 1, count + 1);
         matrix.view_mut((0, 0), (count, count)).copy_from(&normal);
-        for (&quantity, column) in matter.iter().zip(&columns) {
+        for (&quantity, column) in relevant_quantities.iter().zip(&columns) {
             if place(quantity) == count {
                 matrix[(count, count)] = rival.hypothesis.free[quantity].quantity.sigma.powi(-2);
             }
-            for (&other, other_column) in matter.iter().zip(&columns) {
+            for (&other, other_column) in relevant_quantities.iter().zip(&columns) {
                 matrix[(place(quantity), place(other))] += dot(column, other_column, None);
             }
         }
@@ -227,20 +227,20 @@ impl Reach {
             matrix[(quantity, quantity)] *= 1.0 + 1e-9;
         }
         let inverse = matrix.cholesky()?.inverse();
-        let inverse = DMatrix::from_fn(matter.len(), matter.len(), |row, column| {
-            inverse[(place(matter[row]), place(matter[column]))]
+        let inverse = DMatrix::from_fn(relevant_quantities.len(), relevant_quantities.len(), |row, column| {
+            inverse[(place(relevant_quantities[row]), place(relevant_quantities[column]))]
         });
         Some(Self { columns, inverse })
     }
 
-    /// What is left of the distance between two rivals when the one of this reach turns what it can, in standard deviations.
-    pub fn distance(&self, a: &Said, b: &Said) -> f64 {
+    /// Distance between two predictions after the rival of this adjustment has adjusted what it can, in standard deviations.
+    pub fn distance(&self, a: &RunOutcome, b: &RunOutcome) -> f64 {
         let difference = difference(a, b);
-        let shadow = DVector::from_iterator(
+        let products = DVector::from_iterator(
             self.columns.len(),
             self.columns.iter().map(|column| dot(column, &difference, None)),
         );
-        let turned = shadow.dot(&(&self.inverse * &shadow));
+        let turned = products.dot(&(&self.inverse * &products));
         (dot(&difference, &difference, None) - turned).max(0.0).sqrt()
     }
 }

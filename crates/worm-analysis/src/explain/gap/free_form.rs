@@ -1,10 +1,10 @@
-//! The residual's own mean cycle: what a model of any form could add.
+//! The mean cycle of the residual: what a model of any form could add.
 
-use super::{Cycle, Left, Squares, advance_m, settled_cycles, within_cycles};
+use super::{CellResiduals, Cycle, Squares, advance_m, settled_cycles, within_cycles};
 use crate::explain::noise::BINS_PER_STEP;
 use crate::explain::observed::Observed;
 
-/// Samples that a bin has at least, in the mean.
+/// Fewest samples in a bin, on average.
 const SAMPLES_PER_BIN: f64 = 3.0;
 /// Cycles from which the mean cycle has a trend.
 const TREND_CYCLES: usize = 5;
@@ -19,14 +19,19 @@ pub(super) fn bins(observed: &Observed<'_>) -> usize {
 }
 
 /// Mean residual of each cell in each bin, m: `[cycle][cell × bins + bin]`; `NaN` where not seen.
-pub(super) fn binned(observed: &Observed<'_>, cycles: &[Cycle], left: &Left, bins: usize) -> Vec<Vec<f64>> {
+pub(super) fn binned(
+    observed: &Observed<'_>,
+    cycles: &[Cycle],
+    residuals: &CellResiduals,
+    bins: usize,
+) -> Vec<Vec<f64>> {
     let cells = observed.cells();
     let of_cycle = |cycle: &Cycle| {
         let (mut sum_m, mut seen) = (vec![0.0; cells * bins], vec![0.0; cells * bins]);
         for sample in cycle.samples.clone() {
             let bin = place(observed, cycle, sample, bins).clamp(0.0, bins as f64 - 1.0) as usize;
             for cell in 0..cells {
-                let own_m = left.own_m[sample * cells + cell];
+                let own_m = residuals.own_m[sample * cells + cell];
                 if own_m.is_finite() {
                     sum_m[cell * bins + bin] += own_m;
                     seen[cell * bins + bin] += 1.0;
@@ -38,20 +43,20 @@ pub(super) fn binned(observed: &Observed<'_>, cycles: &[Cycle], left: &Left, bin
     cycles.iter().map(of_cycle).collect()
 }
 
-/// Where in its cycle a sample is, in bins.
+/// Position of a sample in its cycle, in bins.
 fn place(observed: &Observed<'_>, cycle: &Cycle, sample: usize, bins: usize) -> f64 {
     (observed.phase[sample] - observed.phase[0] - cycle.index as f64) * bins as f64
 }
 
-/// The residual without its mean cycle, and without the trend of it where there are cycles enough.
-pub(super) fn all(observed: &Observed<'_>, left: &Left) -> Left {
+/// The residual without its mean cycle, and without the trend of it where there are enough cycles.
+pub(super) fn all(observed: &Observed<'_>, residuals: &CellResiduals) -> CellResiduals {
     let has_trend = settled_cycles(observed).len() >= TREND_CYCLES;
-    without(observed, left, has_trend, |_, _| true)
+    without(observed, residuals, has_trend, |_, _| true)
 }
 
-/// Squares within cycles of what [`all`] left, with what it took of the cycles' own scatter given back: the share of its terms
-/// among the cycles, of what varies from bin to bin; what varies within bins it did not take.
-pub(super) fn floor(observed: &Observed<'_>, scatter: &Left) -> Squares {
+/// Squares within cycles of what [`all`] leaves, corrected for its degrees of freedom: it removed a fraction, its terms over the number
+/// of cycles, of the scatter that varies from bin to bin, and nothing of what varies within bins.
+pub(super) fn floor(observed: &Observed<'_>, scatter: &CellResiduals) -> Squares {
     let cycles = settled_cycles(observed);
     let bins = bins(observed);
     let terms = if cycles.len() >= TREND_CYCLES { 2.0 } else { 1.0 };
@@ -64,32 +69,37 @@ pub(super) fn floor(observed: &Observed<'_>, scatter: &Left) -> Squares {
         }
     }
     let taken_m2 = square_sum / count * terms / (cycles.len() as f64 - terms);
-    let left = within_cycles(observed, scatter, |_| true);
+    let residuals = within_cycles(observed, scatter, |_| true);
     Squares {
-        sum: left.sum + left.count * taken_m2,
-        ..left
+        sum: residuals.sum + residuals.count * taken_m2,
+        ..residuals
     }
 }
 
-/// The residual without the mean cycle of the others, blocks of cycles taken out one after the other; with the trend of the
-/// others, where they are enough and it is asked for.
-pub(super) fn held_out(observed: &Observed<'_>, left: &Left, with_trend: bool) -> Left {
+/// The residual of each block of cycles without the mean cycle of all others, and without their trend where `with_trend` and there are
+/// enough of them.
+pub(super) fn held_out(observed: &Observed<'_>, residuals: &CellResiduals, with_trend: bool) -> CellResiduals {
     let has_trend = with_trend && settled_cycles(observed).len() >= TREND_CYCLES + BLOCK;
-    without(observed, left, has_trend, |of, other| of / BLOCK != other / BLOCK)
+    without(observed, residuals, has_trend, |of, other| of / BLOCK != other / BLOCK)
 }
 
-/// Takes from each cycle the mean cycle of those that count for it, by their numbers among the settled ones.
-fn without(observed: &Observed<'_>, left: &Left, has_trend: bool, counts: impl Fn(usize, usize) -> bool) -> Left {
+/// Subtracts from each cycle the mean cycle of those that count for it, by their indices among the settled ones.
+fn without(
+    observed: &Observed<'_>,
+    residuals: &CellResiduals,
+    has_trend: bool,
+    counts: impl Fn(usize, usize) -> bool,
+) -> CellResiduals {
     let cells = observed.cells();
     let cycles = settled_cycles(observed);
     let bins = bins(observed);
-    let mut shapes = binned(observed, &cycles, left, bins);
+    let mut shapes = binned(observed, &cycles, residuals, bins);
     shapes.iter_mut().for_each(|shape| about_mean(shape, bins));
-    let advance_m = advance_m(observed, left);
-    let mut free = left.clone();
+    let advance_m = advance_m(observed, residuals);
+    let mut free = residuals.clone();
     for (number, cycle) in cycles.iter().enumerate() {
         let others: Vec<usize> = (0..cycles.len()).filter(|&other| counts(number, other)).collect();
-        let shape = foretold(&shapes, &others, number, has_trend);
+        let shape = predicted_shape(&shapes, &others, number, has_trend);
         for sample in cycle.samples.clone() {
             let place = place(observed, cycle, sample, bins);
             for cell in 0..cells {
@@ -101,7 +111,7 @@ fn without(observed: &Observed<'_>, left: &Left, has_trend: bool, counts: impl F
     free
 }
 
-/// Takes each cell's mean out of a cycle.
+/// Subtracts each cell's mean over a cycle.
 fn about_mean(shape: &mut [f64], bins: usize) {
     for cell in shape.chunks_exact_mut(bins) {
         let seen = cell.iter().filter(|own_m| own_m.is_finite());
@@ -110,8 +120,8 @@ fn about_mean(shape: &mut [f64], bins: usize) {
     }
 }
 
-/// A cycle's shape by the others', m; `NaN` where none of them saw.
-fn foretold(shapes: &[Vec<f64>], others: &[usize], number: usize, has_trend: bool) -> Vec<f64> {
+/// A cycle's shape predicted from those of others, m; `NaN` where none of them has a value.
+fn predicted_shape(shapes: &[Vec<f64>], others: &[usize], number: usize, has_trend: bool) -> Vec<f64> {
     let entries = shapes.first().map_or(0, Vec::len);
     (0..entries)
         .map(|entry| {
@@ -133,7 +143,7 @@ fn foretold(shapes: &[Vec<f64>], others: &[usize], number: usize, has_trend: boo
         .collect()
 }
 
-/// A shape between the middles of its bins, in straight lines that run on at the ends; `NaN` where it is not known.
+/// A shape, linear between the centres of its bins and extrapolated at the ends; `NaN` where it is not known.
 fn between(shape: &[f64], place: f64) -> f64 {
     if shape.len() < 2 {
         return shape.first().copied().unwrap_or(f64::NAN);
@@ -143,17 +153,17 @@ fn between(shape: &[f64], place: f64) -> f64 {
     shape[low] + fraction * (shape[low + 1] - shape[low])
 }
 
-/// The way of the body that the mean residual cycle adds to a model's, at every sample, m: what it gains in each cycle, and what
-/// repeats on it.
-pub(super) fn mean_displacement_m(observed: &Observed<'_>, left: &Left) -> Vec<f64> {
+/// Displacement of the body that the mean residual cycle adds to a model's, at every sample, m: the gain per cycle, and the periodic
+/// part.
+pub(super) fn mean_displacement_m(observed: &Observed<'_>, residuals: &CellResiduals) -> Vec<f64> {
     let cells = observed.cells();
     let cycles = settled_cycles(observed);
     let bins = bins(observed);
-    let mut shapes = binned(observed, &cycles, left, bins);
+    let mut shapes = binned(observed, &cycles, residuals, bins);
     shapes.iter_mut().for_each(|shape| about_mean(shape, bins));
-    let everyone: Vec<usize> = (0..cycles.len()).collect();
-    let shape = foretold(&shapes, &everyone, 0, false);
-    let advance_m = advance_m(observed, left);
+    let all_cycles: Vec<usize> = (0..cycles.len()).collect();
+    let shape = predicted_shape(&shapes, &all_cycles, 0, false);
+    let advance_m = advance_m(observed, residuals);
     let repeats_m: Vec<f64> = (0..bins)
         .map(|bin| {
             let of_cells = (0..cells)

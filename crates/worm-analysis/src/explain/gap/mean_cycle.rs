@@ -1,4 +1,4 @@
-//! The mean cycle of each run for the page: what was measured, and what the models say at the same samples.
+//! The mean cycle of each run for the page: measured, and by the models at the same samples.
 
 use crate::explain::answer::CycleSeries;
 use crate::explain::fit::{Fit, FitProblem};
@@ -9,8 +9,8 @@ use crate::explain::residual::Residual;
 /// Bins of a cycle, about.
 const BINS: usize = 72;
 
-/// Each run's way of the body within a cycle: measured, by the believed, the recalibrated and the named model. A model that cannot
-/// make a run has no series there; phases that no cycle saw are left out.
+/// Each run's displacement of the body within a cycle: measured, and by the nominal, the recalibrated and the named model. A model that
+/// cannot make a run has no series there; phases that no cycle shows are left out.
 pub(in crate::explain) fn cycles(
     problem: &FitProblem<'_, '_>,
     baseline: &Fit,
@@ -29,7 +29,7 @@ pub(in crate::explain) fn cycles(
         let Some(by_recalibrated) = predict(recalibrated) else {
             return series;
         };
-        // What a lost marker would do to the mean of the cells is not the body's way: the residual knows who was seen.
+        // A lost marker would shift the mean of the cells, so the measured series is a model plus its residual, which accounts for that.
         let left_m = Residual::new(observed, &by_recalibrated).body_m;
         let modelled_m = mean_of_cells_m(observed, &by_recalibrated);
         let measured_m: Vec<f64> = modelled_m.iter().zip(&left_m).map(|(m, left_m)| m + left_m).collect();
@@ -53,7 +53,7 @@ pub(in crate::explain) fn cycles(
     (0..problem.scene.observed.len()).map(of_run).collect()
 }
 
-/// As many for each step as there are samples for them.
+/// Number of bins: as many for each step as there are samples for.
 fn bins(observed: &Observed<'_>) -> usize {
     let cells = observed.cells();
     let steps = (observed.phase[observed.samples() - 1] - observed.phase[0]) * cells as f64;
@@ -67,7 +67,7 @@ fn mean_of_cells_m(observed: &Observed<'_>, predicted: &Predicted) -> Vec<f64> {
     samples.map(|at_m| at_m.iter().sum::<f64>() / cells as f64).collect()
 }
 
-/// A way folded into one gait cycle.
+/// A displacement folded into one gait cycle.
 struct Folded {
     /// Since the start of the cycle, less the stroke's share, m; `NaN` where no cycle saw the bin.
     mean_m: Vec<f64>,

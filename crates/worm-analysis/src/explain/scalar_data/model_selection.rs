@@ -1,9 +1,9 @@
-//! Chance, the set of effects that bring the model within it, and what is said of them.
+//! Chance, the set of effects that bring the model within it, and the sentence about them.
 //!
-//! A right model with normal errors leaves a misfit, priors counted, that is distributed as chi-square: with as many degrees
-//! of freedom as there are scalars for the recalibrated model, and one less for every parameter of an effect. A gap is there where
-//! the recalibrated model leaves what a right one would leave one time in twenty; an effect is ruled out only by what a right one
-//! would leave one time in a hundred, for it is worse to miss a cause than to keep one in doubt.
+//! A right model with normal errors leaves a chi-squared, priors included, with as many degrees of freedom as there are scalars for the
+//! recalibrated model, and one less for every parameter of an effect. There is a gap where the recalibrated model leaves more than a
+//! right one would one time in twenty. An effect is ruled out only by more than a right one would leave one time in a hundred: it is
+//! worse to miss a cause than to keep a doubtful one.
 
 use super::super::answer::{Remainder, Verdict};
 use super::super::fit::Fit;
@@ -15,8 +15,8 @@ use super::table::Table;
 type Quantile = ([f64; 8], f64);
 const ONE_IN_TWENTY: Quantile = ([3.841, 5.991, 7.815, 9.488, 11.070, 12.592, 14.067, 15.507], 1.6449);
 const ONE_IN_A_HUNDRED: Quantile = ([6.635, 9.210, 11.345, 13.277, 15.086, 16.812, 18.475, 20.090], 2.3263);
-/// What every recalibration has to settle, however few the scalars: friction, stiffness and stroke. The cells' own values and the
-/// slopes are known much better, and their priors are counted in the misfit.
+/// Quantities that every recalibration has to determine: friction, stiffness and stroke. The values of single cells and the slopes are
+/// known much better, and their priors are part of chi-squared.
 const COMMON: usize = 3;
 
 fn quantile((first, normal): Quantile, degrees: usize) -> f64 {
@@ -28,28 +28,28 @@ fn quantile((first, normal): Quantile, degrees: usize) -> f64 {
     })
 }
 
-/// What the misfit of a right model exceeds one time in twenty.
+/// The chi-squared that a right model exceeds one time in twenty.
 pub(super) fn chance(scalars: usize) -> f64 {
     quantile(ONE_IN_TWENTY, scalars)
 }
 
-/// An effect with the cells that it may concern, one of several twins.
+/// An effect with the cells that it may act on; one of several twins.
 pub(super) struct AdvanceKind {
     /// At the cell where it fits best.
-    pub find: Candidate,
+    pub candidate: Candidate,
     /// Every cell, from 1, at which it brings the model within chance.
     cells: Vec<usize>,
 }
 
 impl AdvanceKind {
-    /// Whether the advances do not tell which cell it is.
+    /// Whether the advances cannot distinguish between several cells.
     pub fn is_any_cell(&self) -> bool {
         self.cells.len() > 1
     }
 
-    /// Its name, with its cell where that is known.
+    /// Its name, with its cell where that is determined.
     pub fn name(&self) -> String {
-        let hypothesised = &self.find.hypothesised[0];
+        let hypothesised = &self.candidate.hypothesised[0];
         match hypothesised.cell {
             Some(_) if self.is_any_cell() => format!("{} of one cell", hypothesised.effect.name),
             Some(cell) => format!("{} of cell {}", hypothesised.effect.name, cell + 1),
@@ -73,36 +73,37 @@ pub(super) struct Judged {
 }
 
 /// Judges every effect that was fitted.
-pub(super) fn judge(table: &Table<'_>, recalibrated: &Fit, mut finds: Vec<Candidate>) -> Judged {
+pub(super) fn judge(table: &Table<'_>, recalibrated: &Fit, mut candidates: Vec<Candidate>) -> Judged {
     let scalars = table.advances.len();
-    // A parameter more must earn its keep (Akaike).
-    let cost = |find: &Candidate| find.fit.chi_squared + 2.0 * parameters(find) as f64;
-    let is_within = |find: &Candidate| find.fit.chi_squared <= ruled_out(scalars, find);
-    finds.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    // Each additional parameter has a cost (Akaike).
+    let cost = |candidate: &Candidate| candidate.fit.chi_squared + 2.0 * parameters(candidate) as f64;
+    let is_within = |candidate: &Candidate| candidate.fit.chi_squared <= ruled_out(scalars, candidate);
+    candidates.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     let mut kinds: Vec<AdvanceKind> = Vec::new();
-    for find in finds {
-        let cell = find.hypothesised[0]
+    for candidate in candidates {
+        let cell = candidate.hypothesised[0]
             .cell
             .map(|cell| cell + 1)
-            .filter(|_| is_within(&find));
+            .filter(|_| is_within(&candidate));
         match kinds
             .iter_mut()
-            .find(|kind| are_alike(&kind.find.hypothesised[0], &find.hypothesised[0]))
+            .find(|kind| are_alike(&kind.candidate.hypothesised[0], &candidate.hypothesised[0]))
         {
             Some(kind) => kind.cells.extend(cell),
             None => kinds.push(AdvanceKind {
-                find,
+                candidate,
                 cells: cell.into_iter().collect(),
             }),
         }
     }
     let agrees = recalibrated.chi_squared <= chance(scalars);
-    let min = kinds.first().map_or(0.0, |kind| cost(&kind.find));
-    let weight = |kind: &AdvanceKind| (-0.5 * (cost(&kind.find) - min)).exp();
+    let min = kinds.first().map_or(0.0, |kind| cost(&kind.candidate));
+    let weight = |kind: &AdvanceKind| (-0.5 * (cost(&kind.candidate) - min)).exp();
     let whole: f64 = kinds.iter().map(weight).sum();
     kinds.iter_mut().for_each(|kind| kind.cells.sort_unstable());
-    let (set, others): (Vec<AdvanceKind>, Vec<AdvanceKind>) =
-        kinds.into_iter().partition(|kind| !agrees && is_within(&kind.find));
+    let (set, others): (Vec<AdvanceKind>, Vec<AdvanceKind>) = kinds
+        .into_iter()
+        .partition(|kind| !agrees && is_within(&kind.candidate));
     let is_proven = matches!(&set[..], [only] if scalars > asked(only) && !only.is_any_cell());
     Judged {
         verdict: match &set[..] {
@@ -119,18 +120,18 @@ pub(super) fn judge(table: &Table<'_>, recalibrated: &Fit, mut finds: Vec<Candid
     }
 }
 
-/// What rules an effect out, as a misfit.
-fn ruled_out(scalars: usize, find: &Candidate) -> f64 {
-    quantile(ONE_IN_A_HUNDRED, scalars.saturating_sub(parameters(find)))
+/// The chi-squared that rules an effect out.
+fn ruled_out(scalars: usize, candidate: &Candidate) -> f64 {
+    quantile(ONE_IN_A_HUNDRED, scalars.saturating_sub(parameters(candidate)))
 }
 
-fn parameters(find: &Candidate) -> usize {
-    find.hypothesised[0].effect.parameters.len()
+fn parameters(candidate: &Candidate) -> usize {
+    candidate.hypothesised[0].effect.parameters.len()
 }
 
-/// Quantities that the scalars have to settle before they prove an effect; they must be more.
+/// Quantities that the scalars have to determine; more scalars than these prove an effect.
 fn asked(kind: &AdvanceKind) -> usize {
-    COMMON + parameters(&kind.find)
+    COMMON + parameters(&kind.candidate)
 }
 
 fn are_alike(one: &Hypothesised, other: &Hypothesised) -> bool {
@@ -160,8 +161,8 @@ impl Judged {
                 if only.is_any_cell() { ", and they do not tell the cell" } else { "" }
             ),
             (_, [_, ..]) => format!(
-                "The recalibrated model misses the {scalars} advances by more than chance, and each of {} effects alone would mend \
-                 it: {}. {scalars} scalars cannot decide between them.",
+                "The recalibrated model misses the {scalars} advances by more than chance, and each of {} effects alone would close \
+                 the gap: {}. {scalars} scalars cannot decide between them.",
                 self.set.len(),
                 self.set.iter().map(AdvanceKind::name).collect::<Vec<_>>().join(", ")
             ),
@@ -171,8 +172,8 @@ impl Judged {
                     ": {} comes nearest, with a misfit of {:.1} where a right model's stays below {:.1} ninety-nine times in a \
                      hundred",
                     kind.name(),
-                    kind.find.fit.chi_squared,
-                    ruled_out(scalars, &kind.find)
+                    kind.candidate.fit.chi_squared,
+                    ruled_out(scalars, &kind.candidate)
                 ))
             ),
         }
@@ -183,7 +184,7 @@ impl Judged {
         if self.verdict != Verdict::OutsideLibrary {
             return None;
         }
-        let best = self.others.first().map_or(recalibrated, |kind| &kind.find.fit);
+        let best = self.others.first().map_or(recalibrated, |kind| &kind.candidate.fit);
         let off = table.advances.iter().zip(&best.residual).map(|(advance, sigmas)| {
             let off_mm = -sigmas * advance.sigma_m * 1e3;
             format!("{off_mm:+.2} mm at {}°", advance.slope_deg).replace('-', "−")
@@ -200,11 +201,11 @@ impl Judged {
         })
     }
 
-    /// What the user should know; `fit` is what goes into the model.
+    /// Limitations of the answer; `fit` is what goes into the model.
     pub fn warnings(&self, fit: &Fit) -> Vec<String> {
         let mut warnings = vec![
             "advances alone: nothing is known of what happens within a cycle, nothing could be held out, and what shows there only, \
-             or leaves no steady crawl, was not tried; all rests on the standard errors as given"
+             or leaves no steady crawl, was not trial_values; all rests on the standard errors as given"
                 .to_owned(),
         ];
         warnings.extend(self.set.iter().filter(|kind| kind.is_any_cell()).map(|kind| {

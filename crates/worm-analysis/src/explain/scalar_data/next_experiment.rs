@@ -1,4 +1,4 @@
-//! What to record, so that positions decide what advances could not.
+//! What to record, so that positions decide what advances cannot.
 //!
 //! Which tips slide and when is in the positions of any run. The slope is the one on which the candidates' advances also lie
 //! farthest apart, so that one run does both.
@@ -10,15 +10,15 @@ use super::model_selection::Judged;
 use super::table::Table;
 use worm_physics::Cycle;
 
-/// Candidates that are told what they predict.
-const TOLD: usize = 8;
+/// Most candidates whose predictions are listed.
+const MAX_PREDICTIONS: usize = 8;
 
 /// The run to record; none where model and advances agree or one effect is named.
 pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) -> Option<NextExperiment> {
     if matches!(judged.verdict, Verdict::Agrees | Verdict::Explained) {
         return None;
     }
-    // Where nothing stands in the set, what comes nearest has its say; and always the model without any effect.
+    // Where the set is empty, the nearest effects predict; and always the model without any effect.
     let nearest = if judged.set.is_empty() {
         &judged.others
     } else {
@@ -26,18 +26,18 @@ pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) ->
     };
     let mut rivals: Vec<(String, &Fit)> = nearest
         .iter()
-        .take(TOLD)
-        .map(|kind| (kind.name(), &kind.find.fit))
+        .take(MAX_PREDICTIONS)
+        .map(|kind| (kind.name(), &kind.candidate.fit))
         .collect();
     rivals.push(("no effect".to_owned(), recalibrated));
-    let (slope_deg, said) = SLOPES_DEG
+    let (slope_deg, predicted) = SLOPES_DEG
         .into_iter()
-        .filter_map(|slope_deg| Some((slope_deg, ask(table, slope_deg, &rivals)?)))
+        .filter_map(|slope_deg| Some((slope_deg, predict_all(table, slope_deg, &rivals)?)))
         .max_by(|a, b| spread_m(&a.1).total_cmp(&spread_m(&b.1)))?;
     let cells = table.worm.cells();
     let predictions = rivals
         .into_iter()
-        .zip(&said)
+        .zip(&predicted)
         .map(|((effect, _), (cycle, advance_m))| Prediction {
             effect,
             advance_m: Some(*advance_m),
@@ -61,19 +61,20 @@ pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) ->
     })
 }
 
-/// What every rival says of a slope; none where one of them hardly gets on, for that is no experiment.
-fn ask(table: &Table<'_>, slope_deg: f64, rivals: &[(String, &Fit)]) -> Option<Vec<(Cycle, f64)>> {
+/// Predictions of every rival for a slope; none where one of them hardly advances, for that is no experiment.
+fn predict_all(table: &Table<'_>, slope_deg: f64, rivals: &[(String, &Fit)]) -> Option<Vec<(Cycle, f64)>> {
     let min_m = MIN_ADVANCE * table.worm.stroke_m();
-    let said = rivals.iter().map(|(_, fit)| table.on_slope(slope_deg, fit));
-    said.map(|said| said.filter(|(_, advance_m)| *advance_m > min_m))
+    let predicted = rivals.iter().map(|(_, fit)| table.on_slope(slope_deg, fit));
+    predicted
+        .map(|predicted| predicted.filter(|(_, advance_m)| *advance_m > min_m))
         .collect()
 }
 
 /// Standard deviation of the advances, m.
-fn spread_m(said: &[(Cycle, f64)]) -> f64 {
-    let count = said.len() as f64;
-    let mean_m = said.iter().map(|(_, advance_m)| advance_m).sum::<f64>() / count;
-    let squares = said.iter().map(|(_, advance_m)| (advance_m - mean_m).powi(2));
+fn spread_m(predicted: &[(Cycle, f64)]) -> f64 {
+    let count = predicted.len() as f64;
+    let mean_m = predicted.iter().map(|(_, advance_m)| advance_m).sum::<f64>() / count;
+    let squares = predicted.iter().map(|(_, advance_m)| (advance_m - mean_m).powi(2));
     (squares.sum::<f64>() / count).sqrt()
 }
 

@@ -23,10 +23,10 @@ const DESCENTS: usize = 3;
 const GAIN: f64 = 0.03;
 /// Residual of an advance that the worm could not have made.
 const IMPOSSIBLE: f64 = 1e3;
-/// A run that is none of the table's, to which no run's slope error belongs.
+/// Index of a run outside the table, to which no run's slope error applies.
 const NEW_RUN: usize = usize::MAX;
 
-/// Advances, and the worm that is believed to have made them.
+/// Advances, and the nominal worm.
 pub(super) struct Table<'a> {
     pub advances: &'a [Advance],
     pub worm: Worm,
@@ -52,7 +52,7 @@ impl<'a> Table<'a> {
             if !(advance.sigma_m > 0.0 && advance.sigma_m.is_finite() && advance.advance_m.is_finite()) {
                 return Err(ExplainError::NoSigma { recording });
             }
-            if table.said(run, &plain, &[]).is_none() {
+            if table.predict_m(run, &plain, &[]).is_none() {
                 return Err(ExplainError::SlidesDown { recording, slope_deg });
             }
         }
@@ -71,8 +71,8 @@ impl<'a> Table<'a> {
         Physics::of(worm).with(&self.settings).with(&hypothesis.settings(at))
     }
 
-    /// Advance of a run, m; none where the worm slides down.
-    fn said(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<f64> {
+    /// Predicted advance of a run, m; none where the worm slides down.
+    fn predict_m(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<f64> {
         let advance = &self.advances[run];
         let physics = self.physics(run, (advance.slope_deg, advance.payload_kg), hypothesis, at);
         let outcome = steady_cycle_of(&physics, advance.cycle_s.unwrap_or(self.cycle_s));
@@ -91,7 +91,7 @@ impl<'a> Table<'a> {
 
     /// Advance of a run by a fitted model, m; `NaN` where it slides down.
     pub fn advance_m(&self, run: usize, fit: &Fit) -> f64 {
-        self.said(run, &fit.hypothesis, &fit.at).unwrap_or(f64::NAN)
+        self.predict_m(run, &fit.hypothesis, &fit.at).unwrap_or(f64::NAN)
     }
 
     /// Mean over the runs of how far the advance is off, m.
@@ -101,19 +101,19 @@ impl<'a> Table<'a> {
         off_m.sum::<f64>() / self.advances.len() as f64
     }
 
-    /// Whether an effect with some values leaves a steady crawl, and another advance than the believed one.
+    /// Whether an effect with some values leaves a steady crawl, with another advance than the nominal one.
     pub fn shows(&self, hypothesis: &Hypothesis, nominal: &Fit, values: &[f64], min_m: f64) -> bool {
         let at = [&nominal.at, values].concat();
         let is_steady = self.physics(NEW_RUN, (0.0, 0.0), hypothesis, &at).is_periodic();
         let changes = |run: usize| {
-            self.said(run, hypothesis, &at)
+            self.predict_m(run, hypothesis, &at)
                 .is_none_or(|with_m| (with_m - self.advance_m(run, nominal)).abs() > min_m)
         };
         is_steady && (0..self.advances.len()).any(changes)
     }
 
-    /// About the misfit that an effect with some values would leave, were the recalibration to do no more than it does about the
-    /// believed worm, and where everything would lie then; none where the worm slides down.
+    /// Chi-squared that an effect with some values would leave after recalibration, to first order about the nominal worm, and the values
+    /// of all quantities then; none where the worm slides down.
     pub fn promise(&self, hypothesis: &Hypothesis, nominal: &Fit, values: &[f64]) -> Option<(f64, Vec<f64>)> {
         let mut at = [&nominal.at, values].concat();
         let runs = self.advances.len();
@@ -137,11 +137,12 @@ impl<'a> Table<'a> {
         Some((left.dot(&whitened), at))
     }
 
-    /// What is left of one advance, in its standard errors.
+    /// Residual of one advance, in its standard errors.
     fn residual(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> f64 {
         let advance = &self.advances[run];
-        self.said(run, hypothesis, at)
-            .map_or(IMPOSSIBLE, |said_m| (said_m - advance.advance_m) / advance.sigma_m)
+        self.predict_m(run, hypothesis, at).map_or(IMPOSSIBLE, |predicted_m| {
+            (predicted_m - advance.advance_m) / advance.sigma_m
+        })
     }
 
     fn under<'t>(&'t self, hypothesis: &'t Hypothesis) -> UnderHypothesis<'t> {

@@ -48,10 +48,10 @@ fn drift(per_cycle_m2: f64) -> Drift {
     Drift::new(&phases(), &variances(), per_cycle_m2)
 }
 
-fn surprises(drift: &Drift, series: &[f64]) -> Vec<f64> {
-    let mut surprises = Vec::new();
-    drift.whiten(series.iter().copied(), |surprise| surprises.push(surprise));
-    surprises
+fn whitened_residuals(drift: &Drift, series: &[f64]) -> Vec<f64> {
+    let mut whitened_residuals = Vec::new();
+    drift.whiten(series.iter().copied(), |whitened| whitened_residuals.push(whitened));
+    whitened_residuals
 }
 
 #[test]
@@ -59,8 +59,8 @@ fn whitening_is_linear() {
     let drift = drift(PER_CYCLE_M2);
     let (a, b) = (walk(1), walk(2));
     let sum: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - 3.0 * b).collect();
-    let (white_a, white_b) = (surprises(&drift, &a), surprises(&drift, &b));
-    for (at, white) in surprises(&drift, &sum).into_iter().enumerate() {
+    let (white_a, white_b) = (whitened_residuals(&drift, &a), whitened_residuals(&drift, &b));
+    for (at, white) in whitened_residuals(&drift, &sum).into_iter().enumerate() {
         let expected = 2.0 * white_a[at] - 3.0 * white_b[at];
         assert!((white - expected).abs() < 1e-8, "sample {at}: {white}, not {expected}");
     }
@@ -70,10 +70,10 @@ fn whitening_is_linear() {
 fn surprises_of_a_walk_are_independent_with_variance_1() {
     let drift = drift(PER_CYCLE_M2);
     for seed in 1..=5 {
-        let all = surprises(&drift, &walk(seed));
+        let all = whitened_residuals(&drift, &walk(seed));
         let seen: Vec<f64> = (1..SAMPLES).filter(|at| at % 7 != 3).map(|at| all[at]).collect();
         let count = seen.len() as f64;
-        let variance = seen.iter().map(|surprise| surprise * surprise).sum::<f64>() / count;
+        let variance = seen.iter().map(|whitened| whitened * whitened).sum::<f64>() / count;
         let error = (2.0 / count).sqrt();
         assert!((variance - 1.0).abs() < 4.0 * error, "seed {seed}: variance {variance}");
         for lag in 1..=3 {
@@ -137,6 +137,6 @@ fn smoothing_keeps_constants_and_bridges_gaps_with_straight_lines() {
 fn a_walk_that_nobody_saw_is_0() {
     let drift = Drift::new(&[0.0, 0.1, 0.2], &[f64::INFINITY; 3], PER_CYCLE_M2);
     assert_eq!(drift.smooth(&[f64::NAN; 3]), [0.0; 3]);
-    assert_eq!(surprises(&drift, &[f64::NAN; 3]), [0.0; 3]);
+    assert_eq!(whitened_residuals(&drift, &[f64::NAN; 3]), [0.0; 3]);
     assert!(Drift::new(&[], &[], PER_CYCLE_M2).smooth(&[]).is_empty());
 }

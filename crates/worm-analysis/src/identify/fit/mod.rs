@@ -1,8 +1,8 @@
-//! The continuous estimator of the largest tip deformations: theory laid through everything that was seen.
+//! The continuous estimator of the largest tip deformations: theory fitted to everything that was seen.
 //!
-//! The exact model, started with assumed deformations and run with assumed bounds, says how the body goes; what it leaves of
-//! the measured way is noise and drift. Levenberg and Marquardt's method finds the bounds, the mass where a slope
-//! lets it be seen, and the deformations at the start of each run that leave the least. Unlike the balance of (5) to (7), which
+//! The exact model, started with assumed deformations and run with assumed bounds, predicts the displacement of the body; the residual is
+//! noise and drift. [Least squares](crate::least_squares) finds the bounds, the mass where a slope shows it, and the deformations at the
+//! start of each run that leave the least. Unlike the balance of (5) to (7), which
 //! looks at forces that follow from noisy positions, it uses all that the bounds cause: when sliding begins, how far the body
 //! is pushed back, how far the worm gets. Several runs of one worm share bounds and mass.
 //!
@@ -25,8 +25,8 @@ use crate::least_squares::{self, Derivatives, LeastSquares, Method, normal_matri
 use problem::{BoundsProblem, DAMPING, IMPOSSIBLE};
 use worm_physics::{Worm, WormError};
 
-/// Rise of the misfit, beyond one for each cell, up to which a worm counts as laid down.
-const LAID_DOWN_MISFIT: f64 = 16.0;
+/// Rise of chi-squared, beyond one for each cell, up to which a worm counts as laid down.
+const LAID_DOWN_RISE: f64 = 16.0;
 /// Drifts that are tried, as standard deviations after one cycle, m: from `.0` on, each `.1` times the one before.
 const DRIFTS: (f64, f64, usize) = (2e-7, 2.0, 14);
 /// What a worm with mass, cam and pads of its own was seen to add to the standard error of a bound, m: tests hold the standard
@@ -95,7 +95,7 @@ pub struct FittedRun {
     pub laid_down: bool,
     /// Standard deviation that the drift gathers in a cycle, m.
     pub drift_per_cycle_m: f64,
-    /// Way of the body by theory at each sample, drift left out, m, from an origin that makes the drift's mean vanish.
+    /// Displacement of the body by theory at each sample, without drift, m, from an origin that makes the drift's mean vanish.
     pub theory_m: Vec<f64>,
     /// The drift at each sample, m.
     pub drift_m: Vec<f64>,
@@ -154,7 +154,7 @@ impl<'a> BoundsProblem<'a> {
         let mut starts: Vec<(f64, Vec<f64>)> = Vec::with_capacity(starts_m.len());
         for start_m in starts_m {
             self.begin_at(start_m);
-            starts.push((self.data_misfit(), self.parameters.clone()));
+            starts.push((self.data_chi_squared(), self.parameters.clone()));
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<(f64, Vec<f64>)> = None;
@@ -194,7 +194,7 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// Minimises the misfit from where the parameters are; returns it.
+    /// Minimises chi-squared from the current parameters; returns it.
     fn minimise(&mut self) -> f64 {
         let estimate = least_squares::minimise(self, self.parameters.clone(), None, &DESCENT);
         self.parameters = estimate.at;
@@ -205,10 +205,10 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// Takes the drift that makes the present misfit of each run most likely.
+    /// Finds the drift that makes the present residual of each run most likely.
     fn find_drift(&mut self) {
         for run in 0..self.runs.len() {
-            let Some(rest_m) = self.rest_m(run, &self.parameters) else {
+            let Some(residual_m) = self.residual_m(run, &self.parameters) else {
                 continue;
             };
             let data = &mut self.runs[run];
@@ -216,7 +216,7 @@ impl<'a> BoundsProblem<'a> {
                 .map(|at| {
                     let per_cycle_m = DRIFTS.0 * DRIFTS.1.powi(at as i32);
                     let drift = Drift::new(&data.run.gait.phase, &data.variance_m2, per_cycle_m * per_cycle_m);
-                    (drift.chi_squared(rest_m.iter().copied()), drift)
+                    (drift.chi_squared(residual_m.iter().copied()), drift)
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((_, drift)) = likeliest {
@@ -229,7 +229,7 @@ impl<'a> BoundsProblem<'a> {
     /// only the sum, and the search ends anywhere among all ways to share it out, often where one of them would just begin to
     /// slide.
     fn share_out(&mut self) {
-        let allowed = self.data_misfit() + self.misfit_ratio().max(1.0);
+        let allowed = self.data_chi_squared() + self.misfit_ratio().max(1.0);
         let cells = self.cells();
         for (one, other) in (0..SHARING_ROUNDS).flat_map(|_| pairs(cells)) {
             let bounds_m = self.bounds_m(&self.parameters);
@@ -239,7 +239,7 @@ impl<'a> BoundsProblem<'a> {
                     break;
                 }
                 let probe = self.moved(one, other, displacement_m);
-                if self.misfit_at(&probe) < allowed {
+                if self.chi_squared_at(&probe) < allowed {
                     self.set(probe);
                     break;
                 }
@@ -248,8 +248,8 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// How far each bound can be moved at another's expense without the data minding, m.
-    fn free_ways_m(&self) -> Vec<f64> {
-        let allowed = self.data_misfit() + self.misfit_ratio().max(1.0);
+    fn free_displacements_m(&self) -> Vec<f64> {
+        let allowed = self.data_chi_squared() + self.misfit_ratio().max(1.0);
         let bounds_m = self.bounds_m(&self.parameters);
         let mut free_m = vec![0.0_f64; self.cells()];
         for (one, other) in pairs(self.cells()) {
@@ -257,7 +257,7 @@ impl<'a> BoundsProblem<'a> {
                 for displacement_m in MOVES_M {
                     let displacement_m = sign * displacement_m;
                     let possible = bounds_m[one] + displacement_m > 0.0 && bounds_m[other] - displacement_m > 0.0;
-                    if !possible || self.misfit_at(&self.moved(one, other, displacement_m)) >= allowed {
+                    if !possible || self.chi_squared_at(&self.moved(one, other, displacement_m)) >= allowed {
                         break;
                     }
                     free_m[one] = free_m[one].max(displacement_m.abs());
@@ -288,15 +288,15 @@ impl<'a> BoundsProblem<'a> {
         if !self.runs[run].at_begin {
             return;
         }
-        let (free, free_misfit) = (self.parameters.clone(), self.data_misfit());
+        let (free, free_chi_squared) = (self.parameters.clone(), self.data_chi_squared());
         self.runs[run].laid_down = true;
         let first = self.first_start(run);
         for (cell, deformation_m) in self.laid_down_start_m(run, &self.parameters).into_iter().enumerate() {
             self.parameters[first + cell] = deformation_m * 1e3;
         }
         self.minimise();
-        let allowed = (LAID_DOWN_MISFIT + self.cells() as f64) * self.misfit_ratio().max(1.0);
-        self.runs[run].laid_down = self.data_misfit() - free_misfit < allowed;
+        let allowed = (LAID_DOWN_RISE + self.cells() as f64) * self.misfit_ratio().max(1.0);
+        self.runs[run].laid_down = self.data_chi_squared() - free_chi_squared < allowed;
         if !self.runs[run].laid_down {
             self.set(free);
         }
@@ -329,14 +329,14 @@ impl<'a> BoundsProblem<'a> {
         };
         let at = &self.parameters;
         let bounds_m = self.bounds_m(at);
-        let free_m = self.free_ways_m();
+        let free_m = self.free_displacements_m();
         let mut runs = Vec::with_capacity(self.runs.len());
         for run in 0..self.runs.len() {
-            let (Some(mut theory_m), Some(rest_m)) = (self.theory_m(run, at), self.rest_m(run, at)) else {
+            let (Some(mut theory_m), Some(residual_m)) = (self.theory_m(run, at), self.residual_m(run, at)) else {
                 return Err(FitError::NoCrawl);
             };
             let data = &self.runs[run];
-            let mut drift_m = data.drift.smooth(&rest_m);
+            let mut drift_m = data.drift.smooth(&residual_m);
             let mean_m = drift_m.iter().sum::<f64>() / drift_m.len().max(1) as f64;
             theory_m.iter_mut().for_each(|displacement_m| *displacement_m += mean_m);
             drift_m.iter_mut().for_each(|displacement_m| *displacement_m -= mean_m);

@@ -6,7 +6,7 @@ use crate::least_squares::{LeastSquares, Quantity, dot};
 use rayon::prelude::*;
 use worm_physics::{Worm, WormError};
 
-/// Spread of the bounds of one worm about their common mean, as a share: what shares out that which the data do not tell.
+/// Standard deviation of the logarithms of the bounds about their mean: it distributes what the data do not determine.
 const BOUND_SPREAD: f64 = 0.5;
 /// Standard deviation of the configured mass, as a share.
 const MASS_SPREAD: f64 = 0.1;
@@ -16,7 +16,7 @@ pub(super) const DAMPING: (f64, f64) = (0.5, 1.5);
 const START_SPREAD_M: (f64, f64) = (1.5e-3, 2e-5);
 /// Steps of the numerical derivatives: of the logarithms of bounds and mass, and of the deformations at the start, mm.
 const DIFFERENCES: (f64, f64) = (2e-3, 4e-3);
-/// How much wider the differences are by which standard errors are found.
+/// How much wider the differences for standard errors are.
 const WIDE: f64 = 5.0;
 /// Residual of a run that the worm could not have made.
 pub(super) const IMPOSSIBLE: f64 = 1e3;
@@ -100,8 +100,8 @@ impl<'a> BoundsProblem<'a> {
             .with_mass_kg(self.mass_kg(at) + data.run.payload_kg)
     }
 
-    /// What theory leaves of the measured way of a run, m; none where the worm could not have made it.
-    pub(super) fn rest_m(&self, run: usize, at: &[f64]) -> Option<Vec<f64>> {
+    /// Residual of the displacement in a run, m; none where the worm could not have made it.
+    pub(super) fn residual_m(&self, run: usize, at: &[f64]) -> Option<Vec<f64>> {
         let theory_m = self.theory_m(run, at)?;
         let measured_m = &self.runs[run].run.gait.body_m;
         Some(
@@ -113,7 +113,7 @@ impl<'a> BoundsProblem<'a> {
         )
     }
 
-    /// Way of the body by theory at every sample of a run, m.
+    /// Displacement of the body by theory at every sample of a run, m.
     pub(super) fn theory_m(&self, run: usize, at: &[f64]) -> Option<Vec<f64>> {
         let worm = self.worm(run, at).ok()?;
         self.runs[run].displacement_m(&worm, &self.start_m(run, at), self.damping_ratio(at))
@@ -124,7 +124,7 @@ impl<'a> BoundsProblem<'a> {
         (0..self.cells()).map(|cell| at[first + cell] * 1e-3).collect()
     }
 
-    /// Deformations of tips that were laid down unloaded and gave way together, m.
+    /// Deformations of tips that were laid down unloaded and yielded together, m.
     pub(super) fn laid_down_start_m(&self, run: usize, at: &[f64]) -> Vec<f64> {
         match self.worm(run, at) {
             Ok(worm) => vec![common_deformation_m(&worm); worm.cells()],
@@ -132,41 +132,41 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// Square sum of the surprises alone.
-    pub(super) fn data_misfit(&self) -> f64 {
-        self.misfit_at(&self.parameters)
+    /// Chi-squared of the data alone.
+    pub(super) fn data_chi_squared(&self) -> f64 {
+        self.chi_squared_at(&self.parameters)
     }
 
-    /// Square sum of the surprises with other parameters.
-    pub(super) fn misfit_at(&self, at: &[f64]) -> f64 {
-        let mut surprises = Vec::with_capacity(self.rows());
+    /// Chi-squared of the data with other parameters.
+    pub(super) fn chi_squared_at(&self, at: &[f64]) -> f64 {
+        let mut whitened_residuals = Vec::with_capacity(self.rows());
         for run in 0..self.runs.len() {
-            self.surprises(run, at, &mut surprises);
+            self.whitened_residuals(run, at, &mut whitened_residuals);
         }
-        surprises.iter().map(|surprise| surprise * surprise).sum()
+        whitened_residuals.iter().map(|whitened| whitened * whitened).sum()
     }
 
-    /// Mean square of the surprises.
+    /// Chi-squared of the data over its degrees of freedom.
     pub(super) fn misfit_ratio(&self) -> f64 {
         let seen = |data: &RunData<'_>| data.variance_m2.iter().filter(|variance| variance.is_finite()).count();
         let samples: usize = self.runs.iter().map(seen).sum();
-        self.data_misfit() / (samples.saturating_sub(self.parameters.len()).max(1)) as f64
+        self.data_chi_squared() / (samples.saturating_sub(self.parameters.len()).max(1)) as f64
     }
 
     pub(super) fn rows(&self) -> usize {
         self.runs.iter().map(|data| data.variance_m2.len()).sum::<usize>() + self.parameters.len()
     }
 
-    /// Appends the surprises of a run.
-    pub(super) fn surprises(&self, run: usize, at: &[f64], out: &mut Vec<f64>) {
+    /// Appends the whitened residuals of a run.
+    pub(super) fn whitened_residuals(&self, run: usize, at: &[f64], out: &mut Vec<f64>) {
         let data = &self.runs[run];
-        match self.rest_m(run, at) {
-            Some(rest_m) => data.drift.whiten(rest_m, |surprise| out.push(surprise)),
+        match self.residual_m(run, at) {
+            Some(residual_m) => data.drift.whiten(residual_m, |whitened| out.push(whitened)),
             None => out.extend(std::iter::repeat_n(IMPOSSIBLE, data.variance_m2.len())),
         }
     }
 
-    /// Appends what the parameters should be like before the data are asked, each in standard deviations, in their order.
+    /// Appends the residuals of the priors, each in standard deviations, in the order of the parameters.
     pub(super) fn expectations(&self, at: &[f64], out: &mut Vec<f64>) {
         let cells = self.cells();
         let mean = at[..cells].iter().sum::<f64>() / cells as f64;
@@ -192,7 +192,7 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// Residuals of the runs that a parameter concerns, all for none; zeros in the place of the others.
+    /// Residuals of the runs that a parameter concerns, all of them for none; zeros in the place of the others.
     pub(super) fn residuals_at(&self, at: &[f64], parameter: Option<usize>) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.rows());
         for (run, data) in self.runs.iter().enumerate() {
@@ -201,7 +201,7 @@ impl<'a> BoundsProblem<'a> {
             if parameter
                 .is_none_or(|parameter| parameter < shared || (first..first + self.cells()).contains(&parameter))
             {
-                self.surprises(run, at, &mut all);
+                self.whitened_residuals(run, at, &mut all);
             } else {
                 all.extend(std::iter::repeat_n(0.0, data.variance_m2.len()));
             }
@@ -249,7 +249,7 @@ impl LeastSquares for BoundsProblem<'_> {
         &self.quantities
     }
 
-    /// What the parameters should be like before the data are seen is among the residuals.
+    /// Those of the data and of the priors, for some priors concern several parameters.
     fn residuals(&self, at: &[f64]) -> Vec<f64> {
         self.residuals_at(at, None)
     }

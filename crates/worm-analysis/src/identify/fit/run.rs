@@ -1,4 +1,4 @@
-//! One run as the fit sees it: which samples count, and theory's way through them.
+//! One run as the fit sees it: which samples count, and the displacement by theory.
 
 use super::PositionRun;
 use crate::identify::drift::Drift;
@@ -73,7 +73,7 @@ impl<'a> RunData<'a> {
         }
     }
 
-    /// Way of the body at every sample, m: the mean of the cells' positions less what the stroke alone would have made.
+    /// Displacement of the body at every sample, m: the mean of the cells' positions less what the stroke alone would have made.
     pub(super) fn displacement_m(&self, worm: &Worm, start_m: &[f64], damping_ratio: f64) -> Option<Vec<f64>> {
         let PositionRun { time_s, gait, .. } = self.run;
         let mut body = TheoryBody::at_rest(worm, gait.phase[0], start_m, damping_ratio);
@@ -86,7 +86,7 @@ impl<'a> RunData<'a> {
     }
 }
 
-/// From when on the positions tell of the crawl, s: a worm that was just laid down first sinks into its tips.
+/// Time from which the positions show the crawl, s: a worm that was just laid down first settles on its tips.
 fn settled_from_s(time_s: &[f64], phase: &[f64]) -> f64 {
     let moves = phase
         .partition_point(|&phase_here| phase_here < phase[0] + MOVES)

@@ -1,9 +1,9 @@
-//! The gait phase by the positions, sample by sample.
+//! The gait phase from the positions, sample by sample.
 
 use super::Finder;
 use crate::identify::track;
 
-/// Misfit of a sample with all phases, in standard deviations of the noise for each cell, from which it is not believed.
+/// Residual of a sample at the best phase, in standard deviations of the noise for each cell, from which it is rejected.
 const MISFIT: f64 = 6.0;
 
 impl Finder<'_> {

@@ -67,12 +67,12 @@ impl Finder<'_> {
     /// The noise of one position by what the cells at rest leave; with two cells that cannot be told from the phase.
     pub(super) fn measure_noise(&mut self) {
         if self.cells() > 2 {
-            self.noise_m = self.rest_m();
+            self.noise_m = self.residual_m();
         }
     }
 
     /// Standard deviation of what places, stroke and phase leave of the positions of the cells at rest, m.
-    pub(super) fn rest_m(&self) -> f64 {
+    pub(super) fn residual_m(&self) -> f64 {
         let (mut squares, mut equations) = (0.0, 0.0);
         let mut rows = Vec::with_capacity(self.cells());
         for sample in 0..self.phase.len() {

@@ -54,7 +54,7 @@ impl Finder<'_> {
                 .iter()
                 .map(|series| series[sample] - series[sample - 1])
                 .collect();
-            if moves.iter().any(|way| way.is_nan()) {
+            if moves.iter().any(|displacement| displacement.is_nan()) {
                 continue;
             }
             let mean_m = moves.iter().sum::<f64>() / cells as f64;

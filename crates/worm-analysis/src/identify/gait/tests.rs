@@ -16,30 +16,30 @@ const PERIOD_S: f64 = 1.0 / 120.0;
 
 /// How a crawl is seen.
 #[derive(Debug, Clone, Copy)]
-struct Sight {
+struct Visibility {
     dropout_share: f64,
     outlier_fraction: f64, // 5 mm off
     pauses: usize,
 }
 
-const GOOD: Sight = Sight {
+const GOOD: Visibility = Visibility {
     dropout_share: 0.0,
     outlier_fraction: 0.0,
     pauses: 0,
 };
-const BAD: Sight = Sight {
+const BAD: Visibility = Visibility {
     dropout_share: 0.05,
     outlier_fraction: 0.005,
     pauses: 2,
 };
 
-struct Seen {
+struct SeenCrawl {
     time_s: Vec<f64>,
     phase: Vec<f64>,
     measured_m: Vec<Vec<f64>>,
 }
 
-impl Seen {
+impl SeenCrawl {
     fn find(&self, step_order: &[usize], phase: Option<&[f64]>) -> Result<IdentifiedGait, GaitError> {
         let filled_m = Recording {
             source: "seen".into(),
@@ -61,7 +61,7 @@ impl Seen {
 }
 
 /// A worm on the level crawls from a phase for some cycles of 80 samples a step, and pauses where it pleases.
-fn crawl(step_order: &[usize], from: f64, cycles: f64, sight: Sight, seed: u64) -> Seen {
+fn crawl(step_order: &[usize], from: f64, cycles: f64, visibility: Visibility, seed: u64) -> SeenCrawl {
     let cells = step_order.len();
     let worm = Worm::uniform(cells, Contact::symmetric(980.0, 1.75e-3), 0.333, 11.5e-3)
         .and_then(|worm| worm.with_step_order(step_order))
@@ -70,10 +70,10 @@ fn crawl(step_order: &[usize], from: f64, cycles: f64, sight: Sight, seed: u64) 
     let mut motion = Motion::under_way(&worm, from, &places_m, &vec![0.0; cells]);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let per_sample = 1.0 / (80.0 * cells as f64);
-    let pauses: Vec<f64> = (0..sight.pauses)
+    let pauses: Vec<f64> = (0..visibility.pauses)
         .map(|_| from + cycles * rng.random_range(0.2..0.8))
         .collect();
-    let mut seen = Seen {
+    let mut seen = SeenCrawl {
         time_s: Vec::new(),
         phase: Vec::new(),
         measured_m: vec![Vec::new(); cells],
@@ -91,10 +91,10 @@ fn crawl(step_order: &[usize], from: f64, cycles: f64, sight: Sight, seed: u64) 
             for (series, true_m) in seen.measured_m.iter_mut().zip(motion.positions_m()) {
                 let noise: f64 = StandardNormal.sample(&mut rng);
                 let mut at_m = true_m + NOISE_M * noise;
-                if rng.random_bool(sight.outlier_fraction) {
+                if rng.random_bool(visibility.outlier_fraction) {
                     at_m += 5e-3;
                 }
-                series.push(if rng.random_bool(sight.dropout_share) {
+                series.push(if rng.random_bool(visibility.dropout_share) {
                     f64::NAN
                 } else {
                     at_m
@@ -155,7 +155,7 @@ proptest! {
     fn nothing_but_noise_is_an_error(cells in 2_usize..=6, samples in 0_usize..400, seed in any::<u64>()) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut noise = || -> Vec<f64> { (0..samples).map(|_| StandardNormal.sample(&mut rng)).collect() };
-        let seen = Seen {
+        let seen = SeenCrawl {
             time_s: (0..samples).map(|at| at as f64 * PERIOD_S).collect(),
             phase: (0..samples).map(|at| at as f64 * 0.01).collect(),
             measured_m: (0..cells).map(|_| noise()).collect(),
@@ -185,7 +185,7 @@ fn an_order_that_was_configured_otherwise_is_found_all_the_same() {
 #[test]
 fn two_cells_have_a_gait_while_the_motor_turns_evenly() {
     for (seed, from) in [(1, 0.0), (2, 0.3), (3, 0.7)] {
-        let seen = crawl(&[1, 0], from, 5.0, Sight { pauses: 0, ..BAD }, seed);
+        let seen = crawl(&[1, 0], from, 5.0, Visibility { pauses: 0, ..BAD }, seed);
         let gait = seen.find(&[1, 0], None).expect("a gait");
         assert_eq!(gait.step_order, [1, 0]);
         assert!(
@@ -313,7 +313,7 @@ fn tiny_constant_and_unseen_recordings_are_errors() {
     for samples in [0, 1, 2, 3, 4, 9, 10, 11, 50] {
         for at_m in [0.0, 1.0, f64::NAN, f64::INFINITY] {
             for cells in [2, 4] {
-                let seen = Seen {
+                let seen = SeenCrawl {
                     time_s: (0..samples).map(|at| at as f64 * PERIOD_S).collect(),
                     phase: (0..samples).map(|at| at as f64).collect(),
                     measured_m: vec![vec![at_m; samples]; cells],

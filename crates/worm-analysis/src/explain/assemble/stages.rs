@@ -1,0 +1,72 @@
+//! The gap between model and data, stage by stage.
+
+use super::Parts;
+use crate::explain::answer::{Stage, StageKind};
+use crate::explain::fit::FitProblem;
+use crate::explain::gap::Measured;
+use crate::explain::model_selection::Candidate;
+
+/// The gap, stage by stage, and what fraction of it each candidate closes.
+pub(super) struct Gap {
+    pub stages: Vec<Stage>,
+    pub closure: Vec<f64>,
+    best_wrong: f64,
+}
+
+impl Gap {
+    pub fn measure(problem: &FitProblem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Self {
+        let judged = &parts.judged;
+        let best = judged
+            .candidates
+            .first()
+            .map_or(&parts.recalibrated, |candidate| &candidate.fit);
+        let measured = Measured::new(problem, best);
+        let recalibrated = measured.stage(
+            StageKind::Recalibrated,
+            None,
+            &parts.recalibrated,
+            &parts.recalibrated_held_out.fits,
+        );
+        let floor = measured.floor_stage();
+        let stage = |kind: StageKind, candidate: &Candidate| {
+            let folds = candidate.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
+            let names: Vec<&str> = candidate
+                .hypothesised
+                .iter()
+                .map(|hypothesised| hypothesised.effect.name)
+                .collect();
+            measured.stage(kind, Some(names.join(" + ")), &candidate.fit, folds)
+        };
+        let gap_m = recalibrated.held_out_rms_m - floor.held_out_rms_m;
+        let closure = |stage: &Stage| (recalibrated.held_out_rms_m - stage.held_out_rms_m) / gap_m;
+        let of_named: Vec<Stage> = named
+            .iter()
+            .map(|candidate| stage(StageKind::Named, candidate))
+            .collect();
+        let wrong = judged
+            .best_wrong
+            .as_ref()
+            .map(|candidate| stage(StageKind::BestWrong, candidate));
+        let closures = of_named.iter().map(closure).collect();
+        let best_wrong = wrong.as_ref().map_or(0.0, closure);
+        let mut stages = vec![
+            measured.stage(StageKind::Baseline, None, &parts.nominal, &[]),
+            recalibrated,
+        ];
+        stages.extend(wrong);
+        stages.extend(of_named.into_iter().next());
+        stages.push(measured.free_form_stage(&parts.recalibrated));
+        stages.push(floor);
+        Self {
+            stages,
+            closure: closures,
+            best_wrong,
+        }
+    }
+
+    /// A candidate's closure less that of the best other one, candidate or not.
+    pub fn margin(&self, place: usize) -> f64 {
+        let others = self.closure.iter().enumerate().filter(|(other, _)| *other != place);
+        self.closure[place] - others.map(|(_, closure)| *closure).fold(self.best_wrong, f64::max)
+    }
+}

@@ -1,0 +1,130 @@
+//! Prepares the runs of a campaign, and recalibrates the model on them.
+
+use super::error::ExplainError;
+use super::fit::{Fit, FitProblem};
+use super::hypothesis::Hypothesis;
+use super::noise::RunNoise;
+use super::observed::Observed;
+use super::predict::{Scene, nominal, predict};
+use super::residual::Residual;
+use crate::experiment::RecordedRun;
+use worm_estimator::config::Config;
+use worm_physics::effect::Setting;
+use worm_physics::{Physics, Worm};
+
+/// How often noise and recalibration are repeated, each with the result of the other.
+const NOISE_ROUNDS: usize = 2;
+
+/// Prepares the runs of a campaign.
+pub(super) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
+    if runs.is_empty() {
+        return Err(ExplainError::NoRun);
+    }
+    if config.worm.cells < 3 {
+        return Err(ExplainError::TwoCells);
+    }
+    let settings: Vec<Setting> = config
+        .effect
+        .iter()
+        .map(|effect| effect.setting(config.worm.cells))
+        .collect::<Result<_, _>>()?;
+    let mut scene = Scene {
+        observed: Vec::with_capacity(runs.len()),
+        nominal: Vec::with_capacity(runs.len()),
+    };
+    for run in runs {
+        let mut observed = Observed::new(*run, config)?;
+        if let Some(first) = scene.observed.first() {
+            same_order(first, &observed)?;
+        }
+        let worm = Worm::try_from(config)?.with_slope_rad(run.slope_deg.to_radians())?;
+        let physics = Physics::of(nominal(&observed, worm, run.payload_kg)).with(&settings);
+        if physics.clamped_worm().check_hold().is_err() {
+            return Err(ExplainError::SlidesDown {
+                recording: run.recording.source.display().to_string(),
+                slope_deg: run.slope_deg,
+            });
+        }
+        if observed.may_be_laid_down {
+            judge_start(&mut observed, &physics);
+        }
+        scene.observed.push(observed);
+        scene.nominal.push(physics);
+    }
+    Ok(scene)
+}
+
+fn same_order(first: &Observed<'_>, other: &Observed<'_>) -> Result<(), ExplainError> {
+    if first.step_order == other.step_order {
+        return Ok(());
+    }
+    let from_one = |order: &[usize]| order.iter().map(|cell| cell + 1).collect();
+    Err(ExplainError::StepOrder {
+        recording: other.run.recording.source.display().to_string(),
+        found: from_one(&other.step_order),
+        first: first.run.recording.source.display().to_string(),
+        expected: from_one(&first.step_order),
+    })
+}
+
+/// Assumes that the worm was laid down at the start where its first cycle fits that better.
+fn judge_start(observed: &mut Observed<'_>, physics: &Physics) {
+    let first_cycle = |observed: &Observed<'_>| {
+        let predicted = predict(observed, physics, 0.4, physics.is_periodic())?;
+        let residual = Residual::new(observed, &predicted);
+        let until = observed.phase.partition_point(|&phase| phase < observed.phase[0] + 1.0);
+        let body: Vec<f64> = residual.body_m[..until]
+            .iter()
+            .copied()
+            .filter(|at_m| at_m.is_finite())
+            .collect();
+        let mean = body.iter().sum::<f64>() / body.len() as f64;
+        Some(body.iter().map(|at_m| (at_m - mean).powi(2)).sum::<f64>())
+    };
+    observed.assume_laid_down(true);
+    let laid_down = first_cycle(observed);
+    observed.assume_laid_down(false);
+    let under_way = first_cycle(observed);
+    let is_laid_down = match (laid_down, under_way) {
+        (Some(laid_down), Some(under_way)) => laid_down < under_way,
+        (Some(_), None) => true,
+        _ => false,
+    };
+    observed.assume_laid_down(is_laid_down);
+}
+
+/// Alternates between measuring the noise and recalibrating the model.
+pub(super) fn recalibrate<'s, 'a>(
+    scene: &'s Scene<'a>,
+    base: &Hypothesis,
+) -> Result<(FitProblem<'s, 'a>, Fit), ExplainError> {
+    let mut at = base.neutral();
+    let mut round = 0;
+    loop {
+        let mut noise = Vec::with_capacity(scene.observed.len());
+        for (run, observed) in scene.observed.iter().enumerate() {
+            let predicted = scene.predict(run, base, &at).ok_or_else(|| ExplainError::SlidesDown {
+                recording: observed.run.recording.source.display().to_string(),
+                slope_deg: observed.run.slope_deg,
+            })?;
+            noise.push(RunNoise::measure(observed, &Residual::new(observed, &predicted)));
+        }
+        let problem = FitProblem {
+            scene,
+            noise,
+            repeating_excess: 0.0,
+        };
+        let mut fit = problem.fit(base, at, None);
+        round += 1;
+        if round == NOISE_ROUNDS {
+            problem.compute_jacobian(&mut fit);
+            let repeating_excess = problem.repeating_excess(&fit);
+            let problem = FitProblem {
+                repeating_excess,
+                ..problem
+            };
+            return Ok((problem, fit));
+        }
+        at = fit.at;
+    }
+}
