@@ -65,11 +65,11 @@ fn a_log_cut_anywhere_gives_all_whole_chunks() {
                 "at {length}: {:?}",
                 log.warnings
             );
-            let told = log
+            let is_reported = log
                 .warnings
                 .iter()
                 .all(|warning| warning.starts_with(&format!("cut off after {count} messages")));
-            assert!(told, "{:?}", log.warnings);
+            assert!(is_reported, "{:?}", log.warnings);
         }
     }
 }

@@ -22,15 +22,15 @@ fn every_fault_is_reported_in_time_with_its_cell() {
             (case.fault)(&mut bench);
             let onset_s = bench.time_s();
             bench.run(case.within_s + 5.0);
-            let told = bench.changes.iter().find(|alarm| alarm.kind == case.expected.code());
+            let reported = bench.changes.iter().find(|alarm| alarm.kind == case.expected.code());
             let other = bench.changes.iter().find(|alarm| {
                 alarm.kind != case.expected.code() && !case.also.iter().any(|kind| kind.code() == alarm.kind)
             });
             if let Some(other) = other {
                 failures.push(format!("{}: also {other:?}", case.name));
             }
-            let Some(alarm) = told else {
-                failures.push(format!("{}: not told", case.name));
+            let Some(alarm) = reported else {
+                failures.push(format!("{}: not reported", case.name));
                 continue;
             };
             let delay_s = alarm.time_ns as f64 * 1e-9 - onset_s;
@@ -46,7 +46,7 @@ fn every_fault_is_reported_in_time_with_its_cell() {
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }
 
-/// Every alarm that was raised is cleared when its cause is gone and the worm crawls on, or stands.
+/// Every alarm that was raised is cleared when its cause is gone and the worm crawls on or stands still.
 #[test]
 fn what_is_raised_is_cleared_when_it_is_over() {
     for case in table().iter().filter(|case| case.cycles_per_s.abs() > 0.05) {
@@ -121,12 +121,12 @@ fn a_controller_restart_clears() {
     bench.trouble.hardware_error = 0;
     bench.restart_controller();
     bench.run(0.1);
-    let told: Vec<_> = bench
+    let reported: Vec<_> = bench
         .changes
         .iter()
         .map(|alarm| (alarm.sequence, alarm.raised))
         .collect();
-    assert_eq!(told, [(0, 1), (1, 0)]);
+    assert_eq!(reported, [(0, 1), (1, 0)]);
 }
 
 #[test]

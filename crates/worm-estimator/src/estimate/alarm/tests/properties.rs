@@ -1,4 +1,4 @@
-//! Whatever comes in, the watch holds its promises.
+//! Invariants of the monitor for any input.
 
 use super::super::{AlarmMonitor, Observation};
 use super::worm::{Bench, blank_cycle, blank_estimate};
@@ -32,7 +32,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_input_keeps_the_promises(ticks in prop::collection::vec(tick(), 1..120), cells in 2..=16_usize) {
+    fn invariants_hold_for_any_input(ticks in prop::collection::vec(tick(), 1..120), cells in 2..=16_usize) {
         let mut config = Config::default();
         config.worm.cells = cells;
         config.worm.step_order = (1..=cells).collect();
