@@ -1,4 +1,4 @@
-//! The same results live and on the log.
+//! The same results live and from a log.
 
 use testkit::log_sample::{Told, crawl, crawl_with_late_estimator};
 use worm_log::{Comparison, compare, replay};
@@ -12,7 +12,7 @@ fn replayed(session: Told) -> Comparison {
 
 #[test]
 fn a_whole_log_comes_out_as_recorded() {
-    // An estimator that is late begins in the middle of a crawl.
+    // An estimator that starts late begins in the middle of a crawl.
     for late in [0, 3, 1234] {
         let session = crawl_with_late_estimator(6.5, late);
         let (states, cycles, alarms) = (session.states.len(), session.cycles.len(), session.alarms.len());
