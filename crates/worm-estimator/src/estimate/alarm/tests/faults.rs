@@ -146,7 +146,7 @@ fn the_battery_warns_while_the_way_home_is_still_possible() {
     let mut bench = Bench::new(config, 3);
     bench.battery_j = 700.0;
     bench.run(2.0);
-    let fraction = bench.watch.battery_fraction();
+    let fraction = bench.monitor.battery_fraction();
     assert!((fraction - 700.0 / 900.0).abs() < 0.04, "after two seconds: {fraction}");
     bench.command(Mode::Crawling, 0.4);
     while bench.raised().is_empty() && bench.time_s() < 2000.0 {
@@ -155,9 +155,9 @@ fn the_battery_warns_while_the_way_home_is_still_possible() {
     assert_eq!(bench.raised(), [BatteryLow]);
     let fraction = bench.battery_j / 900.0;
     assert!(
-        (bench.watch.battery_fraction() - fraction).abs() < 0.03,
+        (bench.monitor.battery_fraction() - fraction).abs() < 0.03,
         "{fraction} {}",
-        bench.watch.battery_fraction()
+        bench.monitor.battery_fraction()
     );
     // Half of what was above the reserve at the start went into the way out; the other half goes home.
     assert!((0.38..0.5).contains(&fraction), "{fraction}");

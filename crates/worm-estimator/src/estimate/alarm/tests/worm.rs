@@ -67,7 +67,7 @@ impl Trouble {
 /// The worm, and the monitor of its alarms.
 pub struct Bench {
     pub config: Config,
-    pub watch: AlarmMonitor,
+    pub monitor: AlarmMonitor,
     pub state: State,
     pub trouble: Trouble,
     /// Standard deviation of a filtered position, m.
@@ -104,7 +104,7 @@ impl Bench {
         state.phase = 0.0;
         state.time_ns = 5_000_000_000;
         Self {
-            watch: AlarmMonitor::new(&config),
+            monitor: AlarmMonitor::new(&config),
             trouble: Trouble::none(),
             noise_m: 5e-5,
             scatter: 0.01,
@@ -155,13 +155,13 @@ impl Bench {
     }
 
     pub fn raised(&self) -> Vec<AlarmKind> {
-        let mask = self.watch.raised_mask();
+        let mask = self.monitor.raised_mask();
         let is_raised = |kind: &AlarmKind| mask >> kind.code() & 1 == 1;
         AlarmKind::ALL.iter().copied().filter(is_raised).collect()
     }
 
     pub fn is_armed(&self, kind: AlarmKind) -> bool {
-        self.watch.armed_mask() >> kind.code() & 1 == 1
+        self.monitor.armed_mask() >> kind.code() & 1 == 1
     }
 
     /// Resets the controller's counters.
@@ -206,7 +206,7 @@ impl Bench {
             cycle: cycle.as_ref(),
             residuals: None,
         };
-        let changes = self.watch.update(&observation);
+        let changes = self.monitor.update(&observation);
         self.changes.extend_from_slice(&changes);
     }
 
