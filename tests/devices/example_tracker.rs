@@ -115,7 +115,11 @@ fn assert_is_of_the_pattern(reading: &TrackerReading, cells: usize) {
     assert_eq!(usize::from(reading.cell_count), cells);
     for (cell, &position_m) in reading.positions_m[..cells].iter().enumerate() {
         let hidden = cell + 1 == cells && sample % 10 == 9;
-        assert_eq!((reading.valid >> cell & 1 == 1), !hidden, "cell {cell} of capture {sample}");
+        assert_eq!(
+            reading.valid >> cell & 1 == 1,
+            !hidden,
+            "cell {cell} of capture {sample}"
+        );
         let known = if hidden { sample - 1 } else { sample };
         let expected_m = 0.05 * cell as f64 + 1e-4 * f64::from(known % 1_000);
         assert!(

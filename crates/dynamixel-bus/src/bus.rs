@@ -1,7 +1,7 @@
-//! Transactions on a port: one question, its answer, no longer than a deadline.
+//! Transactions on a port: one request and its answer, within a deadline.
 //!
-//! A question is sent when everything that came before it has been thrown away, so that a late answer to the last question
-//! is not taken for the answer to this one. Statuses of devices that were not asked are counted and passed over.
+//! Before a request is sent, all earlier input is discarded, so that a late answer to the last request is not taken for the answer to this
+//! one. Statuses of other devices are counted and ignored.
 
 use std::time::Instant;
 
@@ -17,12 +17,12 @@ pub struct Bus<P> {
     port: P,
     decoder: Decoder,
     counters: BusCounters,
-    /// Garbage of the decoder that the counters hold already.
+    /// Garbage bytes of the decoder that have been counted already.
     garbage_counted: u64,
     writes_are_answered: bool,
 }
 
-/// Who answered a ping.
+/// The answer to a ping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identity {
     /// Model number.
@@ -33,34 +33,34 @@ pub struct Identity {
     pub alert: bool,
 }
 
-/// Why a transaction brought nothing.
+/// Why a transaction failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum TransactionError {
     /// No answer in time.
     #[error("device {0} does not answer: check its power, cable, ID and baud rate")]
     Silent(DeviceId),
-    /// An answer came damaged.
+    /// The answer came damaged.
     #[error("the answer of device {0} came damaged: check cable, length and termination")]
     Damaged(DeviceId),
     /// The device refused.
     #[error("device {id} refused: {error}")]
     Refused {
-        /// Who.
+        /// The device.
         id: DeviceId,
-        /// Why.
+        /// Its error.
         error: StatusError,
     },
-    /// The answer has another length than was asked for.
+    /// The answer has another length than requested.
     #[error("device {id} answered with {found} bytes instead of {expected}: is it of the model configured?")]
     Length {
-        /// Who.
+        /// The device.
         id: DeviceId,
-        /// Bytes asked for.
+        /// Bytes requested.
         expected: usize,
-        /// Bytes that came.
+        /// Bytes received.
         found: usize,
     },
-    /// The question does not fit into a packet.
+    /// The request does not fit into a packet.
     #[error(transparent)]
     Encode(#[from] EncodeError),
     /// The port failed.
@@ -71,7 +71,7 @@ pub enum TransactionError {
 /// How [`Bus::receive_until`] ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WaitEnd {
-    /// Everything that was waited for has come.
+    /// Everything expected has come.
     Done,
     /// The deadline passed first.
     DeadlinePassed {
@@ -81,7 +81,7 @@ pub enum WaitEnd {
 }
 
 impl<P: Port> Bus<P> {
-    /// A bus on this port. Writes are answered, as devices come from the factory.
+    /// A bus on this port. Writes are answered, as with the factory settings of a device.
     pub const fn new(port: P) -> Self {
         Self {
             port,
@@ -92,17 +92,17 @@ impl<P: Port> Bus<P> {
         }
     }
 
-    /// What has gone wrong so far.
+    /// The counts so far.
     pub const fn counters(&self) -> BusCounters {
         self.counters
     }
 
-    /// What has gone wrong so far, to add to: for transactions that are made of this bus's parts.
+    /// The counts so far, for transactions that are built from the parts of this bus.
     pub const fn counters_mut(&mut self) -> &mut BusCounters {
         &mut self.counters
     }
 
-    /// The port, for what is not a transaction.
+    /// The port, for anything that is not a transaction.
     pub const fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
@@ -112,7 +112,7 @@ impl<P: Port> Bus<P> {
         self.writes_are_answered = answered;
     }
 
-    /// Asks a device who it is. Answered at any status return level.
+    /// Asks a device for its identity. It answers at any status return level.
     ///
     /// # Errors
     /// [`TransactionError`]
@@ -128,8 +128,8 @@ impl<P: Port> Bus<P> {
         })
     }
 
-    /// Asks all devices who they are, and listens until `deadline`. They answer in the order of their IDs; the official SDK
-    /// allows 3 ms for each possible ID. Returns how many answered.
+    /// Asks all devices for their identity, and listens until `deadline`. They answer in the order of their IDs; the official SDK allows
+    /// 3 ms for each possible ID. Returns the number of answers.
     ///
     /// # Errors
     /// [`PortError`]
@@ -197,10 +197,10 @@ impl<P: Port> Bus<P> {
         Ok(u32::from_le_bytes(value))
     }
 
-    /// Writes bytes from `address` on, and waits for the receipt if writes are answered.
+    /// Writes bytes from `address` on, and waits for the answer if writes are answered.
     ///
     /// # Errors
-    /// [`TransactionError`]; when writes are not answered, only those of sending.
+    /// [`TransactionError`]; if writes are not answered, only those of sending.
     pub fn write(
         &mut self,
         id: DeviceId,
@@ -234,11 +234,11 @@ impl<P: Port> Bus<P> {
         )
     }
 
-    /// Restarts a device, which clears a hardware error. It is back within a second or so, with the RAM area as at power-up:
-    /// torque off, writes answered.
+    /// Restarts a device, which clears a hardware error. It is back within about a second, with the RAM area as at power-up: torque off,
+    /// writes answered.
     ///
     /// # Errors
-    /// [`TransactionError`]; when writes are not answered, only those of sending.
+    /// [`TransactionError`]; if writes are not answered, only those of sending.
     pub fn reboot(&mut self, id: DeviceId, deadline: Instant) -> Result<(), TransactionError> {
         self.ask(id, Instruction::Reboot, deadline)?;
         if self.writes_are_answered {
@@ -247,10 +247,10 @@ impl<P: Port> Bus<P> {
         Ok(())
     }
 
-    /// Reads the same stretch of several devices; hands over each answer as it comes. Returns how many came.
+    /// Reads the same addresses of several devices, and calls `each` with every answer. Returns the number of answers.
     ///
     /// # Errors
-    /// [`TransactionError`] of sending and of the port; a silent device is one answer less.
+    /// [`TransactionError`] of sending and of the port. A silent device is not an error, only an answer less.
     pub fn sync_read(
         &mut self,
         address: u16,
@@ -276,10 +276,10 @@ impl<P: Port> Bus<P> {
         )
     }
 
-    /// Reads a stretch of each of several devices; hands over each answer as it comes. Returns how many came.
+    /// Reads a span of each of several devices, and calls `each` with every answer. Returns the number of answers.
     ///
     /// # Errors
-    /// [`TransactionError`] of sending and of the port; a silent device is one answer less.
+    /// [`TransactionError`] of sending and of the port. A silent device is not an error, only an answer less.
     pub fn bulk_read<const DEVICES: usize>(
         &mut self,
         spans: [ReadSpan; DEVICES],
@@ -316,7 +316,7 @@ impl<P: Port> Bus<P> {
         Ok(answers)
     }
 
-    /// Listens until `deadline` and throws away what comes, so that the line is quiet afterwards.
+    /// Listens until `deadline` and discards what comes, so that the line is quiet afterwards.
     ///
     /// # Errors
     /// [`PortError`]
@@ -357,7 +357,7 @@ impl<P: Port> Bus<P> {
                 let (expected, found) = (into.len(), status.data.len());
                 answer = Some(Err(TransactionError::Length { id, expected, found }));
             }
-            // An empty answer to a read is the receipt of an earlier write.
+            // An empty answer to a read belongs to an earlier write.
             answer.is_some()
         })?;
         if let Some(answer) = answer {
@@ -372,7 +372,7 @@ impl<P: Port> Bus<P> {
         })
     }
 
-    /// Throws away what came late, then sends the packets in one write.
+    /// Discards late input, then sends the packets in one write.
     ///
     /// # Errors
     /// [`TransactionError`] of encoding and of the port.
@@ -398,8 +398,8 @@ impl<P: Port> Bus<P> {
         Ok(())
     }
 
-    /// Receives packets and hands them to `take` until it says that it has what it wants, or `deadline` has passed. Packets
-    /// that are there already are handed over all the same, so that of two answers the newer one has the last word.
+    /// Receives packets and passes them to `take` until it returns true or `deadline` has passed. Packets that have arrived by then are
+    /// passed, too, so that of two answers the newer one counts.
     ///
     /// # Errors
     /// [`PortError`]
@@ -439,13 +439,13 @@ impl<P: Port> Bus<P> {
                 .map_err(|error| self.count_port_error(error))?;
             self.decoder.commit(received);
             self.counters.received_bytes += received as u64;
-            // A device that never stops talking must not hold the loop beyond its deadline.
+            // A device that never stops sending must not hold the loop beyond its deadline.
             too_late = received == 0 || Instant::now() >= deadline;
         }
     }
 
-    /// Takes the packets that have come since the last wait, without waiting for more, of at most about `byte_limit` bytes. They are
-    /// answers that came late: their bytes count as stale, and what no packet comes of is thrown away.
+    /// Passes the packets that have come since the last wait to `take`, without waiting for more, up to about `byte_limit` bytes. They
+    /// are late answers: their bytes count as stale, and incomplete packets are discarded.
     ///
     /// # Errors
     /// [`PortError`]
@@ -469,13 +469,13 @@ impl<P: Port> Bus<P> {
             }
         }
         self.counters.stale_bytes += stale_bytes as u64;
-        // All of it has been counted: what no packet came of is neither garbage nor once more stale.
+        // All bytes have been counted as stale: they must not count again as garbage.
         self.decoder.clear();
         self.garbage_counted = self.decoder.garbage_bytes();
         Ok(())
     }
 
-    /// The segments that are there of a fast reply whose end has not come.
+    /// Passes an incomplete fast reply to `take`, if there is one: its first segments may be good.
     pub fn take_unfinished_fast_reply(&mut self, take: impl FnOnce(FastReply<'_>, &mut BusCounters)) {
         if let Some(reply) = self.decoder.unfinished_fast_reply() {
             take(reply, &mut self.counters);

@@ -1,4 +1,4 @@
-//! What has passed along a bus so far, and what has gone wrong, by kind.
+//! Counts of bytes, and of errors by kind.
 
 use super::packet::{StatusError, StatusFlags};
 
@@ -13,7 +13,7 @@ pub struct BusCounters {
     pub timeouts: u64,
     /// Packets, and segments of fast replies, whose CRC was wrong.
     pub crc_errors: u64,
-    /// Bytes that belonged to no packet.
+    /// Bytes outside of packets.
     pub garbage_bytes: u64,
     /// Bytes of late answers, which came before the next request.
     pub stale_bytes: u64,

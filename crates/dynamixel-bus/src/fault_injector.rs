@@ -1,7 +1,7 @@
-//! A port that is as bad as one wants it, the same way each time.
+//! A port with faults, the same ones each time.
 //!
-//! Faults are put between bus and port, so that the product has no `if` for them. All chance comes from one seeded generator,
-//! and is drawn byte by byte in the order in which bytes pass: the same seed and the same traffic give the same faults.
+//! Faults are added between bus and port, so that neither has code for them. All randomness comes from one seeded generator and is drawn byte
+//! by byte in the order of the traffic: the same seed and the same traffic give the same faults.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -12,20 +12,20 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 use super::{Port, PortError};
 
-/// What goes wrong, and how often. Probabilities are 0 to 1. Begin with [`NONE`](Self::NONE): `Faults { drop: 0.01, ..Faults::NONE }`.
+/// The faults and their probabilities, 0 to 1. Begin with [`NONE`](Self::NONE): `Faults { drop: 0.01, ..Faults::NONE }`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faults {
     /// Probability that a received byte is lost.
     pub drop: f64,
     /// Probability that a bit of a received byte is flipped.
     pub flip: f64,
-    /// Probability that a received byte comes twice.
+    /// Probability that a received byte is duplicated.
     pub duplicate: f64,
     /// Probability that an answer ends early, after 0 to 63 bytes.
     pub truncate: f64,
     /// Probability that an answer comes late, by [`delay_by`](Self::delay_by).
     pub delay: f64,
-    /// How late a late answer is.
+    /// Delay of a late answer.
     pub delay_by: Duration,
     /// Probability that a sent byte is lost.
     pub drop_sent: f64,
@@ -54,18 +54,18 @@ pub struct FaultInjector<P> {
     faults: Faults,
     rng: Xoshiro256PlusPlus,
     requests: u64,
-    /// Bytes that this answer may still have, when it is to end early.
+    /// Bytes left of this answer, if it is truncated.
     answer_left: Option<usize>,
-    /// When the bytes of this answer come through, when it is late.
+    /// This answer is late.
     answer_delayed: bool,
-    waiting: VecDeque<(Option<Instant>, u8)>, // in the order in which they come through
+    waiting: VecDeque<(Option<Instant>, u8)>, // in the order of delivery
 }
 
 /// Bytes taken from the port at a time.
 const CHUNK: usize = 256;
 
 impl<P: Port> FaultInjector<P> {
-    /// Puts `faults` in front of `port`.
+    /// Wraps `port` with `faults`.
     pub fn new(port: P, faults: Faults, seed: u64) -> Self {
         Self {
             port,
@@ -78,14 +78,14 @@ impl<P: Port> FaultInjector<P> {
         }
     }
 
-    /// Changes what goes wrong from now on.
+    /// Changes the faults from now on.
     pub fn set_faults(&mut self, faults: Faults) {
         self.faults = faults;
     }
 
     fn happens(&mut self, probability: f64) -> bool {
-        // 53 bits are what a float in 0..1 can hold. Nothing is drawn for what cannot happen, so that one more kind of fault
-        // does not change the others.
+        // A float in 0..1 has 53 bits. Nothing is drawn for a probability of 0, so that one more kind of fault does not change the
+        // others.
         probability > 0.0 && ((self.rng.next_u64() >> 11) as f64) < probability * (1u64 << 53) as f64
     }
 
@@ -93,7 +93,7 @@ impl<P: Port> FaultInjector<P> {
         self.rng.next_u64() % bound
     }
 
-    /// Lets bytes from the port through, as far as the faults let them.
+    /// Queues bytes from the port, with faults.
     fn pass(&mut self, bytes: &[u8]) {
         let silent = self.faults.silence.contains(&self.requests.saturating_sub(1));
         let due = self.answer_delayed.then(|| Instant::now() + self.faults.delay_by);
@@ -117,7 +117,7 @@ impl<P: Port> FaultInjector<P> {
         }
     }
 
-    /// Hands over what is due.
+    /// Delivers what is due.
     fn take_due(&mut self, into: &mut [u8]) -> usize {
         let now = Instant::now();
         let mut taken = 0;
@@ -169,7 +169,7 @@ impl<P: Port> Port for FaultInjector<P> {
             let received = self.port.receive(&mut chunk, until)?;
             self.pass(&chunk[..received]);
             if received == 0 {
-                // A port without a clock returns at once; delayed bytes are waited for here.
+                // A port in memory returns at once, so the wait for delayed bytes is here.
                 if due.is_some() {
                     std::thread::sleep(until.saturating_duration_since(Instant::now()));
                 }
@@ -182,7 +182,7 @@ impl<P: Port> Port for FaultInjector<P> {
 
     fn discard_input(&mut self) -> Result<usize, PortError> {
         let discarded = self.port.discard_input()?;
-        // Bytes on their way are not there yet: they come after the next request, as late answers do.
+        // Delayed bytes have not arrived yet: they come after the next request, like late answers.
         let mut arrived = 0;
         let mut scratch = [0; CHUNK];
         loop {

@@ -1,18 +1,18 @@
-//! What a check found.
+//! Findings of a check.
 
-/// Something that a check found out of order, and what came of it.
+/// Something that is not as it should be, and what was done about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// What is out of order.
+    /// What is wrong.
     pub what: String,
-    /// What was done about it when [`corrected`](Self::corrected), or else what is to be done.
+    /// What was done about it if [`corrected`](Self::corrected), otherwise what to do.
     pub remedy: String,
-    /// It has been put in order.
+    /// It has been corrected.
     pub corrected: bool,
 }
 
 impl Finding {
-    /// Something that has been put in order.
+    /// Something that has been corrected.
     pub fn corrected(what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             what: what.into(),
@@ -21,7 +21,7 @@ impl Finding {
         }
     }
 
-    /// Something that a person has to put in order.
+    /// Something that a person has to correct.
     pub fn open(what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             what: what.into(),

@@ -1,8 +1,8 @@
-//! USB adapters that collect bytes before they hand them on.
+//! The latency timer of USB adapters, which collect bytes before they pass them on.
 //!
 //! An FTDI chip (U2D2, most cheap adapters) waits 16 ms for more bytes unless told otherwise: four ticks of a 250 Hz loop.
-//! The flag `ASYNC_LOW_LATENCY` makes its driver set 1 ms. Whether that worked is read from sysfs. Other ports, and
-//! pseudo-terminals, have no such timer.
+//! The flag `ASYNC_LOW_LATENCY` makes its driver set 1 ms; sysfs shows whether that worked. Other ports and pseudo-terminals have no
+//! such timer.
 
 use std::os::fd::{AsRawFd, BorrowedFd};
 use std::path::Path;
@@ -35,14 +35,14 @@ struct SerialStruct {
 /// `ASYNC_LOW_LATENCY` of `linux/tty_flags.h`.
 const LOW_LATENCY: libc::c_int = 1 << 13;
 
-/// Longest collecting that goes unremarked, in ms.
+/// Longest latency that is tolerated, in ms.
 const TOLERATED_MS: u32 = 1;
 
-/// Switches collecting off where there is any; says so when there was, or when it could not be.
-pub(super) fn mend(port: BorrowedFd<'_>, path: &Path) -> Option<Finding> {
+/// Sets the shortest latency. Reports a timer that was longer, and one that cannot be changed.
+pub(super) fn correct(port: BorrowedFd<'_>, path: &Path) -> Option<Finding> {
     let before_ms = latency_timer_ms(path);
     let asked = ask_for_low_latency(port);
-    // A port without a timer has nothing to mend, whatever it answers to the ioctl.
+    // A port without a timer has nothing to correct, whatever the ioctl returns.
     let before_ms = before_ms.filter(|&timer_ms| timer_ms > TOLERATED_MS)?;
     let after_ms = latency_timer_ms(path).unwrap_or(before_ms);
     let what = format!(
@@ -88,7 +88,7 @@ fn ask_for_low_latency(port: BorrowedFd<'_>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// The timer as sysfs tells it; nothing for ports that have none.
+/// The timer according to sysfs; none for ports that have none.
 fn latency_timer_ms(path: &Path) -> Option<u32> {
     let file = format!("/sys/class/tty/{}/device/latency_timer", device_name(path)?);
     std::fs::read_to_string(file).ok()?.trim().parse().ok()

@@ -2,11 +2,10 @@
 //!
 //! 1. [`packet`] turns bytes into valid values and back. It needs neither `std` nor an allocator, so a microcontroller can be a
 //!    device with it: see `examples/tracker`.
-//! 2. A [`Port`] sends and receives, and waits no longer than its deadline. [`Tty`] is a serial port of the operating system,
-//!    opened for one process alone, with its USB latency timer checked and corrected. [`FaultInjector`] makes any port a bad one,
-//!    from a seed.
-//! 3. A [`Bus`] does one transaction at a time on a port: ping, read, write, sync and bulk read, reboot. It counts what goes
-//!    wrong by kind ([`BusCounters`]).
+//! 2. A [`Port`] sends and receives with a deadline. [`Tty`] is a serial port of the operating system, opened for one process alone,
+//!    with its USB latency timer checked and corrected. [`FaultInjector`] adds faults to any port, from a seed.
+//! 3. A [`Bus`] does one transaction at a time on a port: ping, read, write, sync and bulk read, reboot. It counts errors by kind
+//!    ([`BusCounters`]).
 //!
 //! Points 2 and 3 need the feature `std`, which is on by default.
 //!

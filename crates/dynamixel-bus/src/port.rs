@@ -1,30 +1,29 @@
-//! What a bus needs of a serial port: to send, and to wait for bytes no longer than it is told.
+//! The interface between a bus and a serial port: sending and receiving with deadlines.
 
 use std::time::Instant;
 
 /// A serial port with bounded waits.
 ///
-/// [`Tty`](super::Tty) is the operating system's; [`FaultInjector`](super::FaultInjector) wraps any other, for tests and
-/// rehearsals.
+/// [`Tty`](super::Tty) is a port of the operating system; [`FaultInjector`](super::FaultInjector) wraps any other, for tests.
 pub trait Port {
     /// Sends all of `bytes`.
     ///
     /// # Errors
-    /// [`PortError::SendTimeout`] when they are not taken by `deadline`, [`PortError::Disconnected`] when nobody is there.
+    /// [`PortError::SendTimeout`] when they are not accepted by `deadline`, [`PortError::Disconnected`] when the other end is gone.
     fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), PortError>;
 
-    /// Waits until bytes come, and returns how many were put into `into`; zero when none has come by `deadline`.
+    /// Waits for bytes, and returns how many were written to `into`; zero when none has come by `deadline`.
     ///
-    /// Bytes that are there already are returned even when the deadline has passed.
+    /// Bytes that have already arrived are returned even when the deadline has passed.
     ///
     /// # Errors
     /// [`PortError::Disconnected`] when no more can come.
     fn receive(&mut self, into: &mut [u8], deadline: Instant) -> Result<usize, PortError>;
 
-    /// Throws away what has come and was not received; returns how many bytes.
+    /// Discards bytes that have arrived and were not received; returns how many.
     ///
     /// # Errors
-    /// [`PortError::Disconnected`] when nobody is there.
+    /// [`PortError::Disconnected`] when the other end is gone.
     fn discard_input(&mut self) -> Result<usize, PortError>;
 
     /// Changes the baud rate, in bit/s.
@@ -58,15 +57,15 @@ pub enum PortError {
     /// The adapter was unplugged, or the other end of a pseudo-terminal is closed.
     #[error("the serial port is gone: plug the adapter in again, or restart the virtual worm")]
     Disconnected,
-    /// The port took no bytes.
+    /// The port accepted no bytes.
     #[error("the serial port takes no more bytes: is its other end alive, and flow control off?")]
     SendTimeout,
-    /// Anything else that the operating system says.
+    /// Any other error of the operating system.
     #[error("the serial port failed to {doing}: {kind}")]
     Os {
         /// What was tried.
         doing: &'static str,
-        /// What came of it.
+        /// The error.
         kind: std::io::ErrorKind,
     },
 }

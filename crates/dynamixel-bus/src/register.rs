@@ -1,13 +1,13 @@
-//! A place in a control table.
+//! Registers of a control table.
 
-/// A register: where a value stands in a device's control table, and how many bytes it takes (little-endian).
+/// A register of a device's control table: the address of a value and its size (little-endian).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Register {
     /// First address.
     pub address: u16,
     /// Number of bytes: 1, 2 or 4.
     pub size: u16,
-    /// Name in the maker's manual.
+    /// Name in the manual.
     pub name: &'static str,
 }
 
@@ -18,7 +18,7 @@ impl Register {
         Self { address, size, name }
     }
 
-    /// The first address behind the register.
+    /// The first address after the register.
     #[must_use]
     pub const fn end(self) -> u16 {
         self.address + self.size
@@ -31,12 +31,12 @@ impl core::fmt::Display for Register {
     }
 }
 
-/// A block of a control table as it was read: registers are found by the addresses of the table.
+/// A block that was read from a control table. Registers are read from it by their addresses in the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Block<'a, const LEN: usize> {
     /// Address of the first byte.
     pub first_address: u16,
-    /// What was read, from there on.
+    /// The bytes from there on.
     pub bytes: &'a [u8; LEN],
 }
 

@@ -1,4 +1,4 @@
-//! The operating system's serial port: opened for one controller alone, raw, without latency.
+//! A serial port of the operating system: opened exclusively, raw, with low latency.
 
 use std::io::{self, ErrorKind};
 use std::os::fd::{AsRawFd, BorrowedFd};
@@ -16,7 +16,7 @@ use serialport::{SerialPort, TTYPort};
 use super::latency_timer;
 use super::{Finding, Port, PortError};
 
-/// Most bytes thrown away at once: more is a babbling device, which the next exchange will meet anyhow.
+/// Most bytes discarded at once. If there are more, a device sends without end, and the next transaction will show it.
 const DISCARD_LIMIT: usize = 16 * 1024;
 
 /// A serial port of the operating system (or a pseudo-terminal), open for this process alone.
@@ -34,7 +34,7 @@ pub enum OpenError {
         /// The port.
         path: PathBuf,
     },
-    /// The user may not.
+    /// The user has no permission.
     #[error("{path}: permission denied: add the user to the group that owns it (dialout, uucp)", path = path.display())]
     PermissionDenied {
         /// The port.
@@ -53,14 +53,14 @@ pub enum OpenError {
         path: PathBuf,
         /// The baud rate, in bit/s.
         baud: u32,
-        /// What the operating system says.
+        /// The message of the operating system.
         reason: String,
     },
 }
 
 impl Tty {
-    /// Opens the port at `path` with `baud` bit/s, raw, 8N1, for this process alone, and asks an adapter that collects bytes
-    /// for a while (FTDI: 16 ms) not to.
+    /// Opens the port at `path` with `baud` bit/s, raw, 8N1, for this process alone, and turns off the latency timer of an adapter that
+    /// has one (FTDI: 16 ms).
     ///
     /// # Errors
     /// [`OpenError`]
@@ -71,9 +71,9 @@ impl Tty {
             baud,
             reason,
         };
-        // `serialport` takes TIOCEXCL and an exclusive flock. But TIOCEXCL does not keep root out, and a second opener who
-        // then fails at the flock would take TIOCEXCL away from the first; so the lock is asked for before anything else.
-        // The probe stays open until the port is, lest a pseudo-terminal's other end sees a hang-up in between.
+        // `serialport` uses TIOCEXCL and an exclusive flock. But TIOCEXCL does not keep root out, and a second process that then fails at
+        // the flock would remove TIOCEXCL from the first; so the lock is tried before anything else. The probe stays open until the
+        // port is open, so that the other end of a pseudo-terminal sees no hang-up in between.
         let probe = std::fs::OpenOptions::new()
             .read(true)
             .write(true)
@@ -103,7 +103,7 @@ impl Tty {
         drop(probe);
         let tty = Self { port };
         fcntl(tty.fd(), FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(|errno| setup(errno.to_string()))?;
-        let findings = latency_timer::mend(tty.fd(), path).into_iter().collect();
+        let findings = latency_timer::correct(tty.fd(), path).into_iter().collect();
         Ok((tty, findings))
     }
 
@@ -112,7 +112,7 @@ impl Tty {
         unsafe { BorrowedFd::borrow_raw(self.port.as_raw_fd()) }
     }
 
-    /// Waits for `event` until `deadline`; whether it, or the end of the port, has come.
+    /// Waits for `event` until `deadline`; returns whether it, or a hang-up, has come.
     fn wait(&self, event: PollFlags, deadline: Instant) -> Result<bool, PortError> {
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
@@ -125,7 +125,7 @@ impl Tty {
         }
     }
 
-    /// Bytes that are there, or nothing when there are none.
+    /// Reads what is available; none when there is nothing.
     fn read_available(&self, into: &mut [u8]) -> Result<Option<usize>, PortError> {
         loop {
             match unistd::read(self.fd(), into) {
@@ -139,7 +139,7 @@ impl Tty {
     }
 }
 
-/// What an error of the system means for a port. EIO is what a pseudo-terminal says whose other end is closed.
+/// The error of a port for an error of the system. A pseudo-terminal whose other end is closed gives EIO.
 fn port_error(doing: &'static str, errno: Errno) -> PortError {
     match errno {
         Errno::EIO | Errno::EPIPE | Errno::ENXIO | Errno::ENODEV | Errno::EBADF => PortError::Disconnected,

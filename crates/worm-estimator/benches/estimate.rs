@@ -1,4 +1,4 @@
-//! What the estimator costs: a tick without a sample, a tick with one, a whole crawl with its ends of cycles.
+//! Cost of the estimator: a tick without a sample, a tick with one, a whole crawl with its ends of cycles.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -39,7 +39,7 @@ fn benches(criterion: &mut Criterion) {
                 );
             });
         }
-        // The tick in which a cycle ends, by itself.
+        // Only the tick in which a cycle ends.
         let mut before_end = estimator.clone();
         let mut end = None;
         for state in &states {

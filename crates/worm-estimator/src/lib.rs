@@ -1,13 +1,14 @@
-//! What the processes of an earthworm robot know and say: configuration, messages, and the estimator between them.
+//! Configuration, messages and the streaming estimator of an earthworm robot.
 //!
-//! | module | what it holds | knows nothing of |
+//! | module | what it holds | does not depend on |
 //! |---|---|---|
-//! | [`config`] | what a worm is and how it is run: one TOML file, checked once, then trusted | processes, topics |
+//! | [`config`] | the worm and how it is run: one TOML file, checked once, then trusted | processes, topics |
 //! | [`message`] | one plain, fixed-size type per topic, its JSON form and schema | how messages travel |
-//! | [`estimate`] | contact points, deformation, energy, cycles and alarms from the states of the controller | clocks, files, topics |
+//! | [`estimate`] | contact points, deformation, energy, cycles and alarms from the controller's states | clocks, files, topics |
+//! | [`number`] | numbers as text, for reports | everything else |
 //!
-//! Everything here is pure: time comes in with the messages. The same estimator runs on the robot and on a recording, and gives
-//! the same numbers to the last bit.
+//! Everything here is pure: time comes with the messages. The same estimator runs on the robot and on a recording, with the same results
+//! to the last bit.
 
 pub mod config;
 pub mod estimate;

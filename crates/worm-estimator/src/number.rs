@@ -1,9 +1,9 @@
-//! Numbers as people read them: millimetres, millijoules, and as many digits as their error leaves sense in.
+//! Numbers as text: with as many digits as their error justifies.
 
-/// What stands where there is no value.
+/// Text for a missing value.
 pub const NONE: &str = "—";
 
-/// Most decimals that a small error can ask for beyond those that the quantity has anyway.
+/// Most additional decimals for a small error.
 const MORE_DECIMALS: usize = 1;
 
 /// Most values that a sentence lists.
@@ -23,7 +23,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A value as it was set, a rate or a time, with two decimals at most and none that say nothing: `1000`, `0.25`.
+/// A value with at most two decimals and no trailing zeros: `1000`, `0.25`.
 pub fn shortest(value: f64) -> String {
     let text = fixed(value, 2);
     match text.split_once('.') {
@@ -32,8 +32,8 @@ pub fn shortest(value: f64) -> String {
     }
 }
 
-/// A value and its error: `2.00 ± 0.02`, with `decimals`, or with one more where the error is too small to be seen with
-/// those; beyond that stands `± <0.001`. Without a usable error the value alone.
+/// A value and its error: `2.00 ± 0.02`, with `decimals`, or with one more if the error needs it; a still smaller error is written as
+/// `± <0.001`. Without a usable error the value alone.
 pub fn with_error(value: f64, error: f64, decimals: usize) -> String {
     if !value.is_finite() || !error.is_finite() || error <= 0.0 {
         return fixed(value, decimals);
@@ -62,7 +62,7 @@ pub fn to_error(value: f64, error: f64) -> String {
     }
 }
 
-/// A value with so many digits that count, and no exponent.
+/// A value with so many significant digits, and no exponent.
 pub fn significant(value: f64, digits: usize) -> String {
     fixed(value, decimals_for(value, digits))
 }
@@ -77,7 +77,7 @@ fn decimals_for(value: f64, digits: usize) -> usize {
     (digits as f64 - 1.0 - value.abs().log10().floor()).clamp(0.0, MAX_DECIMALS) as usize
 }
 
-/// A share as a percentage; near 0 and 100 % it shows which side it is on.
+/// A fraction as a percentage; near 0 and 100 % it shows that it is neither.
 pub fn percent(fraction: f64) -> String {
     let percent = 100.0 * fraction;
     match percent {
@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_small_error_asks_for_one_more_decimal_and_no_more() {
+    fn a_small_error_gives_one_more_decimal_and_no_more() {
         for (error, text) in [(0.26, "59.8 ± 0.3"), (0.026, "59.78 ± 0.03"), (0.0026, "59.78 ± <0.01")] {
             assert_eq!(with_error(59.779, error, 1), text);
         }
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_share_says_whether_anything_is_missing() {
+    fn percentages_near_0_and_100_are_marked() {
         let fractions = [0.0, 1e-5, 0.004, 0.5, -0.2, 0.996, 0.99999, 1.0, 1.3, f64::NAN];
         let texts = [
             "0.0 %", "<0.1 %", "0.4 %", "50 %", "−20 %", "99.6 %", ">99.9 %", "100 %", "130 %", NONE,
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_set_has_no_idle_decimals() {
+    fn shortest_has_no_trailing_zeros() {
         let values = [1000.0, 0.25, 12.5, 0.0, -3.0, f64::NAN];
         assert_eq!(values.map(shortest), ["1000", "0.25", "12.5", "0", "−3", NONE]);
     }

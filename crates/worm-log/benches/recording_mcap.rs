@@ -1,4 +1,4 @@
-//! What a log costs the recorder: serialising and writing, and reading back.
+//! Cost of a log: serialising and writing, and reading back.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -10,7 +10,7 @@ use worm_log::{Origin, Writer};
 /// Ticks in a chunk at 1 kHz and a chunk every 0.2 s.
 const TICKS: u64 = 200;
 
-/// A state with numbers as long as real ones.
+/// A state with numbers of realistic length.
 fn state(tick: u64) -> State {
     let turn = tick as f64 * 0.000_4;
     let mut state = State {

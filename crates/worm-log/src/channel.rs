@@ -2,15 +2,15 @@
 
 use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
 
-/// How messages are encoded, as MCAP names it.
+/// Encoding of messages, as MCAP names it.
 pub(super) const MESSAGE_ENCODING: &str = "json";
-/// How their schemas are, as MCAP names it.
+/// Encoding of schemas, as MCAP names it.
 pub(super) const SCHEMA_ENCODING: &str = "jsonschema";
 /// The metadata record and the attachment of a log.
 pub(super) const METADATA: &str = "wormd";
 pub(super) const CONFIG_ATTACHMENT: &str = "worm.toml";
 
-/// A message that has a channel in a log.
+/// A message with a channel in a log.
 pub trait Logged: JsonMessage {
     /// Its channel.
     const CHANNEL: Channel;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 pub struct ReadError {
     /// The file.
     pub file: PathBuf,
-    /// Where in it: a line, a column, a channel, a marker.
+    /// The place in it: a line, a column, a channel, a marker.
     pub place: Option<String>,
     /// What is wrong.
     pub problem: String,

@@ -1,4 +1,4 @@
-//! All that a log holds.
+//! The contents of a log.
 
 use super::channel::Channel;
 use super::scan::{refusal, scan};
@@ -13,21 +13,21 @@ use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing
 pub struct Log {
     /// The file.
     pub file: PathBuf,
-    /// What the controller saw and commanded.
+    /// What the controller measured and commanded.
     pub states: Vec<State>,
-    /// Where the ticks' time went.
+    /// The timing of its ticks.
     pub timings: Vec<Timing>,
-    /// What the estimator knew, heartbeats among it.
+    /// The estimator's results, heartbeats included.
     pub estimates: Vec<Estimate>,
     /// The gait cycles that ended.
     pub cycles: Vec<Cycle>,
-    /// What was raised and cleared.
+    /// Alarms raised and cleared.
     pub alarms: Vec<Alarm>,
-    /// The text of the worm's configuration; none where it ran on defaults.
+    /// The text of the worm's configuration; none if it ran on defaults.
     pub config: Option<String>,
     /// Worm, cells, version, and when the log was begun.
     pub metadata: BTreeMap<String, String>,
-    /// What the reader found remarkable: a cut-off end, damaged chunks, foreign channels.
+    /// Remarks of the reader: a truncated end, damaged chunks, unknown channels.
     pub warnings: Vec<String>,
 }
 
@@ -46,10 +46,10 @@ impl Log {
 
 /// Reads a whole log.
 ///
-/// A file that is cut off is read up to its last whole message; `warnings` says so.
+/// A truncated file is read up to its last whole message; `warnings` says so.
 ///
 /// # Errors
-/// [`ReadError`] when the file cannot be read, is no log of a worm, or is of another version.
+/// [`ReadError`] when the file cannot be read, is not the log of a worm, or is of another version.
 pub fn messages(path: &Path) -> Result<Log, ReadError> {
     let mut log = Log {
         file: path.to_owned(),
@@ -71,7 +71,7 @@ pub fn messages(path: &Path) -> Result<Log, ReadError> {
     Ok(log)
 }
 
-/// Reads a log, but leaves its messages where they are: what it says of itself.
+/// Reads configuration, metadata and warnings of a log, without its messages.
 ///
 /// # Errors
 /// As [`messages`].
@@ -86,7 +86,7 @@ pub fn without_messages(path: &Path) -> Result<Log, ReadError> {
     })
 }
 
-/// The error for a log in which there is nothing to look at.
+/// The error for a log without usable messages.
 #[must_use]
 pub fn nothing(path: &Path, problem: &str, remedy: &str) -> ReadError {
     let place = format!("channel {}", Channel::State.topic());

@@ -1,10 +1,10 @@
-//! Messages of older versions: what has been recorded once can be read.
+//! Messages of older versions, so that every log stays readable.
 
 use super::channel::Channel;
 use std::borrow::Cow;
 
-/// The members that messages of an older type lack, as JSON, with what stands for "not known" in them; nothing for a type that is not
-/// an older one of the channel's.
+/// The members that messages of an older type lack, as JSON, with the value for "not known"; nothing if it is not an older type of the
+/// channel.
 pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'static str> {
     match (channel, type_name) {
         (Channel::State, "wormd_state_v1") => Some("\"motor_time_s\":null,\"host_paused_ns\":0,"),
@@ -13,7 +13,7 @@ pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'sta
     }
 }
 
-/// A message with the members that it lacks.
+/// The message, with the members that it lacks.
 pub(super) fn completed<'t>(text: &'t [u8], lacking: Option<&str>) -> Cow<'t, [u8]> {
     match (text.split_first(), lacking) {
         (Some((b'{', rest)), Some(lacking)) => [b"{", lacking.as_bytes(), rest].concat().into(),

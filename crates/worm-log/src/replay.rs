@@ -1,39 +1,39 @@
-//! A log's states through the estimator once more.
+//! Feeding a log's states to the estimator again.
 
 use super::log::Log;
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{EstimatorError, Observer};
 use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State};
 
-/// So many recorded estimates must come out again for the estimator's first state to count as found.
+/// So many recorded estimates must be reproduced to identify the estimator's first state.
 const FIRST_ESTIMATES: usize = 20;
 
-/// What the estimator makes of a log's states.
+/// The estimator's results on a log's states.
 #[derive(Debug, Clone)]
 pub struct Replay {
-    /// Index of the state from which on the estimator was fed.
+    /// Index of the first state that the estimator got.
     pub first: usize,
-    /// Whether that is the state with which the recorded estimator began.
+    /// Whether that is the first state of the recorded estimator.
     pub first_is_known: bool,
     /// One for each new sample.
     pub estimates: Vec<Estimate>,
     /// The gait cycles that ended.
     pub cycles: Vec<Cycle>,
-    /// What was raised and cleared.
+    /// Alarms raised and cleared.
     pub alarms: Vec<Alarm>,
 }
 
 /// Feeds a log's states to the estimator, in their order.
 ///
-/// An estimator that was started beside a running controller has not seen the first states, and its sums depend on where
-/// it began; no message says where. So the beginnings that the first recorded estimate allows are tried, and that with which
-/// the first estimates come out as recorded is taken; without one, the first state.
+/// An estimator that was started after the controller has not seen the first states. Its sums depend on where it started, and no
+/// message says where. So every start that the first recorded estimate allows is tried, and the one that reproduces the first
+/// estimates is used; if there is none, the first state.
 ///
 /// # Errors
 /// [`EstimatorError`] for a configuration that is not valid.
 pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
     let recorded: Vec<_> = fresh(&log.estimates).take(FIRST_ESTIMATES).copied().collect();
-    for first in beginnings(&log.states, recorded.first()) {
+    for first in possible_starts(&log.states, recorded.first()) {
         let mut found = run(&log.states[first..], config, recorded.len())?;
         let is_same = found.estimates.len() == recorded.len()
             && found
@@ -50,13 +50,13 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
     run(&log.states, config, usize::MAX)
 }
 
-/// Indices of the states with which an estimator can have begun whose first estimate this is.
-fn beginnings(states: &[State], first_estimate: Option<&Estimate>) -> std::ops::Range<usize> {
+/// Indices of the states at which an estimator with this first estimate can have started.
+fn possible_starts(states: &[State], first_estimate: Option<&Estimate>) -> std::ops::Range<usize> {
     let Some(estimate) = first_estimate else { return 0..0 };
     let Some(last) = states.iter().position(|state| is_of(estimate, state)) else {
         return 0..0;
     };
-    // The state before it that brought a sample would have brought an estimate.
+    // An earlier state with a sample would have given an earlier estimate.
     let sample_before = states[..last]
         .iter()
         .rposition(|state| state.sample_is_new == 1 && state.phase.is_finite());
@@ -85,8 +85,7 @@ fn run(states: &[State], config: &Config, enough: usize) -> Result<Replay, Estim
     Ok(replay)
 }
 
-/// The estimates without heartbeats: those repeat the last one, with the alarms as they are by then, or say that there
-/// is none yet.
+/// The estimates without heartbeats, which repeat the last estimate with the present alarms, or are sent before the first.
 pub(super) fn fresh(estimates: &[Estimate]) -> impl Iterator<Item = &Estimate> {
     let mut last = (0, 0);
     estimates.iter().filter(move |estimate| {

@@ -1,8 +1,8 @@
-//! Reading a log from the front to wherever it ends.
+//! Reading a log from the front, to wherever it ends.
 //!
-//! A file that was not finished has no index, so none is used. Each chunk is checked by its sum before a message of it is
-//! believed. Behind the last whole record may stand the beginning of one more chunk: what of it can be unpacked
-//! (lz4 goes by blocks of 64 kB) is taken too, up to the last whole message, and a warning tells of it.
+//! A file that was not finished has no index, so none is used. The checksum of each chunk is verified before its
+//! messages are used. The beginning of one more chunk may follow the last whole record: what can be unpacked of it (lz4 works in blocks
+//! of 64 kB) is read, too, up to the last whole message, and a warning says so.
 
 use super::channel::{CONFIG_ATTACHMENT, Channel, MESSAGE_ENCODING, METADATA};
 use super::older::{completed, lacking_members};
@@ -16,27 +16,27 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// Bytes that a record may have when unpacked; a length beyond it is a broken one.
+/// Largest size of an unpacked record, bytes; a greater length is damaged.
 const LARGEST_RECORD: usize = 1 << 28;
-/// Bytes of a record before its content: what it is, and its length.
+/// Bytes of a record before its content: its opcode and its length.
 const RECORD_HEAD: u64 = 9;
 
-/// What a log holds beside its messages, and what was remarkable about it.
+/// The contents of a log besides its messages, and remarks on it.
 #[derive(Debug, Clone, Default)]
 pub struct Contents {
     /// Text of the configuration that the worm ran with.
     pub config: Option<String>,
     /// The metadata record `wormd`: worm, version, wall-clock time.
     pub metadata: BTreeMap<String, String>,
-    /// What the reader noticed: a cut-off end, messages of an older version.
+    /// Remarks of the reader: a truncated end, messages of an older version.
     pub warnings: Vec<String>,
 }
 
-/// Reads a log and hands each of its messages, still as JSON, to `take`, in the order in which they stand in the file.
+/// Reads a log and hands each of its messages, still as JSON, to `take`, in the order of the file.
 ///
 /// # Errors
-/// [`ReadError`] when the file cannot be read, is no MCAP, has no channel of a worm, or has one whose messages this
-/// version cannot read; with channel and number where `take` refuses a message.
+/// [`ReadError`] when the file cannot be read, is not MCAP, has no channel of a worm, or has one whose messages this
+/// version cannot read; with channel and number if `take` refuses a message.
 pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>) -> Result<Contents, ReadError> {
     let (mut file, length) = open(path)?;
     let mut scanner = Scanner::new(path, take);
@@ -78,7 +78,7 @@ pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<
     scanner.into_contents()
 }
 
-/// The file behind its first mark, and its length.
+/// The file after its magic bytes, and its length.
 fn open(path: &Path) -> Result<(File, u64), ReadError> {
     let mut file = File::open(path).map_err(|error| unreadable(path, &error))?;
     let length = file.metadata().map_err(|error| unreadable(path, &error))?.len();
@@ -101,7 +101,7 @@ fn open(path: &Path) -> Result<(File, u64), ReadError> {
     }
 }
 
-/// Why reading goes no further.
+/// Why reading ends.
 enum Trouble {
     Unreadable(io::Error),
     Broken(McapError),
@@ -114,7 +114,7 @@ impl From<McapError> for Trouble {
     }
 }
 
-/// Hands on each whole record of `input`, which begins with one.
+/// Hands each whole record of `input` on.
 fn each_record(
     mut input: impl Read,
     options: LinearReaderOptions,
@@ -147,7 +147,7 @@ struct Scanner<'a, F> {
     path: &'a Path,
     take: F,
     schemas: HashMap<u16, String>,
-    /// The channels of the file by their numbers, with what their messages lack; none for those that are not a worm's.
+    /// The channels of the file by their IDs, with the members that their messages lack; none for unknown channels.
     channels: HashMap<u16, Option<(Channel, Option<&'static str>)>>,
     foreign: Vec<String>,
     contents: Contents,
@@ -169,7 +169,7 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
         }
     }
 
-    /// Takes a whole record that stands at byte `at` of the file. A chunk that is damaged is left out, with a warning.
+    /// Processes a whole record at byte `at` of the file. A damaged chunk is left out, with a warning.
     fn take_record(&mut self, at: u64, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
         if opcode != op::CHUNK {
             return self.take_plain(opcode, content);
@@ -193,7 +193,7 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
         }
     }
 
-    /// Takes a record that is no chunk.
+    /// Processes a record that is not a chunk.
     fn take_plain(&mut self, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
         if opcode == op::ATTACHMENT && !is_whole_attachment(content) {
             return Err(McapError::UnexpectedEof.into());
@@ -250,7 +250,7 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
         };
         let schema = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
         if known == Channel::Timing && schema != known.type_name() {
-            // Where the loop's time went is of no use to any analysis: a log with timings of an older version is read without.
+            // No analysis needs the timings, so those of an older version are skipped.
             if self.channels.insert(channel.id, None).is_none() {
                 self.foreign
                     .push(format!("{} ('{schema}', of another version)", channel.topic));
@@ -324,7 +324,7 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
     }
 }
 
-/// Whether an attachment has room for all that its lengths announce; `mcap` counts on it.
+/// Whether an attachment is as long as its length fields say; `mcap` relies on it.
 fn is_whole_attachment(content: &[u8]) -> bool {
     fn skip_text(rest: &[u8]) -> Option<&[u8]> {
         let (length, rest) = rest.split_first_chunk::<4>()?;

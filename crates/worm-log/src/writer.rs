@@ -9,10 +9,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// A chunk that has grown to this many bytes of JSON is finished, though nobody has asked for it.
+/// A chunk is finished when it has this many bytes of JSON.
 const LARGEST_CHUNK: usize = 1 << 20;
 
-/// A log that cannot be written.
+/// Why a log cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{file}: cannot be written: {problem}: make room or choose another place; what was written until then can be read",
@@ -21,18 +21,18 @@ const LARGEST_CHUNK: usize = 1 << 20;
 pub struct WriteError {
     /// The file.
     pub file: PathBuf,
-    /// What the operating system said.
+    /// The message of the operating system.
     pub problem: String,
 }
 
-/// Whose log it is, and since when.
+/// The worm that a log is of, and when it starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origin {
     /// Name of the worm.
     pub worm: String,
     /// Number of cells.
     pub cells: usize,
-    /// The configuration file's text; none where the worm runs on defaults.
+    /// The configuration file's text; none if the worm runs on defaults.
     pub config: Option<String>,
     /// When the log was begun, wall-clock time.
     pub begun: SystemTime,
@@ -42,7 +42,7 @@ pub struct Origin {
 
 impl Origin {
     fn metadata(&self) -> Metadata {
-        // A clock before 1970 is not set; it tells nothing.
+        // A clock before 1970 is not set.
         let unix = self.begun.duration_since(UNIX_EPOCH).unwrap_or_default();
         let entries = [
             ("worm", self.worm.clone()),
@@ -58,11 +58,11 @@ impl Origin {
     }
 }
 
-/// Writes one log. [`Writer::finish`] gives it its index; without, it is whole up to the last [`Writer::flush`].
+/// Writes one log. [`Writer::finish`] adds the index; without it, the log is readable up to the last [`Writer::flush`].
 pub struct Writer<W: Write> {
     mcap: ::mcap::Writer<NoSeek<W>>,
     file: PathBuf,
-    /// For each channel its number in the file, and how many messages it has.
+    /// For each channel its ID in the file, and its number of messages.
     channels: Vec<(u16, u64)>,
     text: Vec<u8>,
     chunk_bytes: usize,
@@ -70,13 +70,13 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins a log of all channels; `file` is what errors call it.
+    /// Begins a log of all channels; errors call it `file`.
     ///
     /// # Errors
     /// [`WriteError`] when `out` refuses.
     pub fn new(out: W, file: &Path, origin: &Origin) -> Result<Self, WriteError> {
         let begin = || {
-            // Without seeking, a chunk is put together in memory and never stands half-made in the file.
+            // Without seeking, a chunk is assembled in memory, and a partial one is never written.
             let mut mcap = WriteOptions::new()
                 .compression(Some(Compression::Lz4))
                 .chunk_size(None)
@@ -122,7 +122,7 @@ impl<W: Write> Writer<W> {
         self.text.clear();
         let written = message.write_json(&mut self.text).map_err(std::io::Error::from);
         written.map_err(|error| refused(&self.file, error.into()))?;
-        // An estimate that rests on nothing yet has no time of its own.
+        // An estimate before the first state has no time of its own.
         let time_ns = if message.made_ns() == 0 {
             self.latest_ns
         } else {
@@ -147,7 +147,7 @@ impl<W: Write> Writer<W> {
         }
     }
 
-    /// Finishes the chunk and hands it to the output: whatever happens later, what was written until now can be read.
+    /// Finishes the chunk and writes it: everything so far can then be read, whatever happens later.
     ///
     /// # Errors
     /// [`WriteError`] when the output refuses.
@@ -156,12 +156,12 @@ impl<W: Write> Writer<W> {
         self.mcap.flush().map_err(|error| refused(&self.file, error))
     }
 
-    /// How many messages a channel has.
+    /// The number of messages of a channel.
     pub fn count(&self, channel: Channel) -> u64 {
         self.channels[channel as usize].1
     }
 
-    /// Ends the log with its index and gives the output back.
+    /// Ends the log with its index and returns the output.
     ///
     /// # Errors
     /// [`WriteError`] when the output refuses.

@@ -1,16 +1,16 @@
 //! The motion under any of the laws, increment by increment.
 //!
 //! # One increment
-//! The drive moves each cell in the body; the body's translation is the one unknown. Every cell's force grows with the
-//! translation, so Σ Fᵢ + pull + M a = 0 is one monotone scalar equation, solved by Newton's method within a bracket. The law of
-//! each tip takes the whole increment at once (a *return mapping*), which is exact for springs with sliders as long as no cell
-//! turns within it; curved and rate-dependent laws are taken at the increment's end (implicit Euler). `balance` solves it; here is
-//! what it does to the worm.
+//! The drive moves each cell in the body; the only unknown is the body's translation. Every cell's force is monotone in the translation, so
+//! Σ Fᵢ + pull + M a = 0 is one monotone scalar equation, solved by Newton's method within a bracket. The law of each tip is integrated over
+//! the whole increment at once (a *return mapping*), which is exact for springs with sliders as long as no cell reverses within it; curved
+//! and rate-dependent laws are evaluated at the increment's end (implicit Euler). `balance` solves the equation; this file applies the
+//! solution to the worm.
 //!
 //! # Inertia
-//! By default there is none and the motion is quasi-static, as [`Motion`](super::Motion) is: both give the same figures where both
-//! apply. With a damping ratio the mean of the cells has mass: Newmark's method with constant mean acceleration, which neither
-//! damps nor excites. That is a tenth of a millimetre at 2.5 s a cycle, and seen in recordings.
+//! By default there is none and the motion is quasi-static, as [`Motion`](super::Motion) is: both give the same results where both apply. With
+//! a damping ratio the mean of the cells has mass: Newmark's method with constant average acceleration, which neither damps nor excites.
+//! The difference is a tenth of a millimetre at 2.5 s a cycle, and visible in recordings.
 
 mod balance;
 mod carry;
@@ -23,19 +23,19 @@ use super::pad::{Hold, Loaded, Pad};
 use super::worm::SlidesDown;
 use crate::MAX_CELLS;
 
-/// Velocity of the body beyond which nothing holds it, m/s.
+/// Velocity of the body beyond which it counts as sliding down, m/s.
 const LOST_M_S: f64 = 1.0;
-/// Increments that a step is cut into at least.
+/// Fewest increments per step.
 const PARTS_OF_STEP: f64 = 100.0;
-/// Longest increment of a body with mass, s: a small part of a swing.
+/// Longest increment of a body with mass, s: a small part of an oscillation.
 const LONGEST_S: f64 = 4.2e-3;
-/// Shortest increment, s: nothing that depends on time happens in no time.
+/// Shortest increment, s: rate-dependent laws need a time.
 const SHORTEST_S: f64 = 1e-9;
-/// Time that a worm laid down is given to come to rest, s: until nothing creeps or flows any more.
+/// Time in which a worm that was laid down comes to rest, s: until nothing creeps any more.
 const SETTLING_S: f64 = 1e6;
 
-/// A worm in motion under any of the laws. Fixed size, no heap; takes its [`Mechanics`] at every call, so that they may change
-/// while it moves.
+/// A worm in motion under any of the laws. Fixed size, no heap. Every method takes the [`Mechanics`], so that they may change while it
+/// moves.
 #[derive(Debug, Clone)]
 pub struct Crawl {
     cells: usize,
@@ -61,7 +61,7 @@ struct Cell {
     trial: Trial,
 }
 
-/// What the increment under way does to a cell.
+/// The effect of the present increment on a cell.
 #[derive(Debug, Clone, Copy, Default)]
 struct Trial {
     driven_m: f64,
@@ -71,7 +71,7 @@ struct Trial {
     loaded: Loaded,
 }
 
-/// What one increment is solved for.
+/// The constants of one increment's equation.
 struct Increment {
     step_s: f64,
     relaxing: f64,
@@ -81,8 +81,8 @@ struct Increment {
 }
 
 impl Crawl {
-    /// A worm at rest: the tips, laid down unloaded, gave way together until they carry the pull. Without a damping ratio the
-    /// motion is quasi-static.
+    /// A worm at rest: laid down unloaded, the tips have given way together until they carry the pull. Without a damping ratio the motion
+    /// is quasi-static.
     ///
     /// # Errors
     /// [`SlidesDown`] when they cannot.
@@ -114,7 +114,7 @@ impl Crawl {
         };
         mechanics.worm.check_hold()?;
         crawl.take_up(mechanics);
-        // A tether is slack where the worm has come to rest.
+        // The tether is slack at the place of rest.
         let mut untethered = mechanics.clone();
         untethered.laws.tether_n_per_m = 0.0;
         crawl.increment(&untethered, phase, SETTLING_S)?;
@@ -131,7 +131,7 @@ impl Crawl {
         })
     }
 
-    /// Moves on to a phase that is reached evenly after `duration_s`.
+    /// Advances to a phase at a uniform rate over `duration_s`.
     ///
     /// # Errors
     /// [`SlidesDown`] when the tips cannot hold the worm.
@@ -151,7 +151,7 @@ impl Crawl {
         self.increment(mechanics, phase, duration_s / parts)
     }
 
-    /// Increments that a way to a phase is cut into.
+    /// Number of increments to a phase.
     fn parts(&self, phase: f64, duration_s: f64) -> f64 {
         let by_phase = (phase - self.phase).abs() * self.cells as f64 * PARTS_OF_STEP;
         let by_time = if self.damping_ratio.is_some() {
@@ -162,10 +162,10 @@ impl Crawl {
         by_phase.max(by_time).ceil().max(1.0)
     }
 
-    /// Takes up changed mechanics at the present phase: nothing moves, and cells step on from where they are.
+    /// Changes the mechanics at the present phase: nothing moves, and cells step on from where they are.
     ///
     /// # Panics
-    /// When the number of cells is another.
+    /// When the number of cells changes.
     pub fn take_up(&mut self, mechanics: &Mechanics) {
         assert_eq!(self.cells, mechanics.worm.cells(), "a motion keeps its number of cells");
         let cam = mechanics.cam(self.phase);
@@ -174,8 +174,8 @@ impl Crawl {
         }
     }
 
-    /// Moves the whole body along the canal against the contacts, balance or not, within `duration_s`: how a worm that cannot hold
-    /// slides down. What the slide sets free beyond friction is booked as settling loss.
+    /// Moves the whole body along the canal against the contacts, whether or not forces balance, within `duration_s`. This is how a
+    /// worm that cannot hold slides down. The energy that the slide releases beyond friction is added to the settling loss.
     pub fn translate(&mut self, mechanics: &Mechanics, distance_m: f64, duration_s: f64) {
         let before_j = self.elastic_energy_j(mechanics);
         let earlier = self.ledger.clone();
@@ -186,7 +186,7 @@ impl Crawl {
         self.ledger.settling_loss_j = earlier.settling_loss_j + before_j - self.elastic_energy_j(mechanics) - spent_j;
     }
 
-    /// Begins a run here: the cells stand at these positions, and cycles and way count from now on.
+    /// Starts here: sets the cells to these positions, and cycles and distance travelled to 0.
     ///
     /// # Panics
     /// When there is not one position for each cell.
@@ -222,12 +222,12 @@ impl Crawl {
         self.phase
     }
 
-    /// The account of energy and slides since the motion began.
+    /// Energies and slides since the motion began.
     pub fn ledger(&self) -> &Ledger {
         &self.ledger
     }
 
-    /// Force that the stepping cell's actuator exerts, N: its contact force, its weight along the canal and its share of every other
+    /// Force that the stepping cell's actuator exerts, N: its contact force, its weight along the canal and its part of every other
     /// force on the worm (13).
     pub fn actuator_force_n(&self, mechanics: &Mechanics) -> f64 {
         let step = (self.phase * self.cells as f64).floor();
@@ -235,7 +235,7 @@ impl Crawl {
         self.driving_force_n(mechanics, cell)
     }
 
-    /// Work of the whole drive for each cycle of phase as things stand, J: Σ force × dX/dφ over the cells that step.
+    /// Present work of the whole drive per cycle of phase, J: Σ force × dX/dφ over the stepping cells.
     pub fn drive_load_j(&self, mechanics: &Mechanics) -> f64 {
         let cam = mechanics.cam(self.phase);
         (0..self.cells)
@@ -243,7 +243,7 @@ impl Crawl {
             .sum()
     }
 
-    /// Energy that the worm gives back when it is let go, J: of the pads and of the drive that holds the cells.
+    /// Elastic energy, J: of the pads and of the drive that holds the cells.
     pub fn elastic_energy_j(&self, mechanics: &Mechanics) -> f64 {
         let compliance = mechanics.laws.compliance_m_per_n;
         let cells = self.cell[..self.cells]
@@ -257,23 +257,23 @@ impl Crawl {
             .sum()
     }
 
-    /// Energy of a body with mass in motion, J; 0 without a damping ratio.
+    /// Kinetic energy, J; 0 without a damping ratio.
     pub fn kinetic_energy_j(&self, mechanics: &Mechanics) -> f64 {
         0.5 * mechanics.mass_kg * self.velocity_m_s * self.velocity_m_s
     }
 
-    /// What a cell's actuator exerts, N.
+    /// Force of a cell's actuator, N.
     fn driving_force_n(&self, mechanics: &Mechanics, cell: usize) -> f64 {
         self.cell[cell].pad.force_n + mechanics.standing_n[cell] + self.passing_force_n(mechanics, cell)
     }
 
-    /// What acts on a cell beside its contact, its weight and its share of the constant force, N.
+    /// Force on a cell besides its contact, its weight and its part of the constant force, N.
     fn passing_force_n(&self, mechanics: &Mechanics, cell: usize) -> f64 {
         let Cell { damping_n, drag_n, .. } = self.cell[cell];
         damping_n + drag_n + self.shared_force_n(mechanics) / self.cells as f64
     }
 
-    /// Tether and inertia of the whole worm, N.
+    /// Force of tether and inertia on the whole worm, N.
     fn shared_force_n(&self, mechanics: &Mechanics) -> f64 {
         mechanics.laws.tether_n_per_m * self.travelled_m + mechanics.mass_kg * self.acceleration_m_s2
     }
@@ -288,7 +288,7 @@ impl Crawl {
         Ok(())
     }
 
-    /// Makes every cell ready for an increment to a phase.
+    /// Prepares every cell for an increment to a phase.
     fn prepare(&mut self, mechanics: &Mechanics, phase: f64, step_s: f64) -> Increment {
         let laws = &mechanics.laws;
         let even = mechanics.has_even_friction();
@@ -320,7 +320,7 @@ impl Crawl {
         }
     }
 
-    /// Takes over the trial that balances the body, and books it: every force runs in a straight line within an increment.
+    /// Accepts the trial that balances the body, and adds it to the ledger: every force is linear within an increment.
     fn take(&mut self, mechanics: &Mechanics, increment: &Increment, translation_m: f64, phase: f64) {
         let cells = self.cells as f64;
         let mean_shift_m = self.cell[..self.cells]
@@ -371,7 +371,7 @@ impl Crawl {
                 );
                 cell.drive_m += driven_m;
             }
-            // The drive gives way to the contact alone: every other force acts over the way that the cell itself makes.
+            // The drive yields to the contact alone: every other force acts over the cell's own displacement.
             ledger.actuator_net_j += 0.5 * (passing_before_n + passing_after_n) * (shift_m - translation_m - driven_m);
             deformation_m += 0.5 * (before_m + loaded.deformation_m);
             self.position_m[index] += shift_m;

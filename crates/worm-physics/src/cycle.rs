@@ -1,4 +1,4 @@
-//! One cycle of the periodic crawl, and the closed forms to hold it against.
+//! One cycle of the periodic crawl, and closed forms to compare it with.
 
 #[cfg(test)]
 mod tests;
@@ -9,17 +9,17 @@ use super::physics::Physics;
 use super::worm::{SlidesDown, Worm};
 use crate::MAX_CELLS;
 
-/// Change of any deformation over a cycle, as a share of the stroke, below which the crawl counts as periodic.
+/// Change of any deformation over a cycle, as a fraction of the stroke, below which the crawl counts as periodic.
 const PERIODIC_FRACTION: f64 = 1e-12;
-/// Cycles after which the search for the periodic crawl ends in any case.
+/// Cycles after which the search for the periodic crawl ends.
 const MAX_CYCLES: u32 = 10_000;
 /// As [`PERIODIC_FRACTION`], for the incremental motion, whose increments do not end where the events are.
 const NEARLY_PERIODIC_FRACTION: f64 = 1e-7;
 /// As [`MAX_CYCLES`], for the incremental motion.
 const MAX_INCREMENTAL_CYCLES: u32 = 1000;
-/// Cycles from rest after which the cycle of a crawl that never becomes periodic is taken: as many as a recording has.
+/// Cycles from rest before the one that is reported for a crawl that never becomes periodic: as many as a recording has.
 pub const CYCLES_BEFORE: u32 = 10;
-/// Advance, as a share of the stroke, up to which the worm counts as standing still: well above rounding.
+/// Advance, as a fraction of the stroke, up to which the worm counts as standing still: well above rounding.
 const STANDSTILL_FRACTION: f64 = 1e-9;
 
 /// What becomes of a worm that keeps stepping.
@@ -36,7 +36,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The steady cycle, where there is one.
+    /// The steady cycle, if there is one.
     pub fn cycle(&self) -> Option<&Cycle> {
         match self {
             Self::Steady(cycle) => Some(cycle),
@@ -44,7 +44,7 @@ impl Outcome {
         }
     }
 
-    /// Whether the worm gets forward.
+    /// Whether the worm advances.
     pub fn progresses(&self) -> bool {
         self.cycle().is_some_and(|cycle| cycle.progresses)
     }
@@ -63,8 +63,8 @@ pub struct Cycle {
     pub backward_slide_m: [f64; MAX_CELLS],
     /// Sliding losses and work against weight and resisting forces (11), J.
     pub energy_loss_j: f64,
-    /// Net actuator work (13), J; equal to `energy_loss_j` in a periodic cycle, but for what pads that creep or yield and sudden slides
-    /// turn to heat.
+    /// Net actuator work (13), J; equal to `energy_loss_j` in a periodic cycle, except for the heat of pads that creep or yield and of
+    /// sudden slides.
     pub energy_actuator_net_j: f64,
     /// Positive part of the actuator work, the energy of the paper's Table 1, J.
     pub energy_actuator_positive_j: f64,
@@ -86,39 +86,38 @@ impl Cycle {
         self.advance_m < -STANDSTILL_FRACTION * worm.stroke_m()
     }
 
-    fn new(worm: &Worm, advance_m: f64, account: &Ledger, cycles_to_steady: u32, closure_m: f64) -> Self {
+    fn new(worm: &Worm, advance_m: f64, ledger: &Ledger, cycles_to_steady: u32, closure_m: f64) -> Self {
         let progresses = advance_m > STANDSTILL_FRACTION * worm.stroke_m();
-        let positive_j = account.actuator_positive_j;
+        let positive_j = ledger.actuator_positive_j;
         let energy_per_distance_j_per_m = progresses.then(|| positive_j / advance_m);
         let weight_n = worm.weight_n();
         Self {
             advance_m,
             progresses,
-            forward_slide_m: account.forward_slide_m,
-            backward_slide_m: account.backward_slide_m,
-            energy_loss_j: account.loss_j(),
-            energy_actuator_net_j: account.actuator_net_j,
+            forward_slide_m: ledger.forward_slide_m,
+            backward_slide_m: ledger.backward_slide_m,
+            energy_loss_j: ledger.loss_j(),
+            energy_actuator_net_j: ledger.actuator_net_j,
             energy_actuator_positive_j: positive_j,
             cot: energy_per_distance_j_per_m
                 .filter(|_| weight_n > 0.0)
                 .map(|energy| energy / weight_n),
             energy_per_distance_j_per_m,
-            mean_deformation_m: account.deformation_integral_m,
+            mean_deformation_m: ledger.deformation_integral_m,
             cycles_to_steady,
             closure_m,
         }
     }
 }
 
-/// Crawls forward from rest until no deformation changes over a cycle by more than 10⁻¹² strokes, and accounts for that
-/// cycle.
+/// Crawls forward from rest until no deformation changes over a cycle by more than 10⁻¹² strokes, and reports that cycle.
 ///
 /// The deformations of two worms under the same gait never grow apart in the norm of their elastic energy, so the crawl
-/// always tends to a periodic one; should 10 000 cycles not do, the last is returned and its `closure_m` says how far off it
+/// always tends to a periodic one; if 10 000 cycles are not enough, the last is returned and its `closure_m` says how far off it
 /// is. For the crawl in reverse use [`Worm::mirrored`].
 ///
-/// A worm that falls short of holding only while a cell steps still has a steady cycle, with a negative advance. The way
-/// there can be a jump: once the pull exceeds what the others hold against a sliding cell, the stepping cell no longer
+/// A worm that cannot hold only while a cell steps still has a steady cycle, with a negative advance. The transition can be a
+/// jump: once the pull exceeds what the others hold against a sliding cell, the stepping cell no longer
 /// slides forward at all and every step pushes the others back instead. The paper's worm with 3 cells advances by 1.0 mm
 /// just below 44.43° and loses 12.5 mm just above.
 pub fn steady_cycle(worm: &Worm) -> Outcome {
@@ -126,7 +125,7 @@ pub fn steady_cycle(worm: &Worm) -> Outcome {
     steady_cycle_of(&Physics::of(worm.clone()), 1.0)
 }
 
-/// As [`steady_cycle`], under any physics, with gait cycles of `cycle_s`. Both are the same where the exact motion serves; else
+/// As [`steady_cycle`], under any physics, with gait cycles of `cycle_s`. Both are the same where the exact motion applies; otherwise
 /// the crawl goes on until no deformation changes over a cycle by more than 10⁻⁷ strokes, or for 1000 cycles.
 ///
 /// Wear, a tether and a patch in the canal leave no periodic crawl: their figures are those of the cycle that follows
@@ -156,8 +155,8 @@ fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<Cycle, Slides
         let is_closed = physics.laws.are_periodic() && closure_m <= fraction * worm.stroke_m();
         if is_closed || cycles == max_cycles {
             let advance_m = motion.mean_position_m() - before.mean_position_m();
-            let account = motion.ledger().since(before.ledger());
-            return Ok(Cycle::new(worm, advance_m, &account, cycles, closure_m));
+            let ledger = motion.ledger().since(before.ledger());
+            return Ok(Cycle::new(worm, advance_m, &ledger, cycles, closure_m));
         }
         cycles += 1;
     }

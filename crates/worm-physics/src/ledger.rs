@@ -1,10 +1,10 @@
-//! Where the energy went.
+//! Where the energy goes.
 
 use crate::MAX_CELLS;
 
-/// Account of a motion, cumulative since it began. Entries of cells that the worm does not have stay 0.
+/// The energies and slides of a motion, cumulative since it began. Entries of cells that the worm does not have stay 0.
 ///
-/// As long as the worm's description stays the same, the account closes at every instant, not only over a cycle:
+/// As long as the worm's description stays the same, the energy balance closes at every instant, not only over a cycle:
 /// `actuator_net_j` = [`loss_j`](Self::loss_j) + `settling_loss_j` + change of the elastic energy in the contacts.
 /// Over a steady crawl, where the last two vanish, this is the identity of (11) and (13).
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -19,12 +19,11 @@ pub struct Ledger {
     pub weight_work_j: f64,
     /// Work against resisting forces and drag, J.
     pub resisting_work_j: f64,
-    /// Energy that ends as heat outside (11), J: set free by sudden slides of an unbalanced body, or lost within pads that creep or
-    /// yield.
+    /// Heat that (11) does not contain, J: released by sudden slides of an unbalanced body, or lost in pads that creep or yield.
     pub settling_loss_j: f64,
     /// Net actuator work (13), J.
     pub actuator_net_j: f64,
-    /// Positive part of the actuator work: what a drive that cannot take energy back pays, J.
+    /// Positive part of the actuator work: the cost for a drive without energy recovery, J.
     pub actuator_positive_j: f64,
     /// ∫ Σ δᵢ over the travelled phase, m·cycles; divided by the cycles it is the mean deformation (8).
     pub deformation_integral_m: f64,
@@ -36,7 +35,7 @@ impl Ledger {
         self.sliding_loss_j.iter().sum::<f64>() + self.weight_work_j + self.resisting_work_j
     }
 
-    /// The account of what happened since `earlier`, a copy taken from the same motion.
+    /// The difference to `earlier`, a copy taken from the same motion.
     pub fn since(&self, earlier: &Self) -> Self {
         let difference =
             |now: &[f64; MAX_CELLS], then: &[f64; MAX_CELLS]| std::array::from_fn(|cell| now[cell] - then[cell]);
@@ -53,7 +52,7 @@ impl Ledger {
         }
     }
 
-    /// Books a slide of a tip, m with its sign, and the heat of it, J.
+    /// Adds a slide of a tip, m with its sign, and its heat, J.
     pub(super) fn slide(&mut self, cell: usize, slide_m: f64, loss_j: f64) {
         if slide_m > 0.0 {
             self.forward_slide_m[cell] += slide_m;
@@ -63,13 +62,13 @@ impl Ledger {
         self.sliding_loss_j[cell] += loss_j;
     }
 
-    /// Adds the work of an actuator force that runs in a straight line while the cell extends by `extension_m`.
+    /// Adds the work of an actuator force that is linear while the cell extends by `extension_m`.
     pub fn add_actuator_work(&mut self, force_before_n: f64, force_after_n: f64, extension_m: f64) {
         self.actuator_net_j += 0.5 * (force_before_n + force_after_n) * extension_m;
         let sign = extension_m.signum();
         let (before, after) = (force_before_n * sign, force_after_n * sign);
         let (low, high) = (before.min(after), before.max(after));
-        // Mean over the piece of max(force, 0), with the crossing at the share high/(high − low) of it.
+        // Mean over the piece of max(force, 0); the force is positive in the fraction high/(high − low) of it.
         let positive_mean = if low >= 0.0 {
             0.5 * (low + high)
         } else if high > 0.0 {

@@ -1,30 +1,29 @@
-//! The worm as pure physics: what a gait does to the body, the tips and the energy.
+//! The physics of an earthworm-like robot: what a gait does to the body, the tips and the energy.
 //!
-//! Source: D. Zarrouk, I. Sharf, M. Shoham, "Energetic analysis and experiments of earthworm-like locomotion with
-//! compliant surfaces", Bioinspiration & Biomimetics 11 (2016) 014001. Equation numbers in this module are theirs.
+//! Source: D. Zarrouk, I. Sharf, M. Shoham, "Energetic analysis and experiments of earthworm-like locomotion with compliant surfaces",
+//! Bioinspiration & Biomimetics 11 (2016) 014001. Equation numbers in this crate are theirs.
 //!
-//! # The story
-//! A worm of n cells lies in a canal of slope λ. Each cell i, at position Xᵢ along the canal, touches the wall with a
-//! compliant tip at X_C,i. Its deformation δᵢ = Xᵢ − X_C,i (4) loads the body with −kᵢ δᵢ, and friction lets the tip
-//! hold only up to a bound μN/k, beyond which it slides (2, 3): a spring in series with a Coulomb slider. The cells step
-//! one at a time; the stepping cell extends by the stroke relative to the others, which keep their distances. What is
-//! left unknown, the translation of the body, follows from the balance Σ kᵢ δᵢ + m g sin λ = 0, for the worm is too
-//! slow for inertia to matter.
+//! # The model
+//! A worm of n cells lies in a canal of slope λ. Each cell i, at position Xᵢ along the canal, touches the wall with a compliant tip at
+//! X_C,i. Its deformation δᵢ = Xᵢ − X_C,i (4) loads the body with −kᵢ δᵢ, and friction holds the tip only up to a bound μN/k, beyond which
+//! it slides (2, 3): a spring in series with a Coulomb slider. The cells step one at a time; the stepping cell extends by the stroke
+//! relative to the others, which keep their distances. The only unknown, the translation of the body, follows from the balance
+//! Σ kᵢ δᵢ + m g sin λ = 0, because the worm is too slow for inertia to matter.
 //!
-//! # The map, in reading order
+//! # Modules, in reading order
 //! - [`worm`]: [`Worm`], the description of one worm in one canal, validated once.
-//! - [`motion`]: [`Motion`], the streaming state. Between two events (a tip starting or ceasing to slide) everything is
-//!   a straight line in the gait phase, so it runs from event to event and is exact for every increment.
-//! - [`effect`]: what the theory leaves out, a library of effects; [`Physics`] is a worm with any of them.
-//! - [`Crawl`]: the motion increment by increment, under every law of [`Laws`] and with inertia. [`Locomotion`] is whichever of the
-//!   two motions the physics ask for.
-//! - [`ledger`]: [`Ledger`], where the energy went, with an identity that closes at every instant.
-//! - [`cycle`]: [`steady_cycle`] and [`steady_cycle_of`], one cycle of the periodic crawl, and the closed forms beside it.
+//! - [`motion`]: [`Motion`], the streaming state. Between two events (a tip starting or ceasing to slide) everything is linear in the gait
+//!   phase, so it runs from event to event and is exact for every increment.
+//! - [`effect`]: a library of effects that the theory leaves out; [`Physics`] is a worm with any of them.
+//! - [`Crawl`]: the motion increment by increment, under every law of [`Laws`] and with inertia. [`Locomotion`] selects the motion that the
+//!   physics need.
+//! - [`ledger`]: [`Ledger`], where the energy goes, with a balance that closes at every instant.
+//! - [`cycle`]: [`steady_cycle`] and [`steady_cycle_of`], one cycle of the periodic crawl, and closed forms to compare with.
 //! - [`study`]: Tables 1 and 2 of the paper for any design, and the range on a battery.
 //!
 //! # Limits
-//! The exact motion and the steady cycle know no inertia, damping, drop from static to kinetic friction or anything else that
-//! [`Laws`] adds: its only clock is the phase. Coupling between neighbouring contacts is in neither.
+//! The exact motion and the steady cycle have no inertia, damping, drop from static to kinetic friction or anything else that [`Laws`] adds:
+//! their only clock is the phase. Neither motion has coupling between neighbouring contacts.
 
 /// The examples of the README are tested, too.
 #[cfg(doctest)]

@@ -1,4 +1,4 @@
-//! One motion for any physics: exact where the paper's laws hold, incremental otherwise.
+//! One motion for any physics: exact under the paper's laws, incremental otherwise.
 
 use super::crawl::Crawl;
 use super::ledger::Ledger;
@@ -22,7 +22,7 @@ enum MotionKind {
 }
 
 impl Locomotion {
-    /// A worm at rest at phase 0: the tips, laid down unloaded, gave way together until they carry the pull.
+    /// A worm at rest at phase 0: laid down unloaded, the tips have given way together until they carry the pull.
     ///
     /// # Errors
     /// [`SlidesDown`] when they cannot.
@@ -42,14 +42,14 @@ impl Locomotion {
         }))
     }
 
-    /// Takes up changed physics at the present phase; cells step on from where they are. The exact motion lets the body give way at
-    /// once, the incremental one in its next increment.
+    /// Changes the physics at the present phase; cells step on from where they are. The exact motion lets the body give way at once, the
+    /// incremental one in its next increment.
     ///
     /// # Errors
-    /// [`SlidesDown`] when the tips cannot hold the changed worm at rest. It is taken up all the same.
+    /// [`SlidesDown`] when the tips cannot hold the changed worm at rest. The change is made nevertheless.
     ///
     /// # Panics
-    /// When the number of cells is another, or laws that only one of the two motions knows come or go.
+    /// When the number of cells changes, or the physics now need the other motion.
     pub fn take_up(&mut self, physics: &Physics) -> Result<(), SlidesDown> {
         match &mut self.0 {
             MotionKind::Exact { worm, motion } => {
@@ -68,7 +68,7 @@ impl Locomotion {
         }
     }
 
-    /// Moves on to a phase, in gait cycles, unwrapped, that is reached evenly after `duration_s`.
+    /// Advances to a phase, in gait cycles, unwrapped, at a uniform rate over `duration_s`.
     ///
     /// # Errors
     /// [`SlidesDown`] when the tips cannot hold the worm.
@@ -79,7 +79,7 @@ impl Locomotion {
         }
     }
 
-    /// Moves the whole body along the canal against the contacts, balance or not, within `duration_s`: how a worm that cannot hold
+    /// Moves the whole body along the canal against the contacts, whether or not forces balance, within `duration_s`. This is how a worm that cannot hold
     /// slides down.
     pub fn translate(&mut self, distance_m: f64, duration_s: f64) {
         match &mut self.0 {
@@ -88,12 +88,12 @@ impl Locomotion {
         }
     }
 
-    /// Whether it is exact: under no law but the paper's.
+    /// Whether it is exact: under the paper's laws alone.
     pub fn is_exact(&self) -> bool {
         matches!(self.0, MotionKind::Exact { .. })
     }
 
-    /// The worm as it is now, with what the slope does to its clamps.
+    /// The present worm, with the effect of the slope on its clamps.
     pub fn worm(&self) -> &Worm {
         match &self.0 {
             MotionKind::Exact { worm, .. } => worm,
@@ -141,7 +141,7 @@ impl Locomotion {
         }
     }
 
-    /// The account of energy and slides since the motion began.
+    /// Energies and slides since the motion began.
     pub fn ledger(&self) -> &Ledger {
         match &self.0 {
             MotionKind::Exact { motion, .. } => motion.ledger(),
@@ -157,7 +157,7 @@ impl Locomotion {
         }
     }
 
-    /// Work of the whole drive for each cycle of phase as things stand, J: Σ force × dX/dφ over the cells that step.
+    /// Present work of the whole drive per cycle of phase, J: Σ force × dX/dφ over the stepping cells.
     pub fn drive_load_j(&self) -> f64 {
         match &self.0 {
             MotionKind::Exact { worm, motion } => {

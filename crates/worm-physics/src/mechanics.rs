@@ -1,36 +1,36 @@
-//! Physics made ready for the incremental motion: every table that does not change while the worm moves.
+//! Physics prepared for the incremental motion: every table that does not change while the worm moves.
 
 use super::pad::{ELEMENTS, PadLaw};
 use super::physics::{Laws, Physics};
 use super::worm::Worm;
 use crate::MAX_CELLS;
 
-/// Way over which a patch of other friction begins and ends, m: a tip has a width.
+/// Distance over which a patch of different friction begins and ends, m: a tip has a width.
 const PATCH_EDGE_M: f64 = 1e-3;
 
-/// Where the cam is.
+/// The angle of the cam.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cam {
     turns: f64, // whole
     steps: f64, // since the last whole turn, 0 to the number of cells
 }
 
-/// Physics made ready for [`super::Crawl`].
+/// Physics prepared for [`super::Crawl`].
 #[derive(Debug, Clone)]
 pub struct Mechanics {
-    pub(super) worm: Worm, // with what the slope does to its clamps
+    pub(super) worm: Worm, // with the effect of the slope on its clamps
     pub(super) laws: Laws,
     pub(super) pad: [PadLaw; MAX_CELLS],
     pub(super) pull_n: f64,
     pub(super) mass_kg: f64,
     pub(super) full_force_n: f64,
-    pub(super) standing_n: [f64; MAX_CELLS], // weight along the canal and share of the constant force, of each cell
-    pub(super) critical_n_s_per_m: f64,      // of one cell's share of the damping that lets no swing through
-    place_of: [usize; MAX_CELLS],            // of each cell in the step order
+    pub(super) standing_n: [f64; MAX_CELLS], // weight along the canal and part of the constant force, for each cell
+    pub(super) critical_n_s_per_m: f64,      // critical damping, for one cell
+    place_of: [usize; MAX_CELLS],            // in the step order, for each cell
 }
 
 impl Mechanics {
-    /// Tables of some physics.
+    /// The tables for some physics.
     pub fn new(physics: &Physics) -> Self {
         let worm = physics.clamped_worm();
         let laws = physics.laws;
@@ -79,17 +79,17 @@ impl Mechanics {
         }
     }
 
-    /// The worm with what the slope does to its clamps.
+    /// The worm, with the effect of the slope on its clamps.
     pub fn worm(&self) -> &Worm {
         &self.worm
     }
 
-    /// How far the drive has brought a cell in the body at a phase, m, from where it stood at phase 0.
+    /// Displacement of a cell in the body by the drive at a phase, m, since phase 0.
     pub fn drive_m(&self, cell: usize, phase: f64) -> f64 {
         self.drive_at_m(cell, &self.cam(phase))
     }
 
-    /// Where the cam is at a phase.
+    /// The cam's angle at a phase.
     pub(super) fn cam(&self, phase: f64) -> Cam {
         let turns = phase.floor();
         Cam {
@@ -98,7 +98,7 @@ impl Mechanics {
         }
     }
 
-    /// As [`drive_m`](Self::drive_m), for a cam that was worked out before.
+    /// As [`drive_m`](Self::drive_m), for a known angle of the cam.
     #[inline]
     pub(super) fn drive_at_m(&self, cell: usize, cam: &Cam) -> f64 {
         let cells = self.worm.cells() as f64;
@@ -119,7 +119,7 @@ impl Mechanics {
         turns * (stroke_m - play_m) + (stroke_m * fraction - play_m).max(0.0)
     }
 
-    /// How fast the drive moves a cell in the body, m for each cycle of phase.
+    /// Rate at which the drive moves a cell in the body, m per cycle of phase.
     pub(super) fn drive_slope_m(&self, cell: usize, cam: &Cam) -> f64 {
         let cells = self.worm.cells() as f64;
         let steps = (cam.steps - self.place_of[cell] as f64 + self.laws.overlap).rem_euclid(cells);
@@ -132,8 +132,8 @@ impl Mechanics {
         }
     }
 
-    /// How far a step is done after a share of its time: evenly, but for the corners of the cam, where the cell gains its speed and
-    /// loses it evenly over the rounding's share of the step.
+    /// Fraction of a step that is done after a fraction of its time: uniform, except at the rounded corners of the cam, where the cell
+    /// accelerates and decelerates uniformly.
     #[inline]
     fn rounded(&self, fraction: f64) -> f64 {
         let rounding = self.laws.rounding;
@@ -149,7 +149,7 @@ impl Mechanics {
         if fraction < 0.5 { near } else { 1.0 - near }
     }
 
-    /// Speed over the mean one of the step, after a share of its time.
+    /// Speed over the mean speed of the step, after a fraction of its time.
     fn speed(&self, fraction: f64) -> f64 {
         let rounding = self.laws.rounding;
         let from_end = fraction.min(1.0 - fraction);
@@ -160,7 +160,7 @@ impl Mechanics {
         }
     }
 
-    /// Friction of a tip at a place after some cycles, in whichever direction, over its friction at first.
+    /// Friction of a tip at a place after some cycles, in either direction, relative to its initial friction.
     pub(super) fn friction(&self, tip_m: f64, cycles: f64) -> f64 {
         let laws = &self.laws;
         let mut friction = 1.0;
@@ -176,7 +176,7 @@ impl Mechanics {
         friction
     }
 
-    /// Whether friction is the same everywhere and always.
+    /// Whether friction does not depend on place and time.
     pub(super) fn has_even_friction(&self) -> bool {
         self.laws.wear_per_cycle == 0.0 && self.laws.patch.friction_factor == 1.0
     }

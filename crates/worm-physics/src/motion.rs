@@ -1,16 +1,16 @@
-//! The exact quasi-static motion, streamed.
+//! The exact quasi-static motion, as a stream of increments.
 //!
 //! # One step
-//! While a step runs forward, the stepping cell moves forward or stands and all others move backward or stand, because
-//! the balance keeps the body's translation between 0 and minus the extension. A contact therefore loads up until it
-//! reaches its bound and then slides until the step ends. Between two such events the balance of rates is linear: with K
+//! While a step runs forward, the stepping cell moves forward or stands still and all others move backward or stand still, because
+//! the balance keeps the body's translation between 0 and minus the extension. A contact therefore loads until it reaches its bound
+//! and then slides until the step ends. Between two such events the balance of rates is linear: with K
 //! the stiffness of the other cells that still load and k that of the stepping cell (0 once it slides), an extension e
 //! translates the body by −e k/(k + K) and the stepping cell by e K/(k + K). When nothing loads any more every
 //! translation between 0 and −e balances, and the one nearest to rest is taken. A step has at most n + 1 such pieces. Run
 //! in reverse, all signs change.
 //!
 //! # Rounding
-//! A contact closer to its bound than a share 10⁻¹² of the lengths at play counts as having reached it. Otherwise two
+//! A contact closer to its bound than 10⁻¹² of the lengths involved counts as having reached it. Otherwise two
 //! contacts that arrive together, as they do in symmetric worms, would arrive one rounding error apart, and a worm of two
 //! cells would slide the wrong way. The balance that this disturbs is restored at the next increment.
 
@@ -21,16 +21,16 @@ use super::ledger::Ledger;
 use super::worm::{SlidesDown, Worm};
 use crate::MAX_CELLS;
 
-/// Distance from a bound, as a share of bounds and stroke, that counts as none.
+/// Distance from a bound, as a fraction of bounds and stroke, that counts as zero.
 const ARRIVAL_FRACTION: f64 = 1e-12;
-/// Unbalanced force, as a share of what the contacts could exert, that counts as none. It is well below the arrival share
-/// so that restoring the balance does not lift a sliding contact off its bound.
+/// Unbalanced force, as a fraction of what the contacts can exert, that counts as zero. It is well below the arrival fraction, so that
+/// restoring the balance does not lift a sliding contact off its bound.
 const BALANCE_FRACTION: f64 = 1e-14;
 
 /// Largest phase, cycles: beyond it f64 does not resolve a piece of a step.
 const MAX_PHASE: f64 = 1e12;
 
-/// A worm in motion: positions, deformations, phase and the account of its energy. Fixed size, no heap.
+/// A worm in motion: positions, deformations, phase and ledger. Fixed size, no heap.
 ///
 /// Every method takes the [`Worm`] it describes, so that the worm may change while it moves. Cells are counted from 0.
 ///
@@ -46,9 +46,8 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// A worm at rest at the given positions, phase 0: the tips, laid down unloaded, gave way together until they carry
-    /// the pull. Where they cannot carry it all stand at their bounds and the next [`advance_to`](Self::advance_to) says
-    /// [`SlidesDown`].
+    /// A worm at rest at the given positions, phase 0: laid down unloaded, the tips have given way together until they carry the pull.
+    /// If they cannot carry it, all are at their bounds and the next [`advance_to`](Self::advance_to) returns [`SlidesDown`].
     ///
     /// # Panics
     /// When there is not one position for each cell.
@@ -83,7 +82,7 @@ impl Motion {
         }
     }
 
-    /// A worm in the middle of its crawl, with these deformations at this phase; those beyond a bound are put on it. The body
+    /// A worm in the middle of its crawl, with these deformations at this phase; those beyond a bound are set to it. The body
     /// gives way until the balance holds, and stays where it is if it cannot.
     ///
     /// # Panics
@@ -94,19 +93,19 @@ impl Motion {
         motion.phase = phase;
         motion.deformation_m[..worm.cells()].copy_from_slice(deformations_m);
         motion.slide_into_bounds(worm);
-        // A body that cannot be held says so when it is to move on.
+        // A body that cannot be held is reported by the next advance.
         let _ = motion.rebalance(worm);
         motion.ledger = Ledger::default();
         motion
     }
 
-    /// Moves on to a phase, in gait cycles, unwrapped; a smaller phase than the present one runs the gait in reverse.
+    /// Advances to a phase, in gait cycles, unwrapped; a smaller phase than the present one runs the gait in reverse.
     /// Exact for any increment: many small ones end where a large one does, to rounding. Parameters of the worm that
-    /// changed since the last call are taken up first, as by [`rebalance`](Self::rebalance).
+    /// changed since the last call take effect first, as by [`rebalance`](Self::rebalance).
     ///
     /// # Errors
-    /// [`SlidesDown`] when the tips cannot hold the worm. Nothing has moved then; [`translate`](Self::translate) is how
-    /// to let it slide.
+    /// [`SlidesDown`] when the tips cannot hold the worm. Nothing has moved then; [`translate`](Self::translate) lets it
+    /// slide.
     ///
     /// # Panics
     /// When the phase is not finite or beyond 10¹² cycles, where a step could no longer be resolved.
@@ -132,8 +131,8 @@ impl Motion {
         Ok(())
     }
 
-    /// Takes up changed parameters at the present phase: tips beyond a bound that shrank slide to it, then the body gives
-    /// way until the balance holds again. What the sudden motion sets free is booked as settling loss.
+    /// Changes the parameters at the present phase: tips beyond a bound that shrank slide to it, then the body gives way until the
+    /// balance holds again. The energy that the sudden motion releases is added to the settling loss.
     ///
     /// # Errors
     /// [`SlidesDown`] when no balance exists; nothing has moved then.
@@ -175,9 +174,9 @@ impl Motion {
         Ok(())
     }
 
-    /// Moves the whole body along the canal against the contacts, balance or not: how a worm that cannot hold slides
-    /// down. `distance_m` is negative towards smaller positions. Tips load up to their bounds first and then slide. The
-    /// energy that the slide sets free beyond friction is booked as settling loss.
+    /// Moves the whole body along the canal against the contacts, whether or not forces balance. This is how a worm that cannot hold
+    /// slides down. `distance_m` is negative towards smaller positions. Tips load up to their bounds first and then slide. The
+    /// energy that the slide releases beyond friction is added to the settling loss.
     pub fn translate(&mut self, worm: &Worm, distance_m: f64) {
         assert_eq!(self.cells, worm.cells(), "a motion keeps its number of cells");
         let elastic_before_j = self.elastic_energy_j(worm);
@@ -188,8 +187,8 @@ impl Motion {
         self.ledger.settling_loss_j += elastic_before_j - self.elastic_energy_j(worm) - spent_j;
     }
 
-    /// Lets a tip slide by what is outside this motion: its contact point moves by `slide_m` while the cell stays. The body gives
-    /// way at the next increment.
+    /// Lets a tip slide for a reason outside this motion: its contact point moves by `slide_m` while the cell stays. The body gives way
+    /// at the next increment.
     pub fn slide_tip(&mut self, worm: &Worm, cell: usize, slide_m: f64) {
         let contact = &worm.contacts()[cell];
         let deformation_m = self.deformation_m[cell] - slide_m;
@@ -226,7 +225,7 @@ impl Motion {
         self.phase
     }
 
-    /// The cell whose step it is; on the boundary of two steps, the one that is next forward.
+    /// The stepping cell; on the boundary of two steps, the one that steps next in a forward crawl.
     pub fn stepping_cell(&self, worm: &Worm) -> usize {
         cell_of_step(worm, (self.phase * self.cells as f64).floor())
     }
@@ -237,13 +236,13 @@ impl Motion {
         worm.stroke_of_m(self.stepping_cell(worm)) * (steps - steps.floor())
     }
 
-    /// The account of energy and slides since the motion began.
+    /// Energies and slides since the motion began.
     pub fn ledger(&self) -> &Ledger {
         &self.ledger
     }
 
     /// Force that the stepping cell's actuator must exert now: its contact force k δ, its weight along the canal and its
-    /// share of the resisting force (13), N. Positive when extending takes work.
+    /// part of the resisting force (13), N. Positive when extending takes work.
     pub fn actuator_force_n(&self, worm: &Worm) -> f64 {
         self.extending_force_n(worm, self.stepping_cell(worm))
     }
@@ -312,7 +311,7 @@ impl Motion {
         }
     }
 
-    /// Runs a piece without events: the stepping cell takes its share of the extension, the others theirs backward.
+    /// Runs a piece without events: the stepping cell takes its part of the extension, the others theirs backward.
     fn run_piece(&mut self, worm: &Worm, stepping: usize, steps: f64, stepping_fraction: f64, others_fraction: f64) {
         let extension_m = steps * worm.stroke_of_m(stepping);
         let force_before_n = self.extending_force_n(worm, stepping);
@@ -333,8 +332,8 @@ impl Motion {
             .add_actuator_work(force_before_n, force_after_n, extension_m);
     }
 
-    /// How far a cell can still load when it moves in the given sense, m; 0 once it slides. A contact within rounding of
-    /// its bound is put on it.
+    /// How far a cell can still load when it moves in the given direction, m; 0 once it slides. A contact within rounding of its bound
+    /// is set to it.
     fn settle_at_bound(&mut self, worm: &Worm, cell: usize, sign: f64) -> f64 {
         let contact = &worm.contacts()[cell];
         let bound_m = if sign > 0.0 {
@@ -384,12 +383,12 @@ impl Motion {
     }
 }
 
-/// The cell whose turn a step is, the steps counted from phase 0 and possibly negative.
+/// The stepping cell of a step; steps are counted from phase 0 and may be negative.
 fn cell_of_step(worm: &Worm, step: f64) -> usize {
     worm.step_order()[step.rem_euclid(worm.cells() as f64) as usize]
 }
 
-/// Steps until a cell that moves `rate_m` each step has used up its room; never, when it stands.
+/// Steps until a cell that moves by `rate_m` per step has used up its room; infinite when it stands still.
 fn steps_to_go(room_m: f64, rate_m: f64) -> f64 {
     if rate_m > 0.0 { room_m / rate_m } else { f64::INFINITY }
 }

@@ -1,32 +1,32 @@
-//! One tip under any of the laws: what force a shift of its cell calls up, and where the tip slides.
+//! One tip under any of the laws: the force that a shift of its cell causes, and where the tip slides.
 //!
-//! The force on a pad never falls as its cell moves on, for what a tip can hold is settled before its increment: where it breaks
-//! away, the fall comes with the next ones. So the balance of the body stays one monotone scalar equation.
+//! The force on a pad never falls as its cell moves on, because what a tip can hold is fixed before its increment: where it breaks away, the
+//! force falls in the next increments. So the balance of the body stays one monotone scalar equation.
 //!
-//! Slip takes what a tip holds beyond its kinetic friction, and rest gives it back: θ′ = (1 − θ)/t − θ |v|/d, the ageing law of
-//! rate and state (Dieterich 1979, Ruina 1983), of which Stribeck's curve is what a steady slide feels.
+//! Slip reduces what a tip holds beyond its kinetic friction, and rest restores it: θ′ = (1 − θ)/t − θ |v|/d, the ageing law of rate and
+//! state friction (Dieterich 1979, Ruina 1983). In a steady slide it gives the Stribeck curve.
 
-/// Yielding elements of a pad: enough that the curve of their sum shows no corners in positions.
+/// Yielding elements of a pad (Iwan's model): enough that their sum has no visible corners.
 pub(super) const ELEMENTS: usize = 4;
-/// Force, as a share of a tip's friction, to which a curved law is inverted.
+/// Tolerance of the force when a curved law is inverted, as a fraction of a tip's friction.
 const INVERSION_FRACTION: f64 = 1e-12;
-/// Share of a cell's shift to which a curved pad on bristles is solved.
+/// Tolerance for a curved pad on bristles, as a fraction of its cell's shift.
 const STRAIN_FRACTION: f64 = 1e-9;
-/// Share of its friction from which a tip on bristles counts as sliding.
+/// Fraction of its friction from which a tip on bristles counts as sliding.
 const SLIDES_FROM: f64 = 0.98;
-/// Iterations after which an inversion ends in any case: halving alone would do by then.
+/// Most iterations of an inversion: bisection alone would have converged by then.
 const MAX_ITERATIONS: usize = 80;
 
-/// What one cell's tip is made of.
+/// The parameters of one cell's tip.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PadLaw {
-    pub stiffness_n_per_m: f64, // of what does not yield
+    pub stiffness_n_per_m: f64, // of the part that does not yield
     pub forward_n: f64,         // kinetic friction, sliding forward
     pub backward_n: f64,
     pub static_over_kinetic: f64,
     pub slip_m: f64,
     pub grip_s: f64,
-    /// Stiffness of the pad over that of the bristles by which its tip holds on; 0 for a tip that slides suddenly.
+    /// Stiffness of the pad over that of the bristles of its tip; 0 for a tip that starts to slide suddenly.
     pub presliding: f64,
     pub hardening_per_m2: f64,
     pub creep_n_per_m: f64,
@@ -40,18 +40,18 @@ pub(super) struct Pad {
     pub deformation_m: f64,
     pub force_n: f64,
     slip_m_s: f64,  // in the last increment
-    slipped: f64,   // share of what it holds at rest beyond its kinetic friction that is lost
+    slipped: f64,   // lost fraction of what it holds at rest beyond its kinetic friction
     relaxed_m: f64, // of the creeping branch
     yielding_m: [f64; ELEMENTS],
 }
 
-/// What a tip can hold in one increment.
+/// The limits of a tip in one increment.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Hold {
     min_n: f64,
     max_n: f64,
-    // Deformation and force before the cell moves, and deformations under the limits, once they were asked for: all hang on the
-    // tip's state alone, not on the shift.
+    // Deformation and force before the cell moves, and deformations at the limits, on first use: all depend on the tip's state alone,
+    // not on the shift.
     still: Option<(f64, f64)>,
     min_m: Option<f64>,
     max_m: Option<f64>,
@@ -64,7 +64,7 @@ pub(super) struct Loaded {
     pub force_n: f64,
     pub slide_m: f64,
     pub tangent_n_per_m: f64,
-    /// Which way the tip slides: −1, 0 or 1.
+    /// Direction in which the tip slides: −1, 0 or 1.
     pub sliding: i8,
 }
 
@@ -73,8 +73,8 @@ impl PadLaw {
         self.hardening_per_m2 == 0.0 && self.creep_n_per_m == 0.0 && self.element_n_per_m == 0.0
     }
 
-    /// What a tip can hold at the end of an increment, with its friction scaled by `friction`. It is taken to slip on as it
-    /// slipped before: with what it really slips, the force would fall as the cell goes on, and not be one solution.
+    /// The limits of a tip at the end of an increment, with its friction scaled by `friction`. It is assumed to slip as fast as in the
+    /// increment before: with its actual slip the force would fall as the cell moves on, and the solution would not be unique.
     pub fn hold(&self, pad: &Pad, friction: f64, step_s: f64) -> Hold {
         let mut limit = friction;
         if self.static_over_kinetic != 1.0 {
@@ -90,7 +90,7 @@ impl PadLaw {
         }
     }
 
-    /// A tip whose cell moves by `shift_m`, while a share `relaxing` of what the creeping branch carries is lost.
+    /// A tip whose cell moves by `shift_m`, while the creeping branch loses a fraction `relaxing` of its force.
     #[inline]
     pub fn load(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, relaxing: f64) -> Loaded {
         if self.presliding > 0.0 && shift_m != 0.0 {
@@ -127,11 +127,11 @@ impl PadLaw {
         }
     }
 
-    /// A tip that holds by bristles: its force tends to the friction as its cell goes on (Dahl's law), by implicit Euler;
-    /// the limit has the sign of the shift.
+    /// A tip on bristles: its force tends to the friction as its cell moves on (Dahl's law), by implicit Euler; the limit has the sign of
+    /// the shift.
     ///
-    /// With u = 1 − F/limit, what is left of the friction, and c the bristles' share of the way, the pad takes u/(u + c) of the
-    /// shift and the tip slides the rest. For a straight pad that is a quadratic in u at the increment's end.
+    /// With u = 1 − F/limit, the remaining friction, and c the compliance of the bristles relative to the pad's, the pad takes u/(u + c) of
+    /// the shift and the tip slides the rest. For a linear pad that is a quadratic in u at the increment's end.
     fn load_bristles(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, relaxing: f64) -> Loaded {
         let (still_m, still_n) = *hold
             .still
@@ -147,7 +147,7 @@ impl PadLaw {
         let left = (1.0 - still_n / limit_n).max(0.0);
         let linear = fraction - left + shift_m * slope / limit_n;
         let root = (linear * linear + 4.0 * left * fraction).sqrt();
-        // The form of the root that does not cancel.
+        // The form of the root without cancellation.
         let after = if linear > 0.0 {
             2.0 * left * fraction / (linear + root)
         } else {
@@ -182,8 +182,8 @@ impl PadLaw {
         }
     }
 
-    /// Deformation and force of a tip before its cell moves: the creeping branch relaxes even where nothing moves, and what is
-    /// held beyond the friction, as after breaking away, is let go.
+    /// Deformation and force of a tip before its cell moves: the creeping branch relaxes even where nothing moves, and force beyond the
+    /// friction, as after breaking away, is released.
     fn still(&self, pad: &Pad, min_n: f64, max_n: f64, relaxing: f64) -> (f64, f64) {
         let still_n = if self.is_linear() {
             pad.force_n
@@ -198,9 +198,9 @@ impl PadLaw {
         }
     }
 
-    /// A curved pad on bristles: how much of a shift it takes, by Newton's method from what a straight one would take. Both u
-    /// and the excess over u/(u + c) of the shift are monotone in it, so the root is alone.
-    /// Returns strain, force and its slope over the shift.
+    /// A curved pad on bristles: the part of a shift that it takes, by Newton's method from that of a linear one. Both u and the excess
+    /// over u/(u + c) of the shift are monotone in it, so the root is unique. Returns strain, force and the derivative of the force by
+    /// the shift.
     fn strain_bristles(
         &self,
         pad: &Pad,
@@ -230,24 +230,24 @@ impl PadLaw {
         }
     }
 
-    /// What a tip has lost of its grip after an increment in which it slips so far: slip takes it, rest gives it back.
+    /// Lost fraction of the holding force after an increment with this slip: slip reduces it, rest restores it.
     fn slipped(&self, pad: &Pad, slip_m: f64, step_s: f64) -> f64 {
         let slip = slip_m / self.slip_m;
         (pad.slipped + slip) / (1.0 + slip + step_s / self.grip_s)
     }
 
-    /// Takes over a load. Returns the energy that is lost in the pad or set free when a tip breaks away, J.
+    /// Accepts a load. Returns the energy that is lost in the pad or released when a tip breaks away, J.
     pub fn take(&self, pad: &mut Pad, loaded: &Loaded, step_s: f64, relaxing: f64) -> f64 {
         let deformation_m = loaded.deformation_m;
         let before_n = pad.force_n;
         if self.static_over_kinetic != 1.0 {
-            // What bristles give before the tip slides is no slip.
+            // The deflection of bristles before the tip slides does not count as slip.
             let slip_m = f64::from(loaded.sliding).abs() * loaded.slide_m.abs();
             pad.slipped = self.slipped(pad, slip_m, step_s);
             pad.slip_m_s = slip_m / step_s;
         }
         pad.force_n = loaded.force_n;
-        // What a tip holds more while it rests than while it slides goes with the slide, half of it on the way.
+        // What a tip holds at rest beyond its kinetic friction is lost in the slide, half of it on average.
         let freed_j = 0.5 * (before_n - loaded.force_n) * loaded.slide_m;
         if self.is_linear() {
             pad.deformation_m = deformation_m;
@@ -263,7 +263,7 @@ impl PadLaw {
         freed_j + strain_j - (self.elastic_j(pad) - elastic_before_j)
     }
 
-    /// Energy that a tip gives back when it is let go at once, J.
+    /// Elastic energy of a tip, J.
     pub fn elastic_j(&self, pad: &Pad) -> f64 {
         let square_m2 = pad.deformation_m * pad.deformation_m;
         let spring_j = 0.5 * self.stiffness_n_per_m * square_m2 * (1.0 + 0.5 * self.hardening_per_m2 * square_m2);
@@ -277,7 +277,7 @@ impl PadLaw {
         (pad.yielding_m[at] + deformation_m - pad.deformation_m).clamp(-yield_m, yield_m)
     }
 
-    /// Force and its slope at a deformation.
+    /// Force and its derivative at a deformation.
     fn force(&self, pad: &Pad, deformation_m: f64, relaxing: f64) -> (f64, f64) {
         let bend = self.hardening_per_m2 * deformation_m * deformation_m;
         let creep = self.creep_n_per_m * (1.0 - relaxing);
@@ -303,7 +303,7 @@ impl PadLaw {
         }
         let scale_n = self.forward_n.max(self.backward_n);
         let mut at_m = pad.deformation_m;
-        // Neither relaxing nor yielding makes the force fall, so the spring alone reaches the target within this.
+        // Relaxation and yielding never make the force fall, so the spring alone reaches the target within this.
         let far_m = (target_n.abs() + self.force(pad, at_m, relaxing).0.abs()) / self.stiffness_n_per_m;
         let mut bracket = Bracket {
             low_m: at_m - 2.0 * far_m,
@@ -321,14 +321,14 @@ impl PadLaw {
     }
 }
 
-/// Where the root of something that grows lies.
+/// A bracket of the root of a growing function.
 struct Bracket {
     low_m: f64,
     high_m: f64,
 }
 
 impl Bracket {
-    /// Narrows it by the excess found at a place, and gives the next: Newton's, or the middle where that lies outside.
+    /// Narrows the bracket by the value at a place, and returns the next place: Newton's, or the middle if that is outside.
     fn next_m(&mut self, at_m: f64, excess: f64, slope: f64) -> f64 {
         if excess > 0.0 {
             self.high_m = at_m;

@@ -5,11 +5,11 @@
 //! cell, the contact, the stroke, gravity and the resisting force of the base worm.
 //! - With the base worm's own number of cells it *is* the base worm: its unequal contacts, masses, strokes and step order
 //!   count as they are. So `study` on the robot's configuration answers for the robot.
-//! - With another number of cells nobody can say what the added cells would be like: all cells get the mean contact and
-//!   the mean mass of the base worm and its full stroke. Where the base cells are unequal, its own row thus differs a little
-//!   from the trend of the others, and rightly so.
+//! - With another number of cells the properties of added cells are unknown: all cells get the mean contact and the mean mass of the
+//!   base worm and its full stroke. If the base cells are unequal, its own row therefore differs a little from the trend of the
+//!   others, as it should.
 //!
-//! Effects act on every design alike. One that names a cell means the cell of that number; a design without it is refused.
+//! Effects act on every design. One that names a cell means the cell of that number; a design without it is refused.
 
 use super::cycle::{Outcome, steady_cycle_of};
 use super::effect::{Setting, SettingError};
@@ -19,10 +19,10 @@ use serde::Serialize;
 use std::fmt;
 use thiserror::Error;
 
-/// Why a design gets nowhere.
+/// Why a design makes no progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
-    /// It ends each cycle further down, or cannot hold at all.
+    /// It ends each cycle further back, or cannot hold at all.
     SlidesDown,
     /// Its stroke is used up by the compliance of the contacts.
     StandsStill,
@@ -44,7 +44,7 @@ pub struct Row {
     pub cells: usize,
     /// Slope, degrees, positive uphill.
     pub slope_deg: f64,
-    /// Whether the worm gets forward.
+    /// Whether the worm advances.
     pub progresses: bool,
     /// Advance per gait cycle, m.
     pub advance_m: Option<f64>,
@@ -56,7 +56,7 @@ pub struct Row {
     pub cot: Option<f64>,
     /// Positive work over the advance, J/m.
     pub energy_per_distance_j_per_m: Option<f64>,
-    /// Why it does not progress; the tables spell it out.
+    /// Why it does not progress, for the tables.
     #[serde(skip)]
     pub failure: Option<Failure>,
 }
@@ -88,7 +88,7 @@ impl Row {
 }
 
 /// The worm of a design with `cells` cells in a canal of `slope_deg` degrees; the module's documentation says what it
-/// keeps of the base worm.
+/// has in common with the base worm.
 ///
 /// # Errors
 /// [`WormError`] when the number of cells or the slope is out of its range.
@@ -111,7 +111,7 @@ pub fn design(base: &Worm, cells: usize, slope_deg: f64) -> Result<Worm, WormErr
         .with_slope_rad(slope_rad)
 }
 
-/// What is compared, and under what.
+/// The designs to compare, and the conditions.
 #[derive(Debug, Clone, Copy)]
 pub struct Study<'a> {
     /// The worm that the designs are made from, without effects.
@@ -122,14 +122,14 @@ pub struct Study<'a> {
     pub cells: &'a [usize],
     /// Slopes, degrees, positive uphill.
     pub slopes_deg: &'a [f64],
-    /// Time of a gait cycle, s: what depends on time asks for it.
+    /// Time of a gait cycle, s, for effects that depend on time.
     pub cycle_s: f64,
 }
 
-/// Why there is no study.
+/// Why a study is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum StudyError {
-    /// A design cannot be one.
+    /// A design is not valid.
     #[error(transparent)]
     Worm(#[from] WormError),
     /// An effect names a cell that a design does not have.
@@ -163,13 +163,13 @@ pub fn study(study: &Study<'_>) -> Result<Vec<Row>, StudyError> {
     Ok(rows)
 }
 
-/// A battery cannot be like this.
+/// Why a battery is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum BatteryError {
-    /// Not a usable energy.
+    /// The energy is out of range.
     #[error("battery energy {0} J: give a finite number above 0")]
     Energy(f64),
-    /// Not a usable efficiency.
+    /// The efficiency is out of range.
     #[error("drive efficiency {0}: give a number above 0 and at most 1")]
     Efficiency(f64),
 }
@@ -181,7 +181,7 @@ pub struct Battery {
     drive_efficiency: f64, // in 0..=1, above 0
 }
 
-/// How far a battery takes a design.
+/// Range of a design on a battery.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     /// Distance, m.
@@ -191,7 +191,7 @@ pub struct Range {
 }
 
 impl Battery {
-    /// A battery of so much energy, J, of which the drive turns a share (above 0, at most 1) into positive actuator work.
+    /// A battery of so much energy, J, of which the drive turns a fraction (above 0, at most 1) into positive actuator work.
     ///
     /// # Errors
     /// [`BatteryError`].
@@ -208,12 +208,12 @@ impl Battery {
         })
     }
 
-    /// Energy it holds, J.
+    /// Its energy, J.
     pub fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
-    /// How far it takes a design; none where the design does not progress or takes no energy (sliding on downhill).
+    /// Range of a design; none if the design does not progress or needs no energy (sliding downhill).
     pub fn range(&self, row: &Row) -> Option<Range> {
         let (advance_m, cycle_j) = row
             .advance_m

@@ -1,4 +1,4 @@
-//! What the solver knows about one worm in one canal.
+//! The description of one worm in one canal.
 
 mod contact;
 mod error;
@@ -13,7 +13,7 @@ use std::f64::consts::FRAC_PI_2;
 /// Standard gravity as the paper's figures use it, m/s².
 pub const GRAVITY_M_PER_S2: f64 = 9.81;
 
-/// Share by which the pull may exceed the hold before it counts as excess rather than rounding.
+/// Fraction by which the pull may exceed the hold and still count as rounding.
 const HOLD_ROUNDING: f64 = 1e-12;
 
 /// One worm in one canal, validated. Cells are counted from 0.
@@ -143,7 +143,7 @@ impl Worm {
         Ok(self)
     }
 
-    /// This worm with another mass of the whole, kg; the cells' shares of it stay.
+    /// This worm with another total mass, kg; the cells keep their fractions of it.
     ///
     /// # Errors
     /// [`WormError::OutOfRange`].
@@ -167,7 +167,7 @@ impl Worm {
         Ok(self)
     }
 
-    /// This worm with one cell making only a share of the stroke, 0 (jammed: its step passes without motion) to 1.
+    /// This worm with one cell making only a fraction of the stroke, 0 (jammed: its step passes without motion) to 1.
     ///
     /// Over a cycle such a cell falls behind the others by what it lacks; restored, it goes on from where it is.
     ///
@@ -279,7 +279,7 @@ impl Worm {
         self.mass_kg() * self.gravity_m_per_s2
     }
 
-    /// What pulls the body back along the canal: m g sin λ and the resisting force, N.
+    /// Pull on the body, back along the canal: m g sin λ and the resisting force, N.
     pub fn pull_n(&self) -> f64 {
         self.weight_n() * self.slope_sine + self.resisting_force_n
     }
@@ -289,7 +289,7 @@ impl Worm {
         self.mass_kg[cell] * self.gravity_m_per_s2 * self.slope_sine
     }
 
-    /// A cell's share of the resisting force, N.
+    /// A cell's part of the resisting force, N.
     pub(super) fn cell_resistance_n(&self) -> f64 {
         self.resisting_force_n / self.cells as f64
     }
@@ -330,15 +330,15 @@ impl Worm {
         self.resisting_force_n += force_n;
     }
 
-    /// Adds mass in equal shares, kg; what would be left below nothing is nothing.
+    /// Adds mass in equal parts, kg; no cell gets less than 0.
     pub fn add_mass_kg(&mut self, mass_kg: f64) {
-        let share_kg = mass_kg / self.cells as f64;
+        let part_kg = mass_kg / self.cells as f64;
         for mass in &mut self.mass_kg[..self.cells] {
-            *mass = (*mass + share_kg).max(0.0);
+            *mass = (*mass + part_kg).max(0.0);
         }
     }
 
-    /// Puts back the forward bounds, the masses and the mean stroke of `found`, the same worm before effects.
+    /// Restores the forward bounds, the masses and the mean stroke of `found`, the same worm before effects.
     pub(super) fn keep_found(&mut self, found: &Self) {
         let mean_scale = self.stroke_scale[..self.cells].iter().sum::<f64>() / self.cells as f64;
         for cell in 0..self.cells {

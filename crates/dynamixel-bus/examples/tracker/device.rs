@@ -127,6 +127,10 @@ impl Tracker {
 }
 
 /// What this device waits for before it sends.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is no allocator for a box, and a device has one of these"
+)]
 enum Turn {
     /// Nothing: it was not asked.
     None,

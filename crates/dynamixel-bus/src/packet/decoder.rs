@@ -1,4 +1,4 @@
-//! A stream of bytes into packets.
+//! From a stream of bytes to packets.
 
 use super::encode::unstuff;
 use super::{
@@ -6,16 +6,16 @@ use super::{
     Recipient, StatusFlags, StatusPacket, crc_of, field,
 };
 
-/// Bytes that can wait in a decoder: a packet that is being completed, and what is behind it.
+/// Capacity of a decoder, bytes: an incomplete packet, and what follows it.
 const BUFFER_LEN: usize = 2 * MAX_PACKET_LEN;
 
 /// Finds packets in a stream of bytes.
 ///
 /// Bytes go in as they come, by [`push`](Self::push) or directly by [`free_space`](Self::free_space) and
-/// [`commit`](Self::commit); packets come out of [`next_packet`](Self::next_packet). After noise it goes on at the next
-/// header. A packet whose CRC is wrong is reported, and searched for another header, since it may be its length that got
-/// damaged and swallowed its neighbour. A fast reply whose CRC is wrong comes out all the same: ask
-/// [`FastReply::is_intact`], and take the segments that are good.
+/// [`commit`](Self::commit); packets come out of [`next_packet`](Self::next_packet). After noise it continues at the
+/// next header. A packet with a wrong CRC is reported, and searched for another header, because its length may be what is damaged, and
+/// may include the next packet. A fast reply with a wrong CRC is returned nevertheless: see [`FastReply::is_intact`], and use the
+/// segments that are good.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     buffer: [u8; BUFFER_LEN],
@@ -24,7 +24,7 @@ pub struct Decoder {
     garbage_bytes: u64,
 }
 
-/// Why a stretch that looked like a packet is none.
+/// Why bytes that look like a packet are not a valid one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// The CRC is wrong.
@@ -35,29 +35,29 @@ pub enum DecodeError {
         /// Length that its header claims.
         packet_len: usize,
     },
-    /// The CRC is right and the ID is one that the protocol reserves.
+    /// The CRC is right, but the ID is reserved.
     #[error("a packet with the reserved ID {id}")]
     ReservedId {
         /// Raw ID.
         id: u8,
     },
-    /// The CRC is right and an answer holds no error byte.
+    /// The CRC is right, but an answer has no error byte.
     #[error("an empty answer from ID {id}")]
     EmptyStatus {
         /// Raw ID.
         id: u8,
     },
-    /// The CRC is right and the instruction makes no sense.
+    /// The CRC is right, but the instruction is not valid.
     #[error("for ID {id}: {error}", id = recipient.to_wire())]
     Instruction {
-        /// Whom it was for.
+        /// Its recipient.
         recipient: Recipient,
         /// What is wrong with it.
         error: MalformedInstruction,
     },
 }
 
-/// What stands at the front of the buffer.
+/// The front of the buffer.
 enum Front {
     Incomplete,
     Packet { len: usize },
@@ -75,7 +75,7 @@ impl Decoder {
         }
     }
 
-    /// Room for what comes next. Never empty after [`next_packet`](Self::next_packet) has returned nothing.
+    /// Free space for incoming bytes. Never empty after [`next_packet`](Self::next_packet) has returned none.
     pub fn free_space(&mut self) -> &mut [u8] {
         if self.start == self.end {
             (self.start, self.end) = (0, 0);
@@ -91,7 +91,7 @@ impl Decoder {
         self.end = (self.end + count).min(BUFFER_LEN);
     }
 
-    /// Takes as many of `bytes` as there is room for, and returns how many.
+    /// Adds as many of `bytes` as there is room for, and returns how many.
     pub fn push(&mut self, bytes: &[u8]) -> usize {
         let room = self.free_space();
         let taken = room.len().min(bytes.len());
@@ -100,7 +100,7 @@ impl Decoder {
         taken
     }
 
-    /// The next packet, or what is wrong with it, or nothing until more bytes come.
+    /// The next packet or its error; none until more bytes come.
     pub fn next_packet(&mut self) -> Option<Result<Packet<'_>, DecodeError>> {
         let Front::Packet { len } = self.find_front() else {
             return None;
@@ -120,10 +120,9 @@ impl Decoder {
         })
     }
 
-    /// The beginning of a fast reply that has not become a packet, because a device stayed silent or bytes got lost. Its
-    /// segments are checked one by one.
+    /// The beginning of an incomplete fast reply: a device was silent, or bytes were lost. Its segments are checked one by one.
     ///
-    /// Meant for the end of the wait; before it, the rest may still come. What stands before it is given up.
+    /// Call it at the end of the wait; before, the rest may still come. Bytes in front of the reply are discarded.
     pub fn unfinished_fast_reply(&mut self) -> Option<FastReply<'_>> {
         while self.start < self.end {
             let unread = self.start..self.end;
@@ -135,29 +134,29 @@ impl Decoder {
         None
     }
 
-    /// Gives up the packet that is being completed, so that what is behind its header is searched.
+    /// Gives up an incomplete packet: the search for a header continues after its first byte.
     ///
-    /// For a listener that must not wait for ever on a damaged length: a device calls it when the line has been idle.
+    /// A device calls it when the line has been idle, so that it does not wait for ever because of a damaged length.
     pub fn give_up_unfinished(&mut self) {
         if self.start < self.end {
             self.skip_garbage(1);
         }
     }
 
-    /// Forgets all bytes; returns how many there were. They do not count as garbage.
+    /// Discards all bytes; returns how many there were. They do not count as garbage.
     pub fn clear(&mut self) -> usize {
         let forgotten = self.end - self.start;
         (self.start, self.end) = (0, 0);
         forgotten
     }
 
-    /// Whether bytes wait here.
+    /// Whether there are no bytes.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.start == self.end
     }
 
-    /// Bytes so far that belonged to no packet.
+    /// Bytes outside of packets so far.
     #[must_use]
     pub const fn garbage_bytes(&self) -> u64 {
         self.garbage_bytes
@@ -201,7 +200,7 @@ impl Default for Decoder {
     }
 }
 
-/// Where the first header, or what may become one, begins.
+/// Position of the first header, or of what may become one.
 fn position_of_header(bytes: &[u8]) -> usize {
     let may_begin_at = |from: usize| {
         let candidate = &bytes[from..];
@@ -211,7 +210,7 @@ fn position_of_header(bytes: &[u8]) -> usize {
     (0..bytes.len()).find(|&from| may_begin_at(from)).unwrap_or(bytes.len())
 }
 
-/// From a whole packet whose CRC is right.
+/// Parses a whole packet whose CRC is right.
 fn parse(packet: &mut [u8]) -> Result<Packet<'_>, DecodeError> {
     let id = packet[field::ID];
     let instruction = packet[field::INSTRUCTION];

@@ -1,4 +1,4 @@
-//! Writing a packet into a buffer, with byte stuffing.
+//! Writing packets into a buffer, with byte stuffing.
 
 use super::{MAX_PACKET_LEN, crc_of, field};
 
@@ -8,23 +8,23 @@ pub enum EncodeError {
     /// The buffer is too small.
     #[error("the packet does not fit into a buffer of {buffer_len} bytes: give it {MAX_PACKET_LEN}")]
     BufferTooSmall {
-        /// What was offered.
+        /// Its size.
         buffer_len: usize,
     },
     /// The packet is longer than any receiver here accepts.
     #[error("the packet is longer than {MAX_PACKET_LEN} bytes: split it into several")]
     TooLong,
-    /// A segment of a fast reply has another length than the request asked for.
+    /// A segment of a fast reply has another length than requested.
     #[error("a segment of {found} bytes where the request asked for {expected}: answer what was asked")]
     SegmentLength {
-        /// Bytes that the request asked of this device; zero when it asked no further device.
+        /// Bytes requested from this device; zero when the request has no further device.
         expected: usize,
-        /// Bytes offered.
+        /// Bytes given.
         found: usize,
     },
 }
 
-/// Appends stuffed bytes behind a header; the header's length and the CRC are filled in at the end.
+/// Appends stuffed bytes after a header; length and CRC are filled in at the end.
 pub(super) struct PacketWriter<'o> {
     out: &'o mut [u8],
     len: usize,
@@ -57,7 +57,7 @@ impl<'o> PacketWriter<'o> {
         }
     }
 
-    /// Appends a parameter byte, and the extra `FD` behind each `FF FF FD`.
+    /// Appends a parameter byte, and an extra `FD` after each `FF FF FD`.
     pub(super) fn byte(&mut self, byte: u8) {
         self.raw(&[byte]);
         if byte == 0xFD && !self.overflowed && self.out[..self.len].ends_with(&[0xFF, 0xFF, 0xFD]) {
@@ -95,9 +95,9 @@ impl<'o> PacketWriter<'o> {
     }
 }
 
-/// Removes the extra `FD` behind each `FF FF FD`, in place. Returns how many bytes remain at the front.
+/// Removes the extra `FD` after each `FF FF FD`, in place. Returns the number of bytes that remain at the front.
 pub(super) fn unstuff(bytes: &mut [u8]) -> usize {
-    // Most payloads hold no `FF FF FD`; they are left as they are.
+    // Most payloads contain no `FF FF FD` and stay as they are.
     let Some(first) = bytes.windows(4).position(|window| window == [0xFF, 0xFF, 0xFD, 0xFD]) else {
         return bytes.len();
     };
@@ -107,7 +107,7 @@ pub(super) fn unstuff(bytes: &mut [u8]) -> usize {
         bytes[kept] = byte;
         kept += 1;
         from += 1;
-        // The pattern is looked for in what was kept, since the removed byte is no part of the payload.
+        // The pattern is searched in the kept bytes, because the removed byte is not part of the payload.
         let closes_header = byte == 0xFD && bytes[..kept].ends_with(&[0xFF, 0xFF, 0xFD]);
         if closes_header && bytes.get(from) == Some(&0xFD) {
             from += 1;

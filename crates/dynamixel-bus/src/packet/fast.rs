@@ -3,12 +3,12 @@
 //! | `FF FF FD 00` | `FE` | length | `55` | segment of the first device | segment of the second | … |
 //! |---|---|---|---|---|---|---|
 //!
-//! where a segment is `error, ID, data …, CRC low, CRC high`. The first device sends the header with the length of the whole;
-//! each further one appends its segment when it has heard the one before. So
+//! where a segment is `error, ID, data …, CRC low, CRC high`. The first device sends the header with the length of the whole
+//! packet; each further one appends its segment when it has heard the one before. So
 //! - each segment's CRC covers **everything** from the header on, earlier segments and their CRCs included, and the last
 //!   one is the CRC of the packet;
-//! - nothing is byte-stuffed, since the first device cannot know what the others will say;
-//! - when a device stays silent the packet ends early, and what came before it is still good.
+//! - nothing is byte-stuffed, because the first device does not know the data of the others;
+//! - when a device is silent the packet ends early, and the segments before it are still good.
 //!
 //! Source: e-manual "Fast Bulk Read"; its example's CRCs are in the tests.
 
@@ -25,30 +25,30 @@ pub struct FastReply<'a> {
     crc_checked: bool,
 }
 
-/// What one device contributed.
+/// The part of one device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FastSegment<'a> {
-    /// Who.
+    /// The device.
     pub id: DeviceId,
-    /// Obeyed or not, hardware error or not.
+    /// Its error and its alert.
     pub flags: StatusFlags,
-    /// What was read.
+    /// The data read.
     pub data: &'a [u8],
 }
 
-/// Why a device's data could not be had from a fast reply.
+/// Why a fast reply has no valid data of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SegmentError {
     /// The reply ends before or within the segment.
     #[error("the reply ends before the data of device {0}: is it connected, powered and of this baud rate?")]
     Missing(DeviceId),
-    /// Segment or an earlier one got damaged.
+    /// The segment or an earlier one is damaged.
     #[error("the CRC of device {0}'s segment is wrong: check cable, length and termination")]
     Crc(DeviceId),
     /// Another device answered in its place.
     #[error("device {expected} was asked, ID {found} answered in its place: look for a device with a doubled ID")]
     WrongId {
-        /// Who was asked.
+        /// The device that was asked.
         expected: DeviceId,
         /// Raw ID found.
         found: u8,
@@ -56,7 +56,7 @@ pub enum SegmentError {
 }
 
 impl<'a> FastReply<'a> {
-    /// From bytes that begin with a header; nothing when it is not the header of a fast reply.
+    /// From bytes that begin with a header; none when it is not the header of a fast reply.
     pub(super) fn new(bytes: &'a [u8], crc_checked: bool) -> Option<Self> {
         let head = bytes.get(..field::PARAMETERS)?;
         let is_fast_reply = head.starts_with(&field::HEADER)
@@ -73,8 +73,8 @@ impl<'a> FastReply<'a> {
 
     /// The segments in the order of the request, each checked by its own CRC.
     ///
-    /// `spans` is what was asked for. After the first error every further device has an error too, since only the order
-    /// tells where a segment begins.
+    /// `spans` are those of the request. After the first error every further device has an error, too, because a segment can be
+    /// located only by the ones before it.
     pub fn segments<I>(self, spans: I) -> impl Iterator<Item = Result<FastSegment<'a>, SegmentError>>
     where
         I: IntoIterator<Item = ReadSpan>,
@@ -121,8 +121,7 @@ impl<'a> FastReply<'a> {
 
 /// Writes a fast reply as the devices on a bus build it: header, then one segment after another.
 ///
-/// [`len`](Self::len) bytes are good at any time, so that a reply in which a later device is silent is one to which no
-/// further segment is pushed.
+/// The first [`len`](Self::len) bytes are valid at any time: for a silent device, push no further segment.
 #[derive(Debug)]
 pub struct FastReplyWriter<'o, I> {
     out: &'o mut [u8],
@@ -131,7 +130,7 @@ pub struct FastReplyWriter<'o, I> {
 }
 
 impl<'o, I: Iterator<Item = u16> + Clone> FastReplyWriter<'o, I> {
-    /// Begins a reply in `out`. `data_lengths` says how many bytes the request asks of each device, in its order.
+    /// Begins a reply in `out`. `data_lengths` are the numbers of bytes requested from the devices, in the order of the request.
     ///
     /// # Errors
     /// [`EncodeError`] when the whole reply is too long for `out` or for a packet.
@@ -162,7 +161,7 @@ impl<'o, I: Iterator<Item = u16> + Clone> FastReplyWriter<'o, I> {
     /// Appends the next device's segment.
     ///
     /// # Errors
-    /// [`EncodeError::SegmentLength`] when the data has another length than the request asked of this device.
+    /// [`EncodeError::SegmentLength`] when the data has another length than requested from this device.
     pub fn push(&mut self, segment: FastSegment<'_>) -> Result<(), EncodeError> {
         let expected = usize::from(self.expected_lengths.next().unwrap_or(0));
         let found = segment.data.len();
@@ -180,7 +179,7 @@ impl<'o, I: Iterator<Item = u16> + Clone> FastReplyWriter<'o, I> {
         Ok(())
     }
 
-    /// How many bytes of the buffer are to be sent.
+    /// Number of bytes to send.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "never empty: it begins with a header")]
     pub const fn len(&self) -> usize {

@@ -1,4 +1,4 @@
-//! Who is spoken to, and who answers.
+//! IDs of devices.
 
 /// The ID that all devices listen to, and that a fast reply comes from.
 pub const BROADCAST_ID: u8 = 0xFE;
@@ -13,13 +13,13 @@ impl DeviceId {
     /// The greatest ID a device can have.
     pub const MAX: Self = Self(252);
 
-    /// The device with this number, or nothing when no device can have it.
+    /// The device with this ID; none for 253 to 255.
     #[must_use]
     pub const fn new(id: u8) -> Option<Self> {
         if id <= Self::MAX.0 { Some(Self(id)) } else { None }
     }
 
-    /// The number on the wire.
+    /// The byte on the wire.
     #[must_use]
     pub const fn get(self) -> u8 {
         self.0
@@ -32,7 +32,7 @@ impl core::fmt::Display for DeviceId {
     }
 }
 
-/// Whom an instruction is for.
+/// The recipient of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Recipient {
     /// One device.
@@ -42,7 +42,7 @@ pub enum Recipient {
 }
 
 impl Recipient {
-    /// The recipient with this number on the wire, or nothing for the reserved numbers 253 and 255.
+    /// The recipient with this ID on the wire; none for the reserved IDs 253 and 255.
     #[must_use]
     pub const fn from_wire(id: u8) -> Option<Self> {
         if id == BROADCAST_ID {
@@ -54,7 +54,7 @@ impl Recipient {
         }
     }
 
-    /// The number on the wire.
+    /// The byte on the wire.
     #[must_use]
     pub const fn to_wire(self) -> u8 {
         match self {

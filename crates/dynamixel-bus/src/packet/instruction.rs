@@ -1,4 +1,4 @@
-//! What the controller says.
+//! Instructions of the controller.
 
 use super::encode::PacketWriter;
 use super::{BulkWrites, EncodeError, ReadSpans, Recipient, SyncWrites};
@@ -27,14 +27,14 @@ const CLEAR_MULTI_TURN: [u8; 5] = *b"\x01DXL\x22";
 /// Guards Control Table Backup against accident: "CTRL".
 const BACKUP_KEY: [u8; 4] = *b"CTRL";
 
-/// What a factory reset spares.
+/// The scope of a factory reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResetScope {
-    /// Nothing (0xFF). Devices refuse it from the broadcast ID.
+    /// All settings (0xFF). Devices refuse it from the broadcast ID.
     All,
-    /// The ID (0x01).
+    /// All but the ID (0x01).
     AllButId,
-    /// The ID and the baud rate (0x02).
+    /// All but the ID and the baud rate (0x02).
     AllButIdAndBaudRate,
 }
 
@@ -50,7 +50,7 @@ pub enum BackupAction {
 /// An instruction with its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Instruction<'a> {
-    /// Are you there? Answered with model number and firmware version.
+    /// Answer with model number and firmware version.
     Ping,
     /// Answer with these bytes.
     Read {
@@ -59,31 +59,31 @@ pub enum Instruction<'a> {
         /// Number of bytes.
         length: u16,
     },
-    /// Take these bytes.
+    /// Write these bytes.
     Write {
         /// First address.
         address: u16,
         /// What to write there.
         data: &'a [u8],
     },
-    /// Take these bytes at the next [`Action`](Self::Action).
+    /// Write these bytes at the next [`Action`](Self::Action).
     RegWrite {
         /// First address.
         address: u16,
         /// What to write there.
         data: &'a [u8],
     },
-    /// Do what Reg Write prepared.
+    /// Execute a Reg Write.
     Action,
-    /// Forget the settings.
+    /// Reset settings.
     FactoryReset(ResetScope),
     /// Restart, which also clears a hardware error.
     Reboot,
-    /// Forget whole turns: the present position becomes one within a turn. Refused while the motor moves.
+    /// Clear whole turns: the present position becomes one within a turn. Refused while the motor moves.
     ClearMultiTurn,
     /// Store or restore settings.
     ControlTableBackup(BackupAction),
-    /// Several devices answer with the same stretch, each with a status packet.
+    /// Several devices answer with the same addresses, each with a status packet.
     SyncRead {
         /// First address.
         address: u16,
@@ -92,7 +92,7 @@ pub enum Instruction<'a> {
         /// Raw IDs in the order of the answers.
         ids: &'a [u8],
     },
-    /// Several devices take bytes at the same address.
+    /// Several devices write bytes to the same address.
     SyncWrite {
         /// First address.
         address: u16,
@@ -108,15 +108,15 @@ pub enum Instruction<'a> {
         /// Raw IDs in the order of the answers.
         ids: &'a [u8],
     },
-    /// Several devices answer with a stretch each, each with a status packet.
+    /// Several devices answer with a span each, each with a status packet.
     BulkRead(ReadSpans<'a>),
-    /// Several devices take bytes, each at its own address.
+    /// Several devices write bytes, each to its own address.
     BulkWrite(BulkWrites<'a>),
     /// As [`BulkRead`](Self::BulkRead), answered in one [`FastReply`](super::FastReply).
     FastBulkRead(ReadSpans<'a>),
 }
 
-/// An instruction whose CRC is right and whose parameters make no sense.
+/// An instruction that is not valid, though its CRC is right.
 ///
 /// A device answers it with [`StatusError::Instruction`](super::StatusError::Instruction) when it does not know the code, and
 /// [`StatusError::DataLength`](super::StatusError::DataLength) otherwise.
@@ -128,12 +128,12 @@ pub enum MalformedInstruction {
         /// What was found.
         code: u8,
     },
-    /// Known, but its parameters are too few, too many or not among those defined.
+    /// Known, but its parameters are too few, too many or not defined.
     #[error("instruction 0x{code:02X} with {parameter_len} bytes of parameters that do not fit it")]
     Parameters {
         /// The instruction.
         code: u8,
-        /// How many bytes of parameters came with it.
+        /// Number of bytes of its parameters.
         parameter_len: usize,
     },
 }
@@ -254,10 +254,10 @@ fn split_words(bytes: &[u8]) -> Option<(u16, u16, &[u8])> {
     Some((first, second, rest))
 }
 
-/// An instruction and whom it is for.
+/// An instruction and its recipient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InstructionPacket<'a> {
-    /// Whom it is for. Sync and bulk instructions are for [`Recipient::All`].
+    /// The recipient. Sync and bulk instructions are for [`Recipient::All`].
     pub recipient: Recipient,
     /// What to do.
     pub instruction: Instruction<'a>,
@@ -267,7 +267,7 @@ impl InstructionPacket<'_> {
     /// Writes the packet to the front of `out` and returns its length.
     ///
     /// # Errors
-    /// [`EncodeError`] when it does not fit; `out` is then of no use.
+    /// [`EncodeError`] when it does not fit; the content of `out` is then undefined.
     pub fn encode(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
         let mut writer = PacketWriter::new(out, self.recipient.to_wire(), self.instruction.code());
         self.instruction.write_parameters(&mut writer);

@@ -1,11 +1,11 @@
-//! What sync and bulk instructions carry: who is read or written, where, how much.
+//! The lists in sync and bulk instructions: devices, addresses, lengths, data.
 
 use super::DeviceId;
 
-/// A stretch of one device's control table, as a bulk read asks for it.
+/// A span of one device's control table, for a bulk read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReadSpan {
-    /// Whom to read.
+    /// The device to read.
     pub id: DeviceId,
     /// First address.
     pub address: u16,
@@ -17,7 +17,7 @@ impl ReadSpan {
     /// Bytes of a span in a packet.
     pub const WIRE_LEN: usize = 5;
 
-    /// The span as it stands in a packet: ID, address, length, little-endian.
+    /// The span in a packet: ID, address, length, little-endian.
     #[must_use]
     pub const fn to_wire(self) -> [u8; Self::WIRE_LEN] {
         let [address_low, address_high] = self.address.to_le_bytes();
@@ -40,7 +40,7 @@ impl ReadSpan {
 pub struct ReadSpans<'a>(&'a [[u8; ReadSpan::WIRE_LEN]]); // each with a valid device ID
 
 impl<'a> ReadSpans<'a> {
-    /// From spans as [`ReadSpan::to_wire`] writes them; nothing when one of them names no device.
+    /// From spans of [`ReadSpan::to_wire`]; none when one of them has an invalid ID.
     #[must_use]
     pub fn new(wire: &'a [[u8; ReadSpan::WIRE_LEN]]) -> Option<Self> {
         wire.iter()
@@ -48,7 +48,7 @@ impl<'a> ReadSpans<'a> {
             .then_some(Self(wire))
     }
 
-    /// From what [`ReadSpan::to_wire`] has written, whose IDs are valid by type.
+    /// From spans of [`ReadSpan::to_wire`], whose IDs are valid by type.
     #[must_use]
     pub const fn from_valid(wire: &'a [[u8; ReadSpan::WIRE_LEN]]) -> Self {
         Self(wire)
@@ -69,7 +69,7 @@ impl<'a> ReadSpans<'a> {
     }
 }
 
-/// The writes of a sync write: the same stretch of several devices.
+/// The writes of a sync write: the same addresses of several devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SyncWrites<'a> {
     length: u16,       // at least 1
@@ -77,7 +77,7 @@ pub struct SyncWrites<'a> {
 }
 
 impl<'a> SyncWrites<'a> {
-    /// From records of an ID and `length` bytes each; nothing when they do not divide evenly or name no device.
+    /// From records of an ID and `length` bytes each; none when they do not divide evenly or have an invalid ID.
     #[must_use]
     pub fn new(length: u16, records: &'a [u8]) -> Option<Self> {
         let record_len = usize::from(length) + 1;
@@ -90,7 +90,7 @@ impl<'a> SyncWrites<'a> {
         self.iter().count() == self.records.len() / (usize::from(self.length) + 1)
     }
 
-    /// Bytes that each device gets.
+    /// Number of bytes for each device.
     #[must_use]
     pub const fn length(&self) -> u16 {
         self.length
@@ -114,21 +114,21 @@ impl<'a> SyncWrites<'a> {
 /// One write of a bulk write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BulkWrite<'a> {
-    /// Whom to write.
+    /// The device to write.
     pub id: DeviceId,
     /// First address.
     pub address: u16,
-    /// What to write there.
+    /// The bytes.
     pub data: &'a [u8],
 }
 
-/// The writes of a bulk write: any stretch of each of several devices.
+/// The writes of a bulk write: any span of each of several devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BulkWrites<'a>(&'a [u8]); // whole records: span, then as many bytes as it says
 
 impl<'a> BulkWrites<'a> {
-    /// From records of a [`ReadSpan`] on the wire followed by as many bytes as it says; nothing when they do not come out
-    /// even or name no device.
+    /// From records of a [`ReadSpan`] on the wire followed by as many bytes as it says; none when they are not
+    /// whole or have an invalid ID.
     #[must_use]
     pub fn new(records: &'a [u8]) -> Option<Self> {
         let mut rest = records;

@@ -6,20 +6,20 @@
 //! |---|---|---|---|---|---|---|---|---|---|
 //! | | `FF` | `FF` | `FD` | `00` | ID | length (little-endian) | instruction | parameters | CRC-16 (little-endian) |
 //!
-//! The length counts everything behind itself. The CRC covers everything before itself. Inside instruction and
+//! The length counts everything after it. The CRC covers everything before it. Inside instruction and
 //! parameters, `FF FF FD` is followed by an extra `FD` (byte stuffing), so that a header never occurs in a payload.
 //!
 //! In the order in which a transaction uses them:
 //!
-//! 1. [`InstructionPacket`] is what the controller says; [`encode`](InstructionPacket::encode) writes it into any buffer.
+//! 1. [`InstructionPacket`] is a request of the controller; [`encode`](InstructionPacket::encode) writes it into any buffer.
 //! 2. [`Decoder`] turns a stream of bytes, however cut and however noisy, into [`Packet`]s.
-//! 3. [`StatusPacket`] is what one device answers: an error, an alert, data.
-//! 4. [`FastReply`] is what several devices answer together to a fast sync or fast bulk read: a single packet from the
-//!    broadcast ID, **not** byte-stuffed, whose segments carry CRCs of their own, so that the first device's data is good
-//!    even when the second one falls silent. [`FastReplyWriter`] is the devices' side of it.
+//! 3. [`StatusPacket`] is the answer of one device: an error, an alert, data.
+//! 4. [`FastReply`] is the joint answer of several devices to a fast sync or fast bulk read: a single packet from the broadcast ID,
+//!    **not** byte-stuffed. Each segment has a CRC of its own, so that the first device's data is good even when the second one is
+//!    silent. [`FastReplyWriter`] is the devices' side of it.
 //!
 //! Both ends use the same types: the controller encodes instructions and decodes statuses, a device the reverse.
-//! Nothing here allocates, blocks or panics, whatever bytes come in.
+//! Nothing here allocates, blocks or panics, whatever the input.
 //!
 //! Source: ROBOTIS e-manual, "DYNAMIXEL Protocol 2.0"; byte-exact against the examples there and the official SDK.
 
@@ -45,11 +45,10 @@ use crc::{CRC_16_UMTS, Crc, Digest, Table};
 
 /// Longest packet that is encoded or decoded here, in bytes, header and CRC included.
 ///
-/// The longest that a worm needs is a fast bulk reply of a servo (49 bytes) and a tracker of 16 cells (75 bytes):
-/// 140 bytes. The rest is room for other clients of a simulated device. A longer length field is taken for noise.
+/// The protocol allows more, but few control tables are longer than this. A longer length field is taken for noise.
 pub const MAX_PACKET_LEN: usize = 512;
 
-/// Where things are in a packet.
+/// The layout of a packet.
 mod field {
     use core::ops::Range;
 
@@ -60,13 +59,13 @@ mod field {
     pub(super) const INSTRUCTION: usize = 7;
     pub(super) const PARAMETERS: usize = 8;
     pub(super) const CRC_LEN: usize = 2;
-    /// Instruction and CRC: the least that a length field can say.
+    /// Instruction and CRC: the smallest value of a length field.
     pub(super) const MIN_LENGTH_FIELD: usize = 3;
     /// Instruction code that marks an answer.
     pub(super) const STATUS_INSTRUCTION: u8 = 0x55;
 }
 
-// Sixteen tables (8 KiB) instead of one: the CRC is the dearest part of a tick's encoding and decoding.
+// Sixteen tables (8 KiB) instead of one: the CRC dominates the cost of encoding and decoding.
 static CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_UMTS);
 
 fn crc_of(bytes: &[u8]) -> u16 {
@@ -77,10 +76,10 @@ fn crc_digest() -> Digest<'static, u16, Table<16>> {
     CRC.digest()
 }
 
-/// A packet as the [`Decoder`] found it.
+/// A packet from the [`Decoder`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Packet<'a> {
-    /// From the controller (or, on an adapter that echoes, one's own words).
+    /// From the controller (or an echo of one's own request).
     Instruction(InstructionPacket<'a>),
     /// From one device.
     Status(StatusPacket<'a>),

@@ -1,9 +1,9 @@
-//! What one device answers.
+//! The answer of one device.
 
 use super::encode::PacketWriter;
 use super::{DeviceId, EncodeError, field};
 
-/// Why a device did not do what it was told (low seven bits of the error byte).
+/// Why a device did not execute an instruction (low seven bits of the error byte).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StatusError {
     /// Code 1.
@@ -67,14 +67,14 @@ const ALERT: u8 = 0x80;
 /// The error byte of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StatusFlags {
-    /// The device has a hardware error (bit 0x80); the instruction may have been obeyed all the same.
+    /// The device has a hardware error (bit 0x80); the instruction may have been executed nevertheless.
     pub alert: bool,
-    /// Why the instruction was not obeyed.
+    /// Why the instruction was not executed.
     pub error: Option<StatusError>,
 }
 
 impl StatusFlags {
-    /// Obeyed, and no hardware error.
+    /// Executed, and no hardware error.
     pub const OK: Self = Self {
         alert: false,
         error: None,
@@ -103,11 +103,11 @@ impl StatusFlags {
 /// The answer of one device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatusPacket<'a> {
-    /// Who answers.
+    /// The device.
     pub id: DeviceId,
-    /// Obeyed or not, hardware error or not.
+    /// Its error and its alert.
     pub flags: StatusFlags,
-    /// What was read; for a ping, the model number (two bytes, little-endian) and the firmware version.
+    /// The data read; for a ping, the model number (two bytes, little-endian) and the firmware version.
     pub data: &'a [u8],
 }
 
@@ -115,7 +115,7 @@ impl StatusPacket<'_> {
     /// Writes the packet to the front of `out` and returns its length.
     ///
     /// # Errors
-    /// [`EncodeError`] when it does not fit; `out` is then of no use.
+    /// [`EncodeError`] when it does not fit; the content of `out` is then undefined.
     pub fn encode(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
         let mut writer = PacketWriter::new(out, self.id.get(), field::STATUS_INSTRUCTION);
         writer.byte(self.flags.to_wire());

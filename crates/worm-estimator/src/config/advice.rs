@@ -1,14 +1,14 @@
-//! Settings that are legal but foolish.
+//! Settings that are valid but inadvisable.
 
 use super::{Config, Policy};
 use crate::message::AlarmKind;
 
-/// One setting that is legal but foolish, and what would be better.
+/// One setting that is valid but inadvisable, and a better choice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Advice {
     /// The key, as `section.key`.
     pub key: &'static str,
-    /// What is foolish about it and what would be better.
+    /// What is wrong with it, and a better choice.
     pub text: String,
 }
 

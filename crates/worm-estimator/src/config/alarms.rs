@@ -1,4 +1,4 @@
-//! What each alarm watches for and what the controller does about it.
+//! The threshold of each alarm, and the controller's reaction to it.
 
 use super::check::Checker;
 use crate::message::AlarmKind;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Policy {
-    /// Goes on, and tells.
+    /// Goes on, and reports the alarm.
     Warn,
     /// Keeps the cam where it is.
     Hold,
@@ -24,7 +24,7 @@ pub enum Policy {
 pub struct AlarmConfig {
     /// What the controller does.
     pub policy: Policy,
-    /// The threshold; its meaning and unit are told with each alarm in [`Alarms`].
+    /// The threshold; [`Alarms`] gives its meaning and unit for each alarm.
     pub threshold: f64,
 }
 
@@ -32,25 +32,25 @@ pub struct AlarmConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Alarms {
-    /// The cam lags behind its command by more than this share of a turn.
+    /// The cam lags behind its command by more than this fraction of a turn.
     pub motor_stall: AlarmConfig,
-    /// A cell's extension in its step falls short by more than this share of its usual stroke.
+    /// A cell's extension in its step falls short by more than this fraction of its usual stroke.
     pub jammed_cell: AlarmConfig,
-    /// The advance of a cycle falls below this share of the usual one.
+    /// The advance of a cycle falls below this fraction of the usual one.
     pub no_progress: AlarmConfig,
     /// The worm moves down the canal by more than this distance beyond its usual retraction, m.
     pub sliding_down: AlarmConfig,
-    /// Energy per cycle beyond the usual, as a share of it, that counts as a shift worth an alarm.
+    /// Rise of the energy per cycle that is worth an alarm, as a fraction of the usual energy.
     pub energy_over_budget: AlarmConfig,
-    /// Energy left over energy needed for the way home, below which the battery counts as low.
+    /// Ratio of the energy left to the energy needed for the way home, below which the battery counts as low.
     pub battery_low: AlarmConfig,
-    /// Share of failed exchanges over half a second.
+    /// Fraction of failed exchanges over half a second.
     pub link_fault: AlarmConfig,
-    /// Share of missed samples, or of samples in which a cell was not seen, over two seconds.
+    /// Fraction of missed samples, or of samples in which a cell was not seen, over two seconds.
     pub tracker_fault: AlarmConfig,
     /// Servo temperature, °C; hardware errors raise this alarm at once.
     pub device_fault: AlarmConfig,
-    /// Way in a quarter of a step, or in a whole cycle, that the model does not explain, m.
+    /// Displacement in a quarter of a step, or in a whole cycle, that the model does not explain, m.
     pub model_mismatch: AlarmConfig,
 }
 

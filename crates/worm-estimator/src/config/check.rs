@@ -1,4 +1,4 @@
-//! Checking values, and errors that say where and what to do.
+//! Checking values, and errors that say what to do.
 
 use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
@@ -69,7 +69,7 @@ impl Display for ProblemList<'_> {
     }
 }
 
-/// Gives a TOML error its place in the file.
+/// Adds line and column to a TOML error.
 pub(super) fn syntax(text: &str, file: &Path, error: &toml::de::Error) -> ConfigError {
     let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or("");
     ConfigError::Syntax {
@@ -80,14 +80,14 @@ pub(super) fn syntax(text: &str, file: &Path, error: &toml::de::Error) -> Config
     }
 }
 
-/// Collects problems, so that a person sees all of them at once.
+/// Collects problems, so that all of them are reported at once.
 #[derive(Default)]
 pub(super) struct Checker {
     pub(super) problems: Vec<ConfigProblem>,
 }
 
 impl Checker {
-    /// Notes a problem unless `holds`.
+    /// Adds a problem unless `holds`.
     pub(super) fn require(&mut self, holds: bool, key: &str, value: impl Display, remedy: impl Display) {
         if !holds {
             self.problems.push(ConfigProblem {
@@ -98,7 +98,7 @@ impl Checker {
         }
     }
 
-    /// Notes a problem unless `value` is a number in `range`; `unit` is for the reader.
+    /// Adds a problem unless `value` is a number in `range`; `unit` is for the message.
     pub(super) fn range<T: PartialOrd + Display>(&mut self, key: &str, value: T, range: RangeInclusive<T>, unit: &str) {
         let space = if unit.is_empty() { "" } else { " " };
         let remedy = format!("must be from {} to {}{space}{unit}", range.start(), range.end());

@@ -1,4 +1,4 @@
-//! Effects that the model has beyond the paper's theory: `[[effect]]`.
+//! Effects beyond the paper's theory: `[[effect]]`.
 
 use super::check::Checker;
 use serde::Deserialize;
@@ -7,15 +7,15 @@ use std::str::FromStr;
 use worm_physics::MAX_CELLS;
 use worm_physics::effect::{Setting, SettingError};
 
-/// An effect switched on, as the file has it.
+/// An effect that is switched on, as in the file.
 ///
-/// Obeyed by `simulate`, `study`, the virtual worm, the theory in `analyze` and the predicted values of the estimator's cycles. What
-/// follows the tips in measured positions, in the estimator and in the identification, knows the paper's contact law alone.
+/// `simulate`, `study`, the virtual worm, the theory in `analyze` and the predictions of the estimator's cycles use it. What follows the
+/// tips in measured positions, in the estimator and in the identification, uses the paper's contact law alone.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Effect {
     /// Its name in the library.
     pub name: String,
-    /// The cell that it concerns, from 1, where one is meant.
+    /// The cell concerned, from 1, if it is a single one.
     #[serde(default)]
     pub cell: Option<usize>,
     /// Its parameters by name.
@@ -23,7 +23,7 @@ pub struct Effect {
     pub parameters: BTreeMap<String, f64>,
 }
 
-/// Why a text is no effect.
+/// Why a text is not an effect.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EffectTextError {
     /// Something is not NAME:PARAM=VALUE.
@@ -34,7 +34,7 @@ pub enum EffectTextError {
         /// What is wrong.
         part: String,
     },
-    /// A value that is no number.
+    /// A value that is not a number.
     #[error("{parameter} = '{value}' is no number")]
     Number {
         /// The parameter.
@@ -42,13 +42,13 @@ pub enum EffectTextError {
         /// What was given.
         value: String,
     },
-    /// A cell that is no whole number.
+    /// A cell that is not a whole number.
     #[error("cell = '{0}' is no cell: cells count from 1")]
     Cell(String),
     /// Something is given twice.
     #[error("{0} is given twice: give each parameter once")]
     Twice(String),
-    /// There is no such effect, or it cannot be like that.
+    /// There is no such effect, or it is not valid.
     #[error(transparent)]
     Setting(#[from] SettingError),
 }
@@ -56,7 +56,7 @@ pub enum EffectTextError {
 impl FromStr for Effect {
     type Err = EffectTextError;
 
-    /// An effect as the command line has it: `NAME:PARAM=VALUE[,PARAM=VALUE][,cell=K]`.
+    /// An effect from the command line: `NAME:PARAM=VALUE[,PARAM=VALUE][,cell=K]`.
     fn from_str(text: &str) -> Result<Self, EffectTextError> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let form = |part: &str| EffectTextError::Form { part: part.to_owned() };
@@ -85,19 +85,19 @@ impl FromStr for Effect {
                 return Err(EffectTextError::Twice(parameter.to_owned()));
             }
         }
-        // How many cells the worm has is known later; what no worm can have is told here.
+        // The number of cells is not known yet; a cell that no worm can have is refused here.
         effect.setting(MAX_CELLS)?;
         Ok(effect)
     }
 }
 
 impl Effect {
-    /// The effect as the model takes it.
+    /// The effect as a setting of the physics.
     ///
     /// # Errors
-    /// [`SettingError`] for a name, a parameter, a value or a cell that cannot be.
+    /// [`SettingError`] for an unknown name or parameter, and for a value or a cell out of range.
     pub fn setting(&self, cells: usize) -> Result<Setting, SettingError> {
-        // A cell 0 becomes one beyond the last, which is refused by name.
+        // Cell 0 becomes one beyond the last, which is refused.
         let cell = self.cell.map(|cell| cell.wrapping_sub(1));
         Setting::by_names(&self.name, cell, &self.parameters, cells)
     }

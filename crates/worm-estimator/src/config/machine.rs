@@ -1,4 +1,4 @@
-//! The machine around the worm: port, servo, tracker, loop, limits, battery, operating system, topics.
+//! The hardware and software around the worm: port, servo, tracker, loop, limits, battery, operating system, topics.
 
 use super::check::Checker;
 use serde::Deserialize;
@@ -75,7 +75,7 @@ impl Port {
 pub struct Servo {
     /// Device ID on the bus.
     pub id: u8,
-    /// Model number that must answer.
+    /// Required model number.
     pub model_number: u16,
     /// Present position at which the gait phase is a whole number, counts of 1/4096 turn.
     pub home_position: i32,
@@ -151,7 +151,7 @@ impl Servo {
 pub struct Tracker {
     /// Device ID on the bus.
     pub id: u8,
-    /// Model number that must answer.
+    /// Required model number.
     pub model_number: u16,
     /// Samples per second.
     pub rate_hz: f64,
@@ -179,13 +179,13 @@ impl Tracker {
     }
 }
 
-/// The control loop and its patience.
+/// The control loop and its timeouts.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Control {
     /// Ticks per second.
     pub rate_hz: f64,
-    /// Share of the tick's period that the exchange may wait for answers.
+    /// Fraction of the tick's period that the exchange may wait for answers.
     pub bus_wait_share: f64,
     /// Servo silence after which the link counts as lost, s.
     pub link_timeout_s: f64,
@@ -199,9 +199,9 @@ pub struct Control {
     pub hold_gain_per_s: f64,
     /// Gait cycles that a `back-off` goes back before it holds.
     pub back_off_cycles: f64,
-    /// Whether a loop whose computer cannot hold `rate_hz` goes on at a steady fraction of it.
+    /// Whether the loop goes on at a steady fraction of `rate_hz` on a computer that cannot hold it.
     pub adapt_rate: bool,
-    /// Whether the worm crawls on by itself, where that is safe, after a pause of the computer has stopped it.
+    /// Whether the worm crawls on by itself, if that is safe, after a pause of the computer has stopped it.
     pub resume_after_pause: bool,
 }
 
@@ -309,11 +309,11 @@ pub struct Battery {
     pub full_v: f64,
     /// Open-circuit voltage when empty, V.
     pub empty_v: f64,
-    /// Inner resistance, ohm.
+    /// Internal resistance, ohm.
     pub internal_resistance_ohm: f64,
     /// Power of everything but the motor, W.
     pub hotel_power_w: f64,
-    /// Share of the charge kept back beyond the way home.
+    /// Fraction of the charge kept in reserve beyond the way home.
     pub reserve_share: f64,
 }
 
@@ -339,7 +339,7 @@ impl Battery {
     }
 }
 
-/// What the loop asks of the operating system. A refusal is reported, and the worm still runs.
+/// What the loop requests from the operating system. A refusal is reported, and the worm still runs.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Realtime {

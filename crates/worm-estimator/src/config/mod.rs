@@ -1,9 +1,9 @@
-//! What a worm is and how it is run: one TOML file, every key with its unit and range, checked once and then trusted.
+//! The configuration: one TOML file, every key with its unit and range, checked once and then trusted.
 //!
-//! [`Config::load`] reads a file, refuses unknown keys and values out of range (all of them at once, each with its
-//! remedy) and gives a [`Config`] that the rest of the house takes at its word. Every key has a default, the worm of
-//! Zarrouk, Sharf and Shoham 2016; `config/worm.toml` spells all of them out with meaning, unit and range, and a test
-//! holds it against the defaults. [`Config::advice`] names settings that are legal but foolish.
+//! [`Config::load`] reads a file, refuses unknown keys and values out of range (all of them at once, each with its remedy) and returns a
+//! [`Config`] that the rest of the program takes for granted. Every key has a default, the worm of Zarrouk, Sharf and Shoham 2016;
+//! `config/worm.toml` lists all of them with meaning, unit and range, and a test compares it with the defaults. [`Config::advice`] lists
+//! settings that are valid but inadvisable.
 
 mod advice;
 mod alarms;
@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 pub struct Config {
     /// The robot's body.
     pub worm: Worm,
-    /// What the model has beyond the paper's theory; [`Effect`] says who obeys it.
+    /// Effects beyond the paper's theory; [`Effect`] says what uses them.
     pub effect: Vec<Effect>,
     /// The canal that it crawls in.
     pub canal: Canal,
@@ -50,11 +50,11 @@ pub struct Config {
     pub limits: Limits,
     /// The estimator.
     pub estimator: Estimator,
-    /// What each alarm watches for and what is done about it.
+    /// The threshold of each alarm, and the controller's reaction to it.
     pub alarms: Alarms,
-    /// The battery; absent: no account is kept.
+    /// The battery; absent: its charge is not estimated.
     pub battery: Option<Battery>,
-    /// What the loop asks of the operating system.
+    /// What the loop requests from the operating system.
     pub realtime: Realtime,
     /// Where the shared-memory topics live.
     pub topics: Topics,
@@ -75,7 +75,7 @@ impl Config {
         Ok(Self::load_with_text(path)?.0)
     }
 
-    /// As [`Config::load`], with the text of the file: what a log keeps of it.
+    /// As [`Config::load`], with the text of the file, for a log.
     ///
     /// # Errors
     /// As [`Config::load`].
@@ -87,10 +87,10 @@ impl Config {
         Ok((Self::from_toml(&text, path)?, text))
     }
 
-    /// Reads and checks a configuration that is already in memory; `file` is what errors call it.
+    /// Reads and checks a configuration in memory; errors call it `file`.
     ///
     /// # Errors
-    /// As [`Config::load`], but for reading the file.
+    /// As [`Config::load`], except for those of reading the file.
     pub fn from_toml(text: &str, file: &Path) -> Result<Self, ConfigError> {
         let config: Self = toml::from_str(text).map_err(|error| check::syntax(text, file, &error))?;
         let problems = config.problems();
@@ -134,7 +134,7 @@ impl Config {
         checker.problems
     }
 
-    /// Values that are in range each, and cannot work together.
+    /// Values that are each in range, but do not work together.
     fn check_together(&self, checker: &mut check::Checker) {
         let cam_rev_per_min = 60.0 / self.gait.cycle_s;
         checker.require(
@@ -148,7 +148,7 @@ impl Config {
         );
         let tick_s = 1.0 / self.control.rate_hz;
         let sample_s = 1.0 / self.tracker.rate_hz;
-        for (key, value, patience_s, period_s, periods) in [
+        for (key, value, timeout_s, period_s, periods) in [
             (
                 "servo.watchdog_ms",
                 f64::from(self.servo.watchdog_ms),
@@ -173,7 +173,7 @@ impl Config {
         ] {
             let min_s = 2.0 * period_s;
             checker.require(
-                patience_s >= min_s,
+                timeout_s >= min_s,
                 key,
                 value,
                 format!("must be at least two {periods} ({min_s:.3} s), or the worm stops without need"),
@@ -181,7 +181,7 @@ impl Config {
         }
     }
 
-    /// Settings that are legal but foolish, each with what would be better.
+    /// Settings that are valid but inadvisable, each with a better choice.
     pub fn advice(&self) -> Vec<Advice> {
         advice::advise(self)
     }

@@ -1,4 +1,4 @@
-//! The worm that a configuration describes, and what happens to it.
+//! The worm and the physics that a configuration describes.
 
 use super::Config;
 use worm_physics::effect::{Setting, SettingError};
@@ -10,7 +10,7 @@ impl TryFrom<&Config> for Worm {
     /// The worm of `[worm]` in the canal of `[canal]`.
     ///
     /// # Errors
-    /// [`WormError`] for values that a checked configuration does not hold.
+    /// [`WormError`] for values that a checked configuration cannot have.
     fn try_from(config: &Config) -> Result<Self, WormError> {
         let body = &config.worm;
         let contact = |cell| Contact::symmetric(body.stiffness_n_per_m.of(cell), body.max_deformation_m.of(cell));
@@ -24,13 +24,13 @@ impl TryFrom<&Config> for Worm {
     }
 }
 
-/// Why a configuration describes no physics; a checked one does.
+/// Why a configuration describes no valid physics. A checked one always does.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PhysicsError {
-    /// The worm cannot be one.
+    /// The worm is not valid.
     #[error(transparent)]
     Worm(#[from] WormError),
-    /// An effect cannot be switched on like that.
+    /// An effect is not valid.
     #[error(transparent)]
     Effect(#[from] SettingError),
 }
@@ -41,17 +41,17 @@ impl TryFrom<&Config> for Physics {
     /// The worm of `[worm]` in the canal of `[canal]` with every `[[effect]]`.
     ///
     /// # Errors
-    /// [`PhysicsError`] for values that a checked configuration does not hold.
+    /// [`PhysicsError`] for values that a checked configuration cannot have.
     fn try_from(config: &Config) -> Result<Self, PhysicsError> {
         Ok(Self::of(Worm::try_from(config)?).with(&config.effect_settings()?))
     }
 }
 
 impl Config {
-    /// Every `[[effect]]`, as the physics take it.
+    /// Every `[[effect]]`, as a setting of the physics.
     ///
     /// # Errors
-    /// [`SettingError`] for one that a checked configuration does not hold.
+    /// [`SettingError`] for an effect that a checked configuration cannot have.
     pub fn effect_settings(&self) -> Result<Vec<Setting>, SettingError> {
         let cells = self.worm.cells;
         self.effect.iter().map(|effect| effect.setting(cells)).collect()

@@ -6,7 +6,7 @@ fn file() -> &'static Path {
     Path::new("worm.toml")
 }
 
-/// The commented file is the documentation of the defaults: it must say what they are.
+/// The commented file documents the defaults, so it must contain them.
 #[test]
 fn the_commented_file_is_the_defaults() {
     assert_eq!(
@@ -37,15 +37,15 @@ fn the_commented_out_keys_are_accepted() {
 
 /// A line of the commented file for each effect of the library, with its parameters and what they may be.
 #[test]
-fn the_commented_file_tells_every_effect() {
-    let mut told = String::new();
+fn the_commented_file_lists_every_effect() {
+    let mut effect_name = String::new();
     let mut effects = BTreeMap::new();
     for line in Config::COMMENTED.lines() {
         if let Some(line) = line.strip_prefix("#     ") {
             if let Some((name, _)) = line.split_once(' ').filter(|(name, _)| !name.is_empty()) {
-                told = name.to_owned();
+                effect_name = name.to_owned();
             }
-            let text: &mut String = effects.entry(told.clone()).or_default();
+            let text: &mut String = effects.entry(effect_name.clone()).or_default();
             text.push_str(line);
             text.push('\n');
         }
@@ -204,17 +204,17 @@ fn bad_values_are_named_with_file_place_and_remedy() {
 }
 
 #[test]
-fn all_problems_are_told_at_once() {
+fn all_problems_are_effect_name_at_once() {
     let error = Config::from_toml("[worm]\nmass_kg = 0.0\n[gait]\ncycle_s = 0.0\n", file()).expect_err("two problems");
     assert_eq!(error.to_string().lines().count(), 2, "{error}");
 }
 
 #[test]
-fn foolish_settings_are_advised_against() {
+fn inadvisable_settings_are_reported() {
     assert_eq!(Config::default().advice(), []);
-    let foolish =
+    let inadvisable =
         "[port]\npath = \"/dev/ttyUSB0\"\nbaud = 57600\n[servo]\nwatchdog_ms = 20\n[control]\nrate_hz = 200.0\n";
-    let config = Config::from_toml(foolish, file()).expect("legal");
+    let config = Config::from_toml(inadvisable, file()).expect("valid");
     let keys: Vec<_> = config.advice().iter().map(|advice| advice.key).collect();
     assert_eq!(keys, ["port.baud", "servo.watchdog_ms"]);
 }

@@ -4,7 +4,7 @@ use super::check::Checker;
 use super::worm::PerCell;
 use serde::Deserialize;
 
-/// What the virtual worm is made of, where it is not told by the other sections.
+/// Properties of the virtual worm beyond those in the other sections.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VirtualWorm {
@@ -12,11 +12,11 @@ pub struct VirtualWorm {
     pub seed: u64,
     /// Standard deviation of one position measured by its tracker, m.
     pub noise_m: f64,
-    /// Share of positions that its tracker does not see.
+    /// Fraction of positions that its tracker does not see.
     pub dropout_share: f64,
     /// Its true largest tip deformations, m, where they differ from `worm.max_deformation_m`.
     pub max_deformation_m: Option<PerCell>,
-    /// Standard deviation of the largest tip deformations from one cycle to the next, as a share.
+    /// Standard deviation of the largest tip deformations from one cycle to the next, as a fraction.
     pub scatter_share: f64,
     /// Dry friction inside the device, N m at the cam.
     pub inner_friction_n_m: f64,

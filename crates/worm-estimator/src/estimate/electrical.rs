@@ -151,7 +151,7 @@ mod tests {
         }
     }
 
-    /// A motor that lives through all of the computer's time.
+    /// A motor whose time is the computer's.
     fn take(electrical: &mut Electrical, state: &State) {
         electrical.update(state, state.time_ns);
     }

@@ -20,7 +20,7 @@ pub struct ObserverOutput {
 #[derive(Debug)]
 pub struct Observer {
     estimator: Estimator,
-    watch: AlarmMonitor,
+    monitor: AlarmMonitor,
 }
 
 impl Observer {
@@ -31,7 +31,7 @@ impl Observer {
     pub fn new(config: &Config) -> Result<Self, EstimatorError> {
         Ok(Self {
             estimator: Estimator::new(config)?,
-            watch: AlarmMonitor::new(config),
+            monitor: AlarmMonitor::new(config),
         })
     }
 
@@ -45,8 +45,8 @@ impl Observer {
             cycle: cycle.as_ref(),
             residuals: Some(self.estimator.residual_map()),
         };
-        let alarms = self.watch.update(&observation);
-        if !self.watch.is_sound() {
+        let alarms = self.monitor.update(&observation);
+        if !self.monitor.is_fault_free() {
             self.estimator.exclude_cycle();
         }
         ObserverOutput {
@@ -68,9 +68,9 @@ impl Observer {
 
     fn with_alarms(&self, estimate: Estimate) -> Estimate {
         Estimate {
-            armed_mask: self.watch.armed_mask(),
-            raised_mask: self.watch.raised_mask(),
-            battery_fraction: self.watch.battery_fraction(),
+            armed_mask: self.monitor.armed_mask(),
+            raised_mask: self.monitor.raised_mask(),
+            battery_fraction: self.monitor.battery_fraction(),
             ..estimate
         }
     }

@@ -5,7 +5,7 @@ use super::json::{Name, OrNone};
 use super::{coded_enum, message};
 
 coded_enum! {
-    /// What an alarm watches. The code is its bit in [`super::Estimate::armed_mask`] and `raised_mask`.
+    /// The kind of an alarm. The code is its bit in [`super::Estimate::armed_mask`] and `raised_mask`.
     AlarmKind, "alarm" {
         /// The cam does not turn as commanded.
         MotorStall = 0 => "motor-stall",
@@ -17,15 +17,15 @@ coded_enum! {
         SlidingDown = 3 => "sliding-down",
         /// Cycles cost more than they should.
         EnergyOverBudget = 4 => "energy-over-budget",
-        /// What the battery holds is needed for the way home.
+        /// The remaining charge is needed for the way home.
         BatteryLow = 5 => "battery-low",
         /// The servo does not answer, or answers badly.
         LinkFault = 6 => "link-fault",
-        /// The tracker gives no samples, loses many, or does not see a cell.
+        /// The tracker sends no samples, loses many, or does not see a cell.
         TrackerFault = 7 => "tracker-fault",
-        /// The servo reports a hardware error, heat or low voltage.
+        /// The servo reports a hardware error, overheating or low voltage.
         DeviceFault = 8 => "device-fault",
-        /// The worm makes a way that the model does not explain.
+        /// The worm makes a displacement that the model does not explain.
         ModelMismatch = 9 => "model-mismatch",
     }
 }
@@ -47,27 +47,27 @@ message! {
         sequence: u64,
         /// When it was raised or cleared, ns of `CLOCK_MONOTONIC`.
         time_ns: u64,
-        /// When its condition began, by the estimator's account, ns of `CLOCK_MONOTONIC`.
+        /// When its condition began, as estimated, ns of `CLOCK_MONOTONIC`.
         since_ns: u64,
-        /// The watched quantity at the change, in the unit of the threshold.
+        /// The monitored quantity at the change, in the unit of the threshold.
         value: f64,
         /// The threshold that it passed.
         threshold: f64,
-        /// Gait phase at the change, cycles; of a model mismatch, the last one at which the gait was where it shows.
+        /// Gait phase at the change, cycles; for a model mismatch, the last one at which the gait passed the place where it shows.
         phase: f64,
-        /// What is watched: [`AlarmKind`] as a code.
+        /// The kind of alarm: [`AlarmKind`] as a code.
         kind: u32 as Name<AlarmKind>,
         /// How serious it is: [`Severity`] as a code.
         severity: u32 as Name<Severity>,
         /// 1 raised, 0 cleared.
         raised: u32,
-        /// The cell that is meant, from 0, or `u32::MAX` where no single cell is meant.
+        /// The cell concerned, from 0, or `u32::MAX` where it is not a single cell.
         cell: u32 as OrNone<u32>,
     }
 }
 
 impl Alarm {
-    /// No alarm: what fills a fixed-size list behind its end.
+    /// No alarm: fills the unused end of a fixed-size list.
     pub const NONE: Self = Self {
         sequence: 0,
         time_ns: 0,

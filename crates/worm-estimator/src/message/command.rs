@@ -1,10 +1,10 @@
-//! The `command` service: what the controller is asked to do, and what it answers.
+//! The `command` service: requests to the controller, and its answers.
 
 use super::ZeroCopySend;
 use super::coded_enum;
 
 coded_enum! {
-    /// What the controller is asked to do.
+    /// A kind of request to the controller.
     CommandKind, "command" {
         /// Torque on.
         Arm = 0 => "arm",
@@ -20,11 +20,11 @@ coded_enum! {
 }
 
 coded_enum! {
-    /// What became of a command.
+    /// The outcome of a command.
     CommandOutcome, "verdict" {
         /// Carried out, or under way.
         Accepted = 0 => "accepted",
-        /// Not possible in the present mode; the mode stands in the reply.
+        /// Not possible in the present mode, which is in the reply.
         WrongMode = 1 => "wrong-mode",
         /// The fault's cause is still there.
         FaultPersists = 2 => "fault-persists",
@@ -46,7 +46,7 @@ pub struct Command {
     pub cycles_per_s: f64,
     /// [`CommandKind`] as a code.
     pub kind: u32,
-    /// Fills the structure to a whole number of eight bytes; zero.
+    /// Padding to a multiple of eight bytes; zero.
     pub reserved: u32,
 }
 
@@ -55,7 +55,7 @@ pub struct Command {
 #[type_name("wormd_reply_v1")]
 #[repr(C)]
 pub struct Reply {
-    /// Tick in which the command was taken.
+    /// Tick in which the command was processed.
     pub sequence: u64,
     /// [`CommandOutcome`] as a code.
     pub verdict: u32,
@@ -63,6 +63,6 @@ pub struct Reply {
     pub mode: u32,
     /// [`super::Fault`] as a code.
     pub fault: u32,
-    /// Fills the structure to a whole number of eight bytes; zero.
+    /// Padding to a multiple of eight bytes; zero.
     pub reserved: u32,
 }

@@ -13,8 +13,8 @@ message! {
         end_ns: u64,
         /// How long the cycle took, s.
         duration_s: f64,
-        /// Part of it in which the computer paused and ran no controller, s: 0 in an undisturbed cycle. The energies leave out what
-        /// the worm did not live through.
+        /// Part of it in which the computer paused and did not run the controller, s: 0 in an undisturbed cycle. The energies leave out
+        /// time in which a simulated motor stood still.
         host_paused_s: f64,
         /// Distance travelled: mean over the cells of the net displacement, m.
         advance_m: f64,
@@ -24,13 +24,13 @@ message! {
         forward_slide_m: [f64; MAX_CELLS],
         /// Distance each tip slid backward, m, counted positive.
         backward_slide_m: [f64; MAX_CELLS],
-        /// Energy by losses and weight, equation (11), J; like all that is measured by positions `NaN` when the tracker was silent.
+        /// Energy by losses and weight, equation (11), J; `NaN` when the tracker was silent, like everything measured by positions.
         energy_loss_j: f64,
         /// Standard error of `energy_loss_j`, J.
         energy_loss_sigma_j: f64,
         /// Net actuator work, equation (13), J.
         energy_actuator_net_j: f64,
-        /// Positive part of the actuator work (13), what a drive that takes no energy back pays, J.
+        /// Positive part of the actuator work (13), the cost for a drive without energy recovery, J.
         energy_actuator_positive_j: f64,
         /// Standard error of the two actuator energies, J.
         energy_actuator_sigma_j: f64,
@@ -38,7 +38,7 @@ message! {
         energy_electrical_j: f64,
         /// Part of it that heated the winding, ∫ I² R dt, J.
         energy_copper_j: f64,
-        /// Part of it that friction inside the device took: what copper and locomotion leave, J.
+        /// Part of it lost to friction inside the device: what remains after copper and locomotion, J.
         energy_friction_inside_j: f64,
         /// Standard error of the electrical energies, J.
         energy_electrical_sigma_j: f64,
@@ -59,7 +59,7 @@ message! {
         /// How many cells are in use.
         cell_count: u32,
         /// 1 when every tip's deformation was known from the start of the cycle. 0 in the cycle in which they were found: its
-        /// figures rest on a guess of how the tips stood at its start, and its standard errors are larger by that.
+        /// figures use a guess of the deformations at its start, and its standard errors include that uncertainty.
         settled: u32,
         /// +1 crawling forward, −1 backward.
         direction: i32,

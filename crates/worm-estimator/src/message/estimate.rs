@@ -1,17 +1,17 @@
-//! The `estimate` topic: what the estimator knows after one tracker sample.
+//! The `estimate` topic: the estimator's result after one tracker sample.
 
 use super::ZeroCopySend;
 use super::message;
 use worm_physics::MAX_CELLS;
 
 message! {
-    /// The estimator's view after one tracker sample; repeated as a heartbeat while no sample comes.
+    /// The estimator's result after one tracker sample; repeated as a heartbeat while no sample comes.
     Estimate = "wormd_estimate_v1", made: time_ns, cells: |estimate| estimate.cell_count, {
-        /// Tick number of the state that this estimate rests on.
+        /// Tick number of the state that this estimate is based on.
         state_sequence: u64,
         /// Time of that state, ns of `CLOCK_MONOTONIC`.
         time_ns: u64,
-        /// Tracker sample that this estimate rests on, as in [`super::State::sample`].
+        /// Tracker sample that this estimate is based on, as in [`super::State::sample`].
         sample: u64,
         /// States that the controller published and the estimator never received.
         states_lost: u64,
@@ -37,13 +37,13 @@ message! {
         energy_loss_j: f64,
         /// Largest tip deformation in use for each cell, m: measured, or identified on the first cycles.
         max_deformation_m: [f64; MAX_CELLS],
-        /// Charge left in the battery by the estimator's account, 0 to 1; `NaN` when no battery is configured.
+        /// Estimated charge left in the battery, 0 to 1; `NaN` when no battery is configured.
         battery_fraction: f64,
         /// How many cells are in use.
         cell_count: u32,
         /// Bit i set: tip i slides.
         sliding_mask: u32,
-        /// Bit k set: the alarm with code k watches (is calibrated and in a state in which it can tell).
+        /// Bit k set: the alarm with code k is armed (calibrated, and in a state in which it can detect something).
         armed_mask: u32,
         /// Bit k set: the alarm with code k is raised.
         raised_mask: u32,

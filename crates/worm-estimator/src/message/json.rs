@@ -1,12 +1,11 @@
-//! How a message is written as JSON: one object with a member for each field, which reads back to the last bit.
+//! The JSON form of messages: one object with a member for each field, which reads back to the last bit.
 //!
-//! JSON has no word for some values, so these rules hold, and the schema of each type tells them:
+//! JSON cannot express some values, so these rules hold, and the schema of each type states them:
 //! - a number that is not known (`NaN`) is `null`; an infinite one is `"Infinity"` or `"-Infinity"`;
-//! - a list over cells ends with the last cell in use; behind it, a message that was read holds `NaN`;
+//! - a list over cells ends with the last cell in use; the rest is `NaN` in a message that was read;
 //! - a coded value is its name, or the bare code where this version knows no name; `u32::MAX` for "none" is `null`.
 //!
-//! Schemas name one plain type for each member, though `null` may stand in its place: viewers such as Foxglove refuse
-//! unions of types.
+//! Schemas give one plain type for each member, though it may be `null`: viewers such as Foxglove do not accept unions of types.
 
 use serde::de::{DeserializeOwned, Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -15,33 +14,33 @@ use std::fmt;
 use std::marker::PhantomData;
 use worm_physics::MAX_CELLS;
 
-/// A message that has a form as JSON.
+/// A message with a JSON form.
 pub trait JsonMessage: Copy {
     /// Name and version of the type, the same as on its topic.
     const TYPE_NAME: &'static str;
 
-    /// When it was made, ns of `CLOCK_MONOTONIC`; 0 when it rests on nothing yet.
+    /// When it was made, ns of `CLOCK_MONOTONIC`; 0 for an estimate before the first state.
     fn made_ns(&self) -> u64;
 
     /// Appends the message to `out` as one JSON object.
     ///
     /// # Errors
-    /// None that `out` does not make: every value of every field can be written.
+    /// None: every value of every field can be written.
     fn write_json(&self, out: &mut Vec<u8>) -> serde_json::Result<()>;
 
     /// Reads a message.
     ///
     /// # Errors
-    /// With line and column, when it is no JSON, or a member is missing, unknown, or no value of its field.
+    /// With line and column, when it is not JSON, or a member is missing, unknown or of the wrong type.
     fn read_json(text: &[u8]) -> serde_json::Result<Self>;
 
     /// The JSON Schema of the type.
     fn schema() -> Value;
 }
 
-/// What stands in the JSON for a field of type `T`.
+/// The JSON form of a field of type `T`.
 pub(super) trait Form<T>: Serialize + DeserializeOwned {
-    /// The form of `value` in a message of so many cells.
+    /// The form of `value` in a message with so many cells.
     fn of(value: T, cells: usize) -> Self;
     /// The value itself.
     fn value(&self) -> T;
@@ -203,7 +202,7 @@ impl<'de> Deserialize<'de> for PerCell {
     }
 }
 
-/// An enumeration that crosses topics as a code and stands in JSON by its name.
+/// An enumeration that crosses topics as a code and is a name in JSON.
 pub(super) trait Coded: Copy + TryFrom<u32> + 'static {
     const WHAT: &'static str;
     const VALUES: &'static [Self];
@@ -283,7 +282,7 @@ impl<F: Form<u32>> Form<u32> for OrNone<F> {
     }
 }
 
-/// Reads a member that must be there: serde takes one that is missing for `null`, where `null` is allowed.
+/// Reads a required member: where `null` is allowed, serde would accept a missing one as `null`.
 pub(super) fn present<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
     T::deserialize(deserializer)
 }
@@ -295,7 +294,7 @@ pub(super) fn member(name: &str, documentation: &str, mut schema: Value) -> Valu
     schema
 }
 
-/// Documentation without the marks of rustdoc, and of codes, which are names here.
+/// Documentation without rustdoc markup, and without mention of codes, which are names here.
 pub(super) fn prose(documentation: &str) -> String {
     ["[`", "`]", "`", "super::", "Self::", " as a code"]
         .iter()

@@ -1,16 +1,16 @@
-//! What the processes of one worm say to each other: one plain, fixed-size `#[repr(C)]` type per topic.
+//! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
-//! [`control`](crate::control) fills [`State`] and [`Timing`], [`estimate`](crate::estimate) reads `State` and fills
-//! [`Estimate`], [`Cycle`] and [`Alarm`], [`topics`](crate::topics) carries them all without a copy, and a recording
-//! holds the very same values. The types stand apart from the transport so that the pure rooms need not know it.
+//! The controller fills [`State`] and [`Timing`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`], [`Cycle`] and
+//! [`Alarm`]. Topics carry them all without a copy, and a log holds the same values. The types are separate from the transport, so that
+//! nothing here depends on it.
 //!
-//! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, wide
-//! fields first, no padding, and a version in the type name, because iceoryx2 compares name, size and alignment
-//! but not fields. "Not known" is `NaN` in an `f64`. Cells stand in arrays of [`MAX_CELLS`](worm_physics::MAX_CELLS), of which
-//! the first `cell_count` are in use; cell 1 of the paper is index 0. Times are nanoseconds of `CLOCK_MONOTONIC`.
+//! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, wide fields first, no
+//! padding, and a version in the type name, because iceoryx2 compares name, size and alignment but not fields. "Not known" is `NaN` in an
+//! `f64`. Arrays over cells have [`MAX_CELLS`](worm_physics::MAX_CELLS) entries, of which the first `cell_count` are in use; cell 1 of the
+//! paper is index 0. Times are nanoseconds of `CLOCK_MONOTONIC`.
 //!
-//! Each type of a topic is one table, from which come the structure, its documentation, its form as JSON and the schema of
-//! that ([`JsonMessage`]): what is said of a field here is what Foxglove shows of a recording.
+//! Each type of a topic is declared as one table. From it come the structure, its documentation, its JSON form and its JSON schema
+//! ([`JsonMessage`]): Foxglove shows the documentation of a field next to it.
 
 mod alarm;
 mod command;
@@ -32,12 +32,12 @@ pub use timing::{Culprit, Timing};
 use iceoryx2_bb_derive_macros::ZeroCopySend;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 
-/// A number on a topic that stands for no known value of an enumeration: a newer peer, or a broken one.
+/// A code on a topic that this version does not know: the peer is newer, or broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{0} is no known {1}: are all processes of this worm of one version?")]
 pub struct UnknownCode(pub u32, pub &'static str);
 
-/// Declares an enumeration that crosses a topic as a `u32`, with its name as people and JSON read it.
+/// Declares an enumeration that crosses a topic as a `u32`, with a name for people and JSON.
 macro_rules! coded_enum {
     ($(#[$meta:meta])* $name:ident, $what:literal { $($(#[$vmeta:meta])* $variant:ident = $code:literal => $text:literal,)+ }) => {
         $(#[$meta])*
@@ -52,7 +52,7 @@ macro_rules! coded_enum {
             /// The code that crosses the topic.
             pub const fn code(self) -> u32 { self as u32 }
 
-            /// The name as people, the configuration and JSON read it.
+            /// The name in JSON, in the configuration and for people.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $text,)+ }
             }
@@ -84,10 +84,10 @@ macro_rules! coded_enum {
 }
 pub(crate) use coded_enum;
 
-/// Declares a message as one table: the structure that crosses the topic, and its form as JSON.
+/// Declares a message as one table: the structure that crosses the topic, and its JSON form.
 ///
-/// `made` names the field with the time, `cells` tells how many cells are in use. A field whose form in JSON is not that of
-/// its type says `as` which one it is.
+/// `made` names the field with the time, `cells` returns the number of cells in use. A field whose JSON form is not the usual one of its
+/// type names it after `as`.
 macro_rules! message {
     (
         $(#[doc = $doc:literal])+

@@ -1,4 +1,4 @@
-//! The `state` topic: what the controller saw and commanded in one tick.
+//! The `state` topic: what the controller measured and commanded in one tick.
 
 use super::ZeroCopySend;
 use super::json::{Name, OrNone};
@@ -6,7 +6,7 @@ use super::{AlarmKind, coded_enum, message};
 use worm_physics::MAX_CELLS;
 
 coded_enum! {
-    /// Where the controller's state machine stands.
+    /// The state of the controller's state machine.
     Mode, "controller mode" {
         /// No torque; the cam can be turned by hand.
         Disarmed = 0 => "disarmed",
@@ -16,7 +16,7 @@ coded_enum! {
         Crawling = 2 => "crawling",
         /// The cam is actively kept at the angle it had when the hold began.
         Holding = 3 => "holding",
-        /// The speed ramps down; torque goes off when the cam stands.
+        /// The speed ramps down; torque goes off when the cam stands still.
         Stopping = 4 => "stopping",
         /// A safety rule stopped the worm; the reason is latched until a reset.
         Fault = 5 => "fault",
@@ -44,7 +44,7 @@ coded_enum! {
         ServoHardware = 7 => "servo-hardware",
         /// The servo's own bus watchdog had stopped the motor.
         WatchdogTripped = 8 => "watchdog-tripped",
-        /// The servo restarted on its own, and with it torque and watchdog were lost.
+        /// The servo restarted on its own, which resets torque and watchdog.
         ServoRestarted = 9 => "servo-restarted",
         /// An alarm whose policy is `stop`.
         Alarm = 10 => "alarm",
@@ -58,7 +58,7 @@ message! {
     State = "wormd_state_v2", made: time_ns, cells: |state| state.cell_count, {
         /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
         sequence: u64,
-        /// When the tick's work on the bus ended, ns of `CLOCK_MONOTONIC`: its exchange, or a service such as arming behind it.
+        /// When the tick's work on the bus ended, ns of `CLOCK_MONOTONIC`: its exchange, or a service after it, such as arming.
         time_ns: u64,
         /// Gait cycles done, unwrapped: the cam angle over one turn, zero at the configured home.
         phase: f64,
@@ -70,14 +70,14 @@ message! {
         goal_velocity_rad_s: f64,
         /// Current in the motor winding, A.
         motor_current_a: f64,
-        /// Share of the bus voltage that the driver puts on the winding, −1 to 1.
+        /// Fraction of the bus voltage that the driver applies to the winding, −1 to 1.
         motor_duty: f64,
         /// Bus voltage, V.
         bus_voltage_v: f64,
         /// Servo temperature, °C.
         motor_temperature_c: f64,
         /// When the servo took these readings, s of its own clock (register 120, realtime tick), unwrapped. It stands still
-        /// while the servo does, as a simulated one does whose computer pauses.
+        /// while a simulated servo does because its computer pauses.
         motor_time_s: f64,
         /// When the newest tracker sample was captured, s of the tracker's own clock, unwrapped.
         sample_time_s: f64,
@@ -85,12 +85,12 @@ message! {
         position_m: [f64; MAX_CELLS],
         /// Tracker samples since the controller started, unwrapped; grows by one with each sample that was seen.
         sample: u64,
-        /// Tracker samples that came and went between two reads, since the controller started.
+        /// Tracker samples missed between two reads, since the controller started.
         samples_missed: u64,
-        /// Exchanges since the controller started that the servo never answered, or not usably. A late answer is one.
+        /// Exchanges since the controller started without a usable answer of the servo. A late answer counts as an answer.
         link_failures: u64,
-        /// Time since the controller started in which the computer did not run it though it had to, ns: the pauses of 10 ms and
-        /// more, summed.
+        /// Time since the controller started in which the computer did not run it though it was due, ns: the sum of all pauses of 10 ms
+        /// and more.
         host_paused_ns: u64,
         /// How many cells are in use.
         cell_count: u32,
@@ -100,7 +100,7 @@ message! {
         sample_is_new: u32,
         /// 1 when the motor readings came in this tick, 0 when the last ones are repeated.
         motor_is_new: u32,
-        /// Where the state machine stands: [`Mode`] as a code.
+        /// The state of the state machine: [`Mode`] as a code.
         mode: u32 as Name<Mode>,
         /// [`Fault`] as a code: the latched reason.
         fault: u32 as Name<Fault>,

@@ -1,6 +1,6 @@
-//! How exactly cycles are measured: tables over seeds, against the truth of the model that made the data.
+//! Accuracy of the measured cycles: tables over seeds, against the true values of the model that made the data.
 //!
-//! A table that changes is printed in full; if the change is meant, the new one belongs here.
+//! A table that changes is printed in full; if the change is intended, the new one belongs here.
 
 use std::fmt::Write;
 use testkit::crawl::{Crawl, Scene, config_of, paper_worm};
@@ -13,7 +13,7 @@ const SEEDS: std::ops::RangeInclusive<u64> = 1..=10;
 /// Eight cycles of 2.5 s, of which the first is not settled.
 const TICKS: usize = 21_000;
 
-/// Mean, root mean square, and the share within two standard errors.
+/// Mean, root mean square, and the fraction within two standard errors.
 #[derive(Default)]
 struct Errors {
     count: f64,
@@ -43,7 +43,7 @@ impl Errors {
     }
 }
 
-/// Crawls and hands every settled cycle over with the true account and advance.
+/// Crawls, and passes every settled cycle on with its true energies and advance.
 fn settled_cycles(estimator: &mut Estimator, crawl: &mut Crawl, mut take: impl FnMut(&Cycle, &Ledger, f64)) {
     for _ in 0..TICKS {
         let state = crawl.tick();

@@ -1,4 +1,4 @@
-//! What the estimator does when the world is not the model's: backward, jammed, paused, silent, restarted, nonsense.
+//! The estimator outside of the model: backward crawl, jammed cell, pauses, silence, restarts, invalid values.
 
 use proptest::prelude::*;
 use testkit::crawl::{Crawl, Scene, config_of, paper_worm};
@@ -167,7 +167,7 @@ fn silence_of_the_tracker_makes_contact_points_unknown_until_each_tip_has_steppe
     assert_eq!(unknown, 4);
     assert_eq!(cycles[0].settled, 0);
     assert!(cycles[0].advance_m.is_nan() && cycles[0].energy_electrical_j > 0.0);
-    // The next one began with tips that nobody had seen settle: a good guess, and an honest one.
+    // The next one began with contact points that were not known: a good guess, with honest standard errors.
     let index = cycles[1].index as usize;
     let truth = crawl.milestones[index + 1]
         .ledger
@@ -246,7 +246,7 @@ fn an_invalid_configuration_is_refused() {
     assert!(Estimator::new(&config).is_err());
 }
 
-/// Numbers as a broken device, file or peer might give them.
+/// Numbers as a broken device, file or peer may send them.
 fn anything() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -2.0..2.0f64,
@@ -299,7 +299,7 @@ proptest! {
                 prop_assert!(!cycle.energy_electrical_sigma_j.is_nan());
             }
         }
-        // Back to sense: after two whole cycles the positions and energies are good again.
+        // After two whole valid cycles positions and energies are good again.
         let cycles = crawl_cycles(&mut crawl, &mut estimator, 9.0);
         let last = cycles.last().expect("cycles end again");
         prop_assert!((last.energy_loss_j / 46.88e-3 - 1.0).abs() < 0.05, "{last:?}");

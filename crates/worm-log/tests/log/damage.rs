@@ -1,4 +1,4 @@
-//! Files that were cut off or damaged.
+//! Truncated and damaged files.
 
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ fn small_log() -> (Vec<u8>, Vec<(usize, usize)>) {
     (sink.bytes(), chunks)
 }
 
-/// A file that changes, and what is read of it.
+/// A file that changes, and what is read from it.
 struct Patient {
     path: PathBuf,
     _folder: tempfile::TempDir,
@@ -57,7 +57,7 @@ fn a_log_cut_anywhere_gives_all_whole_chunks() {
         );
         assert!(whole.is_none() || log.is_ok(), "cut at {length}: {log:?}");
         if let Ok(log) = log {
-            // With 13 bytes of mark behind the data nothing is missing but the index.
+            // With 13 bytes after the data only the index is missing.
             let is_cut = length < data_end + 13;
             assert_eq!(
                 log.warnings.len(),
@@ -65,11 +65,11 @@ fn a_log_cut_anywhere_gives_all_whole_chunks() {
                 "at {length}: {:?}",
                 log.warnings
             );
-            let told = log
+            let is_reported = log
                 .warnings
                 .iter()
                 .all(|warning| warning.starts_with(&format!("cut off after {count} messages")));
-            assert!(told, "{:?}", log.warnings);
+            assert!(is_reported, "{:?}", log.warnings);
         }
     }
 }
@@ -111,7 +111,7 @@ fn a_damaged_byte_costs_its_chunk_and_no_value_is_wrong() {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x15;
         let patient = Patient::new(&damaged);
-        // Refused or read, but never wrong: each state that comes is one that was written.
+        // Refused or read, but never wrong: each state that is read was written.
         if let Ok(log) = messages(&patient.path) {
             for state in &log.states {
                 let written = truth.iter().find(|written| written.sequence == state.sequence);
@@ -120,7 +120,7 @@ fn a_damaged_byte_costs_its_chunk_and_no_value_is_wrong() {
             }
         }
     }
-    // In the middle of what the second chunk packs.
+    // In the middle of the second chunk's compressed data.
     let mut damaged = bytes.clone();
     damaged[(chunks[1].0 + chunks[2].0) / 2] ^= 0x15;
     let log = messages(&Patient::new(&damaged).path).expect("the rest is there");

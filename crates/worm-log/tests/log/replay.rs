@@ -1,4 +1,4 @@
-//! The same results live and on the log.
+//! The same results live and from a log.
 
 use testkit::log_sample::{Telemetry, crawl, crawl_with_late_estimator};
 use worm_log::{Comparison, compare, replay};
@@ -12,7 +12,7 @@ fn replayed(telemetry: Telemetry) -> Comparison {
 
 #[test]
 fn a_whole_log_comes_out_as_recorded() {
-    // An estimator that is late begins in the middle of a crawl.
+    // An estimator that starts late begins in the middle of a crawl.
     for late in [0, 3, 1234] {
         let telemetry = crawl_with_late_estimator(6.5, late);
         let (states, cycles, alarms) = (telemetry.states.len(), telemetry.cycles.len(), telemetry.alarms.len());

@@ -1,4 +1,4 @@
-//! What a log holds.
+//! The contents of a log.
 
 use std::fs;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};

@@ -5,18 +5,18 @@ use crate::mechanics::Mechanics;
 use crate::pad::{Hold, Loaded, Pad, PadLaw};
 use crate::worm::SlidesDown;
 
-/// Unbalanced force, as a share of what the tips can hold, to which an increment is solved.
+/// Tolerance of the balance, as a fraction of what the tips can hold.
 const BALANCE_FRACTION: f64 = 1e-9;
-/// Iterations after which an increment ends in any case: halving alone would do by then.
+/// Most iterations of an increment: bisection alone would have converged by then.
 const MAX_ITERATIONS: usize = 120;
-/// Way of the body in one increment beyond which nothing holds it, m.
+/// Displacement of the body in one increment beyond which it counts as sliding down, m.
 const LOST_M: f64 = 0.5;
-/// Way to which a cell's own way against its drive is solved, m.
+/// Tolerance of a cell's displacement against its drive, m.
 const OWN_WAY_M: f64 = 1e-15;
-/// Width of a bracket that cannot be halved any more, m.
+/// Width at which a bracket is no longer halved, m.
 const NARROW_M: f64 = 1e-16;
 
-/// How far from balance a trial of one increment leaves the body.
+/// Unbalanced force of one trial of an increment.
 #[derive(Clone, Copy)]
 pub(super) struct Balance {
     excess_n: f64,
@@ -28,7 +28,7 @@ impl Crawl {
     pub(super) fn solve(&mut self, mechanics: &Mechanics, increment: &Increment) -> Result<f64, SlidesDown> {
         let tolerance_n = BALANCE_FRACTION * mechanics.full_force_n.max(1e-6);
         let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
-        // Without mass, the translation nearest to rest is the one meant where several balance.
+        // Without mass several translations may balance: the one nearest to rest is the solution.
         let mut at_m = if increment.inertia_n_per_m > 0.0 {
             self.rate_m_s * increment.step_s
         } else {
@@ -77,12 +77,12 @@ impl Crawl {
         }
     }
 
-    /// Tries a translation out; every cell's trial is the one at it afterwards.
+    /// Evaluates a translation; afterwards every cell's trial is the one at it.
     pub(super) fn try_out(&mut self, mechanics: &Mechanics, increment: &Increment, translation_m: f64) -> Balance {
         let laws = &mechanics.laws;
         let (damping, drag) = (increment.damping_n_per_m, increment.drag_n_per_m);
         let (mut excess_n, mut slope_n_per_m) = (mechanics.pull_n, 0.0);
-        // Of the cells' mean: its way, and how much of a way of the body it makes.
+        // The displacement of the cells' mean, and its derivative by the translation of the body.
         let (mut mean_shift_m, mut yields) = (0.0, 0.0);
         for (cell, law) in self.cell[..self.cells].iter_mut().zip(&mechanics.pad) {
             let trial = &mut cell.trial;
@@ -96,7 +96,7 @@ impl Crawl {
             (trial.shift_m, trial.loaded) = (shift_m, loaded);
             let strain_m = loaded.deformation_m - cell.pad.deformation_m;
             excess_n += loaded.force_n + damping * strain_m + drag * shift_m;
-            // The share of a shift that strains the pad.
+            // The fraction of a shift that strains the pad.
             let damped = damping * (loaded.tangent_n_per_m / law.stiffness_n_per_m).min(1.0);
             slope_n_per_m += (loaded.tangent_n_per_m + damped + drag) * gives;
             mean_shift_m += shift_m;
@@ -117,14 +117,14 @@ impl Crawl {
         }
     }
 
-    /// Acceleration at the end of an increment in which the mean of the cells made a way, by Newmark's method.
+    /// Acceleration at the end of an increment with this displacement of the cells' mean, by Newmark's method.
     pub(super) fn acceleration_after(&self, mean_shift_m: f64, increment: &Increment) -> f64 {
         let step_s = increment.step_s;
         4.0 / (step_s * step_s) * (mean_shift_m - self.velocity_m_s * step_s) - self.acceleration_m_s2
     }
 }
 
-/// A cell between its drive and its tip.
+/// A cell, between its drive and its tip.
 struct Way<'a> {
     law: &'a PadLaw,
     pad: &'a Pad,
@@ -133,7 +133,7 @@ struct Way<'a> {
 }
 
 impl Way<'_> {
-    /// How far the cell moves when its drive moves by `driven_m`, what its tip does, and the slope of the first to the second.
+    /// The cell's displacement when its drive moves by `driven_m`, the state of its tip, and the derivative of the displacement.
     #[inline]
     fn load(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
         if self.compliance_m_per_n == 0.0 {
@@ -143,7 +143,7 @@ impl Way<'_> {
         self.load_yielding(driven_m, hold)
     }
 
-    /// The cell gives way by C (F − F before): a monotone equation of its own, solved as the body's is.
+    /// The cell yields by C (F − F before): a monotone equation, solved like that of the body.
     fn load_yielding(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
         let compliance = self.compliance_m_per_n;
         let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);

@@ -1,16 +1,17 @@
-//! The worm carried along a path that was measured: the tips obey their laws, the body goes where it went.
+//! The worm on a measured path: the tips follow their laws, the body follows the measurement.
 
 use super::{Crawl, SHORTEST_S};
 use crate::mechanics::Mechanics;
 
-/// Trials after which the cells' own ways against a yielding drive count as found.
+/// Most iterations for the cells' displacements against a compliant drive.
 const MAX_TRIALS: usize = 30;
-/// Way of the body to which they are, m.
+/// Tolerance of the body's displacement, m.
 const FOUND_M: f64 = 1e-10;
 
 impl Crawl {
-    /// Carries the worm to a phase that is reached evenly after `duration_s`, the mean of its cells to `mean_m`, balance or not. The
-    /// ledger books what the contacts and the weight take on that path; the actuators' work is then without meaning.
+    /// Moves the worm to a phase at a uniform rate over `duration_s`, and the mean of its cells to `mean_m`, whether or not forces
+    /// balance. The ledger then has the losses in the contacts and the work against the weight on that path; its actuator work has no
+    /// meaning.
     pub fn carry_to(&mut self, mechanics: &Mechanics, phase: f64, duration_s: f64, mean_m: f64) {
         let (from, from_m) = (self.phase, self.mean_position_m());
         let parts = self.parts(phase, duration_s);

@@ -26,7 +26,7 @@ fn paper(slope_deg: f64) -> Worm {
         .expect("a valid slope")
 }
 
-/// Every effect, strong, of cell 2 where one is meant.
+/// Every effect with a strong setting, on cell 2 if it needs a cell.
 fn strong() -> Vec<Setting> {
     let setting = |effect: &&'static Effect| {
         let values: Vec<f64> = effect.parameters.iter().map(strong_value).collect();
@@ -36,7 +36,7 @@ fn strong() -> Vec<Setting> {
     LIBRARY.iter().map(setting).collect()
 }
 
-/// Fifteen times what is just noticed, to the side where there is room for it, but for places.
+/// Fifteen times the notable change, on the side that the range allows; shape parameters keep their value.
 fn strong_value(parameter: &Parameter) -> f64 {
     match parameter.name {
         "from_m" => 0.02,

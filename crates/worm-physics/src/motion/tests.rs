@@ -50,7 +50,7 @@ fn any_worm() -> impl Strategy<Value = Worm> {
     })
 }
 
-/// Symmetric worms, in which many tips reach their bounds at once.
+/// Symmetric worms, in which many tips reach their bounds at the same time.
 fn any_even_worm() -> impl Strategy<Value = Worm> {
     (
         2usize..=16,

@@ -3,7 +3,7 @@
 use crate::MAX_CELLS;
 use thiserror::Error;
 
-/// Why a description cannot be a worm.
+/// Why the description of a worm is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum WormError {
     /// Too few cells to step against one another, or more than the fixed tables hold.
@@ -37,7 +37,7 @@ pub enum WormError {
         /// How many cells there are.
         cells: usize,
     },
-    /// A step order that leaves out or repeats a cell.
+    /// A step order that omits or repeats a cell.
     #[error("step order {0:?}: name each cell, counted from 0, exactly once")]
     StepOrder(Vec<usize>),
 }

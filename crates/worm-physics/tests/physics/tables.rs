@@ -84,7 +84,7 @@ fn assert_close(value: f64, expected: f64, tolerance: f64) {
     );
 }
 
-/// Within one unit of the last digit printed; the paper truncates here and there.
+/// Within one unit of the last digit printed; the paper truncates in some places.
 #[track_caller]
 fn assert_printed(value: f64, printed: &str) {
     let decimals = printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
@@ -140,7 +140,7 @@ fn closed_form_on_the_level() {
         let cycle = steady_cycle(&worm).cycle().expect("it holds").clone();
         let expected = level_closed_form(cells, 980.0, 1.75e-3, 11.5e-3);
         assert_close(cycle.advance_m, expected.advance_m, 1e-12);
-        // Two cells hold each other at their bounds, which leaves no cell to spring back and the form without meaning.
+        // Two cells hold each other at their bounds: no cell springs back, and the closed form does not apply.
         if cells > 2 {
             assert_close(
                 cycle.energy_actuator_positive_j,

@@ -42,8 +42,8 @@ impl EnergyOverBudget {
         }
     }
 
-    /// Processes every tick; `sound` says that nothing else is wrong, so that the cycle may count.
-    pub(super) fn update(&mut self, tick: &Tick, cycle: Option<&Cycle>, sound: bool) -> DetectorOutput {
+    /// Processes every tick; `fault_free` says that nothing else is wrong, so that the cycle may count.
+    pub(super) fn update(&mut self, tick: &Tick, cycle: Option<&Cycle>, fault_free: bool) -> DetectorOutput {
         if tick.regime != self.regime {
             self.regime = tick.regime;
             self.electrical = self.initial.clone();
@@ -51,7 +51,7 @@ impl EnergyOverBudget {
             self.disturbed = true;
             self.reading = None;
         }
-        self.disturbed |= !tick.steady || !sound;
+        self.disturbed |= !tick.steady || !fault_free;
         if let Some(cycle) = cycle {
             let expected_s = 1.0 / tick.regime_cycles_per_s.abs();
             let whole = (cycle.duration_s - expected_s).abs() <= DURATION_FRACTION * expected_s;

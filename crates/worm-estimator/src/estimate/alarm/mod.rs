@@ -146,8 +146,8 @@ impl AlarmMonitor {
             self.detectors.clone_from(&self.initial);
             tick = self.detectors.cam_motion.update(state);
         }
-        let sound = self.is_sound();
-        let findings = self.findings(&tick, observation, sound);
+        let fault_free = self.is_fault_free();
+        let findings = self.findings(&tick, observation, fault_free);
         self.armed_mask = 0;
         for (finding, latch) in findings.iter().zip(&mut self.latches) {
             self.armed_mask |= u32::from(finding.is_armed()) << latch.kind().code();
@@ -176,7 +176,7 @@ impl AlarmMonitor {
     }
 
     /// Whether no alarm is raised that makes a cycle unfit for calibration.
-    pub fn is_sound(&self) -> bool {
+    pub fn is_fault_free(&self) -> bool {
         [
             AlarmKind::MotorStall,
             AlarmKind::JammedCell,
@@ -198,7 +198,7 @@ impl AlarmMonitor {
     }
 
     /// The output of every detector, in the order of [`AlarmKind::ALL`].
-    fn findings(&mut self, tick: &Tick, observation: &Observation<'_>, sound: bool) -> [DetectorOutput; KINDS] {
+    fn findings(&mut self, tick: &Tick, observation: &Observation<'_>, fault_free: bool) -> [DetectorOutput; KINDS] {
         let Observation {
             state,
             estimate,
@@ -216,7 +216,7 @@ impl AlarmMonitor {
                 let positions = detectors.visible_cells.positions(estimate, self.cells);
                 self.battery.note_positions(&positions);
                 detectors.sample_age_s = 0.0;
-                detectors.by_position = detectors.evaluate_positions(tick, &positions, sound);
+                detectors.by_position = detectors.evaluate_positions(tick, &positions, fault_free);
             }
             None => {
                 detectors.sample_age_s += tick.step_s;
@@ -231,7 +231,7 @@ impl AlarmMonitor {
             jam,
             progress,
             sliding,
-            detectors.energy.update(tick, cycle, sound),
+            detectors.energy.update(tick, cycle, fault_free),
             self.battery.update(tick, state),
             detectors.link.update(tick, state),
             detectors.tracker.update(tick, state),
@@ -242,14 +242,20 @@ impl AlarmMonitor {
 }
 
 impl Detectors {
-    fn evaluate_positions(&mut self, tick: &Tick, positions: &sample::Positions, sound: bool) -> [DetectorOutput; 3] {
+    fn evaluate_positions(
+        &mut self,
+        tick: &Tick,
+        positions: &sample::Positions,
+        fault_free: bool,
+    ) -> [DetectorOutput; 3] {
         let stride = self.strides.update(tick, positions);
-        let progress = self.progress.update(tick, &self.strides, stride.as_ref(), sound);
+        let progress = self.progress.update(tick, &self.strides, stride.as_ref(), fault_free);
         let baseline_m = self.progress.baseline_m(tick.direction);
         [
             self.jam.update(tick, positions),
             progress,
-            self.sliding.update(tick, positions, &self.strides, baseline_m, sound),
+            self.sliding
+                .update(tick, positions, &self.strides, baseline_m, fault_free),
         ]
     }
 }

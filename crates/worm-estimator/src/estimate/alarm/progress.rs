@@ -63,13 +63,13 @@ impl NoProgress {
         baseline.is_known(self.calibration_cycles).then(|| baseline.mean_m())
     }
 
-    /// Processes a stride; `sound` says that nothing else is wrong, so that it may be used for calibration.
+    /// Processes a stride; `fault_free` says that nothing else is wrong, so that it may be used for calibration.
     pub(super) fn update(
         &mut self,
         tick: &Tick,
         strides: &Strides,
         stride: Option<&Stride>,
-        sound: bool,
+        fault_free: bool,
     ) -> DetectorOutput {
         let idle = tick.still || !tick.torque;
         if idle || !strides.is_settled() {
@@ -82,12 +82,12 @@ impl NoProgress {
             return DetectorOutput::Idle;
         }
         if let Some(stride) = stride {
-            self.reading = Some(self.evaluate(tick, strides, stride.advance_m, sound));
+            self.reading = Some(self.evaluate(tick, strides, stride.advance_m, fault_free));
         }
         self.reading.map_or(DetectorOutput::Unknown, DetectorOutput::Measured)
     }
 
-    fn evaluate(&mut self, tick: &Tick, strides: &Strides, advance_m: f64, sound: bool) -> Reading {
+    fn evaluate(&mut self, tick: &Tick, strides: &Strides, advance_m: f64, fault_free: bool) -> Reading {
         let side = usize::from(tick.direction > 0.0);
         let known = self.baseline[side].is_known(self.calibration_cycles);
         let (baseline_m, fraction, scatter_m) = if known {
@@ -104,7 +104,7 @@ impl NoProgress {
             self.below += 1;
         } else {
             self.below = 0;
-            if !known && sound && strides.can_calibrate() {
+            if !known && fault_free && strides.can_calibrate() {
                 self.baseline[side].add(advance_m);
             }
         }

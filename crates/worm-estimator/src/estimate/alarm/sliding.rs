@@ -103,7 +103,7 @@ impl SlidingDown {
         }
     }
 
-    /// Processes a sample. `baseline_m` is the calibrated advance per cycle in the present direction; `sound` says that nothing else is
+    /// Processes a sample. `baseline_m` is the calibrated advance per cycle in the present direction; `fault_free` says that nothing else is
     /// wrong, so that the cycle may be used for calibration.
     pub(super) fn update(
         &mut self,
@@ -111,7 +111,7 @@ impl SlidingDown {
         positions: &Positions,
         strides: &Strides,
         baseline_m: Option<f64>,
-        sound: bool,
+        fault_free: bool,
     ) -> DetectorOutput {
         self.smooth(positions);
         let up = if self.slope_sign == 0.0 {
@@ -138,7 +138,7 @@ impl SlidingDown {
         }
         let excess_m = match crawl_state {
             CrawlState::Resting => self.rested(up),
-            CrawlState::Climbing => Some(self.climbed(tick, strides, baseline_m.is_some(), sound)),
+            CrawlState::Climbing => Some(self.climbed(tick, strides, baseline_m.is_some(), fault_free)),
             CrawlState::Descending => self.descended(tick, positions, strides, baseline_m),
         };
         match excess_m {
@@ -181,13 +181,13 @@ impl SlidingDown {
         moved_m.map(|metres| -metres * up)
     }
 
-    fn climbed(&mut self, tick: &Tick, strides: &Strides, baseline_is_known: bool, sound: bool) -> f64 {
+    fn climbed(&mut self, tick: &Tick, strides: &Strides, baseline_is_known: bool, fault_free: bool) -> f64 {
         let below_m = self.highest_m - self.height_m;
         let phase = tick.phase.unwrap_or(0.0);
         let bin = ((phase.rem_euclid(1.0) * BINS as f64) as usize).min(BINS - 1);
         let Retraction { sum_m, count } = &mut self.retraction;
         let calibrates = !baseline_is_known || count[bin] < self.calibration_cycles;
-        if sound && calibrates && strides.can_calibrate() && below_m < 0.5 * self.stroke_m {
+        if fault_free && calibrates && strides.can_calibrate() && below_m < 0.5 * self.stroke_m {
             sum_m[bin] += below_m;
             count[bin] += 1;
         }

@@ -1,4 +1,4 @@
-//! Wherever both motions apply they are the same motion.
+//! Where both motions apply, they are the same.
 
 use super::{effect, of_cell};
 use crate::effect::Setting;
@@ -7,11 +7,11 @@ use proptest::prelude::*;
 
 /// Positions, deformations and slides, m.
 const SAME_M: f64 = 1e-9;
-/// Energies, as a share of the largest: work is booked in straight lines, so the incremental motion goes in small parts.
+/// Energies, as a fraction of the largest: work is taken to be linear in each increment, so the incremental motion goes in small parts.
 const SAME_FRACTION: f64 = 1e-4;
 const PARTS_OF_STEP: usize = 1000;
 
-/// Unequal worms on any slope that they hold on, with whatever the exact motion knows.
+/// Unequal worms on any slope that they hold on, with every effect that the exact motion has.
 fn physics() -> impl Strategy<Value = Physics> {
     let cells = 2usize..7;
     let worm = cells.prop_flat_map(|cells| {

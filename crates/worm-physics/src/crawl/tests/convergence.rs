@@ -1,4 +1,4 @@
-//! Where the incremental motion must arrive: ever smaller increments, ever slower gaits, a free swing.
+//! Limits of the incremental motion: small increments, slow gaits, free oscillation.
 
 use super::{CYCLE_S, effect, paper, strong};
 use crate::{Crawl, Locomotion, Mechanics, Physics};
@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 /// Stiffness of the paper's pads, N/m.
 const STIFFNESS_N_PER_M: f64 = 980.0;
 
-/// Where the mean of the cells is after two cycles of `cycle_s`, m, in `parts` calls of each of which makes one increment.
+/// Mean position of the cells after two cycles of `cycle_s`, m, in `parts` calls that make one increment each.
 fn displacement_m(physics: &Physics, damping_ratio: Option<f64>, cycle_s: f64, parts: u32) -> f64 {
     let mechanics = Mechanics::new(physics);
     let mut crawl = Crawl::at_rest(&mechanics, 0.0, &[0.12, 0.08, 0.04, 0.0], damping_ratio).expect("it holds");
@@ -20,13 +20,13 @@ fn displacement_m(physics: &Physics, damping_ratio: Option<f64>, cycle_s: f64, p
     crawl.mean_position_m()
 }
 
-/// Calls in two cycles where a law asks for the finest increments.
+/// Calls in two cycles for a law that needs the finest increments.
 const FINEST: u32 = 102_400;
 
-/// Breakaway makes a jump of every tip's first slide, which an increment finds only when it is over: the way's error falls as the
-/// increment does, not as its square, so that this law, alone or with all others, asks for the finest.
+/// With breakaway friction every slide starts with a jump, which an increment finds only when it is over: the error falls with the
+/// increment, not with its square, so this law, alone or with all others, needs the finest increments.
 #[test]
-fn half_the_increments_make_the_same_way() {
+fn halving_the_increments_gives_the_same_displacement() {
     let level = Physics::of(paper(10.0));
     for damping_ratio in [None, Some(0.1)] {
         let change_m = |physics: &Physics, parts: u32| {
@@ -55,7 +55,7 @@ fn half_the_increments_make_the_same_way() {
 }
 
 #[test]
-fn a_slow_gait_knows_no_inertia() {
+fn inertia_vanishes_in_a_slow_gait() {
     let physics = Physics::of(paper(20.0));
     let mut still = Locomotion::at_rest(&physics, &[0.12, 0.08, 0.04, 0.0]).expect("it holds");
     still.advance_to(2.0, 1.0).expect("it holds");
@@ -64,13 +64,13 @@ fn a_slow_gait_knows_no_inertia() {
         (displacement_m(&physics, Some(0.1), cycle_s, parts) - still.mean_position_m()).abs()
     };
     let (quick_m, slow_m) = (apart_m(2.5), apart_m(100.0));
-    // The way lags by what the last swings leave, which falls as the speed does.
+    // The difference is that of the last oscillations, and falls with the speed.
     assert!(slow_m < 1e-5 && slow_m < quick_m / 25.0, "{quick_m} m, then {slow_m} m");
 }
 
-/// Let go under another pull, all tips holding, the body swings with √(K/m).
+/// Released under another pull, with all tips holding, the body oscillates with √(K/m).
 #[test]
-fn the_body_swings_at_its_frequency() {
+fn the_body_oscillates_at_its_natural_frequency() {
     let calm = Physics::of(paper(0.0));
     let mut crawl = Crawl::at_rest(&Mechanics::new(&calm), 0.0, &[0.0; 4], Some(0.0)).expect("it holds");
     let pulled = Mechanics::new(&calm.with([&effect("constant-drag", &[0.5])]));

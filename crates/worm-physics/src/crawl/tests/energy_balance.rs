@@ -1,9 +1,9 @@
-//! The account of energy closes under every law, at every instant.
+//! The energy balance closes under every law, at every instant.
 
 use super::{CYCLE_S, paper, strong};
 use crate::{Crawl, Mechanics, Physics};
 
-/// Largest gap, J, beside some 0.1 J that are moved.
+/// Largest error of the balance, J, of some 0.1 J.
 const GAP_J: f64 = 1e-9;
 
 fn assert_closes(name: &str, physics: &Physics, damping_ratio: Option<f64>) {
@@ -26,7 +26,7 @@ fn assert_closes(name: &str, physics: &Physics, damping_ratio: Option<f64>) {
 }
 
 #[test]
-fn the_account_closes_for_every_effect_and_for_all_together() {
+fn the_energy_balance_closes_for_every_effect_and_for_all_together() {
     for damping_ratio in [None, Some(0.1)] {
         let mut all = Physics::of(paper(15.0));
         for setting in strong() {

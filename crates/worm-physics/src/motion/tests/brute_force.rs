@@ -4,12 +4,12 @@ use super::{ROUNDING, largest_difference};
 use crate::{Contact, Motion, Worm};
 use proptest::prelude::*;
 
-/// A brute-force worm that shares no code with the model: tips as points that are dragged, and after each small extension
-/// a search for the translation at which the body rests.
+/// A brute-force worm that shares no code with the model: tips are points that are dragged, and after each small extension it searches
+/// for the translation at which the body is at rest.
 ///
-/// The tips are dragged only once the body has come to rest. Extending a cell against a body held still and dragging at
-/// once would be a jerky drive: where the stepping cell comes to its bound within less than a jerk but the other cells
-/// give way just before, each jerk drags its tip along, though in a slow motion it never slides.
+/// The tips are dragged only once the body has come to rest. To extend a cell against a fixed body and to drag at once would be a jerky
+/// drive: where the stepping cell reaches its bound within less than a jerk but the other cells give way just before, each jerk would
+/// drag its tip along, though it never slides in a slow motion.
 struct Brute<'a> {
     contacts: &'a [Contact],
     pull_n: f64,
@@ -18,7 +18,7 @@ struct Brute<'a> {
 }
 
 impl<'a> Brute<'a> {
-    /// Laid down unloaded at 0, which the cells still have as their positions after they gave way.
+    /// Laid down unloaded. The positions are 0 after the tips gave way.
     fn at_rest(contacts: &'a [Contact], pull_n: f64) -> Self {
         let unloaded = vec![0.0; contacts.len()];
         let mut brute = Self {
@@ -76,18 +76,18 @@ impl<'a> Brute<'a> {
     }
 }
 
-/// A pull on a worm of symmetric contacts that steps in the given sense.
+/// A pull on a worm of symmetric contacts that steps in the given direction.
 #[derive(Debug, Clone)]
 enum Pull {
-    /// This share of what the tips hold at most.
-    Share(f64),
+    /// This fraction of what the tips hold at most.
+    Fraction(f64),
     /// So much more, N, than the pull at which the others just hold against this cell sliding in its step.
     FromLimit(prop::sample::Index, f64),
 }
 
 fn any_pull() -> impl Strategy<Value = Pull> {
     prop_oneof![
-        1 => (-0.9..0.9f64).prop_map(Pull::Share),
+        1 => (-0.9..0.9f64).prop_map(Pull::Fraction),
         1 => (any::<prop::sample::Index>(), -7.0..-1.0f64, any::<bool>()).prop_map(|(cell, magnitude, above)| {
             let excess_n = 10f64.powf(magnitude);
             Pull::FromLimit(cell, if above { excess_n } else { -excess_n })
@@ -112,10 +112,10 @@ proptest! {
         // With this pull all tips can slide at once, the stepping cell's one way and the others' the other way.
         let limit_n = |cell: usize| sign * (hold_n - 2.0 * friction_n[cell]);
         let pull_n = match pull {
-            Pull::Share(fraction) => fraction * hold_n,
+            Pull::Fraction(fraction) => fraction * hold_n,
             Pull::FromLimit(cell, excess_n) => limit_n(cell.index(n)) + excess_n,
         };
-        // Just there the motion jumps from the cell sliding to the others giving way, and anything between is a balance.
+        // Exactly there the motion jumps from the cell sliding to the others giving way, and anything in between balances.
         prop_assume!((0..n).all(|cell| (pull_n - limit_n(cell)).abs() > ROUNDING * hold_n));
         let worm = Worm::uniform(n, Contact::symmetric(500.0, 1e-3), 0.1, stroke_m).expect("valid");
         let worm = (0..n)

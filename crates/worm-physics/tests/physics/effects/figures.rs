@@ -1,7 +1,7 @@
-//! Every effect on the motion against a figure that was worked out by hand, or a worm that must crawl alike.
+//! Every effect on the motion against a figure that was calculated by hand, or a worm that must crawl in the same way.
 //!
 //! On the level with equal cells nothing slides backward: a pad goes from −x to x in its own step and gives 2x/(n−1) back in each
-//! other one, so L = Ls − 2x n/(n−1), whatever odd law makes x of μN.
+//! other one, so L = Ls − 2x n/(n−1), whatever law relates x to μN.
 
 use super::{BOUND_M, CYCLE_S, STIFFNESS_N_PER_M, STROKE_M, effect, of_cell, paper, steady, with};
 use worm_physics::cycle::CYCLES_BEFORE;
@@ -59,7 +59,7 @@ fn advances_on_the_level_are_the_closed_forms() {
             level_m(STROKE_M - 1e-3, BOUND_M),
             1e-8,
         ),
-        // The peak at breakaway is gone again when the step ends; what rest gives back at this speed is not.
+        // The peak at breakaway is over when the step ends; what rest restores at this speed is not.
         (
             "breakaway",
             &[effect("breakaway-friction", &[1.4, 1e-4, 0.1])],
@@ -77,7 +77,7 @@ fn advances_on_the_level_are_the_closed_forms() {
             level_m(STROKE_M, hardened * BOUND_M),
             1e-8,
         ),
-        // Drive and pad in series: the pad's end is where μN is, the drive gives C μN more.
+        // Drive and pad in series: the pad is deformed by μN/k, the drive yields by C μN more.
         (
             "compliance",
             &[effect("actuator-compliance", &[3e-4])],
@@ -159,7 +159,7 @@ fn difference_m(one: &Cycle, other: &Cycle) -> f64 {
 fn twins_crawl_alike() {
     let plain = |worm: Worm| steady(&Physics::of(worm), CYCLE_S);
     let weight_n = 0.333 * 9.81;
-    // Bounds d and r d are bounds (1 + r) d/2 about a mean of (1 − r) d/2, which a constant force makes.
+    // Bounds d and r d are bounds (1 + r) d/2 about a mean of (1 − r) d/2, as a constant force makes it.
     let backward = 1.3;
     let symmetric = Contact::symmetric(STIFFNESS_N_PER_M, 0.5 * (1.0 + backward) * BOUND_M);
     let mean_n = 4.0 * STIFFNESS_N_PER_M * 0.5 * (1.0 - backward) * BOUND_M;
@@ -203,7 +203,7 @@ fn twins_crawl_alike() {
     }
 }
 
-/// The way on a slope with a compliant drive is that of pads as soft as both in series, with the same friction.
+/// The advance on a slope with a compliant drive is that of pads as soft as both in series, with the same friction.
 #[test]
 fn a_compliant_drive_is_a_softer_pad_to_the_body() {
     let compliance = 3e-4;
@@ -251,7 +251,7 @@ fn wear_takes_its_share_with_every_cycle() {
     );
 }
 
-/// A tether holds back as the constant force does that it has come to halfway through the cycle.
+/// A tether acts like a constant force of its value halfway through the cycle.
 #[test]
 fn a_tether_is_a_force_that_grows_with_the_way() {
     let per_metre_n = 5.0;
@@ -286,7 +286,7 @@ fn drag_in_a_quick_cycle_is_a_constant_force() {
     );
 }
 
-/// On nearly rigid tips the worm makes its whole stroke, as long as more cells hold than step.
+/// On nearly rigid tips the worm advances by its whole stroke, as long as more cells hold than step.
 #[test]
 fn overlapping_steps_are_whole_strokes() {
     let contact = Contact::symmetric(1e6, 1e-6);

@@ -1,4 +1,4 @@
-//! What can be switched on, and that nothing happens at neutral values.
+//! Which settings are accepted, and that neutral values have no effect.
 
 use super::{CYCLE_S, of_cell, paper};
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ fn neutral(effect: &'static Effect) -> Setting {
     Setting::new(effect, cell, &values, 4).expect("neutral values are allowed")
 }
 
-/// Positions after a cycle and a half, by whichever motion the physics ask for and by the incremental one, with mass.
+/// Positions after a cycle and a half, by the motion that the physics need and by the incremental one with mass.
 fn positions_m(physics: &Physics) -> Vec<f64> {
     let mut motion = Locomotion::at_rest(physics, &FIRST_M).expect("it holds");
     motion.advance_to(1.5, 1.5 * CYCLE_S).expect("it holds");
@@ -66,7 +66,7 @@ fn values_are_taken_to_their_ends_and_not_beyond() {
     }
 }
 
-/// An effect that names a cell is for designs that have it.
+/// An effect that names a cell needs designs that have it.
 #[test]
 fn a_study_refuses_an_effect_on_a_cell_that_a_design_lacks() {
     let base = paper(0.0);

@@ -17,11 +17,11 @@ fn three_values_of_calibration_give_no_false_alarm_in_thousands() {
         let mut alarms = 0;
         for _ in 0..200 {
             let mut chart = CusumChart::new(0.2, 3);
-            let told = (0..2000).any(|_| {
+            let reported = (0..2000).any(|_| {
                 let value = scattered(&mut random, 1.5, scatter);
                 chart.add(value, 0.0, 0.0, 0).is_some_and(|level| level.beyond)
             });
-            alarms += u32::from(told);
+            alarms += u32::from(reported);
         }
         println!("scatter {scatter}: {alarms} of 200 charts alarmed in 2000 cycles each");
         assert!(alarms <= 2, "scatter {scatter}: {alarms} of 200 charts");
@@ -29,7 +29,7 @@ fn three_values_of_calibration_give_no_false_alarm_in_thousands() {
 }
 
 #[test]
-fn the_configured_shift_is_told_within_few_cycles() {
+fn the_configured_shift_is_detected_within_few_cycles() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(6);
     for (scatter, shift, max) in [(0.01, 1.2, 3.5), (0.03, 1.2, 5.0), (0.01, 1.4, 2.5), (0.03, 1.4, 2.5)] {
         let mut cycles = 0;
@@ -51,7 +51,7 @@ fn the_configured_shift_is_told_within_few_cycles() {
     }
 }
 
-/// One outlier does nothing, neither among the calibration nor later, however large.
+/// One outlier has no effect, neither in the calibration nor later, however large.
 #[test]
 fn one_outlier_is_no_shift() {
     for outlier_at in 0..20 {

@@ -10,7 +10,7 @@ pub(super) struct Case {
     pub(super) slope_deg: f64,
     /// Gait cycles per second, signed.
     pub(super) cycles_per_s: f64,
-    /// Cycles of sound crawling before the fault.
+    /// Cycles of undisturbed crawling before the fault.
     pub(super) before: f64,
     /// Switches the fault on.
     pub(super) fault: fn(&mut Bench),
@@ -18,7 +18,7 @@ pub(super) struct Case {
     pub(super) cell: Option<u32>,
     /// Largest delay, s.
     pub(super) within_s: f64,
-    /// Other alarms that may be raised as well.
+    /// Other alarms that may be raised, too.
     pub(super) also: &'static [AlarmKind],
 }
 

@@ -22,15 +22,15 @@ fn every_fault_is_reported_in_time_with_its_cell() {
             (case.fault)(&mut bench);
             let onset_s = bench.time_s();
             bench.run(case.within_s + 5.0);
-            let told = bench.changes.iter().find(|alarm| alarm.kind == case.expected.code());
+            let reported = bench.changes.iter().find(|alarm| alarm.kind == case.expected.code());
             let other = bench.changes.iter().find(|alarm| {
                 alarm.kind != case.expected.code() && !case.also.iter().any(|kind| kind.code() == alarm.kind)
             });
             if let Some(other) = other {
                 failures.push(format!("{}: also {other:?}", case.name));
             }
-            let Some(alarm) = told else {
-                failures.push(format!("{}: not told", case.name));
+            let Some(alarm) = reported else {
+                failures.push(format!("{}: not reported", case.name));
                 continue;
             };
             let delay_s = alarm.time_ns as f64 * 1e-9 - onset_s;
@@ -46,7 +46,7 @@ fn every_fault_is_reported_in_time_with_its_cell() {
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }
 
-/// Every alarm that was raised is cleared when its cause is gone and the worm crawls on, or stands.
+/// Every alarm that was raised is cleared when its cause is gone and the worm crawls on or stands still.
 #[test]
 fn what_is_raised_is_cleared_when_it_is_over() {
     for case in table().iter().filter(|case| case.cycles_per_s.abs() > 0.05) {
@@ -121,12 +121,12 @@ fn a_controller_restart_clears() {
     bench.trouble.hardware_error = 0;
     bench.restart_controller();
     bench.run(0.1);
-    let told: Vec<_> = bench
+    let reported: Vec<_> = bench
         .changes
         .iter()
         .map(|alarm| (alarm.sequence, alarm.raised))
         .collect();
-    assert_eq!(told, [(0, 1), (1, 0)]);
+    assert_eq!(reported, [(0, 1), (1, 0)]);
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn the_battery_warns_while_the_way_home_is_still_possible() {
     let mut bench = Bench::new(config, 3);
     bench.battery_j = 700.0;
     bench.run(2.0);
-    let fraction = bench.watch.battery_fraction();
+    let fraction = bench.monitor.battery_fraction();
     assert!((fraction - 700.0 / 900.0).abs() < 0.04, "after two seconds: {fraction}");
     bench.command(Mode::Crawling, 0.4);
     while bench.raised().is_empty() && bench.time_s() < 2000.0 {
@@ -155,9 +155,9 @@ fn the_battery_warns_while_the_way_home_is_still_possible() {
     assert_eq!(bench.raised(), [BatteryLow]);
     let fraction = bench.battery_j / 900.0;
     assert!(
-        (bench.watch.battery_fraction() - fraction).abs() < 0.03,
+        (bench.monitor.battery_fraction() - fraction).abs() < 0.03,
         "{fraction} {}",
-        bench.watch.battery_fraction()
+        bench.monitor.battery_fraction()
     );
     // Half of what was above the reserve at the start went into the way out; the other half goes home.
     assert!((0.38..0.5).contains(&fraction), "{fraction}");

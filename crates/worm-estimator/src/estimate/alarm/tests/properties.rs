@@ -1,4 +1,4 @@
-//! Whatever comes in, the watch holds its promises.
+//! Invariants of the monitor for any input.
 
 use super::super::{AlarmMonitor, Observation};
 use super::worm::{Bench, blank_cycle, blank_estimate};
@@ -32,7 +32,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_input_keeps_the_promises(ticks in prop::collection::vec(tick(), 1..120), cells in 2..=16_usize) {
+    fn invariants_hold_for_any_input(ticks in prop::collection::vec(tick(), 1..120), cells in 2..=16_usize) {
         let mut config = Config::default();
         config.worm.cells = cells;
         config.worm.step_order = (1..=cells).collect();
@@ -40,7 +40,7 @@ proptest! {
         config.battery = Some(Battery {
             capacity_j: 100.0, full_v: 5.6, empty_v: 4.0, internal_resistance_ohm: 0.2, hotel_power_w: 0.5, reserve_share: 0.1,
         });
-        let mut watch = AlarmMonitor::new(&config);
+        let mut monitor = AlarmMonitor::new(&config);
         let mut state = State::unknown(cells);
         let (mut numbered, mut mask) = (0, 0);
         for (numbers, codes, time_ns, count, sampled, ended) in ticks {
@@ -59,7 +59,7 @@ proptest! {
             let mut cycle = blank_cycle(cells);
             [cycle.duration_s, cycle.energy_electrical_j, cycle.energy_loss_j] = [numbers[22], numbers[23], numbers[7]];
             [cycle.predicted_energy_loss_j, cycle.predicted_advance_m, cycle.advance_m] = [numbers[8], numbers[9], numbers[10]];
-            let changes = watch.update(&Observation {
+            let changes = monitor.update(&Observation {
                 state: &state,
                 estimate: sampled.then_some(&estimate),
                 cycle: ended.then_some(&cycle),
@@ -74,8 +74,8 @@ proptest! {
                 prop_assert_eq!(mask & bit == 0, alarm.raised == 1, "raised and cleared take turns");
                 mask ^= bit;
             }
-            prop_assert_eq!(mask, watch.raised_mask());
-            let fraction = watch.battery_fraction();
+            prop_assert_eq!(mask, monitor.raised_mask());
+            let fraction = monitor.battery_fraction();
             prop_assert!(fraction.is_nan() || (0.0..=1.0).contains(&fraction));
         }
     }

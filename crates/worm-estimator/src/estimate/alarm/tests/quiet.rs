@@ -1,4 +1,4 @@
-//! A sound worm raises nothing, however untidy its measurements and commands are.
+//! A healthy worm raises no alarm, however poor its measurements and however irregular its commands.
 
 use super::worm::Bench;
 use crate::config::{Battery, Config};
@@ -6,7 +6,7 @@ use crate::message::Mode;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// One kind of quiet day, as it differs from the plain one.
+/// One kind of day without faults, by its difference from a plain one.
 #[derive(Clone, Copy)]
 struct Day {
     name: &'static str,
@@ -15,7 +15,7 @@ struct Day {
     noise_m: f64,
     dropout: f64,
     battery: bool,
-    /// Share of its speed that the cam lacks.
+    /// Fraction of its speed that the cam lacks.
     sluggish: f64,
     /// True stroke over the configured one.
     stroke_factor: f64,

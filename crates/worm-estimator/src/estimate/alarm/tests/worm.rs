@@ -18,24 +18,24 @@ const SPACING_M: f64 = 0.04;
 /// Counts of the goal register per turn/s.
 const GOAL_COUNTS_PER_TURN_S: f64 = 60.0 / 0.229;
 
-/// What can be wrong, or merely untidy, with the worm.
+/// Faults and imperfections of the worm.
 #[derive(Debug, Clone)]
 pub struct Trouble {
     pub stalled: bool,
-    /// Share of its speed that the cam loses.
+    /// Fraction of its speed that the cam loses.
     pub sluggish: f64,
     pub jammed: Option<usize>,
-    /// Share of its stroke that the jammed cell loses.
+    /// Fraction of its stroke that the jammed cell loses.
     pub jam_fraction: f64,
     pub slipping: bool,
     pub slide_m_per_s: f64,
     pub electrical_factor: f64,
     pub loss_factor: f64,
-    /// Chance that an exchange with the servo fails.
+    /// Probability that an exchange with the servo fails.
     pub link_failing: f64,
     pub tracker_dead: bool,
     pub hidden_cell: Option<usize>,
-    /// Chance that a position is not seen.
+    /// Probability that a position is not seen.
     pub dropout: f64,
     pub hardware_error: u32,
     pub temperature_c: f64,
@@ -64,21 +64,21 @@ impl Trouble {
     }
 }
 
-/// The worm and the watch that watches it.
+/// The worm, and the monitor of its alarms.
 pub struct Bench {
     pub config: Config,
-    pub watch: AlarmMonitor,
+    pub monitor: AlarmMonitor,
     pub state: State,
     pub trouble: Trouble,
     /// Standard deviation of a filtered position, m.
     pub noise_m: f64,
-    /// Standard deviation of energy and of the advance lost to tips, from cycle to cycle, share.
+    /// Standard deviation of energy and of the advance lost to tips, from cycle to cycle, as a fraction.
     pub scatter: f64,
     /// True stroke over the configured one.
     pub stroke_factor: f64,
     /// Energy in the battery, J.
     pub battery_j: f64,
-    /// Everything that was raised or cleared.
+    /// Alarms raised or cleared.
     pub changes: Vec<Alarm>,
     random: Xoshiro256PlusPlus,
     seen_m: [f64; MAX_CELLS], // true positions as the tracker and the filter follow them, late
@@ -104,7 +104,7 @@ impl Bench {
         state.phase = 0.0;
         state.time_ns = 5_000_000_000;
         Self {
-            watch: AlarmMonitor::new(&config),
+            monitor: AlarmMonitor::new(&config),
             trouble: Trouble::none(),
             noise_m: 5e-5,
             scatter: 0.01,
@@ -137,7 +137,7 @@ impl Bench {
         self.command_turns_per_s = if mode == Mode::Crawling { cycles_per_s } else { 0.0 };
     }
 
-    /// Crawls with the configured gait for so many cycles.
+    /// Crawls with the configured gait for a number of cycles.
     pub fn crawl_cycles(&mut self, cycles: f64) {
         let cycles_per_s = self.config.gait_cycles_per_s();
         self.command(Mode::Crawling, cycles_per_s);
@@ -155,16 +155,16 @@ impl Bench {
     }
 
     pub fn raised(&self) -> Vec<AlarmKind> {
-        let mask = self.watch.raised_mask();
+        let mask = self.monitor.raised_mask();
         let is_raised = |kind: &AlarmKind| mask >> kind.code() & 1 == 1;
         AlarmKind::ALL.iter().copied().filter(is_raised).collect()
     }
 
     pub fn is_armed(&self, kind: AlarmKind) -> bool {
-        self.watch.armed_mask() >> kind.code() & 1 == 1
+        self.monitor.armed_mask() >> kind.code() & 1 == 1
     }
 
-    /// The controller's counters begin anew.
+    /// Resets the controller's counters.
     pub fn restart_controller(&mut self) {
         self.state.sequence = 0;
         self.state.sample = 0;
@@ -176,7 +176,7 @@ impl Bench {
         StandardNormal.sample(&mut self.random)
     }
 
-    fn chance(&mut self, fraction: f64) -> bool {
+    fn happens(&mut self, fraction: f64) -> bool {
         fraction > 0.0 && self.random.random::<f64>() < fraction
     }
 
@@ -206,7 +206,7 @@ impl Bench {
             cycle: cycle.as_ref(),
             residuals: None,
         };
-        let changes = self.watch.update(&observation);
+        let changes = self.monitor.update(&observation);
         self.changes.extend_from_slice(&changes);
     }
 
@@ -285,7 +285,7 @@ impl Bench {
     }
 
     fn measure_motor(&mut self, step_s: f64) {
-        let failed = self.chance(self.trouble.link_failing);
+        let failed = self.happens(self.trouble.link_failing);
         self.state.motor_is_new = u32::from(!failed);
         self.state.link_failures += u64::from(failed);
         let load = 0.15 + 0.05 * self.speed.abs();
@@ -339,7 +339,7 @@ impl Bench {
         self.state.sample += 1;
         self.state.valid_mask = 0;
         for cell in 0..cells {
-            if self.trouble.hidden_cell == Some(cell) || self.chance(self.trouble.dropout) {
+            if self.trouble.hidden_cell == Some(cell) || self.happens(self.trouble.dropout) {
                 continue;
             }
             self.state.valid_mask |= 1 << cell;
