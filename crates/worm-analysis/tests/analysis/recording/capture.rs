@@ -14,7 +14,7 @@ fn truth() -> Recording {
 }
 
 #[test]
-fn vicon_files_of_all_kinds_tell_of_the_same_worm() {
+fn vicon_files_of_all_kinds_give_the_same_worm() {
     let truth = truth();
     let metres = Style {
         unit: "m",
@@ -123,7 +123,7 @@ fn an_axis_that_is_given_is_exact() {
 }
 
 #[test]
-fn vicon_files_that_leave_something_open_are_refused() {
+fn ambiguous_vicon_files_are_refused() {
     let good = as_vicon(&truth(), Laboratory::askew(0.7, 0.35), PLAIN);
     let lines: Vec<&str> = good.lines().collect();
     let with_line = |number: usize, line: &str| {

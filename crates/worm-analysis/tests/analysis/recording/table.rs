@@ -288,7 +288,7 @@ fn errors_count_lines_as_an_editor_does() {
 }
 
 #[test]
-fn units_are_judged_from_a_tenth_of_a_millimetre_to_a_metre() {
+fn units_are_recognised_from_a_tenth_of_a_millimetre_to_a_metre() {
     let folder = Folder::new();
     for scale in [0.02, 1.0, 25.0] {
         let small = rows(HEADER, |sample, time_s, x_m| {
