@@ -18,15 +18,15 @@
 //! - Breakaway displacement over the displacement at sliding: about Dupont, Hayward, Armstrong and Altpeter, IEEE Trans.
 //!   Autom. Control 47 (2002) 787.
 //! - Stribeck speed and frictional lag: within what Armstrong-Hélouvry et al. list. Slip distance: from the order of the ten
-//!   micrometres of Rabinowicz, J. Appl. Phys. 22 (1951) 1373, upward, for soft contacts slip further before their friction
+//!   micrometres of Rabinowicz, J. Appl. Phys. 22 (1951) 1373, upward, because soft contacts slip further before their friction
 //!   drops, Lorenz and Persson, J. Phys. Condens. Matter 24 (2012) 225008.
 //! - Creep below the limit: not above the nanometres per second at which Farain and Bonn, Tribol. Lett. 70 (2022), slid.
 //!
-//! Two cuts keep a clean worm clean, that is a slow one within about 1 % of the rigid tip's advance on every slope of
-//! the paper, and one at its gait's speed within 1 % of the level's advance: presliding ends, for each law at its own
-//! place, well below the tens of micrometres that soft contacts may have, and where the worm's truth is not breakaway
-//! friction the static bound stands hardly above the kinetic one, though the worm's own sponge has 0.7 to 0.5 (Zarrouk,
-//! Sharf and Shoham 2016, section 2). Dahl's exponent is one of the two that have a closed form.
+//! Two restrictions keep a worm without a hidden effect close to one on rigid tips: a slow one within about 1 % of its advance
+//! on every slope of the paper, one at its gait's speed within 1 % of the advance on the level. Presliding is limited, for each
+//! law separately, to well below the tens of micrometres that soft contacts may have. And unless breakaway friction is the hidden
+//! effect, the static limit is hardly above the kinetic one, though the worm's own sponge has 0.7 to 0.5 (Zarrouk, Sharf and
+//! Shoham 2016, section 2). Dahl's exponent is one of the two that have a closed form.
 
 use super::bristle::{TipLoad, TipStep};
 use super::coulomb::Coulomb;
