@@ -239,7 +239,7 @@ fn unit_m(parameters: &Parameters<'_>, path: &Path) -> Result<f64, ReadError> {
     let problem = match &unit {
         Some(unit) => match metres_in(unit) {
             Some(metres) => return Ok(metres),
-            None => format!("{} is not a unit mm, cm or m", quoted(unit)),
+            None => format!("{} is not mm, cm or m", quoted(unit)),
         },
         None => "the unit of the points is not given".to_owned(),
     };
