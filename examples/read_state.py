@@ -118,7 +118,7 @@ def main():
         if printed == arguments.count:
             return
         printed += 1
-        positions_mm = [1e3 * state.position_m[cell] for cell in range(state.cell_count)]
+        positions_mm = [round(1e3 * state.position_m[cell], 3) for cell in range(state.cell_count)]
         print(json.dumps({"sequence": state.sequence, "phase": state.phase, "positions_mm": positions_mm}), flush=True)
     if printed < arguments.count:
         sys.exit(f"worm/{arguments.worm}/state: nothing published for {arguments.timeout} s: is its controller running?")

@@ -1,4 +1,4 @@
-//! A worm whose truth is known: the exact model crawls, and a poor tracker and an encoder watch it.
+//! A worm whose truth is known: the exact model, seen by a poor tracker and an encoder.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -9,7 +9,7 @@ use worm_estimator::message::State;
 use worm_physics::MAX_CELLS;
 use worm_physics::{Ledger, Motion, Worm};
 
-/// How the worm is watched and driven.
+/// How the worm is driven and measured.
 #[derive(Debug, Clone)]
 pub struct Scene {
     pub seed: u64,
@@ -20,7 +20,7 @@ pub struct Scene {
     pub tick_hz: f64,
     /// Gait cycles per second; negative crawls backward.
     pub cycles_per_s: f64,
-    /// Share by which the cam speed swings.
+    /// Fraction by which the cam speed varies.
     pub ripple: f64,
 }
 
@@ -39,7 +39,7 @@ impl Default for Scene {
     }
 }
 
-/// What truly happened up to a whole number of the phase.
+/// The truth at a whole number of the phase.
 #[derive(Debug, Clone)]
 pub struct Milestone {
     pub ledger: Ledger,
@@ -53,7 +53,7 @@ pub struct Crawl {
     pub motion: Motion,
     /// One for each whole number of the phase that was crossed, the start included.
     pub milestones: Vec<Milestone>,
-    /// The cam stands while this is set.
+    /// Whether the cam stands still.
     pub paused: bool,
     rng: Xoshiro256PlusPlus,
     crawled_s: f64,

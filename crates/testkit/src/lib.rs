@@ -1,14 +1,14 @@
 //! What the tests and benches of the workspace share.
 //!
-//! - [`independent_worm`]: worms with inertia and an uneven motor, which share no code with the library's physics; the
-//!   identification is held against them.
-//! - [`hidden_effects`]: worms with an effect hidden in them, by friction laws of their own; the search for the missing effect is
-//!   held against them.
-//! - [`crawl`]: the exact model watched by a poor tracker, as the controller's states; the estimator is held against it.
+//! - [`independent_worm`]: worms with inertia and an uneven motor, which share no code with the library's physics; they test the
+//!   identification.
+//! - [`hidden_effects`]: worms with a hidden effect and friction laws of their own; they test the search for the missing effect.
+//! - [`nominal`], [`random`]: constants and random draws that both share.
+//! - [`crawl`]: the exact model as a poor tracker sees it, as the controller's states; it tests the estimator.
 //! - [`log_sample`]: a log of such a crawl.
 //! - [`recording_files`]: recordings of the paper's worm, and files with them.
 //! - [`process_pauses`]: stops and continues real processes, as a busy computer does.
-//! - [`html`]: what a page must be.
+//! - [`html`]: what every page must satisfy.
 
 #![allow(
     missing_docs,

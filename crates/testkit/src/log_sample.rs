@@ -1,4 +1,4 @@
-//! A crawl as the topics would tell it, and logs of it.
+//! The messages of a crawl on all topics, and logs of it.
 
 use crate::crawl::{Crawl, Scene, config_of, paper_worm};
 use std::cell::RefCell;
@@ -13,7 +13,7 @@ use worm_log::{Log, Logged, Origin, Writer};
 
 pub const ORIGIN_CONFIG: &str = "[worm]\nname = \"tester\"\n";
 
-/// What the processes of a worm would have said.
+/// What the processes of a worm would have published.
 #[derive(Default)]
 pub struct Telemetry {
     pub config: Config,
@@ -42,7 +42,7 @@ pub fn crawl(seconds: f64) -> Telemetry {
     crawl_with_late_estimator(seconds, 0)
 }
 
-/// A crawl whose estimator was started so many states after the controller, and now and then sends a heartbeat.
+/// A crawl whose estimator starts `late` states after the controller and sends a heartbeat now and then.
 pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Telemetry {
     let scene = Scene {
         cycles_per_s: 0.5,

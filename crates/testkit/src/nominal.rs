@@ -1,7 +1,6 @@
-//! The worm of the paper, as both simulated worms take it, and the limits at which a simulation is given up.
+//! The worm of the paper, for both kinds of simulated worms, and the limits at which a simulation gives up.
 //!
-//! The figures are written down here once more, and not taken from the library, because what judges the library must not
-//! inherit its mistakes.
+//! The figures are not taken from the library, because a test of the library must not share its mistakes.
 
 /// Standard gravity as the paper rounds it, m/s².
 pub const GRAVITY_M_S2: f64 = 9.81;

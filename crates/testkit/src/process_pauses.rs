@@ -1,6 +1,6 @@
-//! A computer that pauses, made by hand: processes of a worm are stopped and go on, at random moments.
+//! A computer that pauses, simulated: processes of a worm are stopped and continued at random times.
 //!
-//! A stopped process cannot tell that it was not its computer that stood still. Used by the tests with processes and by the
+//! To a stopped process it looks as if its computer had paused. Used by the tests with processes and by the
 //! benchmark of the same name. Only processes that the caller has started are ever signalled, and their children.
 
 use nix::sys::signal::{Signal, kill};
@@ -13,9 +13,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Priority at which pauses are made where the system allows it, above all of the worm's: a pause must end when it is over.
+/// Priority at which pauses are made where the system allows it, above all of the worm's: a pause must end on time.
 const PRIORITY: i32 = 95;
-/// How often the thread looks whether it is still wanted.
+/// How often the thread checks whether it should end.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// What is stopped, and for how long.
@@ -27,7 +27,7 @@ pub enum Pause {
     OneOf(Range<u64>),
 }
 
-/// Processes that pause now and then, as long as this lives.
+/// Makes processes pause now and then until it is dropped.
 pub struct HostPauses {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,

@@ -14,7 +14,7 @@ impl Folder {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
-    /// Writes a file and tells where it is.
+    /// Writes a file and returns its path.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.path().join(name);
         std::fs::write(&path, content).expect("a temporary file can be written");
@@ -55,7 +55,7 @@ pub fn assert_says(error: &impl std::fmt::Display, words: &[&str], of: &str) {
     }
 }
 
-/// The largest difference between two series of the same samples, with what was not seen in the same places.
+/// The largest difference between two series of the same samples, which must lack the same ones.
 pub fn difference(left: &[f64], right: &[f64]) -> f64 {
     assert_eq!(left.len(), right.len(), "as many samples");
     let differences = left.iter().zip(right).map(|(left, right)| {

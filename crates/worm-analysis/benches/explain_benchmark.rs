@@ -1,9 +1,9 @@
-//! How well the search names what is hidden: every case of a split, and the score table.
+//! How well the search names the hidden effect: every case of a split, and the score table.
 //!
 //! ```text
 //! cargo bench --bench explain_benchmark -- --split development|test|search [--only EFFECT] [--cases N] [--csv FILE]
 //! ```
-//! Without `--split` a few cases of the development split are run; `search` are those that `tests/explain_search.rs` runs in small.
+//! Without `--split` a few cases of the development split are run; `search` are those that `tests/analysis/search.rs` runs at a smaller size.
 //! `WORMD_CASES` scales how many there are of each kind.
 
 use clap::Parser;
@@ -21,12 +21,12 @@ use testkit::hidden_effects::table::ScoreTable;
 
 /// Threads that explain cases side by side.
 const THREADS: usize = 2;
-/// Cases that are run when no split is asked for.
+/// Cases that are run without `--split`.
 const FEW: usize = 4;
 
 #[derive(Debug, Parser)]
 #[command(about = "Runs the search for the missing effect on campaigns in which one is hidden, and scores it.")]
-struct Order {
+struct Arguments {
     /// Which cases: development, test or search; absent: a few of development.
     #[arg(long, value_parser = |name: &str| Split::named(name).ok_or("must be development, test or search"))]
     split: Option<Split>,
@@ -39,24 +39,24 @@ struct Order {
     /// Writes a row for every case to this file.
     #[arg(long)]
     csv: Option<PathBuf>,
-    /// What `cargo bench` says of itself.
+    /// Passed by `cargo bench`.
     #[arg(long, hide = true)]
     bench: bool,
 }
 
 fn main() -> ExitCode {
-    let order = Order::parse();
-    let mut cases = split(order.split.unwrap_or(Split::Development), scale_from_environment());
-    if let Some(only) = order.only {
+    let arguments = Arguments::parse();
+    let mut cases = split(arguments.split.unwrap_or(Split::Development), scale_from_environment());
+    if let Some(only) = arguments.only {
         cases.retain(|case| case.what() == only);
     }
-    let few = order.split.is_none().then_some(FEW);
-    if let Some(max) = order.cases.or(few) {
+    let few = arguments.split.is_none().then_some(FEW);
+    if let Some(max) = arguments.cases.or(few) {
         cases = spread(&cases, max);
     }
     let assessments = assess_all(&cases);
     println!("\n{}", ScoreTable(&assessments));
-    let Some(path) = &order.csv else {
+    let Some(path) = &arguments.csv else {
         return ExitCode::SUCCESS;
     };
     let written = File::create(path)
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(problem) => {
             eprintln!(
-                "{}: cannot be written: {problem}: name a file in a folder that is there",
+                "{}: cannot be written: {problem}: name a file in an existing folder",
                 path.display()
             );
             ExitCode::FAILURE
@@ -74,13 +74,13 @@ fn main() -> ExitCode {
     }
 }
 
-/// So many cases, as far from each other as they can be.
+/// At most `max` cases, spread evenly.
 fn spread(cases: &[Case], max: usize) -> Vec<Case> {
     let count = max.min(cases.len());
     (0..count).map(|place| cases[place * cases.len() / count]).collect()
 }
 
-/// Judges every case, in the order given, and prints a line for each as it comes.
+/// Assesses every case, in the order given, and prints a line for each as it comes.
 fn assess_all(cases: &[Case]) -> Vec<Assessment> {
     let next = AtomicUsize::new(0);
     let work = || {

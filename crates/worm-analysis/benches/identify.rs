@@ -1,4 +1,4 @@
-//! What the identification costs: the gait of a recording, the paper's exhaustive search, and the whole analysis.
+//! Time of the identification: the gait of a recording, the paper's exhaustive search, and the whole analysis.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;

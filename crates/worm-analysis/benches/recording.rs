@@ -1,4 +1,4 @@
-//! What it costs to open an hour of recording: 432,000 samples of 4 cells with their phase, as text and as motion capture.
+//! Time to open an hour of recording: 432,000 samples of 4 cells with their phase, as text and as motion capture.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::fmt::Write;

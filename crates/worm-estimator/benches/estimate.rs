@@ -1,4 +1,4 @@
-//! Cost of the estimator: a tick without a sample, a tick with one, a whole crawl with its ends of cycles.
+//! Time of the estimator: a tick without a sample, a tick with one, a tick in which a cycle ends.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;

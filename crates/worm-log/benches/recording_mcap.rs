@@ -1,4 +1,4 @@
-//! Cost of a log: serialising and writing, and reading back.
+//! Time that a log costs the recorder: serialising, writing, and reading back.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;

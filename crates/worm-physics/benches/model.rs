@@ -1,4 +1,4 @@
-//! Cost of the motions: a whole gait cycle and the increment of one tick of a 1 kHz loop, exact and incremental.
+//! Time of the motions: a whole gait cycle and the increment of one tick of a 1 kHz loop, exact and incremental.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;

@@ -1,15 +1,15 @@
-//! One answer held against the truth.
+//! One answer compared with the truth.
 //!
-//! [`Answer`] is an explanation as far as it is scored, so that the score does not hang on how the library lays out its own.
+//! [`Answer`] is the scored part of an explanation, so that the score does not depend on the layout of the library's own answer.
 
 use super::campaign::{CampaignKind, HiddenCampaign};
 use super::effect::TrueEffect;
 use super::follow_up::{Condition, ExtraRun};
 
-/// What an explanation comes to.
+/// The conclusion of an explanation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// The believed worm, recalibrated, explains all.
+    /// The nominal worm, recalibrated, explains everything.
     Nothing,
     /// One effect, or several together, with their exact twins.
     Named,
@@ -53,21 +53,21 @@ pub struct Named {
     pub name: String,
     /// From 0.
     pub cell: Option<usize>,
-    /// The effects that it says no position data could tell from this one.
+    /// The effects that, by the answer, position data cannot distinguish from this one.
     pub twins: Vec<String>,
     pub parameters: Vec<Estimate>,
 }
 
-/// What an answer wants done next.
+/// The next step that an answer proposes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Proposal {
     /// One more run.
     Run(Condition),
-    /// Something to be measured on the bench, which no run can stand for.
+    /// Something to be measured on the bench, which no run can replace.
     Measurement,
 }
 
-/// An effect that was looked for, and how surely it was found.
+/// An effect that was tested for, and its significance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Screened {
     pub name: String,
@@ -76,15 +76,15 @@ pub struct Screened {
     pub sigma: f64,
 }
 
-/// An explanation as far as it is scored.
+/// The scored part of an explanation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
     pub verdict: Verdict,
-    /// The effects in the mended model, the most telling first.
+    /// The effects in the corrected model, the most significant first.
     pub named: Vec<Named>,
     /// The other members of an ambiguous set.
     pub rivals: Vec<Named>,
-    /// Every effect that was looked for.
+    /// Every effect that was tested for.
     pub screened: Vec<Screened>,
     /// Share of the recalibrated worm's held-out gap to the noise floor that the named effect closes.
     pub closure: Option<f64>,
@@ -94,16 +94,16 @@ pub struct Answer {
     pub proposal: Option<Proposal>,
 }
 
-/// What is judged.
+/// A search that is assessed.
 pub trait Explainer: Sync {
     /// Explains a campaign and further runs of the same worm.
     ///
     /// # Errors
-    /// Says why there is no answer at all.
+    /// The reason why there is no answer.
     fn explain(&self, campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<Answer, String>;
 }
 
-/// How one case came out. What does not apply to it is absent.
+/// The result of one case; `None` where a figure does not apply to it.
 #[derive(Debug, Clone)]
 pub struct Assessment {
     pub case: String,
@@ -114,7 +114,7 @@ pub struct Assessment {
     pub verdict: Verdict,
     /// The first effect named.
     pub top: Option<String>,
-    /// How surely the library itself sees the true effect, standard deviations; infinite where it gives no answer, so that no
+    /// Significance of the true effect by the library itself, standard deviations; infinite where it gives no answer, so that no
     /// failure is left out.
     pub significance_sigma: f64,
     /// Whether the truth is the first effect or one of its exact twins.
@@ -125,7 +125,7 @@ pub struct Assessment {
     pub right_cell: Option<bool>,
     pub closure: Option<f64>,
     pub margin: Option<f64>,
-    /// Error of the severity as a share of it.
+    /// Relative error of the severity.
     pub severity_error: Option<f64>,
     /// Whether the 90 % interval holds the true severity.
     pub covered: Option<bool>,
@@ -140,7 +140,7 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    /// All of it in a line.
+    /// The result in one line.
     pub fn line(&self) -> String {
         let truth: Vec<String> = self.truth.iter().map(TrueEffect::in_words).collect();
         let percent =
@@ -166,7 +166,7 @@ impl Assessment {
     }
 }
 
-/// Names between which no position data can decide.
+/// Names that position data cannot distinguish.
 const TWINS: [&[&str]; 3] = [
     &["directional-friction", "constant-drag"],
     &["payload", "softer-pads"],
@@ -202,7 +202,7 @@ impl TrueEffect {
     }
 }
 
-/// Holds the answer to a campaign against the truth, and has the proposed run made where the answer is ambiguous.
+/// Compares the answer to a campaign with the truth; where the answer is ambiguous, makes the run that it proposes.
 pub fn assess(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Assessment {
     let answer = explainer.explain(campaign, &[]).unwrap_or_else(|problem| {
         eprintln!("{}: {problem}", campaign.name);
@@ -242,7 +242,7 @@ pub fn assess(campaign: &HiddenCampaign, explainer: &dyn Explainer) -> Assessmen
             .map(|truth| answer.members().any(|member| truth.matches(member))),
         twins_reported: truth
             .filter(|_| campaign.kind == CampaignKind::Twin)
-            .map(|truth| hit.is_some() && answer.tells_twins_of(truth)),
+            .map(|truth| hit.is_some() && answer.names_twins_of(truth)),
         of_pair: (campaign.kind == CampaignKind::Pair).then(|| {
             let met = |truth: &&TrueEffect| answer.names() && answer.named.iter().any(|named| truth.matches(named));
             campaign.truth.iter().filter(met).count()
@@ -278,7 +278,7 @@ impl Answer {
         self.named.iter().chain(&self.rivals)
     }
 
-    /// How surely the library sees an effect, standard deviations.
+    /// Significance of an effect by the library, standard deviations.
     fn significance_of(&self, truth: &TrueEffect) -> f64 {
         if self.verdict == Verdict::Failed {
             return f64::INFINITY;
@@ -295,15 +295,15 @@ impl Answer {
             .fold(0.0, f64::max)
     }
 
-    /// Whether the other names of an effect are told as well.
-    fn tells_twins_of(&self, truth: &TrueEffect) -> bool {
-        // Softer pads are no effect of the library, so they may be told in words.
-        let tells = |said: &str, name: &str| said == name || (name == "softer-pads" && said.contains("soft"));
-        let told = |name: &str| {
+    /// Whether the other names of an effect are given as well.
+    fn names_twins_of(&self, truth: &TrueEffect) -> bool {
+        // Softer pads are no effect of the library, so they may be described in words.
+        let is_name = |given: &str, name: &str| given == name || (name == "softer-pads" && given.contains("soft"));
+        let is_given = |name: &str| {
             self.members()
-                .any(|member| tells(&member.name, name) || member.twins.iter().any(|twin| tells(twin, name)))
+                .any(|member| is_name(&member.name, name) || member.twins.iter().any(|twin| is_name(twin, name)))
         };
-        truth.aliases().into_iter().all(told)
+        truth.aliases().into_iter().all(is_given)
     }
 }
 

@@ -15,7 +15,7 @@ use crate::nominal::{GRAVITY_M_S2, LOWERING_S};
 /// Time in which a cell held by a compliant drive follows its force, s: far below any step, far above the time step.
 const FOLLOW_S: f64 = 2e-3;
 
-/// A worm with all that is hidden in it.
+/// A worm with what is hidden in it.
 #[derive(Debug, Clone)]
 pub struct Worm {
     pub parameters: WormParameters,
@@ -61,10 +61,10 @@ impl Worm {
     }
 }
 
-/// Where and how heavily the worm crawls on one run.
+/// Slope, payload and start of one run.
 #[derive(Debug, Clone, Copy)]
 pub struct Placement {
-    /// Slope as it truly is but for what is hidden, degrees.
+    /// True slope, without a hidden slope error, degrees.
     pub slope_deg: f64,
     /// Known extra mass, kg.
     pub payload_kg: f64,
@@ -72,7 +72,7 @@ pub struct Placement {
     pub start_m: f64,
 }
 
-/// What changes from cycle to cycle.
+/// Inputs of one time step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepInput<'a> {
     /// Gait phase at the end of the time step, cycles.
@@ -94,7 +94,7 @@ pub struct Motion<'a> {
     mass_kg: f64,
     /// Weight along the canal, N.
     weight_n: f64,
-    /// What the slope leaves of the friction.
+    /// Friction on this slope over that on the level.
     grip_on_slope: f64,
     step_s: f64,
     time_s: f64,
@@ -105,7 +105,7 @@ pub struct Motion<'a> {
     velocity_m_s: [f64; CELLS],
     tips: [Tip; CELLS],
     extension_m: [f64; CELLS],
-    /// How far each cell stands off from its place in the body, m, backward.
+    /// How far the drive's compliance holds each cell back, m.
     stand_off_m: [f64; CELLS],
     mean_m: f64,
     /// Mean position where the run began, m.
@@ -142,7 +142,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// From here on counts the way of the run.
+    /// Starts the run: its displacement counts from here.
     pub fn begin(&mut self) {
         self.begin_m = self.mean_m;
     }
@@ -187,18 +187,18 @@ impl<'a> Motion<'a> {
         self.time_s += step_s;
     }
 
-    /// All that pulls the worm back, N.
+    /// Sum of the forces that pull the worm backward, N.
     fn pull_n(&self) -> f64 {
         let deviations = &self.worm.deviations;
         let lowered = (self.time_s / LOWERING_S).min(1.0);
-        let gone_m = self.mean_m - self.begin_m;
+        let displacement_from_start_m = self.mean_m - self.begin_m;
         let mut pull_n = lowered * (self.weight_n + deviations.force_n);
-        pull_n += deviations.tether_n_per_m * gone_m.max(0.0);
+        pull_n += deviations.tether_n_per_m * displacement_from_start_m.max(0.0);
         for cell in 0..CELLS {
             pull_n += self.tips[cell].force_n + deviations.drag_n_s_per_m * self.velocity_m_s[cell];
         }
         if let Some(unmodelled) = &self.worm.unmodelled {
-            pull_n += lowered * unmodelled.on_worm_n(gone_m);
+            pull_n += lowered * unmodelled.on_worm_n(displacement_from_start_m);
             pull_n += lowered
                 * self
                     .position_m

@@ -1,4 +1,4 @@
-//! What the cam makes of its phase: how far each cell stands ahead in the body.
+//! The cam: how far each cell stands ahead in the body at a phase.
 
 use super::CELLS;
 use super::deviations::Deviations;
@@ -6,7 +6,7 @@ use super::parameters::WormParameters;
 use super::unmodelled::UnmodelledEffect;
 use std::f64::consts::TAU;
 
-/// The cam with everything that may be wrong with it.
+/// The cam with all its deviations.
 #[derive(Debug, Clone)]
 pub struct CamProfile {
     stroke_m: [f64; CELLS],
@@ -65,7 +65,7 @@ impl CamProfile {
         found.unwrap_or(0)
     }
 
-    /// Share of its way that a cell has done at a share of its step: even acceleration, speed and braking.
+    /// Fraction of its stroke that a cell has made at a fraction of its step: constant acceleration, speed and braking.
     fn fraction(&self, done: f64) -> f64 {
         let rounding = self.rounding;
         let corner = |done: f64| 0.5 * done * done / (rounding * (1.0 - rounding));

@@ -1,4 +1,4 @@
-//! Campaigns with something hidden in them: three runs of one worm on three slopes, and what is true of it.
+//! Campaigns with a hidden effect: three runs of one worm on three slopes, and the truth about it.
 
 use super::body::{Placement, Worm};
 use super::deviations::Deviations;
@@ -13,34 +13,34 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use worm_analysis::recording::Recording;
 use worm_estimator::config::Config;
 
-/// Least advance of a worm that counts as crawling, m: mean over the cycles of a run.
+/// Smallest advance of a worm that counts as crawling, m: mean over the cycles of a run.
 const MIN_ADVANCE_M: f64 = 0.5e-3;
-/// And of its poorest cycle after the first, m.
+/// Smallest advance of any of its cycles after the first, m.
 const MIN_IN_A_CYCLE_M: f64 = 0.2e-3;
-/// Worms thrown before the ranges are to blame.
+/// Draws after which the ranges must be wrong.
 const MAX_DRAWS: u64 = 200;
 /// Standard deviation of a slope about what is stated, degrees.
 pub const SLOPE_SIGMA_DEG: f64 = 0.1;
 
-/// How much is recorded of a worm: what a search takes goes with the number of samples.
+/// How much is recorded of a worm: the time of a search is proportional to the number of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CampaignSize {
     /// Runs, each on a steeper slope than the one before, the first on the level.
     pub runs: usize,
     /// Gait cycles in each run.
     pub cycles: f64,
-    /// Pictures that the camera takes in a second.
+    /// Samples of the camera per second.
     pub rate_hz: f64,
 }
 
 impl CampaignSize {
-    /// What the score is told of.
+    /// The size that is scored.
     pub const FULL: Self = Self {
         runs: 3,
         cycles: 12.0,
         rate_hz: 120.0,
     };
-    /// The least that the search can work on: several slopes, and cycles enough to tell scatter from cause.
+    /// The smallest size that the search can use: several slopes, and enough cycles to separate scatter from cause.
     pub const SMALL: Self = Self {
         runs: 2,
         cycles: 6.0,
@@ -48,7 +48,7 @@ impl CampaignSize {
     };
 }
 
-/// What a campaign is to test.
+/// What a campaign tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CampaignKind {
     /// Nothing is hidden.
@@ -115,7 +115,7 @@ pub struct HiddenCampaign {
     pub name: String,
     pub kind: CampaignKind,
     pub seed: u64,
-    /// What is believed of the worm.
+    /// The nominal worm.
     pub config: Config,
     pub recordings: Vec<Recording>,
     /// Slope of each run as stated, degrees.
@@ -135,15 +135,15 @@ pub struct HiddenCampaign {
 /// A campaign with something hidden in it; the same for the same seed.
 ///
 /// # Panics
-/// When no worm crawls, which is the ranges' fault.
+/// When no worm crawls: the ranges are wrong.
 pub fn draw(hidden: Hidden, seed: u64) -> HiddenCampaign {
     draw_sized(hidden, seed, CampaignSize::FULL)
 }
 
-/// The same of another size: the same dice, so the same worm where it crawls at either size.
+/// The same of another size: the same random draws, so the same worm where it crawls at either size.
 ///
 /// # Panics
-/// When no worm crawls, which is the ranges' fault.
+/// When no worm crawls: the ranges are wrong.
 pub fn draw_sized(hidden: Hidden, seed: u64, size: CampaignSize) -> HiddenCampaign {
     (0..MAX_DRAWS)
         .find_map(|attempt| try_draw(hidden, seed, attempt, size))
@@ -186,7 +186,7 @@ fn try_draw(hidden: Hidden, seed: u64, attempt: u64, size: CampaignSize) -> Opti
         })
         .collect();
 
-    // All are thrown, so that the same dice are left for what is hidden.
+    // All three are drawn at any size, so that the hidden effect comes from the same random numbers.
     scenes.truncate(size.runs);
 
     let mut deviations = Deviations::default();
@@ -226,7 +226,7 @@ fn try_draw(hidden: Hidden, seed: u64, attempt: u64, size: CampaignSize) -> Opti
     })
 }
 
-/// Throws what is wanted into the worm.
+/// Draws the hidden effect and puts it into the worm.
 fn hide(
     hidden: Hidden,
     deviations: &mut Deviations,
@@ -276,7 +276,7 @@ fn hide(
 
 type SteepestRuns = (Vec<f64>, Vec<SimulatedRun>, Vec<SimulatedRun>);
 
-/// Plays every run on the steepest of its slopes on which the worm crawls with what is hidden in it and without.
+/// Simulates every run on the steepest of its slopes on which the worm crawls with what is hidden in it and without.
 fn crawl_steepest(worm: &Worm, has_effect: bool, scenes: &mut [Scene], steepest_deg: f64) -> Option<SteepestRuns> {
     let steep = [45.0, 40.0, 35.0, 25.0, 18.0];
     let choices: [&[f64]; 3] = [&[0.0], &[30.0, 20.0, 12.0], &steep];
@@ -305,10 +305,10 @@ fn crawl_steepest(worm: &Worm, has_effect: bool, scenes: &mut [Scene], steepest_
     Some(all)
 }
 
-/// Plays a run.
+/// Simulates a run.
 ///
 /// # Errors
-/// [`CrawlFailed`] when the worm slides down or hardly gets on.
+/// [`CrawlFailed`] when the worm slides down or hardly advances.
 pub fn crawl(worm: &Worm, scene: &Scene) -> Result<SimulatedRun, CrawlFailed> {
     let simulated = scene.simulate(worm)?;
     let advances_m = advances_m(&simulated);

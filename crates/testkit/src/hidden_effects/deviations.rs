@@ -1,4 +1,4 @@
-//! How each effect of the library enters the truth.
+//! How each effect of the library enters the true worm.
 
 use super::CELLS;
 
@@ -10,7 +10,7 @@ pub struct Patch {
     pub friction_factor: f64,
 }
 
-/// What differs from the worm that is believed in. The default differs in nothing.
+/// How a worm differs from the nominal one. The default does not.
 #[derive(Debug, Clone)]
 pub struct Deviations {
     /// Friction force of each cell over what it would be.
@@ -23,7 +23,7 @@ pub struct Deviations {
     pub static_over_kinetic: f64,
     /// β of the pad's force k δ (1 + β (δ / 1.75 mm)²).
     pub hardening: f64,
-    /// Stiffness of the Maxwell branch beside the pad's spring, as a share of the spring's.
+    /// Stiffness of the Maxwell branch beside the pad's spring, as a fraction of the spring's.
     pub creep_share: f64,
     /// Time constant of that branch, s.
     pub creep_s: f64,
@@ -37,11 +37,11 @@ pub struct Deviations {
     pub mass_kg: f64,
     /// Slope more than was stated, degrees, on every run.
     pub angle_deg: f64,
-    /// Force that grows with the way since the run's start, N/m.
+    /// Force that grows with the displacement since the run's start, N/m.
     pub tether_n_per_m: f64,
     /// Stroke of each cell over what it would be.
     pub stroke_factor: [f64; CELLS],
-    /// How far a cell stands off from its place in the body for each newton of its contact force, m/N.
+    /// Compliance of the drive: displacement of a cell for each newton of its contact force, m/N.
     pub compliance_m_per_n: f64,
     /// Play between drive and cell, m.
     pub play_m: f64,

@@ -1,6 +1,6 @@
-//! The 22 effects of the library, by the names that they have everywhere, and how strongly each is thrown.
+//! The 22 effects of the library, by name, and the range from which the strength of each is drawn.
 //!
-//! Severities are log-uniform between two ends, from what nobody can see to what nobody can overlook; a [`SeverityRange`] narrows
+//! Severities are log-uniform between two ends, from what cannot be seen to what cannot be overlooked; a [`SeverityRange`] narrows
 //! that to a part of the logarithm.
 
 use super::CELLS;
@@ -31,7 +31,7 @@ impl TrueEffect {
     }
 }
 
-/// A part of the range of severities, as shares of its logarithm.
+/// A part of the range of severities, as fractions of its logarithm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeverityRange {
     pub from: f64,
@@ -119,7 +119,7 @@ impl Effect {
         Self::ALL.iter().copied().find(|effect| effect.name() == name)
     }
 
-    /// What it belongs to; effects of different classes do not look alike.
+    /// Its class; effects of different classes do not look alike.
     pub fn class(self) -> &'static str {
         match self {
             Self::UnequalClamping | Self::UnequalStiffness => "one pad",
@@ -138,12 +138,12 @@ impl Effect {
         }
     }
 
-    /// Whether it can be seen only beside the cam's own phase.
+    /// Whether it can be seen only if the cam's phase is recorded.
     pub fn needs_phase(self) -> bool {
         matches!(self, Self::SensorLatency | Self::MotorDroop | Self::Backlash)
     }
 
-    /// Throws how strong it is and where, and puts it into the worm.
+    /// Draws its strength and its cell, and puts it into the worm.
     pub fn hide(self, range: SeverityRange, deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
         let cell = rng.random_range(0..CELLS);
         let mut of_cell = None;
@@ -202,7 +202,7 @@ impl Effect {
                 vec![("angle_deg", deviations.angle_deg)]
             }
             Self::TetherDrag => {
-                // The force at the end of the level run, over the way that a worm makes there.
+                // The force at the end of the level run, over the distance that a worm crawls there.
                 deviations.tether_n_per_m = range.severity(0.05, 1.0, rng) / LEVEL_DISTANCE_M;
                 vec![("force_per_distance_n_per_m", deviations.tether_n_per_m)]
             }
@@ -268,17 +268,17 @@ impl Effect {
     }
 }
 
-/// Way of a worm on the level in twelve cycles, m.
+/// Distance that a worm crawls on the level in twelve cycles, m.
 const LEVEL_DISTANCE_M: f64 = 0.080;
 
-/// Shortens the stroke of every cell; returns the share that is lost.
+/// Shortens the stroke of every cell; returns the fraction that is lost.
 pub fn shorten_every_stroke(range: SeverityRange, deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> f64 {
     let fraction = range.severity(0.04, 0.15, rng);
     deviations.stroke_factor = [1.0 - fraction; CELLS];
     fraction
 }
 
-/// Makes every pad softer and weaker by the same factor, which no position can tell from a payload.
+/// Makes every pad softer and weaker by the same factor, which positions cannot distinguish from a payload.
 pub fn soften(deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
     let factor = rng.random_range(0.68..0.82);
     deviations.stiffness_factor = [factor; CELLS];

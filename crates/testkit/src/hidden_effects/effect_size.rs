@@ -1,4 +1,4 @@
-//! What a hidden effect does to the positions: the same worm under the same dice with it and without.
+//! What a hidden effect does to the positions: the same worm from the same random draws, with it and without.
 
 use super::CELLS;
 use super::scene::SimulatedRun;
@@ -69,13 +69,13 @@ fn whole_cycles(simulated: &SimulatedRun) -> impl Iterator<Item = f64> {
 }
 
 impl SimulatedRun {
-    /// Sample before a phase, and the share of the way to the next.
+    /// Sample before a phase, and the fraction of the interval to the next.
     fn place(&self, phase: f64) -> (usize, f64) {
         let after = self.phase.partition_point(|&earlier| earlier <= phase);
         let row = after.saturating_sub(1).min(self.phase.len() - 2);
-        let way = self.phase[row + 1] - self.phase[row];
-        let fraction = if way > 0.0 {
-            (phase - self.phase[row]) / way
+        let interval = self.phase[row + 1] - self.phase[row];
+        let fraction = if interval > 0.0 {
+            (phase - self.phase[row]) / interval
         } else {
             0.0
         };

@@ -1,4 +1,4 @@
-//! One more run of the same worm under another condition: the experiment that an answer proposes.
+//! A follow-up run of the same worm under another condition: the experiment that an answer proposes.
 
 use super::body::Placement;
 use super::campaign::{HiddenCampaign, SLOPE_SIGMA_DEG, crawl};
@@ -17,7 +17,7 @@ pub struct Condition {
     pub cycle_s: f64,
     /// Extra mass, weighed, kg.
     pub payload_kg: f64,
-    /// How much further along the canal the worm is laid down, m.
+    /// How much further up the canal the worm starts, m.
     pub start_shift_m: f64,
     /// Gait cycles.
     pub cycles: f64,
@@ -45,7 +45,7 @@ impl HiddenCampaign {
         }
     }
 
-    /// One more run of the same worm, what is hidden in it included, from rest, with dice of its own.
+    /// One more run of the same worm, what is hidden in it included, from rest, with random draws of its own.
     ///
     /// # Errors
     /// [`CrawlFailed`] when the worm does not crawl under the condition.

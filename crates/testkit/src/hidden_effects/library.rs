@@ -1,4 +1,4 @@
-//! The library's own search, asked as its user would ask it, and its answer as far as it is scored.
+//! The library's own search, called as its user would, and the scored part of its answer.
 
 use super::assessment::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict};
 use super::campaign::HiddenCampaign;
@@ -20,8 +20,8 @@ impl Explainer for Library {
     }
 }
 
-/// Has the library explain the runs of a campaign and those that were proposed. A case on which it panics is one more case
-/// without an answer, and not the end of the others.
+/// Has the library explain the runs of a campaign and those that were proposed. A case on which it panics counts
+/// as one without an answer.
 fn search(campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<explain::Answer, String> {
     let own = campaign.recordings.iter().zip(&campaign.slopes_deg);
     let own = own.map(|(recording, &slope_deg)| RecordedRun {
@@ -45,7 +45,7 @@ fn search(campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<explain::Answ
         .map_err(|problem| problem.to_string())
 }
 
-/// The library's answer as far as it is scored.
+/// The scored part of the library's answer.
 fn scored(answer: &explain::Answer, campaign: &HiddenCampaign) -> Answer {
     let first = answer.effects.first();
     Answer {
@@ -124,8 +124,8 @@ fn proposal(next: &explain::answer::NextExperiment, campaign: &HiddenCampaign) -
     })
 }
 
-/// How far up the canal the worm lay where the recording on a slope begins, m: a worm under way had crawled there, and a start
-/// further up is meant from there.
+/// How far up the canal the worm lay where the recording on a slope begins, m: a worm that was recorded from mid-crawl had crawled there,
+/// and a start further up counts from there.
 fn begun_m(campaign: &HiddenCampaign, slope_deg: f64) -> f64 {
     let repeated = campaign
         .slopes_deg

@@ -1,7 +1,7 @@
 //! The motor of one machine: how unevenly it turns its cam.
 //!
-//! What goes with the cam's angle, its load and its eccentricity, is the machine's and the same on every run; how the speed
-//! wanders is not.
+//! Variations with the cam's angle, from load and eccentricity, belong to the machine and are the same on every run; slow
+//! variations of the speed are not.
 
 use super::drive::Drive;
 use crate::random::log_uniform;
@@ -9,16 +9,16 @@ use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// What a motor has of its own.
+/// The unevenness of one motor.
 #[derive(Debug, Clone)]
 pub struct Motor {
-    /// Share by which its speed swings once for each step.
+    /// Fraction by which its speed varies once for each step.
     swing_per_step: f64,
-    /// Share by which it swings once for each turn of the cam.
+    /// Fraction by which it varies once for each turn of the cam.
     swing_per_turn: f64,
-    /// Where both swings begin, rad.
+    /// Phase angles of both variations, rad.
     angles_rad: [f64; 2],
-    /// Share by which it wanders slowly.
+    /// Fraction by which it varies slowly.
     wander: f64,
     /// Time from rest to full speed, s.
     ramp_s: f64,

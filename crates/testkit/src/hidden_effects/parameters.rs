@@ -1,4 +1,4 @@
-//! How a worm was made: everywhere near what is believed of it, nowhere quite.
+//! The true parameters of a worm: all near their nominal values, none exactly.
 
 use super::CELLS;
 use super::motor::Motor;
@@ -8,7 +8,7 @@ use crate::random::{about_one, log_uniform, shuffle};
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The worm's own figures, before anything is hidden in it.
+/// The worm's parameters, before an effect is hidden in it.
 #[derive(Debug, Clone)]
 pub struct WormParameters {
     /// Mass of the whole worm in equal shares, kg.
@@ -24,17 +24,17 @@ pub struct WormParameters {
     pub contact: Contact,
     /// Damping of the contacts; 1 is critical for the body on all its tips.
     pub damping_ratio: f64,
-    /// Share of a step in which the cam gets a cell to speed, and again in which it stops it.
+    /// Fraction of a step in which the cam accelerates a cell, and again in which it stops it.
     pub rounding: f64,
     pub motor: Motor,
-    /// Standard deviation of each tip's friction from cycle to cycle, as a share.
+    /// Standard deviation of each tip's friction from cycle to cycle, relative.
     pub scatter: f64,
     /// Cells from 0, in the order in which they step.
     pub step_order: [usize; CELLS],
 }
 
 impl WormParameters {
-    /// The worm that is believed in, on tips that do not give before they slide.
+    /// The nominal worm, on tips that do not yield before they slide.
     pub fn nominal() -> Self {
         Self {
             mass_kg: MASS_KG,
@@ -51,7 +51,7 @@ impl WormParameters {
         }
     }
 
-    /// A worm as one finds them.
+    /// A worm drawn at random.
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
         let nominal = Self::nominal();
         let friction = about_one(0.08, rng);
@@ -63,7 +63,7 @@ impl WormParameters {
                 .stiffness_n_per_m
                 .map(|n_per_m| n_per_m * stiffness * about_one(0.015, rng)),
             stroke_m: nominal.stroke_m * about_one(0.01, rng),
-            // Cells are said to sit "about 40 mm apart": their distance must not give a wrong ruler away.
+            // Cells are said to sit "about 40 mm apart": their distance must not reveal a wrong sensor scale.
             spacing_m: rng.random_range(0.036..0.044),
             contact: Contact::draw(rng),
             damping_ratio: 10f64.powf(rng.random_range(-1.0..0.0)),

@@ -15,17 +15,17 @@ use worm_analysis::recording::Recording;
 /// Time step of the integrator, s: below a hundredth of the fastest swing of a body on its tips.
 pub const STEP_S: f64 = 100e-6;
 
-/// The tips did not hold the worm, or the motor did not turn its cam.
+/// The tips did not hold the worm, or the motor did not turn the cam far enough.
 #[derive(Debug)]
 pub struct CrawlFailed;
 
-/// The noise of a camera.
+/// A camera whose noise is partly correlated in time.
 #[derive(Debug, Clone)]
 pub struct MotionCapture {
     pub camera: Camera,
-    /// Standard deviation of the part of the noise that lasts, m.
+    /// Standard deviation of the correlated part of the noise, m.
     pub drift_m: f64,
-    /// How long it lasts, s.
+    /// Its correlation time, s.
     pub drift_s: f64,
 }
 
@@ -39,7 +39,7 @@ impl MotionCapture {
         }
     }
 
-    /// A camera as one finds them.
+    /// A camera drawn at random.
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
         Self {
             camera: Camera {
@@ -58,13 +58,13 @@ pub struct Scene {
     pub placement: Placement,
     pub drive: Drive,
     pub capture: MotionCapture,
-    /// Gait cycles, not necessarily whole, before the camera is switched on; none: it sees the worm laid down.
+    /// Gait cycles, not necessarily whole, before the camera is switched on; 0: from the start at rest.
     pub warm_up_cycles: f64,
     /// Gait cycles in the recording.
     pub cycles: f64,
     /// Rest after each whole cycle, s.
     pub dwell_s: f64,
-    /// Cycle of the recording from which on a jump of the friction is there; infinite: never.
+    /// Cycle of the recording at which the friction jumps; infinite: never.
     pub jump_at_cycle: f64,
     /// Whether the cam's phase is recorded.
     pub with_phase: bool,
@@ -73,7 +73,7 @@ pub struct Scene {
     pub step_s: f64,
 }
 
-/// A run as it was recorded and as it was.
+/// A run as recorded, and its truth.
 #[derive(Debug, Clone)]
 pub struct SimulatedRun {
     pub recording: Recording,
@@ -104,10 +104,10 @@ impl Scene {
         }
     }
 
-    /// Plays the run.
+    /// Simulates the run.
     ///
     /// # Errors
-    /// [`CrawlFailed`] when the worm does not hold on the slope or the motor never gets on.
+    /// [`CrawlFailed`] when the worm does not hold on the slope or the motor does not reach its last phase.
     pub fn simulate(&self, worm: &Worm) -> Result<SimulatedRun, CrawlFailed> {
         let from_phase = self.drive.first_phase + self.warm_up_cycles;
         let to_phase = from_phase + self.cycles;
@@ -134,15 +134,15 @@ impl Scene {
             let going = cam.phase < to_phase;
             self.step(&mut motion, &mut cam, worm, &scatter, from_phase)?;
             let ended_s = motion.time_s() - origin_s;
-            let share_at = |time_s: f64| (time_s - begun_s) / (ended_s - begun_s);
+            let fraction_at = |time_s: f64| (time_s - begun_s) / (ended_s - begun_s);
             while going && recorder.position_m[0].len() as f64 / rate_hz < ended_s {
-                let fraction = share_at(recorder.position_m[0].len() as f64 / rate_hz);
-                recorder.see(std::array::from_fn(|cell| {
+                let fraction = fraction_at(recorder.position_m[0].len() as f64 / rate_hz);
+                recorder.record(std::array::from_fn(|cell| {
                     before_m[cell] + fraction * (motion.position_m[cell] - before_m[cell])
                 }));
             }
             while latency_s + recorder.phase.len() as f64 / rate_hz < ended_s {
-                let fraction = share_at(latency_s + recorder.phase.len() as f64 / rate_hz);
+                let fraction = fraction_at(latency_s + recorder.phase.len() as f64 / rate_hz);
                 recorder.phase.push(before + fraction * (cam.phase - before));
             }
         }
@@ -215,12 +215,12 @@ impl<'a> CamRotation<'a> {
     }
 }
 
-/// What the camera takes.
+/// What the camera records.
 struct Recorder {
     sampler: CameraSampler,
     rng: Xoshiro256PlusPlus,
-    /// What is left of a lasting error after one sample, and what is new in it, m.
-    lasting: (f64, f64),
+    /// Of the correlated noise: the factor from one sample to the next, and the standard deviation of what is added, m.
+    correlated: (f64, f64),
     error_m: [f64; CELLS],
     scale: f64,
     phase: Vec<f64>,
@@ -237,7 +237,7 @@ impl Recorder {
         Self {
             sampler: CameraSampler::new(capture.camera.clone(), CELLS, scene.seed.rotate_left(32)),
             rng,
-            lasting: (kept, capture.drift_m * (1.0 - kept * kept).sqrt()),
+            correlated: (kept, capture.drift_m * (1.0 - kept * kept).sqrt()),
             error_m,
             scale,
             phase: Vec::new(),
@@ -246,14 +246,14 @@ impl Recorder {
         }
     }
 
-    fn see(&mut self, position_m: [f64; CELLS]) {
+    fn record(&mut self, position_m: [f64; CELLS]) {
         let time_s = self.sampler.next_s();
         for (cell, position_m) in position_m.into_iter().enumerate() {
-            let (kept, fresh_m) = self.lasting;
+            let (kept, added_m) = self.correlated;
             let measured_m = self.scale * position_m;
-            self.error_m[cell] = kept * self.error_m[cell] + fresh_m * normal(&mut self.rng);
+            self.error_m[cell] = kept * self.error_m[cell] + added_m * normal(&mut self.rng);
             self.position_m[cell].push(measured_m);
-            self.seen_m[cell].push(self.sampler.see(cell, time_s, measured_m + self.error_m[cell]));
+            self.seen_m[cell].push(self.sampler.measure(cell, time_s, measured_m + self.error_m[cell]));
         }
     }
 

@@ -1,5 +1,5 @@
-//! Which cases are run: a development split to tune on and a sealed test split, from disjoint ranges of seeds, and the few that
-//! the tests of the search run in small.
+//! The cases: a development split to tune on and a sealed test split, from disjoint ranges of seeds, and the few that the tests of
+//! the search run at a smaller size.
 
 use super::campaign::{Hidden, HiddenCampaign, Twin, draw};
 use super::effect::{Effect, SeverityRange};
@@ -11,7 +11,7 @@ pub enum Split {
     Development,
     /// To be run once they are frozen.
     Test,
-    /// What `tests/explain_search.rs` runs in small.
+    /// What `tests/analysis/search.rs` runs at a smaller size.
     Search,
 }
 
@@ -47,7 +47,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// Every word that [`what`](Self::what) may be.
+    /// All values of [`what`](Self::what).
     pub fn words() -> impl Iterator<Item = &'static str> {
         let others = ["clean", "outside", "pair", "twin"];
         Effect::ALL.iter().map(|effect| effect.name()).chain(others)
@@ -97,7 +97,7 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
         let severities = count(SEVERITIES);
         for number in 0..severities {
             let hidden = Hidden::Single(effect, SeverityRange::part(number, severities));
-            // The seed tells the severities of different scales apart.
+            // Severities of different scales get different seeds.
             push(hidden, seed(group, 30 * severities + number));
         }
     }
@@ -112,10 +112,10 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
     cases
 }
 
-/// The scale that `WORMD_CASES` asks for, 1 where it does not say.
+/// The scale that `WORMD_CASES` gives, 1 where it is not set.
 ///
 /// # Panics
-/// When it says something that is no positive number.
+/// When it is no number above 0 and up to 7.
 pub fn scale_from_environment() -> f64 {
     let Ok(hidden) = std::env::var("WORMD_CASES") else {
         return 1.0;

@@ -1,4 +1,4 @@
-//! Many judgements in one table, each share with its Wilson interval and what is aimed at.
+//! Many assessments in one table: proportions with their Wilson intervals, medians, and the targets.
 
 use super::assessment::{Assessment, Verdict};
 use super::campaign::CampaignKind;
@@ -10,7 +10,7 @@ const DETECTABLE_SIGMA: f64 = 5.0;
 /// Of the normal distribution, for intervals of 95 %.
 const Z: f64 = 1.96;
 
-/// How many of how many.
+/// A proportion: hits among a number of cases.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Proportion {
     pub hits: usize,
@@ -18,7 +18,7 @@ pub struct Proportion {
 }
 
 impl Proportion {
-    /// Counts what is true among what applies.
+    /// Counts the true ones among those that are not `None`.
     pub fn count(each: impl Iterator<Item = Option<bool>>) -> Self {
         each.flatten().fold(Self::default(), |fraction, hit| Self {
             hits: fraction.hits + usize::from(hit),
@@ -26,7 +26,7 @@ impl Proportion {
         })
     }
 
-    /// Wilson's 95 % interval for the share; all from 0 to 1 where there is nothing to count.
+    /// Wilson's 95 % interval; 0 to 1 where there is nothing to count.
     pub fn wilson(self) -> [f64; 2] {
         if self.of == 0 {
             return [0.0, 1.0];
@@ -55,7 +55,7 @@ impl fmt::Display for Proportion {
     }
 }
 
-/// The whole of the scores.
+/// All scores.
 #[derive(Debug)]
 pub struct ScoreTable<'a>(pub &'a [Assessment]);
 
@@ -70,7 +70,7 @@ impl ScoreTable<'_> {
             .filter(|assessment| assessment.significance_sigma >= DETECTABLE_SIGMA)
     }
 
-    /// Every share: what it is of, itself, and what is aimed at.
+    /// Every proportion: its name, its value and its target.
     pub fn fractions(&self) -> Vec<(&'static str, Proportion, &'static str)> {
         let abstains =
             |assessment: &Assessment| Some(matches!(assessment.verdict, Verdict::Nothing | Verdict::Outside));
@@ -168,7 +168,7 @@ impl ScoreTable<'_> {
         ]
     }
 
-    /// Every median: what it is of, itself with the count, and what is aimed at.
+    /// Every median: its name, its value, the number of cases and the target.
     pub fn medians(&self) -> [(&'static str, Option<f64>, usize, &'static str); 3] {
         let of = |value: fn(&Assessment) -> Option<f64>| {
             let mut values: Vec<f64> = self.detectable().filter_map(value).collect();
@@ -187,7 +187,7 @@ impl ScoreTable<'_> {
     /// Writes a row for every case.
     ///
     /// # Errors
-    /// What the writer says.
+    /// When `to` cannot be written.
     pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
         let mut out = csv::Writer::from_writer(to);
         out.write_record([
@@ -255,8 +255,8 @@ impl fmt::Display for ScoreTable<'_> {
             writeln!(out, "{what:<32} {:<28} {aim}", fraction.to_string())?;
         }
         for (what, median, of, aim) in self.medians() {
-            let told = median.map_or("none".to_owned(), |median| format!("{:.1} % of {of}", 100.0 * median));
-            writeln!(out, "{what:<32} {told:<28} {aim}")?;
+            let value = median.map_or("none".to_owned(), |median| format!("{:.1} % of {of}", 100.0 * median));
+            writeln!(out, "{what:<32} {value:<28} {aim}")?;
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 //! The pad between cell and tip is a spring with a damper beside it, and with what may be hidden in it: a cubic part, a
 //! Maxwell branch, elements that yield. The tip itself has no mass and holds to the canal by the friction law that was drawn
 //! for the worm ([`contact`]). Without mass the forces of pad and contact are equal at every moment; with the pad taken
-//! linear over a time step, each law solves that for the tip's way at the step's end.
+//! linear over a time step, each law solves that for the tip's displacement at the end of the step.
 
 pub mod bristle;
 pub mod contact;
@@ -17,11 +17,12 @@ use bristle::TipLoad;
 use contact::Contact;
 use weakening::FrictionState;
 
-/// How many elements the yielding share of a pad is made of.
+/// Number of elements of the yielding part of a pad.
 const ELEMENTS: usize = 16;
 /// Deformation at which the pad's cubic part equals β times its linear part, m.
 const HARDENING_M: f64 = 1.75e-3;
-/// What a pad and its tip are made of.
+
+/// Parameters of a pad and its tip.
 #[derive(Debug, Clone)]
 pub struct Pad {
     pub stiffness_n_per_m: f64,
@@ -46,14 +47,14 @@ impl Pad {
     }
 }
 
-/// Friction limits of the moment, N, without what rest adds.
+/// Kinetic friction limits at this time, N.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     pub forward_n: f64,
     pub backward_n: f64,
 }
 
-/// How one tip stands.
+/// State of one tip.
 #[derive(Debug, Clone)]
 pub struct Tip {
     /// Where it touches the canal, m.
@@ -70,7 +71,7 @@ pub struct Tip {
 }
 
 impl Tip {
-    /// A tip laid down without load.
+    /// A tip placed on the canal without load.
     pub fn laid_down(place_m: f64) -> Self {
         Self {
             place_m,

@@ -1,11 +1,11 @@
-//! Effects that no library names: the right answer to them is to name none.
+//! Effects that are not in the library: the right answer is to name none.
 
 use super::CELLS;
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Something that the library does not know.
+/// An effect that is not in the library.
 #[derive(Debug, Clone)]
 pub enum UnmodelledEffect {
     /// A corrugated canal pushes each cell to and fro.
@@ -20,9 +20,9 @@ pub enum UnmodelledEffect {
         period_cycles: f64,
         angle_rad: f64,
     },
-    /// A weak elastic pull towards a place ahead, which gives way further out.
+    /// A weak elastic pull towards a place ahead, which fades further out.
     Anchor { place_m: f64, reach_m: f64, force_n: f64 },
-    /// A wave on the cam's profile, of its own height for each cell, as a share of the stroke.
+    /// A wave on the cam's profile, of its own height for each cell, as a fraction of the stroke.
     ProfileError { wave_share: [f64; CELLS] },
     /// A bump in the canal that pushes each cell back as it passes.
     Obstacle { place_m: f64, force_n: f64 },
@@ -32,11 +32,11 @@ pub enum UnmodelledEffect {
 
 /// Width of an obstacle: twice the standard deviation of its Gaussian, m.
 const OBSTACLE_M: f64 = 5e-3;
-/// How many kinds there are.
+/// Number of kinds.
 pub const KINDS: u64 = 6;
 
 impl UnmodelledEffect {
-    /// One of the [`KINDS`], its figures thrown.
+    /// One of the [`KINDS`], its parameters drawn at random.
     pub fn draw(kind: u64, rng: &mut Xoshiro256PlusPlus) -> Self {
         match kind % KINDS {
             0 => Self::Corrugation {
@@ -61,7 +61,7 @@ impl UnmodelledEffect {
                 }),
             },
             4 => Self::Obstacle {
-                // Where some cell passes on every slope: the first cell begins at 0 and goes on for 20 mm at least.
+                // Where some cell passes on every slope: the first cell starts at 0 and advances by 20 mm at least.
                 place_m: rng.random_range(0.003..0.018),
                 force_n: rng.random_range(0.5..1.5),
             },
@@ -132,22 +132,22 @@ impl UnmodelledEffect {
         }
     }
 
-    /// Force on the worm that has gone so far since the run's start, N, backward.
-    pub fn on_worm_n(&self, gone_m: f64) -> f64 {
+    /// Force on the worm at a displacement since the run's start, N, backward.
+    pub fn on_worm_n(&self, displacement_m: f64) -> f64 {
         match *self {
             Self::Anchor {
                 place_m,
                 reach_m,
                 force_n,
             } => {
-                let away = (gone_m - place_m) / reach_m;
+                let away = (displacement_m - place_m) / reach_m;
                 force_n * away * (0.5 * (1.0 - away * away)).exp()
             }
             _ => 0.0,
         }
     }
 
-    /// Friction over what it would be, so many cycles after the run's start; `jumped` once a jump is due.
+    /// Factor on the friction, so many cycles after the run's start; `jumped` after the friction has jumped.
     pub fn friction_factor(&self, cycles: f64, jumped: bool) -> f64 {
         match *self {
             Self::FrictionSwing {

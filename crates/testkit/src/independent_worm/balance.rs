@@ -1,6 +1,6 @@
 //! The true energy balance of an independent worm.
 
-/// Sums since the worm was laid down. A difference of two is the balance between them.
+/// Sums since the start. A difference of two is the balance between them.
 #[derive(Debug, Clone)]
 pub struct TrueBalance {
     /// Mean position of the cells, m.

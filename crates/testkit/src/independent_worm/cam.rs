@@ -1,4 +1,4 @@
-//! What moves the worm: the cam, and the motor that turns it unevenly.
+//! The drive: the cam, and the motor that turns it unevenly.
 
 use std::f64::consts::TAU;
 
@@ -8,8 +8,8 @@ pub struct Cam {
     pub stroke_m: f64,
     /// Cells counted from 0, in the order in which they step.
     pub step_order: Vec<usize>,
-    /// Share of a step in which a cell gets to speed, and again in which it stops, below 0.5: no cam has sharp corners. The
-    /// cells do not overlap; two that moved at once would cost a part of the advance.
+    /// Fraction of a step in which a cell accelerates, and again in which it stops, below 0.5: no cam has sharp corners. Steps do
+    /// not overlap; two cells that moved at once would cost a part of the advance.
     pub rounding: f64,
 }
 
@@ -36,7 +36,7 @@ impl Cam {
         }
     }
 
-    /// Share of its way that a cell has done so many steps after its own began: even acceleration, speed and braking.
+    /// Fraction of its stroke that a cell has made so many steps after its own began: constant acceleration, speed and braking.
     fn fraction(&self, steps: f64) -> f64 {
         let rounding = self.rounding;
         if steps >= 1.0 {
@@ -56,13 +56,13 @@ impl Cam {
 pub struct Drive {
     /// Time of a gait cycle at the mean speed, s.
     pub cycle_s: f64,
-    /// Share by which the speed swings once for each step.
+    /// Fraction by which the speed varies once for each step.
     pub swing_per_step: f64,
-    /// Share by which it swings once for each turn of the cam.
+    /// Fraction by which it varies once for each turn of the cam.
     pub swing_per_turn: f64,
-    /// Share by which it wanders slowly.
+    /// Fraction by which it varies slowly.
     pub wander: f64,
-    /// Where swings and wandering begin, rad: two swings, three slow waves.
+    /// Phase angles of the variations, rad: by step, by turn, and three slow waves.
     pub angles_rad: [f64; 5],
     /// Time from rest to full speed and back, s.
     pub ramp_s: f64,
@@ -77,7 +77,7 @@ pub struct Drive {
 /// Frequencies of the slow waves, Hz: no two of them in step.
 const WANDER_HZ: [f64; 3] = [0.071, 0.193, 0.417];
 
-/// Share of the mean speed at which a braking motor creeps to its last phase, so that it gets there.
+/// Fraction of the mean speed at which a braking motor reaches its last phase.
 const CREEP: f64 = 0.01;
 
 impl Drive {

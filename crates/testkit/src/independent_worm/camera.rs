@@ -1,31 +1,31 @@
-//! The camera that watches the worm, and how poorly it sees.
+//! The camera that watches the worm, with its errors.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// How the worm is watched.
+/// Parameters of the camera.
 #[derive(Debug, Clone)]
 pub struct Camera {
     pub rate_hz: f64,
-    /// Share of the sample time by which each sample comes early or late; its time is told truly. Below 0.5.
+    /// Jitter: fraction of the sample time by which each sample comes early or late; its recorded time is true. Below 0.5.
     pub jitter: f64,
     /// Standard deviation of a position, m.
     pub noise_m: f64,
-    /// Share of single positions not seen.
+    /// Fraction of single positions that are not seen.
     pub dropout_share: f64,
-    /// Share of the time in which a cell is hidden for a while.
+    /// Fraction of the time in which a cell is hidden for a while.
     pub hidden_fraction: f64,
     /// For how long, s.
     pub hidden_s: f64,
-    /// Share of positions that are far off.
+    /// Fraction of positions that are outliers.
     pub outlier_fraction: f64,
-    /// How far, m, either way.
+    /// Error of an outlier, m, of either sign.
     pub outlier_m: f64,
 }
 
 impl Default for Camera {
-    /// The camera that the accuracy is promised for.
+    /// The camera for which the accuracy is specified.
     fn default() -> Self {
         Self {
             rate_hz: 120.0,
@@ -51,7 +51,7 @@ impl Camera {
     }
 }
 
-/// The camera at work.
+/// Samples positions as the camera sees them.
 pub struct CameraSampler {
     camera: Camera,
     rng: Xoshiro256PlusPlus,
@@ -81,8 +81,8 @@ impl CameraSampler {
         time_s
     }
 
-    /// What the camera says of a cell that stands at `position_m`; `NaN` where it does not see it.
-    pub fn see(&mut self, cell: usize, time_s: f64, position_m: f64) -> f64 {
+    /// Measured position of a cell that is at `position_m`; `NaN` where the camera does not see it.
+    pub fn measure(&mut self, cell: usize, time_s: f64, position_m: f64) -> f64 {
         let Camera {
             rate_hz,
             hidden_fraction,

@@ -1,4 +1,4 @@
-//! Worms drawn at random, and only such as crawl.
+//! Worms drawn at random that crawl.
 
 use super::body::Body;
 use super::cam::{Cam, Drive};
@@ -10,13 +10,13 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Least advance of a drawn worm, m for each cycle.
+/// Smallest advance of a drawn worm, m for each cycle.
 const MIN_ADVANCE_M: f64 = 1e-3;
-/// Draws after which the ranges are to blame.
+/// Draws after which the ranges must be wrong.
 const MAX_DRAWS: usize = 1000;
 
-/// A worm and a motor drawn at random that crawl on every one of the slopes, as one scene for each slope; the dice of the
-/// motor and of the camera are thrown anew on each. Starts from rest, twelve cycles, the promised camera.
+/// A worm and a motor drawn at random that crawl on every one of the slopes, as one scene for each slope; motor and
+/// camera get random draws of their own on each. From rest, twelve cycles, the default camera.
 pub fn crawling(cells: usize, slopes_deg: &[f64], seed: u64) -> Vec<Scene> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     for _ in 0..MAX_DRAWS {
@@ -64,7 +64,7 @@ fn uneven_motor(cycle_s: f64, rng: &mut Xoshiro256PlusPlus) -> Drive {
     }
 }
 
-/// Whether a worm holds on and advances in every cycle, its first settling apart.
+/// Whether a worm holds and advances in every cycle after the first.
 fn crawls(scene: &Scene) -> bool {
     if !scene.body.holds() {
         return false;

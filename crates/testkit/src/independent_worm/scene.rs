@@ -1,4 +1,4 @@
-//! One recording in the making: a worm, its motor, and the camera.
+//! How one recording is made: a worm, its motor, and the camera.
 
 use super::body::{Body, Motion};
 use super::cam::{Cam, Drive};
@@ -24,7 +24,7 @@ pub struct Scene {
     pub cam: Cam,
     pub drive: Drive,
     pub camera: Camera,
-    /// Gait cycles, not necessarily whole, before the camera is switched on; none: it sees the worm laid down.
+    /// Gait cycles, not necessarily whole, before the camera is switched on; 0: from the start at rest.
     pub warm_up_cycles: f64,
     /// Gait cycles in the recording.
     pub cycles: f64,
@@ -36,7 +36,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Twelve cycles of a given worm with an even motor and a perfect camera, seen from the moment it is laid down.
+    /// Twelve cycles of a given worm with an even motor and a perfect camera, recorded from the start.
     pub fn ideal(body: Body, cycle_s: f64) -> Self {
         let cells = body.cells();
         Self {
@@ -52,7 +52,7 @@ impl Scene {
         }
     }
 
-    /// Plays the scene: the recording, with the gait phase, and what truly happened.
+    /// Simulates the scene: the recording, with the gait phase, and what truly happened.
     ///
     /// # Errors
     /// [`SlidDown`] when the worm does not hold on the slope.
@@ -93,7 +93,7 @@ impl Scene {
                 truth.push(now_s + self.step_s, phase, motion.balance.clone());
                 break;
             }
-            assert!(now_s < timeout_s, "the motor does not get on: {drive:?}");
+            assert!(now_s < timeout_s, "the motor does not reach its last phase: {drive:?}");
             let before_m = motion.position_m.clone();
             let next_phase = self.step(&drive, phase, &mut motion)?;
             let next_s = motion.time_s() - origin_s;
@@ -104,7 +104,7 @@ impl Scene {
                 for (cell, &before) in before_m.iter().enumerate() {
                     let position_m = before + fraction * (motion.position_m[cell] - before);
                     truth.sample_position_m[cell].push(position_m);
-                    recording.position_m[cell].push(sampler.see(cell, sample_s, position_m));
+                    recording.position_m[cell].push(sampler.measure(cell, sample_s, position_m));
                 }
                 sample_s = sampler.next_s();
             }

@@ -1,4 +1,4 @@
-//! An analysis held against the truth.
+//! An analysis compared with the truth.
 
 use super::balance::TrueBalance;
 use super::truth::Truth;
@@ -14,7 +14,7 @@ pub struct EnergyError {
     pub worst_percent: f64,
 }
 
-/// What an analysis found, and how wrong it is.
+/// What an analysis found, and its errors.
 #[derive(Debug, Clone)]
 pub struct Score {
     pub case: String,
@@ -34,7 +34,7 @@ pub struct Score {
     /// Its standard error, in percent.
     pub mass_sigma_percent: Option<f64>,
     pub order_is_right: bool,
-    /// Whether the analysis took the worm to have been laid down where the recording begins.
+    /// Whether the analysis took the worm to be undeformed and at rest where the recording begins.
     pub laid_down: bool,
     /// Largest distance of a cycle's start from where it truly begins, cycles.
     pub phase_error: f64,
@@ -42,20 +42,20 @@ pub struct Score {
     pub true_cycles: usize,
 }
 
-/// What is asked of an analysis.
+/// Limits that an analysis must keep.
 #[derive(Debug, Clone, Copy)]
 pub struct Tolerances {
     pub bound_m: f64,
     pub energy_percent: f64,
     pub advance_m: f64,
     pub mass_percent: f64,
-    /// How far the phase at which a cycle is said to begin may be off, cycles.
+    /// Error of the phase at which a cycle begins, cycles.
     pub phase_cycles: f64,
     /// Cycles of the recording that need not be settled.
     pub lost_cycles: usize,
 }
 
-/// What the accuracy is promised to be.
+/// The specified accuracy.
 pub const TOLERANCES: Tolerances = Tolerances {
     bound_m: 1e-4,
     energy_percent: 3.0,
@@ -146,7 +146,7 @@ impl Score {
         found.zip(&self.true_m).map(|(found, truly)| found - truly)
     }
 
-    /// What was promised and is not kept, but for the bounds.
+    /// The limits that are exceeded, but for those on the deformations.
     pub fn violations_beside_bounds(&self, tolerances: Tolerances) -> Vec<String> {
         let mut violations = Vec::new();
         let mut hold = |kept: bool, what: String| {
@@ -188,7 +188,7 @@ impl Score {
         violations
     }
 
-    /// What was promised and is not kept.
+    /// The limits that are exceeded.
     pub fn violations(&self, tolerances: Tolerances) -> Vec<String> {
         let mut violations = self.violations_beside_bounds(tolerances);
         for (cell, error_m) in self.errors_m().enumerate() {
@@ -238,7 +238,7 @@ impl fmt::Display for Score {
     }
 }
 
-/// What stands above rows of scores.
+/// Header above rows of scores.
 pub const HEADER: &str = "case, slope | true bounds, mm | found | sigma | worst error, mm | energy errors %: (11), (13) net, (13) positive, mean (worst cycle) | advance error, mm | mass % | order | begins | settled";
 
 /// The value farthest from 0, sign kept; `NaN` if any is.

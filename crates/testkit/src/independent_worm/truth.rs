@@ -12,7 +12,7 @@ pub struct TrueCycle {
     pub balance: TrueBalance,
 }
 
-/// Everything there is to know of a recording.
+/// Everything that is known about a recording.
 #[derive(Debug, Clone)]
 pub struct Truth {
     /// Largest deformation of each tip, m, forward.
@@ -25,7 +25,7 @@ pub struct Truth {
     pub cycles: Vec<TrueCycle>,
     /// Phase at each sample of the recording, cycles.
     pub sample_phase: Vec<f64>,
-    /// Position at each sample before the camera spoilt it, m: `[cell][sample]`.
+    /// Position at each sample before the camera's errors, m: `[cell][sample]`.
     pub sample_position_m: Vec<Vec<f64>>,
     /// Energy in springs and motion at the first and the last row, J.
     pub stored_j: [f64; 2],
@@ -35,7 +35,7 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Nothing has happened yet.
+    /// The truth before the first row.
     pub fn beginning(body: &Body, cam: &Cam) -> Self {
         Self {
             max_deformation_m: body.forward_bound_m.clone(),
@@ -52,14 +52,14 @@ impl Truth {
         }
     }
 
-    /// Keeps how things stand; times must grow.
+    /// Adds a row; times must increase.
     pub fn push(&mut self, time_s: f64, phase: f64, balance: TrueBalance) {
         self.time_s.push(time_s);
         self.phase.push(phase);
         self.balances.push(balance);
     }
 
-    /// What happened between two times of the recording, s.
+    /// Balance between two times of the recording, s.
     pub fn over(&self, start_s: f64, end_s: f64) -> TrueBalance {
         let at = |time_s: f64| {
             let (row, fraction) = place(&self.time_s, time_s);
@@ -74,7 +74,7 @@ impl Truth {
         self.phase[row] + fraction * (self.phase[row + 1] - self.phase[row])
     }
 
-    /// What happened over all of the recording.
+    /// Balance over the whole recording.
     pub fn overall(&self) -> TrueBalance {
         self.balances[self.balances.len() - 1].since(&self.balances[0])
     }
@@ -84,9 +84,9 @@ impl Truth {
     pub fn find_cycles(&mut self) {
         let (first, last) = (self.phase[0], self.phase[self.phase.len() - 1]);
         let between = |row: usize, phase: f64| {
-            let way = self.phase[row + 1] - self.phase[row];
-            let fraction = if way > 0.0 {
-                (phase - self.phase[row]) / way
+            let interval = self.phase[row + 1] - self.phase[row];
+            let fraction = if interval > 0.0 {
+                (phase - self.phase[row]) / interval
             } else {
                 0.0
             };
@@ -107,14 +107,18 @@ impl Truth {
     }
 }
 
-/// The row before a value in a series that does not fall, and how far on the way to the next row it lies; a value outside
-/// is taken to the nearer end.
+/// The row before a value in a series that does not fall, and which fraction of the interval to the next row; a value outside
+/// is clamped.
 fn place(series: &[f64], value: f64) -> (usize, f64) {
     let row = series
         .partition_point(|&entry| entry <= value)
         .clamp(1, series.len() - 1)
         - 1;
-    let way = series[row + 1] - series[row];
-    let fraction = if way > 0.0 { (value - series[row]) / way } else { 0.0 };
+    let interval = series[row + 1] - series[row];
+    let fraction = if interval > 0.0 {
+        (value - series[row]) / interval
+    } else {
+        0.0
+    };
     (row, fraction.clamp(0.0, 1.0))
 }

@@ -1,4 +1,4 @@
-//! Campaigns: several recordings of one worm on different slopes, listed in a TOML file; or, where nobody recorded positions, its
+//! Campaigns: several recordings of one worm on different slopes, listed in a TOML file; or, where no positions were recorded, its
 //! measured advances.
 
 use super::open::open_with_progress;
@@ -282,11 +282,11 @@ impl Reader<'_> {
             let (problem, remedy) = match &entry.advance_m {
                 Some(_) => (
                     "an advance without its standard error",
-                    "add advance_sigma_m, in m: nothing else tells a gap from chance",
+                    "add advance_sigma_m, in m: without it a gap cannot be told from chance",
                 ),
                 None => (
                     "a run without recording or advance",
-                    "give recording = \"FILE\", or advance_m and advance_sigma_m where nobody recorded positions",
+                    "give recording = \"FILE\", or advance_m and advance_sigma_m where no positions were recorded",
                 ),
             };
             return Err(self.invalid(entry.slope_deg.span(), problem, remedy));

@@ -40,7 +40,7 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
         } else {
             (
                 "holds no sample of the tracker",
-                "record a worm whose tracker works: `wormd check` tells",
+                "record a worm whose tracker works: see `wormd check`",
             )
         };
         nothing(path, problem, remedy)

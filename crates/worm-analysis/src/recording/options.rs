@@ -37,7 +37,7 @@ impl OpenOptions {
         let refuse = |problem: String, remedy| Err(ReadError::whole(path, problem, remedy));
         for (name, value) in [("--from", self.from_s), ("--to", self.to_s)] {
             if let Some(value) = value.filter(|value| !value.is_finite()) {
-                return refuse(format!("{name} {value} is no time"), "give seconds");
+                return refuse(format!("{name} {value} is not a time"), "give seconds");
             }
         }
         if let (Some(from_s), Some(to_s)) = (self.from_s, self.to_s)
@@ -50,7 +50,7 @@ impl OpenOptions {
         }
         if !(self.max_gap_s >= 0.0 && self.max_gap_s.is_finite()) {
             return refuse(
-                format!("--max-gap {} is no length of time", self.max_gap_s),
+                format!("--max-gap {} is not a duration", self.max_gap_s),
                 "give seconds, 0 or more",
             );
         }

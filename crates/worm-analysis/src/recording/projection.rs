@@ -34,7 +34,7 @@ pub struct Axis(Vector3<f64>);
 
 /// A text that is not a direction.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{0:?} is no direction: give x, -x, y, -y, z, -z, or three numbers dx,dy,dz that are not all 0")]
+#[error("{0:?} is not a direction: give x, -x, y, -y, z, -z, or three numbers dx,dy,dz that are not all 0")]
 pub struct AxisError(String);
 
 impl Axis {
@@ -240,7 +240,7 @@ fn find_axis(markers: &Markers, path: &Path) -> Result<Axis, ReadError> {
     let range_m = quantile(ranges, 0.5).unwrap_or(0.0);
     if net_m.abs() < MIN_NET_FRACTION * range_m {
         return refuse(format!(
-            "the worm got ahead by {:.2} mm only, too little to tell which way it crawls",
+            "the worm advanced by {:.2} mm only, too little to determine its direction",
             net_m.abs() * 1e3
         ));
     }

@@ -150,7 +150,7 @@ fn check_lengths(recording: &Recording) -> Result<(), ReadError> {
     };
     Err(ReadError::whole(
         &recording.source,
-        format!("{problem}, which no worm does: the positions are evidently in millimetres"),
+        format!("{problem}, which no worm does: the positions seem to be in millimetres"),
         "divide them by 1000; columns that end in _m hold metres",
     ))
 }

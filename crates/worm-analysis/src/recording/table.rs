@@ -174,7 +174,7 @@ impl<R: Read> Rows<'_, R> {
                 Some(first) => {
                     return self.refuse(
                         index,
-                        format!("{name} is there twice, first as column {}", first + 1),
+                        format!("{name} appears twice, first as column {}", first + 1),
                         "keep one of them",
                     );
                 }
@@ -277,7 +277,7 @@ impl<R: Read> Rows<'_, R> {
                 Some(value) => {
                     return self.refuse(
                         index,
-                        format!("{value} is no measurement"),
+                        format!("{value} is not a measurement"),
                         "leave the field empty where nothing was seen",
                     );
                 }
@@ -295,7 +295,7 @@ impl<R: Read> Rows<'_, R> {
                     return self.refuse(index, "there is no time", "give each sample its time");
                 }
                 if let Some(last_s) = last_s.filter(|&last_s| value <= last_s) {
-                    let what = if value < last_s { "runs back" } else { "stands still" };
+                    let what = if value < last_s { "goes back" } else { "repeats" };
                     return self.refuse(
                         index,
                         format!("time {what}: {value} s after {last_s} s"),

@@ -138,7 +138,7 @@ impl Header {
             .ok()
             .filter(|rate_hz| *rate_hz > 0.0 && *rate_hz <= MAX_RATE_HZ);
         let Some(rate_hz) = rate_hz else {
-            return lines.refuse(format!("{} is no rate in Hz", quoted(&lines.line)), EXPORT_AGAIN);
+            return lines.refuse(format!("{} is not a rate in Hz", quoted(&lines.line)), EXPORT_AGAIN);
         };
         lines.next_required("the row of marker names")?;
         let names_at = lines.number;
@@ -247,7 +247,7 @@ fn parse_sample<R: Read>(lines: &LineReader<'_, '_, R>, header: &Header) -> Resu
         // Frames beyond this have no exact time.
         let number = field.parse::<i64>().ok().filter(|number| number.abs() < 1 << 52);
         number.map_or_else(
-            || lines.refuse(format!("{} is no {what} number", quoted(field)), EXPORT_AGAIN),
+            || lines.refuse(format!("{} is not a {what} number", quoted(field)), EXPORT_AGAIN),
             Ok,
         )
     };

@@ -1,4 +1,4 @@
-//! The effects that show in a recording and not in the motion: on the motor and on the sensor.
+//! Effects of motor and sensor, which show in a recording and not in the motion.
 
 use std::collections::BTreeMap;
 use worm_analysis::experiment::{Simulation, simulate};
@@ -34,7 +34,7 @@ fn a_scaled_sensor_sees_every_length_scaled() {
 }
 
 #[test]
-fn a_late_sensor_sees_what_was() {
+fn a_late_sensor_sees_earlier_positions() {
     let late = 6;
     let (plain, delayed) = (
         recorded(None),

@@ -1,4 +1,4 @@
-//! The maker of hidden effects, judged before it judges others.
+//! The worms with hidden effects, tested before they test the library.
 
 mod contact;
 
@@ -36,7 +36,7 @@ fn advance_m(worm: &Worm, slope_deg: f64) -> f64 {
     settled_m.iter().sum::<f64>() / settled_m.len() as f64
 }
 
-/// Advance of a settled cycle so slow that dynamics are not seen, on tips that do not give before they slide, m.
+/// Advance of a settled cycle so slow that dynamics do not show, on tips that do not yield before they slide, m.
 fn slow_advance_m(deviations: Deviations, slope_deg: f64) -> f64 {
     let parameters = WormParameters {
         damping_ratio: 1.0,
@@ -63,7 +63,7 @@ fn slow_advance_of_m(worm: &Worm, slope_deg: f64) -> f64 {
     advances_m(&scene.simulate(worm).expect("the worm holds"))[0]
 }
 
-/// A flaw of the second cell alone.
+/// A factor on the second cell alone.
 fn second(factor: f64) -> [f64; CELLS] {
     [1.0, factor, 1.0, 1.0]
 }
@@ -97,12 +97,12 @@ fn slow_and_stiff_it_gives_the_figures_of_another_simulation() {
 }
 
 #[test]
-fn every_effect_changes_the_advance_in_its_own_sense() {
+fn every_effect_changes_the_advance_in_its_own_direction() {
     let none = Deviations::default;
     #[rustfmt::skip]
-    // Effect, what is wrong, and whether the advance on the level and on a slope grows or shrinks.
+    // Effect, deviation, and whether the advance on the level and on a slope grows or shrinks.
     let table = [
-        // Lower friction spoils less of the stroke on the level, and holds less on a slope.
+        // Lower friction costs less of the stroke on the level, and holds less on a slope.
         ("unequal-clamping", Deviations { friction_factor: second(0.4), ..none() }, [0, -1]),
         ("unequal-clamping", Deviations { friction_factor: second(1.6), ..none() }, [-1, -1]),
         ("unequal-stiffness", Deviations { stiffness_factor: second(0.4), ..none() }, [-1, -1]),
@@ -125,7 +125,7 @@ fn every_effect_changes_the_advance_in_its_own_sense() {
         ("backlash", Deviations { play_m: 1e-3, ..none() }, [-1, -1]),
         ("step-overlap", Deviations { overlap: 0.2, ..none() }, [-1, -1]),
         ("slick-patch", Deviations { patch: Some(Patch { from_m: -0.05, length_m: 0.02, friction_factor: 0.3 }), ..none() }, [0, -1]),
-        // On 30° a tenth less friction spoils as much less as it holds less: the worm is near its best friction there.
+        // On 30° a tenth less friction costs as much less stroke as it holds less: the worm is near its best friction there.
         ("wear", Deviations { loss_per_cycle: 0.02, ..none() }, [1, 0]),
         ("motor-droop", Deviations { slowdown_per_n: 0.3, ..none() }, [0, 0]),
         ("sensor-scale", Deviations { scale: 1.1, ..none() }, [1, 1]),
@@ -156,14 +156,14 @@ fn every_effect_changes_the_advance_in_its_own_sense() {
     for effect in Effect::ALL {
         assert!(
             table.iter().any(|row| row.0 == effect.name()),
-            "{} is not tried",
+            "{} is not tested",
             effect.name()
         );
     }
 }
 
 #[test]
-fn what_shifts_time_and_no_place_shifts_time() {
+fn droop_and_latency_shift_times_and_not_positions() {
     let simulate = |deviations: Deviations| -> SimulatedRun {
         let scene = Scene {
             cycles: 3.0,
@@ -252,7 +252,7 @@ fn a_campaign_is_what_its_seed_says() {
         positions.map(f64::to_bits).collect()
     };
     assert_eq!(one.truth, same.truth);
-    assert_eq!(bits(&one), bits(&same), "the same dice fall the same way");
+    assert_eq!(bits(&one), bits(&same), "the same seed draws the same");
     assert!(
         one.effect_size.advance_m > 0.1e-3,
         "strong creep can be seen: {:?}",

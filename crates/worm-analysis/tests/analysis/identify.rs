@@ -1,7 +1,7 @@
 //! How exactly a recording gives back the worm that made it, over worms, slopes and motors drawn at random.
 //!
-//! The recordings are made by a worm with mass that shares nothing with the library ([`truth`]); the configuration believes
-//! in the paper's worm throughout. Each table draws a few worms of different slopes and numbers of cells; `WORMD_SEEDS` says how many
+//! The recordings are made by a worm with mass that shares nothing with the library ([`Truth`]); the configuration is that
+//! of the paper's worm throughout. Each table draws a few worms of different slopes and numbers of cells; `WORMD_SEEDS` says how many
 //! it draws instead.
 
 use testkit::independent_worm::body::Body;
@@ -15,17 +15,17 @@ use worm_analysis::experiment::{Analysis, PhaseSource, RecordedRun, analyze};
 use worm_analysis::recording::Recording;
 use worm_estimator::config::Config;
 
-/// What is believed of a worm before it was recorded: the paper's figures, cells stepping from the first to the last.
+/// The configuration of every analysis: the paper's figures, cells stepping from the first to the last.
 fn nominal_config(cells: usize) -> Config {
     let mut config = Config::default();
     config.worm.cells = cells;
     config.worm.step_order = (1..=cells).collect();
-    assert_eq!(config.problems(), [], "the belief is a valid configuration");
+    assert_eq!(config.problems(), [], "a valid configuration");
     config
 }
 
-/// Rounding of the cam where the phase is recorded, for then the recording promises that extensions are linear in it. Where the
-/// phase is found from the positions, the cam may be as round as it likes.
+/// Rounding of the cam where the phase is recorded, because extensions are then taken as linear in it. Where the phase is found
+/// from the positions, the cam may be rounder.
 const SHARP: f64 = 0.001;
 
 /// Analyses recordings of one worm together.
@@ -50,13 +50,13 @@ fn recorded(scene: &Scene) -> (Recording, Truth) {
 
 /// The usual few seeds, or all up to the number that `WORMD_SEEDS` says.
 fn seeds(usual: &[u64]) -> Vec<u64> {
-    std::env::var("WORMD_SEEDS").map_or(usual.to_vec(), |told| {
-        let count = told.parse().expect("WORMD_SEEDS is a number");
+    std::env::var("WORMD_SEEDS").map_or(usual.to_vec(), |count| {
+        let count = count.parse().expect("WORMD_SEEDS is a number");
         (1..=count).collect()
     })
 }
 
-/// Gait cycles of a recording: twelve, as in the large run, or the fewer that keep the same promise.
+/// Gait cycles of a recording: twelve, as in the large run, or the smaller number with which the same limits hold.
 fn cycles() -> f64 {
     if std::env::var_os("WORMD_SEEDS").is_some() {
         12.0
@@ -133,9 +133,9 @@ impl AccuracyTable {
         assert!(!self.scores.is_empty(), "nothing was tried");
     }
 
-    /// The standard errors say how wrong the bounds are, and the continuous estimator beats the paper's search.
+    /// The standard errors match the errors of the bounds, and the continuous estimator is better than the paper's search.
     #[track_caller]
-    fn assert_honest_and_better(&self) {
+    fn assert_calibrated_and_better(&self) {
         let (_, in_sigmas) = self.bounds_rms();
         assert!((0.5..2.0).contains(&in_sigmas), "errors of {in_sigmas} standard errors");
         let searched = || self.scores.iter().filter(|score| score.search_m.is_some());
@@ -164,7 +164,7 @@ fn from_rest_by_positions_alone() {
         table.add(Score::of(format!("seed {seed}"), &found[0], &truth), TOLERANCES);
     }
     table.assert_within_tolerances();
-    table.assert_honest_and_better();
+    table.assert_calibrated_and_better();
 }
 
 #[test]
@@ -186,11 +186,11 @@ fn from_rest_with_the_phase() {
         table.add(Score::of(format!("seed {seed}"), &found[0], &truth), TOLERANCES);
     }
     table.assert_within_tolerances();
-    table.assert_honest_and_better();
+    table.assert_calibrated_and_better();
 }
 
-/// Level ground alone cannot tell the tips that never slide backward apart; slopes and level together can, even when all
-/// recordings begin in mid-crawl and nobody saw the worm laid down.
+/// Level ground alone does not separate the tips that never slide backward; slopes and level together do, even when all
+/// recordings begin in mid-crawl.
 #[test]
 fn a_campaign_that_begins_in_mid_crawl() {
     for (title, with_phase) in [
@@ -289,8 +289,8 @@ fn with_rest_at_both_ends() {
     table.assert_within_tolerances();
 }
 
-/// What can be asked of a gait of 0.8 s: its inertia throws the body 0.15 mm beyond where the tips would let it rest, and no
-/// reading of section 3.2 accounts for that wholly.
+/// Limits for a gait of 0.8 s: inertia carries the body 0.15 mm beyond where the tips would let it rest, and section 3.2 does not
+/// fully account for that.
 const FAST: Tolerances = Tolerances {
     bound_m: 1.5e-4,
     energy_percent: 5.0,
@@ -306,7 +306,7 @@ const FAST: Tolerances = Tolerances {
 fn slow_and_fast_gaits_seen_poorly() {
     let mut table = AccuracyTable::titled("60 s at 100 Hz, uneven clock, 5 % lost, 0.1 % far off, started in mid-step");
     let cases = [(8.0, 30.0), (0.8, 30.0), (8.0, 45.0), (0.8, 45.0)];
-    // Of fast gaits, fewer cycles than a minute has keep the same promise.
+    // Of fast gaits, fewer cycles than a minute has are enough for the same limits.
     let all = std::env::var_os("WORMD_SEEDS").is_some();
     for (seed, (cycle_s, slope_deg)) in (1..).zip(cases) {
         if !seeds(&[1, 4]).contains(&seed) {

@@ -1,4 +1,4 @@
-//! The independent worm against what is known of it: before it judges others it is judged itself.
+//! The independent worm against known figures: it is tested before it tests the library.
 
 use testkit::independent_worm::body::Body;
 use testkit::independent_worm::cam::Cam;
@@ -21,7 +21,7 @@ const EQUAL_CELLS: [(usize, f64, [f64; 3]); 11] = [
     (6, 45.0, [4.429, 115.44, 110.16]),
 ];
 
-/// A slow and damped worm: where dynamics should not be seen.
+/// A slow and damped worm, whose dynamics should not show.
 fn slow(bound_m: &[f64], slope_deg: f64) -> Scene {
     let mut scene = Scene::ideal(Body::with_bounds(bound_m, slope_deg), 40.0);
     scene.body.mass_kg = 0.08325 * bound_m.len() as f64;
@@ -88,9 +88,9 @@ fn slow_it_gives_the_figures_of_the_identified_worm() {
 }
 
 /// Where the other tips cannot hold a stepping cell, all are pushed back instead; where all together cannot hold the
-/// weight, the worm is gone.
+/// weight, the worm slides down.
 #[test]
-fn a_worm_that_cannot_hold_does_not_advance_or_is_lost() {
+fn a_worm_that_cannot_hold_does_not_advance_or_slides_down() {
     assert!(!Body::with_bounds(&[1.75e-3; 3], 45.0).holds());
     let advance_m = play(&slow(&[1.75e-3; 3], 60.0)).cycles[0].balance.advance_m();
     assert!(advance_m < 1e-4, "{advance_m} m");
@@ -121,7 +121,7 @@ fn half_the_time_step_changes_nothing_that_matters() {
     }
 }
 
-/// What the cam gives goes into friction, height, dampers, springs and motion, and nowhere else.
+/// The work of the cam goes into friction, height, dampers, springs and motion, and nowhere else.
 #[test]
 fn the_energy_closes() {
     for scene in testkit::independent_worm::draw::crawling(4, &[0.0, 30.0], 3) {
@@ -185,9 +185,9 @@ fn a_warm_up_only_hides_the_beginning() {
     }
 }
 
-/// Noise, gaps and the clock are as poor as they are told to be.
+/// Noise, gaps and the clock have the errors that are set.
 #[test]
-fn the_camera_is_as_poor_as_told() {
+fn the_camera_has_the_errors_that_are_set() {
     let mut scene = Scene::ideal(Body::with_bounds(&[1.75e-3; 4], 0.0), 2.5);
     scene.camera = Camera {
         jitter: 0.3,

@@ -34,7 +34,7 @@ fn read_states(states: Vec<State>) -> Result<Recording, worm_analysis::recording
 }
 
 #[test]
-fn a_recording_has_each_sample_where_and_when_it_was_taken() {
+fn a_recording_has_each_sample_with_its_position_and_time() {
     let (crawl, mut states) = states(8.3);
     let unseen = states.iter().position(|state| state.sample == 100).expect("is there");
     states[unseen].valid_mask = 0b1101;
@@ -66,7 +66,7 @@ fn a_recording_has_each_sample_where_and_when_it_was_taken() {
 }
 
 #[test]
-fn a_failed_motor_reading_does_not_bend_the_gait_phase() {
+fn a_failed_motor_reading_does_not_distort_the_gait_phase() {
     let (_, mut states) = states(8.3);
     // Ticks without a reading repeat what was last read, singly and three in a row.
     for tick in (40..1600).filter(|tick| tick % 7 == 3 || tick % 50 < 3) {
@@ -91,7 +91,7 @@ fn the_longest_run_of_the_controller_is_taken() {
     let (_, second) = states(2.0);
     let repeated = [&second[..200], &second[190..]].concat();
     let recording = read_states([first, repeated].concat()).expect("a recording");
-    // Ticks that come twice are a beginning too: the longest stretch has the second's last 210 ticks.
+    // Repeated ticks count as a restart too: the longest run has the last 210 ticks of the second.
     assert_eq!(recording.samples(), 126);
     assert!(recording.time_s.is_sorted_by(|before, after| before < after));
     assert!(

@@ -1,7 +1,7 @@
-//! Recordings, what is identified in them, the search for the missing effect, and the pages that show all of it.
+//! Recordings, identification, the search for the missing effect, and the pages that show the results.
 //!
-//! `independent_worm` and `hidden_effects` judge the worms of the testkit, which judge the library in `identify`, `score` and
-//! `search`.
+//! `independent_worm` and `hidden_effects` test the simulated worms of the testkit, which `identify`, `score` and `search` use to
+//! test the library.
 
 mod effects_recorded;
 mod hidden_effects;

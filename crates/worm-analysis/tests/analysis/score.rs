@@ -6,9 +6,9 @@ use testkit::hidden_effects::effect::{Effect, SeverityRange, TrueEffect};
 use testkit::hidden_effects::follow_up::ExtraRun;
 use testkit::hidden_effects::table::{Proportion, ScoreTable};
 
-/// Knows the truth; what it does not want to know it calls a payload of 100 g.
+/// Knows the truth, and reports it, or else always a payload.
 struct Oracle {
-    wants_to_know: bool,
+    reports_truth: bool,
 }
 
 impl Explainer for Oracle {
@@ -33,14 +33,14 @@ impl Explainer for Oracle {
             ..Named::default()
         };
         let truth: Vec<Named> = campaign.truth.iter().map(named).collect();
-        // One effect of a single cell it finds too hard to tell until it has seen one more run.
-        let torn = campaign.truth.iter().any(|truth| truth.cell.is_some()) && extra.is_empty();
+        // An effect of a single cell is ambiguous until there is one more run.
+        let is_ambiguous = campaign.truth.iter().any(|truth| truth.cell.is_some()) && extra.is_empty();
         Ok(Answer {
             verdict: match campaign.kind {
-                _ if !self.wants_to_know => Verdict::Named,
+                _ if !self.reports_truth => Verdict::Named,
                 CampaignKind::Clean => Verdict::Nothing,
                 CampaignKind::Outside => Verdict::Outside,
-                _ if torn => Verdict::Ambiguous,
+                _ if is_ambiguous => Verdict::Ambiguous,
                 _ => Verdict::Named,
             },
             screened: truth
@@ -51,7 +51,7 @@ impl Explainer for Oracle {
                     sigma: 8.0,
                 })
                 .collect(),
-            named: if self.wants_to_know {
+            named: if self.reports_truth {
                 truth
             } else {
                 vec![payload.clone()]
@@ -65,7 +65,7 @@ impl Explainer for Oracle {
 }
 
 #[test]
-fn the_score_tells_right_from_wrong() {
+fn the_score_separates_right_from_wrong() {
     let cases = [
         Hidden::Clean,
         Hidden::Outside(0),
@@ -76,10 +76,10 @@ fn the_score_tells_right_from_wrong() {
     ];
     // How much is recorded matters neither to who knows nor to who does not look.
     let campaigns = cases.map(|hidden| draw_sized(hidden, 11, CampaignSize::SMALL));
-    let fractions = |wants_to_know: bool| {
+    let fractions = |reports_truth: bool| {
         let assessments: Vec<_> = campaigns
             .iter()
-            .map(|campaign| assess(campaign, &Oracle { wants_to_know }))
+            .map(|campaign| assess(campaign, &Oracle { reports_truth }))
             .collect();
         let table = ScoreTable(&assessments);
         println!("{table}");

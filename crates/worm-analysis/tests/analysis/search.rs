@@ -1,5 +1,5 @@
-//! The search itself on a few small campaigns with something hidden in them, each drawn from a seed that the splits to tune and to
-//! score on do not use. The same ones in full size are `cargo bench --bench explain_benchmark -- --split search`, and the score over
+//! The search itself on a few small campaigns with a hidden effect, each drawn from a seed that is in neither the development nor
+//! the test split. The same ones in full size are `cargo bench --bench explain_benchmark -- --split search`, and the score over
 //! many is that of the splits `development` and `test`.
 
 use testkit::hidden_effects::assessment::{Answer, Assessment, Explainer, Verdict, assess};
@@ -9,7 +9,7 @@ use testkit::hidden_effects::follow_up::ExtraRun;
 use testkit::hidden_effects::library::Library;
 use testkit::hidden_effects::split::{Case, SEARCH_SEED, Split, split};
 
-/// The library's own search, asked once: whether the run that it proposes settles an ambiguous answer is for the bench.
+/// The library's own search, called once: the bench finds out whether the proposed run settles an ambiguous answer.
 struct Once;
 
 impl Explainer for Once {
@@ -17,7 +17,7 @@ impl Explainer for Once {
         if extra.is_empty() {
             Library.explain(campaign, extra)
         } else {
-            Err("nothing is asked twice".to_owned())
+            Err("the search is called once".to_owned())
         }
     }
 }
@@ -43,7 +43,7 @@ fn on_a_clean_worm_nothing_is_named() {
 }
 
 #[test]
-fn a_cell_that_holds_otherwise_is_named_with_its_friction() {
+fn a_cell_with_other_friction_is_named_with_its_friction() {
     let assessment = assessed(Hidden::Single(Effect::UnequalClamping, SeverityRange::UPPER_HALF));
     assert_eq!(assessment.strict, Some(true));
     assert_eq!(assessment.right_cell, Some(true));

@@ -6,7 +6,7 @@
 pub struct TipLoad {
     /// Force of the pad on the tip if the tip stays where it is, N.
     pub pull_n: f64,
-    /// How fast that force falls with the tip's way, N/m.
+    /// How fast that force falls with the tip's displacement, N/m.
     pub slack_n_per_m: f64,
     /// Friction limit, N.
     pub limit_n: f64,
@@ -34,7 +34,7 @@ pub struct TipStep {
 
 /// The end of a time step with z' = v (1 − `yielding` z), `yielding` in 1/m.
 ///
-/// With s the tip's way, (pull − slack s) = σ₀ z₁ + σ₁ (z₁ − z) / Δt + σ₂ s / Δt and z₁ = (z + s) / (1 + yielding s) are a
+/// With s the tip's displacement, (pull − slack s) = σ₀ z₁ + σ₁ (z₁ − z) / Δt + σ₂ s / Δt and z₁ = (z + s) / (1 + yielding s) are a
 /// quadratic equation for s, so neither stiffness nor damping bounds the time step.
 pub fn yield_at(load: &TipLoad, yielding: f64, damping_s: f64, drag_s_per_m: f64) -> TipStep {
     // Beyond the limit, which has fallen then, a damped unbending would push the tip on: LuGre's known loss of passivity.

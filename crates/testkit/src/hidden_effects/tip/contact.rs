@@ -1,9 +1,9 @@
-//! What holds a tip to the canal: one of four friction laws, and how the static bound falls to the kinetic one.
+//! The friction of a tip on the canal: one of four laws, and how the static limit falls to the kinetic one.
 //!
-//! Nobody knows which law a worm's tips obey, so every campaign throws one, with its figures, for all four tips. The laws
+//! It is not known which law a worm's tips obey, so every campaign draws one, with its parameters, for all four tips. The laws
 //! differ in kind: [`Lugre`] yields from the first micrometre and damps while it does, [`ElastoPlastic`] springs back wholly
 //! up to a breakaway displacement, [`Dahl`] has a rounder or a sharper knee than either and no damper, and [`Coulomb`] does
-//! not give at all. Independently of the law the bound falls with the tip's speed or with its way ([`Weakening`]).
+//! not give at all. Independently of the law the limit falls with the tip's speed or with its slip ([`Weakening`]).
 //!
 //! The ranges are log-uniform and come from what was measured, as far as it is about polymers:
 //!
@@ -17,16 +17,16 @@
 //!   Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419, calculate with, and less.
 //! - Breakaway displacement over the displacement at sliding: about Dupont, Hayward, Armstrong and Altpeter, IEEE Trans.
 //!   Autom. Control 47 (2002) 787.
-//! - Stribeck speed and frictional lag: amid what Armstrong-Hélouvry et al. list. Slip distance: from the order of the ten
-//!   micrometres of Rabinowicz, J. Appl. Phys. 22 (1951) 1373, upward, for soft contacts slip further before their friction
+//! - Stribeck speed and frictional lag: within what Armstrong-Hélouvry et al. list. Slip distance: from the order of the ten
+//!   micrometres of Rabinowicz, J. Appl. Phys. 22 (1951) 1373, upward, because soft contacts slip further before their friction
 //!   drops, Lorenz and Persson, J. Phys. Condens. Matter 24 (2012) 225008.
 //! - Creep below the limit: not above the nanometres per second at which Farain and Bonn, Tribol. Lett. 70 (2022), slid.
 //!
-//! Two cuts keep a clean worm clean, that is a slow one within about 1 % of the rigid tip's advance on every slope of
-//! the paper, and one at its gait's speed within 1 % of the level's advance: presliding ends, for each law at its own
-//! place, well below the tens of micrometres that soft contacts may have, and where the worm's truth is not breakaway
-//! friction the static bound stands hardly above the kinetic one, though the worm's own sponge has 0.7 to 0.5 (Zarrouk,
-//! Sharf and Shoham 2016, section 2). Of Dahl's exponents two are thrown that have a closed form.
+//! Two restrictions keep a worm without a hidden effect close to one on rigid tips: a slow one within about 1 % of its advance
+//! on every slope of the paper, one at its gait's speed within 1 % of the advance on the level. Presliding is limited, for each
+//! law separately, to well below the tens of micrometres that soft contacts may have. And unless breakaway friction is the hidden
+//! effect, the static limit is hardly above the kinetic one, though the worm's own sponge has 0.7 to 0.5 (Zarrouk, Sharf and
+//! Shoham 2016, section 2). Dahl's exponent is one of the two that have a closed form.
 
 use super::bristle::{TipLoad, TipStep};
 use super::coulomb::Coulomb;
@@ -48,7 +48,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// The way on which pad and friction are in balance at the end of the time step.
+    /// The displacement at which pad and friction are in balance at the end of the time step.
     pub fn solve(&self, load: &TipLoad) -> TipStep {
         match self {
             Self::Lugre(law) => law.solve(load),
@@ -59,7 +59,7 @@ impl Law {
     }
 }
 
-/// How tips hold to the canal.
+/// The friction of all tips on the canal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     pub law: Law,
@@ -67,7 +67,7 @@ pub struct Contact {
     pub presliding_m: f64,
     /// Friction limit of a tip at rest over that of a sliding one where nothing is hidden.
     pub static_over_kinetic: f64,
-    /// How the limit falls from the one to the other.
+    /// How the limit falls from the static to the kinetic one.
     pub weakening: Weakening,
 }
 
@@ -88,7 +88,7 @@ impl Contact {
         }
     }
 
-    /// A contact as one finds them.
+    /// A contact drawn at random.
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
         let (damping_s, drag_s_per_m) = (log_uniform(0.1e-3, 1e-3, rng), log_uniform(0.005, 0.05, rng));
         // With each law the most presliding that leaves a clean worm clean, m.

@@ -15,7 +15,7 @@ pub struct Coulomb {
 
 impl Coulomb {
     pub fn solve(&self, load: &TipLoad) -> TipStep {
-        // With s the way and ε = v₀ Δt: (pull − slack s) (s + ε) = g s.
+        // With s the displacement and ε = v₀ Δt: (pull − slack s) (s + ε) = g s.
         let creep_m = self.creep_m_s * load.step_s;
         let slack = load.slack_n_per_m + self.drag_s_per_m * load.limit_n / load.step_s;
         let linear = load.limit_n + slack * creep_m - load.pull_n;

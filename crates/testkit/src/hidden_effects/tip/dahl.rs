@@ -1,13 +1,13 @@
-//! Dahl's friction with an exponent other than 1: dF/dx = σ (1 − F/g)ⁱ, F the force, x the tip's way and g the limit.
+//! Dahl's friction with an exponent other than 1: dF/dx = σ (1 − F/g)ⁱ, F the force, x the tip's displacement and g the limit.
 //!
-//! Below 1 the limit is reached on a finite way, with a sharp knee, as in brittle contacts; above 1 the knee is round and
+//! Below 1 the limit is reached within a finite displacement, with a sharp knee, as in brittle contacts; above 1 the knee is round and
 //! the limit approached slowly, as in ductile ones. There is neither damping nor a viscous part.
 
 use super::bristle::{TipLoad, TipStep, yield_at};
 
 /// Newton's steps at most; two are usual.
 const MAX_STEPS: usize = 12;
-/// A correction smaller than this share of the way is the last: what it leaves is of the order of its square.
+/// The iteration ends at a correction smaller than this fraction of the displacement: the error left is of the order of its square.
 const CLOSE: f64 = 1e-4;
 
 /// The exponent.
@@ -34,7 +34,7 @@ impl Dahl {
             return yield_at(load, 1.0 / reach_m, 0.0, 0.0);
         }
         let root = remaining.sqrt();
-        // What lacks to the limit after a way, as a share of it, and that to the power of the exponent.
+        // What remains to the limit after a displacement, as a fraction of it, and that to the power of the exponent.
         let after = |displacement_m: f64| {
             let half = 0.5 * displacement_m / reach_m;
             match self.knee {
@@ -48,7 +48,7 @@ impl Dahl {
                 }
             }
         };
-        // The force is concave over the way, so Newton's steps from 0 come from below and do not overshoot.
+        // The force is concave in the displacement, so Newton's steps from 0 come from below and do not overshoot.
         let mut displacement_m = 0.0;
         for _ in 0..MAX_STEPS {
             let (remaining, slope) = after(displacement_m);

@@ -25,9 +25,9 @@ impl ElastoPlastic {
         if bent <= self.breakaway_fraction {
             return elastic;
         }
-        // α is taken where an elastic bristle would stand amid that part of the step that is plastic.
-        let amid = 0.5 * (bent + self.breakaway_fraction.max(yielding * load.bristle_m));
-        yield_at(load, self.plastic(amid) * yielding, self.damping_s, self.drag_s_per_m)
+        // α is taken in the middle of the plastic part of an otherwise elastic step.
+        let midway = 0.5 * (bent + self.breakaway_fraction.max(yielding * load.bristle_m));
+        yield_at(load, self.plastic(midway) * yielding, self.damping_s, self.drag_s_per_m)
     }
 
     /// α at a bend over the one at which the tip slides.

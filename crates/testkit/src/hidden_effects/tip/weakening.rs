@@ -1,4 +1,4 @@
-//! How the static bound of a tip falls to the kinetic one once it slides, and comes back.
+//! Frictional weakening: how the static limit of a tip falls to the kinetic one once it slides, and recovers.
 
 use crate::random::log_uniform;
 use rand::RngExt;
@@ -9,7 +9,7 @@ const REST_M_S: f64 = 0.3e-3;
 /// Shares of the Stribeck speed below which the bound is static and above which it is kinetic, to one in a thousand.
 const REGIME_LIMITS: [f64; 2] = [1e-3, 7.0];
 
-/// What the bound falls with.
+/// Velocity weakening or slip weakening.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Weakening {
     /// Stribeck's curve over the tip's speed, which friction feels with a lag.
@@ -17,10 +17,10 @@ pub enum Weakening {
         stribeck_m_s: f64,
         /// 1 after Tustin, 2 after Gauss.
         power: i32,
-        /// How late friction follows the speed, s.
+        /// Frictional lag behind the speed, s.
         lag_s: f64,
     },
-    /// The way since the contact broke; a rest heals it.
+    /// An exponential in the slip since the contact broke; a rest restores it.
     Slip {
         drop_m: f64,
         /// Rest after which the static bound holds again, s.
@@ -44,7 +44,7 @@ impl Weakening {
         }
     }
 
-    /// How much of the static bound's excess is left to a tip that is pulled in a direction.
+    /// Fraction of the static limit's excess over the kinetic one that is left to a tip pulled in a direction.
     pub fn static_excess(&self, friction_state: &FrictionState, sign: f64) -> f64 {
         match *self {
             Self::Velocity {
@@ -67,12 +67,12 @@ impl Weakening {
     }
 }
 
-/// What a tip's friction remembers of its motion.
+/// State variables of a tip's friction.
 #[derive(Debug, Clone, Default)]
 pub struct FrictionState {
     /// Speed as friction feels it, m/s.
     speed_m_s: f64,
-    /// Way since the contact broke, m, with the sign of the direction.
+    /// Slip since the contact broke, m, with the sign of the direction.
     slid_m: f64,
     rested_s: f64,
 }

@@ -36,7 +36,7 @@ pub(super) fn is_recognised(head: &[u8]) -> bool {
 pub(super) fn read(path: &Path, file: &[u8]) -> Result<Markers, ReadError> {
     let refuse = |problem: &str| ReadError::whole(path, problem, EXPORT_AGAIN);
     let [parameter_block, KEY, ..] = *file else {
-        return Err(refuse("is no C3D file: its second byte is not 80"));
+        return Err(refuse("is not a C3D file: its second byte is not 80"));
     };
     let section = (usize::from(parameter_block).checked_sub(1))
         .map(|blocks| blocks * BLOCK)
@@ -239,7 +239,7 @@ fn unit_m(parameters: &Parameters<'_>, path: &Path) -> Result<f64, ReadError> {
     let problem = match &unit {
         Some(unit) => match metres_in(unit) {
             Some(metres) => return Ok(metres),
-            None => format!("{} is no unit mm, cm or m", quoted(unit)),
+            None => format!("{} is not mm, cm or m", quoted(unit)),
         },
         None => "the unit of the points is not given".to_owned(),
     };

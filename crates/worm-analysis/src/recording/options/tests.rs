@@ -35,14 +35,14 @@ fn times_that_cannot_be_used_are_refused_by_the_name_of_the_flag() {
     let nan = f64::NAN;
     let infinite = f64::INFINITY;
     let table = [
-        (Some(nan), None, 0.2, "--from NaN is no time"),
-        (Some(-infinite), None, 0.2, "--from -inf is no time"),
-        (None, Some(infinite), 0.2, "--to inf is no time"),
+        (Some(nan), None, 0.2, "--from NaN is not a time"),
+        (Some(-infinite), None, 0.2, "--from -inf is not a time"),
+        (None, Some(infinite), 0.2, "--to inf is not a time"),
         (Some(2.0), Some(2.0), 0.2, "--from 2 is not before --to 2"),
         (Some(3.0), Some(2.5), 0.2, "--from 3 is not before --to 2.5"),
-        (None, None, -0.1, "--max-gap -0.1 is no length of time"),
-        (None, None, nan, "--max-gap NaN is no length of time"),
-        (None, None, infinite, "--max-gap inf is no length of time"),
+        (None, None, -0.1, "--max-gap -0.1 is not a duration"),
+        (None, None, nan, "--max-gap NaN is not a duration"),
+        (None, None, infinite, "--max-gap inf is not a duration"),
     ];
     for (from_s, to_s, max_gap_s, expected) in table {
         let options = OpenOptions {

@@ -212,7 +212,7 @@ fn what_the_motion_does_not_determine_is_refused() {
     }
     let error = refusal(there_and_back);
     assert!(
-        error.contains("too little to tell which way it crawls") && error.contains("--axis"),
+        error.contains("too little to determine its direction") && error.contains("--axis"),
         "{error}"
     );
 

@@ -63,7 +63,7 @@ fn what_no_worm_could_have_recorded_is_refused() {
     let scale = |recording: &mut Recording| recording.position_m.iter_mut().flatten().for_each(|m| *m *= 1e3);
     assert_refused(
         scale,
-        " m apart, which no worm does: the positions are evidently in millimetres",
+        " m apart, which no worm does: the positions seem to be in millimetres",
     );
     let own_origin = |recording: &mut Recording| {
         scale(recording);

@@ -142,7 +142,7 @@ fn errors_name_line_and_column() {
         ),
         (
             rows("# comment\n0,0,inf\n1,0,0\n"),
-            "line 3, column 3 (x2_m): inf is no measurement",
+            "line 3, column 3 (x2_m): inf is not a measurement",
         ),
         (
             rows("0,0\n1,0,0\n"),
@@ -154,11 +154,11 @@ fn errors_name_line_and_column() {
         ),
         (
             rows("0,0,0\n0,0,0\n1,0,0\n"),
-            "line 3, column 1 (time_s): time stands still: 0 s after 0 s",
+            "line 3, column 1 (time_s): time repeats: 0 s after 0 s",
         ),
         (
             rows("0,0,0\n-1,0,0\n1,0,0\n"),
-            "line 3, column 1 (time_s): time runs back: -1 s after 0 s",
+            "line 3, column 1 (time_s): time goes back: -1 s after 0 s",
         ),
         (rows("nan,0,0\n1,0,0\n"), "line 2, column 1 (time_s): there is no time"),
         (
@@ -173,7 +173,7 @@ fn errors_name_line_and_column() {
         ("time_s,x1_m\n".to_owned(), "line 1: there is only one cell"),
         (
             "time_s,x1_m,x2_m,x1_m\n".to_owned(),
-            "line 1, column 4: x1_m is there twice, first as column 2",
+            "line 1, column 4: x1_m appears twice, first as column 2",
         ),
         ("# nothing\n".to_owned(), "worm.csv: holds nothing but comments"),
     ];

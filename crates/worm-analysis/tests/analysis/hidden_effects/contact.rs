@@ -13,13 +13,13 @@ use testkit::hidden_effects::tip::dahl::Dahl;
 use testkit::hidden_effects::tip::weakening::Weakening;
 use testkit::hidden_effects::tip::{Limits, Pad, Tip};
 
-/// Contacts as they are thrown: so many that each law and both falls are among them.
+/// Contacts drawn at random: enough that each law with both kinds of weakening is among them.
 fn contacts() -> Vec<Contact> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     (0..24).map(|_| Contact::draw(&mut rng)).collect()
 }
 
-/// What is told of a contact when it fails.
+/// Name of a contact's law in messages.
 fn name(contact: &Contact) -> &'static str {
     match contact.law {
         Law::Lugre(_) => "lugre",
@@ -29,7 +29,7 @@ fn name(contact: &Contact) -> &'static str {
     }
 }
 
-/// The first contact of each law, the two knees of Dahl's counted as two, with each fall.
+/// The first contact of each law, Dahl's two knees counted as two, with each kind of weakening.
 fn one_of_each() -> Vec<Contact> {
     let kind = |contact: &Contact| {
         let knee = match contact.law {
@@ -75,13 +75,13 @@ const LIMITS: Limits = Limits {
 };
 
 #[test]
-fn every_law_is_thrown() {
+fn every_law_is_drawn() {
     let mut seen: Vec<_> = one_of_each().iter().map(name).collect();
     seen.sort_unstable();
     seen.dedup();
     assert_eq!(seen, ["coulomb", "dahl", "elasto-plastic", "lugre"]);
-    let falls_with_speed = |contact: &Contact| matches!(contact.weakening, Weakening::Velocity { .. });
-    assert!(contacts().iter().any(falls_with_speed) && !contacts().iter().all(falls_with_speed));
+    let weakens_with_velocity = |contact: &Contact| matches!(contact.weakening, Weakening::Velocity { .. });
+    assert!(contacts().iter().any(weakens_with_velocity) && !contacts().iter().all(weakens_with_velocity));
 }
 
 /// A tip loaded to nine tenths of its limit stays for as long as a run lasts.
@@ -105,7 +105,7 @@ fn a_resting_tip_does_not_creep() {
     }
 }
 
-/// A cell that is drawn along as in a step first feels the static bound, then the kinetic one; the severity is their ratio.
+/// A cell that is pulled along as in a step first meets the static bound, then the kinetic one; the severity is their ratio.
 #[test]
 fn the_static_bound_stands_above_the_kinetic_one() {
     for contact in contacts() {
@@ -118,23 +118,23 @@ fn the_static_bound_stands_above_the_kinetic_one() {
                 tip.follow(cell_m_s * STEP_S, STEP_S, &pad, LIMITS);
                 max_n = max_n.max(tip.force_n);
             }
-            let told = format!(
+            let message = format!(
                 "{}, ratio {ratio}: {max_n} N, then {} N: {contact:?}",
                 name(&contact),
                 tip.force_n
             );
-            // Beside it stand the viscous part and, while the bristle bends, its damper.
+            // To it add the viscous part and, while the bristle bends, its damper.
             let excess = max_n / LIMIT_N - 1.0;
-            assert!(excess < 1.02 * (ratio - 1.0) + 0.01, "{told}");
+            assert!(excess < 1.02 * (ratio - 1.0) + 0.01, "{message}");
             // The faster a contact is loaded and the rounder its knee, the less of a small excess is felt.
-            assert!(excess > 0.4 * (ratio - 1.0) - 1e-3, "{told}");
+            assert!(excess > 0.4 * (ratio - 1.0) - 1e-3, "{message}");
             let slides_n = tip.force_n / LIMIT_N - 1.0;
-            assert!((-0.01..0.01).contains(&slides_n), "{told}");
+            assert!((-0.01..0.01).contains(&slides_n), "{message}");
         }
     }
 }
 
-/// The law on its own is none of the effects: the worm crawls as on rigid tips.
+/// The law alone is no effect: the worm crawls as on rigid tips.
 #[test]
 fn a_clean_worm_is_clean_under_every_law() {
     let worm = |contact: Contact, damping_ratio: f64| Worm {
@@ -166,7 +166,7 @@ fn a_clean_worm_is_clean_under_every_law() {
 }
 
 #[test]
-fn half_the_time_step_changes_nothing_that_counts() {
+fn half_the_time_step_changes_nothing_that_matters() {
     for contact in one_of_each() {
         let worm = Worm {
             parameters: WormParameters {

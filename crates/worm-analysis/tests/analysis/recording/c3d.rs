@@ -166,7 +166,7 @@ fn what_the_header_leaves_open_is_refused() {
             .position(|window| window == b"mm")
             .expect("the unit");
     let table: &[(&str, Vec<u8>, &[&str])] = &[
-        ("foreign", b"something else altogether".to_vec(), &["no C3D file"]),
+        ("foreign", b"something else altogether".to_vec(), &["not a C3D file"]),
         ("processor", with(512 + 3, &[99]), &["unknown processor, 99"]),
         ("rate", with(rate_value, &[0, 0, 0, 0]), &["0 Hz"]),
         ("unit", with(unit, b"in"), &["POINT:UNITS", "\"in\"", "millimetres"]),

@@ -14,7 +14,7 @@ fn truth() -> Recording {
 }
 
 #[test]
-fn vicon_files_of_all_kinds_tell_of_the_same_worm() {
+fn vicon_files_of_all_kinds_give_the_same_worm() {
     let truth = truth();
     let metres = Style {
         unit: "m",
@@ -123,7 +123,7 @@ fn an_axis_that_is_given_is_exact() {
 }
 
 #[test]
-fn vicon_files_that_leave_something_open_are_refused() {
+fn ambiguous_vicon_files_are_refused() {
     let good = as_vicon(&truth(), Laboratory::askew(0.7, 0.35), PLAIN);
     let lines: Vec<&str> = good.lines().collect();
     let with_line = |number: usize, line: &str| {
@@ -191,7 +191,7 @@ fn vicon_files_that_leave_something_open_are_refused() {
             &["line 2", "rate is missing"],
         ),
         ("no rate", without_line(2), &["line 2", "rate"]),
-        ("rate 0", with_line(2, "0"), &["line 2", "\"0\" is no rate"]),
+        ("rate 0", with_line(2, "0"), &["line 2", "\"0\" is not a rate"]),
         ("no names", with_line(3, ",,a,,,b"), &["line 3", "6 markers", "name"]),
         (
             "no axes",
@@ -225,7 +225,7 @@ fn vicon_files_that_leave_something_open_are_refused() {
             &["line 20", "frame 106 comes after frame 114"],
         ),
         ("long gap", lost, &["Worm:c1", "is not seen", "--max-gap"]),
-        ("there and back", nowhere, &["too little to tell", "--axis"]),
+        ("there and back", nowhere, &["too little to determine", "--axis"]),
         ("circle", circle, &["one line", "--axis"]),
     ];
     let folder = Folder::new();

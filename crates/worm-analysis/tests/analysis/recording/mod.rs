@@ -1,4 +1,4 @@
-//! Recordings from files: what is refused and with which words, and that every format tells the same story of the same worm.
+//! Recordings from files: every format gives the same recording of the same worm, and every refusal names its cause.
 
 mod c3d;
 mod campaign;

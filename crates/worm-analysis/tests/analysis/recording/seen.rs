@@ -36,7 +36,7 @@ impl Laboratory {
     }
 }
 
-/// Cells in the order in which their markers are listed: one that tells nothing.
+/// Cells in the order in which their markers are listed: one that follows no rule.
 pub const LISTED: [usize; 4] = [2, 0, 3, 1];
 
 /// What a Vicon file looks like.

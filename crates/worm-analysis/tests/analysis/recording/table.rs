@@ -116,7 +116,7 @@ fn what_cannot_be_a_recording_is_refused_with_its_place_and_a_remedy() {
         (
             "twice",
             "time_s,x1_m,x2_m,x1_m\n".to_owned(),
-            &["line 1, column 4", "x1_m is there twice", "column 2"],
+            &["line 1, column 4", "x1_m appears twice", "column 2"],
         ),
         (
             "millimetres named",
@@ -176,12 +176,12 @@ fn what_cannot_be_a_recording_is_refused_with_its_place_and_a_remedy() {
         (
             "time back",
             with_row(3, "0.15,0.04,0"),
-            &["line 5, column 1", "runs back", "0.15 s after 0.2 s"],
+            &["line 5, column 1", "goes back", "0.15 s after 0.2 s"],
         ),
         (
             "time stands",
             with_row(3, "0.2,0.04,0"),
-            &["line 5, column 1", "stands still", "0.2 s after 0.2 s"],
+            &["line 5, column 1", "repeats", "0.2 s after 0.2 s"],
         ),
         ("never seen", unseen(&[true, true]), &["no cell is ever seen", "--from"]),
         (
@@ -288,7 +288,7 @@ fn errors_count_lines_as_an_editor_does() {
 }
 
 #[test]
-fn units_are_judged_from_a_tenth_of_a_millimetre_to_a_metre() {
+fn units_are_recognised_from_a_tenth_of_a_millimetre_to_a_metre() {
     let folder = Folder::new();
     for scale in [0.02, 1.0, 25.0] {
         let small = rows(HEADER, |sample, time_s, x_m| {
