@@ -1,20 +1,20 @@
-//! Whether the main job holds on a computer that is busy or pauses: `wormd up --json` again and again, beside busy loops and with its
-//! processes stopped at random, and what came of each run.
+//! Whether `wormd up` works on a computer that is busy or pauses: repeated runs of `wormd up --json`, beside busy loops and with its
+//! processes suspended at random, and the result of each.
 //!
 //! ```sh
 //! cargo bench --bench host_pauses                              # one run of each scenario
-//! cargo bench --bench host_pauses -- --runs 50 --scenario d    # all of it together, fifty times
+//! cargo bench --bench host_pauses -- --runs 50 --scenario d    # all disturbances together, fifty times
 //! ```
 //!
-//! | scenario | beside the main job |
+//! | scenario | disturbance |
 //! |---|---|
 //! | `a` | four busy loops at normal priority |
-//! | `b` | its three processes are stopped together for 20 to 300 ms, about once a second |
-//! | `c` | one of the three is stopped for 20 to 80 ms, about once a second |
+//! | `b` | its three processes are suspended together for 20 to 300 ms, about once a second |
+//! | `c` | one of the three is suspended for 20 to 80 ms, about once a second |
 //! | `d` | all of that |
 //!
-//! A run is good when it ends without fault or alarm, lost no sample, and each settled cycle's energies are within 3 % of what they are
-//! without pauses: the median of an undisturbed run that is made first. Exit status 1 when one was not good.
+//! A run is good when it ends without fault or alarm, loses no sample, and each settled cycle's energies are within 3 % of those
+//! without pauses: the medians of an undisturbed run at the beginning. Exit status 1 when any run was not good.
 
 use testkit::process_pauses as host_pauses;
 
@@ -34,7 +34,7 @@ const ENERGIES: [&str; 5] = [
     "energy_electrical_j",
     "energy_copper_j",
 ];
-/// How far a settled cycle's energy may be from the undisturbed one.
+/// Largest relative deviation of a settled cycle's energy from the undisturbed one.
 const NEAR: f64 = 0.03;
 const BUSY_LOOPS: usize = 4;
 /// Time between pauses, ms.
@@ -59,7 +59,7 @@ struct Arguments {
     bench: bool,
 }
 
-/// Busy loops, as long as this lives.
+/// Busy loops that run until this is dropped.
 struct Load {
     end: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
@@ -129,7 +129,7 @@ fn run(arguments: &Arguments, scenario: Option<char>, number: u32) -> Run {
     }
 }
 
-/// An energy of each settled cycle, J, but of one that ended while the worm was already being stopped: braking costs copper heat.
+/// An energy of each settled cycle, J, except one that ended while the worm was being stopped: braking costs copper heat.
 fn energies(summary: &Value, name: &str, duration_s: u32) -> Vec<f64> {
     let cycles = summary["cycles"].as_array().map_or(&[][..], Vec::as_slice);
     let mut ended_s = 0.0;
@@ -156,14 +156,14 @@ impl Run {
                 .into_iter()
                 .map(move |energy_j| (energy_j / reference_j - 1.0).abs())
         });
-        // A value that is not a number is as far as can be.
+        // A NaN counts as the largest deviation.
         deviations.fold(
             0.0,
             |farthest, deviation| if deviation <= farthest { farthest } else { deviation },
         )
     }
 
-    /// What was not as it must be.
+    /// What is wrong with the run.
     fn troubles(&self, undisturbed: &[f64]) -> Vec<String> {
         let mut troubles = Vec::new();
         let mut expect = |holds: bool, trouble: String| {

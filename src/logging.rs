@@ -1,9 +1,9 @@
-//! How often something that recurs is logged: at once when it first happens, then summed once a minute, and at the end.
+//! Rate-limited logging of recurring events: the first at once, then a sum once a minute, and one at the end.
 
-/// Time over which what recurs is summed, ns.
+/// Time over which occurrences are summed, ns.
 const PERIOD_NS: u64 = 60_000_000_000;
 
-/// Sums something that recurs, so that it does not push everything else out of the log.
+/// Sums the occurrences of an event, so that they do not flood the log.
 #[derive(Debug, Clone, Default)]
 pub struct Summed<T> {
     sum: Option<T>,
@@ -16,7 +16,7 @@ impl<T: Default> Summed<T> {
         add(self.sum.get_or_insert_default());
     }
 
-    /// What is to be logged at `now_ns`, if anything: everything since it was logged last.
+    /// The sum since the last log entry, if an entry is due at `now_ns`.
     pub fn take_due(&mut self, now_ns: u64, is_over: bool) -> Option<T> {
         let is_due = self
             .logged_ns
@@ -43,6 +43,6 @@ mod tests {
             logged.extend(due.map(|count| (second, count)));
         }
         assert_eq!(logged, [(10, 1), (70, 60), (130, 60), (150, 20)]);
-        assert_eq!(summed.take_due(151_000_000_000, true), None, "nothing is told twice");
+        assert_eq!(summed.take_due(151_000_000_000, true), None, "nothing is logged twice");
     }
 }

@@ -9,7 +9,7 @@ use wormd::command::{self, Failure};
 #[derive(Debug, Parser)]
 #[command(name = "wormd", version, about, max_term_width = 100)]
 struct Arguments {
-    /// Log more: -v tells what each process does, -vv everything
+    /// Log more: -v for what each process does, -vv for everything
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
     #[command(subcommand)]
@@ -30,7 +30,7 @@ enum Subcommands {
     Command(command::send_command::SendCommandArgs),
     /// The topics of a worm into a log (MCAP)
     Record(command::record::RecordArgs),
-    /// A log through the estimator once more: whether it comes to the same results
+    /// Run a log through the estimator again, and compare the results
     Replay(command::replay::ReplayArgs),
     /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
     Study(command::study::StudyArgs),
@@ -65,7 +65,7 @@ fn main() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
-        // It would panic where standard error is gone: the parent was killed, the terminal closed.
+        // It would panic when standard error is closed: the parent was killed, or the terminal closed.
         .log_internal_errors(false)
         .compact()
         .init();

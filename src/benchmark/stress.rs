@@ -1,4 +1,4 @@
-//! A load beside the loop: what a busy on-board computer does, and no more than that.
+//! A load beside the loop: as much as a busy on-board computer has to do.
 
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
@@ -8,31 +8,31 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Memory that is walked through, in 8-byte words: 64 MiB, more than most caches.
+/// Memory that the load walks through, in 8-byte words: 64 MiB, more than most caches.
 const WORDS: usize = 8 << 20;
 
-/// Bytes written at a time, and how often before the file begins anew: 16 MiB.
+/// Bytes written at a time, and how often before the file is overwritten: 16 MiB.
 const WRITE_BYTES: usize = 1 << 20;
 const WRITES: usize = 16;
 
-/// Rest after each file, so that a disk that is shared is not worn out.
+/// Pause after each file, to spare the disk.
 const REST: Duration = Duration::from_millis(50);
 
-/// Running load: a thread for each CPU that computes, one that walks through memory, one that writes a file and has it put on
-/// the disk. All of ordinary priority. It ends when dropped.
+/// A running load: one thread per CPU computes, one walks through memory, one writes a file and synchronises it to disk. All have
+/// ordinary priority. It ends when dropped.
 pub struct Stress {
     end: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Stress {
-    /// Starts the load; the file is a nameless one in `dir`.
+    /// Starts the load; its file is an unnamed one in `dir`.
     ///
     /// # Errors
-    /// When there is no thread, or no file to be had.
+    /// When a thread or the file cannot be created.
     pub fn start(dir: &Path) -> std::io::Result<Self> {
         let cpus = std::thread::available_parallelism().map_or(1, usize::from);
-        let file = nameless_file(dir)?;
+        let file = unnamed_file(dir)?;
         let mut stress = Self {
             end: Arc::default(),
             threads: Vec::new(),
@@ -59,14 +59,14 @@ impl Drop for Stress {
     fn drop(&mut self) {
         self.end.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // A load that panicked has said so itself.
+            // A panic of the load has been reported by the panic itself.
             let _ = thread.join();
         }
     }
 }
 
-/// A file without a name, which is gone with its descriptor.
-fn nameless_file(dir: &Path) -> std::io::Result<File> {
+/// A file without a name, removed with its descriptor.
+fn unnamed_file(dir: &Path) -> std::io::Result<File> {
     let path = dir.join(format!("wormd-load-{}", std::process::id()));
     let file = File::create_new(&path)?;
     std::fs::remove_file(&path)?;
@@ -88,7 +88,7 @@ fn walk(end: &AtomicBool) {
     while !end.load(Ordering::Relaxed) {
         for _ in 0..10_000 {
             words[place] += 1;
-            // A large odd stride: no two steps on one cache line, and every word in its turn.
+            // A large odd stride: no two steps on one cache line, and every word is visited.
             place = (place + 7_919) % WORDS;
         }
     }
@@ -104,7 +104,7 @@ fn write(mut file: File, end: &AtomicBool) {
             .and_then(|_| (0..WRITES).try_for_each(|_| file.write_all(&bytes)))
             .and_then(|()| file.sync_data());
         if let Err(error) = round {
-            tracing::warn!("the load writes no more: {error}");
+            tracing::warn!("the load cannot write any more: {error}");
             return;
         }
         std::thread::sleep(REST);

@@ -8,10 +8,10 @@ use worm_analysis::experiment::RecordedRun;
 use worm_analysis::recording::{Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, open_with_progress};
 use worm_estimator::config::Config;
 
-/// Share of the progress bar that reading takes.
+/// Fraction of the progress bar for reading.
 pub(super) const READING: f64 = 0.3;
 
-/// How a recording is to be read, and what is known about it.
+/// How to read a recording, and what is known about it.
 #[derive(Debug, Args)]
 pub struct SourceArgs {
     /// Slope of the canal, in degrees, positive uphill; a campaign has its own
@@ -42,7 +42,7 @@ fn payload_kg(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(kg) if PAYLOADS_KG.contains(&kg) => Ok(kg),
         _ => Err(format!(
-            "'{text}' is no mass that a worm carries: give {} to {} kg",
+            "'{text}' is not a usable mass: give {} to {} kg",
             PAYLOADS_KG.start(),
             PAYLOADS_KG.end()
         )),
@@ -93,7 +93,7 @@ impl SourceArgs {
             return Ok(dataset);
         }
         Err(Failure::unusable(format!(
-            "{}: it lists advances, and there is nothing in them to analyse: list recordings, or ask `wormd explain` about it",
+            "{}: it lists advances, which `wormd analyze` cannot use: list recordings, or run `wormd explain`",
             path.display()
         )))
     }
@@ -127,14 +127,14 @@ impl SourceArgs {
     fn read_campaign(&self, path: &Path, progress: &mut Progress) -> Result<Dataset, Failure> {
         if self.slope.is_some() || self.payload != 0.0 || self.config.is_some() {
             return Err(Failure::unusable(format!(
-                "{}: a campaign says slopes, payloads and worm itself: leave out --slope, --payload and --config",
+                "{}: a campaign has its own slopes, payloads and worm: leave out --slope, --payload and --config",
                 path.display()
             )));
         }
         let campaign = Campaign::load(path).map_err(Failure::unusable)?;
         if !campaign.advances.is_empty() && (self.from.is_some() || self.to.is_some() || self.axis.is_some()) {
             return Err(Failure::unusable(format!(
-                "{}: it lists advances, of which nothing can be cut or turned: leave out --from, --to and --axis",
+                "{}: it lists advances, which have no time and no axis: leave out --from, --to and --axis",
                 path.display()
             )));
         }

@@ -32,7 +32,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use worm_estimator::config::{Config, ConfigError};
 
-/// Which worm is meant: the arguments that most subcommands share.
+/// Which worm to use: the arguments that most subcommands share.
 #[derive(Debug, Clone, Args)]
 pub struct WormArgs {
     /// Configuration file; without it, the worm of the paper
@@ -47,7 +47,7 @@ pub struct WormArgs {
 }
 
 impl WormArgs {
-    /// The configuration that the arguments stand for, checked.
+    /// The configuration that the arguments select, checked.
     ///
     /// # Errors
     /// What [`Config::load`] says, and a name or port that cannot be used.
@@ -103,7 +103,7 @@ impl WormArgs {
     }
 }
 
-/// A time as an argument.
+/// Parses a duration in seconds.
 fn positive_seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text
         .parse()
@@ -111,12 +111,13 @@ fn positive_seconds(text: &str) -> Result<Duration, String> {
     if seconds > 0.0 && seconds <= 1e7 {
         Ok(Duration::from_secs_f64(seconds))
     } else {
-        Err(format!("{text} s is no time to go on for: give more than 0 s"))
+        Err(format!(
+            "{text} s is not a usable duration: give more than 0 s and at most 1e7 s"
+        ))
     }
 }
 
-/// A flag that SIGINT, SIGTERM and SIGHUP set, instead of ending the process where it stands. SIGHUP stays ignored where it
-/// was, as under `nohup`.
+/// A flag that SIGINT, SIGTERM and SIGHUP set, instead of killing the process. SIGHUP stays ignored if it was, as under `nohup`.
 ///
 /// # Errors
 /// When the operating system refuses the handlers.
@@ -128,7 +129,7 @@ pub fn end_on_signal() -> Result<Arc<AtomicBool>, Failure> {
     Ok(end)
 }
 
-/// As [`end_on_signal`], until the second flag is set: from then on a signal ends the process where it stands again.
+/// As [`end_on_signal`], until the second flag is set: from then on a signal kills the process again.
 ///
 /// # Errors
 /// When the operating system refuses the handlers.
@@ -155,20 +156,20 @@ fn cannot_handle(signal: libc::c_int, error: &std::io::Error) -> Failure {
 
 fn is_ignored(signal: libc::c_int) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::uninit();
-    // SAFETY: with a null action the call only reads the present one into memory that is ours.
+    // SAFETY: with a null action the call only reads the current one into memory that is ours.
     let read = unsafe { libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr()) };
     // SAFETY: the call has filled it in where it returned zero.
     read == 0 && unsafe { action.assume_init() }.sa_sigaction == libc::SIG_IGN
 }
 
-/// Tells what is legal but foolish in the configuration.
+/// Logs what is valid but inadvisable in the configuration.
 fn report_advice(config: &Config) {
     for advice in config.advice() {
         tracing::warn!("{}: {}", advice.key, advice.text);
     }
 }
 
-/// Tells what the operating system granted, refusals loudly.
+/// Logs what the operating system granted, and warns of refusals.
 fn report_grants(grants: &[crate::realtime::Grant]) {
     for grant in grants {
         if grant.refusal.is_some() {

@@ -1,25 +1,24 @@
-//! A bar for what takes longer than a second.
+//! A progress bar for commands that take longer than a second.
 
 use crossbeam::channel::{Sender, bounded};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long to wait before a bar is worth showing.
-const PATIENCE: Duration = Duration::from_secs(1);
-/// How often the bar is drawn anew where nothing is told, so that its time is seen to go on.
+/// Delay before the bar is shown.
+const SHOW_AFTER: Duration = Duration::from_secs(1);
+/// How often the bar is redrawn without progress, so that its clock keeps running.
 const REFRESH: Duration = Duration::from_millis(250);
 /// Parts of the bar.
 const PARTS: u64 = 1000;
 
-/// Shows on standard error how far something is, if that is a terminal and it takes longer than a second. The bar goes when
-/// this is dropped.
+/// A progress bar on standard error, if that is a terminal and the work takes longer than a second. It is removed on drop.
 #[derive(Debug)]
 pub(super) struct Progress {
     bar: ProgressBar,
     end: Option<Sender<()>>,
-    /// Shows the bar once patience has run out, even where a stage is too long to tell anything.
-    shower: Option<JoinHandle<()>>,
+    /// Shows the bar after the delay, even if the first stage reports nothing for long.
+    delayed_start: Option<JoinHandle<()>>,
 }
 
 impl Progress {
@@ -31,9 +30,9 @@ impl Progress {
         }
         let (end, ended) = bounded::<()>(0);
         let shown = bar.clone();
-        let shower = std::thread::Builder::new().name("bar".to_owned()).spawn(move || {
+        let delayed_start = std::thread::Builder::new().name("bar".to_owned()).spawn(move || {
             // Dropping the sender ends the wait; nothing is ever sent.
-            if ended.recv_timeout(PATIENCE).is_err_and(|error| error.is_timeout()) {
+            if ended.recv_timeout(SHOW_AFTER).is_err_and(|error| error.is_timeout()) {
                 shown.set_draw_target(ProgressDrawTarget::stderr());
                 shown.enable_steady_tick(REFRESH);
             }
@@ -41,11 +40,11 @@ impl Progress {
         Self {
             bar,
             end: Some(end),
-            shower: shower.ok(), // Without a thread there is no bar, and the work goes on.
+            delayed_start: delayed_start.ok(), // Without a thread there is no bar, and the work goes on.
         }
     }
 
-    /// Says what is being done, and which share of everything is done.
+    /// Sets the current stage, and the completed fraction of the whole.
     pub fn tell(&mut self, stage: &str, fraction: f64) {
         if self.bar.message() != stage {
             self.bar.set_message(stage.to_owned());
@@ -57,9 +56,9 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         drop(self.end.take());
-        if let Some(shower) = self.shower.take() {
-            // The thread cannot panic, and nobody would miss its bar.
-            let _ = shower.join();
+        if let Some(delayed_start) = self.delayed_start.take() {
+            // The thread cannot panic; and without it there would only be no bar.
+            let _ = delayed_start.join();
         }
         self.bar.finish_and_clear();
     }

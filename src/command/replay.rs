@@ -1,4 +1,4 @@
-//! `wormd replay`: a log through the estimator once more, and whether it comes to the same results.
+//! `wormd replay`: runs a log through the estimator again, and compares the results.
 
 use super::{Failure, print};
 use clap::Args;
@@ -24,7 +24,7 @@ pub struct ReplayArgs {
 ///
 /// # Errors
 /// [`Failure::Unusable`] for a log or configuration that cannot be used; [`Failure::Failed`] when a log that is complete
-/// does not come out as recorded.
+/// does not reproduce the recorded results.
 pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
     let log = messages(&args.log).map_err(Failure::unusable)?;
     if log.states.is_empty() {
@@ -46,7 +46,7 @@ pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
     }
     if comparison.complete && !comparison.is_identical() {
         return Err(Failure::failed(
-            "the estimator did not come to the recorded results: was the log made by another version, or with another configuration?",
+            "the estimator did not reproduce the recorded results: was the log made by another version, or with another configuration?",
         ));
     }
     Ok(())

@@ -24,7 +24,7 @@ pub struct SimulateArgs {
     /// Configuration; without it the worm of the paper
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// An effect beyond the paper's theory, with its values; several may be given. config/worm.toml tells all names
+    /// An effect beyond the paper's theory, with its values; several may be given. config/worm.toml lists all names
     #[arg(
         long = "effect",
         value_name = "NAME:PARAM=VALUE,…[,cell=K]",
@@ -75,7 +75,7 @@ impl SimulateArgs {
     }
 }
 
-/// Runs `wormd simulate`. What was written is told on one line of standard error.
+/// Runs `wormd simulate`. Prints what was written on one line of standard error.
 ///
 /// # Errors
 /// [`Failure::Unusable`] for arguments or a configuration that cannot be used and a worm that slides down; [`Failure::Failed`]
@@ -110,7 +110,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes the format that the file's name asks for.
+/// Writes the format of the file's extension.
 fn write(recording: &Recording, config: &Config, config_text: Option<&str>, out: &Path) -> Result<(), Failure> {
     let extension = out.extension().map(|extension| extension.to_ascii_lowercase());
     match extension.as_deref().and_then(|extension| extension.to_str()) {

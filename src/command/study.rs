@@ -22,7 +22,7 @@ pub struct StudyArgs {
         allow_negative_numbers = true
     )]
     slopes: Vec<f64>,
-    /// Also tell how far so much battery energy takes each design, in joules; without it, the one of [battery], if any
+    /// Also show how far this much battery energy takes each design, in joules; without it, the capacity of `[battery]`, if any
     #[arg(long, value_name = "J")]
     battery: Option<f64>,
     /// Share of the battery's energy that reaches the cells; without it, all

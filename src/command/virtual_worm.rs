@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use worm_estimator::config::Config;
 
-/// The devices run so far below the loop's priority: a real servo answers however busy the computer is, and so must this one.
+/// The devices' priority lies this far below the loop's: a real servo answers however busy the computer is, and so must this one.
 const PRIORITY_BELOW_LOOP: u8 = 10;
 
 /// Runs the simulated servo and tracker behind a pseudo-terminal until SIGTERM or SIGINT.
@@ -29,7 +29,7 @@ pub struct VirtualWormArgs {
     /// Set the servo to this baud rate, and answer only a peer that uses the servo's; without it any rate is understood
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     pub baud: Option<u32>,
-    /// Write the truth about energy and way to this file at the end, as JSON
+    /// Write the ground truth about energy and distance to this file at the end, as JSON
     #[arg(long, value_name = "FILE")]
     pub ledger: Option<PathBuf>,
     /// Seed of all randomness, in place of the configured one
@@ -60,8 +60,8 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
     };
     let end = end_on_signal()?;
     if let Some(file) = &args.ledger {
-        // A ledger that cannot be written is told now, not after hours.
-        std::fs::write(file, "").map_err(|error| Failure::unusable(ledger_trouble(file, &error)))?;
+        // A ledger that cannot be written is reported now, not after hours.
+        std::fs::write(file, "").map_err(|error| Failure::unusable(ledger_error(file, &error)))?;
     }
     let server = Server::open(&config, &options).map_err(|error| match error {
         ServerError::Devices(_) => Failure::unusable(error),
@@ -69,7 +69,7 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
     })?;
     let link = PortLink::create(&args.link, server.path()).map_err(Failure::unusable)?;
     report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
-    // One who does not want to know when it is ready may have closed the pipe.
+    // A parent that does not wait for this line may have closed the pipe.
     let _ = print::line(args.link.display());
     let devices = server.run(&end).map_err(Failure::failed)?;
     drop(link);
@@ -79,7 +79,7 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
     }
 }
 
-fn ledger_trouble(file: &Path, error: &io::Error) -> String {
+fn ledger_error(file: &Path, error: &io::Error) -> String {
     format!(
         "{}: cannot write the ledger: {error}; does its folder exist, and may you write there?",
         file.display()
@@ -88,5 +88,5 @@ fn ledger_trouble(file: &Path, error: &io::Error) -> String {
 
 fn write_ledger(file: &Path, report: &VirtualWormReport) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(report).map_err(Failure::failed)?;
-    std::fs::write(file, text + "\n").map_err(|error| Failure::failed(ledger_trouble(file, &error)))
+    std::fs::write(file, text + "\n").map_err(|error| Failure::failed(ledger_error(file, &error)))
 }

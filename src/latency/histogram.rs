@@ -1,13 +1,13 @@
-//! Durations, counted in a histogram of the HDR kind: every duration to two digits, however rare it is.
+//! Durations, counted in an HDR histogram: every duration to two digits, however rare it is.
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use worm_estimator::time::microseconds;
 
-/// Longest duration that is told apart, ns: ten seconds. What takes longer counts as that.
-const LONGEST_NS: u64 = 10_000_000_000;
+/// Longest duration that is resolved, ns: ten seconds. Longer ones count as this.
+const MAX_NS: u64 = 10_000_000_000;
 
-/// Digits that are told apart: 1 % of the value.
+/// Significant digits that are resolved: 1 % of the value.
 const DIGITS: u8 = 2;
 
 /// Durations in ns.
@@ -17,7 +17,7 @@ pub struct Durations(Histogram<u64>);
 impl Default for Durations {
     fn default() -> Self {
         // The bounds are constants, and valid.
-        Self(Histogram::new_with_max(LONGEST_NS, DIGITS).unwrap_or_else(|error| unreachable!("{error}")))
+        Self(Histogram::new_with_max(MAX_NS, DIGITS).unwrap_or_else(|error| unreachable!("{error}")))
     }
 }
 
@@ -27,11 +27,11 @@ impl Durations {
         self.0.saturating_record(ns);
     }
 
-    /// Counts a lateness of something that is due once every `period_ns`, and with it the latenesses of those that were due
-    /// meanwhile and never came: each is a period less late than the one before. Without them one stop of a second would
-    /// count as one late tick among thousands of good ones, where a thousand ticks were late ("coordinated omission").
+    /// Counts the lateness of an event that is due once every `period_ns`, and with it the latenesses of the events that were due
+    /// meanwhile and did not happen: each is a period less late than the one before. Without them one stop of a second would count
+    /// as one late tick among thousands of good ones, although a thousand ticks were late ("coordinated omission").
     pub fn record_due(&mut self, ns: u64, period_ns: u64) {
-        let ns = ns.min(LONGEST_NS);
+        let ns = ns.min(MAX_NS);
         if self.0.record_correct(ns, period_ns.max(1)).is_err() {
             self.0.saturating_record(ns);
         }
@@ -74,7 +74,7 @@ impl Durations {
 
 /// The percentiles, how many were counted, and the bars as pairs of the longest duration in µs and the count.
 #[derive(Serialize, Deserialize)]
-struct Told {
+struct JsonForm {
     #[serde(flatten)]
     percentiles: Percentiles,
     count: u64,
@@ -84,21 +84,21 @@ struct Told {
 /// As an object of percentiles, count and bars; null when nothing was counted.
 impl Serialize for Durations {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let told = (!self.is_empty()).then(|| Told {
+        let form = (!self.is_empty()).then(|| JsonForm {
             percentiles: self.percentiles(),
             count: self.count(),
             histogram: self.bars().collect(),
         });
-        told.serialize(serializer)
+        form.serialize(serializer)
     }
 }
 
 /// From the bars of that object: the same histogram, as far as its bars are wide.
 impl<'de> Deserialize<'de> for Durations {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let told = Option::<Told>::deserialize(deserializer)?;
+        let form = Option::<JsonForm>::deserialize(deserializer)?;
         let mut durations = Self::default();
-        for (us, count) in told.into_iter().flat_map(|told| told.histogram) {
+        for (us, count) in form.into_iter().flat_map(|form| form.histogram) {
             durations.0.saturating_record_n((us * 1e3).round() as u64, count);
         }
         Ok(durations)
@@ -136,15 +136,15 @@ mod tests {
         for (ms, count, median_ms, largest_ms) in table {
             let mut durations = Durations::default();
             ms.iter().for_each(|ms| durations.record_due(ms * 1_000_000, 1_000_000));
-            let told = durations.percentiles();
+            let percentiles = durations.percentiles();
             assert_eq!(durations.count(), count, "{ms:?}");
             assert!(
-                (told.p50 / 1e3 - median_ms).abs() <= 0.01 * median_ms,
-                "{ms:?}: {told:?}"
+                (percentiles.p50 / 1e3 - median_ms).abs() <= 0.01 * median_ms,
+                "{ms:?}: {percentiles:?}"
             );
             assert!(
-                (told.max / 1e3 - largest_ms).abs() <= 0.01 * largest_ms,
-                "{ms:?}: {told:?}"
+                (percentiles.max / 1e3 - largest_ms).abs() <= 0.01 * largest_ms,
+                "{ms:?}: {percentiles:?}"
             );
         }
     }

@@ -1,4 +1,4 @@
-//! What a run measured: each duration with its name, and beside it the least that this machine can do.
+//! The durations of a run, each with its name and the best that this machine can do.
 
 use super::histogram::{Durations, Percentiles};
 use super::outcome::Outcome;
@@ -10,18 +10,18 @@ pub struct Measure<'a> {
     pub name: &'static str,
     /// What was measured of wormd.
     pub durations: &'a Durations,
-    /// What was measured without wormd in the same run, with what it is called.
+    /// The name of what was measured without wormd in the same run, and its durations.
     pub floor: Option<(&'static str, &'a Durations)>,
 }
 
 impl Measure<'_> {
-    /// How many times its floor it is, at one percentile; none where either was not measured.
+    /// Its ratio to the floor at one percentile; none where either was not measured.
     pub fn ratio(&self, percentile: fn(&Percentiles) -> f64) -> Option<f64> {
         ratio(self.durations, self.floor?.1, percentile)
     }
 }
 
-/// How many times the floor a duration is, at one percentile; none where either was not measured, or the floor is nothing.
+/// Ratio of a duration to its floor at one percentile; none where either was not measured, or the floor is 0.
 pub fn ratio(durations: &Durations, floor: &Durations, percentile: fn(&Percentiles) -> f64) -> Option<f64> {
     let ratio = percentile(&durations.measured()?) / percentile(&floor.measured()?);
     ratio.is_finite().then_some(ratio)
@@ -90,7 +90,7 @@ mod tests {
             (&[200], &[0], None),
         ];
         for (durations, floor, expected) in table {
-            assert_eq!(ratio(&of(durations), &of(floor), |told| told.p50), expected);
+            assert_eq!(ratio(&of(durations), &of(floor), |us| us.p50), expected);
         }
     }
 }

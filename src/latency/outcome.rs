@@ -1,4 +1,4 @@
-//! What a run of the latency benchmark has found. The JSON names are a contract.
+//! The outcome of a run of the latency benchmark. The JSON names are a published contract.
 
 use super::histogram::Durations;
 use super::tick_stats::HostPauses;
@@ -17,7 +17,7 @@ pub struct Outcome {
     pub worm: String,
     /// The port, or "the virtual worm".
     pub port: String,
-    /// Ticks per second that were asked for.
+    /// Configured ticks per second.
     pub rate_hz: f64,
     /// Time that was measured, s.
     pub duration_s: f64,
@@ -27,15 +27,15 @@ pub struct Outcome {
     pub ticks: u64,
     /// Deadlines that passed without a tick.
     pub overruns: u64,
-    /// Those of them for which the tick's own computation or publishing is to blame.
+    /// Those of them caused by the tick's own computation or publishing.
     pub overruns_of_product: u64,
     /// How long after its deadline the loop ran.
     pub wake_us: Durations,
-    /// How long after its deadline a bare sleeper ran, of the same rate, priority and CPU, in the same run.
+    /// How long after its deadline a bare sleeper of the same rate, priority and CPU ran, in the same run.
     pub floor_wake_us: Durations,
     /// Time from one tick's beginning to the next one's.
     pub period_us: Durations,
-    /// The tick itself, from its beginning to its end: bus, computation, publishing, waking who listens.
+    /// The tick itself, from its beginning to its end: bus, computation, publishing, waking the listeners.
     pub execution_us: Durations,
     /// The bus exchange.
     pub bus_us: Durations,
@@ -45,11 +45,11 @@ pub struct Outcome {
     pub publish_us: Durations,
     /// Computation and publishing: all of a tick that is wormd's own.
     pub own_work_us: Durations,
-    /// Waking who listens: the event's one system call.
+    /// Waking the listeners: the event's system call.
     pub notify_us: Durations,
     /// The same call between a bare notifier and a bare listener in the same run.
     pub floor_notify_us: Durations,
-    /// From before the state is published until the estimator, woken by its event, has it in hand.
+    /// From before the state is published until the estimator, woken by its event, has received it.
     pub delivery_us: Durations,
     /// The same between a bare iceoryx2 publisher and subscriber, of the same payload, in the same run.
     pub floor_delivery_us: Durations,
@@ -58,13 +58,13 @@ pub struct Outcome {
     /// As `floor_delivery_us`, to a subscriber that never sleeps.
     pub floor_polled_delivery_us: Durations,
     /// From the moment at which the cam is blocked until the alarm has woken a listener. Not measured on a real worm,
-    /// which nobody blocks.
+    /// which is not blocked.
     pub alarm_us: Durations,
     /// Late ticks by culprit.
     pub culprits: BTreeMap<&'static str, u64>,
     /// Pauses of the computer, of which the late ticks are part.
     pub host_pauses: HostPauses,
-    /// The latest ticks, the latest first.
+    /// The worst ticks, the worst first.
     pub worst_ticks: WorstTicks,
     /// Share of one CPU that the controller took, 0 to 1.
     pub controller_cpu_share: f64,
@@ -72,17 +72,17 @@ pub struct Outcome {
     pub floor_cpu_share: f64,
     /// Share of one CPU that the estimator took, 0 to 1.
     pub estimator_cpu_share: f64,
-    /// The highest rate at which hardly a tick was late; null where it was not looked for, or none was found.
+    /// The highest sustained rate; null where it was not searched for, or none was found.
     pub highest_rate_hz: Option<f64>,
     /// What was tried for that.
     pub rate_trials: Vec<RateTrial>,
-    /// Scheduler and priority that were really in force for the loop.
+    /// Scheduler and priority that the loop really had.
     pub scheduler: String,
     /// Whether the controller's memory was really locked.
     pub memory_locked: bool,
-    /// What was in force for the loop and on this computer, judged.
+    /// The settings of the loop and of this computer, and whether they suit it.
     pub settings: Vec<Setting>,
-    /// What cyclictest measured, where it was asked for and is installed.
+    /// What cyclictest measured, if it was requested and is installed.
     pub cyclictest: Option<Cyclictest>,
     /// What to know when reading these numbers.
     pub warnings: Vec<String>,
@@ -99,7 +99,7 @@ pub struct RateTrial {
     pub overruns: u64,
     /// Ticks in which the servo's answer was missing or too late.
     pub failed_exchanges: u64,
-    /// Whether so few were missed that the rate counts as sustained.
+    /// Whether so few deadlines were missed that the rate counts as sustained.
     pub sustained: bool,
 }
 
@@ -108,7 +108,7 @@ pub struct RateTrial {
 pub struct Cyclictest {
     /// How it was called.
     pub command: String,
-    /// Least wake lateness, µs.
+    /// Smallest wake lateness, µs.
     pub min_us: f64,
     /// Mean wake lateness, µs.
     pub mean_us: f64,

@@ -24,8 +24,8 @@ impl fmt::Display for Outcome {
             machine(self),
             warnings(&self.warnings),
         ];
-        let told: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-        f.write_str(&told.join("\n\n"))
+        let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+        f.write_str(&parts.join("\n\n"))
     }
 }
 
@@ -35,7 +35,7 @@ fn run(outcome: &Outcome) -> String {
     let memory = if outcome.memory_locked { "locked" } else { "not locked" };
     let fraction = |fraction: f64| match percent(fraction) {
         none if none == NONE => NOT_MEASURED.to_owned(),
-        told => told,
+        text => text,
     };
     let overruns = match outcome.ticks {
         0 => format!("overruns {NOT_MEASURED}"),
@@ -180,7 +180,7 @@ fn evidence(tick: &Tick) -> String {
     found.join(", ")
 }
 
-/// What was in force: first what is not as it should be, with what to do about it.
+/// The settings; first those that do not suit the loop, with the remedies.
 fn settings(settings: &[Setting]) -> String {
     if settings.is_empty() {
         return String::new();
@@ -188,7 +188,7 @@ fn settings(settings: &[Setting]) -> String {
     let named = settings.iter().map(|setting| setting.subject.chars().count());
     let width = named.max().unwrap_or(0);
     let (good, bad): (Vec<&Setting>, Vec<&Setting>) = settings.iter().partition(|setting| setting.good);
-    let mut lines = vec!["settings in force".to_owned()];
+    let mut lines = vec!["effective settings".to_owned()];
     for setting in bad.into_iter().chain(good) {
         let mark = if setting.good { "good" } else { "BAD " };
         let begin = format!("  {mark}  {:<width$}  ", setting.subject);
@@ -256,11 +256,11 @@ fn warnings(warnings: &[String]) -> String {
 
 /// Text in lines that fit, all of them indented by so many columns; a word that is longer than a line gets one of its own.
 fn wrapped(text: &str, indent: usize) -> String {
-    let room = WIDTH.saturating_sub(indent);
+    let width = WIDTH.saturating_sub(indent);
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= room => {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
                 line.push(' ');
                 line.push_str(word);
             }

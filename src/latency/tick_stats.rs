@@ -1,4 +1,4 @@
-//! The loop's ticks, counted: what the `timing` topic tells, and when states were received, become histograms.
+//! Statistics of the loop's ticks: histograms from the `timing` topic, and from when states were received.
 
 use super::histogram::Durations;
 use super::timeline::{Tick, WorstTicks};
@@ -7,10 +7,10 @@ use std::collections::{BTreeMap, VecDeque};
 use worm_estimator::message::{Culprit, Timing};
 use worm_estimator::time::seconds;
 
-/// States whose timing, and timings whose state, may be on their way: some seconds at the highest rate.
-const ON_THE_WAY: usize = 65_536;
+/// Maximum number of states that wait for their timing, and of timings that wait for their state: some seconds at the highest rate.
+const MAX_WAITING: usize = 65_536;
 
-/// Pauses of the computer: times of 10 ms and more in which it did not run the loop though it had to.
+/// Pauses of the computer: times of 10 ms or more in which it did not run the loop although it was due.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct HostPauses {
     /// How many.
@@ -52,14 +52,14 @@ impl std::fmt::Display for HostPauses {
     }
 }
 
-/// What a run of ticks amounts to.
+/// Statistics of a run of ticks.
 #[derive(Debug, Clone, Default)]
 pub struct TickStats {
     /// Ticks.
     pub ticks: u64,
     /// Deadlines that passed without a tick.
     pub overruns: u64,
-    /// Those of them whose culprit is wormd's own work.
+    /// Those of them caused by wormd's own work.
     pub overruns_of_product: u64,
     /// How long after its deadline each tick began; deadlines that were missed count as served when the tick before ended.
     pub wake: Durations,
@@ -75,13 +75,13 @@ pub struct TickStats {
     pub publish: Durations,
     /// Computation and publishing.
     pub own_work: Durations,
-    /// Waking who listens.
+    /// Waking the listeners.
     pub notify: Durations,
     /// Late ticks by culprit.
     pub culprits: BTreeMap<&'static str, u64>,
     /// Pauses of the computer.
     pub host_pauses: HostPauses,
-    /// The latest ticks.
+    /// The worst ticks.
     pub worst: WorstTicks,
     last: Option<Timing>,
     /// Deadlines that had been missed before the last tick, as the controller counts them.
@@ -89,8 +89,8 @@ pub struct TickStats {
 }
 
 impl TickStats {
-    /// Takes the timings of one run of the loop, one after the other. A tick is counted when the next one has told what its
-    /// publishing took.
+    /// Takes the timings of one run of the loop, one after the other. A tick is counted with the next one, which
+    /// carries the duration of its publishing.
     pub fn take(&mut self, timing: &Timing) {
         self.host_pauses.add(timing.host_paused_ns);
         let Some(last) = self.last.replace(*timing) else {
@@ -109,7 +109,7 @@ impl TickStats {
         let ended_ns = began_ns + execution_ns;
         self.ticks += 1;
         self.wake.record(last.wake_lateness_ns);
-        // Missed deadlines would have been served when the tick that cost them ended: coordinated omission, mended.
+        // Missed deadlines would have been served when the tick that cost them ended: this corrects for coordinated omission.
         let period_ns = timing.deadline_ns.saturating_sub(last.deadline_ns) / (missed + 1);
         for number in 1..=missed {
             let missed_ns = last.deadline_ns + number * period_ns;
@@ -135,8 +135,8 @@ impl TickStats {
     }
 }
 
-/// How long states took from before they were published until somebody had them: brings together when a state was received and
-/// what its timing says, whichever comes first.
+/// How long states took from before publishing until they were received: matches each reception with the timing of its state,
+/// whichever comes first.
 #[derive(Debug, Clone, Default)]
 pub struct Deliveries {
     /// The durations so far.
@@ -153,7 +153,7 @@ impl Deliveries {
         self.meet();
     }
 
-    /// Takes the number of a state and when it was in hand, ns.
+    /// Takes the number of a state and when it was received, ns.
     pub fn received(&mut self, sequence: u64, received_ns: u64) {
         self.received.push_back((sequence, received_ns));
         self.meet();
@@ -174,7 +174,7 @@ impl Deliveries {
             }
         }
         for waiting in [&mut self.published, &mut self.received] {
-            if waiting.len() > ON_THE_WAY {
+            if waiting.len() > MAX_WAITING {
                 waiting.pop_front();
             }
         }
@@ -218,25 +218,22 @@ mod tests {
             timing(10, 7, [50, 100, 1500, 4, 10], 44, Culprit::Compute),
             timing(11, 9, [50, 100, 2, 4, 10], 44, Culprit::None),
         ];
-        let mut account = TickStats::default();
-        timings.iter().for_each(|timing| account.take(timing));
-        assert_eq!(
-            (account.ticks, account.overruns, account.overruns_of_product),
-            (4, 4, 1)
-        );
-        assert_eq!(account.culprits, BTreeMap::from([("bus", 1), ("compute", 1)]));
+        let mut stats = TickStats::default();
+        timings.iter().for_each(|timing| stats.take(timing));
+        assert_eq!((stats.ticks, stats.overruns, stats.overruns_of_product), (4, 4, 1));
+        assert_eq!(stats.culprits, BTreeMap::from([("bus", 1), ("compute", 1)]));
         // Four ticks, and the four that were missed: at 3, 4 and 5 ms, when the second ended at 5.067 ms; at 8 ms, when the
         // fourth ended at 8.664 ms.
-        assert_eq!(account.wake.count(), 8);
+        assert_eq!(stats.wake.count(), 8);
         let near = |us: f64, expected: f64| (us / expected - 1.0).abs() < 0.01;
         assert!(
-            near(account.wake.percentiles().max, 2067.0),
+            near(stats.wake.percentiles().max, 2067.0),
             "{:?}",
-            account.wake.percentiles()
+            stats.wake.percentiles()
         );
-        assert!(near(account.own_work.percentiles().max, 1504.0));
-        assert!(near(account.period.percentiles().max, 4000.0));
-        let worst: Vec<u64> = account.worst.ticks().iter().map(|tick| tick.sequence).collect();
+        assert!(near(stats.own_work.percentiles().max, 1504.0));
+        assert!(near(stats.period.percentiles().max, 4000.0));
+        let worst: Vec<u64> = stats.worst.ticks().iter().map(|tick| tick.sequence).collect();
         assert_eq!(worst, [8, 10, 7, 9]);
     }
 
@@ -249,8 +246,8 @@ mod tests {
         deliveries.take(&timing(8, 2, [50, 100, 2, 4, 10], 0, Culprit::None));
         deliveries.received(9, 3_160_000);
         deliveries.take(&timing(9, 3, [50, 100, 2, 4, 10], 0, Culprit::None));
-        let told = deliveries.durations.percentiles();
+        let percentiles = deliveries.durations.percentiles();
         assert_eq!(deliveries.durations.count(), 2);
-        assert!((told.max - 8.0).abs() < 0.1, "{told:?}");
+        assert!((percentiles.max - 8.0).abs() < 0.1, "{percentiles:?}");
     }
 }

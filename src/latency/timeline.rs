@@ -1,10 +1,10 @@
-//! One tick as its parts on the clock, and the latest ticks of a run.
+//! One tick as its parts on the clock, and the worst ticks of a run.
 
 use serde::Serialize;
 use worm_estimator::message::{Culprit, Timing};
 use worm_estimator::time::microseconds;
 
-/// One tick, complete: where its time went, and who made it late.
+/// One complete tick: where its time went, and what made it late.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tick {
     /// The tick's number since the controller started.
@@ -17,17 +17,17 @@ pub struct Tick {
     pub compute_us: f64,
     /// Publishing, µs.
     pub publish_us: f64,
-    /// Waking who listens, µs.
+    /// Waking the listeners, µs.
     pub notify_us: f64,
-    /// Share of it in which the loop could have run and had no CPU, µs; zero where the tick was in time.
+    /// Time in which the loop was runnable but had no CPU, µs; zero if the tick was in time.
     pub waited_us: f64,
-    /// Time that the host took the CPUs away for, µs, in steps of the kernel's clock tick; zero where the tick was in time.
+    /// Time for which the host took the CPUs away, µs, in steps of the kernel's clock tick; zero if the tick was in time.
     pub stolen_us: f64,
-    /// Page faults in it; zero where the tick was in time.
+    /// Page faults in it; zero if the tick was in time.
     pub page_faults: u32,
     /// Whether it ended after the next deadline.
     pub late: bool,
-    /// Who made it late, or took the largest part of it where it was in time.
+    /// What made it late, or its longest part if it was in time.
     #[serde(serialize_with = "name_of")]
     pub culprit: Culprit,
 }
@@ -37,7 +37,7 @@ fn name_of<S: serde::Serializer>(culprit: &Culprit, serializer: S) -> Result<S::
 }
 
 impl Tick {
-    /// The tick that `timing` tells of; `publish_ns` stands in the timing of the tick that follows it.
+    /// The tick of `timing`; its `publish_ns` comes with the timing of the next tick.
     pub fn new(timing: &Timing, publish_ns: u64) -> Self {
         let late = timing.overrun != 0;
         let parts = [
@@ -74,7 +74,7 @@ impl Tick {
     }
 }
 
-/// The latest ticks of a run, the latest first.
+/// The worst ticks of a run, the worst first.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct WorstTicks(Vec<Tick>);
@@ -92,7 +92,7 @@ impl WorstTicks {
         }
     }
 
-    /// The ticks, the latest first.
+    /// The ticks, the worst first.
     pub fn ticks(&self) -> &[Tick] {
         &self.0
     }

@@ -1,4 +1,4 @@
-//! `wormd explain` on a table of advances, as users often have no more: it tells every effect that fits, names none on so few
+//! `wormd explain` on a table of advances, as users often have no more: it lists every effect that fits, selects none on so few
 //! scalars, and refuses what cannot be such a table.
 
 use super::workspace::{Workspace, said, wormd};
@@ -35,11 +35,11 @@ fn of_the_papers_table_4_none_is_named() {
     assert_eq!(answer["verdict"], "ambiguous", "{answer}");
     let candidates = [&list(&answer["effects"])[..], list(&answer["rivals"])].concat();
     assert!(candidates.len() > 1, "{answer}");
-    // The cause that the paper itself supposes is among them, and which cell it would be is not told.
+    // The paper's own hypothesis is among them, without a cell.
     let unequal = candidates.iter().find(|effect| effect["name"] == "unequal-clamping");
     let unequal = unequal.unwrap_or_else(|| panic!("no unequal-clamping in {answer}"));
     assert_eq!(unequal["cell"], Value::Null);
-    // Nothing is told that only positions could.
+    // What only positions could show is absent.
     assert_eq!(list(&answer["where"]), &[] as &[Value]);
     assert!(
         list(&answer["gap"])

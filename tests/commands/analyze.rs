@@ -1,4 +1,4 @@
-//! `wormd analyze` as people and scripts call it: what cannot be analysed is named and ends with status 2, what can is told.
+//! `wormd analyze` as people and scripts call it: input that cannot be analysed is named and ends with status 2, the rest is reported.
 
 use super::workspace::{Workspace, said, wormd};
 use serde_json::Value;

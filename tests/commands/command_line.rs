@@ -123,7 +123,7 @@ fn a_study_prints_the_contracted_fields() {
     );
 }
 
-/// With a battery each row also tells how far it takes the worm.
+/// With a battery each row also shows how far it takes the worm.
 #[test]
 fn a_study_with_a_battery_tells_the_range() {
     let output = wormd(&[

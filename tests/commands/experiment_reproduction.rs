@@ -50,7 +50,7 @@ fn simulated(folder: &Path, slope_deg: f64) -> String {
     file
 }
 
-/// The worm analysed on every slope by itself, once for all tests that look at it.
+/// The worm analysed on every slope by itself, once for all tests that use it.
 static ALONE: LazyLock<[Value; 3]> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a temporary folder");
     ADVANCE_MM.map(|(slope_deg, _)| {

@@ -121,7 +121,7 @@ fn what_cannot_be_explained_is_named_and_ends_with_status_2() {
         (
             written("angle.toml", "worm.toml", &[level]),
             &["--slope", "0"],
-            &["a campaign says slopes", "--slope"],
+            &["a campaign has its own slopes", "--slope"],
         ),
         (writer.path("level.csv"), &[], &["level.csv", "--slope DEG"]),
         (

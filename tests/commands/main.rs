@@ -1,4 +1,4 @@
-//! The commands as a user types them: output, files, exit codes, and what they say of wrong input.
+//! The commands as a user types them: output, files, exit codes, and error messages for wrong input.
 
 mod advances;
 mod analyze;

@@ -1,4 +1,4 @@
-//! The serial side: the link against a worm in memory, and against the virtual worm on a pseudo-terminal; the maker's own client.
+//! The serial side: the link against a worm in memory, and against the virtual worm on a pseudo-terminal; the manufacturer's own client.
 
 mod drive;
 mod example_tracker;

@@ -40,7 +40,7 @@ fn open(path: &Path, baud: u32) -> WormBus<Tty> {
     WormBus::new(Tty::open(path, baud).expect("a port").0)
 }
 
-/// A controller's whole day: make ready, arm, crawl at 1 kHz, and hold what was seen against the truth.
+/// A whole run of a controller: prepare, arm, crawl at 1 kHz, and compare the readings with the ground truth.
 #[test]
 fn link_and_virtual_worm_understand_each_other() {
     let worm = spawn(&[], None);
@@ -115,7 +115,7 @@ fn babble_and_silence_are_survived() {
         for chunk in noise.chunks(500) {
             file.write_all(chunk).expect("sent");
         }
-        // Pings that nobody reads the answers of.
+        // Pings whose answers are not read.
         let ping = [0xFF, 0xFF, 0xFD, 0, 1, 3, 0, 1, 0x19, 0x4E];
         for _ in 0..5000 {
             file.write_all(&ping).expect("sent");

@@ -1,4 +1,5 @@
-//! The latency benchmark for real. What it measures depends on the machine; what it tells, and that it adds up, does not.
+//! The latency benchmark with real processes. What it measures depends on the machine; which figures it reports, and that they add up,
+//! does not.
 
 use crate::worm::{Worm, late_ticks};
 use serde_json::Value;
@@ -128,7 +129,7 @@ fn what_cannot_be_had_is_said_and_the_rest_is_measured() {
     assert!(check_duration(&outcome, "wake_us") > 0.0);
     assert_eq!(outcome["alarm_us"], Value::Null, "no stall fits into a second");
 
-    // A port that another controller has: the machine's own limit is told all the same.
+    // A port that another controller has: the machine's own limit is still reported.
     let busy = Worm::on_a_steady_computer("lat3");
     let _devices = busy.virtual_worm(&[]);
     let _bus = busy.bus();

@@ -1,4 +1,4 @@
-//! Whoever watches `wormd up` may leave without a word; the worm must not crawl on with nobody at it.
+//! The terminal or parent of `wormd up` may vanish; the worm must not crawl on unattended.
 
 use super::PATIENCE;
 use super::worm::{Worm, wait_for};

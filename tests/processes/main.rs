@@ -1,7 +1,7 @@
-//! The three processes of a worm for real: real pseudo-terminal, real topics, real signals. They pause together for 20 to 300 ms about
-//! once a second, but in the tests of the latency benchmark, which measures the computer.
+//! The three processes of a worm with a real pseudo-terminal, real topics and real signals. They pause together for 20 to 300 ms about
+//! once a second, except in the tests of the latency benchmark, which measures the computer.
 //!
-//! These tests wait for conditions with a generous bound; they assert what happens, never how fast a shared machine is.
+//! These tests wait for conditions with a generous bound; they check what happens, never how fast a shared machine is.
 
 mod explaining;
 mod latency;
@@ -18,7 +18,7 @@ use wormd::link::servo::{WATCHDOG_LATCHED, register};
 /// Longest wait for anything that a worm does.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Nothing of a gait cycle, nor of a tick, gets lost in a pause; and a healthy worm has no fault and no alarm in one.
+/// A pause loses no gait cycle and no tick, and gives a healthy worm no fault and no alarm.
 fn assert_main_job(worm: &Worm) {
     let output = worm.wormd(&["up", "--json", "--duration", "12"]).output();
     let error = String::from_utf8_lossy(&output.stderr);

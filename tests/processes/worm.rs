@@ -88,7 +88,7 @@ impl Worm {
         Invocation::new(&named, self.pauses.clone())
     }
 
-    /// What `wormd replay --json` says of a log.
+    /// The output of `wormd replay --json` for a log.
     pub fn replay(&self, log: &str) -> Output {
         Invocation::new(&["replay", "--json", log], None).output()
     }
@@ -101,7 +101,7 @@ impl Worm {
         Invocation::new(&arguments, self.pauses.clone()).start()
     }
 
-    /// The bus of the virtual worm, for whoever is not the controller.
+    /// The bus of the virtual worm, for other clients than the controller.
     pub fn bus(&self) -> (WormBus<Tty>, DeviceId) {
         let (port, _) = Tty::open(&PathBuf::from(self.port()), 1_000_000).expect("the port is free");
         (WormBus::new(port), DeviceId::new(1).expect("1 is an ID"))
@@ -251,7 +251,7 @@ impl Invocation {
         }
     }
 
-    /// Starts it, and hears nothing of it.
+    /// Starts it, and discards its output.
     pub fn start_silent(mut self) -> Process {
         self.command.stdout(Stdio::null()).stderr(Stdio::null());
         self.spawn()
@@ -276,7 +276,7 @@ impl Process {
         self.child.id()
     }
 
-    /// Does not run for so long.
+    /// Suspends it for this long.
     pub fn pause(&self, pause: Duration) {
         let pid = Pid::from_raw(self.child.id() as i32);
         kill(pid, Signal::SIGSTOP).expect("is alive");

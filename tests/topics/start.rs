@@ -133,7 +133,7 @@ fn kill_a_start(home: &Home, random: &mut Xoshiro256PlusPlus) {
     process.kill();
 }
 
-/// Starts a controller here and now, and has it heard, by `watcher` too; says how long the start took.
+/// Starts a controller in this process, checks that it is received, by `watcher` too; returns how long the start took.
 fn start_and_be_heard(instance: &Instance, watcher: Option<&mut Subscriber<State>>) -> Duration {
     let begun = Instant::now();
     let controller = RoleLock::<Controller>::take(instance).expect("the role is free");
@@ -203,7 +203,7 @@ fn nothing_is_wiped_while_a_peer_lives_and_the_error_names_it() {
     );
     Hub::open(&instance).expect("a second process");
 
-    // What a start cannot mend: services without their shared part.
+    // What a start cannot repair: services without their shared part.
     let is_dynamic = |path: &&std::path::PathBuf| path.extension().is_some_and(|extension| extension == "dynamic");
     for file in segments(&instance).iter().filter(is_dynamic) {
         fs::remove_file(file).expect("remove");

@@ -1,5 +1,5 @@
-//! One worm with its controller and its estimator, tick by tick, wired as the processes are: what the estimator says in one tick
-//! reaches the controller in the next.
+//! One worm with its controller and its estimator, tick by tick, wired like the processes: what the estimator publishes in one
+//! tick reaches the controller in the next.
 
 use super::machine::{Exchange, Machine};
 use worm_estimator::config::Config;
@@ -42,7 +42,7 @@ pub struct Session<M> {
     spoken_ns: u64,
     /// Every alarm that was raised.
     pub raised: Vec<Alarm>,
-    /// Every cycle that ended, while somebody wants them.
+    /// Every cycle that ended, if they are collected.
     pub cycles: Option<Vec<Cycle>>,
 }
 
@@ -76,7 +76,7 @@ impl<M: Machine> Session<M> {
         }
     }
 
-    /// A worm that was armed and told to crawl with the configured gait.
+    /// A worm that was armed and commanded to crawl with the configured gait.
     pub fn crawling(config: &Config, machine: M, rate_hz: f64) -> Self {
         let mut session = Self::new(config, machine, rate_hz);
         session.begin();
@@ -120,7 +120,7 @@ impl<M: Machine> Session<M> {
         );
     }
 
-    /// Ticks for so long and shows every tick.
+    /// Ticks for this long and shows every tick.
     pub fn run_s(&mut self, seconds: f64, mut look: impl FnMut(&Tick)) {
         let until_ns = self.now_ns + (seconds * 1e9) as u64;
         while self.now_ns < until_ns {
@@ -128,7 +128,7 @@ impl<M: Machine> Session<M> {
         }
     }
 
-    /// Lets a part of it pause for so long, beginning now.
+    /// Pauses a part of it for this long, beginning now.
     pub fn pause(&mut self, paused: Paused, ms: u64) {
         let pause_ns = ms * 1_000_000;
         match paused {

@@ -69,7 +69,7 @@ impl FaultKind {
     }
 }
 
-/// Crawls for so long. Gives the cycles that were crawled, and the first alarm if there was one.
+/// Crawls for this long. Returns the number of cycles, and the first alarm if there was one.
 fn journey<M: Machine>(
     number: usize,
     hours: f64,

@@ -31,12 +31,12 @@ pub trait Machine {
     fn plant(&mut self) -> &Plant;
 }
 
-/// A port in memory whose other end are the virtual worm's devices. It has a time of its own, which runs only while
-/// somebody waits, and then no longer than `patience_s`.
+/// A port in memory with the virtual worm's devices at its other end. Its time runs only while the link waits, and then for at most
+/// `timeout_s`.
 struct Wire {
     devices: Devices,
     now_s: f64,
-    patience_s: f64,
+    timeout_s: f64,
     give_up_s: f64,
     line: Vec<u8>,
 }
@@ -53,7 +53,7 @@ impl Port for Wire {
         self.devices
             .receive(bytes, self.now_s)
             .expect("a checked configuration");
-        self.give_up_s = self.now_s + self.patience_s;
+        self.give_up_s = self.now_s + self.timeout_s;
         Ok(())
     }
 
@@ -98,7 +98,7 @@ impl Wired {
         let mut bus = WormBus::new(Wire {
             devices,
             now_s: 0.0,
-            patience_s: SERVICE_PATIENCE_S,
+            timeout_s: SERVICE_PATIENCE_S,
             give_up_s: 0.0,
             line: Vec::new(),
         });
@@ -138,7 +138,7 @@ impl Wired {
 impl Machine for Wired {
     fn exchange(&mut self, goal_counts: i32, now_s: f64) -> Exchange {
         let wire = self.bus.port_mut();
-        (wire.now_s, wire.patience_s) = (now_s, TICK_PATIENCE_S);
+        (wire.now_s, wire.timeout_s) = (now_s, TICK_PATIENCE_S);
         let goal_rad_s = f64::from(goal_counts) * scale::VELOCITY_RAD_S;
         let outcome = self.bus.exchange(&self.plan, goal_rad_s, Instant::now() + NEVER);
         Exchange {
@@ -150,7 +150,7 @@ impl Machine for Wired {
 
     fn serve(&mut self, service: Service, now_s: f64) -> Served {
         let wire = self.bus.port_mut();
-        (wire.now_s, wire.patience_s) = (wire.now_s.max(now_s), SERVICE_PATIENCE_S);
+        (wire.now_s, wire.timeout_s) = (wire.now_s.max(now_s), SERVICE_PATIENCE_S);
         let done = match service {
             Service::Arm => self.arm(),
             Service::Disarm => self.bus.set_torque(self.settings.servo_id, false).is_ok(),

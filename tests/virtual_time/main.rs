@@ -2,12 +2,12 @@
 //! processes, ports or clocks.
 //!
 //! - `accuracy`: energy per cycle against the virtual worm's own ledger, within 2 %.
-//! - `stall`: a hard stall is told and the goal is 0 within 100 ms; how near a sound worm comes to the threshold.
-//! - `faults`: what each fault of the virtual worm brings about, by when, and nothing else.
-//! - `mismatch`: which worms the model does not explain, and that those of the file and a few per cent off are quiet.
-//! - `pauses`: a computer that pauses, in whole or in part, is no fault of the worm's and costs no cycle its energies.
-//! - `hours`: healthy worms on many kinds of journeys, and no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
-//!   With it, `mismatch` tries all of its sound worms, else half of them.
+//! - `stall`: a hard stall is reported and the goal is 0 within 100 ms; how close a healthy worm comes to the threshold.
+//! - `faults`: which alarms each fault of the virtual worm raises, and by when, and that it raises no others.
+//! - `mismatch`: worms that the model does not explain are reported; the configured worm and those a few per cent off are not.
+//! - `pauses`: a pause of the computer, in whole or in part, is not a fault of the worm and does not distort the energies.
+//! - `hours`: healthy worms on many kinds of journeys raise no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
+//!   With it, `mismatch` tries all of its healthy worms, otherwise half of them.
 //!
 //! Everything is seeded; a failure names its seed.
 

@@ -10,7 +10,7 @@ use wormd::link::virtual_worm::Options;
 
 const RATE_HZ: f64 = 250.0;
 const CYCLE_S: f64 = 2.5;
-/// Cycles within which a mismatch that was there from the start must be told.
+/// Cycles within which a mismatch from the start must be reported.
 const SOON_CYCLES: f64 = 8.5;
 /// Cycles for which a sound worm is watched.
 const LONG_CYCLES: f64 = 60.0;
@@ -143,10 +143,10 @@ fn a_sound_worm_raises_no_mismatch() {
     assert!(wrongs.is_empty(), "{wrongs}");
 }
 
-/// What is there from the start is told within eight cycles or so. On the level, a cell with less friction than the file says
-/// gives way in its own step, and is named.
+/// A mismatch from the start is reported within about eight cycles. On the level, a cell with less friction than configured slips in
+/// its own step, and is named.
 #[test]
-fn what_the_model_does_not_know_is_told() {
+fn what_the_model_does_not_know_is_reported() {
     let mut wrongs = String::new();
     let mut check = |what: String, file: World, world: World, faults: &[&str], cell: Option<u32>| {
         for seed in 1..=3 {
@@ -208,7 +208,7 @@ fn what_the_model_does_not_know_is_told() {
     assert!(wrongs.is_empty(), "{wrongs}");
 }
 
-/// A drag that comes and goes is told and cleared, and the map shows where it took the way.
+/// A drag that comes and goes is reported and cleared, and the map shows where it cost distance.
 #[test]
 fn a_mismatch_that_is_over_is_cleared() {
     let file = World::of(EQUAL, 15.0);

@@ -1,7 +1,7 @@
 //! A computer that pauses: the whole of it, or one of the worm's processes. Through the packet codec at 1 kHz.
 //!
-//! A pause is nobody's silence: no fault, no alarm, and the energies of each cycle stay right, for the pause was no time to the worm.
-//! What a pause cannot hide is told as ever.
+//! A pause does not count as silence: no fault, no alarm, and the energies of each cycle stay right, because no time passed for the
+//! worm. Real faults are still reported.
 
 use super::accuracy::{QUANTITIES, percent};
 use super::harness::{Paused, Session, config};
@@ -139,7 +139,7 @@ fn a_controller_that_pauses_for_longer_than_the_watchdog_waits_says_so_and_may_c
     assert_eq!(
         session.fault(),
         Fault::LinkLost,
-        "a silent servo is told in link_timeout_s"
+        "a silent servo is reported within link_timeout_s"
     );
     session.run_s(2.0, |_| {});
     session.command(CommandKind::Reset, 0.0);

@@ -1,4 +1,4 @@
-//! A hard stall: how soon it is told, and how far a sound worm stays from the threshold. Through the packet codec at 1 kHz.
+//! A hard stall: how soon it is reported, and how far a healthy worm stays from the threshold. Through the packet codec at 1 kHz.
 
 use super::harness::{Session, config};
 use super::machine::Wired;

@@ -60,7 +60,7 @@ fn servo_from_the_factory_is_set_up() {
         register::RETURN_DELAY,
     ];
     assert_eq!(registers.map(|register| worm.servo(register)), [1, 5, 0, 0]);
-    // The second time there is nothing to mend.
+    // The second time there is nothing to correct.
     let (prepared, findings) = prepare_worm(&mut worm, &settings());
     assert!(prepared.is_ok());
     assert_eq!(findings, []);

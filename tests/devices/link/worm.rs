@@ -262,7 +262,7 @@ impl Port for Worm {
             }
             self.decoder = decoder;
         }
-        // The servo says what it was told, and the tracker takes its next picture.
+        // The servo reports its goal as its velocity, and the tracker takes its next sample.
         self.set_servo(
             servo_register::PRESENT_VELOCITY,
             self.servo(servo_register::GOAL_VELOCITY),
