@@ -12,7 +12,7 @@ use crate::report::runs::names_by_slope;
 
 const HEIGHT: f64 = 220.0;
 const RESIDUAL_HEIGHT: f64 = 130.0;
-/// Strength of the bands that mark steps, and of the scatter.
+/// Opacity of the bands that mark steps, and of the scatter.
 const STEP: f64 = 0.09;
 const SCATTER: f64 = 0.3;
 /// The measurement lies pale and thick under the models.

@@ -1,6 +1,6 @@
 //! How much each effect of the library improves the fit.
 
-use super::super::view::{best_of_each, is_visible, outcome, reached};
+use super::super::view::{best_of_each, converged, is_visible, outcome, reached};
 use crate::explain::answer::Screened;
 use crate::explain::{Answer, Verdict};
 use crate::report::page::{Figure, Key, Mark, Panel};
@@ -82,10 +82,10 @@ fn picture(answer: &Answer) -> Result<Svg, DrawError> {
             };
             let end = reached(bar).max(MIN_IMPROVEMENT);
             let (along, across) = ([MIN_IMPROVEMENT, end], [row - HALF_BAR, row + HALF_BAR]);
-            if bar.outcome.to_string() == "did-not-converge" {
-                plot.edge(along, across, Stroke::new(MUTED, 1.5))?;
-            } else {
+            if converged(bar) {
                 plot.fill(along, across, colour, 1.0)?;
+            } else {
+                plot.edge(along, across, Stroke::new(MUTED, 1.5))?;
             }
             plot.text_beside(end, row, INK, &significant(reached(bar), 2))?;
         }

@@ -1,7 +1,7 @@
 //! Which effect, and why not another: the candidates beside each other, and the screening of the whole library.
 
 use super::quantity::{ParameterView, clause, mm};
-use super::{Block, FigureKind, place, stage_of};
+use super::{Block, FigureKind, is_called, place, stage_of};
 use crate::explain::answer::{NamedEffect, Remainder, Screened, with_cell};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::Table;
@@ -140,7 +140,12 @@ pub(in crate::report::explain) fn reached(entry: &Screened) -> f64 {
 
 /// Whether an effect can be seen in the data at all.
 pub(in crate::report::explain) fn is_visible(entry: &Screened) -> bool {
-    entry.outcome.to_string() != "not-visible"
+    !is_called(entry.outcome, "not-visible")
+}
+
+/// Whether the fit of an effect converged, if it was refitted.
+pub(in crate::report::explain) fn converged(entry: &Screened) -> bool {
+    !is_called(entry.outcome, "did-not-converge")
 }
 
 /// What became of an effect, in words.

@@ -1,6 +1,6 @@
 //! How the gap shrinks, stage by stage, on cycles that nothing was fitted to.
 
-use super::{Block, FigureKind};
+use super::{Block, FigureKind, is_called};
 use crate::explain::answer::Stage;
 use crate::explain::{Answer, Verdict};
 use crate::report::page::Table;
@@ -54,7 +54,7 @@ pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &St
 
 /// The stage of a name in the answer.
 pub(in crate::report::explain) fn stage_of<'a>(answer: &'a Answer, key: &str) -> Option<&'a Stage> {
-    answer.stages.iter().find(|stage| stage.stage.to_string() == key)
+    answer.stages.iter().find(|stage| is_called(stage.stage, key))
 }
 
 impl StageView {
