@@ -26,7 +26,7 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let mut panels = Vec::new();
     for (number, (name, run)) in names.iter().zip(cycles).enumerate() {
         let svg = picture(name, run, answer.figures.maps_before.get(number), &colours)?;
-        let quantity = "above: displacement of the body, mm; below: models minus measured, mm";
+        let quantity = "above: body displacement, mm; below: models − measured, mm";
         panels.push(Panel::new(name, quantity, svg));
     }
     let mut keys = vec![
@@ -156,11 +156,8 @@ fn caption(names: &[String], cycles: &[CycleSeries], is_named: bool) -> String {
     let worst = names.iter().zip(cycles).filter_map(|(name, run)| {
         let [_, recalibrated, named] = lines(run).map(|line| worst_m(run, line.values_m));
         let after = named.filter(|_| is_named);
-        let after = after.map_or_else(String::new, |named_m| format!(", the named one by {}", mm(named_m)));
-        Some(format!(
-            "at {name} the recalibrated model by {}{after}",
-            mm(recalibrated?)
-        ))
+        let after = after.map_or_else(String::new, |named_m| format!(", the named one {}", mm(named_m)));
+        Some(format!("at {name} the recalibrated model {}{after}", mm(recalibrated?)))
     });
     let worst = match worst.collect::<Vec<_>>() {
         none if none.is_empty() => String::new(),
