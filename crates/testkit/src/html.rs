@@ -1,4 +1,4 @@
-//! Checks on a page: its tags close, and what its pictures draw lies within them.
+//! Checks on a page: its tags close, and what its pictures draw is inside them.
 
 /// Fails unless every tag is closed by its own, in order.
 pub fn assert_well_formed(page: &str, name: &str) {
@@ -19,7 +19,7 @@ pub fn assert_well_formed(page: &str, name: &str) {
     assert!(open.is_empty(), "{name}: left open: {open:?}");
 }
 
-/// Fails unless every coordinate of every picture is a number within the picture. Gives the number of pictures.
+/// Fails unless every coordinate of every picture is a number within the picture. Returns the number of pictures.
 pub fn assert_drawn_within(page: &str, name: &str) -> usize {
     let mut pictures = 0;
     for picture in page.split("<svg ").skip(1) {

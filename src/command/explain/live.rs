@@ -42,18 +42,18 @@ pub(super) fn record(
     let (end, over) = end_on_signal_until()?;
     let topics = [Channel::State, Channel::Estimate, Channel::Cycle, Channel::Alarm];
     let mut recorder = Recorder::open(config, text, &topics, log, true)?;
-    let mut cycles_made = CycleProgress::new(&config.worm.name, cycles);
+    let mut cycles_recorded = CycleProgress::new(&config.worm.name, cycles);
     let mut done = Ok(false);
     while matches!(done, Ok(false)) {
         if end.load(Ordering::Relaxed) {
-            done = Err(cycles_made.ended_early("was no longer to be recorded", log));
+            done = Err(cycles_recorded.ended_early("was no longer to be recorded", log));
             break;
         }
         std::thread::sleep(POLL_INTERVAL);
         done = recorder
             .poll()
-            .and_then(|polled| cycles_made.update(polled.state.as_ref(), log));
-        progress.tell("recording the worm", READING * cycles_made.fraction());
+            .and_then(|polled| cycles_recorded.update(polled.state.as_ref(), log));
+        progress.tell("recording the worm", READING * cycles_recorded.fraction());
     }
     recorder.close()?;
     // From here on a signal may end the process at once: the search may take long.
@@ -109,28 +109,28 @@ impl<'a> CycleProgress<'a> {
             self.phase = state.phase;
             self.first_phase.get_or_insert(state.phase);
         }
-        Ok(self.made() >= self.wanted())
+        Ok(self.recorded() >= self.needed())
     }
 
     /// Gait cycles since the recording began.
-    fn made(&self) -> f64 {
+    fn recorded(&self) -> f64 {
         self.first_phase.map_or(0.0, |first| (self.phase - first).abs())
     }
 
     /// Gait cycles until the last whole one has ended, in either direction.
-    fn wanted(&self) -> f64 {
+    fn needed(&self) -> f64 {
         // The cycle in which the recording begins is not whole.
         1.0 + self.cycles + MARGIN_CYCLES
     }
 
     fn fraction(&self) -> f64 {
-        self.made() / self.wanted()
+        self.recorded() / self.needed()
     }
 
     fn ended_early(&self, what: &str, log: &Path) -> Failure {
-        let (made, file) = (self.made(), log.display());
+        let (recorded, file) = (self.recorded(), log.display());
         Failure::failed(format!(
-            "{} {what} after {made:.1} of {} gait cycles: what was recorded is kept, and may be enough for `wormd explain {file} --slope DEG`",
+            "{} {what} after {recorded:.1} of {} gait cycles: what was recorded is kept, and may be enough for `wormd explain {file} --slope DEG`",
             self.worm, self.cycles
         ))
     }

@@ -31,7 +31,7 @@ pub(super) fn measures(outcome: &Outcome) -> Table {
             table.rows.push(row(&name, floor, [String::new(), String::new()]));
         }
     }
-    table.note = Some(format!("{NONE}: not measured."));
+    table.note = Some(format!("{NONE}: nothing was measured."));
     table
 }
 

@@ -11,7 +11,7 @@ const HALF_BAR: f64 = 0.34;
 /// A tick longer than this multiple of the median of those shown is cut, so that the others remain visible.
 const CUT: f64 = 4.0;
 /// Room beside the longest bar for its length as text, as a fraction of the picture.
-const BEHIND: f64 = 0.2;
+const BESIDE: f64 = 0.2;
 /// Width of the gap in a bar that is cut, as a fraction of the picture.
 const GAP: f64 = 0.008;
 
@@ -70,7 +70,7 @@ fn picture(outcome: &Outcome, ticks: &[Tick], colours: &[Colour]) -> Result<Svg,
             ticks.first().map_or("none", |tick| tick.culprit.name())
         ),
         x_label: Some("µs after the deadline".to_owned()),
-        x: Axis::between(0.0, (1.0 + BEHIND) * end_us, 5),
+        x: Axis::between(0.0, (1.0 + BESIDE) * end_us, 5),
         rows: vec![Row::new(Axis::listed(names.collect()), ROW * ticks.len() as f64)],
     };
     draw(&sheet, |_, plot| {

@@ -1,4 +1,4 @@
-//! The runs of a report: what they are called, and sentences over all of them.
+//! The runs of a report: their names, and sentences about all of them.
 
 use crate::experiment::Analysis;
 use worm_estimator::number;
@@ -8,7 +8,7 @@ use worm_estimator::number;
 pub(super) struct Runs<'a>(pub &'a [Analysis]);
 
 impl<'a> Runs<'a> {
-    /// Each run with its name: its slope, with its number before it where slopes occur twice.
+    /// Each run with its name: its slope, with its number before it where a slope occurs twice.
     pub fn named(self) -> impl Iterator<Item = (String, &'a Analysis)> {
         self.names().into_iter().zip(self.0)
     }

@@ -5,7 +5,7 @@ use std::fmt;
 use worm_estimator::number::count;
 
 /// Most rows that the terminal shows of a table.
-const MAX_TERMINAL_ROWS: usize = 20;
+const MAX_TERMINAL_ROWS: usize = 40;
 
 /// A table: a caption, names of columns, and rows of text. The first column names the rows.
 #[derive(Debug, Clone, Default)]

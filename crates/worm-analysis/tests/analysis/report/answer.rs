@@ -1,5 +1,5 @@
-//! Answers to report on: the model's own motion with one cell's friction changed stands for the data. Scores, errors and
-//! significances are made up; nothing here says how well the search works.
+//! Answers to report on: the data are the model's own motion with one cell's friction changed. Scores, errors and
+//! significances are made up; nothing here shows how well the search works.
 
 use super::sample::STIFFNESS_N_PER_M;
 use worm_analysis::explain::answer::{
@@ -12,19 +12,19 @@ use worm_physics::{Contact, Motion, Worm};
 const SLOPES_DEG: [f64; 3] = [0.0, 30.0, 40.0];
 const BINS_PER_STEP: usize = 6;
 const SCATTER_M: f64 = 2.5e-5;
-const BELIEVED_M: f64 = 1.75e-3;
-/// Friction of cell 2 as it is.
+const NOMINAL_M: f64 = 1.75e-3;
+/// True friction of cell 2.
 const FACTOR: f64 = 0.62;
 
-/// The settled cycle of a worm: ways of the cells at evenly spaced phases.
-struct Ways {
+/// The settled cycle of a worm: displacements of the cells at evenly spaced phases.
+struct Displacements {
     phase: Vec<f64>,
     cell_m: Vec<Vec<f64>>,
 }
 
-fn ways(bounds_m: &[f64], slope_deg: f64) -> Ways {
+fn displacements(bounds_m: &[f64], slope_deg: f64) -> Displacements {
     let cells = bounds_m.len();
-    let contact = Contact::symmetric(STIFFNESS_N_PER_M, BELIEVED_M);
+    let contact = Contact::symmetric(STIFFNESS_N_PER_M, NOMINAL_M);
     let worm = Worm::uniform(cells, contact, 0.08325 * cells as f64, 11.5e-3)
         .and_then(|worm| worm.with_max_deformations_m(bounds_m))
         .and_then(|worm| worm.with_slope_rad(slope_deg.to_radians()))
@@ -43,18 +43,18 @@ fn ways(bounds_m: &[f64], slope_deg: f64) -> Ways {
             displacement_m.push(position_m - start_m);
         }
     }
-    Ways { phase, cell_m }
+    Displacements { phase, cell_m }
 }
 
-/// Equal cells but for cell 2.
+/// Equal cells except for cell 2.
 fn bounds_m(cells: usize, all: f64, second: f64) -> Vec<f64> {
-    let mut bounds_m = vec![BELIEVED_M * all; cells];
+    let mut bounds_m = vec![NOMINAL_M * all; cells];
     bounds_m[1] *= second;
     bounds_m
 }
 
-impl Ways {
-    /// Mean way of the cells, less what the stroke alone would make.
+impl Displacements {
+    /// Mean displacement of the cells, minus what the stroke alone would make.
     fn of_body_m(&self) -> Vec<f64> {
         let cells = self.cell_m.len() as f64;
         let mean_m = |sample: usize| {
@@ -71,7 +71,7 @@ impl Ways {
     }
 }
 
-fn map(measured: &Ways, model: &Ways, slope_deg: f64) -> ResidualMap {
+fn map(measured: &Displacements, model: &Displacements, slope_deg: f64) -> ResidualMap {
     let cells = measured.cell_m.len();
     let bins = cells * BINS_PER_STEP;
     let at = |displacement_m: &[f64], bin: usize| displacement_m[bin * (displacement_m.len() - 1) / bins];
@@ -104,10 +104,10 @@ fn map(measured: &Ways, model: &Ways, slope_deg: f64) -> ResidualMap {
 fn figures(cells: usize) -> Figures {
     let mut figures = Figures::default();
     for slope_deg in SLOPES_DEG {
-        let measured = ways(&bounds_m(cells, 1.0, FACTOR), slope_deg);
-        let baseline = ways(&bounds_m(cells, 1.0, 1.0), slope_deg);
-        let recalibrated = ways(&bounds_m(cells, 0.93, 1.0), slope_deg);
-        let named = ways(&bounds_m(cells, 1.004, FACTOR + 0.005), slope_deg);
+        let measured = displacements(&bounds_m(cells, 1.0, FACTOR), slope_deg);
+        let baseline = displacements(&bounds_m(cells, 1.0, 1.0), slope_deg);
+        let recalibrated = displacements(&bounds_m(cells, 0.93, 1.0), slope_deg);
+        let named = displacements(&bounds_m(cells, 1.004, FACTOR + 0.005), slope_deg);
         figures.maps_before.push(map(&measured, &recalibrated, slope_deg));
         figures.maps_after.push(map(&measured, &named, slope_deg));
         figures.cycles.push(CycleSeries {

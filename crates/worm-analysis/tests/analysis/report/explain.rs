@@ -1,4 +1,4 @@
-//! The page of `wormd explain`: every verdict reads well, and what is missing or absurd does no harm.
+//! The page of `wormd explain`: every verdict reads well, and missing or absurd values do no harm.
 
 use super::answer;
 use std::collections::HashSet;
@@ -12,7 +12,7 @@ fn page_of(answer: &Answer) -> String {
     page(answer, "hidden worm").expect("a page")
 }
 
-/// Answers with values that no search should give, and parts that do not fit each other.
+/// Answers with values that no search should give, and parts that do not fit together.
 fn odd_answers() -> Vec<(&'static str, Answer)> {
     let mut absurd = answer::explained(4);
     absurd.threshold = f64::INFINITY;
@@ -209,7 +209,7 @@ fn everything_that_was_found_is_in_the_text() {
 }
 
 #[test]
-fn what_is_marked_on_the_map_is_what_stands_out() {
+fn the_map_marks_what_is_significant() {
     let count = |sigma: f64, mark: &str| {
         let mut answer = answer::agrees();
         answer.figures.maps_before.truncate(1);

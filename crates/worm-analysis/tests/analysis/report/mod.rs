@@ -114,14 +114,14 @@ fn every_figure_is_there_well_formed_and_within_its_picture() {
 fn the_page_says_what_was_found() {
     let page = page_of("slopes", &[0.0, 30.0].map(|slope_deg| analysis(4, slope_deg, 12, 300)));
     // Largest deformation of cell 1, advance on the level by the model, and a mass that cannot be known there.
-    for said in [
+    for part in [
         "2.00 ± 0.02",
         "6.36 ± 0.1",
         "<td>0.000</td><td>—</td><td>—</td>",
         "cell 4",
         "30°",
     ] {
-        assert!(page.contains(said), "the page does not say {said}");
+        assert!(page.contains(part), "the page does not say {part}");
     }
 }
 

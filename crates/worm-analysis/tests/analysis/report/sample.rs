@@ -1,5 +1,5 @@
-//! Analyses to report on: the model's exact motion with noise and gaps laid over what was "measured". The errors and the
-//! scatter of the cycles are made up; nothing here says how well an analysis works.
+//! Analyses to report on: the model's exact motion with noise and gaps in what was "measured". The errors and the
+//! scatter of the cycles are made up; nothing here shows how well an analysis works.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};

@@ -12,7 +12,7 @@ use crate::report::runs::names_by_slope;
 
 const HEIGHT: f64 = 220.0;
 const RESIDUAL_HEIGHT: f64 = 130.0;
-/// Strength of the bands that mark steps, and of the scatter.
+/// Opacity of the bands that mark steps, and of the scatter.
 const STEP: f64 = 0.09;
 const SCATTER: f64 = 0.3;
 /// The measurement lies pale and thick under the models.
@@ -26,7 +26,7 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let mut panels = Vec::new();
     for (number, (name, run)) in names.iter().zip(cycles).enumerate() {
         let svg = picture(name, run, answer.figures.maps_before.get(number), &colours)?;
-        let quantity = "above: displacement of the body, mm; below: models minus measured, mm";
+        let quantity = "above: body displacement, mm; below: models − measured, mm";
         panels.push(Panel::new(name, quantity, svg));
     }
     let mut keys = vec![
@@ -156,11 +156,8 @@ fn caption(names: &[String], cycles: &[CycleSeries], is_named: bool) -> String {
     let worst = names.iter().zip(cycles).filter_map(|(name, run)| {
         let [_, recalibrated, named] = lines(run).map(|line| worst_m(run, line.values_m));
         let after = named.filter(|_| is_named);
-        let after = after.map_or_else(String::new, |named_m| format!(", the named one by {}", mm(named_m)));
-        Some(format!(
-            "at {name} the recalibrated model by {}{after}",
-            mm(recalibrated?)
-        ))
+        let after = after.map_or_else(String::new, |named_m| format!(", the named one {}", mm(named_m)));
+        Some(format!("at {name} the recalibrated model {}{after}", mm(recalibrated?)))
     });
     let worst = match worst.collect::<Vec<_>>() {
         none if none.is_empty() => String::new(),

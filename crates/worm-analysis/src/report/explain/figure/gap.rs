@@ -12,11 +12,11 @@ use worm_estimator::number::fixed;
 
 const ROW: f64 = 54.0;
 const HALF_BAR: f64 = 0.24;
-/// How far below its bar the effect of a stage stands, in rows, and the most characters that fit there.
+/// How far below its bar the effect of a stage is written, in rows, and the most characters that fit there.
 const BELOW: f64 = 0.4;
 const MAX_CHARACTERS: usize = 60;
-/// Room behind the longest bar for its value, as a share of its length.
-const BEHIND: f64 = 0.2;
+/// Room beside the longest bar for its value, as a fraction of its length.
+const BESIDE: f64 = 0.2;
 
 /// How a stage's bar looks.
 fn style(stage: &StageView) -> (Mark, Colour) {
@@ -82,13 +82,13 @@ fn picture(bars: &[(StageView, &Stage)], floor: Option<&Stage>) -> Result<Svg, D
     let sheet = Sheet {
         description: format!("The gap stage by stage: {}", values.collect::<Vec<_>>().join(", ")),
         x_label: Some("mm".to_owned()),
-        x: Axis::between(0.0, (1.0 + BEHIND) * longest_mm, 5),
+        x: Axis::between(0.0, (1.0 + BESIDE) * longest_mm, 5),
         rows: vec![Row::new(
             Axis::listed(bars.iter().map(|(view, _)| view.name.to_owned()).collect()),
             ROW * bars.len() as f64,
         )],
     };
-    // The floor's line is not to run through the names of effects, if there is room beside it.
+    // The floor's line must not run through the names of effects, if there is room beside it.
     let beside_floor_mm = if floor_mm < 0.5 * longest_mm { floor_mm } else { 0.0 };
     draw(&sheet, |_, plot| {
         for (number, (view, stage)) in bars.iter().enumerate() {

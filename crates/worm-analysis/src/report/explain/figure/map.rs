@@ -90,7 +90,7 @@ fn picture(
     })
 }
 
-/// Colours every bin and marks those that stand out.
+/// Colours every bin and marks the significant ones.
 fn paint(plot: &mut Plot<'_, '_, '_>, map: &ResidualMap, cells: usize, largest_m: f64) -> Result<(), DrawError> {
     for (cell, residual_m) in map.residual_m.iter().enumerate() {
         let row = (cells - 1 - cell.min(cells - 1)) as f64;
@@ -122,7 +122,7 @@ fn paint(plot: &mut Plot<'_, '_, '_>, map: &ResidualMap, cells: usize, largest_m
     Ok(())
 }
 
-/// Separates the steps by upright lines and names above each the cell that steps.
+/// Separates the steps by vertical lines and names above each the cell that steps.
 fn name_steps(
     plot: &mut Plot<'_, '_, '_>,
     map: &ResidualMap,

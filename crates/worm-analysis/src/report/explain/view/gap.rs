@@ -84,7 +84,7 @@ pub(super) fn blocks(answer: &Answer) -> Vec<Block> {
 fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
     let floor = stage_of(answer, FLOOR.key).map(|stage| (FLOOR, stage));
     let stages = stages.iter().copied().chain(floor);
-    let advance_head = "error of the advance, mm a cycle";
+    let advance_head = "error of advance, mm";
     let advance = |stage: &Stage| fixed(stage.advance_error_m * 1e3, 3);
     let title = "The gap, stage by stage";
     let (head, rows, note): (&[&str], Vec<_>, _) = if answer.is_by_advances() {
@@ -93,7 +93,7 @@ fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
             stages
                 .map(|(view, stage)| vec![view.with_effect(stage), advance(stage)])
                 .collect(),
-            "The error is the mean over the slopes.",
+            "The error of the advance in a cycle is the mean over the slopes.",
         )
     } else {
         let row = |(view, stage): (StageView, &Stage)| {
@@ -111,11 +111,11 @@ fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
                 "rms, fitted cycles, mm",
                 "rms, held-out cycles, mm",
                 advance_head,
-                "error of the energy (11), mJ a cycle",
+                "error of energy (11), mJ",
             ],
             stages.map(row).collect(),
-            "Held-out cycles were kept out of every fit, so a model that merely bends to the data gains nothing there. Errors of \
-             advance and energy are means over the runs.",
+            "Held-out cycles were kept out of every fit, so a model that merely bends to the data gains nothing there. Errors \
+             of advance and energy are per cycle, means over the runs.",
         )
     };
     Table {

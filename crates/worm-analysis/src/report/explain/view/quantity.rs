@@ -5,7 +5,7 @@ use crate::explain::answer::FoundParameter;
 use worm_estimator::number::{fixed, to_error};
 use worm_physics::effect::{self, Parameter};
 
-/// A unit of files as people read it: the factor to it, and its name.
+/// The unit that people read for a unit of the files: the factor to it, and its name.
 pub(super) fn readable(unit: &str) -> (f64, &str) {
     match unit {
         "m" => (1e3, "mm"),
@@ -19,8 +19,8 @@ pub(super) fn readable(unit: &str) -> (f64, &str) {
     }
 }
 
-/// How a unit ends the names of parameters in files.
-const ENDINGS: [(&str, &str); 9] = [
+/// Suffixes of parameter names in the files, by unit.
+const SUFFIXES: [(&str, &str); 9] = [
     ("m", "_m"),
     ("s", "_s"),
     ("kg", "_kg"),
@@ -54,8 +54,8 @@ impl ParameterView {
             ("", Some(_)) => (1.0, "×"),
             (unit, _) => readable(unit),
         };
-        let ending = ENDINGS.iter().find(|(unit, _)| *unit == found.unit);
-        let name = ending.and_then(|(_, ending)| found.name.strip_suffix(ending));
+        let suffix = SUFFIXES.iter().find(|(unit, _)| *unit == found.unit);
+        let name = suffix.and_then(|(_, suffix)| found.name.strip_suffix(suffix));
         Self {
             name: name.unwrap_or(&found.name).replace('_', " "),
             value: to_error(found.value * factor, found.sigma * factor),
@@ -64,7 +64,7 @@ impl ParameterView {
         }
     }
 
-    /// It in words: `friction factor 0.620 ± 0.018 ×`.
+    /// As text: `friction factor 0.620 ± 0.018 ×`.
     pub fn in_words(&self) -> String {
         format!("{} {} {}", self.name, self.value, self.unit)
             .trim_end()
