@@ -8,7 +8,7 @@ use worm_physics::{Worm, WormError};
 
 /// Standard deviation of the logarithms of the bounds about their mean: it distributes what the data do not determine.
 const BOUND_SPREAD: f64 = 0.5;
-/// Standard deviation of the configured mass, as a share.
+/// Standard deviation of the configured mass, as a fraction.
 const MASS_SPREAD: f64 = 0.1;
 /// Damping ratio that the search begins with, and the standard deviation of its logarithm.
 pub(super) const DAMPING: (f64, f64) = (0.5, 1.5);
