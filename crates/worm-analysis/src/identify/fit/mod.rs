@@ -1,7 +1,7 @@
 //! The continuous estimator of the largest tip deformations: theory fitted to everything that was seen.
 //!
 //! The exact model, started with assumed deformations and run with assumed bounds, predicts the displacement of the body; the residual is
-//! noise and drift. [Least squares](crate::least_squares) finds the bounds, the mass where a slope shows it, and the deformations at the
+//! noise and drift. Least squares finds the bounds, the mass where a slope shows it, and the deformations at the
 //! start of each run that leave the least. Unlike the balance of (5) to (7), which uses forces computed from noisy positions, it uses
 //! all effects of the bounds: when sliding begins, how far the body is pushed back, how far the worm gets. Several runs of one worm share bounds and mass.
 //!
@@ -20,8 +20,9 @@ mod run;
 
 use super::drift::Drift;
 use super::gait::IdentifiedGait;
-use crate::least_squares::{self, Derivatives, LeastSquares, Method, normal_matrix};
-use problem::{BoundsProblem, DAMPING, IMPOSSIBLE};
+use crate::least_squares::normal_matrix;
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use problem::{BoundsProblem, DAMPING, Descent, IMPOSSIBLE};
 use worm_physics::{Worm, WormError};
 
 /// Rise of chi-squared, beyond one for each cell, up to which a worm counts as laid down.
@@ -42,12 +43,6 @@ const SHARING_ROUNDS: usize = 3;
 const MIN_MOVE_M: f64 = 5e-5;
 /// Distances by which bounds are moved at each other's expense to see whether chi-squared rises, m.
 const MOVES_M: [f64; 4] = [5e-5, 1e-4, 2e-4, 4e-4];
-/// A descent of the fit.
-const DESCENT: Method = Method {
-    derivatives: Derivatives::EveryStep,
-    max_steps: 50,
-    converged: (0.0, 1e-6),
-};
 /// How often drift and parameters are fitted, each with the result of the other.
 const ROUNDS: usize = 2;
 
@@ -195,10 +190,15 @@ impl<'a> BoundsProblem<'a> {
 
     /// Minimises chi-squared from the current parameters; returns it.
     fn minimise(&mut self) -> f64 {
-        let estimate = least_squares::minimise(self, self.parameters.clone(), None, &DESCENT);
-        self.parameters = estimate.at;
-        if estimate.chi_squared.is_finite() {
-            estimate.chi_squared
+        let (descent, report) = LevenbergMarquardt::new()
+            .with_ftol(1e-6)
+            .with_xtol(1e-5)
+            .with_gtol(1e-9)
+            .with_patience(8)
+            .minimize(Descent::new(self));
+        self.parameters = descent.params().as_slice().to_vec();
+        if report.objective_function.is_finite() {
+            2.0 * report.objective_function
         } else {
             f64::INFINITY
         }
@@ -318,7 +318,7 @@ impl<'a> BoundsProblem<'a> {
 
     fn finish(self) -> Result<Fitted, FitError> {
         let ratio = self.misfit_ratio();
-        let normal = normal_matrix(self.quantities(), &self.flatter_jacobian(), None);
+        let normal = normal_matrix(&self.quantities, &self.flatter_jacobian(), None);
         let covariance = normal.cholesky().map(|factor| factor.inverse() * ratio.max(1.0));
         let sigma = |at: usize| {
             covariance
