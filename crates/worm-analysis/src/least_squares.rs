@@ -1,8 +1,9 @@
 //! Nonlinear least squares within limits: Levenberg and Marquardt's method on residuals and priors together.
 //!
-//! [`minimise`] serves every fit of the crate. A step solves the damped normal equations; quantities that it would take beyond a
-//! limit are put on the limit and held there, and the others are solved for again. How the derivatives are kept up to date is up
-//! to the fit ([`Derivatives`]): anew at every step where an evaluation is cheap, else by Broyden's rank-one updates.
+//! [`minimise`] fits recordings and tables of advances; sums, normal matrix and standard errors serve the other fits of the crate, too.
+//! A step solves the damped normal equations; quantities that it would take beyond a limit are put on the limit and held there, and the
+//! others are solved for again. How the derivatives are kept up to date is up to the fit ([`Derivatives`]): computed at every step where
+//! an evaluation is cheap, else by Broyden's rank-one updates.
 //!
 //! Everything is deterministic: sums run in a fixed order, and residuals and derivatives do not depend on the number of threads that
 //! compute them.

@@ -13,7 +13,7 @@ use worm_physics::{Ledger, SlidesDown, Worm};
 
 /// Fewest parts of a step, so that forces are linear in each.
 const PARTS: f64 = 64.0;
-/// Distance from the bound, as a share of the bound, that counts as sliding in the series.
+/// Distance from the bound, as a fraction of the bound, that counts as sliding in the series.
 const SLIDING: f64 = 1e-9;
 
 /// What the tips did on one recording.

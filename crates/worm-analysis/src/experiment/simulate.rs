@@ -31,7 +31,7 @@ pub struct Simulation {
     pub noise_m: f64,
     /// Seed of noise and dropouts.
     pub seed: u64,
-    /// Share of the positions that are not seen, 0 to 0.9.
+    /// Fraction of the positions that are not seen, 0 to 0.9.
     pub dropout_share: f64,
     /// Largest tip deformations, m, cell 1 first, instead of the configured ones.
     pub max_deformation_m: Option<Vec<f64>>,

@@ -25,7 +25,7 @@ pub enum ExplainError {
     },
     /// Two cells never stand still together, so their positions say too little.
     #[error(
-        "a worm of two cells: no cell ever stands still in its body to measure the others by, so nothing can be told apart: at least three cells are needed"
+        "a worm of two cells: no cell ever stands still in its body to measure the others by, so effects cannot be separated: at least three cells are needed"
     )]
     TwoCells,
     /// A recording shows no gait.
@@ -50,9 +50,9 @@ pub enum ExplainError {
         /// Its order.
         expected: Vec<usize>,
     },
-    /// A recording is too short to tell scatter from cause.
+    /// A recording is too short to distinguish scatter from cause.
     #[error(
-        "{recording}: {cycles} whole gait cycles after the start, at least {needed} are needed to tell scatter from cause: record a longer run"
+        "{recording}: {cycles} whole gait cycles after the start, at least {needed} are needed to distinguish scatter from cause: record a longer run"
     )]
     TooShort {
         /// The recording.
@@ -62,7 +62,7 @@ pub enum ExplainError {
         /// What is needed.
         needed: usize,
     },
-    /// Too few advances to tell anything by.
+    /// Too few advances.
     #[error(
         "{found} advance alone: a recalibration explains any one figure: list the advances on at least two slopes, or recordings"
     )]
@@ -70,7 +70,7 @@ pub enum ExplainError {
         /// How many were given.
         found: usize,
     },
-    /// An advance without a standard error, by which alone a gap can be told from chance.
+    /// An advance without a standard error, without which a gap cannot be distinguished from chance.
     #[error(
         "{recording}: it and its standard error must be known: give advance_m, and a positive advance_sigma_m, in metres"
     )]

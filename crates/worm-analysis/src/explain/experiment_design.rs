@@ -123,11 +123,11 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
         .map(|&(rival, quantity)| trial.derivative(candidates[rival], &outcomes[rival], quantity))
         .collect();
     let column = |rival: usize, quantity: usize| {
-        let bought = tasks.iter().position(|&task| {
+        let computed = tasks.iter().position(|&task| {
             task == (rival, quantity)
                 || Some(task) == same(candidates, (rival, quantity), quick).map(|same| (quick, same))
         });
-        bought.map(|task| columns[task].clone())
+        computed.map(|task| columns[task].clone())
     };
     let adjustments: Vec<Adjustment> = (0..candidates.len())
         .map(|rival| {
@@ -227,7 +227,7 @@ fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
         unit: String::new(),
         slope_deg: None,
         description: format!(
-            "No single run of this worm tells these apart. Measure {} directly ({}).",
+            "No single run of this worm separates these. Measure {} directly ({}).",
             hypothesised.effect.name, hypothesised.effect.separated_by
         ),
         predictions: predictions.collect(),

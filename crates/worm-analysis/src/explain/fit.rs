@@ -264,3 +264,28 @@ impl<'s, 'a> FitProblem<'s, 'a> {
         fit
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{Campaign, hypothesis, problem, record, scene};
+    use super::*;
+
+    #[test]
+    fn the_number_of_threads_changes_nothing() {
+        let campaign = Campaign::default();
+        let recordings = record(&campaign, None, 1);
+        let scene = scene(&recordings, &campaign);
+        let problem = problem(&scene, &hypothesis(None));
+        let nuisances = Nuisance::all(4, 2, true);
+        let free = Hypothesis::new(&nuisances[..3], &[]);
+        let fit_with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = pool.expect("a pool of threads");
+            pool.install(|| problem.fit(&free, free.neutral(), None))
+        };
+        let (one, three) = (fit_with(1), fit_with(3));
+        assert_eq!((one.at, one.chi_squared), (three.at, three.chi_squared));
+        assert_eq!(one.residual, three.residual);
+        assert_eq!(one.jacobian, three.jacobian);
+    }
+}

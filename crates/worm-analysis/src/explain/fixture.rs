@@ -81,7 +81,7 @@ pub(super) fn record(campaign: &Campaign, truth: Truth<'_>, seed: u64) -> Vec<Re
     recordings
 }
 
-/// An effect supposed to act with these values, and nothing else free.
+/// An effect assumed to act with these values, and nothing else free.
 pub(super) fn hypothesis(truth: Truth<'_>) -> (Hypothesis, Vec<f64>) {
     let Some((name, cell, values)) = truth else {
         return (Hypothesis::default(), Vec::new());

@@ -26,7 +26,7 @@ const ALIKE: f64 = 1e-3;
 #[derive(Debug, thiserror::Error)]
 pub enum WriteBackError {
     /// The text of the nominal model is not TOML.
-    #[error("the believed model is no TOML: {0}: give the text that it was read from")]
+    #[error("the nominal model is not TOML: {0}: give the text that it was read from")]
     Syntax(#[from] TomlError),
     /// The answer speaks of a cell that the worm does not have.
     #[error(

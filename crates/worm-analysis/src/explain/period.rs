@@ -142,7 +142,7 @@ fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], longest: f64, sh
     Some((1.0 / found.0, found.1))
 }
 
-/// Share of the square sum of all ways that waves of one frequency take away.
+/// Fraction of the square sum of all ways that waves of one frequency take away.
 fn fraction(series: &[Series], at: &impl Fn(&Series) -> &[f64], displacements: &[Vec<f64>], frequency: f64) -> f64 {
     let (mut whole, mut taken) = (0.0, 0.0);
     for (one, displacements) in series.iter().zip(displacements) {

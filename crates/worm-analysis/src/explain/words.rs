@@ -4,6 +4,7 @@ use super::answer::{NamedEffect, Place, Verdict, answers_in_words};
 use super::fit::{Fit, FitProblem};
 use super::model_selection::Judged;
 use super::parameter::What;
+use worm_physics::effect::{LIBRARY, Visible};
 
 /// The verdict in a sentence or two. `refused` is the fraction of the held-out gap that the best effect closes, where that is too
 /// little to name it.
@@ -110,9 +111,12 @@ pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<String> {
         );
     }
     if !observed.iter().any(|observed| observed.phase_recorded) {
-        warnings.push(
-            "no gait phase was recorded: backlash and sensor-latency cannot be seen without it, nor can most of what the stepping cell does".to_owned(),
-        );
+        let hidden = LIBRARY.iter().filter(|effect| effect.visible == Visible::RecordedPhase);
+        let names: Vec<&str> = hidden.map(|effect| effect.name).collect();
+        warnings.push(format!(
+            "no gait phase was recorded: {} cannot be seen without it, nor can most of what the stepping cell does",
+            names.join(" and ")
+        ));
     }
     let limits = fit.hypothesis.free.iter().enumerate();
     let at_limit = limits

@@ -1,12 +1,12 @@
 //! The first estimate of the largest tip deformations, by inspection of the positions (section 3.2.1).
 //!
-//! While the stepping tip sticks, the other cells are pushed back; once it slides, they stand. So the way that the stepping
-//! cell has made when the others stop moving back took its tip from one bound to the other: twice δmax, where it began its step
-//! at −δmax as the paper assumes. Here the eye is a broken line: falling, then level, laid through all steps of a cell together.
+//! While the stepping tip sticks, the other cells are pushed back; once it slides, they stand. So the displacement of the
+//! stepping cell at which the others stop moving back took its tip from one bound to the other: twice δmax, if it began its step at
+//! −δmax as the paper assumes. In the place of the eye, a broken line, falling and then level, is fitted to all steps of a cell.
 
 use super::gait::IdentifiedGait;
 
-/// Parts that a step is looked at in.
+/// Parts of a step.
 const PARTS: usize = 60;
 /// Parts at either end of a step that are left out: the cam's corners, and the phase's uncertainty.
 const MARGIN: usize = 1;
@@ -16,7 +16,7 @@ const EARLIEST: usize = 3;
 /// What inspection of one cell's steps shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onset {
-    /// Share of the step at which the others stop moving back, that is, forward sliding begins.
+    /// Fraction of the step at which the others stop moving back, that is, forward sliding begins.
     pub fraction: f64,
     /// How far the others have been pushed back by then, m.
     pub retraction_m: f64,
@@ -52,7 +52,7 @@ pub fn find(gait: &IdentifiedGait) -> Vec<Onset> {
     (0..cells).map(|cell| break_of(&sums[cell], gait.stroke_m)).collect()
 }
 
-/// Adds one step, its ways counted from its mean, so that what happened before it does not matter.
+/// Adds one step, its displacements counted from its mean, so that earlier ones do not matter.
 fn add(sums: &mut [(f64, f64); PARTS], displacements: &[(usize, f64)]) {
     let whole = displacements.first().is_some_and(|first| first.0 < PARTS / 6)
         && displacements.last().is_some_and(|last| last.0 >= PARTS - PARTS / 6);
@@ -83,7 +83,7 @@ fn break_of(sums: &[(f64, f64); PARTS], stroke_m: f64) -> Onset {
             )
         })
         .collect();
-    let mut best = (f64::INFINITY, 1.0, 0.0); // misfit, break, slope before it
+    let mut best = (f64::INFINITY, 1.0, 0.0); // chi-squared, break, slope before it
     for at in EARLIEST..4 * PARTS {
         let at = at as f64 / (4 * PARTS) as f64;
         // way = level + slope · min(share − break, 0): linear least squares in level and slope

@@ -1,29 +1,29 @@
 //! Which cell steps when, found from the positions alone.
 //!
 //! Relative to the mean of all cells a cell rises during its own step and falls during all others, by so much more than noise
-//! that its turning points can be found without knowing the period: a turn counts once the cell has come back by a good part
-//! of its swing. From the turning points follow the steps, their cyclic order, and a first idea of the gait phase.
+//! that its turning points can be found without knowing the period: a turn counts once the cell has come back by a large part of its
+//! swing. The turning points give the steps, their cyclic order, and a first estimate of the gait phase.
 
 use super::gait_error::GaitError;
 use super::running_median::running_median;
 use std::ops::Range;
 
-/// Share of a cell's swing by which it must come back for a turn to count.
+/// Fraction of a cell's swing by which it must come back for a turn to count.
 const TURN_FRACTION: f64 = 0.4;
-/// Share of a cell's swing that a step cut off by an end of the recording must show to count.
+/// Fraction of a cell's swing that a step cut off by an end of the recording must show to count.
 const PARTIAL_FRACTION: f64 = 0.3;
-/// Samples of the running median that takes outliers out before turns are looked for.
+/// Samples of the running median that removes outliers before turns are detected.
 const MEDIAN_SAMPLES: usize = 5;
-/// Share of all steps that may fall out of the order before there is none.
+/// Fraction of all steps that may fall out of the order before there is none.
 const DISORDER_FRACTION: f64 = 0.1;
 /// What a missing step costs, in steps found: more than half, so that leaving one out is better than missing two.
 const MISSING: f64 = 0.75;
-/// Swing, as a multiple of the noise, below which nothing can be seen to step.
+/// Swing, as a multiple of the noise, below which no step can be detected.
 const MIN_SWING: f64 = 10.0;
-/// Share of a cell's time that it may spend rising: half, and some doubt, would be a crawl in reverse.
+/// Fraction of a cell's time that it may spend rising: half, and some doubt, would be a crawl in reverse.
 const RISING_FRACTION: f64 = 0.55;
 
-/// A cell is left behind that goes to and fro by less than the first share of what is usual, and away by more than the second.
+/// A cell is left behind where its swing is below the first fraction of the usual one, and its displacement above the second.
 const LEFT_BEHIND: (f64, f64) = (0.5, 1.5);
 
 /// One step of one cell.
@@ -33,7 +33,7 @@ pub(super) struct Step {
     pub cell: usize,
     /// Samples from its beginning to its end; a step that an end of the recording cuts off begins or ends there.
     pub samples: Range<usize>,
-    /// Share of a whole step seen: below 1 for one that is cut off.
+    /// Fraction of a whole step seen: below 1 for one that is cut off.
     pub fraction: f64,
     /// Number of the step since the first, counting those that were not seen.
     pub slot: usize,
@@ -83,11 +83,11 @@ pub(super) fn find(
         order.rotate_left(first);
         Ok((steps, order))
     });
-    // One cell that stays behind makes all look out of order, and it is to be named.
+    // One cell that is left behind makes all look out of order; the error names it.
     numbered.map_err(|error| left_behind(&relative_m).unwrap_or(error))
 }
 
-/// A cell that does not step while the others crawl on: against their mean it goes straight away, with little to and fro.
+/// A cell that does not step while the others crawl on: it moves steadily away from their mean, with little swing.
 fn left_behind(relative_m: &[Vec<f64>]) -> Option<GaitError> {
     let displacements: Vec<(f64, f64)> = relative_m
         .iter()
@@ -113,7 +113,7 @@ fn left_behind(relative_m: &[Vec<f64>]) -> Option<GaitError> {
         .then_some(GaitError::NoStep { cell, swing_m })
 }
 
-/// Gives every step its number, and leaves out those that are in nobody's turn.
+/// Numbers the steps, and drops those that do not fit the order.
 fn number(found: &[(usize, Range<usize>, f64, bool)], order: &[usize], time_s: &[f64]) -> Result<Vec<Step>, GaitError> {
     let kept = chain(&found.iter().map(|step| step.0).collect::<Vec<_>>(), order);
     let mut steps: Vec<Step> = Vec::with_capacity(kept.len());
@@ -146,7 +146,7 @@ fn number(found: &[(usize, Range<usize>, f64, bool)], order: &[usize], time_s: &
 }
 
 /// The steps that follow one another best in an order: each kept counts one, each that is missing between two costs
-/// [`MISSING`]. One that noise made up would otherwise shift all after it by a cycle.
+/// [`MISSING`]. A false step from noise would otherwise shift all after it by a cycle.
 fn chain(cells: &[usize], order: &[usize]) -> Vec<usize> {
     let reach = 2 * order.len();
     let mut best: Vec<(f64, Option<usize>)> = Vec::with_capacity(cells.len()); // of the chain that ends here; what precedes
@@ -214,7 +214,7 @@ fn relative(position_m: &[Vec<f64>]) -> Vec<Vec<f64>> {
     relative_m
 }
 
-/// How far a series goes up and down, its rarest values left out.
+/// Range of a series without its most extreme values.
 fn swing(series: &[f64]) -> f64 {
     let mut sorted = series.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! What may be changed from one run to the next, and how a person is told to do it.
+//! What may be changed from one run to the next, with instructions.
 
 use super::super::answer::RunChange;
 use super::super::predict::Scene;
@@ -55,7 +55,7 @@ pub(super) struct Change {
 }
 
 impl Change {
-    /// How to do it.
+    /// Instructions.
     pub fn in_words(&self) -> String {
         let slope = format!("{}°", self.slope_deg).replace('-', "−");
         let again = format!("Repeat the run at {slope}");

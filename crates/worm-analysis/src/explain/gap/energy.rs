@@ -30,7 +30,7 @@ pub(super) fn own(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option
 /// The worm of a fit carried through a run along its own way with `beyond_m`, as seen, on it; none where it slides down.
 ///
 /// Its tips slide where the laws of its contacts have them slide on that path, so that what they take is the energy of a motion
-/// that was measured, by contacts that nobody measured.
+/// that was measured, by contacts whose forces were not measured.
 pub(super) fn carried(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit, beyond_m: &[f64]) -> Option<Walk> {
     let own = own(problem, run, fit)?;
     let (physics, _) = problem.scene.physics(run, &fit.hypothesis, &fit.at);

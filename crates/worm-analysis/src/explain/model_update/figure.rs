@@ -13,7 +13,7 @@ pub(super) struct Figure {
 const MIN_DIGITS: i32 = 3;
 /// Significant digits of a value without an error.
 const DIGITS_WITHOUT_ERROR: i32 = 6;
-/// Significant digits of an error that is told.
+/// Significant digits of an error.
 const DIGITS_OF_ERROR: i32 = 2;
 /// More decimals than these no double of everyday size has.
 const MAX_DECIMALS: i32 = 15;

@@ -144,7 +144,7 @@ impl Judged {
         let scalars = self.scalars;
         match (self.verdict, &self.set[..]) {
             (Verdict::Agrees, _) => format!(
-                "Model and advances agree once the model is recalibrated within its priors: its misfit is {:.1}, and chance \
+                "Model and advances agree once the model is recalibrated within its priors: its chi-squared is {:.1}, and chance \
                  stays below {:.1} nineteen times in twenty.",
                 recalibrated.chi_squared,
                 chance(scalars)
@@ -158,7 +158,7 @@ impl Judged {
                  than {} are needed for what a worm and this effect leave open{}.",
                 only.name(),
                 asked(only),
-                if only.is_any_cell() { ", and they do not tell the cell" } else { "" }
+                if only.is_any_cell() { ", and they do not determine the cell" } else { "" }
             ),
             (_, [_, ..]) => format!(
                 "The recalibrated model misses the {scalars} advances by more than chance, and each of {} effects alone would close \
@@ -169,7 +169,7 @@ impl Judged {
             (_, []) => format!(
                 "Model and advances disagree, and no single effect of the library brings the model within chance{}.",
                 self.others.first().map_or_else(String::new, |kind| format!(
-                    ": {} comes nearest, with a misfit of {:.1} where a right model's stays below {:.1} ninety-nine times in a \
+                    ": {} comes nearest, with a chi-squared of {:.1} where a right model's stays below {:.1} ninety-nine times in a \
                      hundred",
                     kind.name(),
                     kind.candidate.fit.chi_squared,
@@ -210,7 +210,7 @@ impl Judged {
         ];
         warnings.extend(self.set.iter().filter(|kind| kind.is_any_cell()).map(|kind| {
             format!(
-                "{}: the advances do not tell which, the values are those of the best of cells {:?}",
+                "{}: the advances do not determine which; the values are those of the best of cells {:?}",
                 kind.name(),
                 kind.cells
             )

@@ -54,7 +54,7 @@ pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) ->
         slope_deg: Some(slope_deg),
         description: format!(
             "Lay the canal at {slope}, let the worm crawl 12 cycles, and record the positions of all its cells, with the gait phase \
-             if there is one: which cell slides, and when, tells apart what gives the same advance. Record a slope of the table too."
+             if there is one: which cell slides, and when, separates effects that give the same advance. Record a slope of the table too."
         ),
         predictions: predictions.collect(),
         separation_sigma: None,

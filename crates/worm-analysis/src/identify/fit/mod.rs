@@ -1,28 +1,28 @@
 //! The continuous estimator of the largest tip deformations: theory fitted to everything that was seen.
 //!
 //! The exact model, started with assumed deformations and run with assumed bounds, predicts the displacement of the body; the residual is
-//! noise and drift. [Least squares](crate::least_squares) finds the bounds, the mass where a slope shows it, and the deformations at the
-//! start of each run that leave the least. Unlike the balance of (5) to (7), which
-//! looks at forces that follow from noisy positions, it uses all that the bounds cause: when sliding begins, how far the body
-//! is pushed back, how far the worm gets. Several runs of one worm share bounds and mass.
+//! noise and drift. Least squares finds the bounds, the mass where a slope shows it, and the deformations at the
+//! start of each run that leave the least. Unlike the balance of (5) to (7), which uses forces computed from noisy positions, it uses
+//! all effects of the bounds: when sliding begins, how far the body is pushed back, how far the worm gets. Several runs of one worm share bounds and mass.
 //!
-//! # What positions cannot tell
-//! A tip that never slides backward shows its bound only through the balance, and of several such tips only the sum. Two
+//! # What positions cannot determine
+//! A tip that never slides backward shows its bound only through the balance, and several such tips show only their sum. Two
 //! things help. A worm whose first step the recording shows was probably laid down there with unloaded tips, which makes its
-//! first cycle tell them apart: this is assumed where it agrees with the data, and said. And what is left is shared out
-//! as evenly as the data allow, with standard errors that say how little is known.
+//! first cycle separate them: this is assumed where it agrees with the data, and reported. The rest is distributed as evenly as
+//! the data allow, with standard errors that show how little is known.
 //!
 //! # Standard errors
-//! They are those of least squares, enlarged where the misfit is more than noise and drift explain. They do not know of effects
-//! that the model lacks, but for a small allowance for cams, pads and inertia that are not quite as theory has them.
+//! They are those of least squares, enlarged where chi-squared is more than noise and drift explain. They do not account for effects
+//! that the model lacks, except for a small allowance for cams, pads and inertia that differ from theory.
 
 mod problem;
 mod run;
 
 use super::drift::Drift;
 use super::gait::IdentifiedGait;
-use crate::least_squares::{self, Derivatives, LeastSquares, Method, normal_matrix};
-use problem::{BoundsProblem, DAMPING, IMPOSSIBLE};
+use crate::least_squares::normal_matrix;
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use problem::{BoundsProblem, DAMPING, Descent, IMPOSSIBLE};
 use worm_physics::{Worm, WormError};
 
 /// Rise of chi-squared, beyond one for each cell, up to which a worm counts as laid down.
@@ -32,24 +32,18 @@ const DRIFTS: (f64, f64, usize) = (2e-7, 2.0, 14);
 /// What a worm with mass, cam and pads of its own was seen to add to the standard error of a bound, m: tests hold the standard
 /// errors against such worms.
 const SYSTEMATIC_M: f64 = 6e-6;
-/// Starting points that are tried at least, and the misfit over what noise and the first drift explain from which no further one
-/// is.
+/// Fewest starting points that are tried, and the ratio of chi-squared to what noise and the first drift explain below which no more
+/// are.
 const MIN_STARTS: usize = 2;
 const GOOD_RATIO: f64 = 1.2;
-/// Shares of their difference by which two bounds are moved towards each other, how often all pairs are tried, and what way is
-/// worth it, m.
+/// Fractions of their difference by which two bounds are moved towards each other, how often all pairs are tried, and the smallest
+/// move, m.
 const SHARES: [f64; 3] = [0.5, 0.25, 0.1];
 const SHARING_ROUNDS: usize = 3;
 const MIN_MOVE_M: f64 = 5e-5;
-/// Ways by which bounds are moved at each other's expense to see whether the data mind, m.
+/// Distances by which bounds are moved at each other's expense to see whether chi-squared rises, m.
 const MOVES_M: [f64; 4] = [5e-5, 1e-4, 2e-4, 4e-4];
-/// A descent of the fit.
-const DESCENT: Method = Method {
-    derivatives: Derivatives::EveryStep,
-    max_steps: 50,
-    converged: (0.0, 1e-6),
-};
-/// Times that drift and parameters are found from one another.
+/// How often drift and parameters are fitted, each with the result of the other.
 const ROUNDS: usize = 2;
 
 /// One run of the worm.
@@ -65,7 +59,7 @@ pub struct PositionRun<'a> {
     pub payload_kg: f64,
 }
 
-/// What was found.
+/// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fitted {
     /// Largest tip deformations, m.
@@ -78,16 +72,16 @@ pub struct Fitted {
     pub mass_sigma_kg: Option<f64>,
     /// Damping ratio of the body on its contacts.
     pub damping_ratio: f64,
-    /// Misfit over what noise and drift explain: 1 where theory holds.
+    /// Chi-squared over what noise and drift explain: 1 where theory holds.
     pub misfit_ratio: f64,
-    /// What was found of each run.
+    /// The result for each run.
     pub runs: Vec<FittedRun>,
 }
 
-/// What was found of one run.
+/// The result of a fit for one run.
 #[derive(Debug, Clone)]
 pub struct FittedRun {
-    /// The worm in its canal, as found.
+    /// The worm in its canal, with the fitted values.
     pub worm: Worm,
     /// Deformations at the first sample, m.
     pub start_deformation_m: Vec<f64>,
@@ -104,7 +98,7 @@ pub struct FittedRun {
 /// Why there is no fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// The configured worm with what was found is none to the model.
+    /// The configured worm with the fitted values is not valid.
     #[error("the model refuses the worm as found: {0}")]
     Worm(#[from] WormError),
     /// No starting point leads to a crawl like the one seen.
@@ -115,7 +109,7 @@ pub enum FitError {
 }
 
 /// Fits all runs together. `base` is the configured worm, `starts_m` are bounds to begin the search from, best guess first;
-/// `progress` is called with the share done.
+/// `progress` is called with the fraction done.
 ///
 /// # Errors
 /// [`FitError`].
@@ -149,7 +143,7 @@ pub fn fit(
 }
 
 impl<'a> BoundsProblem<'a> {
-    /// Searches from the starting points, those first that promise most, until one leads to what noise explains; else from all.
+    /// Fits from the starting points, most promising first, until one leaves only noise; else from all.
     fn search(&mut self, starts_m: &[Vec<f64>]) -> Result<Vec<f64>, FitError> {
         let mut starts: Vec<(f64, Vec<f64>)> = Vec::with_capacity(starts_m.len());
         for start_m in starts_m {
@@ -171,7 +165,7 @@ impl<'a> BoundsProblem<'a> {
         best.map(|(_, parameters)| parameters).ok_or(FitError::NoCrawl)
     }
 
-    /// Begins a search with these bounds.
+    /// Sets the parameters to start a fit from these bounds.
     fn begin_at(&mut self, bounds_m: &[f64]) {
         let cells = self.cells();
         for (cell, bound_m) in bounds_m.iter().enumerate() {
@@ -196,10 +190,15 @@ impl<'a> BoundsProblem<'a> {
 
     /// Minimises chi-squared from the current parameters; returns it.
     fn minimise(&mut self) -> f64 {
-        let estimate = least_squares::minimise(self, self.parameters.clone(), None, &DESCENT);
-        self.parameters = estimate.at;
-        if estimate.chi_squared.is_finite() {
-            estimate.chi_squared
+        let (descent, report) = LevenbergMarquardt::new()
+            .with_ftol(1e-6)
+            .with_xtol(1e-5)
+            .with_gtol(1e-9)
+            .with_patience(8)
+            .minimize(Descent::new(self));
+        self.parameters = descent.params().as_slice().to_vec();
+        if report.objective_function.is_finite() {
+            2.0 * report.objective_function
         } else {
             f64::INFINITY
         }
@@ -225,9 +224,8 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// Moves bounds towards each other in pairs as far as the data do not mind. Of tips that never slide backward the data know
-    /// only the sum, and the search ends anywhere among all ways to share it out, often where one of them would just begin to
-    /// slide.
+    /// Moves bounds towards each other in pairs as far as chi-squared allows. Tips that never slide backward show only the sum of their
+    /// bounds, and the fit ends anywhere among all distributions of it, often where one of them would just begin to slide.
     fn share_out(&mut self) {
         let allowed = self.data_chi_squared() + self.misfit_ratio().max(1.0);
         let cells = self.cells();
@@ -247,7 +245,7 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// How far each bound can be moved at another's expense without the data minding, m.
+    /// How far each bound can be moved at another's expense before chi-squared rises noticeably, m.
     fn free_displacements_m(&self) -> Vec<f64> {
         let allowed = self.data_chi_squared() + self.misfit_ratio().max(1.0);
         let bounds_m = self.bounds_m(&self.parameters);
@@ -283,7 +281,7 @@ impl<'a> BoundsProblem<'a> {
         moved
     }
 
-    /// Assumes that the worm was laid down at the start of a run, and keeps to it if the data agree.
+    /// Assumes that the worm was laid down at the start of a run, and keeps the assumption if the data agree.
     fn try_laid_down(&mut self, run: usize) {
         if !self.runs[run].at_begin {
             return;
@@ -302,7 +300,7 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    /// What a systematic error of all bounds does to the mass, kg: least on the steepest run.
+    /// Error of the mass from a systematic error of all bounds, kg: smallest on the steepest run.
     fn mass_systematic_kg(&self) -> f64 {
         let squares: f64 = self
             .base
@@ -320,7 +318,7 @@ impl<'a> BoundsProblem<'a> {
 
     fn finish(self) -> Result<Fitted, FitError> {
         let ratio = self.misfit_ratio();
-        let normal = normal_matrix(self.quantities(), &self.flatter_jacobian(), None);
+        let normal = normal_matrix(&self.quantities, &self.flatter_jacobian(), None);
         let covariance = normal.cholesky().map(|factor| factor.inverse() * ratio.max(1.0));
         let sigma = |at: usize| {
             covariance

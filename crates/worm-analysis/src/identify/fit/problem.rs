@@ -2,13 +2,15 @@
 
 use super::run::{RunData, common_deformation_m};
 use super::{FitError, PositionRun};
-use crate::least_squares::{LeastSquares, Quantity, dot};
+use crate::least_squares::{Quantity, dot};
+use levenberg_marquardt::LeastSquaresProblem;
+use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use rayon::prelude::*;
 use worm_physics::{Worm, WormError};
 
 /// Standard deviation of the logarithms of the bounds about their mean: it distributes what the data do not determine.
 const BOUND_SPREAD: f64 = 0.5;
-/// Standard deviation of the configured mass, as a share.
+/// Standard deviation of the configured mass, as a fraction.
 const MASS_SPREAD: f64 = 0.1;
 /// Damping ratio that the search begins with, and the standard deviation of its logarithm.
 pub(super) const DAMPING: (f64, f64) = (0.5, 1.5);
@@ -28,7 +30,8 @@ pub(super) struct BoundsProblem<'a> {
     pub runs: Vec<RunData<'a>>,
     pub with_mass: bool,
     pub parameters: Vec<f64>,
-    quantities: Vec<Quantity>,
+    /// Without priors and limits: what is expected of the parameters is among the residuals.
+    pub quantities: Vec<Quantity>,
 }
 
 impl<'a> BoundsProblem<'a> {
@@ -219,6 +222,16 @@ impl<'a> BoundsProblem<'a> {
         })
     }
 
+    /// The Jacobian by central differences, a column for each parameter.
+    fn jacobian(&self, at: &[f64]) -> Vec<Vec<f64>> {
+        let column = |parameter: usize| {
+            let step = self.quantities[parameter].step;
+            let [above, below] = self.sides(at, parameter, step);
+            slope(&above, &below, 2.0 * step)
+        };
+        (0..at.len()).into_par_iter().map(column).collect()
+    }
+
     /// The Jacobian by the flatter of both sides. Where a tip just begins to slide backward, its bound shows on one side only, and
     /// a standard error must not rest on that side.
     pub(super) fn flatter_jacobian(&self) -> Vec<Vec<f64>> {
@@ -244,22 +257,47 @@ fn slope(to: &[f64], from: &[f64], width: f64) -> Vec<f64> {
     to.iter().zip(from).map(|(to, from)| (to - from) / width).collect()
 }
 
-impl LeastSquares for BoundsProblem<'_> {
-    fn quantities(&self) -> &[Quantity] {
-        &self.quantities
+/// A descent of the fit, from some values.
+///
+/// It keeps to MINPACK's trust region, where the other fits of the crate use [`least_squares::minimise`](crate::least_squares::minimise).
+/// Tips that never slide backward leave a valley in which chi-squared hardly changes, with a kink wherever one of them begins to
+/// slide; the two methods stop at different points of it, and with the other one the fit ended in a kink, where the standard errors of
+/// such tips come out too small.
+pub(super) struct Descent<'p, 'a> {
+    problem: &'p BoundsProblem<'a>,
+    at: DVector<f64>,
+}
+
+impl<'p, 'a> Descent<'p, 'a> {
+    pub(super) fn new(problem: &'p BoundsProblem<'a>) -> Self {
+        Self {
+            at: DVector::from_column_slice(&problem.parameters),
+            problem,
+        }
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Descent<'_, '_> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, parameters: &DVector<f64>) {
+        self.at.copy_from(parameters);
     }
 
-    /// Those of the data and of the priors, for some priors concern several parameters.
-    fn residuals(&self, at: &[f64]) -> Vec<f64> {
-        self.residuals_at(at, None)
+    fn params(&self) -> DVector<f64> {
+        self.at.clone()
     }
 
-    fn derivatives(&self, at: &[f64], _residual: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
-        let column = |&parameter: &usize| {
-            let step = self.quantities[parameter].step;
-            let [above, below] = self.sides(at, parameter, step);
-            slope(&above, &below, 2.0 * step)
-        };
-        quantities.par_iter().map(column).collect()
+    fn residuals(&self) -> Option<DVector<f64>> {
+        Some(DVector::from_vec(self.problem.residuals_at(self.at.as_slice(), None)))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let columns = self.problem.jacobian(self.at.as_slice());
+        Some(DMatrix::from_fn(self.problem.rows(), columns.len(), |row, column| {
+            columns[column][row]
+        }))
     }
 }

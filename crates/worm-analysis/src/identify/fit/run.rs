@@ -7,12 +7,12 @@ use worm_physics::{Motion, Worm, WormError, steady_cycle};
 
 /// Distance from the beginning of a step up to which a run counts as beginning with it, cycles.
 const AT_BEGIN: f64 = 0.02;
-/// Phase gone through, cycles, from which the worm counts as moving; how much of the rest before is used, s; and how long a
-/// worm laid down sinks at most, s.
+/// Phase after which the worm counts as moving, cycles; how much of the rest before is used, s; and the time for which a worm just laid
+/// down settles on its tips, s.
 const MOVES: f64 = 0.005;
 const REST_S: f64 = 0.1;
 const SINKING_S: f64 = 0.05;
-/// Drift that the search begins with, as the standard deviation after one cycle, m.
+/// Initial drift, as the standard deviation after one cycle, m.
 const FIRST_DRIFT_M: f64 = 5e-5;
 
 /// One run.
@@ -94,7 +94,7 @@ fn settled_from_s(time_s: &[f64], phase: &[f64]) -> f64 {
     (time_s[moves] - REST_S).max(time_s[0] + SINKING_S)
 }
 
-/// Deformation of all tips alike that carries the pull, m.
+/// Common deformation of all tips that balances the pull, m.
 pub(super) fn common_deformation_m(worm: &Worm) -> f64 {
     let stiffness_n_per_m: f64 = worm.contacts().iter().map(|contact| contact.stiffness_n_per_m).sum();
     -worm.pull_n() / stiffness_n_per_m

@@ -4,7 +4,7 @@ use super::Finder;
 use crate::identify::track;
 
 /// Residual of a sample at the best phase, in standard deviations of the noise for each cell, from which it is rejected.
-const MISFIT: f64 = 6.0;
+const MAX_RESIDUAL: f64 = 6.0;
 
 impl Finder<'_> {
     /// The phase of each sample: where it lies closest to the path of the relative positions, smoothed in time, for a motor
@@ -25,7 +25,7 @@ impl Finder<'_> {
         if self.seen_m[stepping_in(here)][sample].is_nan() {
             return None;
         }
-        let mut best = (f64::INFINITY, 0.0, 0.0); // misfit, phase, variance
+        let mut best = (f64::INFINITY, 0.0, 0.0); // chi-squared, phase, variance
         // The present step first: two cells alone fit the steps beside it just as well.
         for slot in [here, here - 1.0, here + 1.0] {
             let stepping = stepping_in(slot);
@@ -55,7 +55,7 @@ impl Finder<'_> {
                 best = (chi_squared, (slot + fraction) / cells as f64, sigma * sigma);
             }
         }
-        let believable = best.0 < (MISFIT * self.noise_m).powi(2) * cells as f64;
+        let believable = best.0 < (MAX_RESIDUAL * self.noise_m).powi(2) * cells as f64;
         believable.then_some((best.1, best.2))
     }
 }

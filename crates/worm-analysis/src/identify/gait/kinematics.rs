@@ -8,7 +8,7 @@ const CORNER: f64 = 0.04;
 
 impl Finder<'_> {
     /// Whether a cell stands still in the body at a phase, well away from its own step, so that its place there is known
-    /// whatever the shape of the cam. With two cells none ever does, and each must do as it is.
+    /// whatever the shape of the cam. With two cells none ever does, and both are used.
     pub(super) fn rests(&self, cell: usize, phase: f64) -> bool {
         let cells = self.cells() as f64;
         let steps = (phase * cells - self.place_of[cell] as f64).rem_euclid(cells);
@@ -27,8 +27,8 @@ impl Finder<'_> {
         }
     }
 
-    /// Least squares for places and stroke with the phase as it is, on the cells at rest in the body; the body's way drops out
-    /// sample by sample.
+    /// Least squares for places and stroke with the phase as it is, on the cells at rest in the body; the displacement of the
+    /// body is eliminated sample by sample.
     pub(super) fn fit_kinematics(&mut self) {
         let cells = self.cells();
         let mut normal = DMatrix::<f64>::zeros(cells + 1, cells + 1);
@@ -64,14 +64,14 @@ impl Finder<'_> {
         self.measure_noise();
     }
 
-    /// The noise of one position by what the cells at rest leave; with two cells that cannot be told from the phase.
+    /// The noise of one position by the residual of the cells at rest; with two cells it cannot be separated from the phase.
     pub(super) fn measure_noise(&mut self) {
         if self.cells() > 2 {
             self.noise_m = self.residual_m();
         }
     }
 
-    /// Standard deviation of what places, stroke and phase leave of the positions of the cells at rest, m.
+    /// Standard deviation of the residual of the cells at rest, given places, stroke and phase, m.
     pub(super) fn residual_m(&self) -> f64 {
         let (mut squares, mut equations) = (0.0, 0.0);
         let mut rows = Vec::with_capacity(self.cells());

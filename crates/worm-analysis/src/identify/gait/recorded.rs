@@ -1,17 +1,17 @@
-//! A recorded gait phase: what it must be like, and which cell steps in which part of it.
+//! A recorded gait phase: checks, and which cell steps in which part of it.
 
 use super::{Finder, MIN_CYCLES};
 use crate::identify::gait_error::GaitError;
 
-/// How far a recorded phase may fall back behind where it has been, cycles, before it counts as running back.
+/// How far a recorded phase may fall behind its maximum so far before it counts as running back, cycles.
 const BACKWARD: f64 = 0.03;
-/// What cells may stand off where a recorded phase has them: this many times their noise, and this share of the stroke.
+/// How far cells may be from where a recorded phase has them: in standard deviations of the noise, and as a fraction of the stroke.
 const CONTRADICTION: (f64, f64) = (5.0, 0.1);
 /// Largest recorded phase, cycles: a worm that crawled for decades, and a sample is still resolved.
 const LARGEST_PHASE: f64 = 1e9;
 
 impl Finder<'_> {
-    /// Takes over a recorded phase, and finds which cell rises in which part of it.
+    /// Adopts a recorded phase, and finds which cell moves ahead in which part of it.
     pub(super) fn take_phase(&mut self, phase: &[f64]) -> Result<(), GaitError> {
         let cells = self.cells();
         if let Some(at) = phase
