@@ -52,11 +52,18 @@
 //! - SI units stand in the names: `stroke_m`, `energy_j`. People read millimetres, millijoules and degrees.
 //! - Faults are injected by a wrapper, never by an `if` in the product.
 
+mod benchmark;
 pub mod command;
 pub mod control;
+mod estimator;
+mod failure;
 pub mod latency;
 pub mod link;
 pub mod logging;
+mod preflight;
+mod print;
 pub mod realtime;
+mod recorder;
+mod supervisor;
 pub mod topics;
 pub mod watch;

@@ -47,7 +47,7 @@ enum Subcommands {
     Latency(command::latency::LatencyArgs),
     /// The bare sleeper of `wormd latency`
     #[command(hide = true)]
-    LatencyFloor(command::latency::FloorArgs),
+    LatencyFloor(command::latency_floor::LatencyFloorArgs),
     /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
     Check(command::check::CheckArgs),
 }
@@ -95,7 +95,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         #[cfg(feature = "analysis")]
         Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Latency(args) => command::latency::run(&args, verbose),
-        Subcommands::LatencyFloor(args) => command::latency::run_floor(&args),
+        Subcommands::LatencyFloor(args) => command::latency_floor::run(&args),
         Subcommands::Check(args) => command::check::run(&args),
     }
 }

@@ -13,7 +13,7 @@ pub struct ControlArgs {
     worm: WormArgs,
 }
 
-/// Runs `wormd control` until it is told to end. When it is ready it says so on one line of standard output.
+/// Runs `wormd control` until a signal ends it. Prints the line "ready" on standard output once the loop runs.
 ///
 /// # Errors
 /// [`Failure::Unusable`] for a configuration, port, device or worm that cannot be used; [`Failure::Failed`] when the topics
@@ -42,8 +42,7 @@ pub fn run(args: &ControlArgs) -> Result<(), Failure> {
     let hub = Hub::open(&instance).map_err(Failure::failed)?;
     let ending = control::run(&config, &mut drive, &hub, &role, &end, |grants| {
         report_grants(grants);
-        // One who does not want to know when it is ready may have closed the pipe.
-        let _ = print::line("ready");
+        print::ready();
     })
     .map_err(Failure::failed)?;
     tracing::info!(?ending, link = ?drive.counters(), "the loop has ended");

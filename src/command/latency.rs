@@ -1,19 +1,8 @@
 //! `wormd latency`: the loop's own latency, end to end, against what this computer can do at best.
 
-mod bench;
-mod busy_poll;
-mod cyclictest;
-mod floor;
-mod measure;
-mod rates;
-mod testbed;
-mod text;
-mod verdict;
-
-pub use floor::{FloorArgs, run as run_floor};
-
+use super::progress::Progress;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
-use bench::Bench;
+use crate::benchmark::{self, Benchmark, Options};
 use clap::Args;
 #[cfg(feature = "analysis")]
 use std::path::PathBuf;
@@ -29,10 +18,10 @@ pub struct LatencyArgs {
     /// Ticks per second, instead of the configured ones
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// How long to measure the loop; the whole takes longer by the start, a look at busy subscribers, and the trial of rates
+    /// How long to measure the loop; the start, busy subscribers and the search for the highest rate take additional time
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, default_value = "20")]
     duration: Duration,
-    /// Have all CPUs, the memory and the disk busy meanwhile
+    /// Keep all CPUs, the memory and the disk busy meanwhile
     #[arg(long)]
     load: bool,
     /// Priority under SCHED_FIFO, instead of the configured one; 0 leaves the ordinary scheduler
@@ -41,35 +30,54 @@ pub struct LatencyArgs {
     /// CPU to pin loop and floor to, instead of the configured one
     #[arg(long, value_name = "N")]
     cpu: Option<usize>,
-    /// Do not look for the highest rate that can be kept
+    /// Do not search for the highest sustained rate
     #[arg(long)]
     no_rate_search: bool,
-    /// Run `cyclictest` beside the loop, too, where it is installed (package rt-tests)
+    /// Also run `cyclictest` beside the loop, where it is installed (package rt-tests)
     #[arg(long)]
     cyclictest: bool,
-    /// Print one JSON object on standard output, and nothing else there
+    /// Print the result as one JSON object, and nothing else, on standard output
     #[arg(long)]
     json: bool,
-    /// Write a page with the histograms and the latest ticks, and all numbers as JSON, into this directory
+    /// Write a page with the histograms and the worst ticks, and all numbers as JSON, into this directory
     #[cfg(feature = "analysis")]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+}
+
+impl LatencyArgs {
+    fn options(&self, verbose: u8) -> Options {
+        Options {
+            name: self.worm.name.clone(),
+            rate_hz: self.rate,
+            duration: self.duration,
+            load: self.load,
+            priority: self.priority,
+            cpu: self.cpu,
+            search_rates: !self.no_rate_search,
+            cyclictest: self.cyclictest,
+            verbose,
+        }
+    }
 }
 
 /// Runs `wormd latency`.
 ///
 /// # Errors
 /// [`Failure::Unusable`] for arguments, configuration or devices that cannot be used; [`Failure::Failed`] when something fails
-/// while it measures. What could be measured all the same, the machine's own limit at least, is told before.
+/// during the measurement. What could be measured, at least the machine's own limit, is printed before.
 pub fn run(args: &LatencyArgs, verbose: u8) -> Result<(), Failure> {
-    let bench = Bench::new(args, verbose)?;
+    let (config, text) = args.worm.load_with_text()?;
+    let benchmark = Benchmark::new(config, text, args.options(verbose))?;
     #[cfg(feature = "analysis")]
     if let Some(dir) = &args.out {
-        // A directory that cannot be written is told now, not after the measurement.
+        // A directory that cannot be written is reported now, not after the measurement.
         report::prepare(dir).map_err(Failure::unusable)?;
     }
     let end = end_on_signal()?;
-    let (outcome, trouble) = measure::run(&bench, &end)?;
+    let mut bar = Progress::begin();
+    let progress = move |stage: &str, fraction| bar.tell(stage, fraction);
+    let (outcome, problem) = benchmark::run(&benchmark, &end, progress)?;
     #[cfg(feature = "analysis")]
     if let Some(dir) = &args.out {
         crate::latency::page::write(dir, &outcome).map_err(Failure::failed)?;
@@ -83,5 +91,5 @@ pub fn run(args: &LatencyArgs, verbose: u8) -> Result<(), Failure> {
             print::line(format_args!("\n{}", dir.join("latency.html").display()))?;
         }
     }
-    trouble.map_or(Ok(()), Err)
+    problem.map_or(Ok(()), Err)
 }

@@ -3,7 +3,6 @@
 #[cfg(feature = "analysis")]
 pub mod analyze;
 pub mod check;
-mod child_process;
 pub mod control;
 #[cfg(feature = "analysis")]
 mod dataset;
@@ -11,7 +10,7 @@ pub mod estimate;
 #[cfg(feature = "analysis")]
 pub mod explain;
 pub mod latency;
-mod print;
+pub mod latency_floor;
 mod progress;
 pub mod record;
 pub mod replay;
@@ -19,59 +18,19 @@ pub mod send_command;
 #[cfg(feature = "analysis")]
 pub mod simulate;
 pub mod study;
-mod telemetry_receiver;
 pub mod up;
 pub mod virtual_worm;
 
-pub use print::log_line;
+pub use crate::failure::Failure;
+pub use crate::print::log_line;
 
+use crate::print;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use worm_estimator::config::{Config, ConfigError};
-
-/// What lies behind a [`Failure`]: an error with its own sources, or a sentence.
-type Cause = Box<dyn std::error::Error + Send + Sync>;
-
-/// Why a subcommand did not do what it was asked to, and with which exit status it ends.
-#[derive(Debug, thiserror::Error)]
-pub enum Failure {
-    /// Arguments, configuration or input cannot be used: exit status 2.
-    #[error(transparent)]
-    Unusable(Cause),
-    /// It failed while running: exit status 1.
-    #[error(transparent)]
-    Failed(Cause),
-}
-
-impl Failure {
-    /// Arguments, configuration or input cannot be used, because of `cause`.
-    pub fn unusable(cause: impl Into<Cause>) -> Self {
-        Self::Unusable(cause.into())
-    }
-
-    /// It failed while running, because of `cause`.
-    pub fn failed(cause: impl Into<Cause>) -> Self {
-        Self::Failed(cause.into())
-    }
-
-    /// The exit status.
-    pub fn exit_code(&self) -> ExitCode {
-        match self {
-            Self::Unusable(_) => ExitCode::from(2),
-            Self::Failed(_) => ExitCode::FAILURE,
-        }
-    }
-}
-
-impl From<ConfigError> for Failure {
-    fn from(error: ConfigError) -> Self {
-        Self::unusable(error)
-    }
-}
 
 /// Which worm is meant: the arguments that most subcommands share.
 #[derive(Debug, Clone, Args)]

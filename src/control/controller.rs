@@ -4,7 +4,7 @@ use super::presence::{Passed, Presence};
 use super::ramp::{CountRounding, Ramp};
 use super::resume::Resume;
 use super::safety::{Safety, Watched};
-use super::state_assembler::Intake;
+use super::state_assembler::StateAssembler;
 use crate::link::{ServoReading, TrackerReading};
 use std::f64::consts::TAU;
 use worm_estimator::config::{Config, Policy};
@@ -109,7 +109,7 @@ pub struct Controller {
     policies: [Policy; AlarmKind::ALL.len()],
 
     presence: Presence,
-    intake: Intake,
+    assembler: StateAssembler,
     safety: Safety,
     ramp: Ramp,
     rounding: CountRounding,
@@ -151,7 +151,7 @@ impl Controller {
             require_estimator: config.control.require_estimator,
             policies,
             presence: Presence::default(),
-            intake: Intake::new(config),
+            assembler: StateAssembler::new(config),
             safety: Safety::new(config),
             ramp: Ramp::at_rest(gait_velocity_rad_s.abs() / config.gait.ramp_s),
             rounding: CountRounding::default(),
@@ -195,14 +195,14 @@ impl Controller {
         } = self.presence.advance(inputs.now_ns, inputs.absent_ns);
         let dt_s = step_ns as f64 * 1e-9;
 
-        self.intake.state.link_failures += u64::from(inputs.lost_exchanges);
-        self.intake.take_servo(inputs.now_ns, now_ns, inputs.servo);
-        self.intake.take_tracker(inputs.now_ns, now_ns, inputs.tracker);
+        self.assembler.state.link_failures += u64::from(inputs.lost_exchanges);
+        self.assembler.take_servo(inputs.now_ns, now_ns, inputs.servo);
+        self.assembler.take_tracker(inputs.now_ns, now_ns, inputs.tracker);
         if inputs.estimate_arrived {
             self.estimate_seen_ns = Some(now_ns);
         }
         if let Some(bits) = inputs.hardware_error {
-            self.intake.state.hardware_error = u32::from(bits);
+            self.assembler.state.hardware_error = u32::from(bits);
         }
         if let Some(outcome) = inputs.service {
             self.take_service(outcome, now_ns);
@@ -232,7 +232,7 @@ impl Controller {
         let velocity_rad_s = self.command_velocity(now_ns, dt_s);
         let service = self.due_service(now_ns);
         let finished = inputs.end && self.is_over();
-        let servo_rad_s = self.intake.cam().servo_velocity_rad_s(velocity_rad_s);
+        let servo_rad_s = self.assembler.cam().servo_velocity_rad_s(velocity_rad_s);
         Outputs {
             state: self.fill_state(inputs.now_ns, velocity_rad_s),
             goal_counts: self.rounding.round(servo_rad_s / RAD_S_PER_COUNT),
@@ -273,7 +273,7 @@ impl Controller {
             dt_s,
             // What the servo said before a service is not what it says after it.
             servo: inputs.servo.filter(|_| inputs.service.is_none()),
-            intake: &self.intake,
+            assembler: &self.assembler,
             estimate_seen_ns: self.estimate_seen_ns,
             paused_ns: self.paused_unanswered_ns,
             armed_ns: self.armed_ns,
@@ -293,7 +293,7 @@ impl Controller {
         let devices_answer = inputs.servo.is_some_and(|servo| !servo.alert)
             && !self
                 .safety
-                .persists(Fault::TrackerStale, now_ns, inputs.servo, &self.intake);
+                .persists(Fault::TrackerStale, now_ns, inputs.servo, &self.assembler);
         if inputs.end || inputs.command.is_some() {
             self.resume.give_up();
         } else if self.resume.is_due(now_ns, pause_ns, is_disarmed && devices_answer) {
@@ -356,7 +356,7 @@ impl Controller {
     fn begin_back_off(&mut self) {
         let backward = -self.ramp.direction_of_target();
         self.ramp.aim(backward * self.gait_velocity_rad_s.abs());
-        self.back_off_until_rad = Some(self.intake.state.motor_angle_rad + backward * self.back_off_cycles * TAU);
+        self.back_off_until_rad = Some(self.assembler.state.motor_angle_rad + backward * self.back_off_cycles * TAU);
     }
 
     fn take_command(&mut self, command: &Command, now_ns: u64, servo: Option<&ServoReading>) -> Reply {
@@ -365,7 +365,7 @@ impl Controller {
             Ok(kind) => self.carry_out(kind, command.cycles_per_s, now_ns, servo),
         };
         Reply {
-            sequence: self.intake.state.sequence,
+            sequence: self.assembler.state.sequence,
             verdict: verdict.code(),
             mode: self.mode.code(),
             fault: self.fault.code(),
@@ -401,7 +401,7 @@ impl Controller {
             }
             (CommandKind::Stop, Mode::Stopping | Mode::Disarmed) => CommandOutcome::Accepted,
             (CommandKind::Reset, Mode::Fault) => {
-                if self.safety.persists(self.fault, now_ns, servo, &self.intake) {
+                if self.safety.persists(self.fault, now_ns, servo, &self.assembler) {
                     CommandOutcome::FaultPersists
                 } else {
                     self.pending.get_or_insert(Service::Arm);
@@ -442,7 +442,7 @@ impl Controller {
 
     /// The cam velocity that the mode asks for in this tick, rad/s.
     fn command_velocity(&mut self, now_ns: u64, dt_s: f64) -> f64 {
-        let angle_rad = self.intake.state.motor_angle_rad;
+        let angle_rad = self.assembler.state.motor_angle_rad;
         match self.mode {
             Mode::Disarmed | Mode::Armed | Mode::Fault => {
                 self.ramp.halt();
@@ -461,7 +461,8 @@ impl Controller {
             Mode::Stopping => {
                 self.ramp.aim(0.0);
                 let velocity_rad_s = self.ramp.advance(dt_s);
-                let standing = self.ramp.is_at_rest() && self.intake.state.motor_velocity_rad_s.abs() < STANDING_RAD_S;
+                let standing =
+                    self.ramp.is_at_rest() && self.assembler.state.motor_velocity_rad_s.abs() < STANDING_RAD_S;
                 let patience_is_over = now_ns.saturating_sub(self.mode_since_ns) > STANDSTILL_PATIENCE_NS;
                 if self.disarm_due_ns.is_none() && (standing || (self.ramp.is_at_rest() && patience_is_over)) {
                     self.ask_for_disarm(now_ns);
@@ -504,7 +505,7 @@ impl Controller {
     }
 
     fn fill_state(&mut self, now_ns: u64, velocity_rad_s: f64) -> State {
-        let state = &mut self.intake.state;
+        let state = &mut self.assembler.state;
         state.time_ns = now_ns;
         state.host_paused_ns = self.presence.paused_ns();
         state.goal_velocity_rad_s = velocity_rad_s;

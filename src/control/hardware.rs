@@ -120,7 +120,7 @@ impl Drive {
 
     /// What the link has counted.
     pub fn counters(&self) -> LinkCounters {
-        self.bus.counters()
+        self.bus.link_counters()
     }
 
     /// Carries out a service. Gives the servo's hardware error status where it was read.

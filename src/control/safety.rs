@@ -2,7 +2,7 @@
 //!
 //! Every time here is of the loop's own clock (`presence`): a pause of the computer is nobody's silence.
 
-use super::state_assembler::Intake;
+use super::state_assembler::StateAssembler;
 use crate::link::ServoReading;
 use worm_estimator::config::{Config, Limits};
 use worm_estimator::message::Fault;
@@ -31,7 +31,7 @@ pub(super) struct Watched<'a> {
     pub(super) now_ns: u64,
     pub(super) dt_s: f64,
     pub(super) servo: Option<&'a ServoReading>,
-    pub(super) intake: &'a Intake,
+    pub(super) assembler: &'a StateAssembler,
     pub(super) estimate_seen_ns: Option<u64>,
     /// How long the computer paused since the servo answered before, ns.
     pub(super) paused_ns: u64,
@@ -75,11 +75,11 @@ impl Safety {
         let silent_for = |seen_ns: Option<u64>, since_ns: u64| {
             watched.now_ns.saturating_sub(seen_ns.unwrap_or(since_ns).max(since_ns))
         };
-        if silent_for(watched.intake.servo_seen_ns, watched.armed_ns) > self.link_timeout_ns {
+        if silent_for(watched.assembler.servo_seen_ns, watched.armed_ns) > self.link_timeout_ns {
             return Some(Fault::LinkLost);
         }
         let since_ns = watched.crawling_since_ns?;
-        if silent_for(watched.intake.sample_seen_ns, since_ns) > self.tracker_timeout_ns {
+        if silent_for(watched.assembler.sample_seen_ns, since_ns) > self.tracker_timeout_ns {
             return Some(Fault::TrackerStale);
         }
         let estimator_is_silent = silent_for(watched.estimate_seen_ns, since_ns) > self.estimator_timeout_ns;
@@ -124,12 +124,18 @@ impl Safety {
     }
 
     /// Whether `fault`'s cause is still there, so that a reset would be in vain.
-    pub(super) fn persists(&self, fault: Fault, now_ns: u64, servo: Option<&ServoReading>, intake: &Intake) -> bool {
+    pub(super) fn persists(
+        &self,
+        fault: Fault,
+        now_ns: u64,
+        servo: Option<&ServoReading>,
+        assembler: &StateAssembler,
+    ) -> bool {
         let age_ns = |seen_ns: Option<u64>| seen_ns.map_or(u64::MAX, |seen_ns| now_ns.saturating_sub(seen_ns));
         match fault {
             Fault::OverTemperature => servo.is_none_or(|servo| servo.temperature_c > self.limits.temperature_c),
             Fault::UnderVoltage => servo.is_none_or(|servo| servo.voltage_v < self.limits.voltage_v),
-            Fault::TrackerStale => age_ns(intake.sample_seen_ns) > self.tracker_timeout_ns,
+            Fault::TrackerStale => age_ns(assembler.sample_seen_ns) > self.tracker_timeout_ns,
             // A lost link may need the port to be opened again, which is what a reset does; the rest is past by nature.
             _ => false,
         }

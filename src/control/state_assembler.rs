@@ -1,11 +1,12 @@
-//! From device readings to the [`State`] message: units of the cam, unwrapped counters, freshness.
+//! From device readings to the [`State`] message: angles of the cam, unwrapped counters, freshness.
 
 use crate::link::{ServoReading, TrackerReading};
 use std::f64::consts::TAU;
 use worm_estimator::config::Config;
 use worm_estimator::message::State;
+use worm_estimator::time::seconds;
 
-/// How the servo's shaft and the cam relate.
+/// How the servo's shaft relates to the cam.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cam {
     home_rad: f64,
@@ -32,13 +33,17 @@ impl Cam {
     }
 }
 
-/// Fills states from readings and remembers what a tick without an answer repeats.
+/// Fills states from readings, and keeps the values that a tick without an answer repeats.
 #[derive(Debug, Clone)]
-pub(super) struct Intake {
+pub(super) struct StateAssembler {
     cam: Cam,
     pub(super) state: State,
     servo_clock: Option<ServoClock>,
+    /// The servo's clock without its wrapping, ns; counted from when it was first seen to count.
+    motor_time_ns: u64,
     tracker: Option<TrackerClock>,
+    /// The tracker's clock without its wrapping, ns.
+    sample_time_ns: u64,
     /// When the servo last answered, ns of the loop's own clock.
     pub(super) servo_seen_ns: Option<u64>,
     /// When the last new tracker sample came, ns of the loop's own clock.
@@ -50,7 +55,7 @@ pub(super) struct Intake {
 struct ServoClock {
     tick_ms: u16,
     read_ns: u64,
-    /// The register has been seen to count; some imitations of the servo never do.
+    /// Whether the register has been seen to count; some imitations of the servo never do.
     counts: bool,
 }
 
@@ -65,20 +70,22 @@ struct TrackerClock {
 /// Values of the servo's realtime tick (XL330-M288 e-manual, register 120: 0 to 32,767 ms).
 const REALTIME_TICKS: u16 = 32_768;
 
-/// How much further than the computer's clock the servo's may go between two readings, ms: the first of them may have come late, from
-/// before a pause of the computer.
-const LATEST_READING_MS: u64 = 2_000;
+/// How much further the servo's clock may advance than the computer's between two readings, ms: the first reading may have
+/// arrived late, from before a pause of the computer.
+const MAX_READING_AGE_MS: u64 = 2_000;
 
-/// A counter step larger than this is a tracker that started anew, not samples that were missed.
+/// A larger step of the counter means that the tracker restarted, not that samples were missed.
 const RESTART_STEP: u32 = 100_000;
 
-impl Intake {
+impl StateAssembler {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             cam: Cam::new(config),
             state: State::unknown(config.worm.cells),
             servo_clock: None,
+            motor_time_ns: 0,
             tracker: None,
+            sample_time_ns: 0,
             servo_seen_ns: None,
             sample_seen_ns: None,
         }
@@ -88,7 +95,7 @@ impl Intake {
         self.cam
     }
 
-    /// Takes what the servo said at `now_ns` of the computer's clock, which is `present_ns` of the loop's own.
+    /// Takes the servo's answer, or its lack, at `now_ns` of the computer's clock, which is `present_ns` of the loop's own.
     pub(super) fn take_servo(&mut self, now_ns: u64, present_ns: u64, reading: Option<&ServoReading>) {
         let state = &mut self.state;
         state.motor_is_new = u32::from(reading.is_some());
@@ -104,8 +111,8 @@ impl Intake {
         self.follow_servo_clock(now_ns, reading.realtime_tick_ms);
     }
 
-    /// Unwraps the servo's clock. Where it cannot have gone on as it reads, because the servo restarted or was silent for longer than
-    /// its counter reaches, this computer's clock says how long it was away.
+    /// Unwraps the servo's clock. When the reading is implausible, because the servo restarted or was silent for longer than its
+    /// counter's range, the computer's clock measures the time instead.
     fn follow_servo_clock(&mut self, now_ns: u64, tick_ms: u16) {
         let Some(last) = self.servo_clock else {
             self.servo_clock = Some(ServoClock {
@@ -127,18 +134,17 @@ impl Intake {
         let by_servo_ms = u64::from(tick_ms.wrapping_sub(last.tick_ms) % REALTIME_TICKS);
         let elapsed_ns = now_ns.saturating_sub(last.read_ns);
         let elapsed_ms = elapsed_ns / 1_000_000;
-        let is_plausible =
-            by_servo_ms <= elapsed_ms + LATEST_READING_MS && elapsed_ms < u64::from(REALTIME_TICKS) - LATEST_READING_MS;
-        let step_s = if is_plausible {
-            by_servo_ms as f64 * 1e-3
+        let is_plausible = by_servo_ms <= elapsed_ms + MAX_READING_AGE_MS
+            && elapsed_ms < u64::from(REALTIME_TICKS) - MAX_READING_AGE_MS;
+        self.motor_time_ns += if is_plausible {
+            by_servo_ms * 1_000_000
         } else {
-            elapsed_ns as f64 * 1e-9
+            elapsed_ns
         };
-        let time_s = &mut self.state.motor_time_s;
-        *time_s = if time_s.is_nan() { 0.0 } else { *time_s } + step_s;
+        self.state.motor_time_s = seconds(self.motor_time_ns);
     }
 
-    /// Takes what the tracker said, likewise.
+    /// Takes the tracker's answer, likewise.
     pub(super) fn take_tracker(&mut self, now_ns: u64, present_ns: u64, reading: Option<&TrackerReading>) {
         self.state.sample_is_new = 0;
         let Some(reading) = reading else { return };
@@ -163,19 +169,20 @@ impl Intake {
             state.samples_missed += u64::from(step) - 1;
         }
         if before.is_none() {
-            state.sample_time_s = f64::from(clock.capture_us) * 1e-6;
+            self.sample_time_ns = u64::from(clock.capture_us) * 1_000;
         } else if restarted {
-            // The old clock is gone; this computer's own clock tells how long the tracker was away.
+            // The tracker's clock started again; the computer's clock measures how long it was away.
             let away_ns = now_ns.saturating_sub(before.map_or(now_ns, |before| before.arrived_ns));
-            state.sample_time_s += away_ns as f64 * 1e-9;
+            self.sample_time_ns += away_ns;
         } else {
-            state.sample_time_s += f64::from(elapsed_us) * 1e-6;
+            self.sample_time_ns += u64::from(elapsed_us) * 1_000;
         }
+        state.sample_time_s = seconds(self.sample_time_ns);
         state.sample_is_new = 1;
         state.valid_mask = u32::from(reading.valid) & ((1u32 << state.cell_count) - 1);
         for cell in 0..state.cell_count as usize {
-            let seen = state.valid_mask >> cell & 1 == 1;
-            state.position_m[cell] = if seen { reading.positions_m[cell] } else { f64::NAN };
+            let is_valid = state.valid_mask >> cell & 1 == 1;
+            state.position_m[cell] = if is_valid { reading.positions_m[cell] } else { f64::NAN };
         }
         self.sample_seen_ns = Some(present_ns);
     }

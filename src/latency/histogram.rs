@@ -2,6 +2,7 @@
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use worm_estimator::time::microseconds;
 
 /// Longest duration that is told apart, ns: ten seconds. What takes longer counts as that.
 const LONGEST_NS: u64 = 10_000_000_000;
@@ -48,13 +49,13 @@ impl Durations {
 
     /// The percentiles; zeros when nothing was counted.
     pub fn percentiles(&self) -> Percentiles {
-        let us = |quantile| self.0.value_at_quantile(quantile) as f64 * 1e-3;
+        let us = |quantile| microseconds(self.0.value_at_quantile(quantile));
         Percentiles {
             p50: us(0.5),
             p90: us(0.9),
             p99: us(0.99),
             p99_9: us(0.999),
-            max: self.0.max() as f64 * 1e-3,
+            max: microseconds(self.0.max()),
         }
     }
 
@@ -67,7 +68,7 @@ impl Durations {
     pub fn bars(&self) -> impl Iterator<Item = (f64, u64)> + '_ {
         self.0
             .iter_recorded()
-            .map(|bar| (bar.value_iterated_to() as f64 * 1e-3, bar.count_at_value()))
+            .map(|bar| (microseconds(bar.value_iterated_to()), bar.count_at_value()))
     }
 }
 

@@ -1,25 +1,21 @@
-//! How late the loop is, where each late tick's time went, and how near that comes to what the machine can do.
+//! How late the loop is, where each late tick's time went, and how close that comes to what the machine can do.
 //!
 //! In reading order:
 //! - [`histogram`]: durations in histograms, and their [`Percentiles`].
 //! - [`timeline`]: one tick as its parts on the clock; [`WorstTicks`], the worst ones of a run.
-//! - [`tick_stats`]: what the `timing` topic tells of a run, and how long states took to whoever received them.
-//! - [`ipc_baseline`] and [`floor`]: what the machine and iceoryx2 can do at best, measured beside the loop.
-//! - [`stress`]: a load beside it.
-//! - [`outcome`]: what a run has found, as JSON shows it; [`measure`]: its durations, each with its name and its floor;
+//! - [`tick_stats`]: the `timing` topic of a run in histograms, and how long states took to their receivers.
+//! - [`outcome`]: the result of a run, as JSON shows it; [`measure`]: its durations, each with its name and its floor;
 //!   [`attribution`]: what each culprit means.
 //!
-//! `wormd latency` puts them together.
+//! `wormd latency` measures all of it with the crate's `benchmark`, and shows it as text and as a page.
 
 pub mod attribution;
-pub mod floor;
 pub mod histogram;
-pub mod ipc_baseline;
 pub mod measure;
 pub mod outcome;
 #[cfg(feature = "analysis")]
 pub mod page;
-pub mod stress;
+mod text;
 pub mod tick_stats;
 pub mod timeline;
 

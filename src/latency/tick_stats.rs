@@ -5,6 +5,7 @@ use super::timeline::{Tick, WorstTicks};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use worm_estimator::message::{Culprit, Timing};
+use worm_estimator::time::seconds;
 
 /// States whose timing, and timings whose state, may be on their way: some seconds at the highest rate.
 const ON_THE_WAY: usize = 65_536;
@@ -31,10 +32,10 @@ impl HostPauses {
         if pause_ns == 0 {
             return;
         }
-        self.newest_s = pause_ns as f64 / 1e9;
+        self.newest_s = seconds(pause_ns);
         self.count += 1;
         self.total_ns += pause_ns;
-        self.total_s = self.total_ns as f64 / 1e9;
+        self.total_s = seconds(self.total_ns);
         self.longest_s = self.longest_s.max(self.newest_s);
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use worm_estimator::message::{Culprit, Timing};
+use worm_estimator::time::microseconds;
 
 /// One tick, complete: where its time went, and who made it late.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -38,7 +39,6 @@ fn name_of<S: serde::Serializer>(culprit: &Culprit, serializer: S) -> Result<S::
 impl Tick {
     /// The tick that `timing` tells of; `publish_ns` stands in the timing of the tick that follows it.
     pub fn new(timing: &Timing, publish_ns: u64) -> Self {
-        let us = |ns: u64| ns as f64 * 1e-3;
         let late = timing.overrun != 0;
         let parts = [
             (Culprit::Wake, timing.wake_lateness_ns),
@@ -52,13 +52,13 @@ impl Tick {
             .map_or(Culprit::None, |part| part.0);
         Self {
             sequence: timing.sequence,
-            wake_us: us(timing.wake_lateness_ns),
-            bus_us: us(timing.bus_ns),
-            compute_us: us(timing.compute_ns),
-            publish_us: us(publish_ns),
-            notify_us: us(timing.notify_ns),
-            waited_us: us(timing.waited_ns),
-            stolen_us: us(timing.stolen_ns),
+            wake_us: microseconds(timing.wake_lateness_ns),
+            bus_us: microseconds(timing.bus_ns),
+            compute_us: microseconds(timing.compute_ns),
+            publish_us: microseconds(publish_ns),
+            notify_us: microseconds(timing.notify_ns),
+            waited_us: microseconds(timing.waited_ns),
+            stolen_us: microseconds(timing.stolen_ns),
             page_faults: timing.minor_faults.saturating_add(timing.major_faults),
             late,
             culprit: Culprit::try_from(timing.culprit)

@@ -17,7 +17,7 @@
 use std::time::Instant;
 
 use super::{
-    LinkCounters, Port, PortError, ServoReading, TrackerReading, TransactionError, WaitEnd, WormBus, servo, tracker,
+    BusCounters, Port, PortError, ServoReading, TrackerReading, TransactionError, WaitEnd, WormBus, servo, tracker,
 };
 use dynamixel_bus::packet::{
     DeviceId, FastReply, Instruction, InstructionPacket, Packet, ReadSpan, ReadSpans, Recipient, SegmentError,
@@ -157,14 +157,7 @@ impl Harvest {
     };
 
     /// Takes a block of either device. Whether it was one that was asked for.
-    fn take(
-        &mut self,
-        plan: &ExchangePlan,
-        id: DeviceId,
-        flags: StatusFlags,
-        data: &[u8],
-        counters: &mut LinkCounters,
-    ) {
+    fn take(&mut self, plan: &ExchangePlan, id: DeviceId, flags: StatusFlags, data: &[u8], counters: &mut BusCounters) {
         let failure = flags.error.map_or(ReadFailure::Malformed, ReadFailure::Refused);
         if flags.error.is_none() && data.is_empty() {
             return; // the receipt of the goal, from a servo that answers writes
@@ -192,11 +185,11 @@ impl Harvest {
         counters.malformed += u64::from(malformed);
     }
 
-    fn take_status(&mut self, plan: &ExchangePlan, status: &StatusPacket<'_>, counters: &mut LinkCounters) {
+    fn take_status(&mut self, plan: &ExchangePlan, status: &StatusPacket<'_>, counters: &mut BusCounters) {
         self.take(plan, status.id, status.flags, status.data, counters);
     }
 
-    fn take_fast_reply(&mut self, plan: &ExchangePlan, reply: FastReply<'_>, counters: &mut LinkCounters) {
+    fn take_fast_reply(&mut self, plan: &ExchangePlan, reply: FastReply<'_>, counters: &mut BusCounters) {
         for segment in reply.segments(plan.spans()) {
             match segment {
                 Ok(segment) => {
@@ -254,7 +247,7 @@ impl<P: Port> WormBus<P> {
     /// [`ReadPlan::Separate`] the servo has half of the time, so that its silence does not cost the tracker's answer.
     pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
         let before = self.bus.counters();
-        self.bus.counters_mut().exchanges += 1;
+        self.exchange_counters.exchanges += 1;
         let mut late = Harvest::NOTHING;
         if self.answers_owed > 0 {
             // A port that fails here fails in the exchange, too.
@@ -281,7 +274,7 @@ impl<P: Port> WormBus<P> {
         for failure in [harvest.servo.err(), harvest.tracker.err()] {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
         }
-        counters.partial_answers += u64::from(harvest.servo.is_ok() != harvest.tracker.is_ok());
+        self.exchange_counters.partial_answers += u64::from(harvest.servo.is_ok() != harvest.tracker.is_ok());
         self.answers_owed = (self.answers_owed + 1).saturating_sub(harvest.servo_answers);
         self.was_answered = harvest.servo_answers > 0;
         let received_bytes = (counters.received_bytes - before.received_bytes) as u32;
@@ -292,10 +285,10 @@ impl<P: Port> WormBus<P> {
         };
         let reported_rad_s = harvest.servo.map(|servo| servo.goal_velocity_rad_s);
         let goal_taken = reported_rad_s.is_ok_and(|found| goal_counts(found) == goal_counts(goal_velocity_rad_s));
-        counters.goals_not_taken += u64::from(harvest.servo.is_ok() && !goal_taken);
+        self.exchange_counters.goals_not_taken += u64::from(harvest.servo.is_ok() && !goal_taken);
         let servo_is_late = harvest.servo.is_err() && late.servo.is_ok();
         let tracker_is_late = harvest.tracker.is_err() && late.tracker.is_ok();
-        counters.late_answers += u64::from(servo_is_late || tracker_is_late);
+        self.exchange_counters.late_answers += u64::from(servo_is_late || tracker_is_late);
         ExchangeOutcome {
             goal_taken,
             late: servo_is_late || tracker_is_late,

@@ -8,7 +8,7 @@
 //! 3. A [`Port`] sends, and waits no longer than it is told. [`Tty`] is the operating system's: opened for one controller
 //!    alone, its USB latency timer found and mended. [`FaultInjector`] makes any port a bad one, from a seed.
 //! 4. A [`Bus`] asks one question at a time on a port: ping, read, write, sync and bulk read, reboot. It counts what goes
-//!    wrong by kind ([`LinkCounters`]).
+//!    wrong by kind ([`BusCounters`]).
 //! 5. [`prepare`] makes a worm ready at start-up: right devices, right settings, motor at rest, watchdog set. What it finds
 //!    out of order it mends and tells ([`Finding`]), or refuses with a reason ([`StartupError`]).
 //! 6. [`WormBus::exchange`] is what each tick does then: one write with the goal velocity and the question for both devices'
@@ -42,6 +42,7 @@
 //! the last word. When the goal has changed meanwhile, [`ExchangeOutcome::goal_taken`] gives it away; the tracker's sample
 //! counter may, too.
 
+mod counters;
 mod exchange;
 mod operations;
 pub mod servo;
@@ -50,8 +51,9 @@ pub mod tracker;
 pub mod virtual_worm;
 mod worm_bus;
 
+pub use counters::{ExchangeCounters, LinkCounters};
 pub use dynamixel_bus::{
-    Bus, FaultInjector, Faults, Finding, Identity, LinkCounters, OpenError, Port, PortError, RefusalCounters, Register,
+    Bus, BusCounters, FaultInjector, Faults, Finding, Identity, OpenError, Port, PortError, RefusalCounters, Register,
     TransactionError, Tty, WaitEnd, packet,
 };
 pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPlan};

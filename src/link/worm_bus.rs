@@ -2,12 +2,13 @@
 
 use std::ops::{Deref, DerefMut};
 
-use super::{Bus, Port};
+use super::{Bus, ExchangeCounters, LinkCounters, Port};
 
 /// A [`Bus`] with a worm's servo and tracker on it: what any bus can do, and the [exchange](Self::exchange) of a tick.
 #[derive(Debug)]
 pub struct WormBus<P> {
     pub(super) bus: Bus<P>,
+    pub(super) exchange_counters: ExchangeCounters,
     /// Exchanges to which the servo's answer may still come.
     pub(super) answers_owed: u32,
     /// An answer of the servo came in the last exchange, be it to an earlier one.
@@ -21,9 +22,23 @@ impl<P: Port> WormBus<P> {
     pub const fn new(port: P) -> Self {
         Self {
             bus: Bus::new(port),
+            exchange_counters: ExchangeCounters::NONE,
             answers_owed: 0,
             was_answered: false,
             silent_in_a_row: 0,
+        }
+    }
+
+    /// What the exchanges have counted so far.
+    pub const fn exchange_counters(&self) -> ExchangeCounters {
+        self.exchange_counters
+    }
+
+    /// What bus and exchanges have counted so far.
+    pub const fn link_counters(&self) -> LinkCounters {
+        LinkCounters {
+            bus: self.bus.counters(),
+            exchange: self.exchange_counters,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The topics of one worm: shared memory between its processes, without a copy and without a lock in the way.
+//! The topics of one worm: shared memory between its processes, without copies and without locks.
 //!
 //! Read in this order. An [`Instance`] is one worm's namespace on this computer: a folder, and a prefix of names in
 //! `/dev/shm`. A process that may exist only once per worm takes its [`RoleLock`]. A [`Hub`] opens every service of the
@@ -17,7 +17,8 @@
 //!
 //! ```no_run
 //! use std::time::Duration;
-//! use wormd::{config::Config, message::State, topics::{Controller, Hub, Instance, RoleLock}};
+//! use worm_estimator::{config::Config, message::State};
+//! use wormd::topics::{Controller, Hub, Instance, RoleLock};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let instance = Instance::of(&Config::default())?;
@@ -25,9 +26,9 @@
 //! let controller = RoleLock::<Controller>::take(&instance)?; // refuses a second one
 //! let hub = Hub::open(&instance)?;
 //! let states = hub.publisher::<State>(&controller)?;
-//! let bell = hub.notifier::<State>(&controller)?;
+//! let event = hub.notifier::<State>(&controller)?;
 //! states.publish(&State::unknown(4))?;
-//! bell.notify()?;
+//! event.notify()?;
 //! // In any other process:
 //! let hub = Hub::open(&instance)?;
 //! let listener = hub.listener::<State>()?;
@@ -44,7 +45,8 @@
 //! Only the holder of a role's lock gets that role's publishers, so no second process writes a topic by mistake:
 //!
 //! ```compile_fail,E0308
-//! use wormd::{message::State, topics::{Estimator, Hub, Instance, RoleLock}};
+//! use worm_estimator::message::State;
+//! use wormd::topics::{Estimator, Hub, Instance, RoleLock};
 //! # fn f(hub: &Hub, estimator: &RoleLock<Estimator>) {
 //! let publisher = hub.publisher::<State>(estimator); // the state belongs to the controller
 //! # }
@@ -58,24 +60,24 @@
 //! [`Subscriber::lost`] counts the gap where a topic is numbered. A frozen listener's notifications are dropped.
 //!
 //! # Late joiners
-//! A new subscriber gets a topic's last values ("history"), but only when the publisher next sends, or is
-//! told to look: a publisher with nothing to say calls [`Publisher::idle`] now and then.
+//! A new subscriber gets a topic's last values ("history"), but only when the publisher next sends or checks for new
+//! subscribers: a publisher with nothing to send calls [`Publisher::idle`] from time to time.
 //!
 //! # Memory
 //! A publisher reserves `16 subscribers × (buffer + 2) + history + 2` samples: 5.3 MB for `state`, 1.9 MB for `timing`,
-//! 4.3 MB for `estimate`, 0.8 MB for `cycle`, 0.1 MB for `alarm`. Only pages that were written take room, and the same
-//! few slots are used again and again (80 kB after 5000 ticks), unless the process locks its future memory: then all
-//! of it is resident. A subscriber takes 33 kB for each publisher.
+//! 4.3 MB for `estimate`, 0.8 MB for `cycle`, 0.1 MB for `alarm`. Only written pages use
+//! memory, and the same few slots are reused (80 kB after 5000 ticks), unless the process locks its future memory: then
+//! all of it is resident. A subscriber takes 33 kB for each publisher.
 //!
 //! # Cost
 //! On two shared cores at 1 kHz, with one subscriber in another thread, median and 99th percentile: publishing a state
-//! 0.9 and 6 µs, a timing 0.4 and 2 µs, waking a sleeping listener 7 and 30 µs, looking for a command 0.2 and 1.5 µs.
-//! Publishing makes one heap allocation, inside iceoryx2; receiving, waking and looking make none. `benches/topics.rs`
-//! measures the warm path.
+//! 0.9 and 6 µs, a timing 0.4 and 2 µs, waking a sleeping listener 7 and 30 µs, polling for a command 0.2 and 1.5 µs.
+//! Publishing makes one heap allocation, inside iceoryx2; receiving, waking and polling make none.
+//! `benches/topics.rs` measures the warm path.
 //!
 //! # Killed processes
-//! What a process killed while it runs leaves behind is removed when the next one starts. A process killed
-//! *while it starts* can leave half-made files that stop every later start in iceoryx2 0.10. See [`Hub::open`] for the
+//! The next process to start removes what a process killed while running left behind. A process killed
+//! *while it starts* can leave incomplete files that stop every later start in iceoryx2 0.10. See [`Hub::open`] for the
 //! guard. After an orderly exit of the last process nothing remains of the instance's folder or in `/dev/shm`.
 
 mod command;
@@ -84,6 +86,7 @@ mod event;
 mod hub;
 mod instance;
 mod lock;
+mod open;
 mod publisher;
 mod role;
 mod services;

@@ -2,8 +2,9 @@
 
 use super::instance::Instance;
 use super::lock::{LockError, LockFile, LockKind};
+use super::open::{self, Refused};
 use super::role;
-use super::services::{Refused, Services};
+use super::services::Services;
 use super::stale_resources::{self, Peer};
 use std::fmt;
 use std::io;
@@ -213,7 +214,7 @@ fn within(limit: Duration, instance: &Instance) -> Result<Services, String> {
         .name("topics-start".to_owned())
         .spawn(move || {
             // Nobody listens any more after the limit; the services are then dropped here.
-            let _ = sender.send(Services::open(&instance));
+            let _ = sender.send(open::open(&instance));
         })
         .map_err(|error| format!("no thread could be started ({error})"))?;
     match receiver.recv_timeout(limit) {

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use worm_estimator::config::Worm;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Severity};
+use worm_estimator::time::seconds;
 
 /// A run in numbers.
 #[derive(Debug, Clone, Serialize)]
@@ -176,7 +177,7 @@ impl Summary {
 }
 
 fn seconds_since(start_ns: u64, time_ns: u64) -> f64 {
-    time_ns.saturating_sub(start_ns) as f64 * 1e-9
+    seconds(time_ns.saturating_sub(start_ns))
 }
 
 impl CycleSummary {

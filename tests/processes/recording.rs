@@ -132,7 +132,7 @@ fn only_what_was_asked_for_is_recorded_and_no_file_is_lost() {
     assert_eq!((log.config, log.warnings), (None, Vec::new()));
 
     for (arguments, code, part) in [
-        (&[file.as_str()][..], 2, "is there already: choose another name"),
+        (&[file.as_str()][..], 2, "exists already: choose another name"),
         (
             &["/dev/full", "--force"],
             1,

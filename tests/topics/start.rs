@@ -82,7 +82,7 @@ struct Process {
 impl Process {
     fn start(mode: &str, root: &Path, worm: &str) -> Self {
         let mut child = Command::new(std::env::current_exe().expect("this binary"))
-            .args(["--exact", "child", "--nocapture", "--test-threads=1"])
+            .args(["--exact", "start::child", "--nocapture", "--test-threads=1"])
             .env(ROLE, format!("{mode} {} {worm}", root.display()))
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -9,14 +9,14 @@ use super::packet::{
     DecodeError, Decoder, DeviceId, EncodeError, FastReply, Instruction, InstructionPacket, MAX_PACKET_LEN, Packet,
     ReadSpan, ReadSpans, Recipient, StatusError, StatusFlags, StatusPacket,
 };
-use super::{LinkCounters, Port, PortError, Register};
+use super::{BusCounters, Port, PortError, Register};
 
 /// Devices on a bus, behind a port.
 #[derive(Debug)]
 pub struct Bus<P> {
     port: P,
     decoder: Decoder,
-    counters: LinkCounters,
+    counters: BusCounters,
     /// Garbage of the decoder that the counters hold already.
     garbage_counted: u64,
     writes_are_answered: bool,
@@ -86,19 +86,19 @@ impl<P: Port> Bus<P> {
         Self {
             port,
             decoder: Decoder::new(),
-            counters: LinkCounters::NONE,
+            counters: BusCounters::NONE,
             garbage_counted: 0,
             writes_are_answered: true,
         }
     }
 
     /// What has gone wrong so far.
-    pub const fn counters(&self) -> LinkCounters {
+    pub const fn counters(&self) -> BusCounters {
         self.counters
     }
 
     /// What has gone wrong so far, to add to: for transactions that are made of this bus's parts.
-    pub const fn counters_mut(&mut self) -> &mut LinkCounters {
+    pub const fn counters_mut(&mut self) -> &mut BusCounters {
         &mut self.counters
     }
 
@@ -406,7 +406,7 @@ impl<P: Port> Bus<P> {
     pub fn receive_until(
         &mut self,
         deadline: Instant,
-        mut take: impl FnMut(Packet<'_>, &mut LinkCounters) -> bool,
+        mut take: impl FnMut(Packet<'_>, &mut BusCounters) -> bool,
     ) -> Result<WaitEnd, PortError> {
         let (mut done, mut damaged, mut too_late) = (false, false, false);
         loop {
@@ -452,7 +452,7 @@ impl<P: Port> Bus<P> {
     pub fn take_late_packets(
         &mut self,
         byte_limit: usize,
-        mut take: impl FnMut(Packet<'_>, &mut LinkCounters),
+        mut take: impl FnMut(Packet<'_>, &mut BusCounters),
     ) -> Result<(), PortError> {
         let mut stale_bytes = 0;
         while stale_bytes < byte_limit {
@@ -476,7 +476,7 @@ impl<P: Port> Bus<P> {
     }
 
     /// The segments that are there of a fast reply whose end has not come.
-    pub fn take_unfinished_fast_reply(&mut self, take: impl FnOnce(FastReply<'_>, &mut LinkCounters)) {
+    pub fn take_unfinished_fast_reply(&mut self, take: impl FnOnce(FastReply<'_>, &mut BusCounters)) {
         if let Some(reply) = self.decoder.unfinished_fast_reply() {
             take(reply, &mut self.counters);
         }

@@ -1,15 +1,13 @@
-//! What has gone wrong on the link so far, by kind.
+//! What has passed along a bus so far, and what has gone wrong, by kind.
 
 use super::packet::{StatusError, StatusFlags};
 
-/// Counts since the bus was made. A plain value: copy it, subtract an earlier one.
+/// Counts since the bus was made. Copy it, and subtract an earlier copy for an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LinkCounters {
-    /// Exchanges begun, one a tick.
-    pub exchanges: u64,
+pub struct BusCounters {
     /// Bytes sent.
     pub sent_bytes: u64,
-    /// Bytes received, whether of use or not.
+    /// Bytes received, good or not.
     pub received_bytes: u64,
     /// Devices that did not answer by the deadline.
     pub timeouts: u64,
@@ -19,25 +17,19 @@ pub struct LinkCounters {
     pub garbage_bytes: u64,
     /// Bytes of late answers, which came before the next request.
     pub stale_bytes: u64,
-    /// Exchanges in which a late answer stood in for one that did not come in time.
-    pub late_answers: u64,
-    /// Exchanges in which one device's data came and the other's did not.
-    pub partial_answers: u64,
-    /// Exchanges in which the servo reported another goal than the one that was sent.
-    pub goals_not_taken: u64,
     /// Answers from devices that were not asked.
     pub wrong_ids: u64,
-    /// Answers of the wrong length, or that make no sense.
+    /// Answers of the wrong length, or with invalid content.
     pub malformed: u64,
     /// Answers with the alert bit: the device has a hardware error.
     pub alerts: u64,
-    /// Transactions in which the port was gone.
+    /// Transactions that found the port gone.
     pub disconnections: u64,
-    /// Answers that refused, by kind.
+    /// Answers with an error code.
     pub refusals: RefusalCounters,
 }
 
-/// Answers that refused, by their error code.
+/// Answers with an error code, by code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RefusalCounters {
     /// Code 1.
@@ -70,7 +62,7 @@ impl RefusalCounters {
         unknown: 0,
     };
 
-    /// All refusals.
+    /// All of them.
     #[must_use]
     pub const fn total(&self) -> u64 {
         self.result_fail
@@ -84,19 +76,15 @@ impl RefusalCounters {
     }
 }
 
-impl LinkCounters {
+impl BusCounters {
     /// Nothing so far.
     pub const NONE: Self = Self {
-        exchanges: 0,
         sent_bytes: 0,
         received_bytes: 0,
         timeouts: 0,
         crc_errors: 0,
         garbage_bytes: 0,
         stale_bytes: 0,
-        late_answers: 0,
-        partial_answers: 0,
-        goals_not_taken: 0,
         wrong_ids: 0,
         malformed: 0,
         alerts: 0,
@@ -104,7 +92,7 @@ impl LinkCounters {
         refusals: RefusalCounters::NONE,
     };
 
-    /// Counts what the flags of a status say.
+    /// Counts the alert and the error in the flags of a status.
     pub const fn count_flags(&mut self, flags: StatusFlags) {
         if flags.alert {
             self.alerts += 1;
@@ -125,7 +113,7 @@ impl LinkCounters {
     }
 }
 
-impl Default for LinkCounters {
+impl Default for BusCounters {
     fn default() -> Self {
         Self::NONE
     }

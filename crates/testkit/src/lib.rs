@@ -20,5 +20,7 @@ pub mod hidden_effects;
 pub mod html;
 pub mod independent_worm;
 pub mod log_sample;
+pub mod nominal;
 pub mod process_pauses;
+pub mod random;
 pub mod recording_files;

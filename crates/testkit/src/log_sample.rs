@@ -15,7 +15,7 @@ pub const ORIGIN_CONFIG: &str = "[worm]\nname = \"tester\"\n";
 
 /// What the processes of a worm would have said.
 #[derive(Default)]
-pub struct Told {
+pub struct Telemetry {
     pub config: Config,
     pub states: Vec<State>,
     pub timings: Vec<Timing>,
@@ -24,7 +24,7 @@ pub struct Told {
     pub alarms: Vec<Alarm>,
 }
 
-impl Told {
+impl Telemetry {
     /// The same, as a log.
     pub fn log(self) -> Log {
         Log {
@@ -38,12 +38,12 @@ impl Told {
 }
 
 /// A crawl with an estimator from the first state on.
-pub fn crawl(seconds: f64) -> Told {
+pub fn crawl(seconds: f64) -> Telemetry {
     crawl_with_late_estimator(seconds, 0)
 }
 
 /// A crawl whose estimator was started so many states after the controller, and now and then sends a heartbeat.
-pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Told {
+pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Telemetry {
     let scene = Scene {
         cycles_per_s: 0.5,
         ..Scene::default()
@@ -52,11 +52,11 @@ pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Told {
     let config = config_of(&worm, &scene);
     let mut observer = Observer::new(&config).expect("a valid configuration");
     let mut crawl = Crawl::new(worm, scene);
-    let mut told = Told::default();
+    let mut telemetry = Telemetry::default();
     for tick in 0..(seconds * crawl.scene.tick_hz) as usize {
         let state = crawl.tick();
-        told.states.push(state);
-        told.timings.push(Timing {
+        telemetry.states.push(state);
+        telemetry.timings.push(Timing {
             sequence: state.sequence,
             deadline_ns: state.time_ns - 100_000,
             wake_lateness_ns: 30_000 + tick as u64 % 977,
@@ -79,19 +79,19 @@ pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Told {
             continue;
         }
         let report = observer.update(&state);
-        told.alarms.extend(report.alarms.iter());
-        told.cycles.extend(report.cycle);
-        told.estimates.extend(report.estimate);
+        telemetry.alarms.extend(report.alarms.iter());
+        telemetry.cycles.extend(report.cycle);
+        telemetry.estimates.extend(report.estimate);
         if tick % 100 == 99 {
-            told.estimates.push(Estimate {
+            telemetry.estimates.push(Estimate {
                 // A heartbeat shows the alarms as they are by then.
                 armed_mask: 1 << AlarmKind::LinkFault.code(),
                 ..observer.latest()
             });
         }
     }
-    told.config = config;
-    told
+    telemetry.config = config;
+    telemetry
 }
 
 pub fn origin() -> Origin {
@@ -105,7 +105,7 @@ pub fn origin() -> Origin {
 }
 
 /// Writes a crawl as a log.
-pub fn write_log(path: &Path, told: &Told) {
+pub fn write_log(path: &Path, telemetry: &Telemetry) {
     let file = std::fs::File::create(path).expect("can be made");
     let mut writer = Writer::new(file, path, &origin()).expect("there is room");
     fn all<T: Logged>(writer: &mut Writer<std::fs::File>, messages: &[T]) {
@@ -113,11 +113,11 @@ pub fn write_log(path: &Path, told: &Told) {
             writer.write(message).expect("there is room");
         }
     }
-    all(&mut writer, &told.states);
-    all(&mut writer, &told.timings);
-    all(&mut writer, &told.estimates);
-    all(&mut writer, &told.cycles);
-    all(&mut writer, &told.alarms);
+    all(&mut writer, &telemetry.states);
+    all(&mut writer, &telemetry.timings);
+    all(&mut writer, &telemetry.estimates);
+    all(&mut writer, &telemetry.cycles);
+    all(&mut writer, &telemetry.alarms);
     writer.finish().expect("there is room");
 }
 
@@ -125,19 +125,19 @@ pub fn write_log(path: &Path, told: &Told) {
 #[derive(Clone)]
 pub struct Sink {
     bytes: Rc<RefCell<Vec<u8>>>,
-    room: usize,
+    capacity: usize,
 }
 
 impl Default for Sink {
     fn default() -> Self {
-        Self::with_room(usize::MAX)
+        Self::with_capacity(usize::MAX)
     }
 }
 
 impl Sink {
-    pub fn with_room(room: usize) -> Self {
+    pub fn with_capacity(capacity: usize) -> Self {
         let bytes = Rc::default();
-        Self { bytes, room }
+        Self { bytes, capacity }
     }
 
     pub fn bytes(&self) -> Vec<u8> {
@@ -148,7 +148,7 @@ impl Sink {
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         let mut held = self.bytes.borrow_mut();
-        let taken = bytes.len().min(self.room - held.len());
+        let taken = bytes.len().min(self.capacity - held.len());
         if taken == 0 && !bytes.is_empty() {
             return Err(std::io::ErrorKind::StorageFull.into());
         }

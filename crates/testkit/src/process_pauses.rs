@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 /// Priority at which pauses are made where the system allows it, above all of the worm's: a pause must end when it is over.
 const PRIORITY: i32 = 95;
 /// How often the thread looks whether it is still wanted.
-const LOOK: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// What is stopped, and for how long.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,8 +49,8 @@ impl HostPauses {
             end: AtomicBool::new(false),
             made: AtomicU64::new(0),
         });
-        let there = Arc::clone(&shared);
-        let thread = std::thread::spawn(move || make_pauses(&there, &kinds, &between, seed));
+        let for_thread = Arc::clone(&shared);
+        let thread = std::thread::spawn(move || make_pauses(&for_thread, &kinds, &between, seed));
         Self {
             shared,
             thread: Some(thread),
@@ -82,7 +82,7 @@ impl Drop for HostPauses {
 }
 
 fn make_pauses(shared: &Shared, kinds: &[Pause], between: &Range<u64>, seed: u64) {
-    rise_above_all();
+    raise_priority();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     loop {
         let next = Instant::now() + Duration::from_millis(rng.random_range(between.clone()));
@@ -90,7 +90,7 @@ fn make_pauses(shared: &Shared, kinds: &[Pause], between: &Range<u64>, seed: u64
             if shared.end.load(Ordering::Relaxed) {
                 return;
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
         let processes = shared.processes.lock().expect("no holder panics");
         let mut stopped = running(&processes);
@@ -112,7 +112,7 @@ fn make_pauses(shared: &Shared, kinds: &[Pause], between: &Range<u64>, seed: u64
 }
 
 /// Real-time priority, where the system allows it.
-fn rise_above_all() {
+fn raise_priority() {
     let parameters = libc::sched_param {
         sched_priority: PRIORITY,
     };

@@ -14,10 +14,10 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Instant;
+use testkit::hidden_effects::assessment::{Assessment, assess};
 use testkit::hidden_effects::library::Library;
-use testkit::hidden_effects::split::{Case, Split, scale_wanted, split};
-use testkit::hidden_effects::table::Table;
-use testkit::hidden_effects::verdict::{Judgement, judge};
+use testkit::hidden_effects::split::{Case, Split, scale_from_environment, split};
+use testkit::hidden_effects::table::ScoreTable;
 
 /// Threads that explain cases side by side.
 const THREADS: usize = 2;
@@ -46,7 +46,7 @@ struct Order {
 
 fn main() -> ExitCode {
     let order = Order::parse();
-    let mut cases = split(order.split.unwrap_or(Split::Development), scale_wanted());
+    let mut cases = split(order.split.unwrap_or(Split::Development), scale_from_environment());
     if let Some(only) = order.only {
         cases.retain(|case| case.what() == only);
     }
@@ -54,14 +54,14 @@ fn main() -> ExitCode {
     if let Some(max) = order.cases.or(few) {
         cases = spread(&cases, max);
     }
-    let judgements = judge_all(&cases);
-    println!("\n{}", Table(&judgements));
+    let assessments = assess_all(&cases);
+    println!("\n{}", ScoreTable(&assessments));
     let Some(path) = &order.csv else {
         return ExitCode::SUCCESS;
     };
     let written = File::create(path)
         .map_err(csv::Error::from)
-        .and_then(|file| Table(&judgements).write_csv(file));
+        .and_then(|file| ScoreTable(&assessments).write_csv(file));
     match written {
         Ok(()) => ExitCode::SUCCESS,
         Err(problem) => {
@@ -81,7 +81,7 @@ fn spread(cases: &[Case], max: usize) -> Vec<Case> {
 }
 
 /// Judges every case, in the order given, and prints a line for each as it comes.
-fn judge_all(cases: &[Case]) -> Vec<Judgement> {
+fn assess_all(cases: &[Case]) -> Vec<Assessment> {
     let next = AtomicUsize::new(0);
     let work = || {
         let mut done = Vec::new();
@@ -92,18 +92,18 @@ fn judge_all(cases: &[Case]) -> Vec<Judgement> {
             };
             let begun = Instant::now();
             let campaign = case.draw();
-            let judgement = judge(&campaign, &Library);
+            let assessment = assess(&campaign, &Library);
             let seconds = begun.elapsed().as_secs_f64();
-            println!("{:>3}/{} {} {seconds:.1} s", number + 1, cases.len(), judgement.line());
-            done.push((number, judgement));
+            println!("{:>3}/{} {} {seconds:.1} s", number + 1, cases.len(), assessment.line());
+            done.push((number, assessment));
         }
     };
-    let mut all: Vec<(usize, Judgement)> = thread::scope(|scope| {
+    let mut all: Vec<(usize, Assessment)> = thread::scope(|scope| {
         let workers: Vec<_> = (0..THREADS).map(|_| scope.spawn(work)).collect();
         let done = workers.into_iter().map(|worker| worker.join());
         done.flat_map(|done| done.unwrap_or_else(|cause| panic::resume_unwind(cause)))
             .collect()
     });
     all.sort_by_key(|(number, _)| *number);
-    all.into_iter().map(|(_, judgement)| judgement).collect()
+    all.into_iter().map(|(_, assessment)| assessment).collect()
 }

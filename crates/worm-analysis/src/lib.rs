@@ -16,5 +16,6 @@
 pub mod experiment;
 pub mod explain;
 pub mod identify;
+mod least_squares;
 pub mod recording;
 pub mod report;

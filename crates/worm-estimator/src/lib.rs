@@ -13,5 +13,6 @@ pub mod config;
 pub mod estimate;
 pub mod message;
 pub mod number;
+pub mod time;
 
 pub use worm_physics::MAX_CELLS;

@@ -14,6 +14,8 @@
 
 mod balance;
 mod carry;
+#[cfg(test)]
+mod tests;
 
 use super::ledger::Ledger;
 use super::mechanics::Mechanics;

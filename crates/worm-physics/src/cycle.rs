@@ -1,5 +1,8 @@
 //! One cycle of the periodic crawl, and the closed forms to hold it against.
 
+#[cfg(test)]
+mod tests;
+
 use super::ledger::Ledger;
 use super::locomotion::Locomotion;
 use super::physics::Physics;

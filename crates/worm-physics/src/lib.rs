@@ -26,6 +26,11 @@
 //! The exact motion and the steady cycle know no inertia, damping, drop from static to kinetic friction or anything else that
 //! [`Laws`] adds: its only clock is the phase. Coupling between neighbouring contacts is in neither.
 
+/// The examples of the README are tested, too.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 /// Most cells a worm can have: fixed-size topics and control tables are laid out for this many.
 pub const MAX_CELLS: usize = 16;
 

@@ -14,6 +14,9 @@
 //! contacts that arrive together, as they do in symmetric worms, would arrive one rounding error apart, and a worm of two
 //! cells would slide the wrong way. The balance that this disturbs is restored at the next increment.
 
+#[cfg(test)]
+pub(crate) mod tests;
+
 use super::ledger::Ledger;
 use super::worm::{SlidesDown, Worm};
 use crate::MAX_CELLS;

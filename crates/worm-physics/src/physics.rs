@@ -1,6 +1,5 @@
 //! A worm with everything that happens to it: the paper's theory, and what effects add to it.
 
-use super::effect::Setting;
 use super::worm::Worm;
 
 /// Laws beside the paper's theory: what only the incremental motion knows. The default is none of them.
@@ -91,7 +90,7 @@ impl Laws {
         laws.tether_n_per_m == 0.0 && laws.wear_per_cycle == 0.0 && laws.patch == Self::default().patch
     }
 
-    /// These laws with the shape of whatever has no strength put to its default.
+    /// These laws with the shape parameters of whatever is switched off at their defaults.
     fn neutral(&self) -> Self {
         let standard = Self::default();
         let mut laws = *self;
@@ -142,10 +141,9 @@ pub struct Physics {
 }
 
 impl Physics {
-    /// Whether the crawl becomes periodic: no law that knows place, way or number of cycles.
+    /// Whether the crawl becomes periodic: no law depends on the place, the distance or the number of cycles.
     pub fn is_periodic(&self) -> bool {
-        let laws = &self.laws;
-        laws.wear_per_cycle == 0.0 && laws.tether_n_per_m == 0.0 && laws.patch.friction_factor == 1.0
+        self.laws.are_periodic()
     }
 
     /// The paper's theory and nothing else.
@@ -157,25 +155,6 @@ impl Physics {
             slowdown_per_n: 0.0,
             view: View::default(),
         }
-    }
-
-    /// These physics with effects; their order does not matter.
-    pub fn with<'a>(mut self, effects: impl IntoIterator<Item = &'a Setting>) -> Self {
-        for effect in effects {
-            effect.apply(&mut self);
-        }
-        self
-    }
-
-    /// These physics with effects on a worm whose bounds, mass and stroke were identified from positions: what effects make of
-    /// these is in them already and is not done twice.
-    pub fn found_with<'a>(self, effects: impl IntoIterator<Item = &'a Setting>) -> Self {
-        let found = self.worm.clone();
-        let mut physics = self.with(effects);
-        physics.worm.keep_found(&found);
-        physics.slope_clamping = 0.0;
-        physics.view.scale = 1.0;
-        physics
     }
 
     /// The worm with what the slope does to its clamps: what the motions take.
@@ -204,5 +183,53 @@ impl Physics {
     /// The motor's speed against a force of the stepping cell, as a share of its speed without.
     pub fn speed_fraction(&self, actuator_force_n: f64) -> f64 {
         1.0 / (1.0 + self.slowdown_per_n * actuator_force_n.max(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn laws_and_physics_agree_on_what_is_periodic() {
+        let patch = |length_m, friction_factor| Laws {
+            patch: Patch {
+                from_m: 0.1,
+                length_m,
+                friction_factor,
+            },
+            ..Laws::default()
+        };
+        let cases = [
+            (Laws::default(), true),
+            (patch(0.05, 0.5), false),
+            (patch(0.05, 1.0), true),
+            (patch(0.0, 0.5), true),
+            (
+                Laws {
+                    tether_n_per_m: 1.0,
+                    ..Laws::default()
+                },
+                false,
+            ),
+            (
+                Laws {
+                    wear_per_cycle: 0.01,
+                    ..Laws::default()
+                },
+                false,
+            ),
+        ];
+        for (laws, expected) in cases {
+            let physics = Physics {
+                laws,
+                ..Physics::of(Worm::paper())
+            };
+            assert_eq!(
+                (laws.are_periodic(), physics.is_periodic()),
+                (expected, expected),
+                "{laws:?}"
+            );
+        }
     }
 }

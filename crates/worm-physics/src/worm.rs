@@ -1,119 +1,20 @@
 //! What the solver knows about one worm in one canal.
 
+mod contact;
+mod error;
+
+pub use contact::Contact;
+pub use error::{SlidesDown, WormError};
+
 use crate::MAX_CELLS;
+use error::require;
 use std::f64::consts::FRAC_PI_2;
-use thiserror::Error;
 
 /// Standard gravity as the paper's figures use it, m/s².
 pub const GRAVITY_M_PER_S2: f64 = 9.81;
 
 /// Share by which the pull may exceed the hold before it counts as excess rather than rounding.
 const HOLD_ROUNDING: f64 = 1e-12;
-
-/// A cell's compliant contact: a spring in series with a Coulomb slider.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
-    /// Tangential stiffness k of the whole cell, N/m; above 0.
-    pub stiffness_n_per_m: f64,
-    /// Largest deformation μN/k with the tip about to slide forward, m; 0 or more.
-    pub forward_bound_m: f64,
-    /// Largest deformation with the tip about to slide backward, m, as a positive number; 0 or more.
-    pub backward_bound_m: f64,
-}
-
-impl Contact {
-    /// A contact that holds equally well both ways, as the paper assumes.
-    pub const fn symmetric(stiffness_n_per_m: f64, max_deformation_m: f64) -> Self {
-        Self {
-            stiffness_n_per_m,
-            forward_bound_m: max_deformation_m,
-            backward_bound_m: max_deformation_m,
-        }
-    }
-
-    /// Distance between the two bounds, m.
-    pub(super) fn range_m(&self) -> f64 {
-        self.forward_bound_m + self.backward_bound_m
-    }
-
-    fn check(&self) -> Result<(), WormError> {
-        require(
-            self.stiffness_n_per_m > 0.0,
-            "stiffness_n_per_m",
-            self.stiffness_n_per_m,
-            "above 0",
-        )?;
-        require(
-            self.forward_bound_m >= 0.0,
-            "forward_bound_m",
-            self.forward_bound_m,
-            "0 or more",
-        )?;
-        require(
-            self.backward_bound_m >= 0.0,
-            "backward_bound_m",
-            self.backward_bound_m,
-            "0 or more",
-        )
-    }
-}
-
-/// Why a description cannot be a worm.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum WormError {
-    /// Too few cells to step against one another, or more than the fixed tables hold.
-    #[error("{0} cells: give 2 to {MAX_CELLS}")]
-    CellCount(usize),
-    /// A quantity outside its range.
-    #[error("{quantity} = {value}: give a finite number, {range}")]
-    OutOfRange {
-        /// The quantity with its unit.
-        quantity: &'static str,
-        /// What it was.
-        value: f64,
-        /// What it may be.
-        range: &'static str,
-    },
-    /// A list whose length is not the number of cells.
-    #[error("{quantity} lists {given} values for {cells} cells: give one for each cell")]
-    ListLength {
-        /// The quantity with its unit.
-        quantity: &'static str,
-        /// How many values came.
-        given: usize,
-        /// How many cells there are.
-        cells: usize,
-    },
-    /// A cell index beyond the last cell.
-    #[error("cell {cell}, counted from 0, of {cells} cells: give at most {}", cells - 1)]
-    NoSuchCell {
-        /// The index given.
-        cell: usize,
-        /// How many cells there are.
-        cells: usize,
-    },
-    /// A step order that leaves out or repeats a cell.
-    #[error("step order {0:?}: name each cell, counted from 0, exactly once")]
-    StepOrder(Vec<usize>),
-}
-
-fn require(holds: bool, quantity: &'static str, value: f64, range: &'static str) -> Result<(), WormError> {
-    if holds && value.is_finite() {
-        Ok(())
-    } else {
-        Err(WormError::OutOfRange { quantity, value, range })
-    }
-}
-
-/// The pull along the canal exceeds what all tips together can hold: no quasi-static motion exists.
-#[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[error("the worm slides down: it is pulled by {:.3} N and its tips hold at most {hold_n:.3} N", pull_n.abs())]
-pub struct SlidesDown {
-    /// Pull on the body, N; positive towards smaller positions (uphill canal), negative the other way.
-    pub pull_n: f64,
-    /// What the tips hold at most against it, N.
-    pub hold_n: f64,
-}
 
 /// One worm in one canal, validated. Cells are counted from 0.
 ///

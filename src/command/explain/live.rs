@@ -2,8 +2,8 @@
 
 use crate::command::dataset::READING;
 use crate::command::progress::Progress;
-use crate::command::record::{LOOK, Recorder};
 use crate::command::{Failure, end_on_signal_until};
+use crate::recorder::{POLL_INTERVAL, Recorder};
 use crate::topics::{Controller, Hub, Instance, RoleLock};
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -49,10 +49,10 @@ pub(super) fn record(
             done = Err(cycles_recorded.ended_early("was no longer to be recorded", log));
             break;
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
         done = recorder
-            .hear()
-            .and_then(|heard| cycles_recorded.update(heard.state.as_ref(), log));
+            .poll()
+            .and_then(|polled| cycles_recorded.update(polled.state.as_ref(), log));
         progress.tell("recording the worm", READING * cycles_recorded.fraction());
     }
     recorder.close()?;

@@ -1,7 +1,8 @@
-//! What `wormd up` shows while the worm crawls: the moving picture, plain lines, or nothing but the log.
+//! What `wormd up` shows while the worm crawls: the live display, plain lines, or only the log.
 
-use crate::command::child_process::Log;
 use crate::command::{Failure, print};
+use crate::supervisor::child_process::Log;
+use crate::supervisor::crawl::Display;
 use crate::watch::view::{self, Subject};
 use crate::watch::{Telemetry, mismatch, remarks};
 use nix::errno::Errno;
@@ -14,20 +15,13 @@ use std::time::Duration;
 use worm_estimator::config::{Config, Direction};
 use worm_estimator::message::{Alarm, AlarmKind, Cycle};
 
-/// Lines of the log that the picture remembers.
+/// How many lines of the log the live display keeps.
 const LOG_LINES: usize = 100;
 
-/// What the person at the terminal wants.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wish {
-    GoOn,
-    Stop,
-}
-
-/// The way in which a run is shown.
+/// How a run is shown.
 pub(super) enum Screen {
-    /// The moving picture.
-    Picture {
+    /// The live display.
+    Live {
         terminal: Box<DefaultTerminal>,
         subject: Subject,
         log: VecDeque<String>,
@@ -38,7 +32,7 @@ pub(super) enum Screen {
         alarms: usize,
         step_order: Vec<usize>,
     },
-    /// Standard output belongs to the JSON; alarms go to the log.
+    /// Standard output is reserved for the JSON; alarms go to the log.
     Silent { alarms: usize, step_order: Vec<usize> },
 }
 
@@ -70,29 +64,47 @@ impl Screen {
             step_order,
             full_scale_m: bounds_m.into_iter().fold(0.0, f64::max),
         };
-        Ok(Self::Picture {
+        Ok(Self::Live {
             terminal: Box::new(terminal),
             subject,
             log: VecDeque::with_capacity(LOG_LINES),
         })
     }
 
-    /// Waits for `time`, or until a key is pressed that means something.
-    pub(super) fn wait(&mut self, time: Duration) -> Wish {
-        let Self::Picture { .. } = self else {
+    /// Restores the terminal and prints what the processes logged.
+    pub(super) fn close(self, log: &Log) {
+        if let Self::Live {
+            mut terminal,
+            log: shown,
+            ..
+        } = self
+        {
+            let cursor = terminal.show_cursor();
+            if let Err(error) = ratatui::try_restore().and(cursor) {
+                tracing::debug!("the terminal could not be restored: {error}");
+                // Its drop would print to a standard error that is gone, and panic.
+                Box::leak(terminal);
+            }
+            for line in shown {
+                print::log_line(line);
+            }
+        }
+        forward(log);
+    }
+}
+
+impl Display for Screen {
+    fn wait_for_stop(&mut self, time: Duration) -> bool {
+        let Self::Live { .. } = self else {
             std::thread::sleep(time);
-            return Wish::GoOn;
+            return false;
         };
-        read_keys(time)
+        is_stop_pressed(time)
     }
 
-    /// Shows what is new.
-    ///
-    /// # Errors
-    /// [`Failure::Failed`] when standard output is gone.
-    pub(super) fn paint(&mut self, telemetry: &Telemetry, log: &Log) -> Result<(), Failure> {
+    fn show(&mut self, telemetry: &Telemetry, log: &Log) -> Result<(), Failure> {
         match self {
-            Self::Picture {
+            Self::Live {
                 terminal,
                 subject,
                 log: shown,
@@ -132,51 +144,30 @@ impl Screen {
         }
         Ok(())
     }
-
-    /// Gives the terminal back and passes on what the processes logged.
-    pub(super) fn close(self, log: &Log) {
-        if let Self::Picture {
-            mut terminal,
-            log: shown,
-            ..
-        } = self
-        {
-            let cursor = terminal.show_cursor();
-            if let Err(error) = ratatui::try_restore().and(cursor) {
-                tracing::debug!("the terminal could not be given back: {error}");
-                // Dropped, it would tell a standard error that is gone, and panic.
-                Box::leak(terminal);
-            }
-            for line in shown {
-                print::log_line(line);
-            }
-        }
-        forward(log);
-    }
 }
 
-/// Waits for `time` or a key. A terminal that is gone has nobody at it who could stop the worm.
+/// Waits for `time` or a key; true for a key that stops the worm, and when the terminal is gone, since nobody could press one.
 ///
-/// crossterm's own events are no use here: they turn round for ever, deaf to signals, once the terminal is gone.
-fn read_keys(time: Duration) -> Wish {
+/// crossterm's own events do not serve here: once the terminal is gone they loop forever and ignore signals.
+fn is_stop_pressed(time: Duration) -> bool {
     let stdin = std::io::stdin();
     let mut keyboard = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
     let timeout = PollTimeout::try_from(time).unwrap_or(PollTimeout::ZERO);
     match poll(&mut keyboard, timeout) {
-        Ok(0) | Err(Errno::EINTR) => return Wish::GoOn,
+        Ok(0) | Err(Errno::EINTR) => return false,
         Ok(_) => {}
-        Err(_) => return Wish::Stop,
+        Err(_) => return true,
     }
     let mut keys = [0; 64];
     match nix::unistd::read(stdin.as_fd(), &mut keys) {
-        Ok(0) => Wish::Stop,
-        Ok(count) if means_stop(&keys[..count]) => Wish::Stop,
-        Ok(_) | Err(Errno::EINTR | Errno::EAGAIN) => Wish::GoOn,
-        Err(_) => Wish::Stop,
+        Ok(0) => true,
+        Ok(count) => means_stop(&keys[..count]),
+        Err(Errno::EINTR | Errno::EAGAIN) => false,
+        Err(_) => true,
     }
 }
 
-/// Whether these keys of a terminal in raw mode hold Ctrl-C or q. Keys that send more than a character begin with escape.
+/// Whether this input of a terminal in raw mode contains Ctrl-C or q. Keys that send several characters begin with escape.
 fn means_stop(keys: &[u8]) -> bool {
     const CTRL_C: u8 = 3;
     const ESCAPE: u8 = 27;

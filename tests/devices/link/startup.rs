@@ -47,10 +47,10 @@ fn servo_from_the_factory_is_set_up() {
     assert_eq!(
         said(&findings),
         [
-            "the servo waited 500 µs before each answer (mended: set to 0)",
-            "operating mode (register 11) of the servo was 3 (mended: set to 1)",
-            "current limit (register 38) of the servo was 1750 (mended: set to 1000)",
-            "velocity limit (register 44) of the servo was 445 (mended: set to 417)",
+            "the servo waited 500 µs before each answer (corrected: set to 0)",
+            "operating mode (register 11) of the servo was 3 (corrected: set to 1)",
+            "current limit (register 38) of the servo was 1750 (corrected: set to 1000)",
+            "velocity limit (register 44) of the servo was 445 (corrected: set to 417)",
         ]
     );
     let registers = [
@@ -78,8 +78,8 @@ fn servo_left_alone_by_a_crash_is_brought_to_rest() {
     assert_eq!(
         said(&findings)[..2],
         [
-            "torque was on: an earlier controller ended without an orderly stop (mended: torque off)",
-            "the bus watchdog had stopped the motor: the computer fell silent while torque was on (mended: cleared)",
+            "torque was on: an earlier controller ended without an orderly stop (corrected: torque off)",
+            "the bus watchdog had stopped the motor: the computer fell silent while torque was on (corrected: cleared)",
         ]
     );
     assert_eq!(worm.servo(register::GOAL_VELOCITY), 0);

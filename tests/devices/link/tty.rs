@@ -141,15 +141,19 @@ fn worm_behind_a_pseudo_terminal_is_prepared_and_ticks_until_it_is_unplugged() {
     let mut bus = WormBus::new(tty);
     let prepared = prepare(&mut bus, &settings(), &mut findings).expect("prepared");
     bus.set_torque(prepared.plan.servo, true).expect("torque on");
+    let (at_start, exchanges_at_start) = (bus.counters(), bus.exchange_counters().exchanges);
     for _ in 0..ticks {
         let deadline = Instant::now() + Duration::from_millis(500);
         assert!(bus.exchange(&prepared.plan, 2.5, deadline).is_complete());
     }
-    worm.join().expect("served");
-    assert!(bus.exchange(&prepared.plan, 2.5, soon()).is_disconnected());
     let counters = bus.counters();
-    assert_eq!(
-        (counters.exchanges, counters.timeouts, counters.garbage_bytes),
-        (502, 0, 0)
-    );
+    assert_eq!(bus.exchange_counters().exchanges - exchanges_at_start, ticks as u64);
+    // A busy computer may have cost start-up an answer, which it asked for again.
+    assert_eq!((counters.timeouts, counters.garbage_bytes), (at_start.timeouts, 0));
+    worm.join().expect("served");
+    // A process that another test is starting holds a copy of the far end until it runs its own program.
+    let limit = Instant::now() + Duration::from_secs(5);
+    while !bus.exchange(&prepared.plan, 2.5, soon()).is_disconnected() {
+        assert!(Instant::now() < limit, "the terminal is gone, and nobody says so");
+    }
 }

@@ -1,12 +1,13 @@
 //! Campaigns with something hidden in them: three runs of one worm on three slopes, and what is true of it.
 
-use super::body::{Place, Worm};
-use super::effect::{Band, Effect, TrueEffect, lose_all, soften};
-use super::flaws::Flaws;
-use super::make::{Make, normal};
-use super::scene::{Eyes, Lost, Played, STEP_S, Scene};
-use super::stranger::Stranger;
-use super::visible::{Visible, advances_m};
+use super::body::{Placement, Worm};
+use super::deviations::Deviations;
+use super::effect::{Effect, SeverityRange, TrueEffect, shorten_every_stroke, soften};
+use super::effect_size::{EffectSize, advances_m};
+use super::parameters::WormParameters;
+use super::scene::{CrawlFailed, MotionCapture, STEP_S, Scene, SimulatedRun};
+use super::unmodelled::UnmodelledEffect;
+use crate::random::truncated_normal;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use worm_analysis::recording::Recording;
@@ -17,13 +18,13 @@ const MIN_ADVANCE_M: f64 = 0.5e-3;
 /// And of its poorest cycle after the first, m.
 const MIN_IN_A_CYCLE_M: f64 = 0.2e-3;
 /// Worms thrown before the ranges are to blame.
-const MAX_THROWS: u64 = 200;
+const MAX_DRAWS: u64 = 200;
 /// Standard deviation of a slope about what is stated, degrees.
 pub const SLOPE_SIGMA_DEG: f64 = 0.1;
 
 /// How much is recorded of a worm: what a search takes goes with the number of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Size {
+pub struct CampaignSize {
     /// Runs, each on a steeper slope than the one before, the first on the level.
     pub runs: usize,
     /// Gait cycles in each run.
@@ -32,7 +33,7 @@ pub struct Size {
     pub rate_hz: f64,
 }
 
-impl Size {
+impl CampaignSize {
     /// What the score is told of.
     pub const FULL: Self = Self {
         runs: 3,
@@ -86,16 +87,16 @@ impl Twin {
 
 /// What is to be hidden.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wanted {
+pub enum Hidden {
     Clean,
-    Single(Effect, Band),
-    /// The kind of [`Stranger`], counted from 0.
+    Single(Effect, SeverityRange),
+    /// The kind of [`UnmodelledEffect`], counted from 0.
     Outside(u64),
     Pair,
     Twin(Twin),
 }
 
-impl Wanted {
+impl Hidden {
     pub fn kind(self) -> CampaignKind {
         match self {
             Self::Clean => CampaignKind::Clean,
@@ -124,7 +125,7 @@ pub struct HiddenCampaign {
     /// What is hidden; nothing in a clean campaign.
     pub truth: Vec<TrueEffect>,
     /// What it does to the positions.
-    pub visible: Visible,
+    pub effect_size: EffectSize,
     /// The worm itself.
     pub worm: Worm,
     /// How each run was made.
@@ -135,18 +136,18 @@ pub struct HiddenCampaign {
 ///
 /// # Panics
 /// When no worm crawls, which is the ranges' fault.
-pub fn draw(wanted: Wanted, seed: u64) -> HiddenCampaign {
-    draw_sized(wanted, seed, Size::FULL)
+pub fn draw(hidden: Hidden, seed: u64) -> HiddenCampaign {
+    draw_sized(hidden, seed, CampaignSize::FULL)
 }
 
 /// The same of another size: the same dice, so the same worm where it crawls at either size.
 ///
 /// # Panics
 /// When no worm crawls, which is the ranges' fault.
-pub fn draw_sized(wanted: Wanted, seed: u64, size: Size) -> HiddenCampaign {
-    (0..MAX_THROWS)
-        .find_map(|throw| thrown(wanted, seed, throw, size))
-        .unwrap_or_else(|| panic!("no worm crawls with {wanted:?} in it, seed {seed}"))
+pub fn draw_sized(hidden: Hidden, seed: u64, size: CampaignSize) -> HiddenCampaign {
+    (0..MAX_DRAWS)
+        .find_map(|attempt| try_draw(hidden, seed, attempt, size))
+        .unwrap_or_else(|| panic!("no worm crawls with {hidden:?} in it, seed {seed}"))
 }
 
 /// What the paper measured, Table 4: slope in degrees and mean advance of a cycle in m, and nothing else. Three scalars
@@ -155,26 +156,26 @@ pub fn table4() -> [(f64, f64); 3] {
     [(0.0, 7.18e-3), (30.0, 3.76e-3), (45.0, 2.08e-3)]
 }
 
-fn thrown(wanted: Wanted, seed: u64, throw: u64, size: Size) -> Option<HiddenCampaign> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(MAX_THROWS).wrapping_add(throw));
+fn try_draw(hidden: Hidden, seed: u64, attempt: u64, size: CampaignSize) -> Option<HiddenCampaign> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(MAX_DRAWS).wrapping_add(attempt));
     let config = Config::default();
     let cycle_s = config.gait.cycle_s;
-    let make = Make::draw(&mut rng);
-    let mut eyes = Eyes::draw(&mut rng);
-    eyes.camera.rate_hz = size.rate_hz;
+    let parameters = WormParameters::draw(&mut rng);
+    let mut capture = MotionCapture::draw(&mut rng);
+    capture.camera.rate_hz = size.rate_hz;
     let under_way = rng.random_range(0..3) == 0;
     let phase_is_recorded = rng.random::<bool>();
     let steepest_deg = if rng.random::<bool>() { 45.0 } else { 40.0 };
     let warm_up_cycles = if under_way { rng.random_range(1.2..2.2) } else { 0.0 };
     let mut scenes: Vec<Scene> = (0..3)
         .map(|run| Scene {
-            place: Place {
-                slope_deg: SLOPE_SIGMA_DEG * normal(&mut rng),
+            placement: Placement {
+                slope_deg: SLOPE_SIGMA_DEG * truncated_normal(&mut rng),
                 payload_kg: 0.0,
                 start_m: 0.0,
             },
-            drive: make.motor.drive(cycle_s, &mut rng),
-            eyes: eyes.clone(),
+            drive: parameters.motor.drive(cycle_s, &mut rng),
+            capture: capture.clone(),
             warm_up_cycles,
             cycles: size.cycles,
             dwell_s: 0.0,
@@ -188,15 +189,19 @@ fn thrown(wanted: Wanted, seed: u64, throw: u64, size: Size) -> Option<HiddenCam
     // All are thrown, so that the same dice are left for what is hidden.
     scenes.truncate(size.runs);
 
-    let mut flaws = Flaws::default();
-    let mut stranger = None;
-    let truth = hidden(wanted, &mut flaws, &mut stranger, &mut rng);
+    let mut deviations = Deviations::default();
+    let mut unmodelled = None;
+    let truth = hide(hidden, &mut deviations, &mut unmodelled, &mut rng);
     let needs_phase = |effect: &TrueEffect| Effect::named(effect.name).is_some_and(Effect::needs_phase);
     if truth.iter().any(needs_phase) {
         scenes.iter_mut().for_each(|scene| scene.with_phase = true);
     }
-    let worm = Worm { make, flaws, stranger };
-    let (slopes_deg, played, honest) = crawled(&worm, !truth.is_empty(), &mut scenes, steepest_deg)?;
+    let worm = Worm {
+        parameters,
+        deviations,
+        unmodelled,
+    };
+    let (slopes_deg, simulated, baseline) = crawl_steepest(&worm, !truth.is_empty(), &mut scenes, steepest_deg)?;
 
     let what: Vec<&str> = truth.iter().map(|effect| effect.name).collect();
     let what = if what.is_empty() {
@@ -205,14 +210,14 @@ fn thrown(wanted: Wanted, seed: u64, throw: u64, size: Size) -> Option<HiddenCam
         what.join("+")
     };
     let mut config = config;
-    config.worm.step_order = worm.make.step_order.iter().map(|cell| cell + 1).collect();
+    config.worm.step_order = worm.parameters.step_order.iter().map(|cell| cell + 1).collect();
     Some(HiddenCampaign {
         name: format!("{what}-{seed}"),
-        kind: wanted.kind(),
+        kind: hidden.kind(),
         seed,
         config,
-        visible: Visible::between(&played, &honest),
-        recordings: played.into_iter().map(|played| played.recording).collect(),
+        effect_size: EffectSize::between(&simulated, &baseline),
+        recordings: simulated.into_iter().map(|simulated| simulated.recording).collect(),
         slopes_deg,
         cycle_s,
         truth,
@@ -222,25 +227,25 @@ fn thrown(wanted: Wanted, seed: u64, throw: u64, size: Size) -> Option<HiddenCam
 }
 
 /// Throws what is wanted into the worm.
-fn hidden(
-    wanted: Wanted,
-    flaws: &mut Flaws,
-    stranger: &mut Option<Stranger>,
+fn hide(
+    hidden: Hidden,
+    deviations: &mut Deviations,
+    unmodelled: &mut Option<UnmodelledEffect>,
     rng: &mut Xoshiro256PlusPlus,
 ) -> Vec<TrueEffect> {
-    let strong = Band::UPPER_HALF;
-    match wanted {
-        Wanted::Clean => Vec::new(),
-        Wanted::Single(effect, band) => vec![effect.hide(band, flaws, rng)],
-        Wanted::Outside(kind) => {
-            let drawn = stranger.insert(Stranger::draw(kind, rng));
+    let strong = SeverityRange::UPPER_HALF;
+    match hidden {
+        Hidden::Clean => Vec::new(),
+        Hidden::Single(effect, range) => vec![effect.hide(range, deviations, rng)],
+        Hidden::Outside(kind) => {
+            let drawn = unmodelled.insert(UnmodelledEffect::draw(kind, rng));
             vec![TrueEffect {
                 name: drawn.name(),
                 cell: None,
                 parameters: drawn.parameters(),
             }]
         }
-        Wanted::Pair => {
+        Hidden::Pair => {
             let mut any = || Effect::ALL[rng.random_range(0..Effect::ALL.len())];
             let first = any();
             let second = loop {
@@ -249,50 +254,53 @@ fn hidden(
                     break second;
                 }
             };
-            vec![first.hide(strong, flaws, rng), second.hide(strong, flaws, rng)]
+            vec![
+                first.hide(strong, deviations, rng),
+                second.hide(strong, deviations, rng),
+            ]
         }
-        Wanted::Twin(twin) => vec![match twin {
-            Twin::DirectionalFriction => Effect::DirectionalFriction.hide(strong, flaws, rng),
-            Twin::ConstantDrag => Effect::ConstantDrag.hide(strong, flaws, rng),
-            Twin::Payload => Effect::Payload.hide(strong, flaws, rng),
-            Twin::SensorScale => Effect::SensorScale.hide(strong, flaws, rng),
-            Twin::SofterPads => soften(flaws, rng),
+        Hidden::Twin(twin) => vec![match twin {
+            Twin::DirectionalFriction => Effect::DirectionalFriction.hide(strong, deviations, rng),
+            Twin::ConstantDrag => Effect::ConstantDrag.hide(strong, deviations, rng),
+            Twin::Payload => Effect::Payload.hide(strong, deviations, rng),
+            Twin::SensorScale => Effect::SensorScale.hide(strong, deviations, rng),
+            Twin::SofterPads => soften(deviations, rng),
             Twin::LostStroke => TrueEffect {
                 name: Effect::LostStroke.name(),
                 cell: None,
-                parameters: vec![("lost_share", lose_all(strong, flaws, rng))],
+                parameters: vec![("lost_share", shorten_every_stroke(strong, deviations, rng))],
             },
         }],
     }
 }
 
-type Crawled = (Vec<f64>, Vec<Played>, Vec<Played>);
+type SteepestRuns = (Vec<f64>, Vec<SimulatedRun>, Vec<SimulatedRun>);
 
 /// Plays every run on the steepest of its slopes on which the worm crawls with what is hidden in it and without.
-fn crawled(worm: &Worm, is_flawed: bool, scenes: &mut [Scene], steepest_deg: f64) -> Option<Crawled> {
+fn crawl_steepest(worm: &Worm, has_effect: bool, scenes: &mut [Scene], steepest_deg: f64) -> Option<SteepestRuns> {
     let steep = [45.0, 40.0, 35.0, 25.0, 18.0];
     let choices: [&[f64]; 3] = [&[0.0], &[30.0, 20.0, 12.0], &steep];
-    let mut all = Crawled::default();
+    let mut all = SteepestRuns::default();
     for (scene, choices) in scenes.iter_mut().zip(choices) {
-        let error_deg = scene.place.slope_deg;
+        let error_deg = scene.placement.slope_deg;
         let gentlest_deg = all.0.last().map_or(0.0, |&before_deg| before_deg + 5.0);
         let mut able = choices
             .iter()
             .copied()
             .filter(|&deg| deg <= steepest_deg && (deg == 0.0 || deg >= gentlest_deg));
-        let (slope_deg, played, honest) = able.find_map(|slope_deg| {
-            scene.place.slope_deg = slope_deg + error_deg;
-            let played = crawl(worm, scene).ok()?;
-            let honest = if is_flawed {
-                crawl(&worm.honest(), scene).ok()?
+        let (slope_deg, simulated, baseline) = able.find_map(|slope_deg| {
+            scene.placement.slope_deg = slope_deg + error_deg;
+            let simulated = crawl(worm, scene).ok()?;
+            let baseline = if has_effect {
+                crawl(&worm.baseline(), scene).ok()?
             } else {
-                played.clone()
+                simulated.clone()
             };
-            Some((slope_deg, played, honest))
+            Some((slope_deg, simulated, baseline))
         })?;
         all.0.push(slope_deg);
-        all.1.push(played);
-        all.2.push(honest);
+        all.1.push(simulated);
+        all.2.push(baseline);
     }
     Some(all)
 }
@@ -300,15 +308,15 @@ fn crawled(worm: &Worm, is_flawed: bool, scenes: &mut [Scene], steepest_deg: f64
 /// Plays a run.
 ///
 /// # Errors
-/// [`Lost`] when the worm slides down or hardly gets on.
-pub fn crawl(worm: &Worm, scene: &Scene) -> Result<Played, Lost> {
-    let played = scene.play(worm)?;
-    let advances_m = advances_m(&played);
+/// [`CrawlFailed`] when the worm slides down or hardly gets on.
+pub fn crawl(worm: &Worm, scene: &Scene) -> Result<SimulatedRun, CrawlFailed> {
+    let simulated = scene.simulate(worm)?;
+    let advances_m = advances_m(&simulated);
     let mean_m = advances_m.iter().sum::<f64>() / advances_m.len() as f64;
     let min_m = advances_m.iter().skip(1).copied().fold(f64::INFINITY, f64::min);
     if mean_m >= MIN_ADVANCE_M && min_m >= MIN_IN_A_CYCLE_M {
-        Ok(played)
+        Ok(simulated)
     } else {
-        Err(Lost)
+        Err(CrawlFailed)
     }
 }

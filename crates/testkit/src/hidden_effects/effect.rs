@@ -1,10 +1,10 @@
 //! The 22 effects of the library, by the names that they have everywhere, and how strongly each is thrown.
 //!
-//! Severities are log-uniform between two ends, from what nobody can see to what nobody can overlook; a [`Band`] narrows
+//! Severities are log-uniform between two ends, from what nobody can see to what nobody can overlook; a [`SeverityRange`] narrows
 //! that to a part of the logarithm.
 
 use super::CELLS;
-use super::flaws::{Flaws, Patch};
+use super::deviations::{Deviations, Patch};
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -33,12 +33,12 @@ impl TrueEffect {
 
 /// A part of the range of severities, as shares of its logarithm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Band {
+pub struct SeverityRange {
     pub from: f64,
     pub to: f64,
 }
 
-impl Band {
+impl SeverityRange {
     pub const WHOLE: Self = Self { from: 0.0, to: 1.0 };
     pub const UPPER_HALF: Self = Self { from: 0.5, to: 1.0 };
 
@@ -144,92 +144,95 @@ impl Effect {
     }
 
     /// Throws how strong it is and where, and puts it into the worm.
-    pub fn hide(self, band: Band, flaws: &mut Flaws, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
+    pub fn hide(self, range: SeverityRange, deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
         let cell = rng.random_range(0..CELLS);
         let mut of_cell = None;
         let parameters = match self {
             Self::UnequalClamping => {
                 of_cell = Some(cell);
-                let factor = band.factor([0.1, 0.6], [0.1, 0.6], rng);
-                flaws.friction_factor[cell] = factor;
+                let factor = range.factor([0.1, 0.6], [0.1, 0.6], rng);
+                deviations.friction_factor[cell] = factor;
                 vec![("friction_factor", factor)]
             }
             Self::UnequalStiffness => {
                 of_cell = Some(cell);
-                let factor = band.factor([0.1, 0.6], [0.1, 0.6], rng);
-                flaws.stiffness_factor[cell] = factor;
+                let factor = range.factor([0.1, 0.6], [0.1, 0.6], rng);
+                deviations.stiffness_factor[cell] = factor;
                 vec![("stiffness_factor", factor)]
             }
             Self::DirectionalFriction => {
-                flaws.backward_over_forward = band.factor([0.05, 0.5], [0.05, 0.6], rng);
-                vec![("backward_over_forward", flaws.backward_over_forward)]
+                deviations.backward_over_forward = range.factor([0.05, 0.5], [0.05, 0.6], rng);
+                vec![("backward_over_forward", deviations.backward_over_forward)]
             }
             Self::BreakawayFriction => {
-                flaws.static_over_kinetic = 1.0 + band.severity(0.05, 0.8, rng);
-                vec![("static_over_kinetic", flaws.static_over_kinetic)]
+                deviations.static_over_kinetic = 1.0 + range.severity(0.05, 0.8, rng);
+                vec![("static_over_kinetic", deviations.static_over_kinetic)]
             }
             Self::PadHardening => {
-                flaws.hardening = band.severity(0.03, 1.5, rng);
-                vec![("hardening", flaws.hardening)]
+                deviations.hardening = range.severity(0.03, 1.5, rng);
+                vec![("hardening", deviations.hardening)]
             }
             Self::PadCreep => {
-                flaws.creep_share = band.severity(0.05, 1.5, rng);
-                flaws.creep_s = Band::WHOLE.severity(0.1, 3.0, rng);
-                vec![("creep_share", flaws.creep_share), ("time_constant_s", flaws.creep_s)]
+                deviations.creep_share = range.severity(0.05, 1.5, rng);
+                deviations.creep_s = SeverityRange::WHOLE.severity(0.1, 3.0, rng);
+                vec![
+                    ("creep_share", deviations.creep_share),
+                    ("time_constant_s", deviations.creep_s),
+                ]
             }
             Self::PadHysteresis => {
-                flaws.yielding_share = band.severity(0.05, 0.8, rng);
-                vec![("yielding_share", flaws.yielding_share)]
+                deviations.yielding_share = range.severity(0.05, 0.8, rng);
+                vec![("yielding_share", deviations.yielding_share)]
             }
             Self::ViscousDrag => {
-                flaws.drag_n_s_per_m = band.severity(0.5, 30.0, rng);
-                vec![("drag_n_s_per_m", flaws.drag_n_s_per_m)]
+                deviations.drag_n_s_per_m = range.severity(0.5, 30.0, rng);
+                vec![("drag_n_s_per_m", deviations.drag_n_s_per_m)]
             }
             Self::ConstantDrag => {
-                flaws.force_n = band.severity(0.02, 0.8, rng);
-                vec![("force_n", flaws.force_n)]
+                deviations.force_n = range.severity(0.02, 0.8, rng);
+                vec![("force_n", deviations.force_n)]
             }
             Self::Payload => {
-                flaws.mass_kg = band.severity(0.005, 0.15, rng);
-                vec![("mass_kg", flaws.mass_kg)]
+                deviations.mass_kg = range.severity(0.005, 0.15, rng);
+                vec![("mass_kg", deviations.mass_kg)]
             }
             Self::SlopeError => {
-                let angle_deg = band.severity(0.2, 4.0, rng);
-                flaws.angle_deg = if rng.random::<bool>() { angle_deg } else { -angle_deg };
-                vec![("angle_deg", flaws.angle_deg)]
+                let angle_deg = range.severity(0.2, 4.0, rng);
+                deviations.angle_deg = if rng.random::<bool>() { angle_deg } else { -angle_deg };
+                vec![("angle_deg", deviations.angle_deg)]
             }
             Self::TetherDrag => {
                 // The force at the end of the level run, over the way that a worm makes there.
-                flaws.tether_n_per_m = band.severity(0.05, 1.0, rng) / LEVEL_WAY_M;
-                vec![("force_per_distance_n_per_m", flaws.tether_n_per_m)]
+                deviations.tether_n_per_m = range.severity(0.05, 1.0, rng) / LEVEL_DISTANCE_M;
+                vec![("force_per_distance_n_per_m", deviations.tether_n_per_m)]
             }
             Self::LostStroke if rng.random::<bool>() => {
                 of_cell = Some(cell);
-                let fraction = band.severity(0.01, 0.12, rng);
-                flaws.stroke_factor[cell] = 1.0 - fraction;
+                let fraction = range.severity(0.01, 0.12, rng);
+                deviations.stroke_factor[cell] = 1.0 - fraction;
                 vec![("lost_share", fraction)]
             }
-            Self::LostStroke => vec![("lost_share", lose_all(band, flaws, rng))],
+            Self::LostStroke => vec![("lost_share", shorten_every_stroke(range, deviations, rng))],
             Self::ActuatorCompliance => {
-                flaws.compliance_m_per_n = band.severity(1e-5, 3e-4, rng);
-                vec![("compliance_m_per_n", flaws.compliance_m_per_n)]
+                deviations.compliance_m_per_n = range.severity(1e-5, 3e-4, rng);
+                vec![("compliance_m_per_n", deviations.compliance_m_per_n)]
             }
             Self::Backlash => {
-                flaws.play_m = band.severity(0.05e-3, 1e-3, rng);
-                vec![("play_m", flaws.play_m)]
+                deviations.play_m = range.severity(0.05e-3, 1e-3, rng);
+                vec![("play_m", deviations.play_m)]
             }
             Self::StepOverlap => {
-                flaws.overlap = band.severity(0.02, 0.3, rng);
-                vec![("overlap", flaws.overlap)]
+                deviations.overlap = range.severity(0.02, 0.3, rng);
+                vec![("overlap", deviations.overlap)]
             }
             Self::SlickPatch => {
                 let patch = Patch {
                     // On the level the four cells together pass over all from 120 mm behind the first to 70 mm ahead.
                     from_m: rng.random_range(-0.11..0.05),
                     length_m: rng.random_range(0.015..0.060),
-                    friction_factor: 1.0 - band.severity(0.1, 0.7, rng),
+                    friction_factor: 1.0 - range.severity(0.1, 0.7, rng),
                 };
-                flaws.patch = Some(patch);
+                deviations.patch = Some(patch);
                 vec![
                     ("from_m", patch.from_m),
                     ("length_m", patch.length_m),
@@ -237,24 +240,24 @@ impl Effect {
                 ]
             }
             Self::Wear => {
-                flaws.loss_per_cycle = band.severity(0.001, 0.03, rng);
-                vec![("loss_per_cycle", flaws.loss_per_cycle)]
+                deviations.loss_per_cycle = range.severity(0.001, 0.03, rng);
+                vec![("loss_per_cycle", deviations.loss_per_cycle)]
             }
             Self::MotorDroop => {
-                flaws.slowdown_per_n = band.severity(0.01, 0.3, rng);
-                vec![("slowdown_per_n", flaws.slowdown_per_n)]
+                deviations.slowdown_per_n = range.severity(0.01, 0.3, rng);
+                vec![("slowdown_per_n", deviations.slowdown_per_n)]
             }
             Self::SensorScale => {
-                flaws.scale = band.factor([0.04, 0.12], [0.04, 0.12], rng);
-                vec![("scale", flaws.scale)]
+                deviations.scale = range.factor([0.04, 0.12], [0.04, 0.12], rng);
+                vec![("scale", deviations.scale)]
             }
             Self::SensorLatency => {
-                flaws.latency_s = band.severity(0.004, 0.060, rng);
-                vec![("latency_s", flaws.latency_s)]
+                deviations.latency_s = range.severity(0.004, 0.060, rng);
+                vec![("latency_s", deviations.latency_s)]
             }
             Self::SlopeClamping => {
-                flaws.slope_sensitivity = band.severity(0.05, 1.2, rng);
-                vec![("sensitivity", flaws.slope_sensitivity)]
+                deviations.slope_sensitivity = range.severity(0.05, 1.2, rng);
+                vec![("sensitivity", deviations.slope_sensitivity)]
             }
         };
         TrueEffect {
@@ -266,21 +269,21 @@ impl Effect {
 }
 
 /// Way of a worm on the level in twelve cycles, m.
-const LEVEL_WAY_M: f64 = 0.080;
+const LEVEL_DISTANCE_M: f64 = 0.080;
 
 /// Shortens the stroke of every cell; returns the share that is lost.
-pub fn lose_all(band: Band, flaws: &mut Flaws, rng: &mut Xoshiro256PlusPlus) -> f64 {
-    let fraction = band.severity(0.04, 0.15, rng);
-    flaws.stroke_factor = [1.0 - fraction; CELLS];
+pub fn shorten_every_stroke(range: SeverityRange, deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> f64 {
+    let fraction = range.severity(0.04, 0.15, rng);
+    deviations.stroke_factor = [1.0 - fraction; CELLS];
     fraction
 }
 
 /// Makes every pad softer and weaker by the same factor, which no position can tell from a payload.
-pub fn soften(flaws: &mut Flaws, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
+pub fn soften(deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
     let factor = rng.random_range(0.68..0.82);
-    flaws.stiffness_factor = [factor; CELLS];
+    deviations.stiffness_factor = [factor; CELLS];
     // The largest deformation, friction force over stiffness, stays.
-    flaws.friction_factor = [factor; CELLS];
+    deviations.friction_factor = [factor; CELLS];
     TrueEffect {
         name: "softer-pads",
         cell: None,

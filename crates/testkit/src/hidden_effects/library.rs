@@ -1,11 +1,12 @@
 //! The library's own search, asked as its user would ask it, and its answer as far as it is scored.
 
+use super::assessment::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict};
 use super::campaign::HiddenCampaign;
-use super::repeat::{Condition, ExtraRun};
-use super::verdict::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict};
+use super::follow_up::{Condition, ExtraRun};
 use std::panic::{self, AssertUnwindSafe};
 use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain;
+use worm_analysis::explain::answer::{ExperimentChange, RunChange};
 
 /// Standard errors to either end of a 90 % interval.
 const NINETY_PERCENT: f64 = 1.645;
@@ -97,29 +98,29 @@ fn proposal(next: &explain::answer::NextExperiment, campaign: &HiddenCampaign) -
         return Proposal::Measurement;
     };
     let usual = campaign.usual(slope_deg);
-    Proposal::Run(match next.change.as_str() {
-        "slope_deg" => Condition {
+    Proposal::Run(match next.change {
+        ExperimentChange::Run(RunChange::Slope) => Condition {
             slope_deg: value,
             ..usual
         },
-        "cycle_s" => Condition {
+        ExperimentChange::Run(RunChange::Cycle) => Condition {
             cycle_s: value,
             ..usual
         },
-        "payload_kg" => Condition {
+        ExperimentChange::Run(RunChange::Payload) => Condition {
             payload_kg: value,
             ..usual
         },
-        "start_m" => Condition {
+        ExperimentChange::Run(RunChange::Start) => Condition {
             start_shift_m: begun_m(campaign, slope_deg) + value,
             ..usual
         },
-        "cycles" => Condition { cycles: value, ..usual },
-        "dwell_s" => Condition {
+        ExperimentChange::Run(RunChange::Cycles) => Condition { cycles: value, ..usual },
+        ExperimentChange::Run(RunChange::Dwell) => Condition {
             dwell_s: value,
             ..usual
         },
-        _ => return Proposal::Measurement,
+        ExperimentChange::Measurement(_) => return Proposal::Measurement,
     })
 }
 
@@ -135,7 +136,7 @@ fn begun_m(campaign: &HiddenCampaign, slope_deg: f64) -> f64 {
     let displacements_m: Vec<f64> = from_its_place_m
         .filter_map(|(cell, series_m)| {
             let first_m = series_m.iter().find(|at_m| at_m.is_finite())?;
-            Some(first_m + campaign.worm.make.spacing_m * cell as f64)
+            Some(first_m + campaign.worm.parameters.spacing_m * cell as f64)
         })
         .collect();
     displacements_m.iter().sum::<f64>() / displacements_m.len() as f64

@@ -4,7 +4,7 @@
 //! which it makes, and [`worm_estimator::config::Config`], the belief that goes with it. The library moves its worm quasi-statically,
 //! event by event; this one has mass, dampers and a time step ([`body`]), and its tips hold by one of several friction laws,
 //! which is part of the throw ([`tip`]). Nothing is quite as believed: friction, stiffness, stroke, mass and slope are off by
-//! a few per cent ([`make`]), friction scatters from cycle to cycle, the cam is rounded and the motor uneven as each machine
+//! a few per cent ([`parameters`]), friction scatters from cycle to cycle, the cam is rounded and the motor uneven as each machine
 //! has it ([`motor`]), and the camera's noise is correlated in time.
 //!
 //! ```text
@@ -14,31 +14,29 @@
 //!                                        the same dice, nothing hidden ─┘
 //! ```
 //!
-//! [`effect`] has the library's 22 effects by name, [`stranger`] what no library names, [`campaign`] throws the dice and
-//! makes the runs, [`repeat`] makes one more run of the same worm under another condition, and [`split`] lists the cases.
+//! [`effect`] has the library's 22 effects by name, [`unmodelled`] what no library names, [`campaign`] throws the dice and
+//! makes the runs, [`follow_up`] makes one more run of the same worm under another condition, and [`split`] lists the cases.
 //! An answer is held against the truth by [`verdict`], and many of them by [`table`]; [`library`] asks the library's own search.
 
+pub mod assessment;
 pub mod body;
+pub mod cam_profile;
 pub mod campaign;
+pub mod deviations;
 pub mod effect;
-pub mod flaws;
-pub mod gear;
+pub mod effect_size;
+pub mod follow_up;
 pub mod library;
-pub mod make;
 pub mod motor;
-pub mod repeat;
+pub mod parameters;
 pub mod scene;
 pub mod split;
-pub mod stranger;
 pub mod table;
 pub mod tip;
-pub mod verdict;
-pub mod visible;
+pub mod unmodelled;
 
 // The camera and the motor are those that the identification is judged by.
 pub use crate::independent_worm::{cam as drive, camera};
 
 /// Cells of every worm here.
 pub const CELLS: usize = 4;
-/// Standard gravity as the paper rounds it, m/s².
-pub const GRAVITY_M_S2: f64 = 9.81;

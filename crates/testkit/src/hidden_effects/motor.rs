@@ -4,7 +4,7 @@
 //! wanders is not.
 
 use super::drive::Drive;
-use super::tip::contact::between;
+use crate::random::log_uniform;
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
@@ -43,8 +43,8 @@ impl Motor {
             swing_per_step: rng.random_range(0.0..0.15),
             swing_per_turn: rng.random_range(0.0..0.1),
             angles_rad: std::array::from_fn(|_| rng.random_range(0.0..TAU)),
-            wander: between(0.003, 0.02, rng),
-            ramp_s: between(0.05, 0.3, rng),
+            wander: log_uniform(0.003, 0.02, rng),
+            ramp_s: log_uniform(0.05, 0.3, rng),
         }
     }
 

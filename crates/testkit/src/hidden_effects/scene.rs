@@ -1,10 +1,11 @@
 //! One run: a worm, its motor, and the camera.
 
 use super::CELLS;
-use super::body::{Moment, Motion, Place, Worm};
-use super::camera::{Camera, Watch};
+use super::body::{Motion, Placement, StepInput, Worm};
+use super::camera::{Camera, CameraSampler};
 use super::drive::Drive;
-use super::tip::contact::between;
+use crate::nominal::{MAX_BODY_SPEED_M_S, TIMEOUT_CYCLES};
+use crate::random::log_uniform;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -13,18 +14,14 @@ use worm_analysis::recording::Recording;
 
 /// Time step of the integrator, s: below a hundredth of the fastest swing of a body on its tips.
 pub const STEP_S: f64 = 100e-6;
-/// Speed of the body beyond which the tips have lost it, m/s: several times what any gait here gives it.
-const LOST_M_S: f64 = 0.5;
-/// Time after which a motor that never gets on is given up, in mean cycles for each cycle wanted.
-const PATIENCE: f64 = 10.0;
 
 /// The tips did not hold the worm, or the motor did not turn its cam.
 #[derive(Debug)]
-pub struct Lost;
+pub struct CrawlFailed;
 
 /// The noise of a camera.
 #[derive(Debug, Clone)]
-pub struct Eyes {
+pub struct MotionCapture {
     pub camera: Camera,
     /// Standard deviation of the part of the noise that lasts, m.
     pub drift_m: f64,
@@ -32,7 +29,7 @@ pub struct Eyes {
     pub drift_s: f64,
 }
 
-impl Eyes {
+impl MotionCapture {
     /// A camera that sees everything as it is.
     pub fn perfect() -> Self {
         Self {
@@ -46,11 +43,11 @@ impl Eyes {
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
         Self {
             camera: Camera {
-                noise_m: between(0.03e-3, 0.15e-3, rng),
+                noise_m: log_uniform(0.03e-3, 0.15e-3, rng),
                 ..Camera::default()
             },
-            drift_m: between(0.01e-3, 0.05e-3, rng),
-            drift_s: between(0.02, 0.2, rng),
+            drift_m: log_uniform(0.01e-3, 0.05e-3, rng),
+            drift_s: log_uniform(0.02, 0.2, rng),
         }
     }
 }
@@ -58,9 +55,9 @@ impl Eyes {
 /// How one run is made.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    pub place: Place,
+    pub placement: Placement,
     pub drive: Drive,
-    pub eyes: Eyes,
+    pub capture: MotionCapture,
     /// Gait cycles, not necessarily whole, before the camera is switched on; none: it sees the worm laid down.
     pub warm_up_cycles: f64,
     /// Gait cycles in the recording.
@@ -78,7 +75,7 @@ pub struct Scene {
 
 /// A run as it was recorded and as it was.
 #[derive(Debug, Clone)]
-pub struct Played {
+pub struct SimulatedRun {
     pub recording: Recording,
     /// Phase at each sample, cycles, recorded or not.
     pub phase: Vec<f64>,
@@ -90,13 +87,13 @@ impl Scene {
     /// Twelve cycles of an even motor before a perfect camera, from rest.
     pub fn ideal(slope_deg: f64, cycle_s: f64) -> Self {
         Self {
-            place: Place {
+            placement: Placement {
                 slope_deg,
                 payload_kg: 0.0,
                 start_m: 0.0,
             },
             drive: Drive::even(cycle_s),
-            eyes: Eyes::perfect(),
+            capture: MotionCapture::perfect(),
             warm_up_cycles: 0.0,
             cycles: 12.0,
             dwell_s: 0.0,
@@ -110,14 +107,14 @@ impl Scene {
     /// Plays the run.
     ///
     /// # Errors
-    /// [`Lost`] when the worm does not hold on the slope or the motor never gets on.
-    pub fn play(&self, worm: &Worm) -> Result<Played, Lost> {
+    /// [`CrawlFailed`] when the worm does not hold on the slope or the motor never gets on.
+    pub fn simulate(&self, worm: &Worm) -> Result<SimulatedRun, CrawlFailed> {
         let from_phase = self.drive.first_phase + self.warm_up_cycles;
         let to_phase = from_phase + self.cycles;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed);
-        let scatter = worm.make.scatter_over(to_phase.ceil() as usize + 2, &mut rng);
-        let mut motion = Motion::laid_down(worm, self.place, self.drive.first_phase, self.step_s);
-        let mut cam = Turning::new(self);
+        let scatter = worm.parameters.scatter_over(to_phase.ceil() as usize + 2, &mut rng);
+        let mut motion = Motion::laid_down(worm, self.placement, self.drive.first_phase, self.step_s);
+        let mut cam = CamRotation::new(self);
         // Without a warm-up the camera runs while the worm rests before its first step.
         while cam.phase < from_phase {
             if self.warm_up_cycles == 0.0 {
@@ -127,42 +124,42 @@ impl Scene {
         }
         motion.begin();
 
-        let rate_hz = self.eyes.camera.rate_hz;
-        let (origin_s, latency_s) = (motion.time_s(), worm.flaws.latency_s);
-        let mut film = Film::new(self, worm.flaws.scale);
+        let rate_hz = self.capture.camera.rate_hz;
+        let (origin_s, latency_s) = (motion.time_s(), worm.deviations.latency_s);
+        let mut recorder = Recorder::new(self, worm.deviations.scale);
         // Positions are those of so long ago, so they are taken from the origin on and the phase so much later.
-        while cam.phase < to_phase || film.phase.len() < film.position_m[0].len() {
+        while cam.phase < to_phase || recorder.phase.len() < recorder.position_m[0].len() {
             let begun_s = motion.time_s() - origin_s;
             let (before_m, before) = (motion.position_m, cam.phase);
             let going = cam.phase < to_phase;
             self.step(&mut motion, &mut cam, worm, &scatter, from_phase)?;
             let ended_s = motion.time_s() - origin_s;
             let share_at = |time_s: f64| (time_s - begun_s) / (ended_s - begun_s);
-            while going && film.position_m[0].len() as f64 / rate_hz < ended_s {
-                let fraction = share_at(film.position_m[0].len() as f64 / rate_hz);
-                film.see(std::array::from_fn(|cell| {
+            while going && recorder.position_m[0].len() as f64 / rate_hz < ended_s {
+                let fraction = share_at(recorder.position_m[0].len() as f64 / rate_hz);
+                recorder.see(std::array::from_fn(|cell| {
                     before_m[cell] + fraction * (motion.position_m[cell] - before_m[cell])
                 }));
             }
-            while latency_s + film.phase.len() as f64 / rate_hz < ended_s {
-                let fraction = share_at(latency_s + film.phase.len() as f64 / rate_hz);
-                film.phase.push(before + fraction * (cam.phase - before));
+            while latency_s + recorder.phase.len() as f64 / rate_hz < ended_s {
+                let fraction = share_at(latency_s + recorder.phase.len() as f64 / rate_hz);
+                recorder.phase.push(before + fraction * (cam.phase - before));
             }
         }
-        Ok(film.develop(self))
+        Ok(recorder.finish(self))
     }
 
     /// One time step by the midpoint rule.
     fn step(
         &self,
         motion: &mut Motion,
-        cam: &mut Turning,
+        cam: &mut CamRotation,
         worm: &Worm,
         scatter: &[Vec<f64>],
         from_phase: f64,
-    ) -> Result<(), Lost> {
-        let droop = if worm.flaws.slowdown_per_n > 0.0 {
-            1.0 / (1.0 + worm.flaws.slowdown_per_n * motion.actuator_n(cam.phase).max(0.0))
+    ) -> Result<(), CrawlFailed> {
+        let droop = if worm.deviations.slowdown_per_n > 0.0 {
+            1.0 / (1.0 + worm.deviations.slowdown_per_n * motion.actuator_n(cam.phase).max(0.0))
         } else {
             1.0
         };
@@ -170,27 +167,28 @@ impl Scene {
         let cycle = (cam.phase - self.drive.first_phase).max(0.0) as usize;
         let factors = std::array::from_fn(|cell| scatter[cell][cycle.min(scatter[cell].len() - 1)]);
         let cycles = cam.phase - from_phase;
-        motion.step(Moment {
+        motion.step(StepInput {
             phase: cam.phase,
             cycles,
             scatter: &factors,
             jumped: cycles >= self.jump_at_cycle,
         });
-        let patience_s = PATIENCE * (self.warm_up_cycles + self.cycles + 2.0) * (self.drive.cycle_s + self.dwell_s);
-        let holds = motion.translation_m_s.abs() < LOST_M_S && motion.time_s() < patience_s;
-        if holds { Ok(()) } else { Err(Lost) }
+        let timeout_s =
+            TIMEOUT_CYCLES * (self.warm_up_cycles + self.cycles + 2.0) * (self.drive.cycle_s + self.dwell_s);
+        let holds = motion.translation_m_s.abs() < MAX_BODY_SPEED_M_S && motion.time_s() < timeout_s;
+        if holds { Ok(()) } else { Err(CrawlFailed) }
     }
 }
 
 /// The cam as the motor turns it.
-struct Turning<'a> {
+struct CamRotation<'a> {
     drive: &'a Drive,
     dwell_s: f64,
     phase: f64,
     rest_until_s: f64,
 }
 
-impl<'a> Turning<'a> {
+impl<'a> CamRotation<'a> {
     fn new(scene: &'a Scene) -> Self {
         Self {
             drive: &scene.drive,
@@ -218,8 +216,8 @@ impl<'a> Turning<'a> {
 }
 
 /// What the camera takes.
-struct Film {
-    watch: Watch,
+struct Recorder {
+    sampler: CameraSampler,
     rng: Xoshiro256PlusPlus,
     /// What is left of a lasting error after one sample, and what is new in it, m.
     lasting: (f64, f64),
@@ -230,16 +228,16 @@ struct Film {
     seen_m: Vec<Vec<f64>>,
 }
 
-impl Film {
+impl Recorder {
     fn new(scene: &Scene, scale: f64) -> Self {
-        let eyes = &scene.eyes;
-        let kept = (-1.0 / (eyes.camera.rate_hz * eyes.drift_s)).exp();
+        let capture = &scene.capture;
+        let kept = (-1.0 / (capture.camera.rate_hz * capture.drift_s)).exp();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(!scene.seed);
-        let error_m = std::array::from_fn(|_| eyes.drift_m * normal(&mut rng));
+        let error_m = std::array::from_fn(|_| capture.drift_m * normal(&mut rng));
         Self {
-            watch: Watch::new(eyes.camera.clone(), CELLS, scene.seed.rotate_left(32)),
+            sampler: CameraSampler::new(capture.camera.clone(), CELLS, scene.seed.rotate_left(32)),
             rng,
-            lasting: (kept, eyes.drift_m * (1.0 - kept * kept).sqrt()),
+            lasting: (kept, capture.drift_m * (1.0 - kept * kept).sqrt()),
             error_m,
             scale,
             phase: Vec::new(),
@@ -249,31 +247,31 @@ impl Film {
     }
 
     fn see(&mut self, position_m: [f64; CELLS]) {
-        let time_s = self.watch.next_s();
+        let time_s = self.sampler.next_s();
         for (cell, position_m) in position_m.into_iter().enumerate() {
             let (kept, fresh_m) = self.lasting;
             let measured_m = self.scale * position_m;
             self.error_m[cell] = kept * self.error_m[cell] + fresh_m * normal(&mut self.rng);
             self.position_m[cell].push(measured_m);
-            self.seen_m[cell].push(self.watch.see(cell, time_s, measured_m + self.error_m[cell]));
+            self.seen_m[cell].push(self.sampler.see(cell, time_s, measured_m + self.error_m[cell]));
         }
     }
 
-    fn develop(mut self, scene: &Scene) -> Played {
+    fn finish(mut self, scene: &Scene) -> SimulatedRun {
         let samples = self.seen_m[0].len();
         self.phase.truncate(samples);
         let recording = Recording {
-            source: PathBuf::from(format!("seed{}at{}deg", scene.seed, scene.place.slope_deg)),
+            source: PathBuf::from(format!("seed{}at{}deg", scene.seed, scene.placement.slope_deg)),
             cell_names: (1..=CELLS).map(|cell| format!("x{cell}_m")).collect(),
             time_s: (0..samples)
-                .map(|sample| sample as f64 / scene.eyes.camera.rate_hz)
+                .map(|sample| sample as f64 / scene.capture.camera.rate_hz)
                 .collect(),
             position_m: self.seen_m,
             gait_phase: scene.with_phase.then(|| self.phase.clone()),
             motor: None,
             warnings: Vec::new(),
         };
-        Played {
+        SimulatedRun {
             recording,
             phase: self.phase,
             position_m: self.position_m,

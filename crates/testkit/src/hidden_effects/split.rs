@@ -1,8 +1,8 @@
 //! Which cases are run: a development split to tune on and a sealed test split, from disjoint ranges of seeds, and the few that
 //! the tests of the search run in small.
 
-use super::campaign::{HiddenCampaign, Twin, Wanted, draw};
-use super::effect::{Band, Effect};
+use super::campaign::{Hidden, HiddenCampaign, Twin, draw};
+use super::effect::{Effect, SeverityRange};
 
 /// One of the sets of cases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl Split {
 /// One campaign to be drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
-    pub wanted: Wanted,
+    pub hidden: Hidden,
     pub seed: u64,
 }
 
@@ -55,18 +55,18 @@ impl Case {
 
     /// What is hidden, in a word.
     pub fn what(self) -> &'static str {
-        match self.wanted {
-            Wanted::Clean => "clean",
-            Wanted::Single(effect, _) => effect.name(),
-            Wanted::Outside(_) => "outside",
-            Wanted::Pair => "pair",
-            Wanted::Twin(_) => "twin",
+        match self.hidden {
+            Hidden::Clean => "clean",
+            Hidden::Single(effect, _) => effect.name(),
+            Hidden::Outside(_) => "outside",
+            Hidden::Pair => "pair",
+            Hidden::Twin(_) => "twin",
         }
     }
 
     /// Makes the campaign; it takes about half a second.
     pub fn draw(self) -> HiddenCampaign {
-        draw(self.wanted, self.seed)
+        draw(self.hidden, self.seed)
     }
 }
 
@@ -80,34 +80,34 @@ const TWINS: usize = 6;
 /// tests are the same few at any scale.
 pub fn split(split: Split, scale: f64) -> Vec<Case> {
     if split == Split::Search {
-        let wanted = [
-            Wanted::Clean,
-            Wanted::Single(Effect::UnequalClamping, Band::UPPER_HALF),
-            Wanted::Twin(Twin::ConstantDrag),
-            Wanted::Outside(5),
+        let hidden = [
+            Hidden::Clean,
+            Hidden::Single(Effect::UnequalClamping, SeverityRange::UPPER_HALF),
+            Hidden::Twin(Twin::ConstantDrag),
+            Hidden::Outside(5),
         ];
         let seed = split.base();
-        return wanted.map(|wanted| Case { wanted, seed }).to_vec();
+        return hidden.map(|hidden| Case { hidden, seed }).to_vec();
     }
     let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     let seed = |group: usize, number: usize| split.base() + 1000 * group as u64 + number as u64;
     let mut cases = Vec::new();
-    let mut push = |wanted, seed| cases.push(Case { wanted, seed });
+    let mut push = |hidden, seed| cases.push(Case { hidden, seed });
     for (group, &effect) in Effect::ALL.iter().enumerate() {
         let severities = count(SEVERITIES);
         for number in 0..severities {
-            let wanted = Wanted::Single(effect, Band::part(number, severities));
+            let hidden = Hidden::Single(effect, SeverityRange::part(number, severities));
             // The seed tells the severities of different scales apart.
-            push(wanted, seed(group, 30 * severities + number));
+            push(hidden, seed(group, 30 * severities + number));
         }
     }
     let group = Effect::ALL.len();
-    (0..count(CLEAN)).for_each(|number| push(Wanted::Clean, seed(group, number)));
-    (0..count(OUTSIDE)).for_each(|number| push(Wanted::Outside(number as u64), seed(group + 1, number)));
-    (0..count(PAIRS)).for_each(|number| push(Wanted::Pair, seed(group + 2, number)));
+    (0..count(CLEAN)).for_each(|number| push(Hidden::Clean, seed(group, number)));
+    (0..count(OUTSIDE)).for_each(|number| push(Hidden::Outside(number as u64), seed(group + 1, number)));
+    (0..count(PAIRS)).for_each(|number| push(Hidden::Pair, seed(group + 2, number)));
     (0..count(TWINS)).for_each(|number| {
         let twin = Twin::ALL[number % Twin::ALL.len()];
-        push(Wanted::Twin(twin), seed(group + 3, number));
+        push(Hidden::Twin(twin), seed(group + 3, number));
     });
     cases
 }
@@ -116,12 +116,12 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
 ///
 /// # Panics
 /// When it says something that is no positive number.
-pub fn scale_wanted() -> f64 {
-    let Ok(wanted) = std::env::var("WORMD_CASES") else {
+pub fn scale_from_environment() -> f64 {
+    let Ok(hidden) = std::env::var("WORMD_CASES") else {
         return 1.0;
     };
-    match wanted.parse::<f64>() {
+    match hidden.parse::<f64>() {
         Ok(scale) if scale > 0.0 && scale <= 7.0 => scale,
-        _ => panic!("WORMD_CASES is \"{wanted}\": give a scale above 0 and up to 7, 1 for the usual count"),
+        _ => panic!("WORMD_CASES is \"{hidden}\": give a scale above 0 and up to 7, 1 for the usual count"),
     }
 }

@@ -1,7 +1,7 @@
 //! Many judgements in one table, each share with its Wilson interval and what is aimed at.
 
+use super::assessment::{Assessment, Verdict};
 use super::campaign::CampaignKind;
-use super::verdict::{Judgement, Verdict};
 use std::fmt;
 use std::io;
 
@@ -12,12 +12,12 @@ const Z: f64 = 1.96;
 
 /// How many of how many.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Share {
+pub struct Proportion {
     pub hits: usize,
     pub of: usize,
 }
 
-impl Share {
+impl Proportion {
     /// Counts what is true among what applies.
     pub fn count(each: impl Iterator<Item = Option<bool>>) -> Self {
         each.flatten().fold(Self::default(), |fraction, hit| Self {
@@ -39,7 +39,7 @@ impl Share {
     }
 }
 
-impl fmt::Display for Share {
+impl fmt::Display for Proportion {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.of == 0 {
             return write!(out, "{:>22}", "none");
@@ -57,32 +57,33 @@ impl fmt::Display for Share {
 
 /// The whole of the scores.
 #[derive(Debug)]
-pub struct Table<'a>(pub &'a [Judgement]);
+pub struct ScoreTable<'a>(pub &'a [Assessment]);
 
-impl Table<'_> {
-    fn of(&self, kind: CampaignKind) -> impl Iterator<Item = &Judgement> {
-        self.0.iter().filter(move |judgement| judgement.kind == kind)
+impl ScoreTable<'_> {
+    fn of(&self, kind: CampaignKind) -> impl Iterator<Item = &Assessment> {
+        self.0.iter().filter(move |assessment| assessment.kind == kind)
     }
 
     /// Single effects that the library itself says are detectable.
-    fn detectable(&self) -> impl Iterator<Item = &Judgement> {
+    fn detectable(&self) -> impl Iterator<Item = &Assessment> {
         self.of(CampaignKind::Single)
-            .filter(|judgement| judgement.significance_sigma >= DETECTABLE_SIGMA)
+            .filter(|assessment| assessment.significance_sigma >= DETECTABLE_SIGMA)
     }
 
     /// Every share: what it is of, itself, and what is aimed at.
-    pub fn fractions(&self) -> Vec<(&'static str, Share, &'static str)> {
-        let abstains = |judgement: &Judgement| Some(matches!(judgement.verdict, Verdict::Nothing | Verdict::Outside));
-        let settled = |judgement: &&Judgement| judgement.settled.is_some();
+    pub fn fractions(&self) -> Vec<(&'static str, Proportion, &'static str)> {
+        let abstains =
+            |assessment: &Assessment| Some(matches!(assessment.verdict, Verdict::Nothing | Verdict::Outside));
+        let settled = |assessment: &&Assessment| assessment.settled.is_some();
         vec![
             (
                 "no answer at all",
-                Share::count(self.0.iter().map(|one| Some(one.verdict == Verdict::Failed))),
+                Proportion::count(self.0.iter().map(|one| Some(one.verdict == Verdict::Failed))),
                 "0 %",
             ),
             (
                 "singles at least 5 sigma",
-                Share::count(
+                Proportion::count(
                     self.of(CampaignKind::Single)
                         .map(|one| Some(one.significance_sigma >= DETECTABLE_SIGMA)),
                 ),
@@ -90,32 +91,32 @@ impl Table<'_> {
             ),
             (
                 "class, top 1, at least 5 sigma",
-                Share::count(self.detectable().map(|one| one.right_class)),
+                Proportion::count(self.detectable().map(|one| one.right_class)),
                 ">= 90 %",
             ),
             (
                 "class, top 1, every severity",
-                Share::count(self.of(CampaignKind::Single).map(|one| one.right_class)),
+                Proportion::count(self.of(CampaignKind::Single).map(|one| one.right_class)),
                 "",
             ),
             (
                 "strict, at least 5 sigma",
-                Share::count(self.detectable().map(|one| one.strict)),
+                Proportion::count(self.detectable().map(|one| one.strict)),
                 ">= 75 %",
             ),
             (
                 "faulty cell",
-                Share::count(self.detectable().map(|one| one.right_cell)),
+                Proportion::count(self.detectable().map(|one| one.right_cell)),
                 ">= 95 %",
             ),
             (
                 "clean, falsely named",
-                Share::count(self.of(CampaignKind::Clean).map(|one| Some(one.verdict.names()))),
+                Proportion::count(self.of(CampaignKind::Clean).map(|one| Some(one.verdict.names()))),
                 "<= 5 %",
             ),
             (
                 "clean, called outside",
-                Share::count(
+                Proportion::count(
                     self.of(CampaignKind::Clean)
                         .map(|one| Some(one.verdict == Verdict::Outside)),
                 ),
@@ -123,12 +124,12 @@ impl Table<'_> {
             ),
             (
                 "outside, abstained",
-                Share::count(self.of(CampaignKind::Outside).map(abstains)),
+                Proportion::count(self.of(CampaignKind::Outside).map(abstains)),
                 ">= 80 %",
             ),
             (
                 "outside, seen to be outside",
-                Share::count(
+                Proportion::count(
                     self.of(CampaignKind::Outside)
                         .map(|one| Some(one.verdict == Verdict::Outside)),
                 ),
@@ -136,32 +137,32 @@ impl Table<'_> {
             ),
             (
                 "90 % interval covers",
-                Share::count(self.detectable().map(|one| one.covered)),
+                Proportion::count(self.detectable().map(|one| one.covered)),
                 "85 to 95 %",
             ),
             (
                 "ambiguous set holds the truth",
-                Share::count(self.0.iter().map(|one| one.in_set)),
+                Proportion::count(self.0.iter().map(|one| one.in_set)),
                 "",
             ),
             (
                 "ambiguous, settled by proposal",
-                Share::count(self.0.iter().filter(settled).map(|one| one.settled)),
+                Proportion::count(self.0.iter().filter(settled).map(|one| one.settled)),
                 ">= 80 %",
             ),
             (
                 "pairs, one right",
-                Share::count(self.0.iter().map(|one| one.of_pair.map(|met| met >= 1))),
+                Proportion::count(self.0.iter().map(|one| one.of_pair.map(|met| met >= 1))),
                 ">= 95 %",
             ),
             (
                 "pairs, both right",
-                Share::count(self.0.iter().map(|one| one.of_pair.map(|met| met >= 2))),
+                Proportion::count(self.0.iter().map(|one| one.of_pair.map(|met| met >= 2))),
                 ">= 65 %",
             ),
             (
                 "twins reported as twins",
-                Share::count(self.0.iter().map(|one| one.twins_reported)),
+                Proportion::count(self.0.iter().map(|one| one.twins_reported)),
                 "100 %",
             ),
         ]
@@ -169,7 +170,7 @@ impl Table<'_> {
 
     /// Every median: what it is of, itself with the count, and what is aimed at.
     pub fn medians(&self) -> [(&'static str, Option<f64>, usize, &'static str); 3] {
-        let of = |value: fn(&Judgement) -> Option<f64>| {
+        let of = |value: fn(&Assessment) -> Option<f64>| {
             let mut values: Vec<f64> = self.detectable().filter_map(value).collect();
             values.sort_by(f64::total_cmp);
             (median(&values), values.len())
@@ -225,8 +226,8 @@ impl Table<'_> {
                     let each = truth.parameters.iter().map(|(name, value)| format!("{name}={value}"));
                     each.collect::<Vec<_>>().join(" ")
                 }),
-                one.visible_m[0].to_string(),
-                one.visible_m[1].to_string(),
+                one.effect_size_m[0].to_string(),
+                one.effect_size_m[1].to_string(),
                 one.verdict.name().to_owned(),
                 one.top.clone().unwrap_or_default(),
                 one.significance_sigma.to_string(),
@@ -248,7 +249,7 @@ impl Table<'_> {
     }
 }
 
-impl fmt::Display for Table<'_> {
+impl fmt::Display for ScoreTable<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (what, fraction, aim) in self.fractions() {
             writeln!(out, "{what:<32} {:<28} {aim}", fraction.to_string())?;

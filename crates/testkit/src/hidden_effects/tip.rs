@@ -5,15 +5,17 @@
 //! for the worm ([`contact`]). Without mass the forces of pad and contact are equal at every moment; with the pad taken
 //! linear over a time step, each law solves that for the tip's way at the step's end.
 
+pub mod bristle;
 pub mod contact;
 pub mod coulomb;
 pub mod dahl;
 pub mod elasto_plastic;
-pub mod fall;
 pub mod lugre;
+pub mod weakening;
 
-use contact::{Contact, Push};
-use fall::Memory;
+use bristle::TipLoad;
+use contact::Contact;
+use weakening::FrictionState;
 
 /// How many elements the yielding share of a pad is made of.
 const ELEMENTS: usize = 16;
@@ -64,7 +66,7 @@ pub struct Tip {
     bristle_m: f64,
     crept_m: f64,
     yielded_m: [f64; ELEMENTS],
-    memory: Memory,
+    friction_state: FrictionState,
 }
 
 impl Tip {
@@ -78,7 +80,7 @@ impl Tip {
             bristle_m: 0.0,
             crept_m: 0.0,
             yielded_m: [0.0; ELEMENTS],
-            memory: Memory::default(),
+            friction_state: FrictionState::default(),
         }
     }
 
@@ -94,19 +96,20 @@ impl Tip {
         } else {
             limits.backward_n
         };
-        let left = pad.contact.fall.left(&self.memory, sign);
-        let gone = pad.contact.law.go(&Push {
+        let static_excess = pad.contact.weakening.static_excess(&self.friction_state, sign);
+        let step = pad.contact.law.solve(&TipLoad {
             pull_n: sign * pull_n,
             slack_n_per_m: stiffness + damping,
-            limit_n: limit_n * (1.0 + (pad.static_over_kinetic - 1.0) * left),
+            limit_n: limit_n * (1.0 + (pad.static_over_kinetic - 1.0) * static_excess),
             bristle_n_per_m: pad.bristle_n_per_m,
             bristle_m: sign * self.bristle_m,
             step_s,
         });
-        let tip_m = sign * gone.displacement_m;
-        let bristle_m = sign * gone.bristle_m;
+        let tip_m = sign * step.displacement_m;
+        let bristle_m = sign * step.bristle_m;
         let slipped_m = tip_m - (bristle_m - self.bristle_m);
-        self.memory.keep(&pad.contact.fall, tip_m, slipped_m, step_s);
+        self.friction_state
+            .update(&pad.contact.weakening, tip_m, slipped_m, step_s);
         self.bristle_m = bristle_m;
         self.place_m += tip_m;
         let strained_m = displacement_m - tip_m;

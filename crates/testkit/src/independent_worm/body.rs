@@ -5,13 +5,9 @@
 //! P' = −Σ (k δᵢ + c δᵢ') − M g sin λ. The momentum is what is integrated, so a sudden change of eᵢ' needs no infinite
 //! force. A tip's place on the canal stays while its deformation keeps within the bounds and follows the cell otherwise.
 
-use super::account::TrueBalance;
+use super::balance::TrueBalance;
 use super::cam::Cam;
-
-/// Standard gravity as the paper rounds it, m/s².
-pub const GRAVITY_M_S2: f64 = 9.81;
-/// Distance between neighbouring cells at rest, m.
-const SPACING_M: f64 = 0.040;
+use crate::nominal::{DAMPING_RATIO, GRAVITY_M_S2, LOWERING_S, MASS_KG, SPACING_M, STIFFNESS_N_PER_M};
 
 /// What the worm is made of, and where it lies.
 #[derive(Debug, Clone)]
@@ -30,7 +26,7 @@ pub struct Body {
     pub slip_drag_n_s_per_m: f64,
     /// Slope of the canal, degrees.
     pub slope_deg: f64,
-    /// Time over which the hand that lays the worm down lets go of it, s.
+    /// Time over which the worm's weight comes onto its tips as it is laid down, s.
     pub lowering_s: f64,
 }
 
@@ -38,14 +34,14 @@ impl Body {
     /// The paper's worm with given bounds.
     pub fn with_bounds(bound_m: &[f64], slope_deg: f64) -> Self {
         Self {
-            mass_kg: 0.333,
-            stiffness_n_per_m: 980.0,
+            mass_kg: MASS_KG,
+            stiffness_n_per_m: STIFFNESS_N_PER_M,
             forward_bound_m: bound_m.to_vec(),
             backward_bound_m: bound_m.to_vec(),
-            damping_ratio: 0.3,
+            damping_ratio: DAMPING_RATIO,
             slip_drag_n_s_per_m: 0.0,
             slope_deg,
-            lowering_s: 0.1,
+            lowering_s: LOWERING_S,
         }
     }
 
@@ -91,7 +87,7 @@ pub struct Motion {
     deformation_rate_m_s: Vec<f64>,
     extension_m: Vec<f64>,
     next_extension_m: Vec<f64>,
-    pub account: TrueBalance,
+    pub balance: TrueBalance,
 }
 
 impl Motion {
@@ -109,7 +105,7 @@ impl Motion {
             translation_m_s: 0.0,
             velocity_m_s: vec![0.0; cells],
             contact_m: position_m.clone(),
-            account: TrueBalance::zero(cells, position_m.iter().sum::<f64>() / cells as f64),
+            balance: TrueBalance::zero(cells, position_m.iter().sum::<f64>() / cells as f64),
             position_m,
             deformation_m: vec![0.0; cells],
             deformation_rate_m_s: vec![0.0; cells],
@@ -155,18 +151,18 @@ impl Motion {
             let weight_n = pull_n / cells as f64;
             moved_m += displacement_m / cells as f64;
 
-            let account = &mut self.account;
-            account.forward_slide_m[cell] += slid_m.max(0.0);
-            account.backward_slide_m[cell] += (-slid_m).max(0.0);
-            account.friction_j += stiffness * after_m.abs() * slid_m.abs();
-            account.weight_j += weight_n * displacement_m;
-            account.damping_j += damped_n * self.deformation_rate_m_s[cell] * step_s;
-            account.actuator_net_j += (spring_n + weight_n) * extended_m;
-            account.actuator_positive_j += ((spring_n + weight_n) * extended_m).max(0.0);
-            account.cam_j += (spring_n + weight_n + damped_n + inertia_n) * extended_m;
+            let balance = &mut self.balance;
+            balance.forward_slide_m[cell] += slid_m.max(0.0);
+            balance.backward_slide_m[cell] += (-slid_m).max(0.0);
+            balance.friction_j += stiffness * after_m.abs() * slid_m.abs();
+            balance.weight_j += weight_n * displacement_m;
+            balance.damping_j += damped_n * self.deformation_rate_m_s[cell] * step_s;
+            balance.actuator_net_j += (spring_n + weight_n) * extended_m;
+            balance.actuator_positive_j += ((spring_n + weight_n) * extended_m).max(0.0);
+            balance.cam_j += (spring_n + weight_n + damped_n + inertia_n) * extended_m;
             self.velocity_m_s[cell] = velocity_m_s;
         }
-        self.account.mean_m += moved_m;
+        self.balance.mean_m += moved_m;
         std::mem::swap(&mut self.extension_m, &mut self.next_extension_m);
         self.time_s += step_s;
     }

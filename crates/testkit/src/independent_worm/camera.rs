@@ -52,14 +52,14 @@ impl Camera {
 }
 
 /// The camera at work.
-pub struct Watch {
+pub struct CameraSampler {
     camera: Camera,
     rng: Xoshiro256PlusPlus,
     samples: u64,
     hidden_until_s: Vec<f64>,
 }
 
-impl Watch {
+impl CameraSampler {
     pub fn new(camera: Camera, cells: usize, seed: u64) -> Self {
         Self {
             camera,

@@ -4,6 +4,8 @@ use super::body::Body;
 use super::cam::{Cam, Drive};
 use super::camera::Camera;
 use super::scene::{STEP_S, Scene};
+use crate::nominal::STROKE_M;
+use crate::random::shuffle;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
@@ -22,7 +24,9 @@ pub fn crawling(cells: usize, slopes_deg: &[f64], seed: u64) -> Vec<Scene> {
         let mut worm = Body::with_bounds(&bound_m, 0.0);
         worm.mass_kg *= rng.random_range(0.95..1.05);
         worm.damping_ratio = 10f64.powf(rng.random_range(-1.0..0.0));
-        let cam = Cam::new(0.0115, shuffled(cells, &mut rng));
+        let mut step_order: Vec<usize> = (0..cells).collect();
+        shuffle(&mut step_order, &mut rng);
+        let cam = Cam::new(STROKE_M, step_order);
         let cycle_s = rng.random_range(1.5..4.0);
         let scenes: Vec<Scene> = slopes_deg
             .iter()
@@ -33,7 +37,7 @@ pub fn crawling(cells: usize, slopes_deg: &[f64], seed: u64) -> Vec<Scene> {
                     ..worm.clone()
                 },
                 cam: cam.clone(),
-                drive: uneven(cycle_s, &mut rng),
+                drive: uneven_motor(cycle_s, &mut rng),
                 camera: Camera::default(),
                 warm_up_cycles: 0.0,
                 cycles: 12.0,
@@ -50,7 +54,7 @@ pub fn crawling(cells: usize, slopes_deg: &[f64], seed: u64) -> Vec<Scene> {
 }
 
 /// A motor as uneven as real ones.
-fn uneven(cycle_s: f64, rng: &mut Xoshiro256PlusPlus) -> Drive {
+fn uneven_motor(cycle_s: f64, rng: &mut Xoshiro256PlusPlus) -> Drive {
     Drive {
         swing_per_step: rng.random_range(0.0..0.15),
         swing_per_turn: rng.random_range(0.0..0.1),
@@ -58,14 +62,6 @@ fn uneven(cycle_s: f64, rng: &mut Xoshiro256PlusPlus) -> Drive {
         angles_rad: std::array::from_fn(|_| rng.random_range(0.0..TAU)),
         ..Drive::even(cycle_s)
     }
-}
-
-fn shuffled(cells: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..cells).collect();
-    for last in (1..cells).rev() {
-        order.swap(last, rng.random_range(0..=last));
-    }
-    order
 }
 
 /// Whether a worm holds on and advances in every cycle, its first settling apart.
@@ -80,6 +76,6 @@ fn crawls(scene: &Scene) -> bool {
     };
     trial.record().is_ok_and(|(_, truth)| {
         let mut settled = truth.cycles.iter().skip(1);
-        settled.all(|cycle| cycle.account.advance_m() >= MIN_ADVANCE_M)
+        settled.all(|cycle| cycle.balance.advance_m() >= MIN_ADVANCE_M)
     })
 }

@@ -13,10 +13,11 @@
 //!
 //! [`scene`] puts them together, [`draw`] rolls the dice for worms that crawl, and [`score`] holds an analysis against it all.
 
-pub mod account;
+pub mod balance;
 pub mod body;
 pub mod cam;
 pub mod camera;
 pub mod draw;
 pub mod scene;
 pub mod score;
+pub mod truth;

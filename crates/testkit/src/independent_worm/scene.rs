@@ -1,9 +1,10 @@
 //! One recording in the making: a worm, its motor, and the camera.
 
-use super::account::Truth;
 use super::body::{Body, Motion};
 use super::cam::{Cam, Drive};
-use super::camera::{Camera, Watch};
+use super::camera::{Camera, CameraSampler};
+use super::truth::Truth;
+use crate::nominal::{MAX_BODY_SPEED_M_S, STROKE_M, TIMEOUT_CYCLES};
 use std::path::PathBuf;
 use worm_analysis::recording::Recording;
 
@@ -11,10 +12,6 @@ use worm_analysis::recording::Recording;
 pub const STEP_S: f64 = 50e-6;
 /// Time between two rows of the truth, s.
 const ROW_S: f64 = 1e-3;
-/// Speed of the body beyond which the tips have lost it, m/s: several times what any gait here gives it.
-const LOST_M_S: f64 = 0.5;
-/// Time after which a motor that never gets on is given up, in mean cycles for each cycle wanted.
-const PATIENCE: f64 = 10.0;
 
 /// The tips did not hold the worm.
 #[derive(Debug)]
@@ -44,7 +41,7 @@ impl Scene {
         let cells = body.cells();
         Self {
             body,
-            cam: Cam::new(0.0115, (0..cells).collect()),
+            cam: Cam::new(STROKE_M, (0..cells).collect()),
             drive: Drive::even(cycle_s),
             camera: Camera::perfect(),
             warm_up_cycles: 0.0,
@@ -75,28 +72,28 @@ impl Scene {
         }
 
         let origin_s = motion.time_s();
-        let mut watch = Watch::new(self.camera.clone(), cells, self.seed);
+        let mut sampler = CameraSampler::new(self.camera.clone(), cells, self.seed);
         let mut truth = Truth::beginning(&self.body, &self.cam);
         truth.stored_j = [motion.stored_j(); 2];
         let mut recording = self.empty_recording();
-        let mut sample_s = watch.next_s();
+        let mut sample_s = sampler.next_s();
         let mut row_s = 0.0;
         let mut last_s = f64::INFINITY;
-        let wait_s = drive.rest_before_s + PATIENCE * self.cycles * drive.cycle_s;
+        let timeout_s = drive.rest_before_s + TIMEOUT_CYCLES * self.cycles * drive.cycle_s;
         loop {
             let now_s = motion.time_s() - origin_s;
             if now_s >= row_s {
-                truth.push(now_s, phase, motion.account.clone());
+                truth.push(now_s, phase, motion.balance.clone());
                 row_s += ROW_S;
             }
             if phase >= to_phase && last_s.is_infinite() {
                 last_s = now_s + self.rest_after_s;
             }
             if now_s >= last_s {
-                truth.push(now_s + self.step_s, phase, motion.account.clone());
+                truth.push(now_s + self.step_s, phase, motion.balance.clone());
                 break;
             }
-            assert!(now_s < wait_s, "the motor does not get on: {drive:?}");
+            assert!(now_s < timeout_s, "the motor does not get on: {drive:?}");
             let before_m = motion.position_m.clone();
             let next_phase = self.step(&drive, phase, &mut motion)?;
             let next_s = motion.time_s() - origin_s;
@@ -107,9 +104,9 @@ impl Scene {
                 for (cell, &before) in before_m.iter().enumerate() {
                     let position_m = before + fraction * (motion.position_m[cell] - before);
                     truth.sample_position_m[cell].push(position_m);
-                    recording.position_m[cell].push(watch.see(cell, sample_s, position_m));
+                    recording.position_m[cell].push(sampler.see(cell, sample_s, position_m));
                 }
-                sample_s = watch.next_s();
+                sample_s = sampler.next_s();
             }
             phase = next_phase;
         }
@@ -127,7 +124,7 @@ impl Scene {
         let speed = drive.speed(midway, motion.time_s() + half_s, cells);
         let next = (phase + self.step_s * speed).min(drive.last_phase);
         motion.step_to(next);
-        if motion.translation_m_s.abs() > LOST_M_S {
+        if motion.translation_m_s.abs() > MAX_BODY_SPEED_M_S {
             return Err(SlidDown);
         }
         Ok(next)

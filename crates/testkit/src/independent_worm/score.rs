@@ -1,6 +1,7 @@
 //! An analysis held against the truth.
 
-use super::account::{TrueBalance, Truth};
+use super::balance::TrueBalance;
+use super::truth::Truth;
 use std::fmt;
 use worm_analysis::experiment::Analysis;
 
@@ -43,7 +44,7 @@ pub struct Score {
 
 /// What is asked of an analysis.
 #[derive(Debug, Clone, Copy)]
-pub struct Promise {
+pub struct Tolerances {
     pub bound_m: f64,
     pub energy_percent: f64,
     pub advance_m: f64,
@@ -55,7 +56,7 @@ pub struct Promise {
 }
 
 /// What the accuracy is promised to be.
-pub const PROMISE: Promise = Promise {
+pub const TOLERANCES: Tolerances = Tolerances {
     bound_m: 1e-4,
     energy_percent: 3.0,
     advance_m: 0.05e-3,
@@ -70,13 +71,13 @@ impl Score {
         let pairs: Vec<_> = settled
             .iter()
             .map(|cycle| {
-                let account = truth.over(cycle.start_s, cycle.start_s + cycle.duration_s);
-                (&cycle.values, account)
+                let balance = truth.over(cycle.start_s, cycle.start_s + cycle.duration_s);
+                (&cycle.values, balance)
             })
             .collect();
         let energy = |found: fn(&worm_analysis::experiment::CycleValues) -> f64, truly: fn(&TrueBalance) -> f64| {
             let found_j = pairs.iter().map(|(values, _)| found(values));
-            let true_j = pairs.iter().map(|(_, account)| truly(account));
+            let true_j = pairs.iter().map(|(_, balance)| truly(balance));
             let percent = |found_j: f64, true_j: f64| 100.0 * (found_j / true_j - 1.0);
             EnergyError {
                 mean_percent: percent(found_j.clone().sum(), true_j.clone().sum()),
@@ -86,7 +87,7 @@ impl Score {
         let advance_errors = || {
             pairs
                 .iter()
-                .map(|(values, account)| values.advance_m - account.advance_m())
+                .map(|(values, balance)| values.advance_m - balance.advance_m())
         };
         let rotation = truth
             .step_order
@@ -113,10 +114,10 @@ impl Score {
                 .map(|search| search.max_deformation_m.clone()),
             energies: [
                 energy(|values| values.energy_loss_j, TrueBalance::loss_j),
-                energy(|values| values.energy_actuator_net_j, |account| account.actuator_net_j),
+                energy(|values| values.energy_actuator_net_j, |balance| balance.actuator_net_j),
                 energy(
                     |values| values.energy_actuator_positive_j,
-                    |account| account.actuator_positive_j,
+                    |balance| balance.actuator_positive_j,
                 ),
             ],
             mean_advance_m: advance_errors().sum::<f64>() / pairs.len() as f64,
@@ -146,20 +147,20 @@ impl Score {
     }
 
     /// What was promised and is not kept, but for the bounds.
-    pub fn broken_beside_bounds(&self, promise: Promise) -> Vec<String> {
-        let mut broken = Vec::new();
+    pub fn violations_beside_bounds(&self, tolerances: Tolerances) -> Vec<String> {
+        let mut violations = Vec::new();
         let mut hold = |kept: bool, what: String| {
             if !kept {
-                broken.push(format!("{}: {what}", self.case));
+                violations.push(format!("{}: {what}", self.case));
             }
         };
         hold(self.order_is_right, "the step order is wrong".to_owned());
         hold(
-            self.phase_error.abs() < promise.phase_cycles,
+            self.phase_error.abs() < tolerances.phase_cycles,
             format!("cycles begin {:.3} cycles off", self.phase_error),
         );
         hold(
-            self.settled_cycles + promise.lost_cycles >= self.true_cycles,
+            self.settled_cycles + tolerances.lost_cycles >= self.true_cycles,
             format!(
                 "only {} of {} cycles are settled",
                 self.settled_cycles, self.true_cycles
@@ -168,36 +169,36 @@ impl Score {
         for (name, energy) in ["(11)", "(13) net", "(13) positive"].iter().zip(self.energies) {
             let percent = energy.mean_percent;
             hold(
-                percent.abs() < promise.energy_percent,
+                percent.abs() < tolerances.energy_percent,
                 format!("the mean energy by {name} is {percent:+.2} % off"),
             );
         }
         hold(
-            self.mean_advance_m.abs() < promise.advance_m,
+            self.mean_advance_m.abs() < tolerances.advance_m,
             format!("the mean advance is {:+.3} mm off", 1e3 * self.mean_advance_m),
         );
         if self.slope_deg >= 15.0 {
             let percent = self.mass_percent.unwrap_or(f64::NAN);
             let sigma = self.mass_sigma_percent.unwrap_or(f64::NAN);
             hold(
-                percent.abs() < promise.mass_percent.max(3.0 * sigma),
+                percent.abs() < tolerances.mass_percent.max(3.0 * sigma),
                 format!("the mass is {percent:+.1} % off, said to be known within {sigma:.1} %"),
             );
         }
-        broken
+        violations
     }
 
     /// What was promised and is not kept.
-    pub fn broken(&self, promise: Promise) -> Vec<String> {
-        let mut broken = self.broken_beside_bounds(promise);
+    pub fn violations(&self, tolerances: Tolerances) -> Vec<String> {
+        let mut violations = self.violations_beside_bounds(tolerances);
         for (cell, error_m) in self.errors_m().enumerate() {
-            let kept = error_m.abs() < promise.bound_m;
+            let kept = error_m.abs() < tolerances.bound_m;
             if !kept {
                 let (case, number, error_mm) = (&self.case, cell + 1, 1e3 * error_m);
-                broken.push(format!("{case}: the bound of cell {number} is {error_mm:+.3} mm off"));
+                violations.push(format!("{case}: the bound of cell {number} is {error_mm:+.3} mm off"));
             }
         }
-        broken
+        violations
     }
 }
 

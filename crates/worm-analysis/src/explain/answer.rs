@@ -151,11 +151,29 @@ pub struct Place {
     pub significance: f64,
 }
 
+/// A model in the order in which the gap between model and data shrinks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StageKind {
+    /// The nominal model.
+    Baseline,
+    /// Fitted within the priors of what is not known exactly, without an effect.
+    Recalibrated,
+    /// The best effect of another kind than the one named.
+    BestWrong,
+    /// The effect named, or the best of several candidates.
+    Named,
+    /// A correction of any form: about as much as any model could explain.
+    FreeForm,
+    /// The noise floor, which no model can fall below.
+    Floor,
+}
+
 /// One stage of the shrinking gap.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stage {
-    /// `baseline`, `recalibrated`, `named`, `best-wrong`, `free-form` or `floor`.
-    pub stage: &'static str,
+    /// Which one.
+    pub stage: StageKind,
     /// The effect, where the stage has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effect: Option<String>,
@@ -184,11 +202,57 @@ pub struct Remainder {
     pub places: Vec<Place>,
 }
 
+/// What a run may change against the runs of the campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum RunChange {
+    /// Slope of the canal, degrees.
+    #[serde(rename = "slope_deg")]
+    Slope,
+    /// Time of a gait cycle, s.
+    #[serde(rename = "cycle_s")]
+    Cycle,
+    /// Where the worm starts along the canal, as a shift, m.
+    #[serde(rename = "start_m")]
+    Start,
+    /// Known extra mass, kg.
+    #[serde(rename = "payload_kg")]
+    Payload,
+    /// Number of gait cycles.
+    #[serde(rename = "cycles")]
+    Cycles,
+    /// Rest after each gait cycle, s.
+    #[serde(rename = "dwell_s")]
+    Dwell,
+}
+
+impl RunChange {
+    /// Unit of its value; empty for none.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Slope => "deg",
+            Self::Cycle | Self::Dwell => "s",
+            Self::Start => "m",
+            Self::Payload => "kg",
+            Self::Cycles => "",
+        }
+    }
+}
+
+/// What the next experiment changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum ExperimentChange {
+    /// One condition of a run.
+    Run(RunChange),
+    /// Nothing: a measurement on the bench, in words.
+    Measurement(&'static str),
+}
+
 /// A proposal for the next experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NextExperiment {
-    /// What to change: `slope_deg`, `cycle_s`, `payload_kg`, `start_m`, `cycles`, `dwell_s`, or a measurement on the bench.
-    pub change: String,
+    /// What to change, or to measure.
+    pub change: ExperimentChange,
     /// To which value; none for a measurement.
     pub value: Option<f64>,
     /// Unit of the value.
@@ -233,6 +297,20 @@ pub struct Calibrated {
     pub at_limit: bool,
 }
 
+/// What became of an effect in the screening.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ScreeningOutcome {
+    /// Not refitted, for others promised more.
+    ScreenedOut,
+    /// Refitted, and the fit converged.
+    Refitted,
+    /// Refitted, and the fit did not converge.
+    DidNotConverge,
+    /// These data cannot show it.
+    NotVisible,
+}
+
 /// One effect's score at zero severity, other parameters projected out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Screened {
@@ -244,8 +322,8 @@ pub struct Screened {
     pub score: f64,
     /// Rise of twice the log likelihood after the refit, where it was refitted; none where it did not converge.
     pub improvement: Option<f64>,
-    /// What became of it: `screened-out`, `refitted`, `did-not-converge`, `not-visible`.
-    pub outcome: &'static str,
+    /// What became of it.
+    pub outcome: ScreeningOutcome,
 }
 
 /// A recording of the campaign.
@@ -325,4 +403,48 @@ pub struct CycleSeries {
     pub recalibrated_m: Vec<f64>,
     /// By the named model, m; empty where there is none.
     pub named_m: Vec<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// They are part of the JSON contract.
+    #[test]
+    fn names_in_json_are_fixed() {
+        fn check<T: Serialize>(names: &[(T, &str)]) {
+            for (value, name) in names {
+                assert_eq!(serde_json::to_value(value).expect("JSON"), *name);
+            }
+        }
+        check(&[
+            (Verdict::Agrees, "agrees"),
+            (Verdict::Explained, "explained"),
+            (Verdict::Ambiguous, "ambiguous"),
+            (Verdict::OutsideLibrary, "outside-library"),
+        ]);
+        check(&[
+            (StageKind::Baseline, "baseline"),
+            (StageKind::Recalibrated, "recalibrated"),
+            (StageKind::BestWrong, "best-wrong"),
+            (StageKind::Named, "named"),
+            (StageKind::FreeForm, "free-form"),
+            (StageKind::Floor, "floor"),
+        ]);
+        check(&[
+            (ExperimentChange::Run(RunChange::Slope), "slope_deg"),
+            (ExperimentChange::Run(RunChange::Cycle), "cycle_s"),
+            (ExperimentChange::Run(RunChange::Start), "start_m"),
+            (ExperimentChange::Run(RunChange::Payload), "payload_kg"),
+            (ExperimentChange::Run(RunChange::Cycles), "cycles"),
+            (ExperimentChange::Run(RunChange::Dwell), "dwell_s"),
+            (ExperimentChange::Measurement("cut the tether"), "cut the tether"),
+        ]);
+        check(&[
+            (ScreeningOutcome::ScreenedOut, "screened-out"),
+            (ScreeningOutcome::Refitted, "refitted"),
+            (ScreeningOutcome::DidNotConverge, "did-not-converge"),
+            (ScreeningOutcome::NotVisible, "not-visible"),
+        ]);
+    }
 }

@@ -1,14 +1,14 @@
 //! The answer, put together from what was found.
 
 use super::answer::{
-    Answer, Calibrated, Figures, FoundParameter, NamedEffect, Remainder, ResidualMap, RunSummary, Screened, Stage,
-    Verdict, with_cell,
+    Answer, Calibrated, Figures, FoundParameter, NamedEffect, Remainder, ResidualMap, RunSummary, Screened,
+    ScreeningOutcome, Stage, StageKind, Verdict, with_cell,
 };
 use super::cross_validation::HeldOut;
 use super::experiment_design::propose;
 use super::fit::{Fit, FitProblem};
 use super::gap::{Measured, cycles};
-use super::model_selection::{Candidate, Judged, are_twins};
+use super::model_selection::{Candidate, Judged};
 use super::observed::Observed;
 use super::parameter::{Hypothesised, Nuisance, What};
 use super::period::period;
@@ -17,7 +17,7 @@ use super::score_test::Screening;
 use super::speed_droop::SpeedDroop;
 use super::words;
 use worm_estimator::config::Config;
-use worm_physics::effect::{Effect, LIBRARY, Visible};
+use worm_physics::effect::{Effect, LIBRARY, MOTOR_DROOP};
 
 /// Places listed at most.
 const PLACES: usize = 12;
@@ -149,28 +149,31 @@ impl Gap {
         let best = judged.candidates.first().map_or(&parts.recalibrated, |find| &find.fit);
         let measured = Measured::new(problem, best);
         let recalibrated = measured.stage(
-            "recalibrated",
+            StageKind::Recalibrated,
             None,
             &parts.recalibrated,
             &parts.recalibrated_held_out.fits,
         );
         let floor = measured.floor_stage();
-        let stage = |name: &'static str, find: &Candidate| {
+        let stage = |kind: StageKind, find: &Candidate| {
             let folds = find.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
             let names: Vec<&str> = find
                 .hypothesised
                 .iter()
                 .map(|hypothesised| hypothesised.effect.name)
                 .collect();
-            measured.stage(name, Some(names.join(" + ")), &find.fit, folds)
+            measured.stage(kind, Some(names.join(" + ")), &find.fit, folds)
         };
         let gap_m = recalibrated.held_out_rms_m - floor.held_out_rms_m;
         let closure = |stage: &Stage| (recalibrated.held_out_rms_m - stage.held_out_rms_m) / gap_m;
-        let of_named: Vec<Stage> = named.iter().map(|find| stage("named", find)).collect();
-        let wrong = judged.best_wrong.as_ref().map(|find| stage("best-wrong", find));
+        let of_named: Vec<Stage> = named.iter().map(|find| stage(StageKind::Named, find)).collect();
+        let wrong = judged.best_wrong.as_ref().map(|find| stage(StageKind::BestWrong, find));
         let closures = of_named.iter().map(closure).collect();
         let best_wrong = wrong.as_ref().map_or(0.0, closure);
-        let mut stages = vec![measured.stage("baseline", None, &parts.nominal, &[]), recalibrated];
+        let mut stages = vec![
+            measured.stage(StageKind::Baseline, None, &parts.nominal, &[]),
+            recalibrated,
+        ];
         stages.extend(wrong);
         stages.extend(of_named.into_iter().next());
         stages.push(measured.free_form_stage(&parts.recalibrated));
@@ -196,8 +199,8 @@ fn maps(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<ResidualMap> {
 }
 
 fn droop_effect(speed_droop: &SpeedDroop) -> NamedEffect {
-    let effect = &worm_physics::effect::MOTOR_DROOP;
-    let parameter = &effect.parameters[0];
+    let effect = MOTOR_DROOP;
+    let parameter = effect.severity();
     NamedEffect {
         name: effect.name.to_owned(),
         twins: Vec::new(),
@@ -295,7 +298,12 @@ pub(super) fn named_effects(find: &Candidate, probability: f64, closure: f64, ma
         });
         NamedEffect {
             name: hypothesised.effect.name.to_owned(),
-            twins: twins(hypothesised),
+            twins: hypothesised
+                .effect
+                .all_twins(hypothesised.cell)
+                .into_iter()
+                .map(str::to_owned)
+                .collect(),
             parameters: parameters.collect(),
             cell: hypothesised.cell.map(|cell| cell + 1),
             together_with: find
@@ -314,21 +322,6 @@ pub(super) fn named_effects(find: &Candidate, probability: f64, closure: f64, ma
     find.hypothesised.iter().enumerate().map(of).collect()
 }
 
-/// What no positions can tell from an effect: by name where the library has it, else described.
-fn twins(hypothesised: &Hypothesised) -> Vec<String> {
-    let in_library = LIBRARY.iter().map(|&effect| Hypothesised { effect, cell: None });
-    let mut twins: Vec<String> = in_library
-        .filter(|other| are_twins(hypothesised, other))
-        .map(|other| other.effect.name.to_owned())
-        .collect();
-    let is_name = |twin: &&&str| LIBRARY.iter().any(|effect| effect.name == **twin);
-    let described = hypothesised.effect.twins.iter().filter(|twin| !is_name(twin));
-    if hypothesised.cell.is_none() || hypothesised.effect.name != "lost-stroke" {
-        twins.extend(described.map(|twin| (*twin).to_owned()));
-    }
-    twins
-}
-
 /// The library's scores, and what became of each effect.
 fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Screened> {
     let mut rows: Vec<Screened> = screened
@@ -344,23 +337,23 @@ fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Scree
                 score: screening.score,
                 improvement: find.filter(|find| find.fit.converged).map(|find| find.improvement),
                 outcome: match find {
-                    None => "screened-out",
-                    Some(find) if find.fit.converged => "refitted",
-                    Some(_) => "did-not-converge",
+                    None => ScreeningOutcome::ScreenedOut,
+                    Some(find) if find.fit.converged => ScreeningOutcome::Refitted,
+                    Some(_) => ScreeningOutcome::DidNotConverge,
                 },
             }
         })
         .collect();
-    add_unscreened(&mut rows, |effect| match effect.visible {
-        Visible::PhaseTime if droops => "refitted",
-        Visible::PhaseTime => "screened-out",
-        _ => "not-visible",
+    add_unscreened(&mut rows, |effect| match (effect.shows_in_time_alone(), droops) {
+        (true, true) => ScreeningOutcome::Refitted,
+        (true, false) => ScreeningOutcome::ScreenedOut,
+        (false, _) => ScreeningOutcome::NotVisible,
     });
     rows
 }
 
 /// Adds every effect of the library that has no row yet, with what became of it.
-pub(super) fn add_unscreened(rows: &mut Vec<Screened>, outcome: impl Fn(&Effect) -> &'static str) {
+pub(super) fn add_unscreened(rows: &mut Vec<Screened>, outcome: impl Fn(&Effect) -> ScreeningOutcome) {
     for effect in LIBRARY {
         if !rows.iter().any(|row| row.name == effect.name) {
             rows.push(Screened {
@@ -400,11 +393,11 @@ pub(super) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibrated> {
                 Nuisance::Clock => ("clock".to_owned(), 0.0, value, sigma, "s"),
                 Nuisance::Damping => {
                     let (name, _, found, sigma, unit) = factor("damping".to_owned());
-                    (name, free.centre.exp(), found, sigma, unit)
+                    (name, free.quantity.centre.exp(), found, sigma, unit)
                 }
-                Nuisance::Presliding => ("presliding".to_owned(), free.centre, value, sigma, ""),
-                Nuisance::Rounding => ("rounding".to_owned(), free.centre, value, sigma, ""),
-                Nuisance::Viscosity => ("viscosity".to_owned(), free.centre, value, sigma, "N s/m"),
+                Nuisance::Presliding => ("presliding".to_owned(), free.quantity.centre, value, sigma, ""),
+                Nuisance::Rounding => ("rounding".to_owned(), free.quantity.centre, value, sigma, ""),
+                Nuisance::Viscosity => ("viscosity".to_owned(), free.quantity.centre, value, sigma, "N s/m"),
             };
             Some(Calibrated {
                 name,

@@ -15,9 +15,11 @@
 //! An effect that could have been anything gives little to any outcome, and so pays for its freedom. Added is what the values of the
 //! whole fit cost by their priors: of two hypotheses that say the same of the data, that which need be less extreme is the likelier.
 
-use super::fit::{Fit, FitProblem, dot, in_parallel, prior_chi_squared};
+use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
+use crate::least_squares::{dot, prior_chi_squared, submatrix};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Blocks of neighbouring cycles.
 const BLOCKS: usize = 3;
@@ -105,8 +107,7 @@ impl Fold {
 
 /// Holds a fitted hypothesis, whose derivatives are there, against every fold.
 pub(super) fn hold_out(problem: &FitProblem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
-    let anew = in_parallel(folds.len(), |number| {
-        let fold = &folds[number];
+    let refit = |fold: &Fold| {
         let stays = fold.stays(problem);
         let mut without = fit.clone();
         for _ in 0..STEPS {
@@ -115,12 +116,13 @@ pub(super) fn hold_out(problem: &FitProblem<'_, '_>, fit: &Fit, folds: &[Fold]) 
         let chi_squared = score(&without, &stays);
         without.jacobian = Vec::new();
         (chi_squared, (without, fold.left_out.clone()))
-    });
+    };
+    let anew: Vec<(f64, FitWithout)> = folds.par_iter().map(refit).collect();
     let slopes = folds.len() - BLOCKS;
     let ways = if slopes > 0 { 2.0 } else { 1.0 };
     HeldOut {
         chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / ways
-            + prior_chi_squared(&fit.hypothesis, &fit.at),
+            + prior_chi_squared(&fit.hypothesis.quantities(), &fit.at),
         fits: anew.into_iter().map(|(_, without)| without).collect(),
     }
 }
@@ -136,7 +138,7 @@ fn score(without: &Fit, stays: &[bool]) -> f64 {
         .collect();
     let (known, whole) = (without.normal(Some(stays)), without.normal(None));
     let factor = |normal: &DMatrix<f64>| {
-        let mut matrix = DMatrix::from_fn(open.len(), open.len(), |row, column| normal[(open[row], open[column])]);
+        let mut matrix = submatrix(normal, &open);
         for row in 0..open.len() {
             matrix[(row, row)] *= 1.0 + 1e-9;
         }

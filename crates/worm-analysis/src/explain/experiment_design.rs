@@ -8,11 +8,12 @@
 mod change;
 mod trial;
 
-use super::answer::{NextExperiment, Prediction};
-use super::fit::{Fit, FitProblem, in_parallel};
-use super::parameter::{Hypothesised, What as Quantity};
+use super::answer::{ExperimentChange, NextExperiment, Prediction};
+use super::fit::{Fit, FitProblem};
+use super::parameter::{Hypothesised, What};
 pub(super) use change::SLOPES_DEG;
-use change::{Change, What, changes};
+use change::{BY_COST, Change, changes, cost};
+use rayon::prelude::*;
 use trial::{Reach, Said, Trial, blank, plain_distance};
 use worm_physics::effect::Setting;
 
@@ -33,7 +34,7 @@ struct Weighed {
 impl Weighed {
     /// What it is worth for what it costs; more than enough is worth no more.
     fn worth(&self) -> f64 {
-        self.separation.min(SETTLES) / self.change.what.cost()
+        self.separation.min(SETTLES) / cost(self.change.what)
     }
 }
 
@@ -45,14 +46,15 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         return None;
     }
     let changes = changes(problem.scene, cycle_s);
-    let plain = in_parallel(changes.len(), |number| {
-        let blank = blank(problem, &changes[number]);
-        let said = ask_all(&Trial::new(problem, &changes[number], &blank)?, candidates)?;
+    let plain_distance_of = |change: &Change| {
+        let blank = blank(problem, change);
+        let said = ask_all(&Trial::new(problem, change, &blank)?, candidates)?;
         let crawls = |said: &Said| said.advance_m > MIN_ADVANCE * problem.scene.nominal[0].worm.stroke_m();
         said.iter()
             .all(crawls)
             .then(|| nearest(&said, |a, b| plain_distance(&said[a], &said[b])))
-    });
+    };
+    let plain: Vec<Option<f64>> = changes.par_iter().map(plain_distance_of).collect();
     let mut possible: Vec<(f64, Change)> = plain
         .into_iter()
         .zip(changes)
@@ -60,9 +62,9 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         .collect();
     possible.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut best: Option<Weighed> = None;
-    for what in What::ALL {
+    for what in BY_COST {
         // The dearer kinds could not be worth more than one that settles it already.
-        if best.as_ref().is_some_and(|best| best.worth() > SETTLES / what.cost()) {
+        if best.as_ref().is_some_and(|best| best.worth() > SETTLES / cost(what)) {
             break;
         }
         let mine = possible.iter().filter(|(_, change)| change.what == what);
@@ -115,10 +117,10 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
         })
         .filter(|&(rival, quantity)| rival == quick || same(candidates, (rival, quantity), quick).is_none())
         .collect();
-    let columns = in_parallel(tasks.len(), |task| {
-        let (rival, quantity) = tasks[task];
-        trial.derivative(candidates[rival], &said[rival], quantity)
-    });
+    let columns: Vec<Vec<f64>> = tasks
+        .par_iter()
+        .map(|&(rival, quantity)| trial.derivative(candidates[rival], &said[rival], quantity))
+        .collect();
     let column = |rival: usize, quantity: usize| {
         let bought = tasks.iter().position(|&task| {
             task == (rival, quantity)
@@ -143,7 +145,7 @@ fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change
 fn same(candidates: &[&Fit], (rival, quantity): (usize, usize), other: usize) -> Option<usize> {
     let what = candidates[rival].hypothesis.free[quantity].what;
     let others = &candidates[other].hypothesis.free;
-    let is_nuisance = matches!(what, Quantity::Nuisance(_));
+    let is_nuisance = matches!(what, What::Nuisance(_));
     others.iter().position(|free| is_nuisance && free.what == what)
 }
 
@@ -165,11 +167,11 @@ fn in_answer(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &Weighed) 
                 _ => format!("at {slope}, {}", beside(&trial, mine, &said[0], &name(candidates[0]))),
             },
         });
-    let (change, unit) = best.change.what.name();
+    let what = best.change.what;
     Some(NextExperiment {
-        change: change.to_owned(),
+        change: ExperimentChange::Run(what),
         value: Some(best.change.value),
-        unit: unit.to_owned(),
+        unit: what.unit().to_owned(),
         slope_deg: Some(best.change.slope_deg),
         description: best.change.in_words(),
         predictions: predictions.collect(),
@@ -216,7 +218,7 @@ fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
         description: values(rival),
     });
     Some(NextExperiment {
-        change: hypothesised.effect.separated_by.to_owned(),
+        change: ExperimentChange::Measurement(hypothesised.effect.separated_by),
         value: None,
         unit: String::new(),
         slope_deg: None,

@@ -1,10 +1,12 @@
 //! Campaigns for the tests of the search: the model's own crawl under an effect, with noise and a body that goes astray.
 
 use super::fit::{Fit, FitProblem};
+use super::hypothesis::Hypothesis;
 use super::noise::RunNoise;
 use super::observed::Observed;
 use super::parameter::Hypothesised;
-use super::predict::{Hypothesis, Scene, rest};
+use super::predict::Scene;
+use super::residual::Residual;
 use crate::experiment::{RecordedRun, Simulation, simulate};
 use crate::recording::Recording;
 use rand::SeedableRng;
@@ -115,7 +117,7 @@ pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Sce
 pub(super) fn problem<'s, 'a>(scene: &'s Scene<'a>, (hypothesis, at): &(Hypothesis, Vec<f64>)) -> FitProblem<'s, 'a> {
     let noise = |(run, observed): (usize, &Observed<'_>)| {
         let predicted = scene.predict(run, hypothesis, at).expect("it holds");
-        RunNoise::measure(observed, &rest(observed, &predicted))
+        RunNoise::measure(observed, &Residual::new(observed, &predicted))
     };
     FitProblem {
         noise: scene.observed.iter().enumerate().map(noise).collect(),

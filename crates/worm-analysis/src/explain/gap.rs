@@ -17,11 +17,12 @@ mod energy;
 mod free_form;
 mod mean_cycle;
 
-use super::answer::Stage;
+use super::answer::{Stage, StageKind};
 use super::cross_validation::FitWithout;
 use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
-use super::predict::{Predicted, rest};
+use super::predict::Predicted;
+use super::residual::Residual;
 pub(super) use mean_cycle::cycles;
 use std::ops::Range;
 
@@ -50,14 +51,14 @@ struct Left {
 
 impl Left {
     fn new(observed: &Observed<'_>, predicted: &Predicted) -> Self {
-        let rest = rest(observed, predicted);
+        let residual = Residual::new(observed, predicted);
         let cells = observed.cells();
-        let own_m = rest.relative_m.iter().enumerate();
+        let own_m = residual.relative_m.iter().enumerate();
         Self {
             own_m: own_m
-                .map(|(at, relative_m)| rest.body_m[at / cells] + relative_m)
+                .map(|(at, relative_m)| residual.body_m[at / cells] + relative_m)
                 .collect(),
-            body_m: rest.body_m,
+            body_m: residual.body_m,
         }
     }
 
@@ -114,7 +115,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
     /// The stage of a model, fitted to everything in `all`. In each of `folds` it was fitted without the cycles for which the list
     /// of their run says so, numbered by whole cycles from the first sample; without folds it was fitted to nothing, and is
     /// off by as much everywhere. Figures are `NaN` where the model cannot make a run.
-    pub fn stage(&self, name: &'static str, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
+    pub fn stage(&self, stage: StageKind, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
         let left = self.left(all);
         let fit_rms_m = self.rms(&left, |_, _| true);
         let mut held_out = Squares::default();
@@ -124,7 +125,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         }
         let energy_j = |run: usize| energy::own(self.problem, run, all).map(|walk| walk.energy_j(self.observed(run)));
         Stage {
-            stage: name,
+            stage,
             effect,
             fit_rms_m,
             held_out_rms_m: if folds.is_empty() { fit_rms_m } else { held_out.rms() },
@@ -148,7 +149,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
             Some(energy::carried(self.problem, run, recalibrated, &beyond_m)?.energy_j(observed))
         };
         Stage {
-            stage: "free-form",
+            stage: StageKind::FreeForm,
             effect: None,
             fit_rms_m: rms(&all),
             held_out_rms_m: f64::min(rms(&alone), rms(&trend)),
@@ -176,7 +177,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
             MEAN_ABSOLUTE * sigma / cycles.sqrt()
         };
         Stage {
-            stage: "floor",
+            stage: StageKind::Floor,
             effect: None,
             fit_rms_m: squares.rms(),
             held_out_rms_m: squares.rms(),

@@ -1,35 +1,31 @@
-//! Leaps over the walls between the valleys of a fit.
+//! Restarts a fit about the values at which it stopped.
 //!
-//! Where a slick patch begins and ends, the misfit has a kink for each tip that comes to stand on the other side of an edge: a fit
-//! that walks downhill stops at the first of them. So once it has stopped, the patch is tried out with its edges elsewhere, near
-//! and far, and with another friction, and the fit goes on from the best of them, until none is better.
+//! Some effects give the objective many local minima: where a slick patch begins and ends, it has a kink for each tip that comes to
+//! stand on the other side of an end, and a descent stops at the first of them. Such an effect lists values to restart from
+//! ([`Effect::restarts`](worm_physics::effect::Effect::restarts)); the fit goes on from the best of them, until none is better.
 
 use super::fit::{Fit, FitProblem};
 use super::parameter::What;
 
-/// How far an edge leaps, as shares of the patch's length, and by what factor its slickness, one less its share of friction, does.
-const LEAPS: [f64; 7] = [-0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4];
-const SLICKNESS: [f64; 3] = [1.0, 1.8, 0.6];
 const MAX_ROUNDS: usize = 6;
-/// Fall of the misfit for which it is worth going on.
+/// Fall of chi-squared for which it is worth going on.
 const WORTHWHILE: f64 = 2.0;
 
-/// Leaps with the patch that was supposed last, where it is one.
+/// Restarts a fit in the parameters of its last effect.
 pub(super) fn restart_locally(problem: &FitProblem<'_, '_>, mut fit: Fit) -> Fit {
     for _ in 0..MAX_ROUNDS {
-        let Some(patch) = patch(&fit) else {
+        let Some((quantities, restarts)) = restarts(&fit) else {
             return fit;
         };
-        let landings = landings(patch.map(|quantity| fit.at[quantity]));
-        let landed = landings.map(|values| {
+        let evaluated = restarts.iter().map(|values| {
             let mut at = fit.at.clone();
-            for (quantity, value) in patch.into_iter().zip(values) {
+            for (&quantity, value) in quantities.iter().zip(values) {
                 let free = &fit.hypothesis.free[quantity];
-                at[quantity] = value.clamp(free.min, free.max);
+                at[quantity] = value.clamp(free.quantity.min, free.quantity.max);
             }
             problem.evaluate(&fit.hypothesis, at)
         });
-        let best = landed.min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
+        let best = evaluated.min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
         let Some(best) = best.filter(|best| best.chi_squared < fit.chi_squared - WORTHWHILE) else {
             return fit;
         };
@@ -38,32 +34,17 @@ pub(super) fn restart_locally(problem: &FitProblem<'_, '_>, mut fit: Fit) -> Fit
     fit
 }
 
-/// Where among the quantities the patch's friction, beginning and length are.
-fn patch(fit: &Fit) -> Option<[usize; 3]> {
+/// Which quantities are the parameters of the last effect, and the values to restart them from.
+fn restarts(fit: &Fit) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
     let last = fit.hypothesis.hypothesised.len().checked_sub(1)?;
-    if fit.hypothesis.hypothesised[last].effect.name != "slick-patch" {
-        return None;
-    }
-    let number = |wanted: usize| {
+    let effect = fit.hypothesis.hypothesised[last].effect;
+    let quantity_of = |wanted: usize| {
         let mut free = fit.hypothesis.free.iter();
         free.position(
             |free| matches!(free.what, What::Effect { place, parameter } if place == last && parameter == wanted),
         )
     };
-    Some([number(0)?, number(1)?, number(2)?])
-}
-
-/// Patches about one, each as friction factor, beginning and length.
-fn landings([factor, from_m, length_m]: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
-    let edges = LEAPS
-        .into_iter()
-        .flat_map(|before| LEAPS.into_iter().map(move |after| (before, after)));
-    let patches = edges.flat_map(|edges| SLICKNESS.into_iter().map(move |slickness| (edges, slickness)));
-    patches.map(move |((before, after), slickness)| {
-        [
-            1.0 - slickness * (1.0 - factor),
-            from_m + before * length_m,
-            length_m * (1.0 + after - before),
-        ]
-    })
+    let quantities: Vec<usize> = (0..effect.parameters.len()).map(quantity_of).collect::<Option<_>>()?;
+    let values: Vec<f64> = quantities.iter().map(|&quantity| fit.at[quantity]).collect();
+    Some((quantities, effect.restarts(&values)))
 }

@@ -16,7 +16,7 @@ use super::answer::Verdict;
 use super::cross_validation::{Fold, HeldOut, hold_out as hold_out_fit};
 use super::fit::{Fit, FitProblem};
 use super::parameter::{Hypothesised, What};
-use super::predict::rest;
+use super::residual::Residual;
 
 /// Effects that are held against data they were not fitted to.
 const HELD_OUT: usize = 6;
@@ -39,12 +39,6 @@ const COUNTS: f64 = 0.5;
 const HOLDS: f64 = 0.5;
 /// How much less certain probabilities are than held-out likelihoods say, for models that are never quite right.
 const TEMPER: f64 = 0.5;
-
-/// Pairs of effects that no positions can tell apart.
-const TWINS: [(&str, &str); 2] = [
-    ("constant-drag", "directional-friction"),
-    ("lost-stroke", "sensor-scale"),
-];
 
 /// Effects that were fitted.
 #[derive(Debug, Clone)]
@@ -127,11 +121,9 @@ fn jackknife(left_out: impl Iterator<Item = f64> + Clone) -> f64 {
     ((count - 1.0) / count * squares).sqrt()
 }
 
-/// Whether no positions can tell two effects apart.
+/// Whether no positions can distinguish two effects.
 pub(super) fn are_twins(one: &Hypothesised, other: &Hypothesised) -> bool {
-    let whole = one.cell.is_none() && other.cell.is_none();
-    let named = |a: &str, b: &str| one.effect.name == a && other.effect.name == b;
-    whole && TWINS.iter().any(|(a, b)| named(a, b) || named(b, a))
+    one.cell.is_none() && other.cell.is_none() && one.effect.is_twin_of(other.effect)
 }
 
 /// Whether two answers are the same up to twins, or the same effect on another cell.
@@ -198,7 +190,7 @@ fn explainable(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<f64> {
     runs.map(|(run, observed)| {
         let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at);
         predicted.map_or(f64::INFINITY, |predicted| {
-            problem.noise[run].explainable(observed, &rest(observed, &predicted))
+            problem.noise[run].explainable(observed, &Residual::new(observed, &predicted))
         })
     })
     .collect()

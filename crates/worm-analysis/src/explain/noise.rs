@@ -7,7 +7,7 @@
 //! where sums vary more than independent samples would, all weights are smaller by that.
 
 use super::observed::Observed;
-use super::predict::Residual;
+use super::residual::Residual;
 use crate::identify::drift::Drift;
 
 /// Phase bins of a step in the free form.
@@ -35,8 +35,8 @@ pub(super) struct RunNoise {
 
 impl RunNoise {
     /// The noise of a run by what some hypothesis leaves of it.
-    pub fn measure(observed: &Observed<'_>, rest: &Residual) -> Self {
-        let free = free_form(observed, rest);
+    pub fn measure(observed: &Observed<'_>, residual: &Residual) -> Self {
+        let free = free_form(observed, residual);
         let cells = observed.cells();
         let from = observed.settled_from();
         let cycles = observed.whole_cycles() as f64;
@@ -142,20 +142,42 @@ impl RunNoise {
     }
 
     /// How much of the misfit of a residual a free form would take away beyond chance.
-    pub fn explainable(&self, observed: &Observed<'_>, rest: &Residual) -> f64 {
+    pub fn explainable(&self, observed: &Observed<'_>, residual: &Residual) -> f64 {
         let from = observed.settled_from() * observed.cells();
-        let chi_squared = |rest: &Residual| {
+        let chi_squared = |residual: &Residual| {
             let mut squares = 0.0;
-            self.settled.whiten(rest.body_m.iter().copied(), |whitened_residual| {
-                squares += whitened_residual * whitened_residual
-            });
-            let relative = rest.relative_m[from..]
+            self.settled
+                .whiten(residual.body_m.iter().copied(), |whitened_residual| {
+                    squares += whitened_residual * whitened_residual
+                });
+            let relative = residual.relative_m[from..]
                 .iter()
                 .filter(|relative_m| relative_m.is_finite());
             let relative_squares: f64 = relative.map(|relative_m| relative_m * relative_m).sum();
             squares * self.body_scale.powi(2) + relative_squares * self.relative_scale.powi(2)
         };
-        chi_squared(rest) - chi_squared(&free_form(observed, rest)) - self.free_quantities
+        chi_squared(residual) - chi_squared(&free_form(observed, residual)) - self.free_quantities
+    }
+
+    /// Appends the whitened residuals of a run, each of variance 1 where the hypothesis holds: for every sample that counts the
+    /// body's, then for every sample each cell's.
+    pub fn whiten(&self, observed: &Observed<'_>, residual: &Residual, out: &mut Vec<f64>) {
+        let from = observed.counts_from;
+        let mut at = 0;
+        self.drift.whiten(residual.body_m.iter().copied(), |whitened_residual| {
+            if at >= from {
+                out.push(whitened_residual * self.body_scale);
+            }
+            at += 1;
+        });
+        let cells = observed.cells();
+        out.extend(residual.relative_m[from * cells..].iter().map(|relative_m| {
+            if relative_m.is_nan() {
+                0.0
+            } else {
+                relative_m * self.relative_scale
+            }
+        }));
     }
 
     /// Standard deviation that the body's random walk gathers in a cycle, m.
@@ -185,14 +207,14 @@ pub(super) fn bin_of(observed: &Observed<'_>, sample: usize, bins_per_step: usiz
 }
 
 /// What is left when each phase bin may have a way of its own, with an even trend over the cycles.
-fn free_form(observed: &Observed<'_>, rest: &Residual) -> Residual {
+fn free_form(observed: &Observed<'_>, residual: &Residual) -> Residual {
     let cells = observed.cells();
     let mut free = Residual {
-        body_m: flatten(observed, rest.body_m.clone(), true),
-        relative_m: rest.relative_m.clone(),
+        body_m: flatten(observed, residual.body_m.clone(), true),
+        relative_m: residual.relative_m.clone(),
     };
     for cell in 0..cells {
-        let series: Vec<f64> = rest.relative_m.iter().skip(cell).step_by(cells).copied().collect();
+        let series: Vec<f64> = residual.relative_m.iter().skip(cell).step_by(cells).copied().collect();
         for (sample, value) in flatten(observed, series, false).into_iter().enumerate() {
             free.relative_m[sample * cells + cell] = value;
         }

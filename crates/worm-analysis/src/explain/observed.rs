@@ -3,7 +3,7 @@
 use super::error::ExplainError;
 use crate::experiment::RecordedRun;
 use crate::identify::clean::leave_out_outliers;
-use crate::identify::{IdentifiedGait, Prior, gait};
+use crate::identify::{GaitError, IdentifiedGait, Prior, gait};
 use worm_estimator::config::Config;
 
 /// Cycles at the start that do not count where the worm was not seen laid down: the tips' state is not known there.
@@ -158,7 +158,7 @@ impl<'a> Observed<'a> {
 }
 
 /// The gait, also of a worm one of whose cells falls behind the others cycle by cycle.
-fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, gait::GaitError> {
+fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, GaitError> {
     let recording = run.recording;
     let step_order = config.worm.step_order_from_zero();
     let find = |position_m: &[Vec<f64>], filled_m: &[Vec<f64>]| {

@@ -4,6 +4,7 @@
 //! they are free, within what is honestly not known of a worm that was built and measured with care, and what is left after them
 //! is the gap. The priors are normal about the believed value and end at a limit; a value that lies at its limit is told.
 
+use crate::least_squares::Quantity;
 use worm_physics::Worm;
 use worm_physics::effect::{Effect, Parameter};
 
@@ -40,14 +41,8 @@ pub(super) enum Nuisance {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Free {
     pub what: What,
-    /// Mean of its prior.
-    pub centre: f64,
-    /// Standard deviation of its prior; infinite for none.
-    pub sigma: f64,
-    pub min: f64,
-    pub max: f64,
-    /// Step of numerical derivatives.
-    pub step: f64,
+    /// Its prior and its limits.
+    pub quantity: Quantity,
 }
 
 /// What a free quantity is.
@@ -102,34 +97,26 @@ impl Nuisance {
             all.push(Self::Rounding.free_within(ROUNDING));
         }
         let (centre, sigma, reach, step) = DAMPING;
-        all.push(Free {
-            centre,
-            min: centre - reach,
-            max: centre + reach,
-            ..Self::Damping.free((sigma, reach, step))
-        });
+        all.push(Self::Damping.free_within((centre, sigma, centre - reach, centre + reach, step)));
         all.push(Self::Presliding.free_within(PRESLIDING));
         all.push(Self::Viscosity.free_within(VISCOSITY));
         all
     }
 
     fn free(self, (sigma, reach, step): (f64, f64, f64)) -> Free {
-        Free {
-            what: What::Nuisance(self),
-            centre: 0.0,
-            sigma,
-            min: -reach,
-            max: reach,
-            step,
-        }
+        self.free_within((0.0, sigma, -reach, reach, step))
     }
 
     fn free_within(self, (centre, sigma, min, max, step): (f64, f64, f64, f64, f64)) -> Free {
         Free {
-            centre,
-            min,
-            max,
-            ..self.free((sigma, max, step))
+            what: What::Nuisance(self),
+            quantity: Quantity {
+                centre,
+                sigma,
+                min,
+                max,
+                step,
+            },
         }
     }
 
@@ -157,15 +144,17 @@ impl Free {
                 place,
                 parameter: number,
             },
-            centre: parameter.neutral,
-            sigma: if number == 0 {
-                SEVERE * parameter.notable
-            } else {
-                f64::INFINITY
+            quantity: Quantity {
+                centre: parameter.neutral,
+                sigma: if number == 0 {
+                    SEVERE * parameter.notable
+                } else {
+                    f64::INFINITY
+                },
+                min: parameter.min,
+                max: parameter.max,
+                step: 0.2 * parameter.notable,
             },
-            min: parameter.min,
-            max: parameter.max,
-            step: 0.2 * parameter.notable,
         }
     }
 }

@@ -7,7 +7,7 @@
 //! places, which keeps their scatter and loses any wave.
 
 use super::fit::{Fit, FitProblem};
-use super::predict::rest;
+use super::residual::Residual;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -79,7 +79,7 @@ fn period_of(series: &[Series]) -> Period {
 fn ways(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Series> {
     let observed = &problem.scene.observed[run];
     let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
-    let left = rest(observed, &predicted);
+    let left = Residual::new(observed, &predicted);
     let from = observed.settled_from();
     let first = observed.phase.get(from)?;
     let count = observed.whole_cycles();

@@ -1,18 +1,9 @@
-//! What a hypothesis says of every sample, and what it leaves of the data.
-//!
-//! # The residual
-//! The position of cell i is cᵢ + b + (what its drive does): its place in the body, the body's way, and its steps. What a
-//! hypothesis leaves of the positions falls into the body's part, common to all cells, and each cell's part relative to that; the
-//! places cᵢ are taken out as means. The body's part wanders like a random walk whatever the model, for no worm repeats its
-//! cycles exactly; it is whitened by the drift that the data themselves show from cycle to cycle (see [`super::noise`]). Where the
-//! phase had to be found from the positions, what the stepping cell does relative to the others went into it and tells nothing
-//! more: that direction is taken out.
+//! The positions that a hypothesis predicts for every sample.
 
-use super::noise::RunNoise;
+use super::hypothesis::Hypothesis;
 use super::observed::Observed;
-use super::parameter::{Free, Hypothesised, Nuisance, What};
+use super::parameter::{Nuisance, What};
 use super::phase_correction::PhaseCorrection;
-use worm_physics::effect::Setting;
 use worm_physics::{Crawl, Mechanics, Physics, Worm};
 
 /// Cycles that are run before a recording that begins in the middle of a crawl.
@@ -22,55 +13,6 @@ const SETTLING_CYCLES: f64 = 5.0;
 /// What is seen of it before it is repeated, cycles, and in how many parts of a sample.
 const SEEN_CYCLES: f64 = 1.1;
 const PARTS_SEEN: usize = 4;
-
-/// A hypothesis: nuisances and effects, and which quantities are free.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Hypothesis {
-    pub hypothesised: Vec<Hypothesised>,
-    pub free: Vec<Free>,
-    /// Every cycle is run, even where the crawl is periodic.
-    pub throughout: bool,
-}
-
-impl Hypothesis {
-    /// Nuisances and effects.
-    pub fn new(nuisances: &[Free], hypothesised: &[Hypothesised]) -> Self {
-        let mut free = nuisances.to_vec();
-        for (place, hypothesised) in hypothesised.iter().enumerate() {
-            let parameters = hypothesised.effect.parameters.iter().enumerate();
-            free.extend(parameters.map(|(number, parameter)| Free::of_effect(place, number, parameter)));
-        }
-        Self {
-            hypothesised: hypothesised.to_vec(),
-            free,
-            throughout: false,
-        }
-    }
-
-    /// The believed values: every nuisance at its centre, every effect neutral.
-    pub fn neutral(&self) -> Vec<f64> {
-        self.free.iter().map(|free| free.centre).collect()
-    }
-
-    /// The effects with these values.
-    pub fn settings(&self, at: &[f64]) -> Vec<Setting> {
-        let mut values: Vec<Vec<f64>> = self
-            .hypothesised
-            .iter()
-            .map(|hypothesised| vec![0.0; hypothesised.effect.parameters.len()])
-            .collect();
-        for (free, &value) in self.free.iter().zip(at) {
-            if let What::Effect { place, parameter } = free.what {
-                values[place][parameter] = value;
-            }
-        }
-        self.hypothesised
-            .iter()
-            .zip(values)
-            .map(|(hypothesised, values)| Setting::within(hypothesised.effect, hypothesised.cell, &values))
-            .collect()
-    }
-}
 
 /// The runs and what is believed of the worm in each.
 pub(super) struct Scene<'a> {
@@ -270,85 +212,6 @@ impl<'a> Clock<'a> {
         // Before the first sample and after the last, the phase is taken to have gone on as it was.
         self.phase[low] + fraction.clamp(-10.0, 11.0) * (self.phase[high] - self.phase[low])
     }
-}
-
-/// What is left of one run.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Residual {
-    /// The body's part at each sample, m; `NaN` where no cell was seen.
-    pub body_m: Vec<f64>,
-    /// Each cell's part relative to it, m: `[sample][cell]`, flat; `NaN` where not seen.
-    pub relative_m: Vec<f64>,
-}
-
-/// What a prediction leaves of a run.
-pub(super) fn rest(observed: &Observed<'_>, predicted: &Predicted) -> Residual {
-    let cells = observed.cells();
-    let samples = observed.samples();
-    let own_m =
-        |sample: usize, cell: usize| observed.position_m[cell][sample] - predicted.position_m[sample * cells + cell];
-    // The places of the cells in the body, from samples in which all were seen.
-    let mut place_m = vec![0.0; cells];
-    let mut whole = 0.0;
-    for sample in observed.counts_from..samples {
-        let sum_m: f64 = (0..cells).map(|cell| own_m(sample, cell)).sum();
-        if sum_m.is_finite() {
-            whole += 1.0;
-            for (cell, place_m) in place_m.iter_mut().enumerate() {
-                *place_m += own_m(sample, cell) - sum_m / cells as f64;
-            }
-        }
-    }
-    place_m.iter_mut().for_each(|place_m| *place_m /= f64::max(whole, 1.0));
-    let mut rest = Residual {
-        body_m: Vec::with_capacity(samples),
-        relative_m: Vec::with_capacity(samples * cells),
-    };
-    for sample in 0..samples {
-        let stepping = observed.stepping(sample);
-        let (mut sum_m, mut seen) = (0.0, 0.0);
-        for (cell, place_m) in place_m.iter().enumerate() {
-            let own_m = own_m(sample, cell) - place_m;
-            if own_m.is_finite() && (observed.phase_recorded || cell != stepping) {
-                sum_m += own_m;
-                seen += 1.0;
-            }
-        }
-        let body_m = sum_m / seen; // NaN where none was seen
-        rest.body_m.push(body_m);
-        for (cell, place_m) in place_m.iter().enumerate() {
-            let relative_m = own_m(sample, cell) - place_m - body_m;
-            let tells = observed.phase_recorded || cell != stepping;
-            rest.relative_m.push(if tells { relative_m } else { f64::NAN });
-        }
-    }
-    rest
-}
-
-/// Appends a run's residuals, each with variance 1 where the hypothesis holds; `counts` says which samples do.
-pub(super) fn residuals(observed: &Observed<'_>, noise: &RunNoise, rest: &Residual, out: &mut Vec<f64>) {
-    let from = observed.counts_from;
-    let mut at = 0;
-    noise.drift.whiten(rest.body_m.iter().copied(), |whitened_residual| {
-        if at >= from {
-            out.push(whitened_residual * noise.body_scale);
-        }
-        at += 1;
-    });
-    let cells = observed.cells();
-    out.extend(rest.relative_m[from * cells..].iter().map(|relative_m| {
-        if relative_m.is_nan() {
-            0.0
-        } else {
-            relative_m * noise.relative_scale
-        }
-    }));
-}
-
-/// Residuals that a run would leave if the worm could not have made it.
-pub(super) fn impossible(observed: &Observed<'_>, out: &mut Vec<f64>) {
-    let rows = (observed.samples() - observed.counts_from) * (1 + observed.cells());
-    out.extend(std::iter::repeat_n(1e3, rows));
 }
 
 /// The worm of a run, believed.

@@ -14,7 +14,7 @@
 use super::answer::{Place, ResidualMap};
 use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
-use super::predict::{Residual, rest};
+use super::residual::Residual;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -55,7 +55,7 @@ pub(super) fn map(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Residu
     let Some(predicted) = problem.scene.predict(run, &fit.hypothesis, &fit.at) else {
         return map;
     };
-    let ways = Ways::new(observed, &rest(observed, &predicted));
+    let ways = Ways::new(observed, &Residual::new(observed, &predicted));
     let mean_m = ways.mean_m(&vec![1; ways.cycles.len()]);
     let told = ways.told_by();
     let draws = ways.draws(&mean_m, SEED.wrapping_add(run as u64));
@@ -77,7 +77,7 @@ struct Ways {
 }
 
 impl Ways {
-    fn new(observed: &Observed<'_>, rest: &Residual) -> Self {
+    fn new(observed: &Observed<'_>, residual: &Residual) -> Self {
         let cells = observed.cells();
         let per_cycle = cells * BINS_PER_STEP;
         let bin_at = |sample: usize| observed.phase[sample] * per_cycle as f64;
@@ -93,7 +93,7 @@ impl Ways {
                 continue;
             };
             for cell in 0..cells {
-                let own_m = rest.body_m[sample] + rest.relative_m[sample * cells + cell];
+                let own_m = residual.body_m[sample] + residual.relative_m[sample * cells + cell];
                 if own_m.is_finite() {
                     sum_m[bin][cell] += own_m;
                     seen[bin][cell] += 1.0;

@@ -21,20 +21,21 @@ mod model_selection;
 mod next_experiment;
 mod table;
 
-use super::answer::{Answer, Figures, RunSummary, Screened, Stage};
+use super::answer::{Answer, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
 use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
-use super::fit::{Fit, in_parallel};
+use super::fit::Fit;
+use super::hypothesis::Hypothesis;
 use super::model_selection::Candidate;
 use super::parameter::{Free, Hypothesised, Nuisance, What};
-use super::predict::Hypothesis;
 use super::score_test::hypotheses;
 use crate::experiment::Progress;
 use crate::recording::Advance;
 use model_selection::{AdvanceKind, Judged};
+use rayon::prelude::*;
 use table::Table;
 use worm_estimator::config::Config;
-use worm_physics::effect::Parameter;
+use worm_physics::effect::Effect;
 
 /// Fewest advances that say anything of more than the stroke.
 const LEAST: usize = 2;
@@ -77,9 +78,8 @@ pub fn explain_advances(
     let mut finds: Vec<Option<Candidate>> = Vec::with_capacity(hypothesised.len());
     // A few at a time, so that a person sees how far it is.
     for some in hypothesised.chunks(8) {
-        finds.extend(in_parallel(some.len(), |number| {
-            refit(&table, &nominal, &recalibrated, some[number])
-        }));
+        let some = some.par_iter();
+        finds.par_extend(some.map(|&hypothesised| refit(&table, &nominal, &recalibrated, hypothesised)));
         tell("refit", 0.1 + 0.8 * finds.len() as f64 / hypothesised.len() as f64);
     }
     tell("judgement", 0.9);
@@ -101,7 +101,7 @@ fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
 /// it.
 fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hypothesised) -> Option<Candidate> {
     let hypothesis = Hypothesis::new(&recalibrated.hypothesis.free, &[hypothesised]);
-    let tried = tried(hypothesised.effect.parameters);
+    let tried = tried(hypothesised.effect);
     if !tried
         .iter()
         .any(|values| table.shows(&hypothesis, nominal, values, VISIBLE_M))
@@ -135,19 +135,14 @@ fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hyp
     })
 }
 
-/// Values of an effect's parameters to try, its severity to either side of doing nothing.
-fn tried(parameters: &[Parameter]) -> Vec<Vec<f64>> {
-    let (severity, shape) = (&parameters[0], &parameters[1..]);
+/// Values of an effect's parameters to try, with severities on either side of neutral.
+fn tried(effect: &Effect) -> Vec<Vec<f64>> {
+    let severity = effect.severity();
     let sides = TRIED.iter().flat_map(|&notable| [notable, -notable]);
-    let severities = sides
+    sides
         .map(|notable| severity.neutral + notable * severity.notable)
-        .filter(|value| (severity.min..=severity.max).contains(value));
-    severities
-        .map(|value| {
-            let mut values = vec![value];
-            values.extend(shape.iter().map(|parameter| parameter.neutral));
-            values
-        })
+        .filter(|value| (severity.min..=severity.max).contains(value))
+        .map(|value| effect.values_with_neutral_shape(value))
         .collect()
 }
 
@@ -165,14 +160,14 @@ fn screening(hypothesised: &[Hypothesised], finds: &[Option<Candidate>]) -> Vec<
                 .filter(|find| find.fit.converged)
                 .map(|find| find.improvement),
             outcome: match find {
-                None => "not-visible",
-                Some(find) if find.fit.converged => "refitted",
-                Some(_) => "did-not-converge",
+                None => ScreeningOutcome::NotVisible,
+                Some(find) if find.fit.converged => ScreeningOutcome::Refitted,
+                Some(_) => ScreeningOutcome::DidNotConverge,
             },
         })
         .collect();
     rows.sort_by(|a, b| b.score.total_cmp(&a.score));
-    add_unscreened(&mut rows, |_| "not-visible");
+    add_unscreened(&mut rows, |_| ScreeningOutcome::NotVisible);
     rows
 }
 
@@ -199,7 +194,7 @@ fn assemble(
         });
     let effects: Vec<_> = named.by_ref().take(1).collect();
     let rivals: Vec<_> = named.collect();
-    let stage = |stage: &'static str, kind: Option<&AdvanceKind>, fit: &Fit| Stage {
+    let stage = |stage: StageKind, kind: Option<&AdvanceKind>, fit: &Fit| Stage {
         stage,
         effect: kind.map(AdvanceKind::name),
         fit_rms_m: f64::NAN,
@@ -208,13 +203,13 @@ fn assemble(
         energy_error_j: f64::NAN,
     };
     let mut stages = vec![
-        stage("baseline", None, nominal),
-        stage("recalibrated", None, recalibrated),
+        stage(StageKind::Baseline, None, nominal),
+        stage(StageKind::Recalibrated, None, recalibrated),
     ];
     let wrong = judged.others.first();
-    stages.extend(wrong.map(|kind| stage("best-wrong", Some(kind), &kind.find.fit)));
+    stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.find.fit)));
     let best = judged.set.first();
-    stages.extend(best.map(|kind| stage("named", Some(kind), &kind.find.fit)));
+    stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.find.fit)));
     // Where none is named for sure, what goes into the model is what is sure of it.
     let kept = best
         .filter(|_| judged.is_proven)

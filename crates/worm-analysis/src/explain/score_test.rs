@@ -8,17 +8,20 @@
 //! The best of many effects finds something in mere noise too. So noise is drawn on all directions together, with the
 //! correlations they have, and the largest score noted: what it stays below nineteen times in twenty is the threshold.
 
-use super::fit::{Fit, FitProblem, dot, in_parallel};
+use super::fit::{Fit, FitProblem};
+use super::hypothesis::Hypothesis;
 use super::parameter::Hypothesised;
-use super::predict::Hypothesis;
+use crate::least_squares::{dot, submatrix};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use worm_physics::effect::{Effect, LIBRARY, Scope, Visible};
+use rayon::prelude::*;
+use worm_physics::effect::{Effect, LIBRARY, Scope};
 
-/// Strengths that are tried, in notable changes.
+/// Strengths that are tried, in notable changes; a single one where an effect has a place, for there are many places to try.
 const STRENGTHS: [f64; 4] = [1.0, 4.0, 12.0, 36.0];
+const STRENGTHS_AT_A_PLACE: [f64; 1] = [4.0];
 /// Trials of an effect from which fits begin.
 const STARTS: usize = 2;
 /// Strength of an effect from which a fit begins where nothing is known, in notable changes.
@@ -27,14 +30,6 @@ const STRONG: f64 = 8.0;
 const DRAWS: usize = 4000;
 /// Share of the draws that the threshold lies above.
 const CONFIDENCE: f64 = 0.95;
-/// Slips over which a tip may lose its grip, m, and rests in which it may win it back, s.
-const SLIPS_M: [f64; 3] = [1e-5, 1e-4, 1e-3];
-const GRIPS_S: [f64; 2] = [0.05, 0.3];
-/// Times in which a creeping pad may relax, s, and how long slick patches may be and how they are spaced, m.
-const CREEP_TIMES_S: [f64; 3] = [0.1, 0.4, 1.5];
-const PATCH_LENGTHS_M: [f64; 2] = [0.02, 0.05];
-const PATCH_SPACING_M: f64 = 0.015;
-
 /// One effect on one cell, or on all that it concerns, screened.
 #[derive(Debug, Clone)]
 pub(super) struct Screening {
@@ -49,12 +44,7 @@ pub(super) struct Screening {
 pub(super) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<Hypothesised> {
     let mut all = Vec::new();
     for &effect in &LIBRARY {
-        let visible = match effect.visible {
-            Visible::Positions => true,
-            Visible::RecordedPhase => phase_recorded,
-            Visible::PhaseTime => false,
-        };
-        if !visible {
+        if !effect.is_visible_in_positions(phase_recorded) {
             continue;
         }
         if effect.scope != Scope::OneCell {
@@ -70,43 +60,21 @@ pub(super) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<Hypothesised
     all
 }
 
-/// Values at which an effect is tried out: strengths times shapes. The first of each shape is the weakest.
+/// Values at which an effect is tried: strengths times shapes. The first of each shape is the weakest.
 fn trials(effect: &Effect, canal_m: (f64, f64)) -> Vec<Vec<f64>> {
-    let severity = &effect.parameters[0];
-    let shapes: Vec<Vec<f64>> = match effect.name {
-        "pad-creep" => CREEP_TIMES_S.iter().map(|&time_s| vec![time_s]).collect(),
-        "breakaway-friction" => SLIPS_M
-            .iter()
-            .flat_map(|&slip_m| GRIPS_S.map(|grip_s| vec![slip_m, grip_s]))
-            .collect(),
-        "slick-patch" => {
-            let places = ((canal_m.1 - canal_m.0) / PATCH_SPACING_M).ceil().clamp(1.0, 60.0) as usize;
-            let from_m = (0..places).map(|place| canal_m.0 + PATCH_SPACING_M * place as f64);
-            from_m
-                .flat_map(|from_m| PATCH_LENGTHS_M.map(|length_m| vec![from_m, length_m]))
-                .collect()
-        }
-        _ => vec![
-            effect.parameters[1..]
-                .iter()
-                .map(|parameter| parameter.neutral)
-                .collect(),
-        ],
-    };
-    let strengths: &[f64] = if effect.name == "slick-patch" {
-        &[4.0]
+    let severity = effect.severity();
+    let strengths: &[f64] = if effect.has_place() {
+        &STRENGTHS_AT_A_PLACE
     } else {
         &STRENGTHS
     };
     let mut trials = Vec::new();
-    for shape in &shapes {
+    for shape in effect.starting_shapes(canal_m) {
         for &strength in strengths {
             for sign in [1.0, -1.0] {
                 let value = severity.neutral + sign * strength * severity.notable;
                 if value > severity.min && value < severity.max {
-                    let mut values = vec![value];
-                    values.extend(shape);
-                    trials.push(values);
+                    trials.push([&[value], &shape[..]].concat());
                 }
             }
         }
@@ -116,20 +84,15 @@ fn trials(effect: &Effect, canal_m: (f64, f64)) -> Vec<Vec<f64>> {
 
 /// Strong effects from which a fit may begin where nothing is known.
 pub(super) fn strong(effect: &Effect) -> Vec<Vec<f64>> {
-    let severity = &effect.parameters[0];
-    if effect.name == "slick-patch" {
-        return Vec::new(); // nowhere is as good a place to begin as any other
+    if effect.has_place() {
+        return Vec::new(); // no place is more likely than another
     }
-    let signs = [1.0, -1.0];
-    let values = signs.map(|sign| severity.neutral + sign * STRONG * severity.notable);
+    let severity = effect.severity();
+    let values = [1.0, -1.0].map(|sign| severity.neutral + sign * STRONG * severity.notable);
     values
         .into_iter()
         .filter(|value| (severity.min..severity.max).contains(value))
-        .map(|value| {
-            let mut values = vec![value];
-            values.extend(effect.parameters[1..].iter().map(|parameter| parameter.neutral));
-            values
-        })
+        .map(|value| effect.values_with_neutral_shape(value))
         .collect()
 }
 
@@ -144,7 +107,7 @@ impl<'f> Projection<'f> {
     fn new(fit: &'f Fit) -> Self {
         let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
         let normal = fit.normal(None);
-        let mut matrix = DMatrix::from_fn(open.len(), open.len(), |row, column| normal[(open[row], open[column])]);
+        let mut matrix = submatrix(&normal, &open);
         for row in 0..open.len() {
             matrix[(row, row)] += 1e-9 * (1.0 + matrix[(row, row)]);
         }
@@ -205,8 +168,7 @@ pub(super) fn screen(
             })
         })
         .collect();
-    let tried: Vec<Option<Tried>> = in_parallel(tasks.len(), |task| {
-        let (number, values, is_weakest) = &tasks[task];
+    let try_out = |(number, values, is_weakest): &(usize, Vec<f64>, bool)| {
         let hypothesised = hypothesised[*number];
         let mut all = fit.hypothesis.hypothesised.clone();
         all.push(hypothesised);
@@ -214,7 +176,7 @@ pub(super) fn screen(
         let hypothesis = Hypothesis::new(&nuisances, &all);
         let mut at = fit.at.clone();
         at.extend(values);
-        let mut direction = problem.residuals_here(&hypothesis, &at);
+        let mut direction = problem.residuals(&hypothesis, &at);
         for (value, here) in direction.iter_mut().zip(&fit.residual) {
             *value -= here;
         }
@@ -234,8 +196,8 @@ pub(super) fn screen(
             fraction,
             direction: is_weakest.then_some((direction, shadow, own)),
         })
-    });
-    let tried: Vec<Tried> = tried.into_iter().flatten().collect();
+    };
+    let tried: Vec<Tried> = tasks.par_iter().filter_map(try_out).collect();
     let threshold = threshold(&projection, &tried, seed);
     let mut screened: Vec<Screening> = hypothesised
         .iter()
@@ -299,15 +261,14 @@ fn threshold(projection: &Projection<'_>, tried: &[Tried], seed: u64) -> f64 {
     if count == 0 {
         return 0.0;
     }
-    let rows = in_parallel(count, |row| {
+    let correlations = |row: usize| -> Vec<f64> {
         let (a, a_shadow, a_own) = directions[row];
-        (0..=row)
-            .map(|column| {
-                let (b, b_shadow, b_own) = directions[column];
-                projection.product(a, a_shadow, b, b_shadow) / (a_own * b_own).sqrt()
-            })
-            .collect::<Vec<f64>>()
-    });
+        let with_others = directions[..=row].iter();
+        with_others
+            .map(|(b, b_shadow, b_own)| projection.product(a, a_shadow, b, b_shadow) / (a_own * b_own).sqrt())
+            .collect()
+    };
+    let rows: Vec<Vec<f64>> = (0..count).into_par_iter().map(correlations).collect();
     let mut gram = DMatrix::from_fn(count, count, |row, column| rows[row.max(column)][row.min(column)]);
     for row in 0..count {
         gram[(row, row)] += 1e-6;

@@ -5,12 +5,14 @@ use super::assemble;
 use super::cross_validation;
 use super::error::ExplainError;
 use super::fit::{Fit, FitProblem};
+use super::hypothesis::Hypothesis;
 use super::local_restart::restart_locally;
 use super::model_selection::{self, Candidate, Open};
 use super::noise::RunNoise;
 use super::observed::Observed;
 use super::parameter::{Hypothesised, Nuisance, What};
-use super::predict::{Hypothesis, Scene, nominal, predict, rest};
+use super::predict::{Scene, nominal, predict};
+use super::residual::Residual;
 use super::score_test::{self, Screening};
 use super::speed_droop::speed_droop;
 use crate::experiment::{Progress, RecordedRun};
@@ -50,7 +52,7 @@ impl Default for Options {
 }
 
 /// Prepares the runs of a campaign.
-fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
+pub(super) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
     if runs.is_empty() {
         return Err(ExplainError::NoRun);
     }
@@ -105,9 +107,9 @@ fn same_order(first: &Observed<'_>, other: &Observed<'_>) -> Result<(), ExplainE
 fn judge_start(observed: &mut Observed<'_>, physics: &Physics) {
     let first_cycle = |observed: &Observed<'_>| {
         let predicted = predict(observed, physics, 0.4, physics.is_periodic())?;
-        let rest = rest(observed, &predicted);
+        let residual = Residual::new(observed, &predicted);
         let until = observed.phase.partition_point(|&phase| phase < observed.phase[0] + 1.0);
-        let body: Vec<f64> = rest.body_m[..until]
+        let body: Vec<f64> = residual.body_m[..until]
             .iter()
             .copied()
             .filter(|at_m| at_m.is_finite())
@@ -224,7 +226,7 @@ fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(FitPr
                 recording: observed.run.recording.source.display().to_string(),
                 slope_deg: observed.run.slope_deg,
             })?;
-            noise.push(RunNoise::measure(observed, &rest(observed, &predicted)));
+            noise.push(RunNoise::measure(observed, &Residual::new(observed, &predicted)));
         }
         let problem = FitProblem {
             scene,
@@ -234,7 +236,7 @@ fn recalibrate<'s, 'a>(scene: &'s Scene<'a>, base: &Hypothesis) -> Result<(FitPr
         let mut fit = problem.fit(base, at, None);
         round += 1;
         if round == NOISE_ROUNDS {
-            problem.buy_all_derivatives(&mut fit);
+            problem.compute_jacobian(&mut fit);
             let repeating_excess = problem.repeating_excess(&fit);
             let problem = FitProblem {
                 repeating_excess,

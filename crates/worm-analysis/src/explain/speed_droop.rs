@@ -17,7 +17,7 @@ use super::observed::{MIN_CYCLES, Observed};
 use super::predict::Scene;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::f64::consts::TAU;
-use worm_physics::effect;
+use worm_physics::effect::MOTOR_DROOP;
 use worm_physics::{Crawl, Mechanics};
 
 /// Parts that a step is cut into.
@@ -91,8 +91,7 @@ pub(super) fn speed_droop(scene: &Scene<'_>, fit: &Fit, cycle_s_nominal: &[f64])
             })
         })
         .collect();
-    let max = effect::named("motor-droop").ok()?.parameters.first()?.max;
-    likeliest(&paced, max)
+    likeliest(&paced, MOTOR_DROOP.severity().max)
 }
 
 /// The likeliest slowdown from none to the most.

@@ -1,6 +1,6 @@
 //! What can be told of positions before the gait is known: their noise, their outliers, and where there are any.
 
-use super::steps::running_median;
+use super::running_median::running_median;
 
 /// Samples of the running median that outliers are told by.
 const MEDIAN_SAMPLES: usize = 5;

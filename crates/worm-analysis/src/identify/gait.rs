@@ -11,6 +11,7 @@ mod kinematics;
 mod recorded;
 
 use super::clean::{leave_out_outliers, noise_by_differences, usable_range};
+use super::gait_error::GaitError;
 use super::steps::{self, Step};
 
 /// Times that kinematics and phase are found from one another.
@@ -21,53 +22,6 @@ const EVEN: (f64, f64) = (5.0, 0.03);
 const MIN_CYCLES: f64 = 2.0;
 /// Least number of samples that could show two cycles of two cells.
 const MIN_SAMPLES: usize = 10;
-
-/// Why no gait was found.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GaitError {
-    /// A cell does not move against the others.
-    #[error(
-        "cell {} does not step: against the others it goes to and fro by {:.2} mm, too little for a step: is it a cell of this worm, and does the worm crawl?",
-        cell + 1, swing_m * 1e3
-    )]
-    NoStep {
-        /// The cell, from 0.
-        cell: usize,
-        /// How far it goes to and fro relative to the mean of all cells, m.
-        swing_m: f64,
-    },
-    /// The worm's cells do not step in turns.
-    #[error(
-        "at {at_s:.2} s the cells do not step one after the other in a fixed order: cut the recording to where the worm crawls (--from, --to)"
-    )]
-    Disorder {
-        /// Where that was first seen, s.
-        at_s: f64,
-    },
-    /// The recording is too short.
-    #[error("{cycles:.1} gait cycles are too few: at least two whole ones are needed")]
-    TooFewSteps {
-        /// How many there are.
-        cycles: f64,
-    },
-    /// The gait runs in reverse.
-    #[error(
-        "the worm crawls backward: mirror the recording (change the sign of all positions) and the sign of the slope"
-    )]
-    Backward,
-    /// Two cells alone, and no phase to be had from them.
-    #[error(
-        "two cells show where they are in a step only while the motor turns evenly, and here they stand {:.1} mm off that: record the gait phase, or cut the recording to where the worm crawls evenly (--from, --to)",
-        off_m * 1e3
-    )]
-    Uneven {
-        /// Standard deviation of their distance from that of an even motor, m.
-        off_m: f64,
-    },
-    /// The recorded phase does not go with the positions.
-    #[error("the recorded gait phase and the positions contradict each other: {0}")]
-    Phase(String),
-}
 
 /// The gait of a worm in a recording.
 #[derive(Debug, Clone)]
@@ -96,13 +50,6 @@ pub struct IdentifiedGait {
 pub(crate) fn steps_made(cells: usize, place: usize, phase: f64) -> f64 {
     let cycle = phase.floor();
     cycle + ((phase - cycle) * cells as f64 - place as f64).clamp(0.0, 1.0)
-}
-
-/// The number of the step of `cell` that follows step number `slot` of cell `last`: the next but for steps not seen.
-pub(super) fn next_slot(order: &[usize], slot: usize, last: usize, cell: usize) -> usize {
-    let place = |cell| order.iter().position(|&other| other == cell).unwrap_or(0);
-    let ahead = (place(cell) + order.len() - place(last)) % order.len();
-    slot + if ahead == 0 { order.len() } else { ahead }
 }
 
 /// What is known of the gait before the positions are looked at.

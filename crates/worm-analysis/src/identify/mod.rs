@@ -12,12 +12,15 @@ pub(crate) mod clean;
 pub(crate) mod drift;
 pub mod fit;
 pub mod gait;
+mod gait_error;
 pub mod onset;
+mod running_median;
 pub mod search;
 mod steps;
 pub(crate) mod theory;
 mod track;
 
 pub use fit::{FitError, Fitted, FittedRun, PositionRun};
-pub use gait::{GaitError, IdentifiedGait, Prior};
+pub use gait::{IdentifiedGait, Prior};
+pub use gait_error::GaitError;
 pub use onset::Onset;

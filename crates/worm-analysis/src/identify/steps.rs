@@ -4,7 +4,8 @@
 //! that its turning points can be found without knowing the period: a turn counts once the cell has come back by a good part
 //! of its swing. From the turning points follow the steps, their cyclic order, and a first idea of the gait phase.
 
-use super::gait::{GaitError, next_slot};
+use super::gait_error::GaitError;
+use super::running_median::running_median;
 use std::ops::Range;
 
 /// Share of a cell's swing by which it must come back for a turn to count.
@@ -167,6 +168,13 @@ fn chain(cells: &[usize], order: &[usize]) -> Vec<usize> {
     kept
 }
 
+/// The number of the first step of `cell` after step number `slot`, which was of cell `last`.
+fn next_slot(order: &[usize], slot: usize, last: usize, cell: usize) -> usize {
+    let place = |cell| order.iter().position(|&other| other == cell).unwrap_or(0);
+    let ahead = (place(cell) + order.len() - place(last)) % order.len();
+    slot + if ahead == 0 { order.len() } else { ahead }
+}
+
 /// The order in which each cell is most often followed by the next.
 fn cyclic_order(sequence: &[usize], cells: usize) -> Result<Vec<usize>, GaitError> {
     let mut follows = vec![vec![0_usize; cells]; cells];
@@ -201,21 +209,6 @@ fn relative(position_m: &[Vec<f64>]) -> Vec<Vec<f64>> {
         }
     }
     relative_m
-}
-
-/// The running median over a window that shrinks at the ends.
-pub(super) fn running_median(series: &[f64], window: usize) -> Vec<f64> {
-    let half = window / 2;
-    let mut sorted = Vec::with_capacity(window);
-    (0..series.len())
-        .map(|at| {
-            let reach = half.min(at).min(series.len() - 1 - at);
-            sorted.clear();
-            sorted.extend_from_slice(&series[at - reach..=at + reach]);
-            sorted.sort_by(f64::total_cmp);
-            sorted[reach]
-        })
-        .collect()
 }
 
 /// How far a series goes up and down, its rarest values left out.

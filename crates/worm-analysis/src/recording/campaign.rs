@@ -1,7 +1,8 @@
 //! Campaigns: several recordings of one worm on different slopes, listed in a TOML file; or, where nobody recorded positions, its
 //! measured advances.
 
-use super::open::{OpenOptions, open_with_progress};
+use super::open::open_with_progress;
+use super::options::OpenOptions;
 use super::series::Recording;
 use serde::Deserialize;
 use std::ops::{Range, RangeInclusive};

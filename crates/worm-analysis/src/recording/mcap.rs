@@ -6,7 +6,7 @@ pub use write::write;
 
 use super::{Motor, Recording};
 use std::path::Path;
-use worm_estimator::estimate::{Capture, LivedTime};
+use worm_estimator::estimate::{Capture, MotorTime};
 use worm_estimator::message::{JsonMessage, State};
 use worm_log::{Channel, ReadError, nothing, scan};
 
@@ -75,7 +75,7 @@ struct Stretch {
     first_tick: u64,
     last_tick: u64,
     last_sample: u64,
-    lived: LivedTime,
+    lived: MotorTime,
     capture: Capture,
     /// Lived time and phase of each tick that read the motor.
     phases: Vec<(f64, f64)>,
@@ -91,7 +91,7 @@ impl Stretch {
             first_tick: state.sequence,
             last_tick: state.sequence,
             last_sample: state.sample,
-            lived: LivedTime::default(),
+            lived: MotorTime::default(),
             capture: Capture::default(),
             phases: Vec::new(),
             samples: Vec::new(),

@@ -1,6 +1,6 @@
 //! One way in for all formats.
 
-use super::projection::Axis;
+use super::options::OpenOptions;
 use super::series::Recording;
 use super::text::Text;
 use super::{c3d, mcap, projection, sanity_check, table, vicon};
@@ -9,46 +9,22 @@ use std::io::{Cursor, Read};
 use std::path::Path;
 use worm_log::ReadError;
 
-/// Bytes from which the format is told.
+/// Bytes from which the format is recognised.
 const HEAD: usize = 4096;
 const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 const FORMATS: &str = "give a CSV as in the recording format, a Vicon Nexus CSV, a C3D or an MCAP file";
 
-/// What to take from a file and how much may be missing in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OpenOptions {
-    /// Leave out what lies before this time, s.
-    pub from_s: Option<f64>,
-    /// Leave out what lies after this time, s.
-    pub to_s: Option<f64>,
-    /// Longest time for which a cell may be out of sight, s.
-    pub max_gap_s: f64,
-    /// Direction up the canal in the space of the markers; without it, it is found from their motion.
-    pub axis: Option<Axis>,
-}
-
-impl Default for OpenOptions {
-    fn default() -> Self {
-        Self {
-            from_s: None,
-            to_s: None,
-            max_gap_s: 0.2,
-            axis: None,
-        }
-    }
-}
-
 /// Reads a recording in any of the known formats and checks that it can be one of a worm. Positions that were not seen stay
 /// `NaN`; [`Recording::filled`] bridges them.
 ///
 /// # Errors
-/// [`ReadError`] when the file cannot be read, is damaged, contradicts itself or would leave anything to guess.
+/// [`ReadError`] when the file cannot be read, is damaged, contradicts itself or leaves anything to guess.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, ReadError> {
     open_with_progress(path, options, &mut |_fraction| {})
 }
 
-/// As [`open`], telling `progress` now and then which share of the file was read, 0 to 1.
+/// As [`open`], reporting to `progress` now and then which fraction of the file has been read, 0 to 1.
 ///
 /// # Errors
 /// As [`open`].
@@ -57,7 +33,7 @@ pub fn open_with_progress(
     options: &OpenOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Recording, ReadError> {
-    check_options(path, options)?;
+    options.check(path)?;
     let cannot = |error: std::io::Error| {
         ReadError::whole(
             path,
@@ -105,31 +81,7 @@ pub fn open_with_progress(
     Ok(recording)
 }
 
-fn check_options(path: &Path, options: &OpenOptions) -> Result<(), ReadError> {
-    let refuse = |problem: String, remedy| Err(ReadError::whole(path, problem, remedy));
-    for (name, value) in [("--from", options.from_s), ("--to", options.to_s)] {
-        if let Some(value) = value.filter(|value| !value.is_finite()) {
-            return refuse(format!("{name} {value} is no time"), "give seconds");
-        }
-    }
-    if let (Some(from_s), Some(to_s)) = (options.from_s, options.to_s)
-        && from_s >= to_s
-    {
-        return refuse(
-            format!("--from {from_s} is not before --to {to_s}"),
-            "give the earlier time to --from",
-        );
-    }
-    if !(options.max_gap_s >= 0.0 && options.max_gap_s.is_finite()) {
-        return refuse(
-            format!("--max-gap {} is no length of time", options.max_gap_s),
-            "give seconds, 0 or more",
-        );
-    }
-    Ok(())
-}
-
-/// The formats that can be told apart.
+/// The formats that are recognised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     /// CSV with named columns.

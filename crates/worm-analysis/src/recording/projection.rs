@@ -7,9 +7,9 @@
 //! decide is refused: `--axis` then says which way is up.
 
 use super::markers::Markers;
-use super::quantile::{quantile, spread};
-use super::sanity_check::moves;
 use super::series::Recording;
+use super::statistics::moves;
+use super::statistics::{quantile, spread};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 use std::str::FromStr;

@@ -1,17 +1,13 @@
 //! What every recording must satisfy, wherever it comes from, so that no result is made of nothing.
 
 use super::gaps::{bridge, holes, is_longer, round_up};
-use super::open::OpenOptions;
-use super::quantile::{noise, quantile, spread};
+use super::options::OpenOptions;
 use super::series::Recording;
+use super::statistics::{moves, quantile, spread};
 use worm_log::ReadError;
 
 /// Fewest samples that can show anything.
 const MIN_SAMPLES: usize = 10;
-/// A cell whose positions spread less than this many times their noise stands still: noise alone spreads 3.3 times.
-const STILL_NOISE: f64 = 5.0;
-/// A cell whose positions spread less than this stands still, m: half the smallest stroke that a worm may have.
-const STILL_M: f64 = 5e-5;
 /// No worm's neighbouring cells are this far apart, or move this far against each other, m: stroke and spacing are at most
 /// 1 m, and a worm of some millimetres that is written down in millimetres has numbers beyond this.
 const TOO_LARGE_M: f64 = 5.0;
@@ -153,11 +149,6 @@ fn check_lengths(recording: &Recording) -> Result<(), ReadError> {
         format!("{problem}, which no worm does: the positions are evidently in millimetres"),
         "divide them by 1000; columns that end in _m hold metres",
     ))
-}
-
-/// Whether a series of positions, m, moves beyond its noise.
-pub(super) fn moves(series: &[f64]) -> bool {
-    spread(series.iter().copied()) > STILL_M.max(STILL_NOISE * noise(series))
 }
 
 fn check_motion(recording: &Recording) -> Result<(), ReadError> {

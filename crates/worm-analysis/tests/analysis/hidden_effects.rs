@@ -4,23 +4,23 @@ mod contact;
 
 use testkit::hidden_effects::CELLS;
 use testkit::hidden_effects::body::Worm;
-use testkit::hidden_effects::campaign::{CampaignKind, HiddenCampaign, Size, Twin, Wanted, draw_sized};
-use testkit::hidden_effects::effect::{Band, Effect};
-use testkit::hidden_effects::flaws::{Flaws, Patch};
-use testkit::hidden_effects::make::Make;
-use testkit::hidden_effects::repeat::Condition;
-use testkit::hidden_effects::scene::{Played, STEP_S, Scene};
+use testkit::hidden_effects::campaign::{CampaignKind, CampaignSize, Hidden, HiddenCampaign, Twin, draw_sized};
+use testkit::hidden_effects::deviations::{Deviations, Patch};
+use testkit::hidden_effects::effect::{Effect, SeverityRange};
+use testkit::hidden_effects::effect_size::advances_m;
+use testkit::hidden_effects::follow_up::Condition;
+use testkit::hidden_effects::parameters::WormParameters;
+use testkit::hidden_effects::scene::{STEP_S, Scene, SimulatedRun};
 use testkit::hidden_effects::split::{Split, split};
-use testkit::hidden_effects::visible::advances_m;
 
 /// A change of the advance smaller than this counts as none, m.
 const NO_CHANGE_M: f64 = 0.1e-3;
 
-fn worm(flaws: Flaws) -> Worm {
+fn worm(deviations: Deviations) -> Worm {
     Worm {
-        make: Make::nominal(),
-        flaws,
-        stranger: None,
+        parameters: WormParameters::nominal(),
+        deviations,
+        unmodelled: None,
     }
 }
 
@@ -30,19 +30,25 @@ fn advance_m(worm: &Worm, slope_deg: f64) -> f64 {
         cycles: 8.0,
         ..Scene::ideal(slope_deg, 2.5)
     };
-    let played = scene.play(worm).expect("the worm holds");
-    let advances_m = advances_m(&played);
+    let simulated = scene.simulate(worm).expect("the worm holds");
+    let advances_m = advances_m(&simulated);
     let settled_m = &advances_m[2..];
     settled_m.iter().sum::<f64>() / settled_m.len() as f64
 }
 
 /// Advance of a settled cycle so slow that dynamics are not seen, on tips that do not give before they slide, m.
-fn slow_advance_m(flaws: Flaws, slope_deg: f64) -> f64 {
-    let make = Make {
+fn slow_advance_m(deviations: Deviations, slope_deg: f64) -> f64 {
+    let parameters = WormParameters {
         damping_ratio: 1.0,
-        ..Make::nominal()
+        ..WormParameters::nominal()
     };
-    slow_advance_of_m(&Worm { make, ..worm(flaws) }, slope_deg)
+    slow_advance_of_m(
+        &Worm {
+            parameters,
+            ..worm(deviations)
+        },
+        slope_deg,
+    )
 }
 
 /// The same of any worm, m.
@@ -54,7 +60,7 @@ fn slow_advance_of_m(worm: &Worm, slope_deg: f64) -> f64 {
         step_s: 2.0 * STEP_S,
         ..Scene::ideal(slope_deg, 20.0)
     };
-    advances_m(&scene.play(worm).expect("the worm holds"))[0]
+    advances_m(&scene.simulate(worm).expect("the worm holds"))[0]
 }
 
 /// A flaw of the second cell alone.
@@ -65,22 +71,22 @@ fn second(factor: f64) -> [f64; CELLS] {
 #[test]
 fn slow_and_stiff_it_gives_the_figures_of_another_simulation() {
     let identified_m = [2.0e-3, 1.1e-3, 1.75e-3, 2.15e-3];
-    let clamps = Flaws {
+    let clamps = Deviations {
         friction_factor: identified_m.map(|m| m / 1.75e-3),
-        ..Flaws::default()
+        ..Deviations::default()
     };
-    let pads = Flaws {
+    let pads = Deviations {
         stiffness_factor: identified_m.map(|m| 1.75e-3 / m),
-        ..Flaws::default()
+        ..Deviations::default()
     };
     let table = [
-        ("equal cells", Flaws::default(), [6.833, 4.611, 2.072]),
+        ("equal cells", Deviations::default(), [6.833, 4.611, 2.072]),
         ("identified, as clamp forces", clamps, [6.356, 3.333, 1.379]),
         ("identified, as stiffnesses", pads, [6.71, 4.35, 2.07]),
     ];
-    for (worm, flaws, expected_mm) in table {
+    for (worm, deviations, expected_mm) in table {
         for (slope_deg, expected_mm) in [0.0, 30.0, 45.0].into_iter().zip(expected_mm) {
-            let advance_mm = 1e3 * slow_advance_m(flaws.clone(), slope_deg);
+            let advance_mm = 1e3 * slow_advance_m(deviations.clone(), slope_deg);
             println!("{worm} at {slope_deg}°: {advance_mm:.3} mm of {expected_mm} mm");
             assert!(
                 (advance_mm / expected_mm - 1.0).abs() < 0.01,
@@ -92,52 +98,52 @@ fn slow_and_stiff_it_gives_the_figures_of_another_simulation() {
 
 #[test]
 fn every_effect_changes_the_advance_in_its_own_sense() {
-    let flaw = Flaws::default;
+    let none = Deviations::default;
     #[rustfmt::skip]
     // Effect, what is wrong, and whether the advance on the level and on a slope grows or shrinks.
     let table = [
         // Lower friction spoils less of the stroke on the level, and holds less on a slope.
-        ("unequal-clamping", Flaws { friction_factor: second(0.4), ..flaw() }, [0, -1]),
-        ("unequal-clamping", Flaws { friction_factor: second(1.6), ..flaw() }, [-1, -1]),
-        ("unequal-stiffness", Flaws { stiffness_factor: second(0.4), ..flaw() }, [-1, -1]),
-        ("unequal-stiffness", Flaws { stiffness_factor: second(1.6), ..flaw() }, [1, 1]),
-        ("directional-friction", Flaws { backward_over_forward: 0.8, ..flaw() }, [-1, -1]),
-        ("directional-friction", Flaws { backward_over_forward: 1.6, ..flaw() }, [0, 1]),
-        ("breakaway-friction", Flaws { static_over_kinetic: 1.8, ..flaw() }, [0, 1]),
-        ("pad-hardening", Flaws { hardening: 1.5, ..flaw() }, [1, 1]),
-        ("pad-creep", Flaws { creep_share: 1.0, creep_s: 0.5, ..flaw() }, [1, 1]),
-        ("pad-hysteresis", Flaws { yielding_share: 0.5, ..flaw() }, [-1, -1]),
-        ("viscous-drag", Flaws { drag_n_s_per_m: 20.0, ..flaw() }, [-1, -1]),
-        ("constant-drag", Flaws { force_n: 0.5, ..flaw() }, [-1, -1]),
-        ("payload", Flaws { mass_kg: 0.08, ..flaw() }, [0, -1]),
-        ("slope-error", Flaws { angle_deg: 4.0, ..flaw() }, [-1, -1]),
-        ("slope-error", Flaws { angle_deg: -4.0, ..flaw() }, [1, 1]),
-        ("tether-drag", Flaws { tether_n_per_m: 10.0, ..flaw() }, [-1, -1]),
-        ("lost-stroke", Flaws { stroke_factor: second(0.88), ..flaw() }, [-1, -1]),
-        ("lost-stroke", Flaws { stroke_factor: [0.88; CELLS], ..flaw() }, [-1, -1]),
-        ("actuator-compliance", Flaws { compliance_m_per_n: 2e-4, ..flaw() }, [-1, -1]),
-        ("backlash", Flaws { play_m: 1e-3, ..flaw() }, [-1, -1]),
-        ("step-overlap", Flaws { overlap: 0.2, ..flaw() }, [-1, -1]),
-        ("slick-patch", Flaws { patch: Some(Patch { from_m: -0.05, length_m: 0.02, friction_factor: 0.3 }), ..flaw() }, [0, -1]),
+        ("unequal-clamping", Deviations { friction_factor: second(0.4), ..none() }, [0, -1]),
+        ("unequal-clamping", Deviations { friction_factor: second(1.6), ..none() }, [-1, -1]),
+        ("unequal-stiffness", Deviations { stiffness_factor: second(0.4), ..none() }, [-1, -1]),
+        ("unequal-stiffness", Deviations { stiffness_factor: second(1.6), ..none() }, [1, 1]),
+        ("directional-friction", Deviations { backward_over_forward: 0.8, ..none() }, [-1, -1]),
+        ("directional-friction", Deviations { backward_over_forward: 1.6, ..none() }, [0, 1]),
+        ("breakaway-friction", Deviations { static_over_kinetic: 1.8, ..none() }, [0, 1]),
+        ("pad-hardening", Deviations { hardening: 1.5, ..none() }, [1, 1]),
+        ("pad-creep", Deviations { creep_share: 1.0, creep_s: 0.5, ..none() }, [1, 1]),
+        ("pad-hysteresis", Deviations { yielding_share: 0.5, ..none() }, [-1, -1]),
+        ("viscous-drag", Deviations { drag_n_s_per_m: 20.0, ..none() }, [-1, -1]),
+        ("constant-drag", Deviations { force_n: 0.5, ..none() }, [-1, -1]),
+        ("payload", Deviations { mass_kg: 0.08, ..none() }, [0, -1]),
+        ("slope-error", Deviations { angle_deg: 4.0, ..none() }, [-1, -1]),
+        ("slope-error", Deviations { angle_deg: -4.0, ..none() }, [1, 1]),
+        ("tether-drag", Deviations { tether_n_per_m: 10.0, ..none() }, [-1, -1]),
+        ("lost-stroke", Deviations { stroke_factor: second(0.88), ..none() }, [-1, -1]),
+        ("lost-stroke", Deviations { stroke_factor: [0.88; CELLS], ..none() }, [-1, -1]),
+        ("actuator-compliance", Deviations { compliance_m_per_n: 2e-4, ..none() }, [-1, -1]),
+        ("backlash", Deviations { play_m: 1e-3, ..none() }, [-1, -1]),
+        ("step-overlap", Deviations { overlap: 0.2, ..none() }, [-1, -1]),
+        ("slick-patch", Deviations { patch: Some(Patch { from_m: -0.05, length_m: 0.02, friction_factor: 0.3 }), ..none() }, [0, -1]),
         // On 30° a tenth less friction spoils as much less as it holds less: the worm is near its best friction there.
-        ("wear", Flaws { loss_per_cycle: 0.02, ..flaw() }, [1, 0]),
-        ("motor-droop", Flaws { slowdown_per_n: 0.3, ..flaw() }, [0, 0]),
-        ("sensor-scale", Flaws { scale: 1.1, ..flaw() }, [1, 1]),
-        ("sensor-scale", Flaws { scale: 0.9, ..flaw() }, [-1, -1]),
-        ("sensor-latency", Flaws { latency_s: 0.06, ..flaw() }, [0, 0]),
-        ("slope-clamping", Flaws { slope_sensitivity: 0.6, ..flaw() }, [0, 0]),
+        ("wear", Deviations { loss_per_cycle: 0.02, ..none() }, [1, 0]),
+        ("motor-droop", Deviations { slowdown_per_n: 0.3, ..none() }, [0, 0]),
+        ("sensor-scale", Deviations { scale: 1.1, ..none() }, [1, 1]),
+        ("sensor-scale", Deviations { scale: 0.9, ..none() }, [-1, -1]),
+        ("sensor-latency", Deviations { latency_s: 0.06, ..none() }, [0, 0]),
+        ("slope-clamping", Deviations { slope_sensitivity: 0.6, ..none() }, [0, 0]),
     ];
-    let usual = worm(flaw());
+    let usual = worm(none());
     let slopes_deg = [0.0, 30.0];
-    let honest_m = slopes_deg.map(|slope_deg| advance_m(&usual, slope_deg));
-    for (name, flaws, expected) in &table {
+    let baseline_m = slopes_deg.map(|slope_deg| advance_m(&usual, slope_deg));
+    for (name, deviations, expected) in &table {
         assert!(Effect::named(name).is_some(), "the library has no effect {name}");
-        let flawed = Worm {
-            flaws: flaws.clone(),
+        let deviating = Worm {
+            deviations: deviations.clone(),
             ..usual.clone()
         };
-        for ((slope_deg, honest_m), &expected) in slopes_deg.into_iter().zip(honest_m).zip(expected) {
-            let change_m = advance_m(&flawed, slope_deg) - honest_m;
+        for ((slope_deg, baseline_m), &expected) in slopes_deg.into_iter().zip(baseline_m).zip(expected) {
+            let change_m = advance_m(&deviating, slope_deg) - baseline_m;
             let sign = if change_m.abs() < NO_CHANGE_M {
                 0
             } else {
@@ -158,56 +164,56 @@ fn every_effect_changes_the_advance_in_its_own_sense() {
 
 #[test]
 fn what_shifts_time_and_no_place_shifts_time() {
-    let play = |flaws: Flaws| -> Played {
+    let simulate = |deviations: Deviations| -> SimulatedRun {
         let scene = Scene {
             cycles: 3.0,
             ..Scene::ideal(30.0, 2.5)
         };
-        scene.play(&worm(flaws)).expect("the worm holds")
+        scene.simulate(&worm(deviations)).expect("the worm holds")
     };
-    let honest = play(Flaws::default());
-    let droop = play(Flaws {
+    let baseline = simulate(Deviations::default());
+    let droop = simulate(Deviations {
         slowdown_per_n: 0.3,
-        ..Flaws::default()
+        ..Deviations::default()
     });
     // The stepping cell's force goes from −1.7 to +1.7 N, and only what is above 0 slows the cam down.
-    let slower = droop.recording.samples() as f64 / honest.recording.samples() as f64;
+    let slower = droop.recording.samples() as f64 / baseline.recording.samples() as f64;
     assert!((1.1..1.5).contains(&slower), "three cycles take {slower} times as long");
 
     // Six samples late: the position that was seen is the one of six samples ago, and the phase is that of now.
-    let late = play(Flaws {
+    let late = simulate(Deviations {
         latency_s: 6.0 / 120.0,
-        ..Flaws::default()
+        ..Deviations::default()
     });
-    for sample in (0..honest.recording.samples() - 6).step_by(7) {
-        assert!((late.position_m[2][sample] - honest.position_m[2][sample]).abs() < 1e-9);
-        assert!((late.phase[sample] - honest.phase[sample + 6]).abs() < 1e-9);
+    for sample in (0..baseline.recording.samples() - 6).step_by(7) {
+        assert!((late.position_m[2][sample] - baseline.position_m[2][sample]).abs() < 1e-9);
+        assert!((late.phase[sample] - baseline.phase[sample + 6]).abs() < 1e-9);
     }
 }
 
 #[test]
 fn exact_twins_move_alike() {
-    let flaw = Flaws::default;
+    let none = Deviations::default;
     // Four tips of 1.715 N that hold 0.8 as much backward are four of 0.9 as much both ways and 0.4 of one tip's friction.
-    let drag_n = 0.4 * Make::nominal().friction_n[0];
+    let drag_n = 0.4 * WormParameters::nominal().friction_n[0];
     #[rustfmt::skip]
     let table = [
         (
-            Flaws { backward_over_forward: 0.8, ..flaw() },
-            Flaws { friction_factor: [0.9; CELLS], force_n: drag_n, ..flaw() },
+            Deviations { backward_over_forward: 0.8, ..none() },
+            Deviations { friction_factor: [0.9; CELLS], force_n: drag_n, ..none() },
         ),
         (
-            Flaws { mass_kg: 0.111, ..flaw() },
-            Flaws { friction_factor: [0.75; CELLS], stiffness_factor: [0.75; CELLS], ..flaw() },
+            Deviations { mass_kg: 0.111, ..none() },
+            Deviations { friction_factor: [0.75; CELLS], stiffness_factor: [0.75; CELLS], ..none() },
         ),
         (
-            Flaws { scale: 0.9, ..flaw() },
-            Flaws { stroke_factor: [0.9; CELLS], friction_factor: [0.9; CELLS], mass_kg: -0.0333, ..flaw() },
+            Deviations { scale: 0.9, ..none() },
+            Deviations { stroke_factor: [0.9; CELLS], friction_factor: [0.9; CELLS], mass_kg: -0.0333, ..none() },
         ),
     ];
     for (one, other) in table {
         for slope_deg in [0.0, 30.0] {
-            let [one_m, other_m] = [&one, &other].map(|flaws| slow_advance_m(flaws.clone(), slope_deg));
+            let [one_m, other_m] = [&one, &other].map(|deviations| slow_advance_m(deviations.clone(), slope_deg));
             assert!(
                 (one_m - other_m).abs() < 0.01e-3,
                 "at {slope_deg}°: {one_m} m and {other_m} m of {one:?} and {other:?}"
@@ -219,16 +225,16 @@ fn exact_twins_move_alike() {
 #[test]
 fn clamps_that_give_on_a_slope_are_weaker_clamps_there() {
     let giving = |slope_deg: f64| {
-        let flaws = Flaws {
+        let deviations = Deviations {
             slope_sensitivity: 0.6,
-            ..Flaws::default()
+            ..Deviations::default()
         };
-        slow_advance_m(flaws, slope_deg)
+        slow_advance_m(deviations, slope_deg)
     };
     for slope_deg in [0.0, 45.0_f64] {
-        let weaker = Flaws {
+        let weaker = Deviations {
             friction_factor: [1.0 - 0.6 * (1.0 - slope_deg.to_radians().cos()); CELLS],
-            ..Flaws::default()
+            ..Deviations::default()
         };
         assert!((giving(slope_deg) - slow_advance_m(weaker, slope_deg)).abs() < 1e-6);
     }
@@ -236,8 +242,8 @@ fn clamps_that_give_on_a_slope_are_weaker_clamps_there() {
 
 #[test]
 fn a_campaign_is_what_its_seed_says() {
-    let wanted = Wanted::Single(Effect::PadCreep, Band::UPPER_HALF);
-    let [one, same] = [5, 5].map(|seed| draw_sized(wanted, seed, Size::SMALL));
+    let hidden = Hidden::Single(Effect::PadCreep, SeverityRange::UPPER_HALF);
+    let [one, same] = [5, 5].map(|seed| draw_sized(hidden, seed, CampaignSize::SMALL));
     let bits = |campaign: &HiddenCampaign| -> Vec<u64> {
         let positions = campaign
             .recordings
@@ -248,15 +254,19 @@ fn a_campaign_is_what_its_seed_says() {
     assert_eq!(one.truth, same.truth);
     assert_eq!(bits(&one), bits(&same), "the same dice fall the same way");
     assert!(
-        one.visible.advance_m > 0.1e-3,
+        one.effect_size.advance_m > 0.1e-3,
         "strong creep can be seen: {:?}",
-        one.visible
+        one.effect_size
     );
-    assert_ne!(bits(&one), bits(&draw_sized(wanted, 6, Size::SMALL)));
+    assert_ne!(bits(&one), bits(&draw_sized(hidden, 6, CampaignSize::SMALL)));
 
-    let clean = draw_sized(Wanted::Clean, 5, Size::SMALL);
+    let clean = draw_sized(Hidden::Clean, 5, CampaignSize::SMALL);
     assert_eq!(
-        (clean.truth.len(), clean.visible.advance_m, clean.visible.within_cycle_m),
+        (
+            clean.truth.len(),
+            clean.effect_size.advance_m,
+            clean.effect_size.within_cycle_m
+        ),
         (0, 0.0, 0.0)
     );
     for recording in &clean.recordings {
@@ -264,17 +274,21 @@ fn a_campaign_is_what_its_seed_says() {
         let lost = seen.iter().filter(|m| m.is_nan()).count() as f64 / seen.len() as f64;
         assert!((0.005..0.015).contains(&lost), "{lost} of the positions are lost");
     }
-    let late = draw_sized(Wanted::Single(Effect::SensorLatency, Band::WHOLE), 8, Size::SMALL);
+    let late = draw_sized(
+        Hidden::Single(Effect::SensorLatency, SeverityRange::WHOLE),
+        8,
+        CampaignSize::SMALL,
+    );
     assert!(late.recordings.iter().all(|recording| recording.gait_phase.is_some()));
 }
 
 #[test]
 fn one_more_run_is_of_the_same_worm() {
-    let campaign = draw_sized(Wanted::Twin(Twin::Payload), 3, Size::SMALL);
+    let campaign = draw_sized(Hidden::Twin(Twin::Payload), 3, CampaignSize::SMALL);
     let usual = campaign.usual(0.0);
     let run = |condition: Condition| {
         campaign
-            .repeat(condition, 1)
+            .follow_up(condition, 1)
             .expect("the worm crawls on the level")
             .recording
     };
@@ -306,7 +320,7 @@ fn the_splits_are_whole_and_apart() {
     seeds.sort_unstable();
     seeds.dedup();
     assert_eq!(seeds.len(), 2 * development.len(), "no two cases share a seed");
-    let of = |kind: CampaignKind| development.iter().filter(|case| case.wanted.kind() == kind).count();
+    let of = |kind: CampaignKind| development.iter().filter(|case| case.hidden.kind() == kind).count();
     assert_eq!(
         [
             CampaignKind::Clean,

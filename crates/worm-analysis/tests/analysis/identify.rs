@@ -4,19 +4,19 @@
 //! in the paper's worm throughout. Each table draws a few worms of different slopes and numbers of cells; `WORMD_SEEDS` says how many
 //! it draws instead.
 
-use testkit::independent_worm::account::Truth;
 use testkit::independent_worm::body::Body;
 use testkit::independent_worm::cam::Drive;
 use testkit::independent_worm::camera::Camera;
 use testkit::independent_worm::draw::crawling;
 use testkit::independent_worm::scene::{Scene, positions_only};
-use testkit::independent_worm::score::{HEADER, PROMISE, Promise, Score, rms};
+use testkit::independent_worm::score::{HEADER, Score, TOLERANCES, Tolerances, rms};
+use testkit::independent_worm::truth::Truth;
 use worm_analysis::experiment::{Analysis, PhaseSource, RecordedRun, analyze};
 use worm_analysis::recording::Recording;
 use worm_estimator::config::Config;
 
 /// What is believed of a worm before it was recorded: the paper's figures, cells stepping from the first to the last.
-fn believed(cells: usize) -> Config {
+fn nominal_config(cells: usize) -> Config {
     let mut config = Config::default();
     config.worm.cells = cells;
     config.worm.step_order = (1..=cells).collect();
@@ -40,7 +40,7 @@ fn analyses(recordings: &[Recording], scenes: &[Scene], cycle_s: Option<f64>) ->
             cycle_s,
         })
         .collect();
-    let config = believed(recordings[0].cells());
+    let config = nominal_config(recordings[0].cells());
     analyze(&runs, &config, &mut |_| ()).unwrap_or_else(|error| panic!("{}: {error}", recordings[0].source.display()))
 }
 
@@ -74,23 +74,23 @@ fn case_of(seed: u64) -> (f64, usize) {
 }
 
 /// Scores, and what they say together.
-struct Table {
+struct AccuracyTable {
     title: &'static str,
     scores: Vec<Score>,
-    broken: Vec<String>,
+    violations: Vec<String>,
 }
 
-impl Table {
+impl AccuracyTable {
     fn titled(title: &'static str) -> Self {
         Self {
             title,
             scores: Vec::new(),
-            broken: Vec::new(),
+            violations: Vec::new(),
         }
     }
 
-    fn add(&mut self, score: Score, promise: Promise) {
-        self.broken.extend(score.broken(promise));
+    fn add(&mut self, score: Score, tolerances: Tolerances) {
+        self.violations.extend(score.violations(tolerances));
         self.scores.push(score);
     }
 
@@ -106,25 +106,30 @@ impl Table {
 
     /// Prints the table in one piece, since tests run side by side, and asserts that nothing is broken.
     #[track_caller]
-    fn assert_kept(&self) {
+    fn assert_within_tolerances(&self) {
         let rows: Vec<String> = self.scores.iter().map(Score::to_string).collect();
         let (error_m, in_sigmas) = self.bounds_rms();
         let search_m = rms(self.scores.iter().flat_map(Score::search_errors_m));
         let sloped: Vec<f64> = self.scores.iter().filter_map(|score| score.mass_percent).collect();
         let near = sloped
             .iter()
-            .filter(|percent| percent.abs() < PROMISE.mass_percent)
+            .filter(|percent| percent.abs() < TOLERANCES.mass_percent)
             .count();
         println!(
             "{}\n{HEADER}\n{}\nmass within {} % in {near} of {} runs on slopes\nbounds: rms error {:.3} mm, {in_sigmas:.2} standard errors; the paper's search {:.3} mm\n",
             self.title,
             rows.join("\n"),
-            PROMISE.mass_percent,
+            TOLERANCES.mass_percent,
             sloped.len(),
             1e3 * error_m,
             1e3 * search_m
         );
-        assert!(self.broken.is_empty(), "{}:\n{}", self.title, self.broken.join("\n"));
+        assert!(
+            self.violations.is_empty(),
+            "{}:\n{}",
+            self.title,
+            self.violations.join("\n")
+        );
         assert!(!self.scores.is_empty(), "nothing was tried");
     }
 
@@ -147,7 +152,7 @@ impl Table {
 
 #[test]
 fn from_rest_by_positions_alone() {
-    let mut table = Table::titled("from rest, positions alone");
+    let mut table = AccuracyTable::titled("from rest, positions alone");
     // Every slope, and worms of 3 to 6 cells.
     for seed in seeds(&[8, 5, 18, 23]) {
         let (slope_deg, cells) = case_of(seed);
@@ -156,15 +161,15 @@ fn from_rest_by_positions_alone() {
         let (recording, truth) = recorded(&scenes[0]);
         let found = analyses(&[positions_only(&recording)], &scenes, None);
         assert_eq!(found[0].phase_source, PhaseSource::Positions);
-        table.add(Score::of(format!("seed {seed}"), &found[0], &truth), PROMISE);
+        table.add(Score::of(format!("seed {seed}"), &found[0], &truth), TOLERANCES);
     }
-    table.assert_kept();
+    table.assert_within_tolerances();
     table.assert_honest_and_better();
 }
 
 #[test]
 fn from_rest_with_the_phase() {
-    let mut table = Table::titled("from rest, with the phase");
+    let mut table = AccuracyTable::titled("from rest, with the phase");
     // Every slope, and worms of 3 to 6 cells.
     for seed in seeds(&[9, 20, 6, 19]) {
         let (slope_deg, cells) = case_of(seed);
@@ -178,9 +183,9 @@ fn from_rest_with_the_phase() {
             found[0].step_order, truth.step_order,
             "the order begins at whole numbers of the phase"
         );
-        table.add(Score::of(format!("seed {seed}"), &found[0], &truth), PROMISE);
+        table.add(Score::of(format!("seed {seed}"), &found[0], &truth), TOLERANCES);
     }
-    table.assert_kept();
+    table.assert_within_tolerances();
     table.assert_honest_and_better();
 }
 
@@ -192,7 +197,7 @@ fn a_campaign_that_begins_in_mid_crawl() {
         ("level, 30° and 45° together, from mid-crawl, positions alone", false),
         ("level, 30° and 45° together, from mid-crawl, with the phase", true),
     ] {
-        let mut table = Table::titled(title);
+        let mut table = AccuracyTable::titled(title);
         for seed in seeds(&[1]) {
             let mut scenes = crawling(4, &[0.0, 30.0, 45.0], 100 + seed);
             for (run, scene) in scenes.iter_mut().enumerate() {
@@ -204,10 +209,10 @@ fn a_campaign_that_begins_in_mid_crawl() {
                 recordings = recordings.iter().map(positions_only).collect();
             }
             for (found, truth) in analyses(&recordings, &scenes, None).iter().zip(&truths) {
-                table.add(Score::of(format!("seed {seed}"), found, truth), PROMISE);
+                table.add(Score::of(format!("seed {seed}"), found, truth), TOLERANCES);
             }
         }
-        table.assert_kept();
+        table.assert_within_tolerances();
         assert!(
             table.scores.iter().all(|score| !score.laid_down),
             "all begin in mid-crawl"
@@ -233,10 +238,10 @@ fn level_from_mid_crawl_knows_what_it_cannot_know() {
         let found = analyses(&[positions_only(&recording)], &[scene], None);
         let score = Score::of(format!("seed {seed}"), &found[0], &truth);
         println!("{score}");
-        assert_eq!(score.broken_beside_bounds(PROMISE), [""; 0]);
+        assert_eq!(score.violations_beside_bounds(TOLERANCES), [""; 0]);
         assert!(!score.laid_down, "the recording begins in mid-crawl");
 
-        let back_m = &truth.cycles[1].account.backward_slide_m;
+        let back_m = &truth.cycles[1].balance.backward_slide_m;
         let (never, sliding): (Vec<usize>, Vec<usize>) = (0..4).partition(|&cell| back_m[cell] < 1e-5);
         assert!(
             never.len() >= 2,
@@ -245,7 +250,7 @@ fn level_from_mid_crawl_knows_what_it_cannot_know() {
         let errors_m: Vec<f64> = score.errors_m().collect();
         for cell in sliding {
             assert!(
-                errors_m[cell].abs() < PROMISE.bound_m,
+                errors_m[cell].abs() < TOLERANCES.bound_m,
                 "cell {}: {errors_m:?}",
                 cell + 1
             );
@@ -253,21 +258,21 @@ fn level_from_mid_crawl_knows_what_it_cannot_know() {
         for &cell in &never {
             let sigma_m = score.sigma_m[cell];
             assert!(
-                sigma_m > PROMISE.bound_m,
+                sigma_m > TOLERANCES.bound_m,
                 "cell {} is said to be known within {sigma_m} m",
                 cell + 1
             );
             assert!(errors_m[cell].abs() < 3.0 * sigma_m, "cell {}: {errors_m:?}", cell + 1);
         }
         let sum_m: f64 = never.iter().map(|&cell| errors_m[cell]).sum();
-        assert!(sum_m.abs() < PROMISE.bound_m, "the sum is {sum_m} m off");
+        assert!(sum_m.abs() < TOLERANCES.bound_m, "the sum is {sum_m} m off");
     }
 }
 
 /// The worm stands for two seconds before its first step and after its last.
 #[test]
 fn with_rest_at_both_ends() {
-    let mut table = Table::titled("2 s of rest before and after");
+    let mut table = AccuracyTable::titled("2 s of rest before and after");
     for seed in seeds(&[2, 4]) {
         let (slope_deg, _) = case_of(seed);
         let mut scenes = crawling(4, &[slope_deg], 200 + seed);
@@ -278,15 +283,15 @@ fn with_rest_at_both_ends() {
         let (recording, truth) = recorded(&scenes[0]);
         for recording in [positions_only(&recording), recording] {
             let found = analyses(&[recording], &scenes, None);
-            table.add(Score::of(format!("seed {seed}"), &found[0], &truth), PROMISE);
+            table.add(Score::of(format!("seed {seed}"), &found[0], &truth), TOLERANCES);
         }
     }
-    table.assert_kept();
+    table.assert_within_tolerances();
 }
 
 /// What can be asked of a gait of 0.8 s: its inertia throws the body 0.15 mm beyond where the tips would let it rest, and no
 /// reading of section 3.2 accounts for that wholly.
-const FAST: Promise = Promise {
+const FAST: Tolerances = Tolerances {
     bound_m: 1.5e-4,
     energy_percent: 5.0,
     advance_m: 0.08e-3,
@@ -299,7 +304,7 @@ const FAST: Promise = Promise {
 /// tip shows its bound whatever the beginning was.
 #[test]
 fn slow_and_fast_gaits_seen_poorly() {
-    let mut table = Table::titled("60 s at 100 Hz, uneven clock, 5 % lost, 0.1 % far off, started in mid-step");
+    let mut table = AccuracyTable::titled("60 s at 100 Hz, uneven clock, 5 % lost, 0.1 % far off, started in mid-step");
     let cases = [(8.0, 30.0), (0.8, 30.0), (8.0, 45.0), (0.8, 45.0)];
     // Of fast gaits, fewer cycles than a minute has keep the same promise.
     let all = std::env::var_os("WORMD_SEEDS").is_some();
@@ -331,9 +336,9 @@ fn slow_and_fast_gaits_seen_poorly() {
         let (recording, truth) = recorded(scene);
         for recording in [positions_only(&recording), recording] {
             let found = analyses(&[recording], &scenes, Some(cycle_s));
-            let promise = if cycle_s < 1.0 { FAST } else { PROMISE };
-            table.add(Score::of(format!("{cycle_s} s"), &found[0], &truth), promise);
+            let tolerances = if cycle_s < 1.0 { FAST } else { TOLERANCES };
+            table.add(Score::of(format!("{cycle_s} s"), &found[0], &truth), tolerances);
         }
     }
-    table.assert_kept();
+    table.assert_within_tolerances();
 }

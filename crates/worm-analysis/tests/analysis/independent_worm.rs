@@ -1,10 +1,10 @@
 //! The independent worm against what is known of it: before it judges others it is judged itself.
 
-use testkit::independent_worm::account::Truth;
 use testkit::independent_worm::body::Body;
 use testkit::independent_worm::cam::Cam;
 use testkit::independent_worm::camera::Camera;
 use testkit::independent_worm::scene::{Scene, SlidDown};
+use testkit::independent_worm::truth::Truth;
 
 /// Cells, slope, advance mm, positive mJ, net mJ of a worm of equal cells of 83.25 g and 1.75 mm: another simulation.
 const EQUAL_CELLS: [(usize, f64, [f64; 3]); 11] = [
@@ -52,19 +52,19 @@ fn assert_within(fraction: f64, what: &str, value: f64, expected: f64) {
 fn slow_it_gives_the_figures_of_equal_cells() {
     for (cells, slope_deg, [advance_mm, positive_mj, net_mj]) in EQUAL_CELLS {
         let truth = play(&slow(&vec![1.75e-3; cells], slope_deg));
-        let account = &truth.cycles[0].account;
+        let balance = &truth.cycles[0].balance;
         println!(
             "{cells} cells {slope_deg:>2}°: advance {:.3} mm of {advance_mm}, positive {:.2} mJ of {positive_mj}, net {:.2} mJ of {net_mj}, (11) {:.2} mJ",
-            1e3 * account.advance_m(),
-            1e3 * account.actuator_positive_j,
-            1e3 * account.actuator_net_j,
-            1e3 * account.loss_j(),
+            1e3 * balance.advance_m(),
+            1e3 * balance.actuator_positive_j,
+            1e3 * balance.actuator_net_j,
+            1e3 * balance.loss_j(),
         );
         let what = format!("{cells} cells at {slope_deg}°");
-        assert_within(0.01, &what, 1e3 * account.advance_m(), advance_mm);
-        assert_within(0.01, &what, 1e3 * account.actuator_positive_j, positive_mj);
-        assert_within(0.01, &what, 1e3 * account.actuator_net_j, net_mj);
-        assert_within(0.01, &what, 1e3 * account.loss_j(), net_mj);
+        assert_within(0.01, &what, 1e3 * balance.advance_m(), advance_mm);
+        assert_within(0.01, &what, 1e3 * balance.actuator_positive_j, positive_mj);
+        assert_within(0.01, &what, 1e3 * balance.actuator_net_j, net_mj);
+        assert_within(0.01, &what, 1e3 * balance.loss_j(), net_mj);
     }
 }
 
@@ -72,17 +72,17 @@ fn slow_it_gives_the_figures_of_equal_cells() {
 fn slow_it_gives_the_figures_of_the_identified_worm() {
     for (slope_deg, advance_mm) in [(0.0, 6.356), (30.0, 3.333), (45.0, 1.379)] {
         let truth = play(&slow(&[2.0e-3, 1.1e-3, 1.75e-3, 2.15e-3], slope_deg));
-        let account = &truth.cycles[0].account;
+        let balance = &truth.cycles[0].balance;
         println!(
             "identified at {slope_deg}°: {:.3} mm of {advance_mm}",
-            1e3 * account.advance_m()
+            1e3 * balance.advance_m()
         );
-        assert_within(0.01, "identified", 1e3 * account.advance_m(), advance_mm);
+        assert_within(0.01, "identified", 1e3 * balance.advance_m(), advance_mm);
         if slope_deg == 0.0 {
             let mean_mm = |slide_m: &[f64]| 1e3 * slide_m.iter().sum::<f64>() / 4.0;
-            assert_within(0.01, "forward", mean_mm(&account.forward_slide_m), 6.99);
-            assert_within(0.02, "backward", mean_mm(&account.backward_slide_m), 0.63);
-            assert_within(0.01, "cell 2", 1e3 * account.backward_slide_m[1], 2.05);
+            assert_within(0.01, "forward", mean_mm(&balance.forward_slide_m), 6.99);
+            assert_within(0.02, "backward", mean_mm(&balance.backward_slide_m), 0.63);
+            assert_within(0.01, "cell 2", 1e3 * balance.backward_slide_m[1], 2.05);
         }
     }
 }
@@ -92,7 +92,7 @@ fn slow_it_gives_the_figures_of_the_identified_worm() {
 #[test]
 fn a_worm_that_cannot_hold_does_not_advance_or_is_lost() {
     assert!(!Body::with_bounds(&[1.75e-3; 3], 45.0).holds());
-    let advance_m = play(&slow(&[1.75e-3; 3], 60.0)).cycles[0].account.advance_m();
+    let advance_m = play(&slow(&[1.75e-3; 3], 60.0)).cycles[0].balance.advance_m();
     assert!(advance_m < 1e-4, "{advance_m} m");
     assert!(matches!(slow(&[0.5e-3; 3], 60.0).record(), Err(SlidDown)));
 }
@@ -105,7 +105,7 @@ fn half_the_time_step_changes_nothing_that_matters() {
             ..scene.clone()
         };
         let figures = |scene: &Scene| {
-            let cycles = play(scene).cycles.into_iter().map(|cycle| cycle.account);
+            let cycles = play(scene).cycles.into_iter().map(|cycle| cycle.balance);
             let each = cycles.map(|a| [a.advance_m(), a.loss_j(), a.actuator_net_j, a.actuator_positive_j]);
             each.collect::<Vec<_>>().concat()
         };
@@ -181,7 +181,7 @@ fn a_warm_up_only_hides_the_beginning() {
     assert_eq!((whole.cycles.len(), late.cycles.len()), (12, 8));
     for (early, late) in whole.cycles[4..].iter().zip(&late.cycles) {
         assert_within(1e-4, "duration", late.end_s - late.start_s, early.end_s - early.start_s);
-        assert_within(1e-3, "advance", late.account.advance_m(), early.account.advance_m());
+        assert_within(1e-3, "advance", late.balance.advance_m(), early.balance.advance_m());
     }
 }
 

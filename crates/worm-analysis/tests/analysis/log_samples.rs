@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use testkit::crawl::{Crawl, Scene, paper_worm};
-use testkit::log_sample::{Told, write_log};
+use testkit::log_sample::{Telemetry, write_log};
 use worm_analysis::recording::mcap::{read, write};
 use worm_analysis::recording::{Motor, Recording};
 use worm_estimator::config::Config;
@@ -25,11 +25,11 @@ fn states(seconds: f64) -> (Crawl, Vec<State>) {
 fn read_states(states: Vec<State>) -> Result<Recording, worm_analysis::recording::ReadError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("worm.mcap");
-    let told = Told {
+    let telemetry = Telemetry {
         states,
-        ..Told::default()
+        ..Telemetry::default()
     };
-    write_log(&path, &told);
+    write_log(&path, &telemetry);
     read(&path)
 }
 

@@ -1,10 +1,10 @@
 //! The score, on answers that are known to be right or wrong.
 
-use testkit::hidden_effects::campaign::{CampaignKind, HiddenCampaign, Size, Twin, Wanted, draw_sized};
-use testkit::hidden_effects::effect::{Band, Effect, TrueEffect};
-use testkit::hidden_effects::repeat::ExtraRun;
-use testkit::hidden_effects::table::{Share, Table};
-use testkit::hidden_effects::verdict::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict, judge};
+use testkit::hidden_effects::assessment::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict, assess};
+use testkit::hidden_effects::campaign::{CampaignKind, CampaignSize, Hidden, HiddenCampaign, Twin, draw_sized};
+use testkit::hidden_effects::effect::{Effect, SeverityRange, TrueEffect};
+use testkit::hidden_effects::follow_up::ExtraRun;
+use testkit::hidden_effects::table::{Proportion, ScoreTable};
 
 /// Knows the truth; what it does not want to know it calls a payload of 100 g.
 struct Oracle {
@@ -67,21 +67,21 @@ impl Explainer for Oracle {
 #[test]
 fn the_score_tells_right_from_wrong() {
     let cases = [
-        Wanted::Clean,
-        Wanted::Outside(0),
-        Wanted::Pair,
-        Wanted::Twin(Twin::ConstantDrag),
-        Wanted::Single(Effect::UnequalClamping, Band::UPPER_HALF),
-        Wanted::Single(Effect::SlopeError, Band::UPPER_HALF),
+        Hidden::Clean,
+        Hidden::Outside(0),
+        Hidden::Pair,
+        Hidden::Twin(Twin::ConstantDrag),
+        Hidden::Single(Effect::UnequalClamping, SeverityRange::UPPER_HALF),
+        Hidden::Single(Effect::SlopeError, SeverityRange::UPPER_HALF),
     ];
     // How much is recorded matters neither to who knows nor to who does not look.
-    let campaigns = cases.map(|wanted| draw_sized(wanted, 11, Size::SMALL));
+    let campaigns = cases.map(|hidden| draw_sized(hidden, 11, CampaignSize::SMALL));
     let fractions = |wants_to_know: bool| {
-        let judgements: Vec<_> = campaigns
+        let assessments: Vec<_> = campaigns
             .iter()
-            .map(|campaign| judge(campaign, &Oracle { wants_to_know }))
+            .map(|campaign| assess(campaign, &Oracle { wants_to_know }))
             .collect();
-        let table = Table(&judgements);
+        let table = ScoreTable(&assessments);
         println!("{table}");
         let fractions = table.fractions();
         move |what: &str| {
@@ -89,7 +89,7 @@ fn the_score_tells_right_from_wrong() {
                 .iter()
                 .find(|row| row.0 == what)
                 .expect("the table has such a row");
-            let Share { hits, of } = row.1;
+            let Proportion { hits, of } = row.1;
             (hits, of)
         }
     };
@@ -128,7 +128,7 @@ fn wilson_gives_the_intervals_of_the_textbook() {
         (9, 10, [0.596, 0.982]),
         (81, 263, [0.255, 0.366]),
     ] {
-        let interval = Share { hits, of }.wilson();
+        let interval = Proportion { hits, of }.wilson();
         for (found, expected) in interval.into_iter().zip(expected) {
             assert!((found - expected).abs() < 1e-3, "{hits} of {of}: {interval:?}");
         }

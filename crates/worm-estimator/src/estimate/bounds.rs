@@ -25,7 +25,7 @@ type Information = SMatrix<f64, MAX_CELLS, MAX_CELLS>;
 /// Whole cycles on which the bounds are found, the first of which only finds the contact points.
 pub(super) const CYCLES: usize = 5;
 /// Cycles after which a first answer is worth more than the guess.
-const FIRST_ANSWER: usize = 3;
+const FIRST_SEARCH: usize = 3;
 /// Standard deviation of the first guess, as a share of it.
 const GUESS_SPREAD: f64 = 0.3;
 /// How far from the first guess a bound may lie, as factors.
@@ -36,7 +36,7 @@ const STARTS: [f64; 3] = [1.0, 0.7, 1.4];
 const ITERATIONS: usize = 12;
 /// Slides that are not told from noise, in standard deviations of one measured position. Without it, noise at a tip that just
 /// fails to slide would pass for knowledge of its bound.
-const DOUBT: f64 = 0.5;
+const DEADBAND_SIGMAS: f64 = 0.5;
 /// Knots over which the errors of a fit hang together.
 const CORRELATED_KNOTS: f64 = 1.5;
 
@@ -49,7 +49,7 @@ pub(super) struct Identification {
     path_m: Vec<f64>,         // [knot][cell], continuous over the stored cycles
     stored: usize,
     force_sigma_n: f64,
-    doubt_m: f64,                                         // slides up to this are taken for noise
+    deadband_m: f64,                                      // slides up to this are taken for noise
     information: Option<Cholesky<f64, Const<MAX_CELLS>>>, // after a search, as a factor
     force_n: Vec<f64>,
     slope: Vec<f64>, // [knot][cell], k dδ/dδmax
@@ -67,7 +67,7 @@ impl Identification {
             path_m: vec![0.0; knots * cells],
             stored: 0,
             force_sigma_n: 0.0,
-            doubt_m: 0.0,
+            deadband_m: 0.0,
             information: None,
             force_n: vec![0.0; knots],
             slope: vec![0.0; knots * cells],
@@ -110,8 +110,8 @@ impl Identification {
         self.stored += 1;
         let squares: f64 = tips.iter().map(|tip| tip.stiffness_n_per_m.powi(2)).sum();
         self.force_sigma_n = squares.sqrt() * fit.sigma_m();
-        self.doubt_m = DOUBT * fit.sigma_m();
-        if self.stored < FIRST_ANSWER {
+        self.deadband_m = DEADBAND_SIGMAS * fit.sigma_m();
+        if self.stored < FIRST_SEARCH {
             return false;
         }
         self.search(tips);
@@ -139,11 +139,13 @@ impl Identification {
                 *to = guess * start;
             }
             for _ in 0..ITERATIONS {
-                let misfit = self.misfit(tips, &bound_m);
-                if misfit < best.0 {
-                    best = (misfit, bound_m);
+                let chi_squared = self.chi_squared(tips, &bound_m);
+                if chi_squared < best.0 {
+                    best = (chi_squared, bound_m);
                 }
-                let Some(step) = self.newton_step(&bound_m) else { break };
+                let Some(step) = self.gauss_newton_step(&bound_m) else {
+                    break;
+                };
                 for (cell, bound_m) in bound_m[..tips.len()].iter_mut().enumerate() {
                     let (low, high) = (RANGE.0 * self.guess_m[cell], RANGE.1 * self.guess_m[cell]);
                     let largest = 0.3 * self.guess_m[cell];
@@ -152,13 +154,13 @@ impl Identification {
             }
         }
         let bound_m = best.1;
-        self.misfit(tips, &bound_m);
-        self.newton_step(&bound_m);
+        self.chi_squared(tips, &bound_m);
+        self.gauss_newton_step(&bound_m);
         self.bound_m.copy_from_slice(&bound_m[..tips.len()]);
     }
 
     /// Twice the negative logarithm of the likelihood of some bounds; leaves F and its slopes behind.
-    fn misfit(&mut self, tips: &[Tip], bound_m: &[f64; MAX_CELLS]) -> f64 {
+    fn chi_squared(&mut self, tips: &[Tip], bound_m: &[f64; MAX_CELLS]) -> f64 {
         let cells = tips.len();
         let pieces = cells * INTERVALS;
         let knots = self.stored * pieces + 1;
@@ -169,9 +171,11 @@ impl Identification {
             for knot in 0..knots {
                 let at_m = self.path_m[knot * cells + cell];
                 let ended = knot > 0 && self.stroke_cells[(knot - 1) / INTERVALS % cells] == cell;
-                if at_m - contact_m > bound_m + self.doubt_m || (contact_m.is_nan() && ended && knot % INTERVALS == 0) {
+                if at_m - contact_m > bound_m + self.deadband_m
+                    || (contact_m.is_nan() && ended && knot % INTERVALS == 0)
+                {
                     (contact_m, side) = (at_m - bound_m, 1.0);
-                } else if at_m - contact_m < -bound_m - self.doubt_m {
+                } else if at_m - contact_m < -bound_m - self.deadband_m {
                     (contact_m, side) = (at_m + bound_m, -1.0);
                 }
                 self.force_n[knot] += tip.stiffness_n_per_m * (at_m - contact_m);
@@ -196,7 +200,7 @@ impl Identification {
 
     /// Solves for the change of the bounds that would bring the misfit to its minimum if the slopes stayed; leaves the
     /// information on the bounds behind. None when the bounds cannot be told at all.
-    fn newton_step(&mut self, bound_m: &[f64; MAX_CELLS]) -> Option<PerCell> {
+    fn gauss_newton_step(&mut self, bound_m: &[f64; MAX_CELLS]) -> Option<PerCell> {
         let cells = self.guess_m.len();
         let pieces = cells * INTERVALS;
         let weight = self.weight();

@@ -1,7 +1,7 @@
 //! At which gait phase a tracker sample was captured.
 //!
 //! A sample reaches the estimator with the first tick after its capture, up to a tick late, and the cam has turned on. The
-//! tracker stamps captures with a clock of its own. Times here are those that the motor lived through (`lived`): a simulated tracker
+//! tracker stamps captures with a clock of its own. Times here are those that the motor lived through (`motor_time`): a simulated tracker
 //! stands still when its motor does, and its samples are not old by that. The least difference ever seen between the tick's time and that stamp,
 //! let grow slowly because clocks drift, stands for a sample without delay; what a sample has beyond it is its age.
 //! A constant delay cannot be told from a difference of the clocks and stays in: 0.3 ms of it are 0.006 mm.

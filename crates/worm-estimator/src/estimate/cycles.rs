@@ -2,11 +2,11 @@
 //!
 //! A cycle runs from one whole number of the phase to the next in the direction of the crawl. It may rest on the way: a pause
 //! belongs to the cycle in which it falls, with its time and its electrical energy, because both were spent on that
-//! cycle's advance. A hold that trembles by less than [`TREMBLE`] changes nothing. A larger turn back breaks the cycle: its tips
+//! cycle's advance. A hold that trembles by less than [`JITTER`] changes nothing. A larger turn back breaks the cycle: its tips
 //! have a path that no single pass over the phase can describe, so it is not reported, and the next one begins afresh.
 
 /// How far the phase may turn back without breaking a cycle, cycles.
-const TREMBLE: f64 = 0.02;
+const JITTER: f64 = 0.02;
 /// Phase up to which a cycle that begins from rest has not begun, cycles: a few steps of the encoder.
 const AT_REST: f64 = 1e-3;
 
@@ -14,24 +14,24 @@ const AT_REST: f64 = 1e-3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Event {
     /// Nothing ended.
-    Goes,
+    Continues,
     /// The open cycle still rests at its beginning.
-    Rests,
+    AtRest,
     /// A cycle ended at this share of the way from the last phase to this one, and the next began.
-    Ends {
+    Ended {
         /// 0 to 1.
         fraction: f64,
         /// The phase went through it in one direction.
         whole: bool,
     },
     /// A cycle began, in another direction or after a jump; what was open is void.
-    Begins,
+    Began,
 }
 
 /// The open cycle, if any.
 #[derive(Debug, Clone)]
 pub(super) struct Cycles {
-    usual_direction: i32,
+    default_direction: i32,
     start: Option<i64>,
     direction: i32,
     last: f64,
@@ -41,10 +41,10 @@ pub(super) struct Cycles {
 }
 
 impl Cycles {
-    /// No phase known yet; `usual_direction` is what a worm at rest is taken to be about to do.
-    pub(super) fn new(usual_direction: i32) -> Self {
+    /// No phase known yet; `default_direction` is what a worm at rest is taken to be about to do.
+    pub(super) fn new(default_direction: i32) -> Self {
         Self {
-            usual_direction,
+            default_direction,
             start: None,
             direction: 0,
             last: 0.0,
@@ -70,26 +70,26 @@ impl Cycles {
             let whole = self.whole;
             self.begin(start + i64::from(self.direction), self.direction, done - 1.0);
             self.resting = false;
-            return Event::Ends { fraction, whole };
+            return Event::Ended { fraction, whole };
         }
-        if done < -TREMBLE {
+        if done < -JITTER {
             self.begin(start, -self.direction, -done);
-            return Event::Begins;
+            return Event::Began;
         }
         self.furthest = self.furthest.max(done);
-        self.whole &= self.furthest - done < TREMBLE;
+        self.whole &= self.furthest - done < JITTER;
         self.resting &= done <= AT_REST;
-        if self.resting { Event::Rests } else { Event::Goes }
+        if self.resting { Event::AtRest } else { Event::Continues }
     }
 
     fn open_near(&mut self, phase: f64) -> Event {
         let near = phase.round();
         if near.abs() >= 1e15 {
-            return Event::Goes;
+            return Event::Continues;
         }
         let off = phase - near;
         let direction = if off.abs() <= AT_REST {
-            self.usual_direction
+            self.default_direction
         } else if off > 0.0 {
             1
         } else {
@@ -97,8 +97,8 @@ impl Cycles {
         };
         self.begin(near as i64, direction, off.abs());
         // Away from a whole number this is the rest of some cycle, which cannot be reported.
-        self.whole = off.abs() < TREMBLE;
-        Event::Begins
+        self.whole = off.abs() < JITTER;
+        Event::Began
     }
 
     fn begin(&mut self, start: i64, direction: i32, done: f64) {
@@ -125,7 +125,7 @@ impl Cycles {
 
     /// Nothing is known of the phase any more.
     pub(super) fn forget(&mut self) {
-        *self = Self::new(self.usual_direction);
+        *self = Self::new(self.default_direction);
     }
 }
 
@@ -136,7 +136,7 @@ mod tests {
     fn ends(cycles: &mut Cycles, phases: &[f64]) -> Vec<Event> {
         let events = phases.iter().map(|&phase| cycles.advance_to(phase));
         events
-            .filter(|event| !matches!(event, Event::Goes | Event::Rests))
+            .filter(|event| !matches!(event, Event::Continues | Event::AtRest))
             .collect()
     }
 
@@ -144,10 +144,10 @@ mod tests {
     fn a_cycle_ends_where_the_phase_is_whole() {
         let mut cycles = Cycles::new(1);
         let events = ends(&mut cycles, &[0.0, 0.3, 0.6, 0.9, 1.1, 1.5, 1.9, 2.0]);
-        let whole = |fraction| Event::Ends { fraction, whole: true };
+        let whole = |fraction| Event::Ended { fraction, whole: true };
         assert_eq!(events.len(), 3);
-        assert_eq!(events[0], Event::Begins);
-        assert!(matches!(events[1], Event::Ends { fraction, whole: true } if (fraction - 0.5).abs() < 1e-9));
+        assert_eq!(events[0], Event::Began);
+        assert!(matches!(events[1], Event::Ended { fraction, whole: true } if (fraction - 0.5).abs() < 1e-9));
         assert_eq!(events[2], whole(1.0));
     }
 
@@ -165,7 +165,7 @@ mod tests {
         let events = ends(&mut cycles, &[0.0, 0.4, 0.6, 0.4, 0.7, 1.0]);
         assert_eq!(
             events[1],
-            Event::Ends {
+            Event::Ended {
                 fraction: 1.0,
                 whole: false
             }
@@ -174,8 +174,8 @@ mod tests {
         assert_eq!(
             events,
             [
-                Event::Begins,
-                Event::Ends {
+                Event::Began,
+                Event::Ended {
                     fraction: 1.0,
                     whole: true
                 }
@@ -190,18 +190,18 @@ mod tests {
         let events = ends(&mut cycles, &[0.3, 0.6, 0.9, 1.0, 1.4, 1.8, 2.0, 17.4]);
         assert_eq!(
             events[1],
-            Event::Ends {
+            Event::Ended {
                 fraction: 1.0,
                 whole: false
             }
         );
         assert_eq!(
             events[2],
-            Event::Ends {
+            Event::Ended {
                 fraction: 1.0,
                 whole: true
             }
         );
-        assert_eq!(events[3], Event::Begins, "a jump");
+        assert_eq!(events[3], Event::Began, "a jump");
     }
 }

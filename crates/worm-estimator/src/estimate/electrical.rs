@@ -1,5 +1,5 @@
 //! Electrical energy into the motor and heat in its winding, by the trapezoidal rule over the time that the motor lived through
-//! (`lived`).
+//! (`motor_time`).
 //!
 //! Only readings of their own tick count; between two of them power is taken to run in a straight line. Over more than
 //! [`LONGEST_GAP_S`] without a reading nothing is counted, and the standard error grows by what a steady power would
@@ -56,7 +56,7 @@ impl Energies {
 
 #[derive(Debug, Clone, Copy)]
 struct Reading {
-    lived_ns: u64,
+    motor_ns: u64,
     power_w: f64,
     copper_w: f64,
     current_a: f64, // duty × current, what a volt more would add
@@ -80,12 +80,12 @@ impl Electrical {
         }
     }
 
-    /// Takes up a tick at `lived_ns` of the motor's time, if its motor readings are its own and make sense.
-    pub(super) fn update(&mut self, state: &State, lived_ns: u64) {
+    /// Takes up a tick at `motor_ns` of the motor's time, if its motor readings are its own and make sense.
+    pub(super) fn update(&mut self, state: &State, motor_ns: u64) {
         let winding_v = state.bus_voltage_v * state.motor_duty;
         let resistance_ohm = self.resistance_at_ohm(state.motor_temperature_c);
         let reading = Reading {
-            lived_ns,
+            motor_ns,
             power_w: winding_v * state.motor_current_a,
             copper_w: state.motor_current_a * state.motor_current_a * resistance_ohm,
             current_a: state.motor_duty * state.motor_current_a,
@@ -95,9 +95,9 @@ impl Electrical {
             return;
         }
         if let Some(last) = self.last.replace(reading)
-            && reading.lived_ns > last.lived_ns
+            && reading.motor_ns > last.motor_ns
         {
-            let dt = (reading.lived_ns - last.lived_ns) as f64 * 1e-9;
+            let dt = (reading.motor_ns - last.motor_ns) as f64 * 1e-9;
             let mean = |from: f64, to: f64| 0.5 * (from + to);
             let power_w = mean(last.power_w, reading.power_w);
             if dt <= LONGEST_GAP_S {
@@ -198,7 +198,7 @@ mod tests {
     fn readings_that_make_no_sense_are_left_out() {
         let mut electrical = Electrical::new(2.0);
         for current_a in [1.0, f64::NAN, f64::INFINITY, 1.0] {
-            let time_ns = electrical.last.map_or(0, |last| last.lived_ns + 10_000_000);
+            let time_ns = electrical.last.map_or(0, |last| last.motor_ns + 10_000_000);
             take(&mut electrical, &state(time_ns, current_a));
         }
         assert!((electrical.total().electrical_j - 0.025).abs() < 1e-12);

@@ -11,9 +11,9 @@ use worm_physics::MAX_CELLS;
 
 /// Slides up to this many standard errors of the advance are not told from noise. Every peak that a fitted path has at a
 /// bound would count as a slide otherwise, and always as a positive one.
-const DOUBT: f64 = 1.3;
+const DEADBAND_SIGMAS: f64 = 1.3;
 /// The same without noise, strokes: by this much a fit overshoots a corner that lies between two knots.
-const MIN_DOUBT: f64 = 2e-3;
+const MIN_DEADBAND: f64 = 2e-3;
 
 /// What a tip is, seen in the direction of the crawl.
 #[derive(Debug, Clone, Copy, Default)]
@@ -26,7 +26,7 @@ pub(super) struct Tip {
 
 /// A contact point and the knot to which it is bound; none when it was brought along.
 #[derive(Debug, Clone, Copy)]
-struct Touch {
+struct ContactPoint {
     at_m: f64, // NaN before it is known
     knot: Option<usize>,
     guessed: bool,
@@ -74,37 +74,37 @@ pub(super) struct Start<'a> {
     /// Deformations of a worm that was laid down and stands, m.
     pub(super) resting_m: [f64; MAX_CELLS],
     /// Such a worm it was.
-    pub(super) laid_down: bool,
+    pub(super) starts_at_rest: bool,
 }
 
 /// Keeps the account of the last cycle of a fit.
 #[derive(Debug, Clone)]
-pub(super) struct Accountant {
+pub(super) struct EnergyIntegrator {
     tips: Vec<Tip>,
-    touch: Vec<Touch>,
+    contact: Vec<ContactPoint>,
     loss_gradient: Vec<f64>,
     actuator_gradient: Vec<f64>,
     advance_gradient: Vec<f64>,
     sliding: Vec<Option<(f64, f64)>>, // sense of a tip that slid in the present step, and its way back since
-    doubt_m: f64,                     // slides up to this are not counted
+    deadband_m: f64,                  // slides up to this are not counted
     work_by_contact_n: Vec<f64>,      // derivative of the actuator work by each contact point
 }
 
-impl Accountant {
+impl EnergyIntegrator {
     pub(super) fn new(cells: usize, unknowns: usize) -> Self {
-        let touch = Touch {
+        let contact = ContactPoint {
             at_m: f64::NAN,
             knot: None,
             guessed: false,
         };
         Self {
             tips: vec![Tip::default(); cells],
-            touch: vec![touch; cells],
+            contact: vec![contact; cells],
             loss_gradient: Vec::with_capacity(unknowns),
             actuator_gradient: Vec::with_capacity(unknowns),
             advance_gradient: Vec::with_capacity(unknowns),
             sliding: vec![None; cells],
-            doubt_m: 0.0,
+            deadband_m: 0.0,
             work_by_contact_n: vec![0.0; cells],
         }
     }
@@ -113,14 +113,14 @@ impl Accountant {
     /// carry its part of the weight if the worm was laid down and began to crawl; else the cycle is taken to be like any
     /// other, so that the tip begins it as it ends it.
     pub(super) fn close(&mut self, fit: &Fit, tips: &[Tip], start: &Start<'_>) -> EnergyBalance {
-        if start.laid_down {
+        if start.starts_at_rest {
             return self.close_with_guess(fit, tips, start.contact_m, &start.resting_m);
         }
-        let account = self.close_with_guess(fit, tips, start.contact_m, &[f64::NAN; MAX_CELLS]);
-        if account.complete {
-            return account;
+        let balance = self.close_with_guess(fit, tips, start.contact_m, &[f64::NAN; MAX_CELLS]);
+        if balance.complete {
+            return balance;
         }
-        let mut guess_m = account.deformation_at_end_m;
+        let mut guess_m = balance.deformation_at_end_m;
         for (guess_m, resting_m) in guess_m.iter_mut().zip(start.resting_m) {
             if guess_m.is_nan() {
                 *guess_m = resting_m; // it has not made a step, so nothing tells how it stands
@@ -135,9 +135,9 @@ impl Accountant {
         self.tips.copy_from_slice(tips);
         self.work_by_contact_n.fill(0.0);
         self.sliding.fill(None);
-        for (cell, touch) in self.touch.iter_mut().enumerate() {
+        for (cell, contact) in self.contact.iter_mut().enumerate() {
             let guessed = contact_m[cell].is_nan();
-            *touch = Touch {
+            *contact = ContactPoint {
                 at_m: if guessed {
                     fit.position_m(cell, 0) - guess_m[cell]
                 } else {
@@ -150,7 +150,7 @@ impl Accountant {
         fit.clear_gradient(&mut self.loss_gradient);
         fit.clear_gradient(&mut self.actuator_gradient);
         fit.clear_gradient(&mut self.advance_gradient);
-        let mut account = EnergyBalance {
+        let mut balance = EnergyBalance {
             advance_m: 0.0,
             advance_sigma_m: f64::NAN,
             forward_slide_m: [0.0; MAX_CELLS],
@@ -168,73 +168,77 @@ impl Accountant {
         };
         let mut guess_j2 = 0.0;
         let (from, knots) = (fit.last_cycle_from(), fit.knots());
-        self.add_weight(fit, from, knots - 1, &mut account);
-        account.advance_sigma_m = fit.standard_error(&mut self.advance_gradient);
-        self.doubt_m = (DOUBT * account.advance_sigma_m).max(MIN_DOUBT * fit.stroke_m());
+        self.add_weight(fit, from, knots - 1, &mut balance);
+        balance.advance_sigma_m = fit.standard_error(&mut self.advance_gradient);
+        self.deadband_m = (DEADBAND_SIGMAS * balance.advance_sigma_m).max(MIN_DEADBAND * fit.stroke_m());
         for piece in 0..knots - 1 {
             if piece == from {
-                account.contact_at_start_m = self.contacts();
-                account.complete = self.touch.iter().all(|touch| touch.at_m.is_finite());
-                guess_j2 = self.doubt_of_guesses_j2();
+                balance.contact_at_start_m = self.contacts();
+                balance.complete = self.contact.iter().all(|contact| contact.at_m.is_finite());
+                guess_j2 = self.guess_variance_j2();
             }
             let counts = piece >= from;
             if counts {
-                self.add_work(fit, piece, &mut account);
+                self.add_work(fit, piece, &mut balance);
             }
             for cell in 0..self.tips.len() {
-                self.slide(fit, cell, piece, counts, &mut account);
+                self.slide(fit, cell, piece, counts, &mut balance);
             }
         }
-        account.contact_at_end_m = self.contacts();
+        balance.contact_at_end_m = self.contacts();
         for cell in 0..self.tips.len() {
-            account.deformation_at_end_m[cell] = fit.position_m(cell, knots - 1) - account.contact_at_end_m[cell];
+            balance.deformation_at_end_m[cell] = fit.position_m(cell, knots - 1) - balance.contact_at_end_m[cell];
         }
-        account.settled = account.contact_at_start_m[..self.tips.len()]
+        balance.settled = balance.contact_at_start_m[..self.tips.len()]
             .iter()
             .all(|at| at.is_finite());
-        if account.complete {
-            let overshoot_m = MIN_DOUBT * fit.stroke_m();
-            let blurred_j2: f64 = tips
+        if balance.complete {
+            let overshoot_m = MIN_DEADBAND * fit.stroke_m();
+            let overshoot_variance_j2: f64 = tips
                 .iter()
                 .map(|tip| (tip.stiffness_n_per_m * tip.bound_m * overshoot_m).powi(2))
                 .sum();
-            account.loss_sigma_j = fit
+            balance.loss_sigma_j = fit
                 .standard_error(&mut self.loss_gradient)
-                .hypot((blurred_j2 + guess_j2).sqrt());
+                .hypot((overshoot_variance_j2 + guess_j2).sqrt());
             // A slide too small to be told leaves its contact point off by up to that, and the force all along the loading.
-            let unseen_j2: f64 = self
+            let deadband_variance_j2: f64 = self
                 .work_by_contact_n
                 .iter()
-                .map(|by_contact_n| (0.5 * self.doubt_m * by_contact_n).powi(2))
+                .map(|by_contact_n| (0.5 * self.deadband_m * by_contact_n).powi(2))
                 .sum();
-            account.actuator_sigma_j = fit
+            balance.actuator_sigma_j = fit
                 .standard_error(&mut self.actuator_gradient)
-                .hypot((unseen_j2 + guess_j2).sqrt());
+                .hypot((deadband_variance_j2 + guess_j2).sqrt());
         }
-        account
+        balance
     }
 
     /// Variance of an energy when every deformation that is still guessed may be anything between the bounds: a tip that
     /// begins elsewhere slides by so much more or less, at the force of its bound.
-    fn doubt_of_guesses_j2(&self) -> f64 {
-        let guessed = self.tips.iter().zip(&self.touch).filter(|(_, touch)| touch.guessed);
+    fn guess_variance_j2(&self) -> f64 {
+        let guessed = self
+            .tips
+            .iter()
+            .zip(&self.contact)
+            .filter(|(_, contact)| contact.guessed);
         guessed
             .map(|(tip, _)| (tip.stiffness_n_per_m * tip.bound_m * tip.bound_m).powi(2) / 3.0)
             .sum()
     }
 
     /// Moves a tip to the end of a piece.
-    fn slide(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, account: &mut EnergyBalance) {
+    fn slide(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, balance: &mut EnergyBalance) {
         let (end, bound_m) = (piece + 1, self.tips[cell].bound_m);
         let at_m = fit.position_m(cell, end);
         // (1): at the end of its own step, if it was a step, the tip has slid forward.
         let own_end = fit.stepping_cell(piece) == cell && end.is_multiple_of(INTERVALS);
         let has_stepped = own_end && at_m - fit.position_m(cell, end - INTERVALS) > 2.0 * bound_m;
-        if !self.touch[cell].at_m.is_nan() {
-            self.follow(fit, cell, piece, counts, account);
-            self.touch[cell].guessed &= !has_stepped;
+        if !self.contact[cell].at_m.is_nan() {
+            self.follow(fit, cell, piece, counts, balance);
+            self.contact[cell].guessed &= !has_stepped;
         } else if has_stepped {
-            self.touch[cell] = Touch {
+            self.contact[cell] = ContactPoint {
                 at_m: at_m - bound_m,
                 knot: Some(end),
                 guessed: false,
@@ -243,18 +247,18 @@ impl Accountant {
     }
 
     /// Moves a tip whose contact point is known, or guessed, to the end of a piece.
-    fn follow(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, account: &mut EnergyBalance) {
+    fn follow(&mut self, fit: &Fit, cell: usize, piece: usize, counts: bool, balance: &mut EnergyBalance) {
         let Tip {
             stiffness_n_per_m,
             bound_m,
             ..
         } = self.tips[cell];
         let (end, at_m) = (piece + 1, fit.position_m(cell, piece + 1));
-        let Touch {
+        let ContactPoint {
             at_m: was_m,
             knot: was,
             guessed,
-        } = self.touch[cell];
+        } = self.contact[cell];
         let deformation_m = at_m - was_m;
         let (sign, excess_m) = (deformation_m.signum(), deformation_m.abs() - bound_m);
         if piece.is_multiple_of(INTERVALS) {
@@ -262,13 +266,13 @@ impl Accountant {
         }
         // Once a tip slides, small ways back within the same step are peaks of the fit too: the tip stays at its bound.
         let back_m = match self.sliding[cell] {
-            Some((sliding, back_m)) if sliding == sign && back_m - excess_m <= self.doubt_m => back_m,
-            None if excess_m > self.doubt_m => 0.0,
+            Some((sliding, back_m)) if sliding == sign && back_m - excess_m <= self.deadband_m => back_m,
+            None if excess_m > self.deadband_m => 0.0,
             _ => return,
         };
         self.sliding[cell] = Some((sign, (back_m - excess_m).max(0.0)));
         let slide_m = sign * excess_m;
-        self.touch[cell] = Touch {
+        self.contact[cell] = ContactPoint {
             at_m: was_m + slide_m,
             knot: Some(end),
             guessed,
@@ -277,13 +281,13 @@ impl Accountant {
             return;
         }
         let slides = if sign > 0.0 {
-            &mut account.forward_slide_m
+            &mut balance.forward_slide_m
         } else {
-            &mut account.backward_slide_m
+            &mut balance.backward_slide_m
         };
         slides[cell] += excess_m;
         let force_n = stiffness_n_per_m * sign * bound_m;
-        account.loss_j += force_n * slide_m;
+        balance.loss_j += force_n * slide_m;
         fit.add_to_gradient(&mut self.loss_gradient, cell, end, force_n);
         if let Some(knot) = was {
             fit.add_to_gradient(&mut self.loss_gradient, cell, knot, -force_n);
@@ -291,16 +295,16 @@ impl Accountant {
     }
 
     /// Adds the actuator work of a piece, ∫ (k δ + m g sin λ) d(extension).
-    fn add_work(&mut self, fit: &Fit, piece: usize, account: &mut EnergyBalance) {
+    fn add_work(&mut self, fit: &Fit, piece: usize, balance: &mut EnergyBalance) {
         let cell = fit.stepping_cell(piece);
         let Tip {
             stiffness_n_per_m,
             bound_m,
             weight_n,
         } = self.tips[cell];
-        let touch = self.touch[cell];
+        let contact = self.contact[cell];
         let extension_m = fit.extension_m(piece);
-        let before_m = fit.position_m(cell, piece) - touch.at_m;
+        let before_m = fit.position_m(cell, piece) - contact.at_m;
         if before_m.is_nan() {
             return; // the account is not complete, and will be kept once more with a guess
         }
@@ -317,8 +321,8 @@ impl Accountant {
         let mut work = Ledger::default();
         work.add_actuator_work(force_n(before_m), force_n(held_m), first);
         work.add_actuator_work(force_n(held_m), force_n(held_m), second);
-        account.actuator_net_j += work.actuator_net_j;
-        account.actuator_positive_j += work.actuator_positive_j;
+        balance.actuator_net_j += work.actuator_net_j;
+        balance.actuator_positive_j += work.actuator_positive_j;
         let mean_force_n = force_n(0.5 * (before_m + held_m)) * loading + force_n(held_m) * (1.0 - loading);
         fit.add_extension_to_gradient(&mut self.actuator_gradient, piece, mean_force_n);
         // The mean deformation changes by `loading` with the one before, by loading²/2 with the shift.
@@ -327,18 +331,18 @@ impl Accountant {
         self.work_by_contact_n[cell] += by_before;
         fit.add_to_gradient(&mut self.actuator_gradient, cell, piece, by_before - by_shift);
         fit.add_to_gradient(&mut self.actuator_gradient, cell, piece + 1, by_shift);
-        if let Some(knot) = touch.knot {
+        if let Some(knot) = contact.knot {
             fit.add_to_gradient(&mut self.actuator_gradient, cell, knot, -by_before);
         }
     }
 
     /// Adds advance and work against the weight.
-    fn add_weight(&mut self, fit: &Fit, from: usize, to: usize, account: &mut EnergyBalance) {
+    fn add_weight(&mut self, fit: &Fit, from: usize, to: usize, balance: &mut EnergyBalance) {
         let fraction = 1.0 / self.tips.len() as f64;
         for (cell, tip) in self.tips.iter().enumerate() {
             let displacement_m = fit.position_m(cell, to) - fit.position_m(cell, from);
-            account.advance_m += fraction * displacement_m;
-            account.loss_j += tip.weight_n * displacement_m;
+            balance.advance_m += fraction * displacement_m;
+            balance.loss_j += tip.weight_n * displacement_m;
             for (knot, sign) in [(to, 1.0), (from, -1.0)] {
                 fit.add_to_gradient(&mut self.advance_gradient, cell, knot, sign * fraction);
                 fit.add_to_gradient(&mut self.loss_gradient, cell, knot, sign * tip.weight_n);
@@ -349,8 +353,8 @@ impl Accountant {
     /// Contact points as they are known now, without guesses.
     fn contacts(&self) -> [f64; MAX_CELLS] {
         let mut contact_m = [f64::NAN; MAX_CELLS];
-        for (to, touch) in contact_m.iter_mut().zip(&self.touch) {
-            *to = if touch.guessed { f64::NAN } else { touch.at_m };
+        for (to, contact) in contact_m.iter_mut().zip(&self.contact) {
+            *to = if contact.guessed { f64::NAN } else { contact.at_m };
         }
         contact_m
     }

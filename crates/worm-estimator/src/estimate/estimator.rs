@@ -1,16 +1,19 @@
 //! The estimator: states in, estimates and cycles out.
 
+mod cycle_end;
+mod sample;
+
 use super::bounds::Identification;
 use super::capture::Capture;
 use super::contact::Contacts;
 use super::cycles::{Cycles, Event};
 use super::electrical::{Electrical, Energies};
-use super::energy_balance::{Accountant, EnergyBalance, Start, Tip};
+use super::energy_balance::{EnergyIntegrator, Tip};
 use super::filter::BodyFilter;
 use super::fit::Fit;
 use super::gait::StepSequence;
-use super::lived::LivedTime;
 use super::mismatch::{Mismatch, ResidualMap};
+use super::motor_time::MotorTime;
 use super::prediction::Predictor;
 use super::unknown;
 use super::update::{EstimatorError, Update};
@@ -19,18 +22,14 @@ use crate::config::{Config, DeformationSource};
 use crate::message::{Cycle, Estimate, Mode, State};
 use worm_physics::MAX_CELLS;
 
-/// Positions beyond this are no positions, m.
-const FARTHEST_M: f64 = 1e5;
 /// Steps of the gait without a believed position after which the contact points are lost.
-const LONGEST_BLIND_STEPS: f64 = 0.5;
+const MAX_BLIND_STEPS: f64 = 0.5;
 /// Tracker periods that are no silence yet, however far the gait goes in them.
 const SHORTEST_SILENCE_PERIODS: f64 = 2.5;
-/// Standard deviation of largest tip deformations that are only guessed, as a share: that of all of them together.
-const GUESSED_BOUND_FRACTION: f64 = 0.15;
 
 /// Account of the open cycle.
 #[derive(Debug, Clone, Copy)]
-struct Opened {
+struct CycleStart {
     time_s: f64,
     host_paused_ns: u64,
     electrical: Energies,
@@ -48,22 +47,22 @@ pub struct Estimator {
     tips: Vec<Tip>, // in forward direction
     filter: BodyFilter,
     contacts: Contacts,
-    lived: LivedTime,
+    motor_time: MotorTime,
     capture: Capture,
     host_paused_ns: u64, // as of the last state
     cycles: Cycles,
     electrical: Electrical,
     window: Window,
     window_contact_m: [f64; MAX_CELLS], // at the window's start, in the direction of the crawl
-    window_whole: bool,                 // no silence in the open cycle
+    window_is_complete: bool,           // no silence in the open cycle
     has_crawled: bool,                  // a cycle has ended
-    laid_down: bool,                    // the open cycle is the first, and began at rest
+    starts_at_rest: bool,               // the open cycle is the first, and began at rest
     fit: Fit,
-    accountant: Accountant,
+    energy_integrator: EnergyIntegrator,
     identification: Option<Identification>,
     mismatch: Mismatch,
     predictor: Predictor,
-    opened: Opened,
+    cycle_start: CycleStart,
     cycle_index: u64,
     last: Option<(u64, f64, f64)>, // sequence, time and phase of the last state
     last_seen: Option<(f64, f64)>, // time and phase of the last believed position
@@ -94,22 +93,22 @@ impl Estimator {
             tracker_period_s: 1.0 / config.tracker.rate_hz,
             filter: BodyFilter::new(config, gait),
             contacts: Contacts::new(&tips),
-            lived: LivedTime::default(),
+            motor_time: MotorTime::default(),
             capture: Capture::default(),
             host_paused_ns: 0,
             cycles: Cycles::new(config.gait.direction.sign() as i32),
             electrical: Electrical::new(config.servo.winding_resistance_ohm),
             window: Window::new(cells),
             window_contact_m: [f64::NAN; MAX_CELLS],
-            window_whole: false,
+            window_is_complete: false,
             has_crawled: false,
-            laid_down: false,
-            accountant: Accountant::new(cells, fit.unknowns()),
+            starts_at_rest: false,
+            energy_integrator: EnergyIntegrator::new(cells, fit.unknowns()),
             fit,
             identification: identified.then(|| Identification::new(&tips)),
             mismatch: Mismatch::new(predictor.worm()),
             predictor,
-            opened: Opened {
+            cycle_start: CycleStart {
                 time_s: 0.0,
                 host_paused_ns: 0,
                 electrical: Energies::default(),
@@ -141,17 +140,17 @@ impl Estimator {
     }
 
     /// Something is wrong with the worm that has a name of its own: the open cycle does not enter the residual map.
-    pub fn leave_cycle_out(&mut self) {
+    pub fn exclude_cycle(&mut self) {
         self.mismatch.disturb();
     }
 
     /// Takes up one state.
     pub fn update(&mut self, state: &State) -> Update<'_> {
         let time_s = state.time_ns as f64 * 1e-9;
-        self.notice_restart(state, time_s);
-        let lived_ns = self.lived.update(state);
-        let lived_s = lived_ns as f64 * 1e-9;
-        self.electrical.update(state, lived_ns);
+        self.detect_restart(state, time_s);
+        let motor_ns = self.motor_time.update(state);
+        let motor_s = motor_ns as f64 * 1e-9;
+        self.electrical.update(state, motor_ns);
         self.host_paused_ns = state.host_paused_ns;
         if state.mode != Mode::Crawling.code() {
             self.mismatch.disturb();
@@ -162,11 +161,11 @@ impl Estimator {
         }
         let sampled = state.sample_is_new == 1 && state.phase.is_finite();
         if sampled {
-            self.take_sample(state, time_s, lived_s);
+            self.take_sample(state, time_s, motor_s);
         }
         if state.phase.is_finite() {
-            self.capture.note_tick(lived_s, state.phase);
-            self.notice_silence(state.phase, time_s);
+            self.capture.note_tick(motor_s, state.phase);
+            self.detect_silence(state.phase, time_s);
             self.last = Some((state.sequence, time_s, state.phase));
         } else if let Some((sequence, ..)) = &mut self.last {
             *sequence = state.sequence;
@@ -181,14 +180,14 @@ impl Estimator {
     }
 
     /// Counts lost states; starts over when the controller did.
-    fn notice_restart(&mut self, state: &State, time_s: f64) {
+    fn detect_restart(&mut self, state: &State, time_s: f64) {
         let Some((sequence, last_s, _)) = self.last else { return };
         if state.sequence > sequence && time_s >= last_s {
             self.estimate.states_lost += state.sequence - sequence - 1;
             return;
         }
         self.filter.forget();
-        self.lived.forget();
+        self.motor_time.forget();
         self.capture.forget();
         self.cycles.forget();
         self.electrical.restart();
@@ -202,7 +201,7 @@ impl Estimator {
         self.contacts.forget();
         self.window.clear();
         self.window_contact_m = [f64::NAN; MAX_CELLS];
-        self.window_whole = false;
+        self.window_is_complete = false;
         // Where the open step began was not seen well enough for (1) to hold at its end.
         self.entered = (f64::NAN, f64::NAN);
         if let Some(identification) = &mut self.identification {
@@ -210,12 +209,12 @@ impl Estimator {
         }
     }
 
-    fn notice_silence(&mut self, phase: f64, time_s: f64) {
+    fn detect_silence(&mut self, phase: f64, time_s: f64) {
         let Some((seen_s, seen_phase)) = self.last_seen else {
             return;
         };
         let blind_steps = (phase - seen_phase).abs() * self.cells as f64;
-        if blind_steps > LONGEST_BLIND_STEPS && time_s - seen_s > SHORTEST_SILENCE_PERIODS * self.tracker_period_s {
+        if blind_steps > MAX_BLIND_STEPS && time_s - seen_s > SHORTEST_SILENCE_PERIODS * self.tracker_period_s {
             self.last_seen = None;
             self.lose_contacts();
         }
@@ -224,21 +223,21 @@ impl Estimator {
     /// Follows the phase over the ends of cycles. True when `self.cycle` is a new one.
     fn follow_phase(&mut self, phase: f64, time_s: f64) -> bool {
         match self.cycles.advance_to(phase) {
-            Event::Goes => false,
-            Event::Rests => {
-                self.laid_down = !self.has_crawled;
+            Event::Continues => false,
+            Event::AtRest => {
+                self.starts_at_rest = !self.has_crawled;
                 self.mismatch.rest();
                 self.open(time_s);
                 false
             }
-            Event::Begins => {
-                self.laid_down = false;
+            Event::Began => {
+                self.starts_at_rest = false;
                 self.begin_window();
                 self.cycle_index = 0;
                 self.open(time_s);
                 false
             }
-            Event::Ends { fraction, whole } => {
+            Event::Ended { fraction, whole } => {
                 let end_s = match self.last {
                     Some((_, last_s, _)) => last_s + fraction * (time_s - last_s),
                     None => time_s,
@@ -249,7 +248,7 @@ impl Estimator {
                     self.begin_window();
                 }
                 self.open(end_s);
-                (self.has_crawled, self.laid_down) = (true, false);
+                (self.has_crawled, self.starts_at_rest) = (true, false);
                 whole
             }
         }
@@ -258,7 +257,7 @@ impl Estimator {
     /// A window that begins here, with the contact points of this moment.
     fn begin_window(&mut self) {
         self.window.clear();
-        self.window_whole = true;
+        self.window_is_complete = true;
         self.mismatch.begin(self.cycles.direction());
         let sign = f64::from(self.cycles.direction());
         self.window_contact_m = self.contacts.contact_m().map(|contact_m| sign * contact_m);
@@ -268,7 +267,7 @@ impl Estimator {
     }
 
     fn open(&mut self, time_s: f64) {
-        self.opened = Opened {
+        self.cycle_start = CycleStart {
             time_s,
             host_paused_ns: self.host_paused_ns,
             electrical: self.electrical.total(),
@@ -278,239 +277,9 @@ impl Estimator {
         };
     }
 
-    /// Closes the open cycle: fit, account, prediction.
-    fn close(&mut self, end_s: f64) {
-        let direction = self.cycles.direction();
-        let sign = f64::from(direction);
-        let gait = self.gait.seen_along(direction);
-        let fitted = self.window_whole
-            && self.window.samples() as usize >= 2 * self.cells
-            && self.fit.run(&self.window, &gait, self.filter.noise_m());
-        self.cycle = unknown::cycle(self.cells);
-        self.describe_electrical(end_s, direction);
-        if fitted {
-            let mut tips = [Tip::default(); MAX_CELLS];
-            for (to, tip) in tips.iter_mut().zip(&self.tips) {
-                *to = Tip {
-                    weight_n: sign * tip.weight_n,
-                    ..*tip
-                };
-            }
-            let tips = &tips[..self.cells];
-            let start = Start {
-                contact_m: &self.window_contact_m[..self.cells],
-                resting_m: self.predictor.resting_deformation_m().map(|m| sign * m),
-                laid_down: self.laid_down,
-            };
-            let account = self.accountant.close(&self.fit, tips, &start);
-            self.describe_motion(&account, sign);
-            self.correct_contacts(&account, sign);
-            self.window_contact_m = account.contact_at_start_m;
-            if self.bounds_are_known() {
-                self.mismatch.take_up(&self.window);
-            }
-            self.window.next_cycle();
-            self.identify(tips);
-        } else {
-            self.begin_window();
-        }
-        let prediction = self.predictor.cycle(direction);
-        self.cycle.predicted_advance_m = prediction.advance_m;
-        self.cycle.predicted_energy_loss_j = prediction.energy_loss_j;
-        self.cycle.predicted_energy_positive_j = prediction.energy_positive_j;
-        self.cycle.predicted_forward_slide_m = prediction.forward_slide_m;
-        self.cycle.predicted_backward_slide_m = prediction.backward_slide_m;
-        self.cycle_index += 1;
-    }
-
-    fn bounds_are_known(&self) -> bool {
-        self.identification.as_ref().is_none_or(Identification::is_done)
-    }
-
-    fn describe_electrical(&mut self, end_s: f64, direction: i32) {
-        let spent = self.electrical.total().since(&self.opened.electrical);
-        self.cycle.index = self.cycle_index;
-        self.cycle.end_ns = (end_s * 1e9) as u64;
-        self.cycle.duration_s = end_s - self.opened.time_s;
-        self.cycle.host_paused_s = self.host_paused_ns.saturating_sub(self.opened.host_paused_ns) as f64 / 1e9;
-        self.cycle.energy_electrical_j = spent.electrical_j;
-        self.cycle.energy_copper_j = spent.copper_j;
-        self.cycle.energy_electrical_sigma_j = spent.sigma_j();
-        self.cycle.samples = self.window.samples();
-        self.cycle.direction = direction;
-    }
-
-    fn describe_motion(&mut self, account: &EnergyBalance, sign: f64) {
-        let known = self.bounds_are_known();
-        let (forward_m, backward_m) = account.slides_along_canal_m(sign);
-        let cycle = &mut self.cycle;
-        cycle.advance_m = sign * account.advance_m;
-        cycle.advance_sigma_m = account.advance_sigma_m;
-        cycle.forward_slide_m = forward_m;
-        cycle.backward_slide_m = backward_m;
-        cycle.energy_loss_j = account.loss_j;
-        cycle.energy_actuator_net_j = account.actuator_net_j;
-        cycle.energy_actuator_positive_j = account.actuator_positive_j;
-        cycle.energy_friction_inside_j = cycle.energy_electrical_j - cycle.energy_copper_j - account.actuator_net_j;
-        cycle.settled = u32::from(known && account.settled);
-        if account.advance_m > account.advance_sigma_m {
-            let weight_n = self.predictor.weight_n();
-            cycle.cot = account.actuator_positive_j / (weight_n * account.advance_m);
-        }
-        let mut by_bound = [0.0; MAX_CELLS];
-        for (cell, tip) in self.tips.iter().enumerate() {
-            by_bound[cell] = tip.stiffness_n_per_m * (forward_m[cell] + backward_m[cell]);
-        }
-        let from_bounds_j = match &self.identification {
-            None => 0.0,
-            Some(found) if known => found.standard_error(&by_bound),
-            Some(_) => {
-                let doubtful = by_bound.iter().zip(&self.tips);
-                GUESSED_BOUND_FRACTION * doubtful.map(|(by_bound_n, tip)| by_bound_n * tip.bound_m).sum::<f64>()
-            }
-        };
-        cycle.energy_loss_sigma_j = account.loss_sigma_j.hypot(from_bounds_j);
-        cycle.energy_actuator_sigma_j = account.actuator_sigma_j.hypot(from_bounds_j);
-    }
-
-    /// Replaces what the live positions gave for this cycle by what the fit gave.
-    fn correct_contacts(&mut self, account: &EnergyBalance, sign: f64) {
-        let (slid_forward_m, slid_backward_m) = account.slides_along_canal_m(sign);
-        let mut forward_m = *self.contacts.forward_m();
-        let mut backward_m = *self.contacts.backward_m();
-        let mut loss_j = self.contacts.loss_j();
-        if account.complete {
-            loss_j = self.opened.loss_j;
-            for (cell, tip) in self.tips.iter().enumerate() {
-                forward_m[cell] = self.opened.forward_m[cell] + slid_forward_m[cell];
-                backward_m[cell] = self.opened.backward_m[cell] + slid_backward_m[cell];
-                loss_j += tip.stiffness_n_per_m * tip.bound_m * (slid_forward_m[cell] + slid_backward_m[cell]);
-            }
-        }
-        let contact_m = account.contact_at_end_m.map(|contact_m| sign * contact_m);
-        self.contacts.correct(&contact_m, &forward_m, &backward_m, loss_j);
-    }
-
-    fn identify(&mut self, tips: &[Tip]) {
-        let Some(identification) = &mut self.identification else {
-            return;
-        };
-        if identification.take_up(&self.fit, tips) && self.predictor.set_bounds(identification.bound_m()).is_ok() {
-            for (tip, &bound_m) in self.tips.iter_mut().zip(identification.bound_m()) {
-                tip.bound_m = bound_m;
-            }
-            self.contacts.set_tips(&self.tips);
-            self.mismatch.set_identified(self.predictor.worm());
-            // The window is accounted for from its start with the new bounds, so its contact points are found anew.
-            self.window_contact_m = [f64::NAN; MAX_CELLS];
-            self.show_bounds();
-        }
-    }
-
     fn show_bounds(&mut self) {
         for (to, tip) in self.estimate.max_deformation_m.iter_mut().zip(&self.tips) {
             *to = tip.bound_m;
         }
-    }
-
-    /// Takes up the tracker sample of a state.
-    fn take_sample(&mut self, state: &State, time_s: f64, lived_s: f64) {
-        let (captured_s, phase) = self.capture.place(state.sample_time_s, lived_s, state.phase);
-        let mut position_m = [f64::NAN; MAX_CELLS];
-        for (cell, to) in position_m[..self.cells].iter_mut().enumerate() {
-            *to = state
-                .position_of(cell)
-                .filter(|position_m| position_m.abs() < FARTHEST_M)
-                .unwrap_or(f64::NAN);
-        }
-        self.predict(phase, captured_s);
-        let believed = self.filter.observe(&position_m[..self.cells]);
-        if believed != 0 {
-            self.last_seen = Some((time_s, state.phase));
-        }
-        let sign = f64::from(self.cycles.direction());
-        for (cell, position_m) in position_m[..self.cells].iter_mut().enumerate() {
-            self.contacts
-                .follow(cell, self.filter.position_m(cell), self.filter.sigma_m(cell));
-            *position_m = if believed >> cell & 1 == 1 {
-                sign * *position_m
-            } else {
-                f64::NAN
-            };
-        }
-        if believed != 0
-            && self.window_whole
-            && let Some(cycle_phase) = self.cycles.phase_in_cycle(phase)
-        {
-            self.window.add(cycle_phase, &position_m[..self.cells]);
-        }
-    }
-
-    /// Carries the filter to a phase, over the boundaries of steps, where (1) applies.
-    fn predict(&mut self, phase: f64, time_s: f64) {
-        let steps = phase * self.cells as f64;
-        let near = self
-            .filter
-            .at()
-            .is_some_and(|(at, _)| (steps - at).abs() <= self.cells as f64);
-        if !near {
-            self.filter.forget();
-            self.filter.begin(steps, time_s);
-            self.enter_step(steps - steps.floor());
-        }
-        while let Some(boundary) = self.filter.boundary_before(steps) {
-            let (at, since_s) = self.filter.at().unwrap_or((boundary, time_s));
-            let fraction = if steps == at {
-                1.0
-            } else {
-                (boundary - at) / (steps - at)
-            };
-            self.filter.predict(boundary, since_s + fraction * (time_s - since_s));
-            let forward = steps > at;
-            let (cell, sign) = (self.filter.stepping_cell(), if forward { 1.0 } else { -1.0 });
-            let (position_m, sigma_m) = (self.filter.position_m(cell), self.filter.sigma_m(cell));
-            let whole_step = self.entered.0 == if forward { 0.0 } else { 1.0 };
-            if whole_step {
-                let step_m = self.filter.lead_m() - self.entered.1;
-                self.contacts.anchor(cell, position_m, sigma_m, step_m, sign);
-            }
-            self.filter.cross(forward);
-            self.enter_step(if forward { 0.0 } else { 1.0 });
-        }
-        self.filter.predict(steps, time_s);
-    }
-
-    fn enter_step(&mut self, fraction: f64) {
-        self.entered = (fraction, self.filter.lead_m());
-    }
-
-    fn fill_estimate(&mut self, state: &State) {
-        let (mut mean_m, mut loss_j, contacts) = (0.0, self.contacts.loss_j(), &self.contacts);
-        let estimate = &mut self.estimate;
-        for cell in 0..self.cells {
-            let position_m = self.filter.position_m(cell);
-            mean_m += position_m / self.cells as f64;
-            estimate.position_m[cell] = position_m;
-            estimate.deformation_m[cell] = contacts.deformation_m(cell, position_m);
-            estimate.force_n[cell] = self.tips[cell].stiffness_n_per_m * estimate.deformation_m[cell];
-        }
-        if self.first_mean_m.is_nan() {
-            self.first_mean_m = mean_m;
-        }
-        let pull_n: f64 = self.tips.iter().map(|tip| tip.weight_n).sum();
-        if mean_m.is_finite() {
-            loss_j += pull_n * (mean_m - self.first_mean_m);
-            estimate.energy_loss_j = loss_j;
-        }
-        estimate.state_sequence = state.sequence;
-        estimate.time_ns = state.time_ns;
-        estimate.sample = state.sample;
-        estimate.phase = state.phase;
-        estimate.contact_m = *contacts.contact_m();
-        estimate.forward_slide_m = *contacts.forward_m();
-        estimate.backward_slide_m = *contacts.backward_m();
-        estimate.power_electrical_w = self.electrical.power_w();
-        estimate.energy_electrical_j = self.electrical.total().electrical_j;
-        estimate.sliding_mask = contacts.sliding_mask();
     }
 }

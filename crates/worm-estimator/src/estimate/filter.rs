@@ -186,7 +186,7 @@ impl BodyFilter {
             innovations[i] = position_m[i] - self.state[i];
         }
         self.follow_common_jump(&innovations[..n]);
-        let mut believed = 0;
+        let mut accepted = 0;
         for (i, &position) in position_m[..n].iter().enumerate() {
             if !position.is_finite() {
                 continue;
@@ -201,17 +201,17 @@ impl BodyFilter {
                 continue;
             }
             self.rejections[i] = 0;
-            believed |= 1 << i;
+            accepted |= 1 << i;
             self.update(i, innovation, expected);
         }
-        believed
+        accepted
     }
 
     fn update(&mut self, i: usize, innovation: f64, expected: f64) {
         let n = self.gait.cells();
-        let surprise = square(innovation) - expected;
+        let excess_m2 = square(innovation) - expected;
         let range = self.configured_variance / NOISE_RANGE..=self.configured_variance * NOISE_RANGE;
-        self.variance = (self.variance + NOISE_GAIN * surprise).clamp(*range.start(), *range.end());
+        self.variance = (self.variance + NOISE_GAIN * excess_m2).clamp(*range.start(), *range.end());
         let column = self.covariance[i];
         for a in 0..n + 2 {
             let gain = column[a] / expected;

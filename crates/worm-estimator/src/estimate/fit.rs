@@ -22,7 +22,7 @@
 //!   widen the standard errors.
 //! - The standard errors are those of the last reweighted problem, as if its corner variances had been known.
 
-use super::bordered::Bordered;
+use super::bordered_band::BorderedBandMatrix;
 use super::gait::StepSequence;
 use super::window::{CYCLES, INTERVALS, Window};
 
@@ -54,8 +54,8 @@ pub(super) struct Fit {
     cell_of_step: Vec<usize>,
     cycles: usize,
     origin_m: f64,
-    data: Bordered,   // normal equations of the samples, unweighted
-    system: Bordered, // weighted and penalised; after `run` its factor
+    data: BorderedBandMatrix,   // normal equations of the samples, unweighted
+    system: BorderedBandMatrix, // weighted and penalised; after `run` its factor
     moments: Vec<f64>,
     solution: Vec<f64>,
     scratch: Vec<f64>,
@@ -79,8 +79,8 @@ impl Fit {
             position_m: vec![0.0; (CYCLES * cells * INTERVALS + 1) * cells],
             cycles: 1,
             origin_m: 0.0,
-            data: Bordered::with_capacity(band, border),
-            system: Bordered::with_capacity(band, border),
+            data: BorderedBandMatrix::with_capacity(band, border),
+            system: BorderedBandMatrix::with_capacity(band, border),
             moments: vector.clone(),
             solution: vector.clone(),
             scratch: vector,

@@ -5,12 +5,12 @@
 //!
 //! # The story
 //! The controller's ticks carry the gait phase, precisely, and now and then a tracker sample, noisy, late and with holes.
-//! `lived` knows how much of the time the motor lived through, `capture` finds the phase at which a sample was taken. `filter` makes of the samples where the cells are *now*, and
+//! `motor_time` knows how much of the time the motor lived through, `capture` finds the phase at which a sample was taken. `filter` makes of the samples where the cells are *now*, and
 //! throws out what cannot be. `contact` follows the tips on those positions; together they are the `estimate` topic.
 //!
 //! Energies need better positions than a causal filter has, for noise at a sliding tip looks like sliding. So `window`
 //! keeps the samples of the open gait cycle and the one before, `cycles` tells when a cycle ends, `fit` then lays the
-//! cells' paths through all samples of both (solved by `bordered`), and `energy_balance` follows the tips along these paths:
+//! cells' paths through all samples of both (solved by `bordered_band`), and `energy_balance` follows the tips along these paths:
 //! losses (11, 12), actuator work (13), and the standard error of each. `electrical` adds what the motor took,
 //! `prediction` what the model expects, and that is the `cycle` topic. Where the largest tip deformations are only
 //! guessed, `bounds` finds them on the first cycles.
@@ -32,7 +32,7 @@
 
 pub mod alarm;
 
-mod bordered;
+mod bordered_band;
 mod bounds;
 mod capture;
 mod contact;
@@ -43,8 +43,8 @@ mod estimator;
 mod filter;
 mod fit;
 mod gait;
-mod lived;
 pub mod mismatch;
+mod motor_time;
 mod observer;
 mod prediction;
 mod unknown;
@@ -53,7 +53,7 @@ mod window;
 
 pub use capture::Capture;
 pub use estimator::Estimator;
-pub use lived::LivedTime;
 pub use mismatch::{Residual, ResidualMap};
+pub use motor_time::MotorTime;
 pub use observer::{Observer, ObserverOutput};
 pub use update::{EstimatorError, Update};

@@ -1,6 +1,6 @@
 //! Estimator and alarms together: what an estimator process, or a recording that is played back, runs.
 
-use super::alarm::{self, AlarmChanges, Watch};
+use super::alarm::{self, AlarmChanges, AlarmMonitor};
 use super::{Estimator, EstimatorError, ResidualMap};
 use crate::config::Config;
 use crate::message::{Cycle, Estimate, State};
@@ -22,7 +22,7 @@ pub struct ObserverOutput {
 #[derive(Debug)]
 pub struct Observer {
     estimator: Estimator,
-    watch: Watch,
+    watch: AlarmMonitor,
 }
 
 impl Observer {
@@ -33,7 +33,7 @@ impl Observer {
     pub fn new(config: &Config) -> Result<Self, EstimatorError> {
         Ok(Self {
             estimator: Estimator::new(config)?,
-            watch: Watch::new(config),
+            watch: AlarmMonitor::new(config),
         })
     }
 
@@ -49,7 +49,7 @@ impl Observer {
         };
         let alarms = self.watch.update(&observation);
         if !self.watch.is_sound() {
-            self.estimator.leave_cycle_out();
+            self.estimator.exclude_cycle();
         }
         ObserverOutput {
             estimate: estimate.map(|estimate| self.with_alarms(estimate)),

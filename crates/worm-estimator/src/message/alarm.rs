@@ -1,8 +1,8 @@
 //! The `alarm` topic: what is wrong, since when, and by how much.
 
+use super::ZeroCopySend;
 use super::json::{Name, OrNone};
 use super::{coded_enum, message};
-use iceoryx2::prelude::ZeroCopySend;
 
 coded_enum! {
     /// What an alarm watches. The code is its bit in [`super::Estimate::armed_mask`] and `raised_mask`.

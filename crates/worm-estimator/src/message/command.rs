@@ -1,7 +1,7 @@
 //! The `command` service: what the controller is asked to do, and what it answers.
 
+use super::ZeroCopySend;
 use super::coded_enum;
-use iceoryx2::prelude::ZeroCopySend;
 
 coded_enum! {
     /// What the controller is asked to do.

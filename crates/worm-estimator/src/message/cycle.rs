@@ -1,7 +1,7 @@
 //! The `cycle` topic: what one gait cycle did and cost.
 
+use super::ZeroCopySend;
 use super::message;
-use iceoryx2::prelude::ZeroCopySend;
 use worm_physics::MAX_CELLS;
 
 message! {

@@ -1,7 +1,7 @@
 //! The `estimate` topic: what the estimator knows after one tracker sample.
 
+use super::ZeroCopySend;
 use super::message;
-use iceoryx2::prelude::ZeroCopySend;
 use worm_physics::MAX_CELLS;
 
 message! {

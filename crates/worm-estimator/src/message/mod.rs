@@ -28,6 +28,10 @@ pub use json::JsonMessage;
 pub use state::{Fault, Mode, State};
 pub use timing::{Culprit, Timing};
 
+// The trait and its derive share a name, as in iceoryx2's own prelude. Taken from its parts, they do without shared memory.
+use iceoryx2_bb_derive_macros::ZeroCopySend;
+use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
+
 /// A number on a topic that stands for no known value of an enumeration: a newer peer, or a broken one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{0} is no known {1}: are all processes of this worm of one version?")]

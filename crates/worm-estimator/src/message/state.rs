@@ -1,8 +1,8 @@
 //! The `state` topic: what the controller saw and commanded in one tick.
 
+use super::ZeroCopySend;
 use super::json::{Name, OrNone};
 use super::{AlarmKind, coded_enum, message};
-use iceoryx2::prelude::ZeroCopySend;
 use worm_physics::MAX_CELLS;
 
 coded_enum! {

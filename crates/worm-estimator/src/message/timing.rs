@@ -1,8 +1,8 @@
 //! The `timing` topic: where each tick's time went.
 
+use super::ZeroCopySend;
 use super::json::Name;
 use super::{coded_enum, message};
-use iceoryx2::prelude::ZeroCopySend;
 
 coded_enum! {
     /// What made a tick end after its deadline.

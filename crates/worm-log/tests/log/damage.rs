@@ -131,7 +131,7 @@ fn a_damaged_byte_costs_its_chunk_and_no_value_is_wrong() {
 #[test]
 fn a_full_disk_is_told_and_what_was_written_can_be_read() {
     let (whole, chunks) = small_log();
-    let sink = Sink::with_room(chunks[2].0 + 100);
+    let sink = Sink::with_capacity(chunks[2].0 + 100);
     let mut writer = Writer::new(sink.clone(), "full.mcap".as_ref(), &origin()).expect("there is room yet");
     let mut outcome = Ok(());
     for state in &crawl(0.04).states {

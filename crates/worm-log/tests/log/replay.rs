@@ -1,11 +1,11 @@
 //! The same results live and on the log.
 
-use testkit::log_sample::{Told, crawl, crawl_with_late_estimator};
+use testkit::log_sample::{Telemetry, crawl, crawl_with_late_estimator};
 use worm_log::{Comparison, compare, replay};
 
-fn replayed(told: Told) -> Comparison {
-    let config = told.config.clone();
-    let log = told.log();
+fn replayed(telemetry: Telemetry) -> Comparison {
+    let config = telemetry.config.clone();
+    let log = telemetry.log();
     let replay = replay(&log, &config).expect("a valid configuration");
     compare(&log, &replay)
 }
@@ -14,10 +14,10 @@ fn replayed(told: Told) -> Comparison {
 fn a_whole_log_comes_out_as_recorded() {
     // An estimator that is late begins in the middle of a crawl.
     for late in [0, 3, 1234] {
-        let told = crawl_with_late_estimator(6.5, late);
-        let (states, cycles, alarms) = (told.states.len(), told.cycles.len(), told.alarms.len());
+        let telemetry = crawl_with_late_estimator(6.5, late);
+        let (states, cycles, alarms) = (telemetry.states.len(), telemetry.cycles.len(), telemetry.alarms.len());
         assert!(cycles >= 2, "{cycles} cycles");
-        let comparison = replayed(told);
+        let comparison = replayed(telemetry);
         assert!(
             comparison.complete && comparison.is_identical(),
             "{late}: {comparison:?}"
@@ -40,22 +40,22 @@ fn a_whole_log_comes_out_as_recorded() {
 
 #[test]
 fn what_is_missing_is_told() {
-    type Loss = fn(&mut Told);
+    type Loss = fn(&mut Telemetry);
     let table: [(&str, Loss, &str); 6] = [
         (
             "begins late",
-            |told| told.states = told.states.split_off(1500),
+            |telemetry| telemetry.states = telemetry.states.split_off(1500),
             "the log begins after the estimator",
         ),
         (
             "a state",
-            |told| told.states.retain(|state| state.sequence != 3000),
+            |telemetry| telemetry.states.retain(|state| state.sequence != 3000),
             "1 states are not in the log",
         ),
         (
             "a state that the estimator missed too",
-            |told| {
-                for estimate in told.estimates.iter_mut().skip(300) {
+            |telemetry| {
+                for estimate in telemetry.estimates.iter_mut().skip(300) {
                     estimate.states_lost = 2;
                 }
             },
@@ -63,28 +63,28 @@ fn what_is_missing_is_told() {
         ),
         (
             "a cycle",
-            |told| told.cycles.retain(|cycle| cycle.index != 1),
+            |telemetry| telemetry.cycles.retain(|cycle| cycle.index != 1),
             "1 cycles came out that are not in the log",
         ),
         (
             "the estimator's first life",
-            |told| {
+            |telemetry| {
                 let anew = crawl_with_late_estimator(5.0, 2500);
-                told.estimates.truncate(200);
-                told.estimates.extend(anew.estimates);
+                telemetry.estimates.truncate(200);
+                telemetry.estimates.extend(anew.estimates);
             },
             "the estimator was started anew at t = 3.5",
         ),
         (
             "all estimates",
-            |told| told.estimates.clear(),
+            |telemetry| telemetry.estimates.clear(),
             "there are no estimates in the log",
         ),
     ];
     for (what, lose, warning) in table {
-        let mut told = crawl(5.0);
-        lose(&mut told);
-        let comparison = replayed(told);
+        let mut telemetry = crawl(5.0);
+        lose(&mut telemetry);
+        let comparison = replayed(telemetry);
         assert!(!comparison.complete, "{what}");
         assert!(
             comparison.warnings.iter().any(|text| text.contains(warning)),
@@ -96,11 +96,11 @@ fn what_is_missing_is_told() {
 
 #[test]
 fn a_result_that_differs_in_its_last_bit_is_found() {
-    let mut told = crawl(5.0);
-    let estimate = &mut told.estimates[400];
+    let mut telemetry = crawl(5.0);
+    let estimate = &mut telemetry.estimates[400];
     estimate.force_n[2] = estimate.force_n[2].next_up();
-    told.cycles[1].cot = f64::NAN;
-    let comparison = replayed(told);
+    telemetry.cycles[1].cot = f64::NAN;
+    let comparison = replayed(telemetry);
     assert_eq!(comparison.estimates_identical, comparison.estimates_compared - 1);
     assert_eq!(comparison.cycles_identical, comparison.cycles_compared - 1);
     assert!(!comparison.is_identical());

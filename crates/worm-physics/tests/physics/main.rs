@@ -1,5 +1,4 @@
-//! The physics against the paper, against themselves, and against figures that were worked out without them.
+//! The physics against the paper's tables, and against figures that were calculated without them.
 
 mod effects;
-mod properties;
 mod tables;

@@ -3,7 +3,7 @@
 //! Nobody knows which law a worm's tips obey, so every campaign throws one, with its figures, for all four tips. The laws
 //! differ in kind: [`Lugre`] yields from the first micrometre and damps while it does, [`ElastoPlastic`] springs back wholly
 //! up to a breakaway displacement, [`Dahl`] has a rounder or a sharper knee than either and no damper, and [`Coulomb`] does
-//! not give at all. Independently of the law the bound falls with the tip's speed or with its way ([`Fall`]).
+//! not give at all. Independently of the law the bound falls with the tip's speed or with its way ([`Weakening`]).
 //!
 //! The ranges are log-uniform and come from what was measured, as far as it is about polymers:
 //!
@@ -28,44 +28,15 @@
 //! friction the static bound stands hardly above the kinetic one, though the worm's own sponge has 0.7 to 0.5 (Zarrouk,
 //! Sharf and Shoham 2016, section 2). Of Dahl's exponents two are thrown that have a closed form.
 
+use super::bristle::{TipLoad, TipStep};
 use super::coulomb::Coulomb;
 use super::dahl::{Dahl, Knee};
 use super::elasto_plastic::ElastoPlastic;
-use super::fall::Fall;
 use super::lugre::Lugre;
+use super::weakening::Weakening;
+use crate::random::log_uniform;
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-/// A tip that is pulled forward for one time step, or backward with all signs turned.
-#[derive(Debug, Clone, Copy)]
-pub struct Push {
-    /// Force of the pad on the tip if the tip stays where it is, N.
-    pub pull_n: f64,
-    /// How fast that force falls with the tip's way, N/m.
-    pub slack_n_per_m: f64,
-    /// Friction limit, N.
-    pub limit_n: f64,
-    pub bristle_n_per_m: f64,
-    /// The bristle's bend, m, below `pull_n / bristle_n_per_m`.
-    pub bristle_m: f64,
-    pub step_s: f64,
-}
-
-impl Push {
-    /// What pulls the tip beyond what its bent bristle holds, N.
-    pub fn excess_n(&self) -> f64 {
-        self.pull_n - self.bristle_n_per_m * self.bristle_m
-    }
-}
-
-/// Where a tip is after the time step.
-#[derive(Debug, Clone, Copy)]
-pub struct Gone {
-    /// Way of the tip, m, not negative.
-    pub displacement_m: f64,
-    /// The bristle's bend, m.
-    pub bristle_m: f64,
-}
 
 /// A friction law.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,12 +49,12 @@ pub enum Law {
 
 impl Law {
     /// The way on which pad and friction are in balance at the end of the time step.
-    pub fn go(&self, push: &Push) -> Gone {
+    pub fn solve(&self, load: &TipLoad) -> TipStep {
         match self {
-            Self::Lugre(law) => law.go(push),
-            Self::ElastoPlastic(law) => law.go(push),
-            Self::Dahl(law) => law.go(push),
-            Self::Coulomb(law) => law.go(push),
+            Self::Lugre(law) => law.solve(load),
+            Self::ElastoPlastic(law) => law.solve(load),
+            Self::Dahl(law) => law.solve(load),
+            Self::Coulomb(law) => law.solve(load),
         }
     }
 }
@@ -97,7 +68,7 @@ pub struct Contact {
     /// Friction limit of a tip at rest over that of a sliding one where nothing is hidden.
     pub static_over_kinetic: f64,
     /// How the limit falls from the one to the other.
-    pub fall: Fall,
+    pub weakening: Weakening,
 }
 
 impl Contact {
@@ -110,7 +81,7 @@ impl Contact {
             }),
             presliding_m: 1e-6,
             static_over_kinetic: 1.0,
-            fall: Fall::Way {
+            weakening: Weakening::Slip {
                 drop_m: 0.1e-3,
                 restored_s: 0.010,
             },
@@ -119,7 +90,7 @@ impl Contact {
 
     /// A contact as one finds them.
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
-        let (damping_s, drag_s_per_m) = (between(0.1e-3, 1e-3, rng), between(0.005, 0.05, rng));
+        let (damping_s, drag_s_per_m) = (log_uniform(0.1e-3, 1e-3, rng), log_uniform(0.005, 0.05, rng));
         // With each law the most presliding that leaves a clean worm clean, m.
         let (law, max_m) = match rng.random_range(0..5) {
             0 => {
@@ -131,7 +102,7 @@ impl Contact {
             }
             1 => {
                 let law = ElastoPlastic {
-                    breakaway_fraction: between(0.3, 0.9, rng),
+                    breakaway_fraction: log_uniform(0.3, 0.9, rng),
                     damping_s,
                     drag_s_per_m,
                 };
@@ -141,7 +112,7 @@ impl Contact {
             3 => (Law::Dahl(Dahl { knee: Knee::Round }), 1.5e-6),
             _ => {
                 let law = Coulomb {
-                    creep_m_s: between(1e-10, 1e-9, rng),
+                    creep_m_s: log_uniform(1e-10, 1e-9, rng),
                     drag_s_per_m,
                 };
                 (Law::Coulomb(law), 1e-6)
@@ -149,14 +120,9 @@ impl Contact {
         };
         Self {
             law,
-            presliding_m: between(0.5e-6, max_m, rng),
-            static_over_kinetic: 1.0 + between(0.0005, 0.002, rng),
-            fall: Fall::draw(rng),
+            presliding_m: log_uniform(0.5e-6, max_m, rng),
+            static_over_kinetic: 1.0 + log_uniform(0.0005, 0.002, rng),
+            weakening: Weakening::draw(rng),
         }
     }
-}
-
-/// A value from a range, log-uniform.
-pub fn between(min: f64, max: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
-    min * (max / min).powf(rng.random::<f64>())
 }

@@ -2,8 +2,7 @@
 //!
 //! v₀ is a speed of creep, so low that a loaded tip at rest stays where it is for as long as a run lasts.
 
-use super::contact::{Gone, Push};
-use super::lugre::positive_root;
+use super::bristle::{TipLoad, TipStep, positive_root};
 
 /// Figures of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,13 +14,13 @@ pub struct Coulomb {
 }
 
 impl Coulomb {
-    pub fn go(&self, push: &Push) -> Gone {
+    pub fn solve(&self, load: &TipLoad) -> TipStep {
         // With s the way and ε = v₀ Δt: (pull − slack s) (s + ε) = g s.
-        let creep_m = self.creep_m_s * push.step_s;
-        let slack = push.slack_n_per_m + self.drag_s_per_m * push.limit_n / push.step_s;
-        let linear = push.limit_n + slack * creep_m - push.pull_n;
-        Gone {
-            displacement_m: positive_root(slack, linear, push.pull_n * creep_m),
+        let creep_m = self.creep_m_s * load.step_s;
+        let slack = load.slack_n_per_m + self.drag_s_per_m * load.limit_n / load.step_s;
+        let linear = load.limit_n + slack * creep_m - load.pull_n;
+        TipStep {
+            displacement_m: positive_root(slack, linear, load.pull_n * creep_m),
             bristle_m: 0.0,
         }
     }

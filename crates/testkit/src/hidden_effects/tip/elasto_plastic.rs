@@ -3,8 +3,7 @@
 //! It is LuGre's law with its yielding times α: 0 up to the breakaway displacement and whenever the bristle unbends, from
 //! there rising along a sine, and 1 at the bend at which the tip slides. A tip below breakaway does not drift.
 
-use super::contact::{Gone, Push};
-use super::lugre::yield_at;
+use super::bristle::{TipLoad, TipStep, yield_at};
 use std::f64::consts::PI;
 
 /// Figures of the law.
@@ -19,16 +18,16 @@ pub struct ElastoPlastic {
 }
 
 impl ElastoPlastic {
-    pub fn go(&self, push: &Push) -> Gone {
-        let yielding = push.bristle_n_per_m / push.limit_n;
-        let elastic = yield_at(push, 0.0, self.damping_s, self.drag_s_per_m);
+    pub fn solve(&self, load: &TipLoad) -> TipStep {
+        let yielding = load.bristle_n_per_m / load.limit_n;
+        let elastic = yield_at(load, 0.0, self.damping_s, self.drag_s_per_m);
         let bent = yielding * elastic.bristle_m;
         if bent <= self.breakaway_fraction {
             return elastic;
         }
         // α is taken where an elastic bristle would stand amid that part of the step that is plastic.
-        let amid = 0.5 * (bent + self.breakaway_fraction.max(yielding * push.bristle_m));
-        yield_at(push, self.plastic(amid) * yielding, self.damping_s, self.drag_s_per_m)
+        let amid = 0.5 * (bent + self.breakaway_fraction.max(yielding * load.bristle_m));
+        yield_at(load, self.plastic(amid) * yielding, self.damping_s, self.drag_s_per_m)
     }
 
     /// α at a bend over the one at which the tip slides.

@@ -1,5 +1,6 @@
 //! What may be changed from one run to the next, and how a person is told to do it.
 
+use super::super::answer::RunChange;
 use super::super::predict::Scene;
 
 /// Slopes, degrees; factors on the cycle time, and the cycle times in s that motors do; extra masses, kg; ways that the start is
@@ -17,53 +18,29 @@ const SAME_CYCLE: f64 = 0.1;
 /// Gait cycles of a run that is not made longer.
 const CYCLES: f64 = 12.0;
 
-/// What is changed, with what it costs of a person's time, in runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum What {
-    Slope,
-    Cycle,
-    Start,
-    Payload,
-    Cycles,
-    Dwell,
-}
+/// What may be changed, cheapest first.
+pub(super) const BY_COST: [RunChange; 6] = [
+    RunChange::Slope,
+    RunChange::Cycle,
+    RunChange::Start,
+    RunChange::Payload,
+    RunChange::Cycles,
+    RunChange::Dwell,
+];
 
-impl What {
-    /// Cheapest first.
-    pub const ALL: [Self; 6] = [
-        Self::Slope,
-        Self::Cycle,
-        Self::Start,
-        Self::Payload,
-        Self::Cycles,
-        Self::Dwell,
-    ];
-
-    pub fn cost(self) -> f64 {
-        match self {
-            Self::Slope | Self::Cycle | Self::Start => 1.0,
-            Self::Payload => 1.2,
-            Self::Cycles | Self::Dwell => 1.5,
-        }
-    }
-
-    /// Name and unit in the answer.
-    pub fn name(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Slope => ("slope_deg", "deg"),
-            Self::Cycle => ("cycle_s", "s"),
-            Self::Start => ("start_m", "m"),
-            Self::Payload => ("payload_kg", "kg"),
-            Self::Cycles => ("cycles", ""),
-            Self::Dwell => ("dwell_s", "s"),
-        }
+/// What a run with a change costs of a person's time, in plain runs.
+pub(super) fn cost(what: RunChange) -> f64 {
+    match what {
+        RunChange::Slope | RunChange::Cycle | RunChange::Start => 1.0,
+        RunChange::Payload => 1.2,
+        RunChange::Cycles | RunChange::Dwell => 1.5,
     }
 }
 
 /// A run that may be made next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Change {
-    pub what: What,
+    pub what: RunChange,
     /// To which value.
     pub value: f64,
     /// The run of the campaign that is repeated with the change.
@@ -84,21 +61,21 @@ impl Change {
         let again = format!("Repeat the run at {slope}");
         let value = self.value;
         match self.what {
-            What::Slope => format!(
+            RunChange::Slope => format!(
                 "Lay the canal at {slope} and let the worm crawl {} cycles.",
                 self.cycles
             ),
-            What::Cycle => format!("{again} with a gait cycle of {value} s."),
-            What::Start => format!(
+            RunChange::Cycle => format!("{again} with a gait cycle of {value} s."),
+            RunChange::Start => format!(
                 "{again} with the worm laid down {:.0} mm further up the canal.",
                 value * 1e3
             ),
-            What::Payload => format!(
+            RunChange::Payload => format!(
                 "{again} with {:.0} g of known mass on the worm, in equal shares on all cells.",
                 value * 1e3
             ),
-            What::Cycles => format!("{again} for {value} cycles."),
-            What::Dwell => format!("{again} and stop the motor for {value} s after each whole cycle."),
+            RunChange::Cycles => format!("{again} for {value} cycles."),
+            RunChange::Dwell => format!("{again} and stop the motor for {value} s after each whole cycle."),
         }
     }
 }
@@ -109,7 +86,7 @@ pub(super) fn changes(scene: &Scene<'_>, cycle_s: f64) -> Vec<Change> {
     let runs = 0..scene.observed.len();
     let same_slope = |a_deg: f64, b_deg: f64| (a_deg - b_deg).abs() < SAME_SLOPE_DEG;
     let plain = |base: usize| Change {
-        what: What::Slope,
+        what: RunChange::Slope,
         value: slope_of(base),
         base,
         slope_deg: slope_of(base),
@@ -146,22 +123,22 @@ pub(super) fn changes(scene: &Scene<'_>, cycle_s: f64) -> Vec<Change> {
                 same_slope(slope_of(run), slope_of(base)) && (ratio - 1.0).abs() < SAME_CYCLE
             };
             if CYCLES_S.contains(&cycle_s) && !runs.clone().any(is_done) {
-                push(What::Cycle, cycle_s, Change { cycle_s, ..here });
+                push(RunChange::Cycle, cycle_s, Change { cycle_s, ..here });
             }
         }
         for shift_m in SHIFTS_M {
-            push(What::Start, shift_m, Change { shift_m, ..here });
+            push(RunChange::Start, shift_m, Change { shift_m, ..here });
         }
         for extra_kg in PAYLOADS_KG {
             let payload_kg = scene.observed[base].run.payload_kg + extra_kg;
-            push(What::Payload, payload_kg, Change { extra_kg, ..here });
+            push(RunChange::Payload, payload_kg, Change { extra_kg, ..here });
         }
         for factor in LENGTHS {
             let cycles = factor * CYCLES;
-            push(What::Cycles, cycles, Change { cycles, ..here });
+            push(RunChange::Cycles, cycles, Change { cycles, ..here });
         }
         for dwell_s in DWELLS_S {
-            push(What::Dwell, dwell_s, Change { dwell_s, ..here });
+            push(RunChange::Dwell, dwell_s, Change { dwell_s, ..here });
         }
     }
     changes

@@ -1,9 +1,12 @@
+use super::super::hypothesis::Hypothesis;
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
 use super::super::parameter::Nuisance;
-use super::super::predict::{Hypothesis, Scene, nominal, rest};
+use super::super::predict::{Scene, nominal};
+use super::super::residual::Residual;
 use super::*;
 use crate::experiment::{RecordedRun, Simulation, simulate};
+use crate::explain::answer::RunChange;
 use crate::recording::Recording;
 use worm_estimator::config::Config;
 use worm_physics::{Physics, Worm, effect};
@@ -60,7 +63,7 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
     let base = Hypothesis::new(&nuisances, &[]);
     let noise = scene.observed.iter().enumerate().map(|(run, observed)| {
         let predicted = scene.predict(run, &base, &base.neutral()).expect("the worm holds");
-        RunNoise::measure(observed, &rest(observed, &predicted))
+        RunNoise::measure(observed, &Residual::new(observed, &predicted))
     });
     let noise = noise.collect();
     let problem = FitProblem {
@@ -76,8 +79,7 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
             let mut at = hypothesis.neutral();
             *at.last_mut().expect("the effect's parameter") = value;
             let mut fit = problem.evaluate(&hypothesis, at);
-            let all: Vec<usize> = (0..fit.at.len()).collect();
-            problem.compute_jacobian_columns(&mut fit, &all);
+            problem.compute_jacobian(&mut fit);
             fit
         })
         .collect();
@@ -88,7 +90,11 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
 fn a_payload_tells_a_wrong_slope_from_a_constant_drag() {
     // The same pull at 30°: m g (sin 32.5° − sin 30°).
     let next = proposed(&[("slope-error", 2.5), ("constant-drag", 0.122)]).expect("two rivals");
-    assert_eq!((&*next.change, &*next.unit), ("payload_kg", "kg"), "{next:?}");
+    assert_eq!(
+        (next.change, &*next.unit),
+        (ExperimentChange::Run(RunChange::Payload), "kg"),
+        "{next:?}"
+    );
     assert!(
         next.value.is_some() && next.description.contains("known mass"),
         "{next:?}"
@@ -106,7 +112,7 @@ fn what_no_run_tells_apart_goes_to_the_bench() {
     assert_eq!((next.value, next.separation_sigma), (None, None), "{next:?}");
     assert_eq!(
         next.change,
-        effect::named("slope-clamping").expect("an effect").separated_by
+        ExperimentChange::Measurement(effect::named("slope-clamping").expect("an effect").separated_by)
     );
     assert_eq!(next.predictions.len(), 2);
 }

@@ -3,13 +3,15 @@
 //! The distance between two rivals is what the data of the new run would say against the wrong one, which may turn everything
 //! that is free in it as far as the campaign so far allows (its own normal matrix is the prior), and the error of the new run's slope.
 
-use super::super::fit::{Fit, FitProblem, dot};
+use super::super::fit::{Fit, FitProblem};
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
 use super::super::parameter::{Nuisance, What};
-use super::super::predict::{Predicted, Scene, residuals, rest};
+use super::super::predict::{Predicted, Scene};
+use super::super::residual::Residual;
 use super::change::Change;
 use crate::experiment::RecordedRun;
+use crate::least_squares::dot;
 use crate::recording::Recording;
 use nalgebra::{DMatrix, DVector};
 
@@ -124,7 +126,8 @@ impl<'r> Trial<'r> {
         physics.clamped_worm().check_hold().ok()?;
         let predicted = self.scene.predict(0, &rival.hypothesis, at)?;
         let mut whitened = Vec::new();
-        residuals(observed, &self.noise, &rest(observed, &predicted), &mut whitened);
+        self.noise
+            .whiten(observed, &Residual::new(observed, &predicted), &mut whitened);
         let cells = observed.cells();
         let mean_m = |sample: usize| {
             let cells_m = &predicted.position_m[sample * cells..(sample + 1) * cells];
@@ -155,12 +158,7 @@ impl<'r> Trial<'r> {
     pub fn derivative(&self, rival: &Fit, said: &Said, quantity: usize) -> Vec<f64> {
         let free = &rival.hypothesis.free[quantity];
         let mut at = as_new(rival);
-        // Towards the inside of its limits.
-        let step = if at[quantity] + free.step <= free.max {
-            free.step
-        } else {
-            -free.step
-        };
+        let step = free.quantity.inward_step(at[quantity]);
         at[quantity] += step;
         match self.ask_at(rival, &at) {
             Some(beside) => {
@@ -176,8 +174,14 @@ impl<'r> Trial<'r> {
 /// A rival's values with the slope of the new run as stated.
 fn as_new(rival: &Fit) -> Vec<f64> {
     let free = rival.hypothesis.free.iter().zip(&rival.at);
-    free.map(|(free, &at)| if free.what == FRESH_SLOPE { free.centre } else { at })
-        .collect()
+    free.map(|(free, &at)| {
+        if free.what == FRESH_SLOPE {
+            free.quantity.centre
+        } else {
+            at
+        }
+    })
+    .collect()
 }
 
 /// Distance between what two rivals say, in standard deviations, nothing turned.
@@ -213,7 +217,7 @@ impl Reach {
         matrix.view_mut((0, 0), (count, count)).copy_from(&normal);
         for (&quantity, column) in matter.iter().zip(&columns) {
             if place(quantity) == count {
-                matrix[(count, count)] = rival.hypothesis.free[quantity].sigma.powi(-2);
+                matrix[(count, count)] = rival.hypothesis.free[quantity].quantity.sigma.powi(-2);
             }
             for (&other, other_column) in matter.iter().zip(&columns) {
                 matrix[(place(quantity), place(other))] += dot(column, other_column, None);

@@ -3,7 +3,8 @@
 use crate::explain::answer::CycleSeries;
 use crate::explain::fit::{Fit, FitProblem};
 use crate::explain::observed::Observed;
-use crate::explain::predict::{Predicted, rest};
+use crate::explain::predict::Predicted;
+use crate::explain::residual::Residual;
 
 /// Bins of a cycle, about.
 const BINS: usize = 72;
@@ -29,7 +30,7 @@ pub(in crate::explain) fn cycles(
             return series;
         };
         // What a lost marker would do to the mean of the cells is not the body's way: the residual knows who was seen.
-        let left_m = rest(observed, &by_recalibrated).body_m;
+        let left_m = Residual::new(observed, &by_recalibrated).body_m;
         let modelled_m = mean_of_cells_m(observed, &by_recalibrated);
         let measured_m: Vec<f64> = modelled_m.iter().zip(&left_m).map(|(m, left_m)| m + left_m).collect();
         let fold = |displacement_m: &[f64]| Folded::new(observed, displacement_m, stroke_m, bins);

@@ -1,6 +1,6 @@
 use super::super::fixture::{Campaign, NOISE_M, Truth, WALK_M, hypothesis, problem, record, scene, taken};
 use super::{Measured, cycles};
-use crate::explain::answer::Stage;
+use crate::explain::answer::{Stage, StageKind};
 use crate::explain::predict::Scene;
 use crate::recording::Recording;
 
@@ -29,8 +29,8 @@ fn stages(recordings: &[Recording], truth: Truth<'_>) -> Stages {
     let measured = Measured::new(&problem, &named);
     let folds = [(named.clone(), fold(&scene, true))];
     Stages {
-        baseline: measured.stage("baseline", None, &baseline, &[]),
-        named: measured.stage("named", Some("it".to_owned()), &named, &folds),
+        baseline: measured.stage(StageKind::Baseline, None, &baseline, &[]),
+        named: measured.stage(StageKind::Named, Some("it".to_owned()), &named, &folds),
         free_form: measured.free_form_stage(&baseline),
         floor: measured.floor_stage(),
     }
@@ -99,8 +99,8 @@ fn only_cycles_that_were_held_out_count_as_such() {
         taken(&problem, hypothesis(EFFECTS[0])),
     );
     let measured = Measured::new(&problem, &right);
-    let rms_m = |folds: &[_]| measured.stage("named", None, &right, folds).held_out_rms_m;
-    let wrong_m = measured.stage("named", None, &wrong, &[]).fit_rms_m;
+    let rms_m = |folds: &[_]| measured.stage(StageKind::Named, None, &right, folds).held_out_rms_m;
+    let wrong_m = measured.stage(StageKind::Named, None, &wrong, &[]).fit_rms_m;
     let right_m = rms_m(&[]);
     assert_eq!(rms_m(&[(right.clone(), fold(&scene, true))]), right_m);
     assert_eq!(

@@ -3,7 +3,7 @@
 //! Which tips slide and when is in the positions of any run. The slope is the one on which the candidates' advances also lie
 //! farthest apart, so that one run does both.
 
-use super::super::answer::{NextExperiment, Prediction, Verdict};
+use super::super::answer::{ExperimentChange, NextExperiment, Prediction, RunChange, Verdict};
 use super::super::experiment_design::{MIN_ADVANCE, SLOPES_DEG};
 use super::super::fit::Fit;
 use super::model_selection::Judged;
@@ -48,9 +48,9 @@ pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) ->
         });
     let slope = format!("{slope_deg}°").replace('-', "−");
     Some(NextExperiment {
-        change: "slope_deg".to_owned(),
+        change: ExperimentChange::Run(RunChange::Slope),
         value: Some(slope_deg),
-        unit: "deg".to_owned(),
+        unit: RunChange::Slope.unit().to_owned(),
         slope_deg: Some(slope_deg),
         description: format!(
             "Lay the canal at {slope}, let the worm crawl 12 cycles, and record the positions of all its cells, with the gait phase \

@@ -1,28 +1,26 @@
-//! The scalars, what a hypothesis says of them, and its least-squares fit within limits.
-//!
-//! A quantity is turned through the sine of an angle, which cannot leave its limits; priors are residuals like any other.
+//! The advances, what a hypothesis predicts of them, and its fit.
 
 use super::super::error::ExplainError;
 use super::super::fit::Fit;
-use super::super::parameter::{Free, Nuisance, What};
-use super::super::predict::Hypothesis;
+use super::super::hypothesis::Hypothesis;
+use super::super::parameter::{Nuisance, What};
 use super::name;
+use crate::least_squares::{self, Derivatives, LeastSquares, Method, Quantity};
 use crate::recording::Advance;
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use nalgebra::{DMatrix, DVector};
 use worm_estimator::config::Config;
 use worm_physics::effect::Setting;
 use worm_physics::{Cycle, Physics, Worm, steady_cycle_of};
 
-/// Relative change of the misfit, and of the quantities, at which a fit has converged.
-const CONVERGED: f64 = 1e-4;
-/// Evaluations of a fit, for each quantity, after which it has not.
-const PATIENCE: usize = 5;
-/// Descents of a fit at most, and the gain in the misfit with which they end.
+/// One descent of a fit: the advances are few and quickly computed.
+const DESCENT: Method = Method {
+    derivatives: Derivatives::EveryStep,
+    max_steps: 40,
+    converged: (1e-5, 1e-4),
+};
+/// Descents of a fit at most, and the gain in chi-squared with which they end.
 const DESCENTS: usize = 3;
 const GAIN: f64 = 0.03;
-/// Share of its reach at which a quantity begins at most.
-const WITHIN: f64 = 0.998;
 /// Residual of an advance that the worm could not have made.
 const IMPOSSIBLE: f64 = 1e3;
 /// A run that is none of the table's, to which no run's slope error belongs.
@@ -125,7 +123,7 @@ impl<'a> Table<'a> {
             return None;
         }
         let slopes = DMatrix::from_fn(runs, nominal.at.len(), |run, quantity| {
-            nominal.jacobian[quantity][run] * nominal.hypothesis.free[quantity].sigma
+            nominal.jacobian[quantity][run] * nominal.hypothesis.free[quantity].quantity.sigma
         });
         let covariance = DMatrix::identity(runs, runs) + &slopes * slopes.transpose();
         let whitened = covariance.cholesky()?.solve(&left);
@@ -134,7 +132,7 @@ impl<'a> Table<'a> {
             .zip(&nominal.hypothesis.free)
             .zip(&slopes.tr_mul(&whitened))
         {
-            *at = (*at - free.sigma * turned).clamp(free.min, free.max);
+            *at = (*at - free.quantity.sigma * turned).clamp(free.quantity.min, free.quantity.max);
         }
         Some((left.dot(&whitened), at))
     }
@@ -146,167 +144,80 @@ impl<'a> Table<'a> {
             .map_or(IMPOSSIBLE, |said_m| (said_m - advance.advance_m) / advance.sigma_m)
     }
 
-    /// Square sum of what is left of the advances, and of what the priors add.
-    pub fn chi_squared(&self, hypothesis: &Hypothesis, at: &[f64]) -> f64 {
-        let runs = 0..self.advances.len();
-        let advances = runs.map(|run| self.residual(run, hypothesis, at));
-        let priors = hypothesis.free.iter().zip(at).map(|(free, &value)| prior(free, value));
-        advances.chain(priors).map(|left| left * left).sum()
-    }
-
-    /// A hypothesis at some values.
-    pub fn evaluate(&self, hypothesis: &Hypothesis, at: &[f64]) -> Fit {
-        let runs = 0..self.advances.len();
-        let residual: Vec<f64> = runs.map(|run| self.residual(run, hypothesis, at)).collect();
-        Fit {
-            chi_squared: self.chi_squared(hypothesis, at),
-            hypothesis: hypothesis.clone(),
-            at: at.to_vec(),
-            jacobian: self.derivatives(hypothesis, at, &residual),
-            residual,
-            converged: true,
+    fn under<'t>(&'t self, hypothesis: &'t Hypothesis) -> UnderHypothesis<'t> {
+        UnderHypothesis {
+            table: self,
+            hypothesis,
+            quantities: hypothesis.quantities(),
         }
     }
 
-    /// How the residuals change with each quantity: a column for each, by differences towards the inside of its limits.
-    fn derivatives(&self, hypothesis: &Hypothesis, at: &[f64], here: &[f64]) -> Vec<Vec<f64>> {
-        let column = |(quantity, free): (usize, &Free)| {
-            let inward = at[quantity] + free.step <= free.max;
-            let step = if inward { free.step } else { -free.step };
-            let mut probe = at.to_vec();
-            probe[quantity] += step;
-            let of_run = |(run, here): (usize, &f64)| match free.what {
-                What::Nuisance(Nuisance::SlopeOf(of)) if of != run => 0.0,
-                _ => (self.residual(run, hypothesis, &probe) - here) / step,
-            };
-            here.iter().enumerate().map(of_run).collect()
-        };
-        hypothesis.free.iter().enumerate().map(column).collect()
+    /// A hypothesis at some values, with derivatives.
+    pub fn evaluate(&self, hypothesis: &Hypothesis, at: &[f64]) -> Fit {
+        let problem = self.under(hypothesis);
+        let estimate = least_squares::evaluate(&problem, at.to_vec());
+        let all: Vec<usize> = (0..at.len()).collect();
+        let jacobian = problem.derivatives(&estimate.at, &estimate.residual, &all);
+        Fit {
+            jacobian,
+            converged: true,
+            ..Fit::new(hypothesis, estimate)
+        }
     }
 
     /// Fits every quantity within its limits, from some values. A tip that begins to slide puts a kink into the advance, at which a
-    /// descent may end too early, so it begins anew from there until that gains nothing.
+    /// descent may end too early, so another starts from there until that gains nothing.
     pub fn fit(&self, hypothesis: &Hypothesis, from: &[f64]) -> Fit {
-        let (mut values, mut chi_squared) = (from.to_vec(), self.chi_squared(hypothesis, from));
+        let problem = self.under(hypothesis);
+        let mut best = least_squares::evaluate(&problem, from.to_vec());
         let mut converged = false;
         for _ in 0..DESCENTS {
-            let (reached, ended) = self.descend(hypothesis, &values);
-            let reached_chi_squared = self.chi_squared(hypothesis, &reached);
-            let gained = chi_squared - reached_chi_squared;
+            let reached = least_squares::minimise(&problem, best.at.clone(), None, &DESCENT);
+            let gained = best.chi_squared - reached.chi_squared;
+            converged = reached.converged && gained < GAIN;
             if gained > 0.0 {
-                (values, chi_squared) = (reached, reached_chi_squared);
+                best = reached;
             }
-            converged = ended && gained < GAIN;
             if converged {
                 break;
             }
         }
         Fit {
             converged,
-            ..self.evaluate(hypothesis, &values)
+            ..self.evaluate(hypothesis, &best.at)
         }
     }
-
-    /// One descent, and whether it ended by itself.
-    fn descend(&self, hypothesis: &Hypothesis, from: &[f64]) -> (Vec<f64>, bool) {
-        let angles = hypothesis
-            .free
-            .iter()
-            .zip(from)
-            .map(|(free, &value)| angle(free, value));
-        let search = Search {
-            angles: DVector::from_iterator(from.len(), angles),
-            hypothesis,
-            table: self,
-        };
-        let method = LevenbergMarquardt::new()
-            .with_ftol(CONVERGED)
-            .with_xtol(CONVERGED)
-            .with_patience(PATIENCE);
-        let (search, report) = method.minimize(search);
-        (search.values(), report.termination.was_successful())
-    }
 }
 
-/// What a quantity is off the centre of its prior, in standard deviations.
-fn prior(free: &Free, value: f64) -> f64 {
-    (value - free.centre) / free.sigma
+/// The advances' residuals under one hypothesis.
+struct UnderHypothesis<'t> {
+    table: &'t Table<'t>,
+    hypothesis: &'t Hypothesis,
+    quantities: Vec<Quantity>,
 }
 
-fn middle_and_reach(free: &Free) -> (f64, f64) {
-    (0.5 * (free.max + free.min), 0.5 * (free.max - free.min))
-}
-
-fn angle(free: &Free, value: f64) -> f64 {
-    let (middle, reach) = middle_and_reach(free);
-    // At a limit the sine has no slope, and nothing would ever move it away.
-    ((value - middle) / reach).clamp(-WITHIN, WITHIN).asin()
-}
-
-/// A fit under way.
-struct Search<'s> {
-    table: &'s Table<'s>,
-    hypothesis: &'s Hypothesis,
-    angles: DVector<f64>,
-}
-
-impl Search<'_> {
-    fn values(&self) -> Vec<f64> {
-        let turned = self.hypothesis.free.iter().zip(&self.angles);
-        turned
-            .map(|(free, angle)| {
-                let (middle, reach) = middle_and_reach(free);
-                (middle + reach * angle.sin()).clamp(free.min, free.max)
-            })
-            .collect()
-    }
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, angles: &DVector<f64>) {
-        self.angles.copy_from(angles);
+impl LeastSquares for UnderHypothesis<'_> {
+    fn quantities(&self) -> &[Quantity] {
+        &self.quantities
     }
 
-    fn params(&self) -> DVector<f64> {
-        self.angles.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let values = self.values();
+    fn residuals(&self, at: &[f64]) -> Vec<f64> {
         let runs = 0..self.table.advances.len();
-        let mut rows: Vec<f64> = runs
-            .map(|run| self.table.residual(run, self.hypothesis, &values))
-            .collect();
-        rows.extend(
-            self.hypothesis
-                .free
-                .iter()
-                .zip(&values)
-                .map(|(free, &value)| prior(free, value)),
-        );
-        Some(DVector::from_vec(rows))
+        runs.map(|run| self.table.residual(run, self.hypothesis, at)).collect()
     }
 
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let values = self.values();
-        let runs = self.table.advances.len();
-        let here: Vec<f64> = (0..runs)
-            .map(|run| self.table.residual(run, self.hypothesis, &values))
-            .collect();
-        let columns = self.table.derivatives(self.hypothesis, &values, &here);
-        let count = values.len();
-        Some(DMatrix::from_fn(runs + count, count, |row, quantity| {
-            let free = &self.hypothesis.free[quantity];
-            let per_value = match row.checked_sub(runs) {
-                None => columns[quantity][row],
-                Some(of) if of == quantity => free.sigma.recip(),
-                Some(_) => 0.0,
+    /// By differences towards the inside of the limits.
+    fn derivatives(&self, at: &[f64], residual: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
+        let column = |&number: &usize| {
+            let step = self.quantities[number].inward_step(at[number]);
+            let mut probe = at.to_vec();
+            probe[number] += step;
+            let of_run = |(run, here): (usize, &f64)| match self.hypothesis.free[number].what {
+                What::Nuisance(Nuisance::SlopeOf(of)) if of != run => 0.0,
+                _ => (self.table.residual(run, self.hypothesis, &probe) - here) / step,
             };
-            per_value * middle_and_reach(free).1 * self.angles[quantity].cos()
-        }))
+            residual.iter().enumerate().map(of_run).collect()
+        };
+        quantities.iter().map(column).collect()
     }
 }

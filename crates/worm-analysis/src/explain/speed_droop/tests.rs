@@ -1,7 +1,7 @@
 use super::*;
 use crate::experiment::RecordedRun;
+use crate::explain::hypothesis::Hypothesis;
 use crate::explain::parameter::Nuisance;
-use crate::explain::predict::Hypothesis;
 use crate::recording::Recording;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

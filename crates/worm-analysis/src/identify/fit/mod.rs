@@ -21,8 +21,7 @@ mod run;
 
 use super::drift::Drift;
 use super::gait::IdentifiedGait;
-use levenberg_marquardt::LevenbergMarquardt;
-use nalgebra::DVector;
+use crate::least_squares::{self, Derivatives, LeastSquares, Method, normal_matrix};
 use problem::{BoundsProblem, DAMPING, IMPOSSIBLE};
 use worm_physics::{Worm, WormError};
 
@@ -44,6 +43,12 @@ const SHARING_ROUNDS: usize = 3;
 const MIN_MOVE_M: f64 = 5e-5;
 /// Ways by which bounds are moved at each other's expense to see whether the data mind, m.
 const MOVES_M: [f64; 4] = [5e-5, 1e-4, 2e-4, 4e-4];
+/// A descent of the fit.
+const DESCENT: Method = Method {
+    derivatives: Derivatives::EveryStep,
+    max_steps: 50,
+    converged: (0.0, 1e-6),
+};
 /// Times that drift and parameters are found from one another.
 const ROUNDS: usize = 2;
 
@@ -145,14 +150,14 @@ pub fn fit(
 
 impl<'a> BoundsProblem<'a> {
     /// Searches from the starting points, those first that promise most, until one leads to what noise explains; else from all.
-    fn search(&mut self, starts_m: &[Vec<f64>]) -> Result<DVector<f64>, FitError> {
-        let mut starts: Vec<(f64, DVector<f64>)> = Vec::with_capacity(starts_m.len());
+    fn search(&mut self, starts_m: &[Vec<f64>]) -> Result<Vec<f64>, FitError> {
+        let mut starts: Vec<(f64, Vec<f64>)> = Vec::with_capacity(starts_m.len());
         for start_m in starts_m {
             self.begin_at(start_m);
             starts.push((self.data_misfit(), self.parameters.clone()));
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut best: Option<(f64, DVector<f64>)> = None;
+        let mut best: Option<(f64, Vec<f64>)> = None;
         for (tried, (_, start)) in starts.into_iter().enumerate() {
             if tried >= MIN_STARTS && best.is_some() && self.misfit_ratio() < GOOD_RATIO {
                 break;
@@ -191,16 +196,10 @@ impl<'a> BoundsProblem<'a> {
 
     /// Minimises the misfit from where the parameters are; returns it.
     fn minimise(&mut self) -> f64 {
-        let problem = std::mem::replace(self, Self::placeholder(&self.base));
-        let (problem, report) = LevenbergMarquardt::new()
-            .with_ftol(1e-6)
-            .with_xtol(1e-5)
-            .with_gtol(1e-9)
-            .with_patience(8)
-            .minimize(problem);
-        *self = problem;
-        if report.objective_function.is_finite() {
-            2.0 * report.objective_function
+        let estimate = least_squares::minimise(self, self.parameters.clone(), None, &DESCENT);
+        self.parameters = estimate.at;
+        if estimate.chi_squared.is_finite() {
+            estimate.chi_squared
         } else {
             f64::INFINITY
         }
@@ -271,7 +270,7 @@ impl<'a> BoundsProblem<'a> {
 
     /// The parameters with one bound larger by `displacement_m` and another smaller. A tip that never slides backward has a deformation
     /// larger by as much all the time, from the start.
-    fn moved(&self, one: usize, other: usize, displacement_m: f64) -> DVector<f64> {
+    fn moved(&self, one: usize, other: usize, displacement_m: f64) -> Vec<f64> {
         let mut moved = self.parameters.clone();
         for (cell, displacement_m) in [(one, displacement_m), (other, -displacement_m)] {
             moved[cell] = (self.parameters[cell].exp() + displacement_m).ln();
@@ -321,10 +320,8 @@ impl<'a> BoundsProblem<'a> {
 
     fn finish(self) -> Result<Fitted, FitError> {
         let ratio = self.misfit_ratio();
-        let covariance = self
-            .flatter_jacobian()
-            .and_then(|jacobian| (jacobian.tr_mul(&jacobian)).cholesky())
-            .map(|factor| factor.inverse() * ratio.max(1.0));
+        let normal = normal_matrix(self.quantities(), &self.flatter_jacobian(), None);
+        let covariance = normal.cholesky().map(|factor| factor.inverse() * ratio.max(1.0));
         let sigma = |at: usize| {
             covariance
                 .as_ref()

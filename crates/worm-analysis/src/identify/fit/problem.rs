@@ -2,8 +2,8 @@
 
 use super::run::{RunData, common_deformation_m};
 use super::{FitError, PositionRun};
-use levenberg_marquardt::LeastSquaresProblem;
-use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use crate::least_squares::{LeastSquares, Quantity, dot};
+use rayon::prelude::*;
 use worm_physics::{Worm, WormError};
 
 /// Spread of the bounds of one worm about their common mean, as a share: what shares out that which the data do not tell.
@@ -27,7 +27,8 @@ pub(super) struct BoundsProblem<'a> {
     pub base: Worm,
     pub runs: Vec<RunData<'a>>,
     pub with_mass: bool,
-    pub parameters: DVector<f64>,
+    pub parameters: Vec<f64>,
+    quantities: Vec<Quantity>,
 }
 
 impl<'a> BoundsProblem<'a> {
@@ -38,11 +39,21 @@ impl<'a> BoundsProblem<'a> {
             .map(|run| RunData::new(base, *run))
             .collect::<Result<_, WormError>>()?;
         let with_mass = runs.iter().any(|run| run.worm.slope_rad() != 0.0);
-        let count = cells + 1 + usize::from(with_mass) + cells * runs.len();
+        let shared = cells + 1 + usize::from(with_mass);
+        let count = shared + cells * runs.len();
         Ok(Self {
             base: base.clone(),
             with_mass,
-            parameters: DVector::zeros(count),
+            parameters: vec![0.0; count],
+            quantities: (0..count)
+                .map(|parameter| {
+                    Quantity::unlimited(if parameter < shared {
+                        DIFFERENCES.0
+                    } else {
+                        DIFFERENCES.1
+                    })
+                })
+                .collect(),
             runs,
         })
     }
@@ -60,11 +71,11 @@ impl<'a> BoundsProblem<'a> {
         self.cells() + 1
     }
 
-    pub(super) fn damping_ratio(&self, at: &DVector<f64>) -> f64 {
+    pub(super) fn damping_ratio(&self, at: &[f64]) -> f64 {
         at[self.cells()].exp()
     }
 
-    pub(super) fn mass_kg(&self, at: &DVector<f64>) -> f64 {
+    pub(super) fn mass_kg(&self, at: &[f64]) -> f64 {
         if self.with_mass {
             at[self.mass_at()].exp()
         } else {
@@ -72,16 +83,16 @@ impl<'a> BoundsProblem<'a> {
         }
     }
 
-    pub(super) fn bounds_m(&self, at: &DVector<f64>) -> Vec<f64> {
+    pub(super) fn bounds_m(&self, at: &[f64]) -> Vec<f64> {
         at.iter().take(self.cells()).map(|log| log.exp()).collect()
     }
 
-    pub(super) fn set(&mut self, parameters: DVector<f64>) {
+    pub(super) fn set(&mut self, parameters: Vec<f64>) {
         self.parameters = parameters;
     }
 
     /// The worm of a run with some parameters.
-    pub(super) fn worm(&self, run: usize, at: &DVector<f64>) -> Result<Worm, WormError> {
+    pub(super) fn worm(&self, run: usize, at: &[f64]) -> Result<Worm, WormError> {
         let data = &self.runs[run];
         data.worm
             .clone()
@@ -89,17 +100,8 @@ impl<'a> BoundsProblem<'a> {
             .with_mass_kg(self.mass_kg(at) + data.run.payload_kg)
     }
 
-    pub(super) fn placeholder(base: &Worm) -> Self {
-        Self {
-            base: base.clone(),
-            runs: Vec::new(),
-            with_mass: false,
-            parameters: DVector::zeros(0),
-        }
-    }
-
     /// What theory leaves of the measured way of a run, m; none where the worm could not have made it.
-    pub(super) fn rest_m(&self, run: usize, at: &DVector<f64>) -> Option<Vec<f64>> {
+    pub(super) fn rest_m(&self, run: usize, at: &[f64]) -> Option<Vec<f64>> {
         let theory_m = self.theory_m(run, at)?;
         let measured_m = &self.runs[run].run.gait.body_m;
         Some(
@@ -112,18 +114,18 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// Way of the body by theory at every sample of a run, m.
-    pub(super) fn theory_m(&self, run: usize, at: &DVector<f64>) -> Option<Vec<f64>> {
+    pub(super) fn theory_m(&self, run: usize, at: &[f64]) -> Option<Vec<f64>> {
         let worm = self.worm(run, at).ok()?;
         self.runs[run].displacement_m(&worm, &self.start_m(run, at), self.damping_ratio(at))
     }
 
-    pub(super) fn start_m(&self, run: usize, at: &DVector<f64>) -> Vec<f64> {
+    pub(super) fn start_m(&self, run: usize, at: &[f64]) -> Vec<f64> {
         let first = self.first_start(run);
         (0..self.cells()).map(|cell| at[first + cell] * 1e-3).collect()
     }
 
     /// Deformations of tips that were laid down unloaded and gave way together, m.
-    pub(super) fn laid_down_start_m(&self, run: usize, at: &DVector<f64>) -> Vec<f64> {
+    pub(super) fn laid_down_start_m(&self, run: usize, at: &[f64]) -> Vec<f64> {
         match self.worm(run, at) {
             Ok(worm) => vec![common_deformation_m(&worm); worm.cells()],
             Err(_) => vec![0.0; self.cells()],
@@ -136,7 +138,7 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// Square sum of the surprises with other parameters.
-    pub(super) fn misfit_at(&self, at: &DVector<f64>) -> f64 {
+    pub(super) fn misfit_at(&self, at: &[f64]) -> f64 {
         let mut surprises = Vec::with_capacity(self.rows());
         for run in 0..self.runs.len() {
             self.surprises(run, at, &mut surprises);
@@ -156,7 +158,7 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// Appends the surprises of a run.
-    pub(super) fn surprises(&self, run: usize, at: &DVector<f64>, out: &mut Vec<f64>) {
+    pub(super) fn surprises(&self, run: usize, at: &[f64], out: &mut Vec<f64>) {
         let data = &self.runs[run];
         match self.rest_m(run, at) {
             Some(rest_m) => data.drift.whiten(rest_m, |surprise| out.push(surprise)),
@@ -165,9 +167,9 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// Appends what the parameters should be like before the data are asked, each in standard deviations, in their order.
-    pub(super) fn expectations(&self, at: &DVector<f64>, out: &mut Vec<f64>) {
+    pub(super) fn expectations(&self, at: &[f64], out: &mut Vec<f64>) {
         let cells = self.cells();
-        let mean = at.rows(0, cells).mean();
+        let mean = at[..cells].iter().sum::<f64>() / cells as f64;
         out.extend((0..cells).map(|cell| (at[cell] - mean) / BOUND_SPREAD));
         out.push((at[cells] - DAMPING.0.ln()) / DAMPING.1);
         if self.with_mass {
@@ -191,7 +193,7 @@ impl<'a> BoundsProblem<'a> {
     }
 
     /// Residuals of the runs that a parameter concerns, all for none; zeros in the place of the others.
-    pub(super) fn residuals_at(&self, at: &DVector<f64>, parameter: Option<usize>) -> DVector<f64> {
+    pub(super) fn residuals_at(&self, at: &[f64], parameter: Option<usize>) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.rows());
         for (run, data) in self.runs.iter().enumerate() {
             let first = self.first_start(run);
@@ -205,89 +207,59 @@ impl<'a> BoundsProblem<'a> {
             }
         }
         self.expectations(at, &mut all);
-        DVector::from_vec(all)
+        all
     }
 
-    /// The Jacobian, column by column, by a function of parameters, step and which of them.
-    pub(super) fn columns(
-        &self,
-        column: impl Fn(&DVector<f64>, f64, usize) -> DVector<f64> + Sync,
-    ) -> Option<DMatrix<f64>> {
-        let count = self.parameters.len();
-        let threads = std::thread::available_parallelism()
-            .map_or(1, std::num::NonZero::get)
-            .min(count);
-        let compute = |parameter: usize| {
-            let shared = parameter < self.first_start(0);
-            let step = if shared { DIFFERENCES.0 } else { DIFFERENCES.1 };
-            (parameter, column(&self.parameters, step, parameter))
-        };
-        // Which thread computes a column does not change it: the same data give the same answer on every machine.
-        let columns: Vec<(usize, DVector<f64>)> = std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..threads)
-                .map(|thread| {
-                    let compute = &compute;
-                    scope.spawn(move || (thread..count).step_by(threads).map(compute).collect::<Vec<_>>())
-                })
-                .collect();
-            workers
-                .into_iter()
-                .map(|worker| worker.join().ok())
-                .collect::<Option<Vec<_>>>()
-        })?
-        .concat();
-        let mut matrix = DMatrix::zeros(self.rows(), count);
-        for (parameter, column) in columns {
-            matrix.set_column(parameter, &column);
-        }
-        Some(matrix)
+    /// The residuals with a parameter's value increased and decreased by a step.
+    fn sides(&self, at: &[f64], parameter: usize, step: f64) -> [Vec<f64>; 2] {
+        [step, -step].map(|step| {
+            let mut probe = at.to_vec();
+            probe[parameter] = at[parameter] + step;
+            self.residuals_at(&probe, Some(parameter))
+        })
     }
 
-    /// The Jacobian by the flatter of both sides. Where a tip just begins to slide backward, its bound is seen on one side only,
-    /// and a standard error must not rest on that side.
-    pub(super) fn flatter_jacobian(&self) -> Option<DMatrix<f64>> {
-        self.columns(|at, step, parameter| {
-            let mut probe = at.clone();
+    /// The Jacobian by the flatter of both sides. Where a tip just begins to slide backward, its bound shows on one side only, and
+    /// a standard error must not rest on that side.
+    pub(super) fn flatter_jacobian(&self) -> Vec<Vec<f64>> {
+        let at = &self.parameters;
+        let column = |parameter: usize| {
+            let step = WIDE * self.quantities[parameter].step;
             let here = self.residuals_at(at, Some(parameter));
-            probe[parameter] = at[parameter] + WIDE * step;
-            let above = self.residuals_at(&probe, Some(parameter)) - &here;
-            probe[parameter] = at[parameter] - WIDE * step;
-            let below = here - self.residuals_at(&probe, Some(parameter));
-            let flatter = if above.norm_squared() < below.norm_squared() {
+            let [above, below] = self.sides(at, parameter, step);
+            let above = slope(&above, &here, step);
+            let below = slope(&here, &below, step);
+            if dot(&above, &above, None) < dot(&below, &below, None) {
                 above
             } else {
                 below
-            };
-            flatter / (WIDE * step)
-        })
+            }
+        };
+        (0..at.len()).into_par_iter().map(column).collect()
     }
 }
 
-impl LeastSquaresProblem<f64, Dyn, Dyn> for BoundsProblem<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
+/// How much residuals change over a width, each.
+fn slope(to: &[f64], from: &[f64], width: f64) -> Vec<f64> {
+    to.iter().zip(from).map(|(to, from)| (to - from) / width).collect()
+}
 
-    fn set_params(&mut self, parameters: &DVector<f64>) {
-        self.parameters.copy_from(parameters);
+impl LeastSquares for BoundsProblem<'_> {
+    fn quantities(&self) -> &[Quantity] {
+        &self.quantities
     }
 
-    fn params(&self) -> DVector<f64> {
-        self.parameters.clone()
+    /// What the parameters should be like before the data are seen is among the residuals.
+    fn residuals(&self, at: &[f64]) -> Vec<f64> {
+        self.residuals_at(at, None)
     }
 
-    fn residuals(&self) -> Option<DVector<f64>> {
-        Some(self.residuals_at(&self.parameters, None))
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        self.columns(|at, step, parameter| {
-            let mut probe = at.clone();
-            probe[parameter] = at[parameter] + step;
-            let mut difference = self.residuals_at(&probe, Some(parameter));
-            probe[parameter] = at[parameter] - step;
-            difference -= self.residuals_at(&probe, Some(parameter));
-            difference / (2.0 * step)
-        })
+    fn derivatives(&self, at: &[f64], _residual: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
+        let column = |&parameter: &usize| {
+            let step = self.quantities[parameter].step;
+            let [above, below] = self.sides(at, parameter, step);
+            slope(&above, &below, 2.0 * step)
+        };
+        quantities.par_iter().map(column).collect()
     }
 }

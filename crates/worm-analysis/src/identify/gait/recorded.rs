@@ -1,6 +1,7 @@
 //! A recorded gait phase: what it must be like, and which cell steps in which part of it.
 
-use super::{Finder, GaitError, MIN_CYCLES};
+use super::{Finder, MIN_CYCLES};
+use crate::identify::gait_error::GaitError;
 
 /// How far a recorded phase may fall back behind where it has been, cycles, before it counts as running back.
 const BACKWARD: f64 = 0.03;

@@ -1,6 +1,7 @@
 //! Gaits of worms that pause, begin and end anywhere, and are seen badly; and what is not a gait.
 
-use super::{GaitError, IdentifiedGait, Prior, find};
+use super::{IdentifiedGait, Prior, find};
+use crate::identify::GaitError;
 use crate::recording::Recording;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -4,14 +4,14 @@ use super::{advance_m, slow_advance_of_m};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use testkit::hidden_effects::body::Worm;
-use testkit::hidden_effects::flaws::Flaws;
-use testkit::hidden_effects::make::Make;
+use testkit::hidden_effects::deviations::Deviations;
+use testkit::hidden_effects::effect_size::advances_m;
+use testkit::hidden_effects::parameters::WormParameters;
 use testkit::hidden_effects::scene::{STEP_S, Scene};
 use testkit::hidden_effects::tip::contact::{Contact, Law};
 use testkit::hidden_effects::tip::dahl::Dahl;
-use testkit::hidden_effects::tip::fall::Fall;
+use testkit::hidden_effects::tip::weakening::Weakening;
 use testkit::hidden_effects::tip::{Limits, Pad, Tip};
-use testkit::hidden_effects::visible::advances_m;
 
 /// Contacts as they are thrown: so many that each law and both falls are among them.
 fn contacts() -> Vec<Contact> {
@@ -36,7 +36,11 @@ fn one_of_each() -> Vec<Contact> {
             Law::Dahl(Dahl { knee }) => Some(knee),
             _ => None,
         };
-        (name(contact), knee, matches!(contact.fall, Fall::Speed { .. }))
+        (
+            name(contact),
+            knee,
+            matches!(contact.weakening, Weakening::Velocity { .. }),
+        )
     };
     let mut each: Vec<Contact> = Vec::new();
     for contact in contacts() {
@@ -76,7 +80,7 @@ fn every_law_is_thrown() {
     seen.sort_unstable();
     seen.dedup();
     assert_eq!(seen, ["coulomb", "dahl", "elasto-plastic", "lugre"]);
-    let falls_with_speed = |contact: &Contact| matches!(contact.fall, Fall::Speed { .. });
+    let falls_with_speed = |contact: &Contact| matches!(contact.weakening, Weakening::Velocity { .. });
     assert!(contacts().iter().any(falls_with_speed) && !contacts().iter().all(falls_with_speed));
 }
 
@@ -134,13 +138,13 @@ fn the_static_bound_stands_above_the_kinetic_one() {
 #[test]
 fn a_clean_worm_is_clean_under_every_law() {
     let worm = |contact: Contact, damping_ratio: f64| Worm {
-        make: Make {
+        parameters: WormParameters {
             contact,
             damping_ratio,
-            ..Make::nominal()
+            ..WormParameters::nominal()
         },
-        flaws: Flaws::default(),
-        stranger: None,
+        deviations: Deviations::default(),
+        unmodelled: None,
     };
     let level_m = advance_m(&worm(Contact::rigid(), 0.3), 0.0);
     for slope_deg in [0.0, 30.0, 45.0] {
@@ -165,13 +169,13 @@ fn a_clean_worm_is_clean_under_every_law() {
 fn half_the_time_step_changes_nothing_that_counts() {
     for contact in one_of_each() {
         let worm = Worm {
-            make: Make {
+            parameters: WormParameters {
                 contact,
                 damping_ratio: 0.1,
                 rounding: 0.002,
-                ..Make::nominal()
+                ..WormParameters::nominal()
             },
-            flaws: Flaws {
+            deviations: Deviations {
                 static_over_kinetic: 1.3,
                 hardening: 0.5,
                 creep_share: 0.3,
@@ -179,9 +183,9 @@ fn half_the_time_step_changes_nothing_that_counts() {
                 compliance_m_per_n: 3e-4,
                 drag_n_s_per_m: 5.0,
                 play_m: 0.3e-3,
-                ..Flaws::default()
+                ..Deviations::default()
             },
-            stranger: None,
+            unmodelled: None,
         };
         for slope_deg in [0.0, 30.0] {
             let advance_m = |step_s: f64| {
@@ -190,7 +194,7 @@ fn half_the_time_step_changes_nothing_that_counts() {
                     step_s,
                     ..Scene::ideal(slope_deg, 2.5)
                 };
-                advances_m(&scene.play(&worm).expect("the worm holds"))[2]
+                advances_m(&scene.simulate(&worm).expect("the worm holds"))[2]
             };
             let ratio = advance_m(0.5 * STEP_S) / advance_m(STEP_S);
             assert!(

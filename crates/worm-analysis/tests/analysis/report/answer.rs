@@ -3,8 +3,8 @@
 
 use super::sample::STIFFNESS_N_PER_M;
 use worm_analysis::explain::answer::{
-    Answer, Calibrated, CycleSeries, Figures, FoundParameter, NamedEffect, NextExperiment, Place, Prediction,
-    Remainder, ResidualMap, RunSummary, Screened, Stage, Verdict,
+    Answer, Calibrated, CycleSeries, ExperimentChange, Figures, FoundParameter, NamedEffect, NextExperiment, Place,
+    Prediction, Remainder, ResidualMap, RunChange, RunSummary, Screened, ScreeningOutcome, Stage, StageKind, Verdict,
 };
 use worm_physics::effect::{self, LIBRARY};
 use worm_physics::{Contact, Motion, Worm};
@@ -179,7 +179,11 @@ pub fn found(
         });
     NamedEffect {
         name: name.to_owned(),
-        twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
+        twins: effect
+            .all_twins(cell.map(|cell| cell - 1))
+            .into_iter()
+            .map(str::to_owned)
+            .collect(),
         parameters: parameters.collect(),
         cell,
         together_with: Vec::new(),
@@ -198,21 +202,29 @@ fn screening() -> Vec<Screened> {
             cell: Some(cell),
             score: if cell == 2 { 812.4 } else { 40.0 + cell as f64 },
             improvement: (cell == 2).then_some(1043.7),
-            outcome: if cell == 2 { "refitted" } else { "screened-out" },
+            outcome: if cell == 2 {
+                ScreeningOutcome::Refitted
+            } else {
+                ScreeningOutcome::ScreenedOut
+            },
         })
         .collect();
     screening.extend(LIBRARY.iter().skip(1).enumerate().map(|(number, effect)| {
         let score = 620.0 * 0.62f64.powi(number as i32);
         let (improvement, outcome) = match effect.name {
-            "sensor-latency" | "motor-droop" => (None, "not-visible"),
-            "breakaway-friction" => (None, "did-not-converge"),
-            _ if number < 6 => (Some(0.8 * score), "refitted"),
-            _ => (None, "screened-out"),
+            "sensor-latency" | "motor-droop" => (None, ScreeningOutcome::NotVisible),
+            "breakaway-friction" => (None, ScreeningOutcome::DidNotConverge),
+            _ if number < 6 => (Some(0.8 * score), ScreeningOutcome::Refitted),
+            _ => (None, ScreeningOutcome::ScreenedOut),
         };
         Screened {
             name: effect.name.to_owned(),
             cell: None,
-            score: if outcome == "not-visible" { 0.0 } else { score },
+            score: if outcome == ScreeningOutcome::NotVisible {
+                0.0
+            } else {
+                score
+            },
             improvement,
             outcome,
         }
@@ -221,7 +233,7 @@ fn screening() -> Vec<Screened> {
     screening
 }
 
-fn stage(stage: &'static str, effect: Option<&str>, rms_mm: f64, advance_mm: f64) -> Stage {
+fn stage(stage: StageKind, effect: Option<&str>, rms_mm: f64, advance_mm: f64) -> Stage {
     Stage {
         stage,
         effect: effect.map(str::to_owned),
@@ -234,14 +246,14 @@ fn stage(stage: &'static str, effect: Option<&str>, rms_mm: f64, advance_mm: f64
 
 fn stages(named: Option<&str>, wrong: Option<&str>) -> Vec<Stage> {
     let mut stages = vec![
-        stage("baseline", None, 0.412, 0.61),
-        stage("recalibrated", None, 0.187, 0.11),
+        stage(StageKind::Baseline, None, 0.412, 0.61),
+        stage(StageKind::Recalibrated, None, 0.187, 0.11),
     ];
-    stages.extend(named.map(|named| stage("named", Some(named), 0.041, 0.012)));
-    stages.extend(wrong.map(|wrong| stage("best-wrong", Some(wrong), 0.102, 0.07)));
+    stages.extend(named.map(|named| stage(StageKind::Named, Some(named), 0.041, 0.012)));
+    stages.extend(wrong.map(|wrong| stage(StageKind::BestWrong, Some(wrong), 0.102, 0.07)));
     stages.extend([
-        stage("free-form", None, 0.037, 0.004),
-        stage("floor", None, 0.0342, 0.003),
+        stage(StageKind::FreeForm, None, 0.037, 0.004),
+        stage(StageKind::Floor, None, 0.0342, 0.003),
     ]);
     stages
 }
@@ -300,7 +312,7 @@ pub fn explained(cells: usize) -> Answer {
         stages: stages(Some("unequal-clamping"), Some("unequal-stiffness")),
         remainder: None,
         next_experiment: Some(NextExperiment {
-            change: "pull test of one cell".to_owned(),
+            change: ExperimentChange::Measurement("pull test of one cell"),
             value: None,
             unit: String::new(),
             slope_deg: None,
@@ -353,7 +365,7 @@ pub fn ambiguous() -> Answer {
         ],
         stages: stages(Some("slope-error"), Some("constant-drag")),
         next_experiment: Some(NextExperiment {
-            change: "payload_kg".to_owned(),
+            change: ExperimentChange::Run(RunChange::Payload),
             value: Some(0.1),
             unit: "kg".to_owned(),
             slope_deg: Some(30.0),
@@ -391,7 +403,7 @@ pub fn outside() -> Answer {
             places: places(&answer.figures.maps_before)[..3].to_vec(),
         }),
         next_experiment: Some(NextExperiment {
-            change: "start_m".to_owned(),
+            change: ExperimentChange::Run(RunChange::Start),
             value: Some(0.005),
             unit: "m".to_owned(),
             slope_deg: Some(30.0),

@@ -12,8 +12,8 @@
 //!
 //! The watched value is (charge − reserve) over the energy for the way home.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::{Moment, finite_or_zero};
+use super::cam_motion::{Tick, finite_or_zero};
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use super::sample::Positions;
 use crate::config::{Battery, Config};
 use crate::message::{Cycle, Severity, State};
@@ -27,7 +27,7 @@ const COST_WEIGHT: f64 = 0.1;
 /// A cycle longer than this many steady ones held the worm for a while: its cost is not that of the way.
 const LONGEST_CYCLE: f64 = 1.5;
 /// The cost is known once the weighted way is this share of the stroke.
-const MIN_ADVANCE_SHARE: f64 = 0.05;
+const MIN_ADVANCE_FRACTION: f64 = 0.05;
 /// The alarm is over when the ratio is above the threshold by this factor.
 const CLEAR_FACTOR: f64 = 1.15;
 /// Ratios above this are reported as this: the worm is at home.
@@ -80,11 +80,11 @@ impl BatteryLow {
         }
     }
 
-    pub(super) fn note_cycle(&mut self, moment: &Moment, cycle: &Cycle) {
+    pub(super) fn note_cycle(&mut self, tick: &Tick, cycle: &Cycle) {
         let Some(battery) = &self.battery else { return };
         let displacement_m = cycle.advance_m.abs();
         let energy_j = cycle.energy_electrical_j + battery.hotel_power_w * cycle.duration_s;
-        let crawled_through = cycle.duration_s * moment.regime_cycles_per_s.abs() <= LONGEST_CYCLE;
+        let crawled_through = cycle.duration_s * tick.regime_cycles_per_s.abs() <= LONGEST_CYCLE;
         if crawled_through && displacement_m <= self.stroke_m && energy_j > 0.0 && energy_j < 1e9 {
             self.paid_j += energy_j - COST_WEIGHT * self.paid_j;
             self.gained_m += displacement_m - COST_WEIGHT * self.gained_m;
@@ -93,12 +93,12 @@ impl BatteryLow {
 
     /// Cost of a metre as the last cycles paid it, J/m, once they gained some way.
     fn cost_j_per_m(&self) -> Option<f64> {
-        (self.gained_m >= MIN_ADVANCE_SHARE * self.stroke_m).then(|| self.paid_j / self.gained_m)
+        (self.gained_m >= MIN_ADVANCE_FRACTION * self.stroke_m).then(|| self.paid_j / self.gained_m)
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
+    pub(super) fn update(&mut self, tick: &Tick, state: &State) -> DetectorOutput {
         let Some(battery) = &self.battery else {
-            return AlarmReading::Blind;
+            return DetectorOutput::Unknown;
         };
         let volts = state.bus_voltage_v;
         if volts.is_finite() && volts > 0.5 * battery.empty_v && volts < 2.0 * battery.full_v {
@@ -108,16 +108,16 @@ impl BatteryLow {
             let drawn_w = load_w + amperes * amperes * battery.internal_resistance_ohm;
             let open_v = volts + amperes * battery.internal_resistance_ohm;
             let by_voltage = ((open_v - battery.empty_v) / (battery.full_v - battery.empty_v)).clamp(0.0, 1.0);
-            self.known_s += moment.step_s;
+            self.known_s += tick.step_s;
             if self.fraction.is_nan() {
                 self.fraction = by_voltage;
             }
-            self.fraction -= drawn_w * moment.step_s / battery.capacity_j;
-            let weight = moment.step_s / self.known_s.clamp(moment.step_s.max(1e-3), CORRECTION_S);
+            self.fraction -= drawn_w * tick.step_s / battery.capacity_j;
+            let weight = tick.step_s / self.known_s.clamp(tick.step_s.max(1e-3), CORRECTION_S);
             self.fraction = (self.fraction + weight * (by_voltage - self.fraction)).clamp(0.0, 1.0);
         }
         if self.known_s < USABLE_S {
-            return AlarmReading::Blind;
+            return DetectorOutput::Unknown;
         }
         let left_j = (self.fraction - battery.reserve_share) * battery.capacity_j;
         let home_j = self.distance_m * self.cost_j_per_m().unwrap_or(0.0);
@@ -130,9 +130,9 @@ impl BatteryLow {
             ReadingState::Between
         };
         if verdict != ReadingState::Bad {
-            self.since_ns = moment.now_ns;
+            self.since_ns = tick.now_ns;
         }
-        AlarmReading::Seen(Reading {
+        DetectorOutput::Measured(Reading {
             value: ratio,
             threshold: self.threshold,
             verdict,

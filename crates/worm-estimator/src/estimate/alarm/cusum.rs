@@ -34,7 +34,7 @@ const KEPT: usize = 100;
 
 /// Where the sum stands after a value.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Level {
+pub(super) struct CusumLevel {
     /// Mean excess since the sum left zero, share of the usual.
     pub excess: f64,
     /// The reference k that this mean must stay below.
@@ -48,13 +48,13 @@ pub(super) struct Level {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct PageChart {
+pub(super) struct CusumChart {
     shift: f64,
     wanted: u32,
     first: [f64; KEPT],
     stated_sum: f64, // of the squared stated standard errors of the first values
     count: u32,
-    usual: f64,
+    baseline: f64,
     sigma: f64, // share of the usual
     sum: f64,
     risen_sum: f64, // of the excesses since the sum left zero
@@ -62,7 +62,7 @@ pub(super) struct PageChart {
     since_ns: u64,
 }
 
-impl PageChart {
+impl CusumChart {
     /// A chart for a rise by `shift`, a share of the usual, that calibrates on `wanted` values.
     pub(super) fn new(shift: f64, wanted: u32) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl PageChart {
             first: [0.0; KEPT],
             stated_sum: 0.0,
             count: 0,
-            usual: f64::NAN,
+            baseline: f64::NAN,
             sigma: f64::NAN,
             sum: 0.0,
             risen_sum: 0.0,
@@ -81,13 +81,19 @@ impl PageChart {
     }
 
     /// Calibrated, with a usual value that is clearly positive.
-    pub(super) fn can_tell(&self) -> bool {
-        self.usual > 0.0 && self.sigma < 1.0 / 3.0
+    pub(super) fn is_calibrated(&self) -> bool {
+        self.baseline > 0.0 && self.sigma < 1.0 / 3.0
     }
 
     /// Takes a value with its stated standard error and the least that is plausible as usual; tells nothing before
     /// calibration. The value began at `began_ns`.
-    pub(super) fn add(&mut self, value: f64, stated_sigma: f64, least_usual: f64, began_ns: u64) -> Option<Level> {
+    pub(super) fn add(
+        &mut self,
+        value: f64,
+        stated_sigma: f64,
+        min_baseline: f64,
+        began_ns: u64,
+    ) -> Option<CusumLevel> {
         if !value.is_finite() {
             return None;
         }
@@ -97,14 +103,14 @@ impl PageChart {
             self.stated_sum += stated_sigma * stated_sigma;
             self.count += 1;
             if self.count == self.wanted {
-                self.calibrate(least_usual);
+                self.calibrate(min_baseline);
             }
             return None;
         }
-        self.can_tell().then(|| self.judge(value, began_ns))
+        self.is_calibrated().then(|| self.evaluate(value, began_ns))
     }
 
-    fn calibrate(&mut self, least_usual: f64) {
+    fn calibrate(&mut self, min_baseline: f64) {
         let count = self.count as usize;
         let first = &mut self.first[..count];
         first.sort_unstable_by(f64::total_cmp);
@@ -114,12 +120,12 @@ impl PageChart {
         }
         first.sort_unstable_by(f64::total_cmp);
         let scatter = MAD_TO_SIGMA * median_of_sorted(first);
-        let least_usual = if least_usual.is_finite() { least_usual } else { 0.0 };
-        self.usual = median.max(least_usual);
-        let stated = self.stated_sum / f64::from(self.count) / (self.usual * self.usual);
+        let min_baseline = if min_baseline.is_finite() { min_baseline } else { 0.0 };
+        self.baseline = median.max(min_baseline);
+        let stated = self.stated_sum / f64::from(self.count) / (self.baseline * self.baseline);
         let prior = PRIOR_SCATTER * PRIOR_SCATTER + stated;
         let degrees = f64::from(self.count - 1);
-        let measured = (scatter / self.usual) * (scatter / self.usual);
+        let measured = (scatter / self.baseline) * (scatter / self.baseline);
         self.sigma = ((PRIOR_WEIGHT * prior + degrees * measured) / (PRIOR_WEIGHT + degrees)).sqrt();
     }
 
@@ -139,8 +145,8 @@ impl PageChart {
         ((b - 1.166) * self.sigma).max(0.75 * self.shift)
     }
 
-    fn judge(&mut self, value: f64, began_ns: u64) -> Level {
-        let excess = value / self.usual - 1.0;
+    fn evaluate(&mut self, value: f64, began_ns: u64) -> CusumLevel {
+        let excess = value / self.baseline - 1.0;
         let (reference, limit) = (self.reference(), self.limit());
         if self.sum == 0.0 {
             self.since_ns = began_ns;
@@ -153,7 +159,7 @@ impl PageChart {
         if self.sum == 0.0 && self.count < LEARNED.max(self.wanted) {
             self.learn(excess);
         }
-        Level {
+        CusumLevel {
             excess: self.risen_sum / f64::from(self.risen_count),
             reference,
             beyond: self.sum > limit,
@@ -167,7 +173,7 @@ impl PageChart {
         let count = f64::from(self.count);
         let max = LEARNED_SIGMAS * self.sigma;
         let off = excess.clamp(-max, max);
-        self.usual *= 1.0 + off / count;
+        self.baseline *= 1.0 + off / count;
         let weight = PRIOR_WEIGHT + count - 1.0;
         self.sigma = (self.sigma * self.sigma + (off * off - self.sigma * self.sigma) / weight).sqrt();
     }

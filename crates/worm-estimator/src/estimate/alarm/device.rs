@@ -4,8 +4,8 @@
 //! (or the fault's code) and threshold 0. Otherwise value and threshold are the temperature, °C: the servo reads it in
 //! steps of one degree, so it must be 3 °C below the threshold before it counts as cool.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
+use super::cam_motion::Tick;
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Fault, Severity, State};
 
@@ -32,7 +32,7 @@ impl DeviceFault {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
+    pub(super) fn update(&mut self, tick: &Tick, state: &State) -> DetectorOutput {
         let stopped_by = Fault::try_from(state.fault).ok().filter(|fault| {
             matches!(
                 fault,
@@ -56,7 +56,7 @@ impl DeviceFault {
             (f64::from(fault.code()), 0.0, ReadingState::Bad, Severity::Critical)
         } else if celsius.is_finite() {
             self.hot_s = if celsius > self.threshold_c {
-                self.hot_s + moment.step_s
+                self.hot_s + tick.step_s
             } else {
                 0.0
             };
@@ -74,12 +74,12 @@ impl DeviceFault {
             };
             (celsius, self.threshold_c, verdict, severity)
         } else {
-            return AlarmReading::Blind;
+            return DetectorOutput::Unknown;
         };
         if verdict != ReadingState::Bad && self.hot_s == 0.0 {
-            self.since_ns = moment.now_ns;
+            self.since_ns = tick.now_ns;
         }
-        AlarmReading::Seen(Reading {
+        DetectorOutput::Measured(Reading {
             value,
             threshold,
             verdict,

@@ -5,9 +5,9 @@
 //! end to end, every tip's deformation known. What a cycle costs depends on speed and direction, so a new regime calibrates
 //! anew and the alarm is unarmed meanwhile; holding and going on at the same speed keeps what was learned.
 
-use super::cusum::{Level, PageChart};
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
+use super::cam_motion::Tick;
+use super::cusum::{CusumChart, CusumLevel};
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Cycle, Severity};
 
@@ -18,9 +18,9 @@ const DURATION_FRACTION: f64 = 0.1;
 
 #[derive(Debug, Clone)]
 pub(super) struct EnergyOverBudget {
-    fresh: PageChart,
-    electrical: PageChart,
-    locomotion: PageChart,
+    initial: CusumChart,
+    electrical: CusumChart,
+    locomotion: CusumChart,
     regime: u32,
     disturbed: bool, // since the last cycle ended
     reading: Option<Reading>,
@@ -28,14 +28,14 @@ pub(super) struct EnergyOverBudget {
 
 impl EnergyOverBudget {
     pub(super) fn new(config: &Config) -> Self {
-        let fresh = PageChart::new(
+        let initial = CusumChart::new(
             config.alarms.energy_over_budget.threshold,
             config.estimator.calibration_cycles,
         );
         Self {
-            electrical: fresh.clone(),
-            locomotion: fresh.clone(),
-            fresh,
+            electrical: initial.clone(),
+            locomotion: initial.clone(),
+            initial,
             regime: 0,
             disturbed: true,
             reading: None,
@@ -43,28 +43,28 @@ impl EnergyOverBudget {
     }
 
     /// Every tick; `sound` when nothing else is wrong, so that the cycle may count.
-    pub(super) fn update(&mut self, moment: &Moment, cycle: Option<&Cycle>, sound: bool) -> AlarmReading {
-        if moment.regime != self.regime {
-            self.regime = moment.regime;
-            self.electrical = self.fresh.clone();
-            self.locomotion = self.fresh.clone();
+    pub(super) fn update(&mut self, tick: &Tick, cycle: Option<&Cycle>, sound: bool) -> DetectorOutput {
+        if tick.regime != self.regime {
+            self.regime = tick.regime;
+            self.electrical = self.initial.clone();
+            self.locomotion = self.initial.clone();
             self.disturbed = true;
             self.reading = None;
         }
-        self.disturbed |= !moment.steady || !sound;
+        self.disturbed |= !tick.steady || !sound;
         if let Some(cycle) = cycle {
-            let expected_s = 1.0 / moment.regime_cycles_per_s.abs();
+            let expected_s = 1.0 / tick.regime_cycles_per_s.abs();
             let whole = (cycle.duration_s - expected_s).abs() <= DURATION_FRACTION * expected_s;
             if !self.disturbed && whole && cycle.settled == 1 {
-                self.judge(cycle);
+                self.evaluate(cycle);
             }
             self.disturbed = false;
         }
         // A new regime has another usual: what was over the old budget says nothing about it.
-        self.reading.map_or(AlarmReading::Idle, AlarmReading::Seen)
+        self.reading.map_or(DetectorOutput::Idle, DetectorOutput::Measured)
     }
 
-    fn judge(&mut self, cycle: &Cycle) {
+    fn evaluate(&mut self, cycle: &Cycle) {
         let began_ns = cycle.end_ns.saturating_sub((cycle.duration_s * 1e9) as u64);
         let electrical = self.electrical.add(
             cycle.energy_electrical_j,
@@ -78,10 +78,10 @@ impl EnergyOverBudget {
             MIN_OF_PREDICTION * cycle.predicted_energy_loss_j,
             began_ns,
         );
-        if !self.electrical.can_tell() && !self.locomotion.can_tell() {
+        if !self.electrical.is_calibrated() && !self.locomotion.is_calibrated() {
             return;
         }
-        let nothing = Level {
+        let nothing = CusumLevel {
             excess: 0.0,
             reference: 0.0,
             beyond: false,

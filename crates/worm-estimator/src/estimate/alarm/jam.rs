@@ -7,8 +7,8 @@
 //! extension falls short of the usual by more than `threshold` of it, and by more than noise (as learned) can make it; until its
 //! calibration is done the share that may be missing is half-way between `threshold` and all.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
+use super::cam_motion::Tick;
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use super::sample::Positions;
 use crate::config::Config;
 use crate::message::Severity;
@@ -17,7 +17,7 @@ use worm_physics::MAX_CELLS;
 /// Parts of a step in which the usual extension is known.
 const PARTS: usize = 8;
 /// Share of the step that must be done before it is judged: before, latency and noise are as large as the motion.
-const JUDGED_FROM: f64 = 0.3;
+const EVALUATED_FROM: f64 = 0.3;
 /// A step is whole when it was seen from before this share …
 const WHOLE_FROM: f64 = 0.15;
 /// … to beyond this one.
@@ -88,7 +88,7 @@ pub(super) struct JammedCell {
     cells: usize,
     order: [usize; MAX_CELLS],
     calibration_steps: u32,
-    usual: [[(u32, Profile); MAX_CELLS]; 2], // backward, forward; good steps and their profile
+    baseline: [[(u32, Profile); MAX_CELLS]; 2], // backward, forward; good steps and their profile
     regime: u32,
     reversals: u32,
     previous: Option<(f64, Positions)>, // phase and positions of the last sample
@@ -114,7 +114,7 @@ impl JammedCell {
             cells,
             order,
             calibration_steps: config.estimator.calibration_cycles,
-            usual: [[(0, Profile::default()); MAX_CELLS]; 2],
+            baseline: [[(0, Profile::default()); MAX_CELLS]; 2],
             regime: 0,
             reversals: 0,
             previous: None,
@@ -124,43 +124,43 @@ impl JammedCell {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, positions: &Positions) -> AlarmReading {
-        if moment.regime != self.regime {
-            self.regime = moment.regime;
-            let side = side_of(moment);
-            self.usual[side] = [(0, Profile::default()); MAX_CELLS];
+    pub(super) fn update(&mut self, tick: &Tick, positions: &Positions) -> DetectorOutput {
+        if tick.regime != self.regime {
+            self.regime = tick.regime;
+            let side = side_of(tick);
+            self.baseline[side] = [(0, Profile::default()); MAX_CELLS];
         }
-        let Some(phase) = moment.phase.filter(|_| moment.torque) else {
+        let Some(phase) = tick.phase.filter(|_| tick.torque) else {
             self.pause();
-            return AlarmReading::Idle;
+            return DetectorOutput::Idle;
         };
-        if moment.reversals != self.reversals {
-            self.reversals = moment.reversals;
+        if tick.reversals != self.reversals {
+            self.reversals = tick.reversals;
             self.step = None;
         }
         let steps = phase * self.cells as f64;
         let number = steps.floor();
         let within = steps - number;
-        let done = if moment.direction > 0.0 { within } else { 1.0 - within };
+        let done = if tick.direction > 0.0 { within } else { 1.0 - within };
         let number = number as i64;
         if self.step.as_ref().is_some_and(|step| step.number != number) {
-            self.finish(moment);
+            self.finish(tick);
         }
         if self.step.is_none() {
-            self.begin(moment, number, done, phase, positions);
+            self.begin(tick, number, done, phase, positions);
         }
         self.previous = Some((phase, *positions));
-        self.judge(moment, done, positions);
-        if moment.still {
+        self.evaluate(tick, done, positions);
+        if tick.still {
             self.jammed = None;
             self.reading = None;
-            return AlarmReading::Idle;
+            return DetectorOutput::Idle;
         }
-        self.reading.map_or(AlarmReading::Blind, AlarmReading::Seen)
+        self.reading.map_or(DetectorOutput::Unknown, DetectorOutput::Measured)
     }
 
     /// A new step: its start lies between the last sample and this one, where the cam passed from cell to cell.
-    fn begin(&mut self, moment: &Moment, number: i64, done: f64, phase: f64, positions: &Positions) {
+    fn begin(&mut self, tick: &Tick, number: i64, done: f64, phase: f64, positions: &Positions) {
         let cell = self.order[number.rem_euclid(self.cells as i64) as usize];
         let mut start = *positions;
         let mut start_done = done;
@@ -180,7 +180,7 @@ impl JammedCell {
             cell,
             start,
             start_done,
-            began_ns: moment.now_ns,
+            began_ns: tick.now_ns,
             seen_from: done,
             seen_to: done,
             short: 0,
@@ -189,10 +189,10 @@ impl JammedCell {
         });
     }
 
-    fn judge(&mut self, moment: &Moment, done: f64, positions: &Positions) {
+    fn evaluate(&mut self, tick: &Tick, done: f64, positions: &Positions) {
         let Some(step) = &mut self.step else { return };
         let covered = done - step.start_done;
-        if covered < JUDGED_FROM || !positions.has(step.cell) || !step.start.has(step.cell) || done < step.seen_to {
+        if covered < EVALUATED_FROM || !positions.has(step.cell) || !step.start.has(step.cell) || done < step.seen_to {
             return;
         }
         let stepping = 1 << step.cell;
@@ -200,21 +200,21 @@ impl JammedCell {
             return;
         };
         let own_m = positions.metres[step.cell] - step.start.metres[step.cell];
-        let extension_m = (own_m - others_m) * moment.direction;
+        let extension_m = (own_m - others_m) * tick.direction;
         step.seen_to = done;
         let ratio = extension_m / (covered * self.stroke_m);
         step.profile.add(done, ratio);
-        let (good_steps, profile) = &self.usual[side_of(moment)][step.cell];
+        let (good_steps, profile) = &self.baseline[side_of(tick)][step.cell];
         let calibrated = *good_steps >= self.calibration_steps;
-        let (usual_ratio, fraction) = match profile.ratio(done).filter(|_| calibrated) {
+        let (baseline_ratio, fraction) = match profile.ratio(done).filter(|_| calibrated) {
             Some(ratio) => (ratio, self.fraction),
             None => (1.0, 0.5 * (1.0 + self.fraction)),
         };
-        let missing_fraction = 1.0 - ratio / usual_ratio.max(0.1);
-        let missing_m = (usual_ratio - ratio) * covered * self.stroke_m;
+        let missing_fraction = 1.0 - ratio / baseline_ratio.max(0.1);
+        let missing_m = (baseline_ratio - ratio) * covered * self.stroke_m;
         let noise_m = NOISE_SIGMAS * self.noise_m.max(self.variance_m2.sqrt());
         let short = missing_fraction > fraction
-            && missing_m > noise_m.min(LARGEST_NOISE_FRACTION * usual_ratio * self.stroke_m);
+            && missing_m > noise_m.min(LARGEST_NOISE_FRACTION * baseline_ratio * self.stroke_m);
         if calibrated && !short {
             let error_m = missing_m.clamp(-noise_m, noise_m);
             self.variance_m2 += (error_m * error_m - self.variance_m2) / NOISE_MEMORY;
@@ -247,13 +247,13 @@ impl JammedCell {
     }
 
     /// A step ended: it may serve for calibration, and it tells whether a jammed cell is free again.
-    fn finish(&mut self, moment: &Moment) {
+    fn finish(&mut self, tick: &Tick) {
         let Some(step) = self.step.take() else { return };
         let whole = step.seen_from <= WHOLE_FROM && step.seen_to >= WHOLE_TO;
         if !whole || step.short > 0 {
             return;
         }
-        let (good_steps, profile) = &mut self.usual[side_of(moment)][step.cell];
+        let (good_steps, profile) = &mut self.baseline[side_of(tick)][step.cell];
         if *good_steps < self.calibration_steps && step.worst_fraction < 0.5 * (1.0 + self.fraction) {
             *good_steps += 1;
             profile.merge(&step.profile);
@@ -281,6 +281,6 @@ impl JammedCell {
     }
 }
 
-const fn side_of(moment: &Moment) -> usize {
-    if moment.direction > 0.0 { 1 } else { 0 }
+const fn side_of(tick: &Tick) -> usize {
+    if tick.direction > 0.0 { 1 } else { 0 }
 }

@@ -15,13 +15,13 @@ pub(super) enum ReadingState {
 
 /// What a detector knows after an update.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum AlarmReading {
+pub(super) enum DetectorOutput {
     /// It cannot tell: not calibrated, or nothing to compare. What is raised stays raised.
-    Blind,
+    Unknown,
     /// The worm does not do what is watched, so nothing can be wrong with it. What is raised will clear.
     Idle,
     /// It watches.
-    Seen(Reading),
+    Measured(Reading),
 }
 
 /// The watched quantity and how it stands.
@@ -38,15 +38,15 @@ pub(super) struct Reading {
     pub severity: Severity,
 }
 
-impl AlarmReading {
+impl DetectorOutput {
     pub(super) const fn watches(&self) -> bool {
-        matches!(self, Self::Seen(_))
+        matches!(self, Self::Measured(_))
     }
 }
 
 /// How long a condition must hold before the latch follows it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Patience {
+pub(super) struct Delays {
     /// How long the verdict must be bad, ns; 0 where the detector confirms by itself.
     pub raise_after_ns: u64,
     /// How long the verdict must be good, or the worm idle, ns.
@@ -57,7 +57,7 @@ pub(super) struct Patience {
 #[derive(Debug, Clone)]
 pub(super) struct Latch {
     kind: AlarmKind,
-    timeout: Patience,
+    delays: Delays,
     raised: Option<Reading>,
     watched_from_ns: Option<u64>, // nothing is known from before
     bad_from_ns: Option<u64>,
@@ -65,10 +65,10 @@ pub(super) struct Latch {
 }
 
 impl Latch {
-    pub(super) const fn new(kind: AlarmKind, timeout: Patience) -> Self {
+    pub(super) const fn new(kind: AlarmKind, delays: Delays) -> Self {
         Self {
             kind,
-            timeout,
+            delays,
             raised: None,
             watched_from_ns: None,
             bad_from_ns: None,
@@ -85,12 +85,12 @@ impl Latch {
     }
 
     /// Follows the newest finding; the change it made, if any, still without its number.
-    pub(super) fn update(&mut self, now_ns: u64, phase: f64, finding: &AlarmReading) -> Option<Alarm> {
+    pub(super) fn update(&mut self, now_ns: u64, phase: f64, finding: &DetectorOutput) -> Option<Alarm> {
         let watched_from_ns = *self.watched_from_ns.get_or_insert(now_ns);
         match (self.raised, finding) {
-            (None, AlarmReading::Seen(reading)) if reading.verdict == ReadingState::Bad && is_sound(reading) => {
+            (None, DetectorOutput::Measured(reading)) if reading.verdict == ReadingState::Bad && is_sound(reading) => {
                 let from_ns = *self.bad_from_ns.get_or_insert(now_ns);
-                (now_ns.saturating_sub(from_ns) >= self.timeout.raise_after_ns).then(|| {
+                (now_ns.saturating_sub(from_ns) >= self.delays.raise_after_ns).then(|| {
                     let reading = Reading {
                         since_ns: reading.since_ns.min(from_ns).max(watched_from_ns),
                         ..*reading
@@ -106,20 +106,20 @@ impl Latch {
             }
             (Some(raised), finding) => {
                 let over = match finding {
-                    AlarmReading::Blind => false,
-                    AlarmReading::Idle => true,
-                    AlarmReading::Seen(reading) => reading.verdict == ReadingState::Good,
+                    DetectorOutput::Unknown => false,
+                    DetectorOutput::Idle => true,
+                    DetectorOutput::Measured(reading) => reading.verdict == ReadingState::Good,
                 };
                 if !over {
                     self.over_from_ns = None;
                     return None;
                 }
                 let from_ns = *self.over_from_ns.get_or_insert(now_ns);
-                if now_ns.saturating_sub(from_ns) < self.timeout.clear_after_ns {
+                if now_ns.saturating_sub(from_ns) < self.delays.clear_after_ns {
                     return None;
                 }
                 let last = match finding {
-                    AlarmReading::Seen(now) if is_sound(now) => Reading {
+                    DetectorOutput::Measured(now) if is_sound(now) => Reading {
                         value: now.value,
                         threshold: now.threshold,
                         ..raised

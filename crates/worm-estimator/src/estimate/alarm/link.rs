@@ -4,8 +4,8 @@
 //! compared, so states that the estimator did not receive are counted all the same. An answer that comes late is none that failed:
 //! that is a busy computer, and `timing` tells it. The controller's own verdict, link lost, raises the alarm at once.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
+use super::cam_motion::Tick;
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Fault, Severity, State};
 
@@ -14,7 +14,7 @@ const WINDOW_S: f64 = 0.5;
 /// Parts of the window; the oldest part falls out as a whole.
 const PARTS: usize = 10;
 /// Least share of the configured rate at which the loop ticks: see `control.adapt_rate`.
-const MIN_RATE_SHARE: f64 = 0.125;
+const MIN_RATE_FRACTION: f64 = 0.125;
 
 #[derive(Debug, Clone)]
 pub(super) struct LinkFault {
@@ -42,8 +42,8 @@ impl LinkFault {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
-        self.advance_window(moment.present_s);
+    pub(super) fn update(&mut self, tick: &Tick, state: &State) -> DetectorOutput {
+        self.advance_window(tick.present_s);
         let (ticks, failures) = match self.last {
             Some((sequence, failures)) => (
                 state.sequence.saturating_sub(sequence),
@@ -57,10 +57,14 @@ impl LinkFault {
         part.1 = part.1.saturating_add(failures);
         let ticks: f64 = self.parts.iter().map(|part| part.0 as f64).sum();
         let failures: f64 = self.parts.iter().map(|part| part.1 as f64).sum();
-        let min_ticks = if self.filled_s < WINDOW_S { 1.0 } else { MIN_RATE_SHARE } * self.exchanges_in_window;
+        let min_ticks = if self.filled_s < WINDOW_S {
+            1.0
+        } else {
+            MIN_RATE_FRACTION
+        } * self.exchanges_in_window;
         let fraction = failures / ticks.max(min_ticks);
         if failures == 0.0 {
-            self.since_ns = moment.now_ns;
+            self.since_ns = tick.now_ns;
         }
         let lost = state.fault == Fault::LinkLost.code();
         let verdict = if lost || fraction > self.threshold {
@@ -70,7 +74,7 @@ impl LinkFault {
         } else {
             ReadingState::Between
         };
-        AlarmReading::Seen(Reading {
+        DetectorOutput::Measured(Reading {
             value: fraction,
             threshold: self.threshold,
             verdict,

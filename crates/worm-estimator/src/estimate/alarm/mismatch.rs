@@ -8,8 +8,8 @@
 //! Value is the unexplained way, measured less modelled along the crawl. The cell is the one whose way shows it best, and the
 //! alarm's phase is the last at which the gait was where it shows: with the step order that tells whose step it was.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
+use super::cam_motion::Tick;
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::estimate::mismatch::ResidualMap;
 use crate::message::Severity;
@@ -20,7 +20,7 @@ pub(super) struct ModelMismatch {
     revision: u64,
     place: Option<f64>, // gait phase of what was found last, 0 to 1
     since_ns: u64,
-    finding: AlarmReading,
+    finding: DetectorOutput,
 }
 
 impl ModelMismatch {
@@ -30,14 +30,14 @@ impl ModelMismatch {
             revision: 0,
             place: None,
             since_ns: 0,
-            finding: AlarmReading::Blind,
+            finding: DetectorOutput::Unknown,
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, map: Option<&ResidualMap>) -> AlarmReading {
+    pub(super) fn update(&mut self, tick: &Tick, map: Option<&ResidualMap>) -> DetectorOutput {
         if let Some(map) = map.filter(|map| map.revision() != self.revision) {
             self.revision = map.revision();
-            self.finding = self.judge(moment, map);
+            self.finding = self.evaluate(tick, map);
         }
         self.finding
     }
@@ -47,21 +47,21 @@ impl ModelMismatch {
         self.place.map_or(phase, |place| (phase - place).floor() + place)
     }
 
-    fn judge(&mut self, moment: &Moment, map: &ResidualMap) -> AlarmReading {
+    fn evaluate(&mut self, tick: &Tick, map: &ResidualMap) -> DetectorOutput {
         let Some(found) = map.unexplained(self.threshold_m) else {
-            self.since_ns = moment.now_ns;
-            return AlarmReading::Blind;
+            self.since_ns = tick.now_ns;
+            return DetectorOutput::Unknown;
         };
         let verdict = if found.is_significant {
             ReadingState::Bad
         } else if found.is_within {
-            self.since_ns = moment.now_ns;
+            self.since_ns = tick.now_ns;
             ReadingState::Good
         } else {
             ReadingState::Between
         };
         self.place = Some(found.at.phase);
-        AlarmReading::Seen(Reading {
+        DetectorOutput::Measured(Reading {
             value: found.excess_m,
             threshold: self.threshold_m,
             verdict,

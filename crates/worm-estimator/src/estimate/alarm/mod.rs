@@ -1,9 +1,9 @@
 //! The alarms: what is wrong with the worm, since when, and by how much.
 //!
-//! [`Watch::update`] takes every state, with the estimate that a new tracker sample gave and the cycle that ended, and
+//! [`AlarmMonitor::update`] takes every state, with the estimate that a new tracker sample gave and the cycle that ended, and
 //! gives back the alarms that were raised or cleared. It owns no clock: time is [`State::time_ns`]. It allocates nothing.
 //!
-//! Read in this order: `motion` tells what the cam does and `sample` which positions to trust; each detector (`stall`,
+//! Read in this order: `cam_motion` tells what the cam does and `sample` which positions to trust; each detector (`stall`,
 //! `jam`, `stride` with `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`)
 //! tells in its head how it decides; `latch` turns what they find into one "raised" and one "cleared".
 //!
@@ -11,7 +11,7 @@
 //! extensions and energy for the present speed and direction, advance and retraction for each direction. Where a
 //! gross fault shows without calibration (a cell that does not move, a worm that does not advance, a long slide) the alarm
 //! watches from the start with a wide threshold; where it does not (energy) it is unarmed until then, and
-//! [`Watch::armed_mask`] says so. Cycles in which something was wrong never serve as examples.
+//! [`AlarmMonitor::armed_mask`] says so. Cycles in which something was wrong never serve as examples.
 //!
 //! **Clearing.** An alarm is cleared when its condition was clearly over for a while. Stall, jam and lack of progress
 //! exist only while the worm is asked to move: they also clear two seconds after it no longer is, so that a reset of the
@@ -21,6 +21,7 @@
 //! the battery, which did not change.
 
 mod battery;
+mod cam_motion;
 mod changes;
 mod cusum;
 mod device;
@@ -29,7 +30,6 @@ mod jam;
 mod latch;
 mod link;
 mod mismatch;
-mod motion;
 mod progress;
 mod sample;
 mod sliding;
@@ -45,9 +45,9 @@ pub use changes::AlarmChanges;
 use crate::config::Config;
 use crate::estimate::ResidualMap;
 use crate::message::{AlarmKind, Cycle, Estimate, State};
-use latch::{AlarmReading, Latch, Patience};
-use motion::{Moment, Motion};
-use sample::Sight;
+use cam_motion::{CamMotion, Tick};
+use latch::{Delays, DetectorOutput, Latch};
+use sample::VisibleCells;
 use worm_physics::MAX_CELLS;
 
 /// What there is to see in one tick.
@@ -65,9 +65,9 @@ pub struct Observation<'a> {
 
 /// Watches one worm for everything that [`AlarmKind`] names.
 #[derive(Debug, Clone)]
-pub struct Watch {
+pub struct AlarmMonitor {
     cells: usize,
-    fresh: Detectors, // as they are before the first tick
+    initial: Detectors, // as they are before the first tick
     detectors: Detectors,
     battery: battery::BatteryLow,
     latches: [Latch; KINDS],
@@ -83,8 +83,8 @@ const STALE_S: f64 = 0.5;
 /// Everything that begins anew when the controller does.
 #[derive(Debug, Clone)]
 struct Detectors {
-    motion: Motion,
-    sight: Sight,
+    cam_motion: CamMotion,
+    visible_cells: VisibleCells,
     strides: stride::Strides,
     stall: stall::MotorStall,
     jam: jam::JammedCell,
@@ -95,16 +95,16 @@ struct Detectors {
     tracker: tracker::TrackerFault,
     device: device::DeviceFault,
     mismatch: mismatch::ModelMismatch,
-    by_position: [AlarmReading; 3], // jam, progress, sliding, as of the last sample
+    by_position: [DetectorOutput; 3], // jam, progress, sliding, as of the last sample
     sample_age_s: f64,
 }
 
-impl Watch {
+impl AlarmMonitor {
     /// A watch for a worm of a checked configuration, before its first tick.
     pub fn new(config: &Config) -> Self {
         let detectors = Detectors {
-            motion: Motion::new(config),
-            sight: Sight::new(),
+            cam_motion: CamMotion::new(config),
+            visible_cells: VisibleCells::new(),
             strides: stride::Strides::new(),
             stall: stall::MotorStall::new(config),
             jam: jam::JammedCell::new(config),
@@ -115,17 +115,17 @@ impl Watch {
             tracker: tracker::TrackerFault::new(config),
             device: device::DeviceFault::new(config),
             mismatch: mismatch::ModelMismatch::new(config),
-            by_position: [AlarmReading::Blind; 3],
+            by_position: [DetectorOutput::Unknown; 3],
             sample_age_s: 0.0,
         };
         Self {
             cells: config.worm.cells.min(MAX_CELLS),
-            fresh: detectors.clone(),
+            initial: detectors.clone(),
             detectors,
             battery: battery::BatteryLow::new(config),
             latches: std::array::from_fn(|index| {
                 let kind = AlarmKind::ALL[index];
-                Latch::new(kind, patience_of(kind))
+                Latch::new(kind, delays_of(kind))
             }),
             armed_mask: 0,
             next_sequence: 0,
@@ -136,18 +136,18 @@ impl Watch {
     pub fn update(&mut self, observation: &Observation<'_>) -> AlarmChanges {
         let state = observation.state;
         let mut changes = AlarmChanges::none();
-        let mut moment = self.detectors.motion.update(state);
-        if moment.restarted {
+        let mut tick = self.detectors.cam_motion.update(state);
+        if tick.restarted {
             for latch in &mut self.latches {
-                if let Some(alarm) = latch.reset(moment.now_ns, state.phase) {
+                if let Some(alarm) = latch.reset(tick.now_ns, state.phase) {
                     changes.push(alarm, &mut self.next_sequence);
                 }
             }
-            self.detectors.clone_from(&self.fresh);
-            moment = self.detectors.motion.update(state);
+            self.detectors.clone_from(&self.initial);
+            tick = self.detectors.cam_motion.update(state);
         }
         let sound = self.is_sound();
-        let findings = self.findings(&moment, observation, sound);
+        let findings = self.findings(&tick, observation, sound);
         self.armed_mask = 0;
         for (finding, latch) in findings.iter().zip(&mut self.latches) {
             self.armed_mask |= u32::from(finding.watches()) << latch.kind().code();
@@ -155,7 +155,7 @@ impl Watch {
                 AlarmKind::ModelMismatch => self.detectors.mismatch.phase_before(state.phase),
                 _ => state.phase,
             };
-            if let Some(alarm) = latch.update(moment.now_ns, phase, finding) {
+            if let Some(alarm) = latch.update(tick.now_ns, phase, finding) {
                 changes.push(alarm, &mut self.next_sequence);
             }
         }
@@ -198,7 +198,7 @@ impl Watch {
     }
 
     /// What every detector finds, in the order of [`AlarmKind::ALL`].
-    fn findings(&mut self, moment: &Moment, observation: &Observation<'_>, sound: bool) -> [AlarmReading; KINDS] {
+    fn findings(&mut self, tick: &Tick, observation: &Observation<'_>, sound: bool) -> [DetectorOutput; KINDS] {
         let Observation {
             state,
             estimate,
@@ -206,56 +206,56 @@ impl Watch {
             residuals,
         } = *observation;
         let detectors = &mut self.detectors;
-        detectors.sight.follow(state, self.cells);
+        detectors.visible_cells.follow(state, self.cells);
         if let Some(cycle) = cycle {
             detectors.progress.note_cycle(cycle);
-            self.battery.note_cycle(moment, cycle);
+            self.battery.note_cycle(tick, cycle);
         }
         match estimate {
             Some(estimate) => {
-                let positions = detectors.sight.positions(estimate, self.cells);
+                let positions = detectors.visible_cells.positions(estimate, self.cells);
                 self.battery.note_positions(&positions);
                 detectors.sample_age_s = 0.0;
-                detectors.by_position = detectors.judge_positions(moment, &positions, sound);
+                detectors.by_position = detectors.evaluate_positions(tick, &positions, sound);
             }
             None => {
-                detectors.sample_age_s += moment.step_s;
+                detectors.sample_age_s += tick.step_s;
                 if detectors.sample_age_s > STALE_S {
-                    detectors.by_position = [AlarmReading::Blind; 3];
+                    detectors.by_position = [DetectorOutput::Unknown; 3];
                 }
             }
         }
         let [jam, progress, sliding] = detectors.by_position;
         [
-            detectors.stall.update(moment, state),
+            detectors.stall.update(tick, state),
             jam,
             progress,
             sliding,
-            detectors.energy.update(moment, cycle, sound),
-            self.battery.update(moment, state),
-            detectors.link.update(moment, state),
-            detectors.tracker.update(moment, state),
-            detectors.device.update(moment, state),
-            detectors.mismatch.update(moment, residuals),
+            detectors.energy.update(tick, cycle, sound),
+            self.battery.update(tick, state),
+            detectors.link.update(tick, state),
+            detectors.tracker.update(tick, state),
+            detectors.device.update(tick, state),
+            detectors.mismatch.update(tick, residuals),
         ]
     }
 }
 
 impl Detectors {
-    fn judge_positions(&mut self, moment: &Moment, positions: &sample::Positions, sound: bool) -> [AlarmReading; 3] {
-        let stride = self.strides.update(moment, positions);
-        let progress = self.progress.update(moment, &self.strides, stride.as_ref(), sound);
-        let usual_m = self.progress.usual_m(moment.direction);
+    fn evaluate_positions(&mut self, tick: &Tick, positions: &sample::Positions, sound: bool) -> [DetectorOutput; 3] {
+        let stride = self.strides.update(tick, positions);
+        let progress = self.progress.update(tick, &self.strides, stride.as_ref(), sound);
+        let baseline_m = self.progress.baseline_m(tick.direction);
         [
-            self.jam.update(moment, positions),
+            self.jam.update(tick, positions),
             progress,
-            self.sliding.update(moment, positions, &self.strides, usual_m, sound),
+            self.sliding.update(tick, positions, &self.strides, baseline_m, sound),
         ]
     }
 }
 
 /// How long each condition must hold, and be over. Where `raise_after_ns` is 0 the detector itself confirms.
-const fn patience_of(kind: AlarmKind) -> Patience {
+const fn delays_of(kind: AlarmKind) -> Delays {
     let (raise_after_s, clear_after_s) = match kind {
         AlarmKind::MotorStall => (0.0, 2.0),
         AlarmKind::JammedCell => (0.0, 2.0),
@@ -268,7 +268,7 @@ const fn patience_of(kind: AlarmKind) -> Patience {
         AlarmKind::DeviceFault => (0.0, 2.0),
         AlarmKind::ModelMismatch => (0.0, 0.0),
     };
-    Patience {
+    Delays {
         raise_after_ns: (raise_after_s * 1e9) as u64,
         clear_after_ns: (clear_after_s * 1e9) as u64,
     }

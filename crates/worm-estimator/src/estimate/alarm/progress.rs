@@ -6,14 +6,14 @@
 //! does not progress, whatever the model says. When the worm slips from one moment to the next, the advance over the
 //! last cycle falls along a straight line, so the default share of 0.3 tells after 0.7 of a cycle.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
-use super::stride::{Stride, Strides, Usual};
+use super::cam_motion::Tick;
+use super::latch::{DetectorOutput, Reading, ReadingState};
+use super::stride::{Baseline, Stride, Strides};
 use crate::config::Config;
 use crate::message::{Cycle, Severity};
 
 /// Least advance per cycle that counts as usual, share of the stroke.
-const MIN_USUAL_SHARE: f64 = 0.05;
+const MIN_BASELINE_FRACTION: f64 = 0.05;
 /// Part of the threshold share that is asked of the model's prediction.
 const TRUST_IN_MODEL: f64 = 0.5;
 /// Strides in a row below the limit.
@@ -28,9 +28,9 @@ const CLEAR_FRACTION: f64 = 0.25;
 #[derive(Debug, Clone)]
 pub(super) struct NoProgress {
     fraction: f64,
-    least_usual_m: f64,
+    min_baseline_m: f64,
     calibration_cycles: u32,
-    usual: [Usual; 2],             // backward, forward
+    baseline: [Baseline; 2],       // backward, forward
     predicted_m: [Option<f64>; 2], // by the model, distance in the crawling direction
     below: u32,
     since_ns: u64,
@@ -41,9 +41,9 @@ impl NoProgress {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             fraction: config.alarms.no_progress.threshold,
-            least_usual_m: MIN_USUAL_SHARE * config.worm.stroke_m,
+            min_baseline_m: MIN_BASELINE_FRACTION * config.worm.stroke_m,
             calibration_cycles: config.estimator.calibration_cycles,
-            usual: [Usual::default(); 2],
+            baseline: [Baseline::default(); 2],
             predicted_m: [None; 2],
             below: 0,
             since_ns: 0,
@@ -58,62 +58,62 @@ impl NoProgress {
     }
 
     /// The usual advance of a direction, m, once it is calibrated.
-    pub(super) fn usual_m(&self, direction: f64) -> Option<f64> {
-        let usual = &self.usual[usize::from(direction > 0.0)];
-        usual.is_known(self.calibration_cycles).then(|| usual.mean_m())
+    pub(super) fn baseline_m(&self, direction: f64) -> Option<f64> {
+        let baseline = &self.baseline[usize::from(direction > 0.0)];
+        baseline.is_known(self.calibration_cycles).then(|| baseline.mean_m())
     }
 
     /// Takes a stride; `sound` when nothing else is wrong, so that it may serve for calibration.
     pub(super) fn update(
         &mut self,
-        moment: &Moment,
+        tick: &Tick,
         strides: &Strides,
         stride: Option<&Stride>,
         sound: bool,
-    ) -> AlarmReading {
-        let idle = moment.still || !moment.torque;
+    ) -> DetectorOutput {
+        let idle = tick.still || !tick.torque;
         if idle || !strides.is_settled() {
             self.below = 0;
             self.reading = None;
             if !idle {
-                return AlarmReading::Blind;
+                return DetectorOutput::Unknown;
             }
-            self.since_ns = moment.now_ns;
-            return AlarmReading::Idle;
+            self.since_ns = tick.now_ns;
+            return DetectorOutput::Idle;
         }
         if let Some(stride) = stride {
-            self.reading = Some(self.judge(moment, strides, stride.advance_m, sound));
+            self.reading = Some(self.evaluate(tick, strides, stride.advance_m, sound));
         }
-        self.reading.map_or(AlarmReading::Blind, AlarmReading::Seen)
+        self.reading.map_or(DetectorOutput::Unknown, DetectorOutput::Measured)
     }
 
-    fn judge(&mut self, moment: &Moment, strides: &Strides, advance_m: f64, sound: bool) -> Reading {
-        let side = usize::from(moment.direction > 0.0);
-        let known = self.usual[side].is_known(self.calibration_cycles);
-        let (usual_m, fraction, scatter_m) = if known {
-            let usual = &self.usual[side];
-            (usual.mean_m(), self.fraction, SCATTER_SIGMAS * usual.sigma_m())
+    fn evaluate(&mut self, tick: &Tick, strides: &Strides, advance_m: f64, sound: bool) -> Reading {
+        let side = usize::from(tick.direction > 0.0);
+        let known = self.baseline[side].is_known(self.calibration_cycles);
+        let (baseline_m, fraction, scatter_m) = if known {
+            let baseline = &self.baseline[side];
+            (baseline.mean_m(), self.fraction, SCATTER_SIGMAS * baseline.sigma_m())
         } else {
             let predicted_m = self.predicted_m[side].unwrap_or(0.0);
             (predicted_m, TRUST_IN_MODEL * self.fraction, 0.0)
         };
-        let usual_m = usual_m.max(self.least_usual_m);
-        let limit_m = fraction * usual_m;
-        let below = advance_m < limit_m && usual_m - advance_m > scatter_m;
+        let baseline_m = baseline_m.max(self.min_baseline_m);
+        let limit_m = fraction * baseline_m;
+        let below = advance_m < limit_m && baseline_m - advance_m > scatter_m;
         if below {
             self.below += 1;
         } else {
             self.below = 0;
-            if !known && sound && strides.is_exemplary() {
-                self.usual[side].add(advance_m);
+            if !known && sound && strides.can_calibrate() {
+                self.baseline[side].add(advance_m);
             }
         }
-        if advance_m >= ONSET_FRACTION * usual_m - scatter_m {
-            self.since_ns = moment.now_ns;
+        if advance_m >= ONSET_FRACTION * baseline_m - scatter_m {
+            self.since_ns = tick.now_ns;
         }
         let verdict = if self.below >= CONFIRMATIONS {
             ReadingState::Bad
-        } else if advance_m > limit_m + CLEAR_FRACTION * (usual_m - limit_m) {
+        } else if advance_m > limit_m + CLEAR_FRACTION * (baseline_m - limit_m) {
             ReadingState::Good
         } else {
             ReadingState::Between

@@ -8,7 +8,7 @@ const TRUSTED_SAMPLES: u32 = 6;
 
 /// Which cells the tracker sees, so that a position that the filter only carries on is not taken for a measurement.
 #[derive(Debug, Clone)]
-pub(super) struct Sight {
+pub(super) struct VisibleCells {
     unseen: [u32; MAX_CELLS], // samples since the cell was seen
 }
 
@@ -20,7 +20,7 @@ pub(super) struct Positions {
     pub mask: u32,
 }
 
-impl Sight {
+impl VisibleCells {
     pub(super) const fn new() -> Self {
         Self {
             unseen: [TRUSTED_SAMPLES; MAX_CELLS],

@@ -11,8 +11,8 @@
 //!
 //! It clears when the worm has not sunk further for a while, and then watches anew from there.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
+use super::cam_motion::Tick;
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use super::sample::Positions;
 use super::stride::{BINS, Strides};
 use crate::config::Config;
@@ -42,7 +42,7 @@ struct Retraction {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Manner {
+enum CrawlState {
     Resting,
     Climbing,
     Descending,
@@ -55,7 +55,7 @@ pub(super) struct SlidingDown {
     slope_sign: f64, // +1 uphill along the canal, −1 downhill, 0 level
     calibration_cycles: u32,
     smoothed: Positions,
-    manner: Option<Manner>,
+    crawl_state: Option<CrawlState>,
     reversals: u32,
     anchor: Positions, // where the present manner began
     anchor_phase: f64,
@@ -84,7 +84,7 @@ impl SlidingDown {
             },
             calibration_cycles: config.estimator.calibration_cycles,
             smoothed: Positions::NONE,
-            manner: None,
+            crawl_state: None,
             reversals: 0,
             anchor: Positions::NONE,
             anchor_phase: 0.0,
@@ -103,47 +103,47 @@ impl SlidingDown {
         }
     }
 
-    /// Takes a sample. `usual_m` is the calibrated advance per cycle in the present direction, `sound` tells that nothing
+    /// Takes a sample. `baseline_m` is the calibrated advance per cycle in the present direction, `sound` tells that nothing
     /// else is wrong, so that the cycle may serve for calibration.
     pub(super) fn update(
         &mut self,
-        moment: &Moment,
+        tick: &Tick,
         positions: &Positions,
         strides: &Strides,
-        usual_m: Option<f64>,
+        baseline_m: Option<f64>,
         sound: bool,
-    ) -> AlarmReading {
+    ) -> DetectorOutput {
         self.smooth(positions);
         let up = if self.slope_sign == 0.0 {
-            moment.direction
+            tick.direction
         } else {
             self.slope_sign
         };
-        let manner = if moment.still || moment.phase.is_none() {
-            Manner::Resting
-        } else if up == moment.direction {
-            Manner::Climbing
+        let crawl_state = if tick.still || tick.phase.is_none() {
+            CrawlState::Resting
+        } else if up == tick.direction {
+            CrawlState::Climbing
         } else {
-            Manner::Descending
+            CrawlState::Descending
         };
-        if self.manner != Some(manner) || self.reversals != moment.reversals {
-            self.manner = Some(manner);
-            self.reversals = moment.reversals;
-            self.start_here(moment);
+        if self.crawl_state != Some(crawl_state) || self.reversals != tick.reversals {
+            self.crawl_state = Some(crawl_state);
+            self.reversals = tick.reversals;
+            self.start_here(tick);
         }
         self.height_m += positions.moved_since(&self.last).unwrap_or(0.0) * up;
         self.last = *positions;
         if self.height_m > self.highest_m {
             self.highest_m = self.height_m;
         }
-        let excess_m = match manner {
-            Manner::Resting => self.rested(up),
-            Manner::Climbing => Some(self.climbed(moment, strides, usual_m.is_some(), sound)),
-            Manner::Descending => self.descended(moment, positions, strides, usual_m),
+        let excess_m = match crawl_state {
+            CrawlState::Resting => self.rested(up),
+            CrawlState::Climbing => Some(self.climbed(tick, strides, baseline_m.is_some(), sound)),
+            CrawlState::Descending => self.descended(tick, positions, strides, baseline_m),
         };
         match excess_m {
-            Some(excess_m) if positions.mask != 0 => AlarmReading::Seen(self.judge(moment, excess_m)),
-            _ => AlarmReading::Blind,
+            Some(excess_m) if positions.mask != 0 => DetectorOutput::Measured(self.evaluate(tick, excess_m)),
+            _ => DetectorOutput::Unknown,
         }
     }
 
@@ -162,14 +162,14 @@ impl SlidingDown {
         self.smoothed.mask = positions.mask;
     }
 
-    fn start_here(&mut self, moment: &Moment) {
+    fn start_here(&mut self, tick: &Tick) {
         self.anchor = self.smoothed;
-        self.anchor_phase = moment.phase.unwrap_or(0.0);
+        self.anchor_phase = tick.phase.unwrap_or(0.0);
         self.height_m = 0.0;
         self.highest_m = 0.0;
         self.beyond = 0;
         self.lowest_excess_m = 0.0;
-        self.sunk_ns = moment.now_ns;
+        self.sunk_ns = tick.now_ns;
     }
 
     fn rested(&mut self, up: f64) -> Option<f64> {
@@ -181,56 +181,56 @@ impl SlidingDown {
         moved_m.map(|metres| -metres * up)
     }
 
-    fn climbed(&mut self, moment: &Moment, strides: &Strides, usual_is_known: bool, sound: bool) -> f64 {
+    fn climbed(&mut self, tick: &Tick, strides: &Strides, baseline_is_known: bool, sound: bool) -> f64 {
         let below_m = self.highest_m - self.height_m;
-        let phase = moment.phase.unwrap_or(0.0);
+        let phase = tick.phase.unwrap_or(0.0);
         let bin = ((phase.rem_euclid(1.0) * BINS as f64) as usize).min(BINS - 1);
         let Retraction { sum_m, count } = &mut self.retraction;
-        let examples_wanted = !usual_is_known || count[bin] < self.calibration_cycles;
-        if sound && examples_wanted && strides.is_exemplary() && below_m < 0.5 * self.stroke_m {
+        let calibrates = !baseline_is_known || count[bin] < self.calibration_cycles;
+        if sound && calibrates && strides.can_calibrate() && below_m < 0.5 * self.stroke_m {
             sum_m[bin] += below_m;
             count[bin] += 1;
         }
-        let usual_m = if usual_is_known && count[bin] > 0 {
+        let baseline_m = if baseline_is_known && count[bin] > 0 {
             sum_m[bin] / f64::from(count[bin])
         } else {
             0.5 * self.stroke_m
         };
-        below_m - usual_m
+        below_m - baseline_m
     }
 
     fn descended(
         &mut self,
-        moment: &Moment,
+        tick: &Tick,
         positions: &Positions,
         strides: &Strides,
-        usual_m: Option<f64>,
+        baseline_m: Option<f64>,
     ) -> Option<f64> {
-        let phase = moment.phase?;
-        if let Some(displacement_m) = strides.advance_until(moment, positions) {
-            let usual_m = usual_m.filter(|_| strides.is_settled());
-            return Some(displacement_m - usual_m.unwrap_or(self.stroke_m));
+        let phase = tick.phase?;
+        if let Some(displacement_m) = strides.advance_until(tick, positions) {
+            let baseline_m = baseline_m.filter(|_| strides.is_settled());
+            return Some(displacement_m - baseline_m.unwrap_or(self.stroke_m));
         }
         // No sample of one cycle ago: what was gained since the descent began, while that is less than a cycle ago.
         if (phase - self.anchor_phase).abs() > 1.0 {
-            self.start_here(moment);
+            self.start_here(tick);
         }
         Some(-self.height_m - self.stroke_m)
     }
 
-    fn judge(&mut self, moment: &Moment, excess_m: f64) -> Reading {
+    fn evaluate(&mut self, tick: &Tick, excess_m: f64) -> Reading {
         if excess_m > self.threshold_m {
             self.beyond += 1;
         } else {
             self.beyond = 0;
             if excess_m < FURTHER_FRACTION * self.threshold_m && !self.sliding {
-                self.since_ns = moment.now_ns;
+                self.since_ns = tick.now_ns;
             }
         }
         if self.beyond >= CONFIRMATIONS && !self.sliding {
             self.sliding = true;
             self.lowest_excess_m = excess_m;
-            self.sunk_ns = moment.now_ns;
+            self.sunk_ns = tick.now_ns;
         }
         let mut verdict = if self.sliding {
             ReadingState::Bad
@@ -240,18 +240,18 @@ impl SlidingDown {
         if self.sliding {
             if excess_m > self.lowest_excess_m + FURTHER_FRACTION * self.threshold_m {
                 self.lowest_excess_m = excess_m;
-                self.sunk_ns = moment.now_ns;
+                self.sunk_ns = tick.now_ns;
             }
-            let cycle_s = match self.manner {
-                Some(Manner::Resting) | None => 0.0,
-                Some(_) => (OVER_CYCLES / moment.regime_cycles_per_s.abs().max(1e-3)).min(600.0),
+            let cycle_s = match self.crawl_state {
+                Some(CrawlState::Resting) | None => 0.0,
+                Some(_) => (OVER_CYCLES / tick.regime_cycles_per_s.abs().max(1e-3)).min(600.0),
             };
-            let quiet_s = moment.now_ns.saturating_sub(self.sunk_ns) as f64 * 1e-9;
-            let falls_on = self.manner == Some(Manner::Descending) && self.beyond > 0;
+            let quiet_s = tick.now_ns.saturating_sub(self.sunk_ns) as f64 * 1e-9;
+            let falls_on = self.crawl_state == Some(CrawlState::Descending) && self.beyond > 0;
             if quiet_s > OVER_S.max(cycle_s) && !falls_on {
                 self.sliding = false;
-                self.start_here(moment);
-                self.since_ns = moment.now_ns;
+                self.start_here(tick);
+                self.since_ns = tick.now_ns;
                 verdict = ReadingState::Good;
             }
         }

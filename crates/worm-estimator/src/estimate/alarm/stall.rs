@@ -14,8 +14,8 @@
 //! While the commanded speed changes, twice the threshold is needed, unless the current says the motor works hard: the
 //! current only corroborates, the encoder decides.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::{GOAL_UNIT_TURNS_PER_S, Moment, finite_or_zero};
+use super::cam_motion::{GOAL_UNIT_TURNS_PER_S, Tick, finite_or_zero};
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Severity, State};
 
@@ -77,29 +77,29 @@ impl MotorStall {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
-        let Some(phase) = moment.phase.filter(|_| moment.torque) else {
+    pub(super) fn update(&mut self, tick: &Tick, state: &State) -> DetectorOutput {
+        let Some(phase) = tick.phase.filter(|_| tick.torque) else {
             self.forget();
-            return AlarmReading::Idle;
+            return DetectorOutput::Idle;
         };
-        self.follow_command(moment);
-        if moment.phase_is_new {
-            self.leave_out_standstill(moment);
-            self.follow_cam(phase, moment);
+        self.follow_command(tick);
+        if tick.phase_is_new {
+            self.leave_out_standstill(tick);
+            self.follow_cam(phase, tick);
         }
         if self.uncommanded_s >= SETTLED_S {
             self.lag = 0.0;
             self.beyond = 0;
-            return AlarmReading::Idle;
+            return DetectorOutput::Idle;
         }
         let works_hard = finite_or_zero(state.motor_current_a).abs() >= self.hard_work_a;
-        let usual = self.threshold_at(moment.goal_turns_per_s);
-        let threshold = if moment.steady || works_hard {
-            usual
+        let baseline = self.threshold_at(tick.goal_turns_per_s);
+        let threshold = if tick.steady || works_hard {
+            baseline
         } else {
-            2.0 * usual
+            2.0 * baseline
         };
-        if moment.phase_is_new {
+        if tick.phase_is_new {
             self.beyond = if self.lag > threshold { self.beyond + 1 } else { 0 };
         }
         let verdict = if self.beyond >= CONFIRMATIONS {
@@ -109,7 +109,7 @@ impl MotorStall {
         } else {
             ReadingState::Between
         };
-        AlarmReading::Seen(Reading {
+        DetectorOutput::Measured(Reading {
             value: self.lag,
             threshold,
             verdict,
@@ -125,15 +125,15 @@ impl MotorStall {
         (fraction * self.threshold_turns).max(MIN_TURNS.min(self.threshold_turns))
     }
 
-    fn follow_command(&mut self, moment: &Moment) {
-        let goal = moment.goal_turns_per_s;
+    fn follow_command(&mut self, tick: &Tick) {
+        let goal = tick.goal_turns_per_s;
         let asked = if goal.abs() < GOAL_UNIT_TURNS_PER_S {
             0.0
         } else {
             goal - goal.signum() * 0.5 * GOAL_UNIT_TURNS_PER_S
         };
         self.uncommanded_s = if asked == 0.0 {
-            self.uncommanded_s + moment.step_s
+            self.uncommanded_s + tick.step_s
         } else {
             0.0
         };
@@ -143,27 +143,27 @@ impl MotorStall {
         if asked.abs() <= self.reference.abs() {
             self.reference = asked;
         } else {
-            self.reference += (asked - self.reference) * (moment.step_s / SERVO_LAG_S).min(1.0);
+            self.reference += (asked - self.reference) * (tick.step_s / SERVO_LAG_S).min(1.0);
         }
         if asked != 0.0 && asked.signum() != self.side {
             self.side = asked.signum();
             self.lag = 0.0;
             self.beyond = 0;
         }
-        self.commanded += self.reference * moment.step_s;
-        self.gap_s += moment.step_s;
+        self.commanded += self.reference * tick.step_s;
+        self.gap_s += tick.step_s;
     }
 
     /// A servo that stood still with its computer was commanded nothing meanwhile.
-    fn leave_out_standstill(&mut self, moment: &Moment) {
-        if moment.lived_s < self.gap_s {
-            self.commanded *= moment.lived_s / self.gap_s;
-            self.gap_s = moment.lived_s;
+    fn leave_out_standstill(&mut self, tick: &Tick) {
+        if tick.motor_s < self.gap_s {
+            self.commanded *= tick.motor_s / self.gap_s;
+            self.gap_s = tick.motor_s;
         }
     }
 
-    fn follow_cam(&mut self, phase: f64, moment: &Moment) {
-        let threshold = self.threshold_at(moment.goal_turns_per_s);
+    fn follow_cam(&mut self, phase: f64, tick: &Tick) {
+        let threshold = self.threshold_at(tick.goal_turns_per_s);
         let travelled = self.last_phase.map_or(f64::NAN, |last| phase - last);
         let bridged = self.gap_s <= self.longest_gap_s && travelled.abs() < 0.01 + IMPLAUSIBLE_TURNS_PER_S * self.gap_s;
         if bridged {
@@ -172,7 +172,7 @@ impl MotorStall {
             self.lag = self.lag.max(-MAX_AHEAD * threshold);
         }
         if self.lag <= ONSET_FRACTION * threshold {
-            self.since_ns = moment.now_ns;
+            self.since_ns = tick.now_ns;
         }
         self.last_phase = Some(phase);
         self.commanded = 0.0;

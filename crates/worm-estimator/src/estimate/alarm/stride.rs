@@ -4,7 +4,7 @@
 //! cancels and the difference is the advance of the last cycle, whatever the shape of the gait. So nobody waits for the end
 //! of a cycle, and the usual advance is calibrated in phase for each direction by itself.
 
-use super::motion::Moment;
+use super::cam_motion::Tick;
 use super::sample::Positions;
 
 /// Phases per cycle at which positions are kept.
@@ -21,13 +21,13 @@ pub(super) struct Stride {
 
 /// What is usual in one direction.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Usual {
+pub(super) struct Baseline {
     strides: u32,
     mean_m: f64,
     square_m2: f64, // sum of squared deviations
 }
 
-impl Usual {
+impl Baseline {
     pub(super) fn add(&mut self, advance_m: f64) {
         self.strides += 1;
         let off = advance_m - self.mean_m;
@@ -76,36 +76,33 @@ impl Strides {
     }
 
     /// Takes a sample; the stride, when the cam entered a new bin and the positions one cycle ago are known.
-    pub(super) fn update(&mut self, moment: &Moment, positions: &Positions) -> Option<Stride> {
-        let phase = moment.phase?;
+    pub(super) fn update(&mut self, tick: &Tick, positions: &Positions) -> Option<Stride> {
+        let phase = tick.phase?;
         let bin = (phase * BINS as f64).floor() as i64;
-        let reversed = moment.reversals != self.reversals;
-        if reversed || !moment.torque || !self.torque || self.bin.is_none() {
+        let reversed = tick.reversals != self.reversals;
+        if reversed || !tick.torque || !self.torque || self.bin.is_none() {
             // Without torque the worm may be carried; after a reversal the tips must first unload.
             self.after_reversal = reversed && self.bin.is_some() || self.after_reversal && self.newest.is_none();
             self.slots.fill((i64::MIN, Positions::NONE));
             self.newest = None;
             self.began_phase = phase;
-            self.reversals = moment.reversals;
-            self.torque = moment.torque;
+            self.reversals = tick.reversals;
+            self.torque = tick.torque;
             self.bin = Some(bin);
             return None;
         }
-        if self
-            .bin
-            .is_some_and(|last| (bin - last) as f64 * moment.direction <= 0.0)
-        {
+        if self.bin.is_some_and(|last| (bin - last) as f64 * tick.direction <= 0.0) {
             return None; // in the same bin, or back in an earlier one by the give of a hold
         }
         self.bin = Some(bin);
         let slot = &mut self.slots[bin.rem_euclid(BINS as i64) as usize];
-        let cycle_ago = bin.saturating_sub(moment.direction as i64 * BINS as i64);
+        let cycle_ago = bin.saturating_sub(tick.direction as i64 * BINS as i64);
         let earlier = std::mem::replace(slot, (bin, *positions));
         let moved_m = (earlier.0 == cycle_ago)
             .then(|| positions.moved_since(&earlier.1))
             .flatten();
         self.newest = moved_m.map(|moved_m| Stride {
-            advance_m: moved_m * moment.direction,
+            advance_m: moved_m * tick.direction,
             cycles: (phase - self.began_phase).abs(),
         });
         self.newest_at = *positions;
@@ -113,9 +110,9 @@ impl Strides {
     }
 
     /// The newest stride, carried on by what the worm moved since: along the crawling direction, m.
-    pub(super) fn advance_until(&self, moment: &Moment, positions: &Positions) -> Option<f64> {
+    pub(super) fn advance_until(&self, tick: &Tick, positions: &Positions) -> Option<f64> {
         let since_m = positions.moved_since(&self.newest_at)?;
-        Some(self.newest?.advance_m + since_m * moment.direction)
+        Some(self.newest?.advance_m + since_m * tick.direction)
     }
 
     /// Whether the tips have settled into this direction, so that a stride can be compared.
@@ -125,7 +122,7 @@ impl Strides {
     }
 
     /// Whether a stride may serve as an example of what is usual.
-    pub(super) fn is_exemplary(&self) -> bool {
+    pub(super) fn can_calibrate(&self) -> bool {
         self.newest.is_some_and(|stride| stride.cycles >= 2.0)
     }
 }

@@ -5,8 +5,8 @@
 //! others are below half the threshold. No sample at all for the controller's tracker timeout raises the alarm at once,
 //! and so does the controller's own verdict that the tracker is stale.
 
-use super::latch::{AlarmReading, Reading, ReadingState};
-use super::motion::Moment;
+use super::cam_motion::Tick;
+use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Fault, Severity, State};
 use worm_physics::MAX_CELLS;
@@ -62,8 +62,8 @@ impl TrackerFault {
         }
     }
 
-    pub(super) fn update(&mut self, moment: &Moment, state: &State) -> AlarmReading {
-        self.advance_window(moment);
+    pub(super) fn update(&mut self, tick: &Tick, state: &State) -> DetectorOutput {
+        self.advance_window(tick);
         self.count(state);
         let silent = self.silent_s > self.timeout_s || state.fault == Fault::TrackerStale.code();
         let (fraction, cell) = self.worst();
@@ -75,9 +75,9 @@ impl TrackerFault {
             ReadingState::Between
         };
         if verdict == ReadingState::Good {
-            self.since_ns = moment.now_ns;
+            self.since_ns = tick.now_ns;
         }
-        AlarmReading::Seen(Reading {
+        DetectorOutput::Measured(Reading {
             value: fraction,
             threshold: self.threshold,
             verdict,
@@ -87,9 +87,9 @@ impl TrackerFault {
         })
     }
 
-    fn advance_window(&mut self, moment: &Moment) {
+    fn advance_window(&mut self, tick: &Tick) {
         let part_ns = (WINDOW_S * 1e9) as u64 / PARTS as u64;
-        let due_s = self.due_s(moment);
+        let due_s = self.due_s(tick);
         self.part_ns += (due_s * 1e9) as u64;
         let passed = self.part_ns / part_ns;
         for _ in 0..passed.min(PARTS as u64) {
@@ -103,17 +103,17 @@ impl TrackerFault {
         }
         self.part_ns -= passed * part_ns;
         self.filled_s += due_s;
-        self.silent_s += moment.present_s;
+        self.silent_s += tick.present_s;
     }
 
     /// The time in which samples were due that has become known with this tick, s. While the servo does not answer it is not known
     /// whether its line or its computer is silent, and with it the tracker's; where they stood still no sample was due.
-    fn due_s(&mut self, moment: &Moment) -> f64 {
-        self.unanswered_s += moment.present_s;
-        if !moment.phase_is_new {
+    fn due_s(&mut self, tick: &Tick) -> f64 {
+        self.unanswered_s += tick.present_s;
+        if !tick.phase_is_new {
             return 0.0;
         }
-        std::mem::take(&mut self.unanswered_s).min(moment.lived_s)
+        std::mem::take(&mut self.unanswered_s).min(tick.motor_s)
     }
 
     fn count(&mut self, state: &State) {
@@ -151,11 +151,11 @@ impl TrackerFault {
         let absent = (due - self.whole.arrived as f64).max(0.0) / full;
         let mut worst = 0.0;
         let mut named = None;
-        let mut ailing = 0;
+        let mut affected = 0;
         for cell in 0..self.cells {
             let looked_at = (self.whole.looked_at as f64).max(0.5 * full);
             let fraction = f64::from(self.whole.unseen[cell]) / looked_at;
-            ailing += u32::from(fraction > 0.5 * self.threshold);
+            affected += u32::from(fraction > 0.5 * self.threshold);
             if fraction > worst {
                 worst = fraction;
                 named = Some(cell);
@@ -164,7 +164,7 @@ impl TrackerFault {
         if absent > worst {
             (absent, None)
         } else {
-            (worst, named.filter(|_| ailing == 1))
+            (worst, named.filter(|_| affected == 1))
         }
     }
 }

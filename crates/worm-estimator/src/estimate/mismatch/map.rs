@@ -7,8 +7,8 @@
 //! [`FALSE_FRACTION`], whatever hangs together with what.
 
 use super::BINS;
-use super::shadow::{ALLOWANCES, Part, Shadow};
-use super::tally::{Known, Tally};
+use super::reference_model::{ALLOWANCES, Part, ReferenceModel};
+use super::weighted_mean::{MeanEstimate, WeightedMean};
 use worm_physics::MAX_CELLS;
 
 /// Chance of the whole family to be beyond by chance, at one look.
@@ -22,8 +22,8 @@ pub struct ResidualMap {
     cells: usize,
     direction: i32,
     stepping: [usize; MAX_CELLS],
-    tallies: Vec<Tally>, // [step][bin][cell]
-    advance: Tally,
+    means: Vec<WeightedMean>, // [step][bin][cell]
+    advance: WeightedMean,
     effects_m: [Vec<f64>; ALLOWANCES.len()], // of whole units of the allowed deviations
     allowed_m: Vec<f64>,                     // their best fit
     allowed_advance_m: f64,
@@ -79,8 +79,8 @@ impl ResidualMap {
             cells,
             direction: 1,
             stepping: [0; MAX_CELLS],
-            tallies: vec![Tally::default(); size],
-            advance: Tally::default(),
+            means: vec![WeightedMean::default(); size],
+            advance: WeightedMean::default(),
             effects_m: std::array::from_fn(|_| vec![0.0; size]),
             allowed_m: vec![0.0; size],
             allowed_advance_m: 0.0,
@@ -90,15 +90,15 @@ impl ResidualMap {
     }
 
     /// Forgets everything; what deviations would do is asked of the model.
-    pub(super) fn clear(&mut self, direction: i32, shadow: &Shadow) {
+    pub(super) fn clear(&mut self, direction: i32, model: &ReferenceModel) {
         self.direction = direction;
         for (step, cell) in self.stepping[..self.cells].iter_mut().enumerate() {
-            *cell = shadow.stepping_cell(step);
+            *cell = model.stepping_cell(step);
         }
-        self.tallies.fill(Tally::default());
-        self.advance = Tally::default();
+        self.means.fill(WeightedMean::default());
+        self.advance = WeightedMean::default();
         for (effect_m, allowance) in self.effects_m.iter_mut().zip(&ALLOWANCES) {
-            shadow.effect_of(allowance, effect_m);
+            model.effect_of(allowance, effect_m);
         }
         self.allowed_m.fill(0.0);
         self.allowed_advance_m = 0.0;
@@ -107,12 +107,12 @@ impl ResidualMap {
 
     /// Adds one cycle: an increment for each entry, `NaN` where it was not seen.
     pub(super) fn add(&mut self, increments_m: &[f64]) {
-        for (tally, &increment_m) in self.tallies.iter_mut().zip(increments_m) {
-            tally.add(increment_m);
+        for (mean, &increment_m) in self.means.iter_mut().zip(increments_m) {
+            mean.add(increment_m);
         }
         self.advance.add(increments_m.iter().sum::<f64>() / self.cells as f64);
         let (mut sum, mut count) = (0.0, 0.0);
-        for variance in self.tallies.iter().filter_map(Tally::variance) {
+        for variance in self.means.iter().filter_map(WeightedMean::variance) {
             sum += variance;
             count += 1.0;
         }
@@ -129,7 +129,7 @@ impl ResidualMap {
             for bin in 0..self.cells * BINS {
                 let of = |value: &dyn Fn(usize) -> f64| self.seen_in(allowance.shows_in, bin, value);
                 let left_m = of(&|index| {
-                    let known = self.tallies[index].known(self.pooled);
+                    let known = self.means[index].known(self.pooled);
                     known.map_or(f64::NAN, |known| known.mean - self.allowed_m[index])
                 });
                 let effect_m = of(&|index| effect_m[index]);
@@ -175,7 +175,7 @@ impl ResidualMap {
     }
 
     pub(super) fn size(&self) -> usize {
-        self.tallies.len()
+        self.means.len()
     }
 
     /// Every entry that rests on enough cycles, in the order of steps, bins and cells.
@@ -183,8 +183,8 @@ impl ResidualMap {
         (0..self.size()).filter_map(|index| self.entry(index).map(|(residual, _)| residual))
     }
 
-    fn entry(&self, index: usize) -> Option<(Residual, Known)> {
-        let known = self.tallies[index].known(self.pooled)?;
+    fn entry(&self, index: usize) -> Option<(Residual, MeanEstimate)> {
+        let known = self.means[index].known(self.pooled)?;
         let (bin_of_cycle, cell) = (index / self.cells, index % self.cells);
         let along = (bin_of_cycle as f64 + 0.5) / (self.cells * BINS) as f64;
         let residual = Residual {

@@ -1,10 +1,10 @@
 //! What the model does not explain: the residual of the crawl, kept as a map while the worm crawls.
 //!
 //! # The story
-//! Beside the estimator runs the configured worm as the model has it (`shadow`), over the same gait phase, on the bounds that
+//! Beside the estimator runs the configured worm as the model has it (`model`), over the same gait phase, on the bounds that
 //! are measured or were identified. At the end of each gait cycle the way that each cell was *seen* to make in each
 //! [`BINS`]th of a step is compared with the way that the model makes there, and the difference enters the [`map`](ResidualMap):
-//! for each cell, step and bin a mean that forgets slowly, with a standard error from its scatter over the cycles (`tally`).
+//! for each cell, step and bin a mean that forgets slowly, with a standard error from its scatter over the cycles (`mean`).
 //! The alarm `model-mismatch` reads the map; so may anybody else, by [`Observer::residual_map`](super::Observer::residual_map).
 //!
 //! # How a way is measured
@@ -43,8 +43,8 @@
 //! instead is not reached by a common 10 %.
 
 mod map;
-mod shadow;
-mod tally;
+mod reference_model;
+mod weighted_mean;
 
 #[cfg(test)]
 mod tests;
@@ -52,7 +52,7 @@ mod tests;
 pub use map::{Residual, ResidualMap, Unexplained};
 
 use super::window::{INTERVALS, Window};
-use shadow::Shadow;
+use reference_model::ReferenceModel;
 use worm_physics::MAX_CELLS;
 use worm_physics::Worm;
 
@@ -66,10 +66,10 @@ const SIDE: usize = PIECES / 2;
 /// Model and map, and which cycles may enter it.
 #[derive(Debug, Clone)]
 pub(super) struct Mismatch {
-    shadow: Shadow,
+    model: ReferenceModel,
     map: ResidualMap,
     disturbed: bool,            // the open cycle
-    was_sound: bool,            // the cycle before it
+    was_undisturbed: bool,      // the cycle before it
     identified_in: Option<i32>, // the direction in which the bounds were found
     step: Vec<f64>,             // increments of one cycle, as the map has its entries
 }
@@ -79,11 +79,11 @@ impl Mismatch {
     pub(super) fn new(worm: &Worm) -> Self {
         let map = ResidualMap::new(worm.cells());
         let mut new = Self {
-            shadow: Shadow::new(worm),
+            model: ReferenceModel::new(worm),
             step: vec![f64::NAN; map.size()],
             map,
             disturbed: true,
-            was_sound: false,
+            was_undisturbed: false,
             identified_in: None,
         };
         new.clear(1);
@@ -92,7 +92,7 @@ impl Mismatch {
 
     /// Takes up bounds that were identified in the present direction: everything begins anew.
     pub(super) fn set_identified(&mut self, worm: &Worm) {
-        self.shadow.set_worm(worm);
+        self.model.set_worm(worm);
         self.identified_in = Some(self.map.direction());
         self.clear(self.map.direction());
     }
@@ -102,8 +102,8 @@ impl Mismatch {
         if direction != self.map.direction() {
             self.clear(direction);
         }
-        self.shadow.begin(direction);
-        (self.disturbed, self.was_sound) = (false, false);
+        self.model.begin(direction);
+        (self.disturbed, self.was_undisturbed) = (false, false);
     }
 
     /// The open cycle is not to be judged.
@@ -127,22 +127,22 @@ impl Mismatch {
     }
 
     fn clear(&mut self, direction: i32) {
-        self.shadow.begin(direction);
-        self.map.clear(direction, &self.shadow);
+        self.model.begin(direction);
+        self.map.clear(direction, &self.model);
     }
 
     /// Takes up the cycle that has just ended, the newer one of the window.
     pub(super) fn take_up(&mut self, window: &Window) {
-        let sound = !std::mem::replace(&mut self.disturbed, false);
-        let both_sound = std::mem::replace(&mut self.was_sound, sound) && sound;
+        let undisturbed = !std::mem::replace(&mut self.disturbed, false);
+        let both_undisturbed = std::mem::replace(&mut self.was_undisturbed, undisturbed) && undisturbed;
         let is_told = self
             .identified_in
             .is_none_or(|direction| direction == self.map.direction());
         if !is_told
-            || self.shadow.run_cycle().is_err()
-            || !both_sound
+            || self.model.run_cycle().is_err()
+            || !both_undisturbed
             || window.cycles() < 2
-            || self.shadow.cycles() < 2
+            || self.model.cycles() < 2
         {
             return;
         }
@@ -180,8 +180,8 @@ impl Mismatch {
         for piece in pieces {
             let seen = window.piece(piece)[cell];
             let (from_m, to_m) = (
-                self.shadow.position_m(piece, cell),
-                self.shadow.position_m(piece + 1, cell),
+                self.model.position_m(piece, cell),
+                self.model.position_m(piece + 1, cell),
             );
             sum_m += seen.x - from_m * seen.count - (to_m - from_m) * seen.t;
             count += seen.count;

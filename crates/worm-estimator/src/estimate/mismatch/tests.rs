@@ -1,5 +1,5 @@
-use super::shadow::{ALLOWANCES, Shadow};
-use super::tally::Tally;
+use super::reference_model::{ALLOWANCES, ReferenceModel};
+use super::weighted_mean::WeightedMean;
 use super::{BINS, ResidualMap};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -13,7 +13,7 @@ const NOISE_M: f64 = 3e-5;
 /// A map of the paper's worm over so many cycles of noise, and what `add` adds to step, bin and cell.
 fn map_of(cycles: usize, seed: u64, add: impl Fn(usize, usize, usize) -> f64) -> ResidualMap {
     let mut map = ResidualMap::new(CELLS);
-    map.clear(1, &Shadow::new(&Worm::paper()));
+    map.clear(1, &ReferenceModel::new(&Worm::paper()));
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     for _ in 0..cycles {
         let increments_m: Vec<f64> = (0..map.size())
@@ -35,17 +35,17 @@ fn a_tally_knows_how_well_it_knows() {
     let mut squares = 0.0;
     const TALLIES: usize = 4000;
     for _ in 0..TALLIES {
-        let mut tally = Tally::default();
+        let mut mean = WeightedMean::default();
         for _ in 0..30 {
             let value: f64 = StandardNormal.sample(&mut random);
-            tally.add(2.0 + value);
+            mean.add(2.0 + value);
         }
-        let known = tally.known(1.0).expect("enough values");
+        let known = mean.known(1.0).expect("enough values");
         squares += ((known.mean - 2.0) / known.sigma).powi(2);
     }
     let ratio = squares / TALLIES as f64;
     assert!((0.9..1.1).contains(&ratio), "{ratio}");
-    let mut stepped = Tally::default();
+    let mut stepped = WeightedMean::default();
     (0..20).for_each(|index| stepped.add(if index < 12 { 0.0 } else { 1.0 }));
     let known = stepped.known(0.0).expect("enough values");
     assert!(known.mean > 0.6 && known.sigma < 0.1, "{known:?}");
@@ -116,15 +116,18 @@ fn the_place_is_where_it_is() {
 #[test]
 fn a_small_deviation_of_the_stroke_is_allowed_for() {
     let mut effect_m = vec![0.0; CELLS * BINS * CELLS];
-    Shadow::new(&Worm::paper()).effect_of(&ALLOWANCES[0], &mut effect_m);
+    ReferenceModel::new(&Worm::paper()).effect_of(&ALLOWANCES[0], &mut effect_m);
     let with_fraction = |fraction: f64| {
         let map = map_of(12, 3, |step, bin, cell| {
             fraction * effect_m[(step * BINS + bin) * CELLS + cell]
         });
         map.unexplained(THRESHOLD_M).expect("enough cycles")
     };
-    let sound = with_fraction(-0.015);
-    assert!(sound.is_within && sound.excess_m.abs() < 5e-5, "{sound:?}");
+    let undisturbed = with_fraction(-0.015);
+    assert!(
+        undisturbed.is_within && undisturbed.excess_m.abs() < 5e-5,
+        "{undisturbed:?}"
+    );
     let long = with_fraction(0.06);
     // 4 % of 11.5 mm, once a cycle for each cell.
     assert!(long.is_significant && (long.excess_m - 4.6e-4).abs() < 3e-5, "{long:?}");

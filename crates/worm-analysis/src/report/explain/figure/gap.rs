@@ -3,6 +3,7 @@
 use super::super::view::{StageView, mm, stage_of, stages};
 use crate::explain::Answer;
 use crate::explain::answer::Stage;
+use crate::explain::answer::StageKind;
 use crate::report::page::{Figure, Key, Mark, Panel};
 use crate::report::plot::{
     ACCENT, Axis, Colour, DrawError, INK, LIGHT, MID, MUTED, Row, SHADE, Sheet, Stroke, Svg, draw,
@@ -20,17 +21,17 @@ const BESIDE: f64 = 0.2;
 /// How a stage's bar looks.
 fn style(stage: &StageView) -> (Mark, Colour) {
     match stage.key {
-        "baseline" => (Mark::Box, MID),
-        "recalibrated" => (Mark::Box, SHADE),
-        "best-wrong" => (Mark::Box, LIGHT),
-        "named" => (Mark::Box, ACCENT),
+        StageKind::Baseline => (Mark::Box, MID),
+        StageKind::Recalibrated => (Mark::Box, SHADE),
+        StageKind::BestWrong => (Mark::Box, LIGHT),
+        StageKind::Named => (Mark::Box, ACCENT),
         _ => (Mark::Frame, MUTED),
     }
 }
 
 pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let bars = stages(answer);
-    let floor = stage_of(answer, "floor");
+    let floor = stage_of(answer, StageKind::Floor);
     let key = |(stage, _): &(StageView, &Stage)| {
         let (mark, colour) = style(stage);
         Key::new(mark, colour, stage.name)
@@ -42,7 +43,7 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let meanings = bars
         .iter()
         .map(|(stage, _)| format!("{}: {}", stage.name, stage.meaning));
-    let missing = match (stage_of(answer, "named"), floor) {
+    let missing = match (stage_of(answer, StageKind::Named), floor) {
         (None, _) => " No bar for a named effect, for none is named.",
         (_, None) => " The noise floor is not known.",
         _ => "",

@@ -1,7 +1,7 @@
 //! How much each effect of the library improves the fit.
 
-use super::super::view::{best_of_each, converged, is_visible, outcome, reached};
-use crate::explain::answer::Screened;
+use super::super::view::{best_of_each, is_visible, outcome, reached};
+use crate::explain::answer::{Screened, ScreeningOutcome};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::{Figure, Key, Mark, Panel};
 use crate::report::plot::{ACCENT, Axis, DrawError, INK, LIGHT, MID, MUTED, Row, SHADE, Sheet, Stroke, Svg, draw};
@@ -72,7 +72,7 @@ fn picture(answer: &Answer) -> Result<Svg, DrawError> {
         for (number, bar) in bars.iter().enumerate() {
             let row = (bars.len() - 1 - number) as f64;
             if !is_visible(bar) {
-                plot.text_beside(MIN_IMPROVEMENT, row, MUTED, &outcome(bar))?;
+                plot.text_beside(MIN_IMPROVEMENT, row, MUTED, outcome(bar))?;
                 continue;
             }
             let colour = match bar.improvement {
@@ -82,10 +82,10 @@ fn picture(answer: &Answer) -> Result<Svg, DrawError> {
             };
             let end = reached(bar).max(MIN_IMPROVEMENT);
             let (along, across) = ([MIN_IMPROVEMENT, end], [row - HALF_BAR, row + HALF_BAR]);
-            if converged(bar) {
-                plot.fill(along, across, colour, 1.0)?;
-            } else {
+            if bar.outcome == ScreeningOutcome::DidNotConverge {
                 plot.edge(along, across, Stroke::new(MUTED, 1.5))?;
+            } else {
+                plot.fill(along, across, colour, 1.0)?;
             }
             plot.text_beside(end, row, INK, &significant(reached(bar), 2))?;
         }

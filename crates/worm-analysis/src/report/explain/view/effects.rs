@@ -1,8 +1,8 @@
 //! Which effect, and why not another: the candidates beside each other, and the screening of the whole library.
 
 use super::quantity::{ParameterView, clause, mm};
-use super::{Block, FigureKind, is_called, place, stage_of};
-use crate::explain::answer::{NamedEffect, Remainder, Screened, with_cell};
+use super::{Block, FigureKind, place, stage_of};
+use crate::explain::answer::{NamedEffect, Remainder, Screened, ScreeningOutcome, StageKind, with_cell};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::Table;
 use std::collections::HashSet;
@@ -109,7 +109,10 @@ fn why(answer: &Answer) -> String {
 
 /// What the named effect and the best of another kind leave, as a clause; empty where there was none.
 fn against_best_rival(answer: &Answer) -> String {
-    let (Some(rival), Some(named)) = (stage_of(answer, "best-wrong"), stage_of(answer, "named")) else {
+    let (Some(rival), Some(named)) = (
+        stage_of(answer, StageKind::BestWrong),
+        stage_of(answer, StageKind::Named),
+    ) else {
         return String::new();
     };
     let other = rival.effect.as_deref().unwrap_or("the best effect of another kind");
@@ -140,24 +143,17 @@ pub(in crate::report::explain) fn reached(entry: &Screened) -> f64 {
 
 /// Whether an effect can be seen in the data at all.
 pub(in crate::report::explain) fn is_visible(entry: &Screened) -> bool {
-    !is_called(entry.outcome, "not-visible")
-}
-
-/// Whether the fit of an effect converged, if it was refitted.
-pub(in crate::report::explain) fn converged(entry: &Screened) -> bool {
-    !is_called(entry.outcome, "did-not-converge")
+    entry.outcome != ScreeningOutcome::NotVisible
 }
 
 /// What became of an effect, in words.
-pub(in crate::report::explain) fn outcome(entry: &Screened) -> String {
-    let outcome = entry.outcome.to_string();
-    match &*outcome {
-        "screened-out" => "not refitted, others promised more",
-        "did-not-converge" => "the fit did not converge",
-        "not-visible" => "not visible in these data",
-        other => other,
+pub(in crate::report::explain) const fn outcome(entry: &Screened) -> &'static str {
+    match entry.outcome {
+        ScreeningOutcome::ScreenedOut => "not refitted, others promised more",
+        ScreeningOutcome::Refitted => "refitted",
+        ScreeningOutcome::DidNotConverge => "the fit did not converge",
+        ScreeningOutcome::NotVisible => "not visible in these data",
     }
-    .to_owned()
 }
 
 /// The best entry of each effect, best first; those not visible last.
@@ -227,7 +223,7 @@ fn library(answer: &Answer) -> Table {
     let row = |entry: &Screened| {
         vec![
             with_cell(&entry.name, entry.cell),
-            outcome(entry),
+            outcome(entry).to_owned(),
             fixed(entry.score, 1),
             fixed(entry.improvement.unwrap_or(f64::NAN), 1),
         ]

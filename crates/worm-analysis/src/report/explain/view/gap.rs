@@ -1,7 +1,7 @@
 //! How the gap shrinks, stage by stage, on cycles that nothing was fitted to.
 
-use super::{Block, FigureKind, is_called};
-use crate::explain::answer::Stage;
+use super::{Block, FigureKind};
+use crate::explain::answer::{Stage, StageKind};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::Table;
 use worm_estimator::number::fixed;
@@ -10,19 +10,19 @@ use worm_estimator::number::fixed;
 #[derive(Debug, Clone, Copy)]
 pub(in crate::report::explain) struct StageView {
     /// Its name in the answer.
-    pub key: &'static str,
+    pub key: StageKind,
     /// Its name for people.
     pub name: &'static str,
     /// What it is.
     pub meaning: &'static str,
 }
 
-const fn stage_view(key: &'static str, name: &'static str, meaning: &'static str) -> StageView {
+const fn stage_view(key: StageKind, name: &'static str, meaning: &'static str) -> StageView {
     StageView { key, name, meaning }
 }
 
 /// The name of the noise floor, which is no model.
-pub(super) const FLOOR: StageView = stage_view("floor", "noise floor", "no model can do better");
+pub(super) const FLOOR: StageView = stage_view(StageKind::Floor, "noise floor", "no model can do better");
 
 /// The models in reading order, as far as the answer has them.
 pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &Stage)> {
@@ -32,16 +32,16 @@ pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &St
         _ => ("with the named effect", "the model with the effect named"),
     };
     let all = [
-        stage_view("baseline", "nominal model", "the model as configured"),
+        stage_view(StageKind::Baseline, "nominal model", "the model as configured"),
         stage_view(
-            "recalibrated",
+            StageKind::Recalibrated,
             "recalibrated model",
             "its known quantities adjusted within their priors; what it leaves is the gap that counts",
         ),
-        stage_view("best-wrong", "best rival", "the best effect of another kind"),
-        stage_view("named", named.0, named.1),
+        stage_view(StageKind::BestWrong, "best rival", "the best effect of another kind"),
+        stage_view(StageKind::Named, named.0, named.1),
         stage_view(
-            "free-form",
+            StageKind::FreeForm,
             "free-form correction",
             "a correction of any form, fitted freely: about as much as can be closed",
         ),
@@ -52,9 +52,9 @@ pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &St
     known.collect()
 }
 
-/// The stage of a name in the answer.
-pub(in crate::report::explain) fn stage_of<'a>(answer: &'a Answer, key: &str) -> Option<&'a Stage> {
-    answer.stages.iter().find(|stage| is_called(stage.stage, key))
+/// A stage of the answer.
+pub(in crate::report::explain) fn stage_of<'a>(answer: &'a Answer, key: StageKind) -> Option<&'a Stage> {
+    answer.stages.iter().find(|stage| stage.stage == key)
 }
 
 impl StageView {

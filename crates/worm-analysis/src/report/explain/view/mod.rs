@@ -9,13 +9,12 @@ mod quantity;
 mod runs;
 mod verdict;
 
-pub(super) use effects::{best_of_each, converged, is_visible, named_model, outcome, reached};
+pub(super) use effects::{best_of_each, is_visible, named_model, outcome, reached};
 pub(super) use gap::{StageView, stage_of, stages};
 pub(super) use quantity::{cells, mm};
 
 use crate::explain::Answer;
 use crate::report::page::{Table, TileRow};
-use std::fmt::Display;
 
 /// The whole answer in words.
 #[derive(Debug, Clone)]
@@ -101,11 +100,6 @@ pub enum LineKind {
     Removed,
     /// Both files have it.
     Kept,
-}
-
-/// Whether a part of the answer has this name in its JSON.
-fn is_called(part: impl Display, name: &str) -> bool {
-    part.to_string() == name
 }
 
 impl View {

@@ -1,8 +1,8 @@
 //! The next experiment: what to change, and what each candidate predicts.
 
 use super::Block;
-use super::quantity::{clause, readable};
-use crate::explain::answer::{NextExperiment, Prediction};
+use super::quantity::clause;
+use crate::explain::answer::{ExperimentChange, NextExperiment, Prediction, RunChange};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::Table;
 use worm_estimator::number::{fixed, significant};
@@ -31,22 +31,18 @@ pub(super) fn blocks(answer: &Answer) -> Vec<Block> {
 }
 
 fn setting(next: &NextExperiment) -> String {
-    let change = next.change.to_string();
-    let Some(value) = next.value else {
-        return format!("What to measure: {}.", clause(&change));
+    let (change, value) = match (next.change, next.value) {
+        (ExperimentChange::Run(change), Some(value)) => (change, value),
+        (ExperimentChange::Measurement(what), _) => return format!("What to measure: {}.", clause(what)),
+        (ExperimentChange::Run(_), None) => return format!("What to change: {}.", clause(&next.description)),
     };
-    let (what, factor, unit) = match &*change {
-        "slope_deg" => ("slope", 1.0, "°"),
-        "cycle_s" => ("time of a gait cycle", 1.0, " s"),
-        "payload_kg" => ("known extra mass", 1e3, " g"),
-        "start_m" => ("start shifted along the canal by", 1e3, " mm"),
-        "cycles" => ("gait cycles", 1.0, ""),
-        "dwell_s" => ("rest between the cycles", 1.0, " s"),
-        other => {
-            let (factor, unit) = readable(&next.unit);
-            let text = format!("What to change: {other} {} {unit}", significant(value * factor, 3));
-            return format!("{}.", text.trim_end());
-        }
+    let (what, factor, unit) = match change {
+        RunChange::Slope => ("slope", 1.0, "°"),
+        RunChange::Cycle => ("time of a gait cycle", 1.0, " s"),
+        RunChange::Payload => ("known extra mass", 1e3, " g"),
+        RunChange::Start => ("start shifted along the canal by", 1e3, " mm"),
+        RunChange::Cycles => ("gait cycles", 1.0, ""),
+        RunChange::Dwell => ("rest between the cycles", 1.0, " s"),
     };
     let value = value * factor;
     let value = match value.fract() {

@@ -3,7 +3,7 @@
 use super::effects::names;
 use super::gap::{FLOOR, StageView, stage_of, stages};
 use super::quantity::{ParameterView, cells, clause, formula, library_sentence};
-use crate::explain::answer::{NamedEffect, RunSummary, Stage, answers_in_words};
+use crate::explain::answer::{NamedEffect, RunSummary, Stage, StageKind, answers_in_words};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::{Text, Tile, TileRow};
 use crate::report::plot::cell_colours;
@@ -194,13 +194,16 @@ fn foot(answer: &Answer, effect: &NamedEffect) -> Vec<Vec<Text>> {
 fn gap(answer: &Answer) -> Option<TileRow> {
     let floor = stage_of(answer, FLOOR.key).map(|stage| (FLOOR, stage));
     let shown = stages(answer).into_iter().chain(floor).filter(|(view, stage)| {
-        let is_shown = matches!(view.key, "baseline" | "recalibrated" | "named" | "floor");
+        let is_shown = matches!(
+            view.key,
+            StageKind::Baseline | StageKind::Recalibrated | StageKind::Named | StageKind::Floor
+        );
         is_shown && (!answer.is_by_advances() || stage.held_out_rms_m.is_finite())
     });
     let tile = |(view, stage): (StageView, &Stage)| {
         let how = match view.key {
-            "recalibrated" => "within the priors",
-            "floor" => view.meaning,
+            StageKind::Recalibrated => "within the priors",
+            StageKind::Floor => view.meaning,
             _ => "",
         };
         Tile::new(view.name, fixed(stage.held_out_rms_m * 1e3, 3), "mm", how)

@@ -1,6 +1,6 @@
 //! The energy chart's false alarms and power, over many charts, each calibrated on three values.
 
-use super::super::cusum::PageChart;
+use super::super::cusum::CusumChart;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -16,7 +16,7 @@ fn three_values_of_calibration_give_no_false_alarm_in_thousands() {
     for scatter in [0.005, 0.01, 0.03, 0.05] {
         let mut alarms = 0;
         for _ in 0..200 {
-            let mut chart = PageChart::new(0.2, 3);
+            let mut chart = CusumChart::new(0.2, 3);
             let told = (0..2000).any(|_| {
                 let value = scattered(&mut random, 1.5, scatter);
                 chart.add(value, 0.0, 0.0, 0).is_some_and(|level| level.beyond)
@@ -34,7 +34,7 @@ fn the_configured_shift_is_told_within_few_cycles() {
     for (scatter, shift, max) in [(0.01, 1.2, 3.5), (0.03, 1.2, 5.0), (0.01, 1.4, 2.5), (0.03, 1.4, 2.5)] {
         let mut cycles = 0;
         for _ in 0..500 {
-            let mut chart = PageChart::new(0.2, 3);
+            let mut chart = CusumChart::new(0.2, 3);
             for _ in 0..15 {
                 chart.add(scattered(&mut random, 1.0, scatter), 0.0, 0.0, 0);
             }
@@ -55,7 +55,7 @@ fn the_configured_shift_is_told_within_few_cycles() {
 #[test]
 fn one_outlier_is_no_shift() {
     for outlier_at in 0..20 {
-        let mut chart = PageChart::new(0.2, 3);
+        let mut chart = CusumChart::new(0.2, 3);
         for index in 0..40 {
             let value = if index == outlier_at {
                 9.0
@@ -68,6 +68,6 @@ fn one_outlier_is_no_shift() {
                 "outlier at {outlier_at}, alarm at {index}"
             );
         }
-        assert!(chart.can_tell());
+        assert!(chart.is_calibrated());
     }
 }

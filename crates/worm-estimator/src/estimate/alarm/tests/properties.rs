@@ -1,6 +1,6 @@
 //! Whatever comes in, the watch holds its promises.
 
-use super::super::{Observation, Watch};
+use super::super::{AlarmMonitor, Observation};
 use super::worm::{Bench, blank_cycle, blank_estimate};
 use crate::config::{Battery, Config};
 use crate::message::{AlarmKind, State};
@@ -40,7 +40,7 @@ proptest! {
         config.battery = Some(Battery {
             capacity_j: 100.0, full_v: 5.6, empty_v: 4.0, internal_resistance_ohm: 0.2, hotel_power_w: 0.5, reserve_share: 0.1,
         });
-        let mut watch = Watch::new(&config);
+        let mut watch = AlarmMonitor::new(&config);
         let mut state = State::unknown(cells);
         let (mut numbered, mut mask) = (0, 0);
         for (numbers, codes, time_ns, count, sampled, ended) in ticks {

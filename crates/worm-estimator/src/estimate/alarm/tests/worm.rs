@@ -1,6 +1,6 @@
 //! A worm for tests: its kinematics as closed forms, its motor as a first-order lag, its faults as switches.
 
-use super::super::{Observation, Watch};
+use super::super::{AlarmMonitor, Observation};
 use crate::config::Config;
 use crate::message::{Alarm, AlarmKind, Cycle, Estimate, Fault, Mode, State};
 use rand::{RngExt, SeedableRng};
@@ -67,7 +67,7 @@ impl Trouble {
 /// The worm and the watch that watches it.
 pub struct Bench {
     pub config: Config,
-    pub watch: Watch,
+    pub watch: AlarmMonitor,
     pub state: State,
     pub trouble: Trouble,
     /// Standard deviation of a filtered position, m.
@@ -104,7 +104,7 @@ impl Bench {
         state.phase = 0.0;
         state.time_ns = 5_000_000_000;
         Self {
-            watch: Watch::new(&config),
+            watch: AlarmMonitor::new(&config),
             trouble: Trouble::none(),
             noise_m: 5e-5,
             scatter: 0.01,

@@ -1,0 +1,34 @@
+//! What a model predicts for recordings, without any search.
+
+use super::error::ExplainError;
+use super::hypothesis::Hypothesis;
+use super::predict::Scene;
+use super::search::prepare;
+use crate::experiment::RecordedRun;
+use worm_estimator::config::Config;
+
+/// The configured worm, ready to predict the positions in recordings of it.
+pub struct Prediction<'a> {
+    scene: Scene<'a>,
+    nominal: Hypothesis,
+}
+
+impl<'a> Prediction<'a> {
+    /// Prepares one prediction for each run: finds the gait, and where each recording begins.
+    ///
+    /// # Errors
+    /// [`ExplainError`] where there is no run, or a recording is not of the configured worm.
+    pub fn new(runs: &[RecordedRun<'a>], config: &Config) -> Result<Self, ExplainError> {
+        Ok(Self {
+            scene: prepare(runs, config)?,
+            nominal: Hypothesis::default(),
+        })
+    }
+
+    /// Predicted positions of a run, m: cell by cell for each sample, one sample after the other. None where the configured
+    /// worm cannot hold itself on the slope of the run.
+    pub fn positions_m(&self, run: usize) -> Option<Vec<f64>> {
+        let predicted = self.scene.predict(run, &self.nominal, &[])?;
+        Some(predicted.position_m)
+    }
+}

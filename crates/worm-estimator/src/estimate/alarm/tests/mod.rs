@@ -1,7 +1,0 @@
-//! The alarms against a simulated worm in virtual time: every fault is told, nothing else is.
-
-mod charts;
-mod faults;
-mod properties;
-mod quiet;
-mod worm;

@@ -1,0 +1,66 @@
+//! Why an effect cannot be switched on.
+
+use thiserror::Error;
+
+/// Why an effect cannot be switched on as requested.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SettingError {
+    /// No such effect.
+    #[error("there is no effect `{name}`{}: the library has {names}", suggestion(*nearest))]
+    Unknown {
+        /// The name given.
+        name: String,
+        /// The effect whose name is nearest, where one is near.
+        nearest: Option<&'static str>,
+        /// All names there are.
+        names: String,
+    },
+    /// No such parameter.
+    #[error("effect `{effect}` has no parameter `{parameter}`: it has {names}")]
+    NoParameter {
+        /// The effect.
+        effect: &'static str,
+        /// The one given.
+        parameter: String,
+        /// All names there are.
+        names: String,
+    },
+    /// A parameter that was left out.
+    #[error("effect `{effect}` needs `{parameter}`: {about}")]
+    Missing {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+        /// What it is.
+        about: &'static str,
+    },
+    /// A value out of its range.
+    #[error("effect `{effect}`: {parameter} = {value}: must be from {min} to {max} {unit}")]
+    OutOfRange {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+        /// The one given.
+        value: f64,
+        /// Smallest value.
+        min: f64,
+        /// Largest value.
+        max: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A cell too many, too few, or one that the worm does not have.
+    #[error("effect `{effect}`: {problem}")]
+    Cell {
+        /// The effect.
+        effect: &'static str,
+        /// What is wrong and what to do.
+        problem: String,
+    },
+}
+
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest.map_or_else(String::new, |nearest| format!(" (did you mean `{nearest}`?)"))
+}

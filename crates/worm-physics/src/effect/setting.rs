@@ -1,0 +1,146 @@
+//! Effects switched on, and added to a worm.
+
+use super::definition::{Effect, MAX_PARAMETERS};
+use super::error::SettingError;
+use super::library::named;
+use crate::physics::Physics;
+use std::collections::BTreeMap;
+
+/// An effect switched on.
+#[derive(Debug, Clone, Copy)]
+pub struct Setting {
+    effect: &'static Effect,
+    cell: Option<usize>,
+    values: [f64; MAX_PARAMETERS], // the first `parameters.len()` count
+}
+
+impl PartialEq for Setting {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect.name == other.effect.name && self.cell == other.cell && self.values() == other.values()
+    }
+}
+
+impl Setting {
+    /// An effect with values in the order of its parameters, on one cell (from 0) of a worm of `cells` where it concerns a single one.
+    ///
+    /// # Errors
+    /// [`SettingError`].
+    ///
+    /// # Panics
+    /// When there is not one value for each parameter.
+    pub fn new(
+        effect: &'static Effect,
+        cell: Option<usize>,
+        values: &[f64],
+        cells: usize,
+    ) -> Result<Self, SettingError> {
+        assert_eq!(values.len(), effect.parameters.len(), "one value for each parameter");
+        effect.check_cell(cell, cells)?;
+        for (parameter, &value) in effect.parameters.iter().zip(values) {
+            if !(parameter.min..=parameter.max).contains(&value) {
+                return Err(SettingError::OutOfRange {
+                    effect: effect.name,
+                    parameter: parameter.name,
+                    value,
+                    min: parameter.min,
+                    max: parameter.max,
+                    unit: parameter.unit,
+                });
+            }
+        }
+        Ok(Self::within(effect, cell, values))
+    }
+
+    /// An effect by names, as files and the command line give it; `cell` counts from 0.
+    ///
+    /// # Errors
+    /// [`SettingError`].
+    pub fn by_names(
+        name: &str,
+        cell: Option<usize>,
+        parameters: &BTreeMap<String, f64>,
+        cells: usize,
+    ) -> Result<Self, SettingError> {
+        let effect = named(name)?;
+        let known = |given: &str| effect.parameters.iter().any(|parameter| parameter.name == given);
+        if let Some(unknown) = parameters.keys().find(|given| !known(given)) {
+            let names: Vec<&str> = effect.parameters.iter().map(|parameter| parameter.name).collect();
+            return Err(SettingError::NoParameter {
+                effect: effect.name,
+                parameter: unknown.clone(),
+                names: names.join(", "),
+            });
+        }
+        let mut values = Vec::with_capacity(effect.parameters.len());
+        for parameter in effect.parameters {
+            let value = parameters.get(parameter.name).ok_or(SettingError::Missing {
+                effect: effect.name,
+                parameter: parameter.name,
+                about: parameter.about,
+            })?;
+            values.push(*value);
+        }
+        Self::new(effect, cell, &values, cells)
+    }
+
+    /// An effect with its values clamped to their ranges.
+    pub fn within(effect: &'static Effect, cell: Option<usize>, values: &[f64]) -> Self {
+        let mut kept = [0.0; MAX_PARAMETERS];
+        for ((kept, parameter), value) in kept.iter_mut().zip(effect.parameters).zip(values) {
+            *kept = value.clamp(parameter.min, parameter.max);
+        }
+        Self {
+            effect,
+            cell,
+            values: kept,
+        }
+    }
+
+    /// Checks that a worm of `cells` has the cell it acts on.
+    ///
+    /// # Errors
+    /// [`SettingError::Cell`].
+    pub fn check_cells(&self, cells: usize) -> Result<(), SettingError> {
+        self.effect.check_cell(self.cell, cells)
+    }
+
+    /// The effect.
+    pub fn effect(&self) -> &'static Effect {
+        self.effect
+    }
+
+    /// The cell it acts on, from 0, where it acts on one alone.
+    pub fn cell(&self) -> Option<usize> {
+        self.cell
+    }
+
+    /// The values, in the order of the effect's parameters.
+    pub fn values(&self) -> &[f64] {
+        &self.values[..self.effect.parameters.len()]
+    }
+
+    fn apply(&self, physics: &mut Physics) {
+        (self.effect.apply)(physics, self.cell, self.values());
+    }
+}
+
+impl Physics {
+    /// These physics with effects; their order does not matter.
+    pub fn with<'a>(mut self, effects: impl IntoIterator<Item = &'a Setting>) -> Self {
+        for effect in effects {
+            effect.apply(&mut self);
+        }
+        self
+    }
+
+    /// These physics with effects, on a worm whose bounds, mass and stroke were identified from positions. The identified values
+    /// include what effects do to them, so effects leave them as they are.
+    pub fn found_with<'a>(self, effects: impl IntoIterator<Item = &'a Setting>) -> Self {
+        let identified = self.worm.clone();
+        let mut physics = self.with(effects);
+        physics.worm.keep_found(&identified);
+        physics.slope_clamping = 0.0;
+        physics.view.scale = 1.0;
+        physics
+    }
+}

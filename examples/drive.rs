@@ -1,0 +1,75 @@
+//! Commands a running worm: arms it, lets it crawl five centimetres or for a minute, whichever comes first, and stops it.
+//!
+//! ```sh
+//! cargo run --release -- virtual-worm --link /tmp/worm-port &
+//! cargo run --release -- control --port /tmp/worm-port &
+//! cargo run --release -- estimate --port /tmp/worm-port &
+//! cargo run --release --example drive
+//! ```
+//!
+//! A command is a request with an answer: what the controller refuses, it refuses with a reason. Whatever happens to this
+//! program, the controller keeps its own safety rules.
+
+use std::error::Error;
+use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Command, CommandKind, CommandOutcome, Cycle, Fault, Mode};
+use wormd::topics::{CommandClient, Hub, Instance};
+
+const DISTANCE_M: f64 = 0.05;
+const LONGEST: Duration = Duration::from_secs(60);
+/// How long the controller may take to answer; it does so in its next tick.
+const ANSWER_TIME: Duration = Duration::from_secs(1);
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut config = Config::default();
+    if let Some(name) = std::env::args().nth(1) {
+        config.worm.name = name;
+    }
+    let hub = Hub::open(&Instance::of(&config)?)?;
+    let client = hub.command_client()?;
+    let mut cycles = hub.subscriber::<Cycle>()?;
+
+    command(&client, CommandKind::Arm, 0.0)?;
+    command(&client, CommandKind::Crawl, 0.4)?; // gait cycles per second
+    let result = follow(&mut cycles);
+    // Stop first, then say what went wrong.
+    command(&client, CommandKind::Stop, 0.0)?;
+    result
+}
+
+/// Adds up the advance of each cycle.
+fn follow(cycles: &mut wormd::topics::Subscriber<Cycle>) -> Result<(), Box<dyn Error>> {
+    let begin = Instant::now();
+    let mut travelled_m = 0.0;
+    while travelled_m < DISTANCE_M && begin.elapsed() < LONGEST {
+        while let Some(cycle) = cycles.next()? {
+            if cycle.advance_m.is_finite() {
+                travelled_m += cycle.advance_m;
+            }
+            println!("cycle {}: {:.0} mm so far", cycle.index, 1e3 * travelled_m);
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    Ok(())
+}
+
+/// Sends one command and expects that it is accepted.
+fn command(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Result<(), Box<dyn Error>> {
+    let request = Command {
+        cycles_per_s,
+        kind: kind.code(),
+        reserved: 0,
+    };
+    let reply = client.call(request, ANSWER_TIME)?;
+    match CommandOutcome::try_from(reply.verdict)? {
+        CommandOutcome::Accepted => {
+            println!("{kind} accepted");
+            Ok(())
+        }
+        refused => {
+            let (mode, fault) = (Mode::try_from(reply.mode)?, Fault::try_from(reply.fault)?);
+            Err(format!("{kind} refused: {refused} (mode {mode}, fault {fault})").into())
+        }
+    }
+}

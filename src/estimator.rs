@@ -1,0 +1,98 @@
+//! The estimator process: feeds every state to the pure [`Observer`] and publishes what it finds.
+
+use crate::failure::Failure;
+use crate::realtime::{self, Grant};
+use crate::topics::{Estimator, Hub, Notifier, PortError, PublishError, Publisher, RoleLock};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::estimate::{Observer, ObserverOutput};
+use worm_estimator::message::{Alarm, Cycle, Estimate, State};
+
+/// Longest sleep without an event from the controller; should an event get lost, its state is read this much later.
+const MAX_SLEEP: Duration = Duration::from_millis(10);
+
+/// Interval at which the last estimate is published again while no state comes, so that the controller knows it is alive.
+const HEARTBEAT: Duration = Duration::from_millis(50);
+
+/// The estimator's priority lies this far below the loop's: above ordinary processes, and never in the loop's way.
+pub(crate) const PRIORITY_BELOW_LOOP: u8 = 20;
+
+/// Estimates until `end` is set: sleeps until the controller's event, reads every new state, publishes the results.
+/// Calls `ready` once it listens, and `on_state` for each state as soon as it was read.
+///
+/// # Errors
+/// [`Failure::Unusable`] for a configuration that cannot be used; [`Failure::Failed`] when the topics fail.
+pub(crate) fn run(
+    config: &Config,
+    hub: &Hub,
+    role: &RoleLock<Estimator>,
+    end: &AtomicBool,
+    ready: impl FnOnce(&[Grant]),
+    mut on_state: impl FnMut(&State),
+) -> Result<(), Failure> {
+    let mut observer = Observer::new(config).map_err(Failure::unusable)?;
+    let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
+    let state_event = hub.listener::<State>().map_err(Failure::failed)?;
+    let mut output = OutputTopics::open(hub, role).map_err(Failure::failed)?;
+    ready(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
+    while !end.load(Ordering::Relaxed) {
+        state_event.wait(MAX_SLEEP).map_err(Failure::failed)?;
+        while let Some(state) = states.next().map_err(Failure::failed)? {
+            on_state(&state);
+            output.publish(&observer.update(&state)).map_err(Failure::failed)?;
+        }
+        if output.last_published.elapsed() >= HEARTBEAT {
+            output.publish_heartbeat(&observer.latest()).map_err(Failure::failed)?;
+        }
+    }
+    Ok(())
+}
+
+/// The topics that the estimator writes.
+struct OutputTopics {
+    estimate: Publisher<Estimate>,
+    cycle: Publisher<Cycle>,
+    alarm: Publisher<Alarm>,
+    alarm_event: Notifier<Alarm>,
+    /// When an estimate was last published.
+    last_published: Instant,
+}
+
+impl OutputTopics {
+    fn open(hub: &Hub, role: &RoleLock<Estimator>) -> Result<Self, PortError> {
+        Ok(Self {
+            estimate: hub.publisher(role)?,
+            cycle: hub.publisher(role)?,
+            alarm: hub.publisher(role)?,
+            alarm_event: hub.notifier(role)?,
+            last_published: Instant::now(),
+        })
+    }
+
+    fn publish(&mut self, found: &ObserverOutput) -> Result<(), PublishError> {
+        for alarm in found.alarms.iter() {
+            self.alarm.publish(alarm)?;
+        }
+        if !found.alarms.is_empty() {
+            // A lack of listeners is not the estimator's problem.
+            let _ = self.alarm_event.notify();
+        }
+        if let Some(estimate) = &found.estimate {
+            self.estimate.publish(estimate)?;
+            self.last_published = Instant::now();
+        }
+        if let Some(cycle) = &found.cycle {
+            self.cycle.publish(cycle)?;
+        }
+        Ok(())
+    }
+
+    /// Shows that the estimator is alive, and delivers the last values of the rarely written topics to late joiners.
+    fn publish_heartbeat(&mut self, latest: &Estimate) -> Result<(), PublishError> {
+        self.estimate.publish(latest)?;
+        self.last_published = Instant::now();
+        self.cycle.idle()?;
+        self.alarm.idle()
+    }
+}

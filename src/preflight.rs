@@ -1,0 +1,210 @@
+//! The checks of `wormd check`: what keeps this worm from running on this computer with this configuration, and the remedies.
+
+use crate::control::{Drive, link_settings};
+use crate::realtime::machine::{self, Setting};
+use crate::realtime::{self, InForce};
+use crate::topics::{Hub, Instance};
+use serde::Serialize;
+use std::path::Path;
+use worm_estimator::config::{Config, Realtime};
+
+/// How much a finding matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Level {
+    /// As it should be.
+    Good,
+    /// The worm runs, but not as well as it could.
+    Warning,
+    /// The worm does not run.
+    Error,
+}
+
+/// The result of one check.
+#[derive(Debug, Serialize)]
+pub(crate) struct CheckItem {
+    /// How much it matters.
+    pub level: Level,
+    /// What was checked.
+    pub subject: &'static str,
+    /// What was found.
+    pub found: String,
+    /// What to do about it; null where nothing needs doing.
+    pub remedy: Option<String>,
+}
+
+impl From<Setting> for CheckItem {
+    fn from(setting: Setting) -> Self {
+        Self {
+            level: if setting.good { Level::Good } else { Level::Warning },
+            subject: setting.subject,
+            found: setting.found,
+            remedy: setting.remedy,
+        }
+    }
+}
+
+/// All results, as `wormd check --json` prints them.
+#[derive(Debug, Serialize)]
+pub(crate) struct CheckReport {
+    worm: String,
+    /// In the order of the checks.
+    pub findings: Vec<CheckItem>,
+}
+
+impl CheckReport {
+    /// Runs all checks. `source` says where the configuration comes from.
+    pub(crate) fn new(config: &Config, source: &str) -> Self {
+        let mut report = Self {
+            worm: config.worm.name.clone(),
+            findings: Vec::new(),
+        };
+        check_config(source, config, &mut report);
+        check_realtime(&config.realtime, &mut report);
+        for setting in machine::settings(config.realtime.cpu) {
+            report.findings.push(setting.into());
+        }
+        check_topics(config, &mut report);
+        check_port(config, &mut report);
+        report
+    }
+
+    /// How many findings keep the worm from running.
+    pub(crate) fn errors(&self) -> usize {
+        let errors = self.findings.iter().filter(|finding| finding.level == Level::Error);
+        errors.count()
+    }
+
+    fn good(&mut self, subject: &'static str, found: impl Into<String>) {
+        self.findings.push(CheckItem {
+            level: Level::Good,
+            subject,
+            found: found.into(),
+            remedy: None,
+        });
+    }
+
+    fn note(&mut self, level: Level, subject: &'static str, found: impl Into<String>, remedy: impl Into<String>) {
+        self.findings.push(CheckItem {
+            level,
+            subject,
+            found: found.into(),
+            remedy: Some(remedy.into()),
+        });
+    }
+}
+
+fn check_config(source: &str, config: &Config, report: &mut CheckReport) {
+    report.good(
+        "configuration",
+        format!("{source}: {} cells, {} Hz", config.worm.cells, config.control.rate_hz),
+    );
+    for advice in config.advice() {
+        report.note(Level::Warning, "configuration", advice.key, advice.text);
+    }
+}
+
+/// Requests what the loop would request, in a thread that ends at once, and reads back what that thread got.
+fn check_realtime(wanted: &Realtime, report: &mut CheckReport) {
+    let trial = {
+        let wanted = wanted.clone();
+        move || (realtime::request(&wanted, 0), InForce::of_this_thread())
+    };
+    let Ok((grants, in_force)) = std::thread::spawn(trial).join() else {
+        report.note(
+            Level::Error,
+            "scheduler",
+            "the trial thread failed",
+            "report this as a defect of wormd",
+        );
+        return;
+    };
+    for grant in grants {
+        match grant.refusal {
+            None => report.good("operating system", grant.request),
+            Some(refusal) => report.note(
+                Level::Warning,
+                "operating system",
+                format!("{} refused: {}", grant.request, refusal.reason),
+                refusal.remedy,
+            ),
+        }
+    }
+    match in_force {
+        Ok(in_force) => {
+            let shortfalls = in_force.shortfalls(wanted, 0);
+            if shortfalls.is_empty() {
+                report.good("in force", in_force.to_string());
+            } else {
+                report.note(
+                    Level::Warning,
+                    "in force",
+                    in_force.to_string(),
+                    format!("less than configured: {}", shortfalls.join("; ")),
+                );
+            }
+        }
+        Err(error) => report.note(
+            Level::Warning,
+            "in force",
+            format!("cannot be read back: {error}"),
+            "mount /proc, so that wormd can read what the kernel really grants",
+        ),
+    }
+}
+
+fn check_topics(config: &Config, report: &mut CheckReport) {
+    let root = Path::new(&config.topics.root);
+    // What every process of the worm does first. It does not disturb a running worm.
+    let opened = Instance::of(config)
+        .map_err(|error| error.to_string())
+        .and_then(|instance| Hub::open(&instance).map_err(|error| error.to_string()));
+    match opened {
+        Ok(_) => report.good(
+            "topics",
+            format!("those of {} open in {}", config.worm.name, root.display()),
+        ),
+        // The error's text includes the remedy.
+        Err(error) => report.note(Level::Error, "topics", "cannot be used", error),
+    }
+    match nix::sys::statfs::statfs(root) {
+        Ok(stat) if stat.filesystem_type() == nix::sys::statfs::TMPFS_MAGIC => report.good("topics", "on a tmpfs"),
+        Ok(_) => report.note(
+            Level::Warning,
+            "topics",
+            "not on a tmpfs",
+            "start-up waits for the disk; /dev/shm/… is faster",
+        ),
+        Err(_) => {}
+    }
+}
+
+fn check_port(config: &Config, report: &mut CheckReport) {
+    let Some(port) = &config.port else {
+        report.good("port", "none configured: the virtual worm is used");
+        return;
+    };
+    let opened = link_settings(config, port.baud).and_then(|settings| Drive::open(Path::new(&port.path), settings));
+    match opened {
+        Ok((_drive, prepared, findings)) => {
+            report.good(
+                "port",
+                format!(
+                    "{} at {} baud: servo model {} (firmware {}), tracker with {} cells, read by {:?}",
+                    port.path,
+                    port.baud,
+                    prepared.servo.model,
+                    prepared.servo.firmware,
+                    prepared.tracker_cells,
+                    prepared.plan.read
+                ),
+            );
+            for finding in findings {
+                let level = if finding.corrected { Level::Good } else { Level::Warning };
+                report.note(level, "port", finding.what, finding.remedy);
+            }
+        }
+        // The error's text includes the remedy.
+        Err(error) => report.note(Level::Error, "port", "cannot be used", error.to_string()),
+    }
+}

@@ -1,0 +1,175 @@
+//! The recorder process: the topics of a worm into a log.
+//!
+//! An ordinary subscriber at ordinary priority, which the loop does not notice. One thread reads the topics before they
+//! overwrite their oldest messages, another ([`LogWriter`]) writes the file, so that a slow disk delays the log and not the
+//! reading.
+
+mod log_writer;
+
+use crate::failure::Failure;
+use crate::topics::{Hub, Instance, Subscriber, Topic};
+use log_writer::{Batch, LogWriter};
+use nix::time::{ClockId, clock_gettime};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
+use worm_log::{Channel, Logged, Origin};
+
+/// How often the topics are emptied. At 1 kHz even the fullest holds a second.
+pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(20);
+
+/// The topics of a worm on their way into a log.
+pub(crate) struct Recorder {
+    topics: RecordedTopics,
+    writer: LogWriter,
+}
+
+/// What one poll of the topics read.
+pub(crate) struct Polled {
+    /// How many messages.
+    pub messages: usize,
+    /// The newest state among them.
+    #[cfg_attr(
+        not(feature = "analysis"),
+        expect(dead_code, reason = "only `explain --live` reads it")
+    )]
+    pub state: Option<State>,
+}
+
+impl Recorder {
+    /// Begins a log that carries the configuration's text; `force` overwrites an existing file.
+    ///
+    /// # Errors
+    /// [`Failure::Unusable`] for a worm or file that cannot be used; [`Failure::Failed`] when the topics fail.
+    pub(crate) fn open(
+        config: &Config,
+        text: Option<String>,
+        topics: &[Channel],
+        out: &Path,
+        force: bool,
+    ) -> Result<Self, Failure> {
+        let instance = Instance::of(config).map_err(Failure::unusable)?;
+        let now = clock_gettime(ClockId::CLOCK_MONOTONIC).map_err(Failure::failed)?;
+        let origin = Origin {
+            worm: config.worm.name.clone(),
+            cells: config.worm.cells,
+            config: text,
+            begun: SystemTime::now(),
+            begun_ns: Duration::from(now).as_nanos() as u64,
+        };
+        Ok(Self {
+            topics: RecordedTopics::open(&instance, topics)?,
+            writer: LogWriter::open(out, force, &origin)?,
+        })
+    }
+
+    /// Records until `end` is set, or until `duration` has passed since the first message.
+    ///
+    /// # Errors
+    /// As [`poll`](Self::poll).
+    pub(crate) fn run(&mut self, duration: Option<Duration>, end: &AtomicBool) -> Result<(), Failure> {
+        let mut first_message: Option<Instant> = None;
+        let is_over = |first: Instant| duration.is_some_and(|duration| first.elapsed() >= duration);
+        while !first_message.is_some_and(is_over) && !end.load(Ordering::Relaxed) {
+            std::thread::sleep(POLL_INTERVAL);
+            if self.poll()?.messages > 0 {
+                first_message.get_or_insert_with(Instant::now);
+            }
+        }
+        // What came before the signal to end belongs in the log.
+        self.poll().map(|_| ())
+    }
+
+    /// Reads what is new and queues it for writing. The topics hold at least a second of messages.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when the topics fail or the log cannot be written.
+    pub(crate) fn poll(&mut self) -> Result<Polled, Failure> {
+        let batch = self.topics.read()?;
+        let polled = Polled {
+            messages: batch.len(),
+            state: batch.states.last().copied(),
+        };
+        if polled.messages > 0 {
+            self.writer.write(batch)?;
+        }
+        Ok(polled)
+    }
+
+    /// Finishes the log and returns a summary of what is in it.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when the file could not be completed; what was written until then can be read.
+    pub(crate) fn close(self) -> Result<String, Failure> {
+        let counts = self.writer.close()?;
+        let counts = counts.iter().map(|&(channel, count)| {
+            let lost = match self.topics.lost(channel) {
+                Some(lost) => format!(" ({lost} lost)"),
+                None => String::new(),
+            };
+            format!("{} {count}{lost}", channel.name())
+        });
+        Ok(format!("recorded: {}", counts.collect::<Vec<_>>().join(", ")))
+    }
+}
+
+/// A topic, if it is recorded.
+type Recorded<T> = Option<Subscriber<T>>;
+
+/// The topics that are recorded.
+struct RecordedTopics {
+    state: Recorded<State>,
+    timing: Recorded<Timing>,
+    estimate: Recorded<Estimate>,
+    cycle: Recorded<Cycle>,
+    alarm: Recorded<Alarm>,
+}
+
+impl RecordedTopics {
+    fn open(instance: &Instance, topics: &[Channel]) -> Result<Self, Failure> {
+        fn subscribe<T: Topic + Logged>(hub: &Hub, topics: &[Channel]) -> Result<Recorded<T>, Failure> {
+            let is_wanted = topics.contains(&T::CHANNEL);
+            is_wanted.then(|| hub.subscriber()).transpose().map_err(Failure::failed)
+        }
+        let hub = Hub::open(instance).map_err(Failure::failed)?;
+        Ok(Self {
+            state: subscribe(&hub, topics)?,
+            timing: subscribe(&hub, topics)?,
+            estimate: subscribe(&hub, topics)?,
+            cycle: subscribe(&hub, topics)?,
+            alarm: subscribe(&hub, topics)?,
+        })
+    }
+
+    fn read(&mut self) -> Result<Batch, Failure> {
+        fn take<T: Topic>(topic: &mut Recorded<T>) -> Result<Vec<T>, Failure> {
+            let mut messages = Vec::new();
+            if let Some(subscriber) = topic {
+                while let Some(message) = subscriber.next().map_err(Failure::failed)? {
+                    messages.push(*message);
+                }
+            }
+            Ok(messages)
+        }
+        Ok(Batch {
+            states: take(&mut self.state)?,
+            timings: take(&mut self.timing)?,
+            estimates: take(&mut self.estimate)?,
+            cycles: take(&mut self.cycle)?,
+            alarms: take(&mut self.alarm)?,
+        })
+    }
+
+    /// How many messages of a topic were lost; none for a topic that is not recorded, or whose messages are not numbered.
+    fn lost(&self, channel: Channel) -> Option<u64> {
+        match channel {
+            Channel::State => self.state.as_ref().map(Subscriber::lost),
+            Channel::Timing => self.timing.as_ref().map(Subscriber::lost),
+            Channel::Estimate => None,
+            Channel::Cycle => self.cycle.as_ref().map(Subscriber::lost),
+            Channel::Alarm => self.alarm.as_ref().map(Subscriber::lost),
+        }
+    }
+}
