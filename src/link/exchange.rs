@@ -65,6 +65,18 @@ impl ExchangePlan {
             tracker::block_span(self.tracker, self.cells),
         ]
     }
+
+    /// Bytes of an answer of the servo; of the whole reply where both devices answer in one.
+    fn answer_len(&self) -> u64 {
+        const STATUS_OVERHEAD: u64 = 11; // header, ID, length, instruction, error, CRC
+        const FAST_HEADER: u64 = 8;
+        const SEGMENT_OVERHEAD: u64 = 4; // error, ID, CRC
+        let [servo, tracker] = self.spans().map(|span| u64::from(span.length));
+        match self.read {
+            ReadPlan::FastBulk => FAST_HEADER + servo + tracker + 2 * SEGMENT_OVERHEAD,
+            ReadPlan::Bulk | ReadPlan::Separate => STATUS_OVERHEAD + servo,
+        }
+    }
 }
 
 /// What an exchange brought.
@@ -257,7 +269,6 @@ impl<P: Port> WormBus<P> {
                 Packet::Instruction(_) => {}
             });
         }
-        let lost = self.count_lost(late.servo_answers);
         let mut harvest = Answers::NOTHING;
         let end = match plan.read {
             ReadPlan::FastBulk | ReadPlan::Bulk => {
@@ -270,12 +281,18 @@ impl<P: Port> WormBus<P> {
             harvest.fail(plan, plan.servo, failure);
             harvest.fail(plan, plan.tracker, failure);
         }
+        // An answer may come between the look for late ones and the request, which throws away what is on the line.
+        let stale_bytes = self.bus.counters().stale_bytes - before.stale_bytes;
+        let late_answers = late.servo_answers.max((stale_bytes / plan.answer_len()) as u32);
+        // With separate reads, the request to the tracker throws away what the servo answers after its half of the time.
+        let discarded = late_answers.saturating_sub(self.answers_owed);
+        let lost = self.count_lost(late_answers);
         let counters = self.bus.counters_mut();
         for failure in [harvest.servo.err(), harvest.tracker.err()] {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
         }
         self.exchange_counters.partial_answers += u64::from(harvest.servo.is_ok() != harvest.tracker.is_ok());
-        self.answers_owed = (self.answers_owed + 1).saturating_sub(harvest.servo_answers);
+        self.answers_owed = (self.answers_owed + 1).saturating_sub(harvest.servo_answers + discarded);
         self.was_answered = harvest.servo_answers > 0;
         let received_bytes = (counters.received_bytes - before.received_bytes) as u32;
         self.silent_in_a_row = if received_bytes == 0 {

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::time::{Duration, Instant};
 
 use wormd::link::servo::{register, scale};
-use wormd::link::{ExchangePlan, FaultInjector, Faults, ReadPlan, WormBus};
+use wormd::link::{ExchangePlan, FaultInjector, Faults, Port, PortError, ReadPlan, WormBus};
 
 use super::worm::{SERVO, TRACKER, Worm, id};
 
@@ -187,6 +187,54 @@ fn a_late_answer_stands_in_for_the_next_one_and_is_none_that_was_lost() {
         (counters.stale_bytes, bus.exchange_counters().late_answers),
         (5 * 96, 4)
     );
+}
+
+/// A port on which the answer to the first exchange arrives just before the second request, which discards it.
+struct JustTooLate {
+    worm: Worm,
+    is_late: bool,
+}
+
+impl Port for JustTooLate {
+    fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), PortError> {
+        self.worm.send(bytes, deadline)
+    }
+
+    fn receive(&mut self, into: &mut [u8], deadline: Instant) -> Result<usize, PortError> {
+        if self.is_late {
+            Ok(0)
+        } else {
+            self.worm.receive(into, deadline)
+        }
+    }
+
+    fn discard_input(&mut self) -> Result<usize, PortError> {
+        let discarded = self.worm.discard_input()?;
+        self.is_late &= discarded == 0;
+        Ok(discarded)
+    }
+
+    fn set_baud_rate(&mut self, baud: u32) -> Result<(), PortError> {
+        self.worm.set_baud_rate(baud)
+    }
+}
+
+#[test]
+fn an_answer_that_the_next_request_discards_is_not_lost() {
+    for read in [ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate] {
+        let mut worm = Worm::new(5);
+        worm.set_servo(register::STATUS_RETURN_LEVEL, 1);
+        let mut bus = WormBus::new(JustTooLate { worm, is_late: true });
+        bus.set_writes_are_answered(false);
+        let outcomes: Vec<(bool, u32)> = (0..4)
+            .map(|_| {
+                let wait = Instant::now() + Duration::from_millis(2);
+                let outcome = bus.exchange(&plan(read), 1.0, wait);
+                (outcome.is_complete(), outcome.lost)
+            })
+            .collect();
+        assert_eq!(outcomes, [(false, 0), (true, 0), (true, 0), (true, 0)], "{read:?}");
+    }
 }
 
 #[test]
