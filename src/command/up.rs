@@ -104,7 +104,7 @@ fn fault_in_words(telemetry: &Telemetry) -> String {
             "{fault}: the computer did not run the controller for {:.0} ms, longer than the servo's bus watchdog waits; \
              `wormd check` says what keeps the computer from pausing, servo.watchdog_ms allows longer pauses, and \
              control.resume_after_pause crawls on after one",
-            telemetry.account.host_pauses.newest_s * 1e3
+            telemetry.tick_stats.host_pauses.newest_s * 1e3
         ),
         _ => fault.to_string(),
     }

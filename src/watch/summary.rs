@@ -145,7 +145,7 @@ impl Summary {
         let fault = state
             .and_then(|state| Fault::try_from(state.fault).ok())
             .unwrap_or(Fault::None);
-        let account = &telemetry.account;
+        let tick_stats = &telemetry.tick_stats;
         Self {
             worm: worm.name.clone(),
             duration_s: state.map_or(0.0, |state| seconds_since(start_ns, state.time_ns)),
@@ -159,18 +159,18 @@ impl Summary {
             cycles: telemetry.cycles.iter().map(CycleSummary::new).collect(),
             alarms: alarm_summaries(&telemetry.alarms, start_ns, &worm.step_order),
             timing: TimingSummary {
-                wake_us: account.wake.percentiles(),
-                bus_us: account.bus.percentiles(),
-                compute_us: account.compute.percentiles(),
-                publish_us: account.publish.percentiles(),
-                notify_us: account.notify.percentiles(),
-                culprits: account.culprits.clone(),
+                wake_us: tick_stats.wake.percentiles(),
+                bus_us: tick_stats.bus.percentiles(),
+                compute_us: tick_stats.compute.percentiles(),
+                publish_us: tick_stats.publish.percentiles(),
+                notify_us: tick_stats.notify.percentiles(),
+                culprits: tick_stats.culprits.clone(),
                 rate_hz: telemetry
                     .timing
                     .map(|timing| 1e9 / timing.period_ns as f64)
                     .filter(|rate_hz| rate_hz.is_finite()),
-                host_pauses: account.host_pauses,
-                worst_ticks: account.worst.clone(),
+                host_pauses: tick_stats.host_pauses,
+                worst_ticks: tick_stats.worst.clone(),
             },
         }
     }

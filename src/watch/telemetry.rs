@@ -19,7 +19,7 @@ pub struct Telemetry {
     /// All alarm changes.
     pub alarms: Vec<Alarm>,
     /// Where the ticks' time went, and what made late ones late.
-    pub account: TickStats,
+    pub tick_stats: TickStats,
 }
 
 impl Telemetry {
@@ -31,7 +31,7 @@ impl Telemetry {
 
     /// Takes a timing.
     pub fn take_timing(&mut self, timing: &Timing) {
-        self.account.take(timing);
+        self.tick_stats.take(timing);
         self.timing = Some(*timing);
     }
 

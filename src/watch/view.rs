@@ -459,7 +459,7 @@ fn draw_cycles(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {
 }
 
 fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
-    let account = &telemetry.account;
+    let tick_stats = &telemetry.tick_stats;
     let held_hz = telemetry.timing.map(|timing| (1e9 / timing.period_ns as f64).round());
     let rate_hz = held_hz.filter(|hz| hz.is_finite()).unwrap_or(subject.rate_hz);
     let mut lines = vec![
@@ -472,9 +472,9 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
         Line::raw("µs         p50     p99      max").bold(),
     ];
     for (name, durations) in [
-        ("wake", &account.wake),
-        ("bus", &account.bus),
-        ("compute", &account.compute),
+        ("wake", &tick_stats.wake),
+        ("bus", &tick_stats.bus),
+        ("compute", &tick_stats.compute),
     ] {
         let us = durations.percentiles();
         lines.push(Line::raw(format!(
@@ -482,7 +482,7 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
             us.p50, us.p99, us.max
         )));
     }
-    let pauses = account.host_pauses;
+    let pauses = tick_stats.host_pauses;
     if pauses.count > 0 {
         lines.push(Line::raw(format!(
             "{} host pauses, {:.2} s",

@@ -1,4 +1,4 @@
-//! Start-up: what is refused, what is mended, what is said.
+//! Start-up: what it refuses, corrects and reports.
 
 use dynamixel_bus::packet::DeviceId;
 use wormd::link::servo::register;

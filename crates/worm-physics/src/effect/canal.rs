@@ -94,7 +94,7 @@ pub(super) static SLOPE_CLAMPING: Effect = Effect {
     parameters: &[Parameter {
         name: "sensitivity",
         unit: "",
-        about: "s",
+        about: "share of the friction lost from the level to the vertical",
         neutral: 0.0,
         min: -2.0,
         max: 3.0,

@@ -2,15 +2,18 @@
 
 use super::axis::Axis;
 use super::decimate;
+use super::error::DrawError;
 use super::palette::{Colour, GRID, INK, MUTED, PAPER};
-use super::raw::{Raw, Svg, TEXT, dots, text_size, text_style};
+use super::raw::{Raw, Svg};
+use super::stroke::Stroke;
+use super::units::{TEXT, dots, text_size, text_style};
 use plotters::prelude::{
-    Cartesian2d, ChartBuilder, ChartContext, Circle, DrawingAreaErrorKind, EmptyElement, LabelAreaPosition,
-    PathElement, Polygon, Rectangle, SVGBackend, Text,
+    Cartesian2d, ChartBuilder, ChartContext, Circle, EmptyElement, LabelAreaPosition, PathElement, Polygon, Rectangle,
+    SVGBackend, Text,
 };
 use plotters::series::DashedLineSeries;
 use plotters::style::text_anchor::{HPos, VPos};
-use plotters::style::{Color, IntoFont, ShapeStyle};
+use plotters::style::{Color, IntoFont};
 
 /// Width of a sheet, in units; text and lines are sized for about that many CSS pixels.
 const WIDTH: f64 = 600.0;
@@ -24,17 +27,6 @@ const TOP: f64 = 20.0;
 const TICK_LABELS: f64 = 24.0;
 const X_LABEL: f64 = 20.0;
 const BETWEEN_ROWS: f64 = 16.0;
-
-/// A picture could not be drawn. Drawing into memory should not fail, but the backend may report that it did.
-#[derive(Debug, thiserror::Error)]
-#[error("a figure could not be drawn: {0}")]
-pub struct DrawError(String);
-
-impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for DrawError {
-    fn from(error: DrawingAreaErrorKind<E>) -> Self {
-        Self(error.to_string())
-    }
-}
 
 /// A picture: rows above each other over one horizontal axis.
 #[derive(Debug, Clone)]
@@ -64,42 +56,6 @@ impl Row {
     /// A row without a label.
     pub fn new(y: Axis, height: f64) -> Self {
         Self { y, height, label: None }
-    }
-}
-
-/// How a line is drawn.
-#[derive(Debug, Clone, Copy)]
-pub struct Stroke {
-    colour: Colour,
-    width: f64,
-    opacity: f64,
-    dashed: bool,
-}
-
-impl Stroke {
-    /// A full line of a width in units.
-    pub fn new(colour: Colour, width: f64) -> Self {
-        Self {
-            colour,
-            width,
-            opacity: 1.0,
-            dashed: false,
-        }
-    }
-
-    /// The line with less than full colour, 0 to 1.
-    pub fn faint(self, opacity: f64) -> Self {
-        Self { opacity, ..self }
-    }
-
-    /// The line broken into dashes.
-    pub fn dashed(self) -> Self {
-        Self { dashed: true, ..self }
-    }
-
-    /// The style for `plotters`.
-    pub(super) fn style(self) -> ShapeStyle {
-        self.colour.mix(self.opacity).stroke_width(dots(self.width) as u32)
     }
 }
 

@@ -7,16 +7,21 @@
 mod axis;
 mod canvas;
 mod decimate;
+mod error;
 mod palette;
 mod raw;
+mod stroke;
 #[cfg(test)]
 mod tests;
+mod units;
 
 pub use axis::Axis;
-pub use canvas::{DrawError, Plot, Row, Sheet, Stroke, draw};
+pub use canvas::{Plot, Row, Sheet, draw};
+pub use error::DrawError;
 pub use palette::{
     ACCENT, BLUE, Colour, GOOD, GRID, INK, LIGHT, MID, MUTED, PAPER, SHADE, VERMILION, cell_colours, css, diverging,
 };
 
 pub(super) use raw::Raw;
 pub use raw::Svg;
+pub use stroke::Stroke;

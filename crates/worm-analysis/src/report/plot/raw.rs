@@ -1,41 +1,16 @@
-//! A picture without axes, and what all drawing shares: units and text style.
+//! A picture without axes.
 
-use super::canvas::{DrawError, Stroke};
+use super::error::DrawError;
 use super::palette::Colour;
+use super::stroke::Stroke;
+use super::units::dots;
 use maud::{Markup, PreEscaped, html};
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, IntoDrawingArea, PathElement, Polygon, SVGBackend, Text};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, FontStyle, IntoFont, TextStyle};
+use plotters::style::{Color, TextStyle};
 
 /// A finished picture: inline SVG.
 pub type Svg = Markup;
-
-/// Dots of the drawing per unit of a sheet: the backend knows whole dots only.
-const DOTS: f64 = 4.0;
-/// Height of text, units.
-pub(super) const TEXT: f64 = 14.0;
-/// What `plotters` divides text sizes by when it writes SVG.
-const TEXT_FACTOR: f64 = 1.24;
-
-/// Units as dots.
-pub(super) fn dots(units: f64) -> i32 {
-    (units * DOTS).round() as i32
-}
-
-/// Height of text for `plotters`.
-pub(super) fn text_size() -> f64 {
-    TEXT * DOTS * TEXT_FACTOR
-}
-
-/// The style of text, and its alignment to its place.
-pub(super) fn text_style(colour: Colour, horizontal: HPos, vertical: VPos, bold: bool) -> TextStyle<'static> {
-    let style = if bold { FontStyle::Bold } else { FontStyle::Normal };
-    ("sans-serif", text_size(), style)
-        .into_font()
-        .color(&colour)
-        .pos(Pos::new(horizontal, vertical))
-}
 
 /// A picture without axes, in units from its upper left corner.
 pub(in crate::report) struct Raw<'b> {

@@ -4,6 +4,7 @@ use super::Estimator;
 use crate::estimate::bounds::Identification;
 use crate::estimate::energy_balance::{EnergyBalance, Start, Tip};
 use crate::estimate::unknown;
+use crate::time::seconds;
 use worm_physics::MAX_CELLS;
 
 /// Standard deviation of largest tip deformations that are only guessed, as a fraction: that of all of them together.
@@ -63,8 +64,9 @@ impl Estimator {
         let spent = self.electrical.total().since(&self.cycle_start.electrical);
         self.cycle.index = self.cycle_index;
         self.cycle.end_ns = (end_s * 1e9) as u64;
-        self.cycle.duration_s = end_s - self.cycle_start.time_s;
-        self.cycle.host_paused_s = self.host_paused_ns.saturating_sub(self.cycle_start.host_paused_ns) as f64 / 1e9;
+        let start_ns = (self.cycle_start.time_s * 1e9) as u64;
+        self.cycle.duration_s = seconds(self.cycle.end_ns.saturating_sub(start_ns));
+        self.cycle.host_paused_s = seconds(self.host_paused_ns.saturating_sub(self.cycle_start.host_paused_ns));
         self.cycle.energy_electrical_j = spent.electrical_j;
         self.cycle.energy_copper_j = spent.copper_j;
         self.cycle.energy_electrical_sigma_j = spent.sigma_j();
