@@ -140,11 +140,11 @@ fn named_effects_are_added_with_their_twins_and_the_file_stays_as_it_was() {
         added,
         "\n# Found by `wormd explain`; these act together.\n\
          # A constant force holds the worm back. F = const\n\
-         # No cell positions can report it from: directional-friction.\n\
-         # What would report it from its neighbours: cut the tether.\n\
+         # No cell positions can tell it from: directional-friction.\n\
+         # What would tell it from its neighbours: cut the tether.\n\
          [[effect]]\nname = \"constant-drag\"\nforce_n = 0.2034 # ± 0.012 N\n\
          \n# One cell is clamped harder or softer than the others, so its friction differs. μᵢNᵢ = f · μN\n\
-         # What would report it from its neighbours: cut the tether.\n\
+         # What would tell it from its neighbours: cut the tether.\n\
          [[effect]]\nname = \"unequal-clamping\"\ncell = 2\nfriction_factor = 0.71\n"
     );
     let found: Vec<_> = config

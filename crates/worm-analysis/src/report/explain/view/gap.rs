@@ -53,7 +53,7 @@ pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &St
 }
 
 /// A stage of the answer.
-pub(in crate::report::explain) fn stage_of<'a>(answer: &'a Answer, key: StageKind) -> Option<&'a Stage> {
+pub(in crate::report::explain) fn stage_of(answer: &Answer, key: StageKind) -> Option<&Stage> {
     answer.stages.iter().find(|stage| stage.stage == key)
 }
 
