@@ -26,7 +26,7 @@ fn the_crawling_worm_is_recorded_and_explained() {
         "{said}"
     );
 
-    assert_eq!(nobody.residue(), Vec::<String>::new());
+    assert_eq!(nobody.stale_resources(), Vec::<String>::new());
 
     let crawling = Crawling::start("explain");
     let (code, said, answer) = live(&crawling.worm);

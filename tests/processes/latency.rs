@@ -103,7 +103,7 @@ fn a_run_tells_everything_and_adds_up() {
             "{file}"
         );
     }
-    assert_eq!(worm.residue(), Vec::<String>::new());
+    assert_eq!(worm.stale_resources(), Vec::<String>::new());
 }
 
 #[test]

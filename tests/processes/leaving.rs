@@ -19,7 +19,7 @@ fn a_reader_that_leaves_stops_the_worm() {
     // Its output is closed after the first line.
     let up = worm.wormd(&["up", "--plain"]).start();
     assert_eq!(up.ends_by_itself().code(), Some(1));
-    assert_eq!(worm.residue(), Vec::<String>::new());
+    assert_eq!(worm.stale_resources(), Vec::<String>::new());
 }
 
 #[test]
@@ -32,7 +32,7 @@ fn a_killed_parent_leaves_neither_processes_nor_files() {
     wait_for("a worm that is recorded", PATIENCE, || recorded() > 100_000);
     up.kill();
     wait_for("the end of its children, with all they had", PATIENCE, || {
-        worm.residue().is_empty()
+        worm.stale_resources().is_empty()
     });
     std::fs::remove_file(&path).expect("the log is there");
 }

@@ -84,7 +84,7 @@ fn assert_main_job(worm: &Worm) {
         "a late tick costs a deadline at least: {timing}"
     );
     assert!(worm.pauses() > 0, "it was tried");
-    assert_eq!(worm.residue(), Vec::<String>::new());
+    assert_eq!(worm.stale_resources(), Vec::<String>::new());
 }
 
 #[test]

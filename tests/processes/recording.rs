@@ -40,7 +40,7 @@ fn the_main_job_records_what_replays_to_the_same_results() {
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}\n{error}", output.status);
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary");
-    assert_eq!(worm.residue(), Vec::<String>::new());
+    assert_eq!(worm.stale_resources(), Vec::<String>::new());
 
     let log = messages(&path).expect("a log");
     assert_eq!(log.warnings, Vec::<String>::new(), "it was finished");

@@ -149,7 +149,7 @@ impl Worm {
     }
 
     /// Files of this worm that are left in shared memory.
-    pub fn residue(&self) -> Vec<String> {
+    pub fn stale_resources(&self) -> Vec<String> {
         let mut left: Vec<String> = ["/dev/shm", "/dev/shm/wormd"]
             .iter()
             .filter_map(|folder| std::fs::read_dir(folder).ok())

@@ -150,7 +150,7 @@ impl PortLink {
         let beside = PathBuf::from(beside);
         match std::fs::remove_file(&beside) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(error)),
-            _ => {} // the residue of a process that had our number, or nothing
+            _ => {} // left behind by a process that had our number, or nothing
         }
         std::os::unix::fs::symlink(target, &beside).map_err(failed)?;
         std::fs::rename(&beside, path).map_err(failed)?;
