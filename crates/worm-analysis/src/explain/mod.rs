@@ -15,7 +15,7 @@
 //! - `observed`: the recordings as the search sees them; `predict`: the positions that a `hypothesis` predicts; `residual`: what
 //!   that leaves of the data; `noise`: how well the worm repeats itself.
 //! - `parameter`: which quantities are free, with priors; `phase_correction`: for phases found from overlapping steps;
-//!   `fit`: the campaign as a problem of [least squares](crate::least_squares); `local_restart`: from one local minimum to another.
+//!   `fit`: the campaign as a problem of least squares (`least_squares`); `local_restart`: from one local minimum to another.
 //! - `score_test`: screens the whole library; `speed_droop`: the one effect that shows in time alone.
 //! - `cross_validation`: held-out data; `model_selection`: the verdict.
 //! - `residual_map`: where the gap is; `period`: whether it repeats; `gap`: how it shrinks; `experiment_design`: the next experiment;

@@ -8,7 +8,7 @@
 //! - [`plot`]: pictures as inline SVG; what is not finite is never drawn.
 //! - [`page`]: the page, its figures, tables and tiles. Neither knows anything of worms.
 //! - `runs`, `summary`, `figure`, `tables`: the contents of this report.
-//! - `sheets` and [`file`]: the CSV, and how files are replaced.
+//! - `sheets` and [`mod@file`]: the CSV, and how files are replaced.
 //! - [`explain`]: another page, on the search for the effect that the model misses.
 
 pub mod explain;
