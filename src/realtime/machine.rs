@@ -1,11 +1,11 @@
 //! How the computer is set for a loop that must be in time: the kernel, its CPUs, and what else runs on them.
 //!
-//! [`settings`] reads the kernel's files; what they mean is judged in `judge`, which sees only their texts.
+//! [`settings`] reads the kernel's files; what they mean is judged in `assess`, which sees only their texts.
 
-mod judge;
+mod assess;
 
 use super::cpus;
-use judge::IdleState;
+use assess::IdleState;
 use serde::Serialize;
 use std::fs::File;
 use std::io::Read;
@@ -51,7 +51,7 @@ pub fn settings(cpu: Option<usize>) -> Vec<Setting> {
     let cpu = cpu.filter(|cpu| online.contains(cpu));
     let used = cpu.map_or_else(|| online.clone(), |cpu| vec![cpu]);
     let settings = [
-        judge::count(&online),
+        assess::count(&online),
         kernel(),
         clock_source(),
         isolation(cpu, &online),
@@ -78,27 +78,32 @@ fn kernel() -> Option<Setting> {
     let realtime = read("/sys/kernel/realtime");
     let modes = read("/sys/kernel/debug/sched/preempt");
     let options = read("/proc/cmdline").unwrap_or_default();
-    Some(judge::kernel(&version, realtime.as_deref(), modes.as_deref(), &options))
+    Some(assess::kernel(
+        &version,
+        realtime.as_deref(),
+        modes.as_deref(),
+        &options,
+    ))
 }
 
 fn clock_source() -> Option<Setting> {
     let folder = "/sys/devices/system/clocksource/clocksource0";
     let current = read(&format!("{folder}/current_clocksource"))?;
     let available = read(&format!("{folder}/available_clocksource")).unwrap_or_default();
-    Some(judge::clock_source(&current, &available))
+    Some(assess::clock_source(&current, &available))
 }
 
 fn isolation(cpu: Option<usize>, online: &[usize]) -> Option<Setting> {
     let mut isolated = cpus::parse(&read("/sys/devices/system/cpu/isolated")?);
     isolated.retain(|cpu| online.contains(cpu));
     let tickless = read("/sys/devices/system/cpu/nohz_full").map(|text| cpus::parse(&text));
-    judge::isolation(cpu, &isolated, &tickless.unwrap_or_default(), online)
+    assess::isolation(cpu, &isolated, &tickless.unwrap_or_default(), online)
 }
 
 fn hyper_threading(cpu: Option<usize>) -> Option<Setting> {
     let cpu = cpu?;
     let siblings = read_cpu(cpu, "topology/thread_siblings_list")?;
-    Some(judge::hyper_threading(cpu, &cpus::parse(&siblings)))
+    Some(assess::hyper_threading(cpu, &cpus::parse(&siblings)))
 }
 
 fn governor(cpu: Option<usize>, used: &[usize]) -> Setting {
@@ -106,13 +111,13 @@ fn governor(cpu: Option<usize>, used: &[usize]) -> Setting {
         .iter()
         .filter_map(|&used| Some((used, read_cpu(used, "cpufreq/scaling_governor")?)))
         .collect();
-    judge::governor(cpu, &governors)
+    assess::governor(cpu, &governors)
 }
 
 fn idle_states(cpu: Option<usize>, used: &[usize]) -> Setting {
     let states: Vec<IdleState> = used.iter().flat_map(|&used| idle_states_of(used)).collect();
     let driver = read("/sys/devices/system/cpu/cpuidle/current_driver");
-    judge::idle_states(cpu, &states, driver.as_deref(), wake_latency_limit_us())
+    assess::idle_states(cpu, &states, driver.as_deref(), wake_latency_limit_us())
 }
 
 /// The CPU's idle states (kernel doc cpuidle), those first that sleep least deep.
@@ -137,11 +142,11 @@ fn wake_latency_limit_us() -> Option<u32> {
 fn throttling() -> Option<Setting> {
     let runtime_us = read("/proc/sys/kernel/sched_rt_runtime_us")?.parse().ok()?;
     let period_us = read("/proc/sys/kernel/sched_rt_period_us")?.parse().ok()?;
-    Some(judge::throttling(runtime_us, period_us))
+    Some(assess::throttling(runtime_us, period_us))
 }
 
 fn virtual_machine(cpu: Option<usize>) -> Option<Setting> {
-    judge::virtual_machine(cpu, &read("/proc/cpuinfo")?, &read("/proc/stat").unwrap_or_default())
+    assess::virtual_machine(cpu, &read("/proc/cpuinfo")?, &read("/proc/stat").unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -104,7 +104,7 @@ impl Bus {
         for (fault, _) in self.faults.iter().zip(&self.holding).filter(|(_, holding)| **holding) {
             fault.apply(&mut conditions);
         }
-        self.plant.set_conditions(&conditions.plant, conditions.sight)?;
+        self.plant.set_conditions(&conditions.plant, conditions.camera)?;
         if conditions.servo != self.conditions.servo {
             self.servo.set_conditions(conditions.servo, &mut self.plant, self.now_s);
         }

@@ -1,6 +1,6 @@
 //! What the tracker captures: positions with noise, now and then a cell unseen or older than its time stamp, on a clock of its own.
 
-use super::conditions::Sight;
+use super::conditions::CameraConditions;
 use crate::link::TrackerReading;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -23,7 +23,7 @@ pub struct Camera {
     /// What was there at the last captures, oldest first, as far back as one may have to be: when, s of the plant's time, and
     /// where the cells were, m.
     past: VecDeque<(f64, Vec<f64>)>,
-    conditions: Sight,
+    conditions: CameraConditions,
     reading: TrackerReading,
 }
 
@@ -37,7 +37,7 @@ impl Camera {
             clock_offset_us: rng.next_u32(),
             taken: 0,
             past: VecDeque::new(),
-            conditions: Sight::default(),
+            conditions: CameraConditions::default(),
             reading: TrackerReading {
                 sample: 0,
                 capture_time_us: 0,
@@ -49,7 +49,7 @@ impl Camera {
     }
 
     /// Changes what it sees.
-    pub fn set_conditions(&mut self, conditions: Sight) {
+    pub fn set_conditions(&mut self, conditions: CameraConditions) {
         self.conditions = conditions;
     }
 

@@ -11,7 +11,7 @@ pub struct Conditions {
     /// Body, canal, motor, supply.
     pub plant: PlantConditions,
     /// What the tracker sees.
-    pub sight: Sight,
+    pub camera: CameraConditions,
     /// The servo's electronics.
     pub servo: ServoConditions,
     /// The cable.
@@ -62,7 +62,7 @@ impl Default for PlantConditions {
 
 /// What the tracker sees.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sight {
+pub struct CameraConditions {
     /// Bit *i*: cell *i* is hidden.
     pub hidden: u16,
     /// Standard deviation of a position, m, where it is not the configured one.

@@ -217,20 +217,20 @@ pub(super) const KINDS: &[FaultKind] = &[
     ),
     kind("blind", "the tracker does not see a cell", &[CELL], |c, v| {
         for cell in cells(v[0]) {
-            c.sight.hidden |= 1 << cell;
+            c.camera.hidden |= 1 << cell;
         }
     }),
     kind(
         "dropout",
         "the tracker misses a share of the positions",
         &[fraction(Some(0.3))],
-        |c, v| c.sight.dropout_share = Some(v[0]),
+        |c, v| c.camera.dropout_share = Some(v[0]),
     ),
     kind(
         "noise",
         "the tracker's positions have this standard deviation",
         &[number("m", 0.0, 0.1, "m", Some(0.0003))],
-        |c, v| c.sight.noise_m = Some(v[0]),
+        |c, v| c.camera.noise_m = Some(v[0]),
     ),
     kind(
         "wrong-model",

@@ -44,9 +44,9 @@ fn every_kind_changes_what_it_says() {
     assert!(conditions_of("reboot").servo.unpowered);
     assert_eq!(conditions_of("overheat:ambient=80").plant.heated_to_c, Some(80.0));
     assert_eq!(conditions_of("hardware-error:bits=0x24").servo.hardware_errors, 0x24);
-    assert_eq!(conditions_of("blind:cell=3").sight.hidden, 0b100);
-    assert_eq!(conditions_of("dropout:share=0.1").sight.dropout_share, Some(0.1));
-    assert_eq!(conditions_of("noise:m=0.0005").sight.noise_m, Some(0.0005));
+    assert_eq!(conditions_of("blind:cell=3").camera.hidden, 0b100);
+    assert_eq!(conditions_of("dropout:share=0.1").camera.dropout_share, Some(0.1));
+    assert_eq!(conditions_of("noise:m=0.0005").camera.noise_m, Some(0.0005));
     assert_eq!(conditions_of("wrong-model:number=1190").servo.model_number, Some(1190));
 }
 

@@ -7,7 +7,7 @@
 
 use super::body::{Body, BodyError};
 use super::camera::Camera;
-use super::conditions::{PlantConditions, Sight};
+use super::conditions::{CameraConditions, PlantConditions};
 use super::ledger::{PlantLedger, Standing, TruthLedger};
 use super::motor::{Drive, Gains, Motor};
 use super::supply::Supply;
@@ -96,7 +96,7 @@ impl Plant {
     ///
     /// # Errors
     /// [`WormError`] never for values within a fault's domains.
-    pub fn set_conditions(&mut self, conditions: &PlantConditions, sight: Sight) -> Result<(), WormError> {
+    pub fn set_conditions(&mut self, conditions: &PlantConditions, camera: CameraConditions) -> Result<(), WormError> {
         self.motor.set_friction_scale(conditions.inner_friction_scale);
         self.motor.heat_to(conditions.heated_to_c);
         self.supply
@@ -106,7 +106,7 @@ impl Plant {
         {
             self.supply.set_charge_fraction(charge);
         }
-        self.camera.set_conditions(sight);
+        self.camera.set_conditions(camera);
         self.conditions = conditions.clone();
         self.body.set_conditions(conditions)
     }

@@ -28,12 +28,12 @@ fn crawl(config: &Config, velocity_rad_per_s: f64, seconds: f64) -> Plant {
 }
 
 /// `fraction` is what may be missing: a cycle ends within a step, a total at its end.
-fn assert_closes(account: &PlantLedger, fraction: f64) {
-    let gone_j = account.copper_j + account.friction_inside_j + account.actuator_net_j + account.kinetic_j;
+fn assert_closes(balance: &PlantLedger, fraction: f64) {
+    let gone_j = balance.copper_j + balance.friction_inside_j + balance.actuator_net_j + balance.kinetic_j;
     assert!(
-        (account.electrical_j - gone_j).abs() <= fraction * account.electrical_j,
+        (balance.electrical_j - gone_j).abs() <= fraction * balance.electrical_j,
         "electrical {} J, accounted for {gone_j} J",
-        account.electrical_j
+        balance.electrical_j
     );
 }
 
@@ -134,7 +134,9 @@ fn conditions_do_what_they_say() {
         let mut conditions = PlantConditions::default();
         change(&mut conditions);
         let mut plant = base.clone();
-        plant.set_conditions(&conditions, Sight::default()).expect("a worm");
+        plant
+            .set_conditions(&conditions, CameraConditions::default())
+            .expect("a worm");
         plant.advance_to(10.0).expect("a worm");
         let before = base.total();
         let after = plant.total();

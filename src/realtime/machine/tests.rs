@@ -1,4 +1,4 @@
-use super::judge::{self, IdleState};
+use super::assess::{self, IdleState};
 use super::{Setting, settings};
 
 /// Case, judgement, whether it should be good, and a part of what should be found or else be told to do.
@@ -27,106 +27,116 @@ fn governors(names: &[&str]) -> Vec<(usize, String)> {
 }
 
 fn kernels() -> Vec<Case> {
-    let judge = |version, modes, options| Some(judge::kernel(version, None, modes, options));
+    let assess = |version, modes, options| Some(assess::kernel(version, None, modes, options));
     let dynamic = "#1 SMP PREEMPT_DYNAMIC Debian 6.12.9-1 (2025-01-10)";
     vec![
         (
             "PREEMPT_RT",
-            judge("#1 SMP PREEMPT_RT Debian 6.12.9-1", None, ""),
+            assess("#1 SMP PREEMPT_RT Debian 6.12.9-1", None, ""),
             true,
             "PREEMPT_RT",
         ),
         (
             "before it was merged",
-            judge("#1 SMP PREEMPT RT", None, ""),
+            assess("#1 SMP PREEMPT RT", None, ""),
             true,
             "PREEMPT_RT",
         ),
         (
             "by its own file",
-            Some(judge::kernel("#1 SMP", Some("1"), None, "")),
+            Some(assess::kernel("#1 SMP", Some("1"), None, "")),
             true,
             "PREEMPT_RT",
         ),
         (
             "full",
-            judge(dynamic, Some("none voluntary (full)"), ""),
+            assess(dynamic, Some("none voluntary (full)"), ""),
             false,
             "linux-image-rt",
         ),
         (
             "voluntary",
-            judge(dynamic, Some("none (voluntary) full lazy"), ""),
+            assess(dynamic, Some("none (voluntary) full lazy"), ""),
             false,
             "`preempt=full`",
         ),
         (
             "asked for at the start",
-            judge(dynamic, None, "quiet preempt=full -- preempt=none"),
+            assess(dynamic, None, "quiet preempt=full -- preempt=none"),
             false,
             "a PREEMPT_RT kernel bounds",
         ),
-        ("not readable", judge(dynamic, None, "quiet"), false, "mount -t debugfs"),
+        (
+            "not readable",
+            assess(dynamic, None, "quiet"),
+            false,
+            "mount -t debugfs",
+        ),
         (
             "always preemptible",
-            judge("#1 SMP PREEMPT", None, ""),
+            assess("#1 SMP PREEMPT", None, ""),
             false,
             "linux-image-rt",
         ),
-        ("a server's", judge("#45-Ubuntu SMP", None, ""), false, "linux-image-rt"),
+        (
+            "a server's",
+            assess("#45-Ubuntu SMP", None, ""),
+            false,
+            "linux-image-rt",
+        ),
     ]
 }
 
 fn cpus() -> Vec<Case> {
     let two: &[usize] = &[0, 1];
     vec![
-        ("two CPUs", judge::count(two), true, "2: 0-1"),
-        ("one CPU", judge::count(&[0]), false, "two CPUs or more"),
+        ("two CPUs", assess::count(two), true, "2: 0-1"),
+        ("one CPU", assess::count(&[0]), false, "two CPUs or more"),
         (
             "not isolated",
-            judge::isolation(None, &[], &[], two),
+            assess::isolation(None, &[], &[], two),
             false,
             "isolcpus=1 nohz_full=1 rcu_nocbs=1",
         ),
         (
             "not isolated, not pinned",
-            judge::isolation(None, &[], &[], two),
+            assess::isolation(None, &[], &[], two),
             false,
             "realtime.cpu = 1",
         ),
         (
             "pinned elsewhere",
-            judge::isolation(Some(0), &[1], &[], two),
+            assess::isolation(Some(0), &[1], &[], two),
             false,
             "isolcpus=0 ",
         ),
         (
             "isolated in vain",
-            judge::isolation(None, &[1], &[1], two),
+            assess::isolation(None, &[1], &[1], two),
             false,
             "realtime.cpu = 1",
         ),
         (
             "isolated",
-            judge::isolation(Some(1), &[1], &[], two),
+            assess::isolation(Some(1), &[1], &[], two),
             true,
             "isolated from other threads",
         ),
         (
             "tickless",
-            judge::isolation(Some(1), &[1], &[1], two),
+            assess::isolation(Some(1), &[1], &[1], two),
             true,
             "no periodic tick",
         ),
         (
             "its own core",
-            Some(judge::hyper_threading(1, &[1])),
+            Some(assess::hyper_threading(1, &[1])),
             true,
             "for itself",
         ),
         (
             "a shared core",
-            Some(judge::hyper_threading(1, &[1, 5])),
+            Some(assess::hyper_threading(1, &[1, 5])),
             false,
             "cpu5/online",
         ),
@@ -134,15 +144,15 @@ fn cpus() -> Vec<Case> {
 }
 
 fn clocks_and_sleep() -> Vec<Case> {
-    let clock = |current| Some(judge::clock_source(current, "tsc hpet acpi_pm"));
-    let governor = |cpu, names: &[&str]| Some(judge::governor(cpu, &governors(names)));
-    let idle_states = |states: &[IdleState], limit| Some(judge::idle_states(None, states, Some("acpi_idle"), limit));
+    let clock = |current| Some(assess::clock_source(current, "tsc hpet acpi_pm"));
+    let governor = |cpu, names: &[&str]| Some(assess::governor(cpu, &governors(names)));
+    let idle_states = |states: &[IdleState], limit| Some(assess::idle_states(None, states, Some("acpi_idle"), limit));
     vec![
         ("tsc", clock("tsc"), true, "tsc"),
         ("hpet beside tsc", clock("hpet"), false, "echo tsc >"),
         (
             "hpet alone",
-            Some(judge::clock_source("hpet", "hpet acpi_pm")),
+            Some(assess::clock_source("hpet", "hpet acpi_pm")),
             false,
             "tsc=reliable",
         ),
@@ -186,20 +196,20 @@ fn clocks_and_sleep() -> Vec<Case> {
         ("shallow", idle_states(&notebook()[..2], None), true, "acpi_idle"),
         (
             "no idle states",
-            Some(judge::idle_states(None, &[], Some("none"), None)),
+            Some(assess::idle_states(None, &[], Some("none"), None)),
             true,
             "none listed",
         ),
         (
             "throttled a little",
-            Some(judge::throttling(950_000, 1_000_000)),
+            Some(assess::throttling(950_000, 1_000_000)),
             true,
             "far less",
         ),
-        ("not throttled", Some(judge::throttling(-1, 1_000_000)), true, "off"),
+        ("not throttled", Some(assess::throttling(-1, 1_000_000)), true, "off"),
         (
             "no real time left",
-            Some(judge::throttling(0, 1_000_000)),
+            Some(assess::throttling(0, 1_000_000)),
             false,
             "sched_rt_runtime_us=950000",
         ),
@@ -210,8 +220,8 @@ fn hosts() -> Vec<Case> {
     let guest = "processor\t: 0\nflags\t\t: fpu tsc hypervisor lahf_lm\n";
     let metal = "processor\t: 0\nflags\t\t: fpu tsc lahf_lm\n";
     vec![
-        ("a guest", judge::virtual_machine(None, guest, ""), false, "idle=poll"),
-        ("its own master", judge::virtual_machine(None, metal, ""), true, "none"),
+        ("a guest", assess::virtual_machine(None, guest, ""), false, "idle=poll"),
+        ("its own master", assess::virtual_machine(None, metal, ""), true, "none"),
     ]
 }
 
@@ -229,10 +239,10 @@ fn every_setting_is_judged_with_a_remedy() {
 
 #[test]
 fn what_cannot_be_judged_is_left_out() {
-    assert_eq!(judge::count(&[]), None);
-    assert_eq!(judge::isolation(None, &[], &[], &[0]), None);
+    assert_eq!(assess::count(&[]), None);
+    assert_eq!(assess::isolation(None, &[], &[], &[0]), None);
     assert_eq!(
-        judge::virtual_machine(None, "processor\t: 0\nFeatures\t: fp asimd\n", ""),
+        assess::virtual_machine(None, "processor\t: 0\nFeatures\t: fp asimd\n", ""),
         None
     );
 }
@@ -241,10 +251,10 @@ fn what_cannot_be_judged_is_left_out() {
 fn the_time_that_the_host_took_is_that_of_the_loops_cpu() {
     let stat = "cpu  60 0 20 100 0 0 0 20 0 0\ncpu0 30 0 10 50 0 0 0 10 0 0\ncpu1 50 0 10 40 0 0 0 0 0 0\nintr 7\n";
     for (cpu, part) in [(None, "took 10.00 %"), (Some(1), "took 0.00 %")] {
-        let setting = judge::virtual_machine(cpu, "flags : hypervisor\n", stat).expect("the processor tells");
+        let setting = assess::virtual_machine(cpu, "flags : hypervisor\n", stat).expect("the processor tells");
         assert!(setting.found.contains(part), "{}", setting.found);
     }
-    let untold = judge::virtual_machine(Some(2), "flags : hypervisor\n", stat).expect("the processor tells");
+    let untold = assess::virtual_machine(Some(2), "flags : hypervisor\n", stat).expect("the processor tells");
     assert!(!untold.found.contains("took"), "{}", untold.found);
 }
 

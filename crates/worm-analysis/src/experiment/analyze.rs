@@ -188,17 +188,17 @@ impl<'a> Prepared<'a> {
         let fitted_run = &fitted.runs[index];
         let worm = &fitted_run.worm;
         let configured_kg = base.mass_kg() + self.run.payload_kg;
-        let account = energy_balance::follow(recording, &self.gait, fitted_run, fitted.damping_ratio, configured_kg)?;
-        let settled: Vec<&CycleValues> = account
+        let balance = energy_balance::follow(recording, &self.gait, fitted_run, fitted.damping_ratio, configured_kg)?;
+        let settled: Vec<&CycleValues> = balance
             .cycles
             .iter()
             .filter(|cycle| cycle.settled)
             .map(|cycle| &cycle.values)
             .collect();
-        let every: Vec<&CycleValues> = account.cycles.iter().map(|cycle| &cycle.values).collect();
+        let every: Vec<&CycleValues> = balance.cycles.iter().map(|cycle| &cycle.values).collect();
         let counted = if settled.is_empty() { &every } else { &settled };
         let (mean, std) = CycleValues::mean_and_std(counted, recording.cells());
-        let deformation_m = mean_deformations(&account);
+        let deformation_m = mean_deformations(&balance);
         let carried_n: f64 = worm
             .contacts()
             .iter()
@@ -214,7 +214,7 @@ impl<'a> Prepared<'a> {
             .clone()
             .with_slope_rad(worm.slope_rad())?
             .with_mass_kg(configured_kg)?;
-        let durations_s: Vec<f64> = account
+        let durations_s: Vec<f64> = balance
             .cycles
             .iter()
             .filter(|cycle| cycle.settled || settled.is_empty())
@@ -259,11 +259,11 @@ impl<'a> Prepared<'a> {
                 identified: theory(&Physics::of(worm.clone()).found_with(effects), cycle_s),
                 nominal: theory(&Physics::of(nominal).with(effects), cycle_s),
             },
-            warnings: self.warnings(fitted, &account.cycles, cycle_s, mass_kg, base, effects),
-            cycles: account.cycles,
+            warnings: self.warnings(fitted, &balance.cycles, cycle_s, mass_kg, base, effects),
+            cycles: balance.cycles,
             mean,
             std,
-            series: account.series,
+            series: balance.series,
         })
     }
 
@@ -361,13 +361,13 @@ fn check_stroke(seen_m: f64, configured_m: f64, name: impl Fn() -> String) -> Re
 }
 
 /// Time mean of each tip's deformation over the settled cycles, or over everything where there are none, m.
-fn mean_deformations(account: &energy_balance::EnergyBalance) -> Vec<f64> {
-    let range = match &account.settled {
-        settled if settled.is_empty() => 0..account.series.time_s.len(),
+fn mean_deformations(balance: &energy_balance::EnergyBalance) -> Vec<f64> {
+    let range = match &balance.settled {
+        settled if settled.is_empty() => 0..balance.series.time_s.len(),
         settled => settled.clone(),
     };
-    let time_s = &account.series.time_s[range.clone()];
-    account
+    let time_s = &balance.series.time_s[range.clone()];
+    balance
         .series
         .deformation_m
         .iter()

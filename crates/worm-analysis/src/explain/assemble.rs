@@ -11,7 +11,7 @@ use super::cross_validation::HeldOut;
 use super::experiment_design::propose;
 use super::fit::{Fit, FitProblem};
 use super::gap::cycles;
-use super::model_selection::{Candidate, Judged};
+use super::model_selection::{Candidate, Selected};
 use super::period::period;
 use super::residual_map::{map, places};
 use super::score_test::Screening;
@@ -35,29 +35,29 @@ pub(super) struct Parts {
     pub recalibrated: Fit,
     pub recalibrated_held_out: HeldOut,
     pub screened: Vec<Screening>,
-    pub judged: Judged,
+    pub selected: Selected,
     pub speed_droop: Option<SpeedDroop>,
     pub threshold: f64,
 }
 
 /// Puts the answer together.
 pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Parts) -> Answer {
-    let judged = &parts.judged;
+    let selected = &parts.selected;
     let speed_droop = parts
         .speed_droop
         .as_ref()
         .filter(|speed_droop| speed_droop.improvement > DROOPS);
-    let mut named: &[Candidate] = match judged.verdict {
-        Verdict::Explained | Verdict::Ambiguous => &judged.candidates,
+    let mut named: &[Candidate] = match selected.verdict {
+        Verdict::Explained | Verdict::Ambiguous => &selected.candidates,
         Verdict::Agrees | Verdict::OutsideLibrary => &[],
     };
     let mut gap = stages::Gap::measure(problem, parts, named);
-    let mut of_positions = judged.verdict;
+    let mut of_positions = selected.verdict;
     let refused = gap.closure.first().copied().filter(|closure| *closure < CLOSES);
     if refused.is_some() {
         named = &[];
         gap = stages::Gap::measure(problem, parts, named);
-        of_positions = if judged.gap_is_negligible {
+        of_positions = if selected.gap_is_negligible {
             Verdict::Agrees
         } else {
             Verdict::OutsideLibrary
@@ -72,7 +72,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     for (place, candidate) in named.iter().enumerate() {
         let found = named_effects(
             candidate,
-            judged.probability[place],
+            selected.probability[place],
             gap.closure[place],
             gap.margin(place),
         );
@@ -91,7 +91,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     effects.extend(speed_droop.map(effects::droop_effect));
     let final_fit = named.first().map_or(&parts.recalibrated, |candidate| &candidate.fit);
     let maps_before = maps(problem, &parts.recalibrated);
-    let best = judged.candidates.first().map(|candidate| &candidate.fit);
+    let best = selected.candidates.first().map(|candidate| &candidate.fit);
     let maps_after = match verdict {
         Verdict::Agrees => Vec::new(),
         _ => best.map_or_else(Vec::new, |fit| maps(problem, fit)),
@@ -100,8 +100,8 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         let places = places(&maps_after, PLACES);
         let period = period(problem, best.unwrap_or(&parts.recalibrated));
         Remainder {
-            description: words::remainder(judged, &places),
-            open_share: judged.open_share,
+            description: words::remainder(selected, &places),
+            open_share: selected.open_share,
             period_cycles: period.cycles,
             period_m: period.displacement_m,
             places,
@@ -118,7 +118,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     let runs = runs::runs(problem, parts, named.first());
     Answer {
         verdict,
-        sentence: words::sentence(verdict, &effects, &rivals, judged, refused, parts.threshold),
+        sentence: words::sentence(verdict, &effects, &rivals, selected, refused, parts.threshold),
         r#where: places(&maps_before, PLACES),
         effects,
         rivals,
@@ -126,7 +126,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         remainder,
         next_experiment,
         calibration: calibration(final_fit, config),
-        screening: screening::screening(&parts.screened, judged, speed_droop.is_some()),
+        screening: screening::screening(&parts.screened, selected, speed_droop.is_some()),
         threshold: parts.threshold,
         warnings: words::warnings(problem, final_fit),
         runs,

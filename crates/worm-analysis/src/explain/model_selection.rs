@@ -195,7 +195,7 @@ fn explainable(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<f64> {
 }
 
 /// The verdict, and what it rests on.
-pub(super) struct Judged {
+pub(super) struct Selected {
     pub verdict: Verdict,
     /// What explains the data, best first, without twins and other cells of the same effect. Holds the best candidate even where
     /// nothing is named.
@@ -224,14 +224,14 @@ pub(super) fn hold_out(problem: &FitProblem<'_, '_>, recalibrated: &Fit, candida
 }
 
 /// Reaches the verdict; `singles` and `pairs` are best first.
-pub(super) fn judge(
+pub(super) fn select_model(
     problem: &FitProblem<'_, '_>,
     open: &Open,
     singles: Vec<Candidate>,
     pairs: Vec<Candidate>,
     threshold: f64,
     recalibrated_held_out: f64,
-) -> Judged {
+) -> Selected {
     let mut all = singles.clone();
     all.extend(pairs.iter().cloned());
     let is_sound = |candidate: &Candidate| candidate.is_notable() && candidate.holds(recalibrated_held_out);
@@ -278,7 +278,7 @@ pub(super) fn judge(
     } else {
         Verdict::Explained
     };
-    Judged {
+    Selected {
         verdict,
         probability: kinds.iter().map(|candidate| weight(candidate) / whole).collect(),
         open_share: kinds

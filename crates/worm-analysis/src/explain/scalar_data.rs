@@ -29,7 +29,7 @@ use super::parameter::{Free, Hypothesised, Nuisance, What};
 use super::score_test::hypotheses;
 use crate::experiment::Progress;
 use crate::recording::Advance;
-use model_selection::{AdvanceKind, Judged};
+use model_selection::{AdvanceKind, Selected};
 use rayon::prelude::*;
 use table::Table;
 use worm_estimator::config::Config;
@@ -82,8 +82,8 @@ pub fn explain_advances(
     }
     report("judgement", 0.9);
     let screening = screening(&hypothesised, &candidates);
-    let judged = model_selection::judge(&table, &recalibrated, candidates.into_iter().flatten().collect());
-    Ok(assemble(&table, config, &nominal, &recalibrated, screening, &judged))
+    let selected = model_selection::select_model(&table, &recalibrated, candidates.into_iter().flatten().collect());
+    Ok(assemble(&table, config, &nominal, &recalibrated, screening, &selected))
 }
 
 /// The nuisances that change an advance: neither the clock nor those of the first moment of a slide.
@@ -175,12 +175,12 @@ fn assemble(
     nominal: &Fit,
     recalibrated: &Fit,
     screening: Vec<Screened>,
-    judged: &Judged,
+    selected: &Selected,
 ) -> Answer {
-    let mut named = judged
+    let mut named = selected
         .set
         .iter()
-        .zip(&judged.probability)
+        .zip(&selected.probability)
         .flat_map(|(kind, &probability)| {
             let mut named = named_effects(&kind.candidate, probability, f64::NAN, f64::NAN);
             // The parameters are still those of one cell, and name it.
@@ -204,13 +204,13 @@ fn assemble(
         stage(StageKind::Baseline, None, nominal),
         stage(StageKind::Recalibrated, None, recalibrated),
     ];
-    let wrong = judged.others.first();
+    let wrong = selected.others.first();
     stages.extend(wrong.map(|kind| stage(StageKind::BestWrong, Some(kind), &kind.candidate.fit)));
-    let best = judged.set.first();
+    let best = selected.set.first();
     stages.extend(best.map(|kind| stage(StageKind::Named, Some(kind), &kind.candidate.fit)));
     // An effect that is not proven is not written into the model.
     let kept = best
-        .filter(|_| judged.is_proven)
+        .filter(|_| selected.is_proven)
         .map_or(recalibrated, |kind| &kind.candidate.fit);
     let runs = table.advances.iter().enumerate().map(|(run, advance)| RunSummary {
         recording: name(advance),
@@ -230,19 +230,19 @@ fn assemble(
         advance_sigma_m: Some(advance.sigma_m),
     });
     Answer {
-        verdict: judged.verdict,
-        sentence: judged.sentence(recalibrated),
+        verdict: selected.verdict,
+        sentence: selected.sentence(recalibrated),
         effects,
         rivals,
         r#where: Vec::new(),
         stages,
-        remainder: judged.remainder(table, recalibrated),
-        next_experiment: next_experiment::propose(table, recalibrated, judged),
+        remainder: selected.remainder(table, recalibrated),
+        next_experiment: next_experiment::propose(table, recalibrated, selected),
         calibration: calibration(kept, config),
         screening,
         threshold: model_selection::chance(table.advances.len()),
         runs: runs.collect(),
-        warnings: judged.warnings(kept),
+        warnings: selected.warnings(kept),
         figures: Figures::default(),
     }
 }

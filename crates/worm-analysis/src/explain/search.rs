@@ -90,7 +90,7 @@ pub fn explain(
         }
     }
     report("judgement", 0.9);
-    let judged = model_selection::judge(
+    let selected = model_selection::select_model(
         &problem,
         &open,
         candidates,
@@ -104,7 +104,7 @@ pub fn explain(
         .collect();
     let speed_droop = speed_droop(
         &scene,
-        judged
+        selected
             .candidates
             .first()
             .map_or(&recalibrated, |candidate| &candidate.fit),
@@ -116,7 +116,7 @@ pub fn explain(
         recalibrated,
         recalibrated_held_out,
         screened,
-        judged,
+        selected,
         speed_droop,
         threshold,
     };

@@ -2,7 +2,7 @@
 
 use super::answer::{NamedEffect, Place, Verdict, answers_in_words};
 use super::fit::{Fit, FitProblem};
-use super::model_selection::Judged;
+use super::model_selection::Selected;
 use super::parameter::What;
 use worm_physics::effect::{LIBRARY, Visible};
 
@@ -12,13 +12,13 @@ pub(super) fn sentence(
     verdict: Verdict,
     effects: &[NamedEffect],
     rivals: &[NamedEffect],
-    judged: &Judged,
+    selected: &Selected,
     refused: Option<f64>,
     threshold: f64,
 ) -> String {
     match verdict {
         Verdict::Agrees => {
-            let best = judged
+            let best = selected
                 .all
                 .iter()
                 .map(|candidate| candidate.improvement)
@@ -40,7 +40,7 @@ pub(super) fn sentence(
             answers_in_words(rivals).join(", and so does ")
         ),
         Verdict::OutsideLibrary => {
-            let nearest = judged.candidates.first().map_or_else(
+            let nearest = selected.candidates.first().map_or_else(
                 || "none that is strong enough to matter keeps its improvement on held-out data".to_owned(),
                 |candidate| {
                     let names: Vec<&str> = candidate
@@ -53,7 +53,7 @@ pub(super) fn sentence(
                             "closes {:.0} % of the gap on cycles that it was not fitted to",
                             100.0 * closure.max(0.0)
                         ),
-                        None => format!("leaves {:.0} % of the gap open", 100.0 * judged.open_share),
+                        None => format!("leaves {:.0} % of the gap open", 100.0 * selected.open_share),
                     };
                     format!("{} comes nearest and {how_near}", names.join(" with "))
                 },
@@ -81,8 +81,8 @@ fn closing(effects: &[NamedEffect]) -> String {
 }
 
 /// What no effect explains, in words.
-pub(super) fn remainder(judged: &Judged, places: &[Place]) -> String {
-    let whole = format!("{:.0} % of the gap stays open", 100.0 * judged.open_share);
+pub(super) fn remainder(selected: &Selected, places: &[Place]) -> String {
+    let whole = format!("{:.0} % of the gap stays open", 100.0 * selected.open_share);
     match places.first() {
         Some(place) => format!(
             "{whole}; it is largest at cell {} while cell {} steps, phase {:.2}, on the {}° run: {:+.3} mm in each cycle ({:.1} standard errors)",

@@ -29,7 +29,7 @@ fn recorded(slope_deg: f64, cycles: f64) -> (Recording, Worm) {
 }
 
 /// The account with the truth in the place of a fit: bounds, start and a drift of 0.
-fn account(recording: &Recording, worm: &Worm) -> EnergyBalance {
+fn balance(recording: &Recording, worm: &Worm) -> EnergyBalance {
     let prior = Prior {
         step_order: worm.step_order(),
         phase: recording.gait_phase.as_deref(),
@@ -55,12 +55,12 @@ fn account(recording: &Recording, worm: &Worm) -> EnergyBalance {
 fn cycles_sum_up_to_the_ledger_of_the_model() {
     for slope_deg in [0.0, 20.0, 35.0] {
         let (recording, worm) = recorded(slope_deg, 6.0);
-        let account = account(&recording, &worm);
+        let balance = balance(&recording, &worm);
         let mut motion = Motion::at_rest(&worm, &[0.0; 4]);
         motion.advance_to(&worm, 6.0).expect("it holds");
         let ledger = motion.ledger();
         let sum = |of: &dyn Fn(&super::CycleValues) -> f64| -> f64 {
-            account.cycles.iter().map(|cycle| of(&cycle.values)).sum()
+            balance.cycles.iter().map(|cycle| of(&cycle.values)).sum()
         };
         let mut pairs = vec![
             ("(11)", sum(&|values| values.energy_loss_j), ledger.loss_j()),
@@ -82,7 +82,7 @@ fn cycles_sum_up_to_the_ledger_of_the_model() {
             let backward_m = sum(&|values| values.backward_slide_m[cell]);
             pairs.push(("backward slide", backward_m + 0.1, ledger.backward_slide_m[cell] + 0.1));
         }
-        assert_eq!(account.cycles.len(), 6);
+        assert_eq!(balance.cycles.len(), 6);
         for (name, found, true_value) in pairs {
             let off = (found / true_value - 1.0).abs();
             assert!(off < 3e-3, "{slope_deg}°: {name} is {found}, not {true_value}");
@@ -96,7 +96,7 @@ fn a_cycle_cut_by_less_than_a_sample_counts_and_one_cut_by_more_does_not() {
     let sample_cycles = 1.0 / 300.0;
     for (short_samples, expected) in [(0.0, 5), (0.4, 5), (0.9, 5), (3.0, 4)] {
         let (recording, worm) = recorded(0.0, 5.0 - short_samples * sample_cycles);
-        let cycles = account(&recording, &worm).cycles;
+        let cycles = balance(&recording, &worm).cycles;
         assert_eq!(cycles.len(), expected, "{short_samples} samples short");
         let settled: Vec<bool> = cycles.iter().map(|cycle| cycle.settled).collect();
         assert!(

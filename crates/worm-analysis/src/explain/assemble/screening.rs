@@ -1,16 +1,16 @@
 //! What became of every effect of the library.
 
 use crate::explain::answer::{Screened, ScreeningOutcome};
-use crate::explain::model_selection::Judged;
+use crate::explain::model_selection::Selected;
 use crate::explain::score_test::Screening;
 use worm_physics::effect::{Effect, LIBRARY};
 
 /// The library's scores, and what became of each effect.
-pub(super) fn screening(screened: &[Screening], judged: &Judged, droops: bool) -> Vec<Screened> {
+pub(super) fn screening(screened: &[Screening], selected: &Selected, droops: bool) -> Vec<Screened> {
     let mut rows: Vec<Screened> = screened
         .iter()
         .map(|screening| {
-            let candidate = judged
+            let candidate = selected
                 .all
                 .iter()
                 .find(|candidate| candidate.hypothesised == [screening.hypothesised]);

@@ -15,8 +15,8 @@ pub(super) struct Gap {
 
 impl Gap {
     pub fn measure(problem: &FitProblem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Self {
-        let judged = &parts.judged;
-        let best = judged
+        let selected = &parts.selected;
+        let best = selected
             .candidates
             .first()
             .map_or(&parts.recalibrated, |candidate| &candidate.fit);
@@ -43,7 +43,7 @@ impl Gap {
             .iter()
             .map(|candidate| stage(StageKind::Named, candidate))
             .collect();
-        let wrong = judged
+        let wrong = selected
             .best_wrong
             .as_ref()
             .map(|candidate| stage(StageKind::BestWrong, candidate));

@@ -59,7 +59,7 @@ impl AdvanceKind {
 }
 
 /// The outcome.
-pub(super) struct Judged {
+pub(super) struct Selected {
     pub verdict: Verdict,
     scalars: usize,
     /// What brings the model within chance, likeliest first.
@@ -73,7 +73,7 @@ pub(super) struct Judged {
 }
 
 /// Judges every effect that was fitted.
-pub(super) fn judge(table: &Table<'_>, recalibrated: &Fit, mut candidates: Vec<Candidate>) -> Judged {
+pub(super) fn select_model(table: &Table<'_>, recalibrated: &Fit, mut candidates: Vec<Candidate>) -> Selected {
     let scalars = table.advances.len();
     // Each additional parameter has a cost (Akaike).
     let cost = |candidate: &Candidate| candidate.fit.chi_squared + 2.0 * parameters(candidate) as f64;
@@ -105,7 +105,7 @@ pub(super) fn judge(table: &Table<'_>, recalibrated: &Fit, mut candidates: Vec<C
         .into_iter()
         .partition(|kind| !agrees && is_within(&kind.candidate));
     let is_proven = matches!(&set[..], [only] if scalars > asked(only) && !only.is_any_cell());
-    Judged {
+    Selected {
         verdict: match &set[..] {
             _ if agrees => Verdict::Agrees,
             [] => Verdict::OutsideLibrary,
@@ -138,7 +138,7 @@ fn are_alike(one: &Hypothesised, other: &Hypothesised) -> bool {
     one.effect.name == other.effect.name || are_twins(one, other)
 }
 
-impl Judged {
+impl Selected {
     /// The outcome in a sentence or two.
     pub fn sentence(&self, recalibrated: &Fit) -> String {
         let scalars = self.scalars;

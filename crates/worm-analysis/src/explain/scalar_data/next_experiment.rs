@@ -6,7 +6,7 @@
 use super::super::answer::{ExperimentChange, NextExperiment, Prediction, RunChange, Verdict};
 use super::super::experiment_design::{MIN_ADVANCE, SLOPES_DEG};
 use super::super::fit::Fit;
-use super::model_selection::Judged;
+use super::model_selection::Selected;
 use super::table::Table;
 use worm_physics::Cycle;
 
@@ -14,15 +14,15 @@ use worm_physics::Cycle;
 const MAX_PREDICTIONS: usize = 8;
 
 /// The run to record; none where model and advances agree or one effect is named.
-pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, judged: &Judged) -> Option<NextExperiment> {
-    if matches!(judged.verdict, Verdict::Agrees | Verdict::Explained) {
+pub(super) fn propose(table: &Table<'_>, recalibrated: &Fit, selected: &Selected) -> Option<NextExperiment> {
+    if matches!(selected.verdict, Verdict::Agrees | Verdict::Explained) {
         return None;
     }
     // Where the set is empty, the nearest effects predict; and always the model without any effect.
-    let nearest = if judged.set.is_empty() {
-        &judged.others
+    let nearest = if selected.set.is_empty() {
+        &selected.others
     } else {
-        &judged.set
+        &selected.set
     };
     let mut rivals: Vec<(String, &Fit)> = nearest
         .iter()
