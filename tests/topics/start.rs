@@ -29,6 +29,8 @@ fn child() {
     let [mode, root, worm] = role.split(' ').collect::<Vec<_>>()[..] else {
         panic!("{ROLE}={role}");
     };
+    // The mode mask is inherited, and iceoryx2 changes that of the parent process for moments in other tests.
+    nix::sys::stat::umask(nix::sys::stat::Mode::from_bits_truncate(0o022));
     println!("ready");
     if mode == "reader" {
         let name = fs::read_dir("/dev/shm")
@@ -299,7 +301,7 @@ fn the_root_is_as_open_as_where_it_lies() {
         let parent = tempfile::tempdir_in("/dev/shm").expect("a temporary folder");
         fs::set_permissions(parent.path(), Permissions::from_mode(parent_mode)).expect("is ours");
         let root = parent.path().join("w");
-        // In a process of its own: the mode mask belongs to the whole process, and iceoryx2 changes it for moments in other tests.
+        // In a process of its own, because the mode mask belongs to the whole process.
         Process::start("folders", &root, "open").wait_for("done");
         let mode_of = |path: &Path| path.metadata().expect("is there").permissions().mode() & 0o7777;
         assert_eq!(mode_of(&root), root_mode, "in a folder of mode {parent_mode:o}");
