@@ -1,6 +1,6 @@
 //! The hot paths as the benches run them, each ready for its next step.
 
-use dynamixel_bus::packet::{DeviceId, FastReplyWriter, FastSegment, MAX_PACKET_LEN, StatusFlags};
+use dynamixel_bus::packet::{DeviceId, FastReplyWriter, FastSegment, MAX_PACKET_LEN, ReadSpan, StatusFlags};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
@@ -118,21 +118,8 @@ impl AnsweringPort {
             servo::block_span(plan.servo),
             tracker::block_span(plan.tracker, plan.cells),
         ];
-        let mut reply = [0; MAX_PACKET_LEN];
-        let mut writer = FastReplyWriter::new(&mut reply, spans.iter().map(|span| span.length)).expect("it fits");
-        for span in spans {
-            let data: Vec<u8> = (0..span.length).map(|at| (at * 37 + 11) as u8).collect();
-            writer
-                .push(FastSegment {
-                    id: span.id,
-                    flags: StatusFlags::OK,
-                    data: &data,
-                })
-                .expect("as asked");
-        }
-        let length = writer.len();
         Self {
-            reply: reply[..length].to_vec(),
+            reply: fast_reply(spans),
             is_asked: false,
         }
     }
@@ -160,4 +147,22 @@ impl Port for AnsweringPort {
     fn set_baud_rate(&mut self, _baud: u32) -> Result<(), PortError> {
         Ok(())
     }
+}
+
+/// The answer of both devices to a fast bulk read of these spans, with some data in it.
+pub fn fast_reply(spans: [ReadSpan; 2]) -> Vec<u8> {
+    let mut reply = [0; MAX_PACKET_LEN];
+    let mut writer = FastReplyWriter::new(&mut reply, spans.iter().map(|span| span.length)).expect("it fits");
+    for span in spans {
+        let data: Vec<u8> = (0..span.length).map(|at| (at * 37 + 11) as u8).collect();
+        writer
+            .push(FastSegment {
+                id: span.id,
+                flags: StatusFlags::OK,
+                data: &data,
+            })
+            .expect("as asked");
+    }
+    let length = writer.len();
+    reply[..length].to_vec()
 }
