@@ -11,9 +11,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use dynamixel_bus::packet::DeviceId;
-use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use nix::pty::openpty;
+use testkit::pseudo_terminal::PseudoTerminal;
 use worm_estimator::config::Config;
 use wormd::link::virtual_worm::{Options, VirtualWorm};
 use wormd::link::{
@@ -97,17 +96,6 @@ impl Drop for Process {
     }
 }
 
-/// Both ends of a pseudo-terminal, and the path of the second one.
-fn pseudo_terminal() -> (OwnedFd, OwnedFd, PathBuf) {
-    let ends = openpty(None, None).expect("a pseudo-terminal");
-    for end in [&ends.master, &ends.slave] {
-        // A child that held the near end would keep the line open.
-        fcntl(end, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC)).expect("kept from children");
-    }
-    let path = nix::unistd::ttyname(&ends.slave).expect("its name");
-    (ends.master, ends.slave, path)
-}
-
 /// What the example's pattern says about a capture.
 fn assert_is_of_the_pattern(reading: &TrackerReading, cells: usize) {
     let sample = reading.sample;
@@ -131,7 +119,7 @@ fn assert_is_of_the_pattern(reading: &TrackerReading, cells: usize) {
 
 #[test]
 fn example_tracker_alone_on_a_pseudo_terminal_is_identified_and_read() {
-    let (far, near, path) = pseudo_terminal();
+    let PseudoTerminal { far, near, path } = PseudoTerminal::open();
     let output = far.try_clone().expect("a second descriptor");
     let process = Process::spawn(100, 5, far.into(), output.into());
     let mut bus = WormBus::new(Tty::open(&path, BAUD).expect("the port").0);
@@ -206,7 +194,7 @@ impl SharedLine {
             .open(worm.path())
             .expect("its port");
         let mut tracker = Process::spawn(tracker_id, cells, Stdio::piped(), Stdio::piped());
-        let (far, near, path) = pseudo_terminal();
+        let PseudoTerminal { far, near, path } = PseudoTerminal::open();
         let controller = File::from(far);
         let tracker_input = OwnedFd::from(tracker.0.stdin.take().expect("piped"));
         let tracker_output = OwnedFd::from(tracker.0.stdout.take().expect("piped"));

@@ -8,6 +8,7 @@
 //! - [`log_sample`]: a log of such a crawl.
 //! - [`recording_files`]: recordings of the paper's worm, and files with them.
 //! - [`process_pauses`]: stops and continues real processes, as a busy computer does.
+//! - [`pseudo_terminal`]: a terminal that ends with its test.
 //! - [`html`]: what every page must satisfy.
 
 #![allow(
@@ -22,5 +23,6 @@ pub mod independent_worm;
 pub mod log_sample;
 pub mod nominal;
 pub mod process_pauses;
+pub mod pseudo_terminal;
 pub mod random;
 pub mod recording_files;

@@ -1,10 +1,12 @@
 //! The operating system's port, on a pseudo-terminal.
 
 use std::io::{Read, Write};
-use std::path::Path;
+use std::os::fd::{FromRawFd, IntoRawFd, OwnedFd};
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use serialport::{SerialPort, TTYPort};
+use testkit::pseudo_terminal::PseudoTerminal;
 use wormd::link::{OpenError, Port, PortError, Tty, WormBus, prepare};
 
 use super::startup::settings;
@@ -14,17 +16,18 @@ fn soon() -> Instant {
     Instant::now() + Duration::from_millis(100)
 }
 
-/// The other end, and the path of this one.
-fn pseudo_terminal() -> (TTYPort, TTYPort, String) {
-    let (far, near) = TTYPort::pair().expect("a pseudo-terminal");
-    let path = near.name().expect("a name");
+/// The other end, and this one, which keeps the line open while nobody else has it.
+fn pseudo_terminal() -> (TTYPort, OwnedFd, PathBuf) {
+    let PseudoTerminal { far, near, path } = PseudoTerminal::open();
+    // SAFETY: the descriptor is open, and belongs to the port alone from now on.
+    let far = unsafe { TTYPort::from_raw_fd(far.into_raw_fd()) };
     (far, near, path)
 }
 
 #[test]
 fn bytes_pass_both_ways() {
     let (mut far, _near, path) = pseudo_terminal();
-    let (mut tty, findings) = Tty::open(Path::new(&path), 1_000_000).expect("open");
+    let (mut tty, findings) = Tty::open(&path, 1_000_000).expect("open");
     assert_eq!(findings, []);
     tty.send(&[0xFF, 0x0A, 0x0D, 0x11, 0x00], soon()).expect("sent");
     let mut sent = [0; 5];
@@ -44,7 +47,7 @@ fn bytes_pass_both_ways() {
 #[test]
 fn wait_ends_at_the_deadline() {
     let (_far, _near, path) = pseudo_terminal();
-    let (mut tty, _) = Tty::open(Path::new(&path), 1_000_000).expect("open");
+    let (mut tty, _) = Tty::open(&path, 1_000_000).expect("open");
     let waited = shortest_of_a_few(|| {
         let start = Instant::now();
         assert_eq!(tty.receive(&mut [0; 16], start + Duration::from_millis(20)), Ok(0));
@@ -63,7 +66,7 @@ fn shortest_of_a_few(attempt: impl FnMut() -> Duration) -> Duration {
 #[test]
 fn input_is_discarded_and_counted() {
     let (mut far, _near, path) = pseudo_terminal();
-    let (mut tty, _) = Tty::open(Path::new(&path), 1_000_000).expect("open");
+    let (mut tty, _) = Tty::open(&path, 1_000_000).expect("open");
     far.write_all(&[7; 700]).expect("sent there");
     assert_eq!(tty.discard_input(), Ok(700));
     assert_eq!(tty.discard_input(), Ok(0));
@@ -72,19 +75,19 @@ fn input_is_discarded_and_counted() {
 #[test]
 fn second_controller_is_refused_and_the_first_goes_on() {
     let (mut far, _near, path) = pseudo_terminal();
-    let (mut first, _) = Tty::open(Path::new(&path), 1_000_000).expect("open");
-    let second = Tty::open(Path::new(&path), 1_000_000);
+    let (mut first, _) = Tty::open(&path, 1_000_000).expect("open");
+    let second = Tty::open(&path, 1_000_000);
     assert!(matches!(second, Err(OpenError::AlreadyInUse { .. })), "{second:?}");
     first.send(&[1], soon()).expect("sent");
     far.read_exact(&mut [0]).expect("received there");
     drop(first);
-    Tty::open(Path::new(&path), 1_000_000).expect("open again");
+    Tty::open(&path, 1_000_000).expect("open again");
 }
 
 #[test]
 fn far_end_that_closes_is_told_from_silence() {
     let (far, near, path) = pseudo_terminal();
-    let (mut tty, _) = Tty::open(Path::new(&path), 1_000_000).expect("open");
+    let (mut tty, _) = Tty::open(&path, 1_000_000).expect("open");
     drop((far, near));
     assert_eq!(tty.receive(&mut [0; 16], soon()), Err(PortError::Disconnected));
     assert_eq!(tty.send(&[1], soon()), Err(PortError::Disconnected));
@@ -94,7 +97,7 @@ fn far_end_that_closes_is_told_from_silence() {
 #[test]
 fn port_that_takes_no_bytes_does_not_hold_the_loop() {
     let (_far, _near, path) = pseudo_terminal();
-    let (mut tty, _) = Tty::open(Path::new(&path), 1_000_000).expect("open");
+    let (mut tty, _) = Tty::open(&path, 1_000_000).expect("open");
     let held = shortest_of_a_few(|| {
         let start = Instant::now();
         let sent = tty.send(&vec![0; 1 << 20], start + Duration::from_millis(30));
@@ -136,7 +139,7 @@ fn worm_behind_a_pseudo_terminal_is_prepared_and_ticks_until_it_is_unplugged() {
     let ticks = 500;
     // One tick's request is that of start-up, which tries the read mode.
     let worm = std::thread::spawn(move || serve(far, Worm::new(5), 1 + ticks));
-    let (tty, mut findings) = Tty::open(Path::new(&path), 1_000_000).expect("open");
+    let (tty, mut findings) = Tty::open(&path, 1_000_000).expect("open");
     drop(near);
     let mut bus = WormBus::new(tty);
     let prepared = prepare(&mut bus, &settings(), &mut findings).expect("prepared");
@@ -151,7 +154,7 @@ fn worm_behind_a_pseudo_terminal_is_prepared_and_ticks_until_it_is_unplugged() {
     // A busy computer may have cost start-up an answer, which it asked for again.
     assert_eq!((counters.timeouts, counters.garbage_bytes), (at_start.timeouts, 0));
     worm.join().expect("served");
-    // A process that another test is starting holds a copy of the far end until it runs its own program.
+    // A process that another test is just starting holds a copy of the far end until it runs its own program.
     let limit = Instant::now() + Duration::from_secs(5);
     while !bus.exchange(&prepared.plan, 2.5, soon()).is_disconnected() {
         assert!(Instant::now() < limit, "the terminal is gone, and nobody says so");
