@@ -70,8 +70,7 @@ fn follow(cycles: &mut Subscriber<Cycle>) -> Result<f64, Box<dyn Error>> {
 fn command(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Result<(), Box<dyn Error>> {
     let request = Command {
         cycles_per_s,
-        kind: kind.code(),
-        reserved: 0,
+        ..Command::new(kind)
     };
     let reply = client.call(request, ANSWER_TIME)?;
     match CommandOutcome::try_from(reply.verdict)? {

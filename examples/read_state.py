@@ -53,11 +53,15 @@ class State(ctypes.Structure):
         ("fault", ctypes.c_uint32),
         ("fault_alarm", ctypes.c_uint32),
         ("hardware_error", ctypes.c_uint32),
+        ("hold_reason", ctypes.c_uint32),
+        ("acknowledged_mask", ctypes.c_uint32),
+        ("acknowledged_by", ctypes.c_uint32),
+        ("emergency_stop", ctypes.c_uint32),
     ]
 
     @staticmethod
     def type_name():
-        return "wormd_state_v2"
+        return "wormd_state_v3"
 
 
 def join(worm, root):

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{Command, CommandKind};
 use worm_physics::MAX_CELLS;
-use wormd::control::{Controller, Inputs, Service, ServiceOutcome};
+use wormd::control::{Controller, EstimateSeen, Inputs, Lease, Service, ServiceOutcome};
 use wormd::link::{ExchangePlan, Port, PortError, ReadPlan, ServoReading, TrackerReading, WormBus, servo, tracker};
 
 const SERVO_READING: ServoReading = ServoReading {
@@ -28,6 +28,7 @@ pub struct Crawling {
     controller: Controller,
     tracker: TrackerReading,
     now_ns: u64,
+    tick: u64,
 }
 
 impl Crawling {
@@ -42,13 +43,10 @@ impl Crawling {
                 positions_m: [0.1; MAX_CELLS],
             },
             now_ns: 0,
+            tick: 0,
         };
         crawling.tick_with(None, Some(ServiceOutcome::Done(Service::Arm)));
-        let crawl = Command {
-            cycles_per_s: 0.0,
-            kind: CommandKind::Crawl.code(),
-            reserved: 0,
-        };
+        let crawl = Command::new(CommandKind::Crawl);
         crawling.tick_with(Some(crawl), None);
         crawling
     }
@@ -60,6 +58,7 @@ impl Crawling {
 
     fn tick_with(&mut self, command: Option<Command>, service: Option<ServiceOutcome>) {
         self.now_ns += 1_000_000;
+        self.tick += 1;
         self.tracker.sample += 1;
         let inputs = Inputs {
             now_ns: self.now_ns,
@@ -69,7 +68,12 @@ impl Crawling {
             tracker: Some(&self.tracker),
             command,
             alarms: &[],
-            estimate_arrived: true,
+            estimate: Some(EstimateSeen {
+                state_sequence: self.tick,
+                raised_mask: 0,
+            }),
+            lease: Lease::Held,
+            emergency_stop: Some(false),
             end: false,
             service,
             hardware_error: None,

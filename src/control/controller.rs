@@ -138,7 +138,7 @@ impl Controller {
         self.assembler.state.link_failures += u64::from(inputs.lost_exchanges);
         self.assembler.take_servo(inputs.now_ns, now_ns, inputs.servo);
         self.assembler.take_tracker(inputs.now_ns, now_ns, inputs.tracker);
-        if inputs.estimate_arrived {
+        if inputs.estimate.is_some() {
             self.estimate_seen_ns = Some(now_ns);
         }
         if let Some(bits) = inputs.hardware_error {
@@ -309,7 +309,7 @@ impl Controller {
             verdict: verdict.code(),
             mode: self.mode.code(),
             fault: self.fault.code(),
-            reserved: 0,
+            alarm_mask: 0,
         }
     }
 

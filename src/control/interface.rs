@@ -1,7 +1,7 @@
 //! What goes into a tick and what comes out of it.
 
 use crate::link::{ServoReading, TrackerReading};
-use worm_estimator::message::{Alarm, Command, Reply, State};
+use worm_estimator::message::{Alarm, Command, Estimate, Reply, State};
 
 /// Inputs of one tick.
 #[derive(Debug, Clone, Copy)]
@@ -20,14 +20,47 @@ pub struct Inputs<'a> {
     pub command: Option<Command>,
     /// Alarm changes that arrived since the last tick.
     pub alarms: &'a [Alarm],
-    /// Whether an estimate arrived since the last tick.
-    pub estimate_arrived: bool,
+    /// The newest estimate, if one arrived since the last tick.
+    pub estimate: Option<EstimateSeen>,
+    /// The lease under which the worm crawls.
+    pub lease: Lease,
+    /// Whether the emergency stop is pressed; none where there is none.
+    pub emergency_stop: Option<bool>,
     /// Whether the process was asked to end.
     pub end: bool,
     /// The outcome of the service that the last tick requested, if any.
     pub service: Option<ServiceOutcome>,
     /// The servo's hardware error status, if it was read since the last tick.
     pub hardware_error: Option<u8>,
+}
+
+/// What a tick needs of an [`Estimate`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EstimateSeen {
+    /// The tick whose state it is based on.
+    pub state_sequence: u64,
+    /// Bit k set: the alarm with code k is raised.
+    pub raised_mask: u32,
+}
+
+impl From<&Estimate> for EstimateSeen {
+    fn from(estimate: &Estimate) -> Self {
+        Self {
+            state_sequence: estimate.state_sequence,
+            raised_mask: estimate.raised_mask,
+        }
+    }
+}
+
+/// Whether whoever started the controller still watches over the crawl.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lease {
+    /// The controller was started by itself: crawls are limited in time.
+    None,
+    /// The supervisor is there and renews the lease.
+    Held,
+    /// The supervisor has gone, or has been silent for `control.lease_s`.
+    Lapsed,
 }
 
 /// Work on the bus beyond the tick's exchange. It takes several milliseconds, so it is done only while the worm stands still.

@@ -29,6 +29,6 @@ mod state_assembler;
 
 pub use controller::Controller;
 pub use hardware::{Drive, DriveError, link_settings};
-pub use interface::{Inputs, Outputs, Service, ServiceOutcome};
+pub use interface::{EstimateSeen, Inputs, Lease, Outputs, Service, ServiceOutcome};
 pub use run::{Ending, RunError, run};
 pub use schedule::{Schedule, bus_allowed_ns};

@@ -3,7 +3,7 @@
 
 use super::controller::Controller;
 use super::hardware::Drive;
-use super::interface::{Inputs, Outputs, Service, ServiceOutcome};
+use super::interface::{EstimateSeen, Inputs, Lease, Outputs, Service, ServiceOutcome};
 use super::journal::{Entry, Journal};
 use super::loop_clock::{ExchangeTimes, MIN_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
@@ -218,7 +218,7 @@ impl Loop {
         let resumed = monotonic_ns();
 
         let alarm_count = self.ports.take_alarms(&mut self.alarms);
-        let estimate_arrived = matches!(self.ports.estimates.latest(), Ok(Some(_)));
+        let estimate = self.ports.estimates.latest().ok().flatten();
         let (command, responder) = split(self.ports.commands.take());
         let inputs = Inputs {
             // A service takes long, and no reading is requested meanwhile: silences count from its end.
@@ -229,7 +229,9 @@ impl Loop {
             tracker: outcome.tracker.as_ref().ok(),
             command,
             alarms: &self.alarms[..alarm_count],
-            estimate_arrived,
+            estimate: estimate.as_deref().map(EstimateSeen::from),
+            lease: Lease::None,
+            emergency_stop: None,
             end,
             service: served.map(|(outcome, _)| outcome),
             hardware_error: served.and_then(|(_, hardware_error)| hardware_error),

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::topics::CommandClient;
 use std::time::Duration;
-use worm_estimator::message::{Command, CommandKind, CommandOutcome, Fault, Mode, Reply};
+use worm_estimator::message::{AlarmKind, Command, CommandKind, CommandOutcome, Fault, Mode, Reply};
 
 /// How long the controller may take to answer: a reset prepares the servo again, which takes a while on a slow bus.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
@@ -22,8 +22,7 @@ pub(crate) struct Answer {
 pub(crate) fn send(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Result<Answer, Failure> {
     let command = Command {
         cycles_per_s,
-        kind: kind.code(),
-        reserved: 0,
+        ..Command::new(kind)
     };
     let reply = client.call(command, REPLY_TIMEOUT).map_err(Failure::failed)?;
     let outcome = CommandOutcome::try_from(reply.verdict).map_err(Failure::failed)?;
@@ -78,6 +77,11 @@ impl Answer {
             CommandOutcome::NoEstimator => {
                 "no estimator is running: start `wormd estimate`, or set control.require_estimator = false".to_owned()
             }
+            CommandOutcome::AlarmStands => format!(
+                "an alarm stands ({}): remove its cause; alarms of motion clear after two seconds at rest, the others let \
+                 the worm move after `wormd command reset`",
+                alarm_names(self.reply.alarm_mask)
+            ),
             CommandOutcome::Unknown => {
                 "this controller does not know the command: is it of another version?".to_owned()
             }
@@ -92,4 +96,13 @@ impl Answer {
     fn fault(&self) -> &'static str {
         Fault::try_from(self.reply.fault).map_or("unknown", Fault::name)
     }
+}
+
+/// The alarms of a mask, by name.
+fn alarm_names(mask: u32) -> String {
+    let names = AlarmKind::ALL
+        .iter()
+        .filter(|kind| mask >> kind.code() & 1 == 1)
+        .map(|kind| kind.name());
+    names.collect::<Vec<_>>().join(", ")
 }

@@ -122,11 +122,7 @@ impl Worm {
 
     /// Commands the controller.
     pub fn order(&self, kind: CommandKind) -> CommandOutcome {
-        let order = Order {
-            cycles_per_s: 0.0,
-            kind: kind.code(),
-            reserved: 0,
-        };
+        let order = Order::new(kind);
         let reply = self
             .with_ears(|receiver| receiver.client.call(order, Duration::from_secs(5)))
             .expect("an answer");

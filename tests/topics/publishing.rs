@@ -305,15 +305,10 @@ fn a_command_is_answered_once_and_an_abandoned_one_is_not_carried_out() {
     let instance = home.instance("worm1");
     let hub = Hub::open(&instance).expect("hub");
     let client = hub.command_client().expect("client");
-    let arm = Command {
-        cycles_per_s: 0.0,
-        kind: CommandKind::Arm.code(),
-        reserved: 0,
-    };
+    let arm = Command::new(CommandKind::Arm);
     let crawl = Command {
         cycles_per_s: 0.4,
-        kind: CommandKind::Crawl.code(),
-        reserved: 0,
+        ..Command::new(CommandKind::Crawl)
     };
 
     let error = client.call(arm, SECOND).expect_err("nobody is there");
@@ -373,7 +368,7 @@ fn a_command_is_answered_once_and_an_abandoned_one_is_not_carried_out() {
                 verdict: CommandOutcome::Accepted.code(),
                 mode: Mode::Crawling.code(),
                 fault: 0,
-                reserved: 0,
+                alarm_mask: 0,
             };
             responder.answer(&reply).expect("answer");
         }

@@ -5,7 +5,7 @@ use super::machine::{Exchange, Machine};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::Observer;
 use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, State};
-use wormd::control::{Controller, Inputs, Outputs};
+use wormd::control::{Controller, EstimateSeen, Inputs, Lease, Outputs};
 
 /// The estimator's heartbeat while no sample comes, s.
 const HEARTBEAT_S: f64 = 0.1;
@@ -38,7 +38,7 @@ pub struct Session<M> {
     waiting: Vec<State>,
     last: Option<Outputs>,
     on_the_way: Vec<Alarm>,
-    estimate_on_the_way: bool,
+    estimate_on_the_way: Option<EstimateSeen>,
     spoken_ns: u64,
     /// Every alarm that was raised.
     pub raised: Vec<Alarm>,
@@ -69,7 +69,7 @@ impl<M: Machine> Session<M> {
             waiting: Vec::new(),
             last: None,
             on_the_way: Vec::new(),
-            estimate_on_the_way: false,
+            estimate_on_the_way: None,
             spoken_ns: 0,
             raised: Vec::new(),
             cycles: None,
@@ -108,8 +108,7 @@ impl<M: Machine> Session<M> {
     pub fn command(&mut self, kind: CommandKind, cycles_per_s: f64) {
         let command = Command {
             cycles_per_s,
-            kind: kind.code(),
-            reserved: 0,
+            ..Command::new(kind)
         };
         let verdict = self.tick(Some(command)).verdict;
         assert_eq!(
@@ -186,14 +185,15 @@ impl<M: Machine> Session<M> {
             tracker: exchange.tracker.as_ref(),
             command,
             alarms: &self.on_the_way,
-            estimate_arrived: self.estimate_on_the_way,
+            estimate: self.estimate_on_the_way.take(),
+            lease: Lease::Held,
+            emergency_stop: None,
             end: false,
             service: served.as_ref().map(|served| served.outcome),
             hardware_error: served.and_then(|served| served.hardware_error),
         });
         self.last = Some(outputs);
         self.on_the_way.clear();
-        self.estimate_on_the_way = false;
         self.waiting.push(outputs.state);
         if self.now_ns >= self.estimator_stands_until_ns {
             for state in std::mem::take(&mut self.waiting) {
@@ -216,7 +216,7 @@ impl<M: Machine> Session<M> {
             .extend(report.alarms.iter().filter(|alarm| alarm.raised == 1));
         let beats = state.time_ns.saturating_sub(self.spoken_ns) as f64 * 1e-9 >= HEARTBEAT_S;
         if report.estimate.is_some() || beats {
-            self.estimate_on_the_way = true;
+            self.estimate_on_the_way = Some((&self.observer.latest()).into());
             self.spoken_ns = state.time_ns;
         }
         if let (Some(cycles), Some(cycle)) = (&mut self.cycles, report.cycle) {

@@ -3,11 +3,22 @@
 use super::channel::Channel;
 use std::borrow::Cow;
 
+/// What states have since version 3; a macro, for `concat!` takes no constant.
+macro_rules! not_in_state_v2 {
+    () => {
+        "\"hold_reason\":\"none\",\"acknowledged_mask\":0,\"acknowledged_by\":null,\"emergency_stop\":null,"
+    };
+}
+
 /// The members that messages of an older type lack, as JSON, with the value for "not known"; nothing if it is not an older type of the
 /// channel.
 pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'static str> {
     match (channel, type_name) {
-        (Channel::State, "wormd_state_v1") => Some("\"motor_time_s\":null,\"host_paused_ns\":0,"),
+        (Channel::State, "wormd_state_v1") => Some(concat!(
+            "\"motor_time_s\":null,\"host_paused_ns\":0,",
+            not_in_state_v2!()
+        )),
+        (Channel::State, "wormd_state_v2") => Some(not_in_state_v2!()),
         (Channel::Cycle, "wormd_cycle_v1") => Some("\"host_paused_s\":0.0,"),
         _ => None,
     }

@@ -203,6 +203,43 @@ pub struct Control {
     pub adapt_rate: bool,
     /// Whether the worm crawls on by itself, if that is safe, after a pause of the computer has stopped it.
     pub resume_after_pause: bool,
+    /// How long the lease of `wormd up` lasts without being renewed, s.
+    pub lease_s: f64,
+    /// What a crawling worm does when its lease lapses.
+    pub on_lapsed_lease: OnLapsedLease,
+    /// How long a worm crawls by a command that names no time, where nobody holds a lease, s.
+    pub crawl_limit_s: f64,
+    /// Time without motion after which torque goes off, s.
+    pub idle_disarm_s: f64,
+    /// Where torque goes off after idling.
+    pub idle_disarm: IdleDisarm,
+}
+
+/// What a crawling worm does when whoever made it crawl is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnLapsedLease {
+    /// Stands still at once and keeps the cam where it is: a worm on a slope must not fall.
+    Hold,
+    /// Stands still at once and switches torque off.
+    Stop,
+}
+
+/// Where torque goes off after idling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IdleDisarm {
+    /// On slopes of at most [`IdleDisarm::LEVEL_DEG`]; on a steeper one the worm goes on holding.
+    Level,
+    /// Everywhere.
+    Always,
+    /// Nowhere.
+    Never,
+}
+
+impl IdleDisarm {
+    /// Steepest slope that counts as level, degrees.
+    pub const LEVEL_DEG: f64 = 5.0;
 }
 
 impl Default for Control {
@@ -218,6 +255,11 @@ impl Default for Control {
             back_off_cycles: 1.0,
             adapt_rate: true,
             resume_after_pause: false,
+            lease_s: 1.0,
+            on_lapsed_lease: OnLapsedLease::Hold,
+            crawl_limit_s: 600.0,
+            idle_disarm_s: 300.0,
+            idle_disarm: IdleDisarm::Level,
         }
     }
 }
@@ -231,6 +273,9 @@ impl Control {
         checker.range("control.estimator_timeout_s", self.estimator_timeout_s, 0.1..=10.0, "s");
         checker.range("control.hold_gain_per_s", self.hold_gain_per_s, 0.1..=50.0, "1/s");
         checker.range("control.back_off_cycles", self.back_off_cycles, 0.1..=100.0, "cycles");
+        checker.range("control.lease_s", self.lease_s, 0.1..=60.0, "s");
+        checker.range("control.crawl_limit_s", self.crawl_limit_s, 1.0..=1e6, "s");
+        checker.range("control.idle_disarm_s", self.idle_disarm_s, 1.0..=1e6, "s");
     }
 }
 

@@ -18,7 +18,9 @@ pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
-pub use machine::{Battery, Control, Estimator, Limits, Port, ReadMode, Realtime, Servo, Topics, Tracker};
+pub use machine::{
+    Battery, Control, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode, Realtime, Servo, Topics, Tracker,
+};
 pub use physics::PhysicsError;
 pub use virtual_worm::VirtualWorm;
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};

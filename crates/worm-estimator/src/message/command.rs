@@ -14,8 +14,11 @@ coded_enum! {
         Hold = 2 => "hold",
         /// Ramp down, then torque off.
         Stop = 3 => "stop",
-        /// Leave the fault state; the worm is re-armed from the measured position.
+        /// Leave the fault state, re-armed from the measured position; with torque on, permit motion despite the alarms that stand and
+        /// do not clear at rest.
         Reset = 4 => "reset",
+        /// Note that somebody has seen the alarms of [`Command::alarm_mask`]. Permits nothing.
+        Acknowledge = 5 => "acknowledge",
     }
 }
 
@@ -34,25 +37,48 @@ coded_enum! {
         Unknown = 4 => "unknown",
         /// No estimator is running, and the configuration requires one for crawling.
         NoEstimator = 5 => "no-estimator",
+        /// An alarm stands whose policy is more than a warning; [`Reply::alarm_mask`] has it.
+        AlarmStands = 6 => "alarm-stands",
     }
 }
 
 /// A request to the controller.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_command_v1")]
+#[type_name("wormd_command_v2")]
 #[repr(C)]
 pub struct Command {
     /// Gait cycles per second for [`CommandKind::Crawl`], negative for backward; 0 means the configured gait.
     pub cycles_per_s: f64,
+    /// For [`CommandKind::Crawl`], how long the worm may crawl before it holds, s. 0 leaves it to the controller: as long as the lease of
+    /// `wormd up` lasts, and without one `control.crawl_limit_s`.
+    pub limit_s: f64,
     /// [`CommandKind`] as a code.
     pub kind: u32,
+    /// Bit k set: the command concerns the alarm with code k, for [`CommandKind::Acknowledge`].
+    pub alarm_mask: u32,
+    /// User ID of the sender, for the record.
+    pub user: u32,
     /// Padding to a multiple of eight bytes; zero.
     pub reserved: u32,
 }
 
+impl Command {
+    /// A command without parameters, of user 0.
+    pub const fn new(kind: CommandKind) -> Self {
+        Self {
+            cycles_per_s: 0.0,
+            limit_s: 0.0,
+            kind: kind.code(),
+            alarm_mask: 0,
+            user: 0,
+            reserved: 0,
+        }
+    }
+}
+
 /// The controller's answer.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_reply_v1")]
+#[type_name("wormd_reply_v2")]
 #[repr(C)]
 pub struct Reply {
     /// Tick in which the command was processed.
@@ -63,6 +89,6 @@ pub struct Reply {
     pub mode: u32,
     /// [`super::Fault`] as a code.
     pub fault: u32,
-    /// Padding to a multiple of eight bytes; zero.
-    pub reserved: u32,
+    /// Bit k set: the alarm with code k stands in the way of the command.
+    pub alarm_mask: u32,
 }

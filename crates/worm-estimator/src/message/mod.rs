@@ -25,7 +25,7 @@ pub use command::{Command, CommandKind, CommandOutcome, Reply};
 pub use cycle::Cycle;
 pub use estimate::Estimate;
 pub use json::JsonMessage;
-pub use state::{Fault, Mode, State};
+pub use state::{Fault, HoldReason, Mode, State};
 pub use timing::{Culprit, Timing};
 
 // The trait and its derive share a name, as in iceoryx2's own prelude. Taken from its parts, they do without shared memory.

@@ -50,12 +50,30 @@ coded_enum! {
         Alarm = 10 => "alarm",
         /// The computer did not run the controller for so long that the servo's own bus watchdog stopped the motor.
         HostPaused = 11 => "host-paused",
+        /// The emergency stop is pressed, or cannot be read.
+        EmergencyStop = 12 => "emergency-stop",
+    }
+}
+
+coded_enum! {
+    /// Why the controller is in [`Mode::Holding`].
+    HoldReason, "hold reason" {
+        /// It is not holding.
+        None = 0 => "none",
+        /// A command.
+        Command = 1 => "command",
+        /// An alarm with policy `hold`, or the end of a back-off.
+        Alarm = 2 => "alarm",
+        /// Whoever made the worm crawl is gone, or does not renew its lease.
+        LeaseLapsed = 3 => "lease-lapsed",
+        /// The time for which it was to crawl is over.
+        TimeLimit = 4 => "time-limit",
     }
 }
 
 message! {
     /// One tick of the controller, published every tick.
-    State = "wormd_state_v2", made: time_ns, cells: |state| state.cell_count, {
+    State = "wormd_state_v3", made: time_ns, cells: |state| state.cell_count, {
         /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
         sequence: u64,
         /// When the tick's work on the bus ended, ns of `CLOCK_MONOTONIC`: its exchange, or a service after it, such as arming.
@@ -108,6 +126,14 @@ message! {
         fault_alarm: u32 as OrNone<Name<AlarmKind>>,
         /// Servo register 70, hardware error status, as last read.
         hardware_error: u32,
+        /// [`HoldReason`] as a code.
+        hold_reason: u32 as Name<HoldReason>,
+        /// Bit k set: the alarm with code k stands and was acknowledged.
+        acknowledged_mask: u32,
+        /// User ID of whoever acknowledged an alarm last, or `u32::MAX`.
+        acknowledged_by: u32 as OrNone<u32>,
+        /// 1 while the emergency stop is pressed, else 0; `u32::MAX` where there is none.
+        emergency_stop: u32 as OrNone<u32>,
     }
 }
 
@@ -140,6 +166,10 @@ impl State {
             fault: Fault::None.code(),
             fault_alarm: u32::MAX,
             hardware_error: 0,
+            hold_reason: HoldReason::None.code(),
+            acknowledged_mask: 0,
+            acknowledged_by: u32::MAX,
+            emergency_stop: u32::MAX,
         }
     }
 

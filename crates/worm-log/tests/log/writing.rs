@@ -79,18 +79,25 @@ fn states_of_an_older_version_are_read_without_what_they_lack() {
     let path = folder.path().join("worm.mcap");
     let state = crawl(0.1).states[0];
     let mut object: serde_json::Map<_, _> = serde_json::from_slice(&text(&[state])).expect("JSON");
-    for member in ["motor_time_s", "host_paused_ns"] {
-        object.remove(member).expect("is new");
-    }
-    let older = serde_json::Value::from(object).to_string();
-    fs::write(&path, foreign("/state", "wormd_state_v1", "json", &older)).expect("can be written");
-    let read = messages(&path).expect("a log").states;
+    let mut read_as = |version: &str, lacking: &[&str]| {
+        for member in lacking {
+            object.remove(*member).expect("is new");
+        }
+        let older = serde_json::Value::from(object.clone()).to_string();
+        fs::write(&path, foreign("/state", version, "json", &older)).expect("can be written");
+        text(&messages(&path).expect("a log").states)
+    };
+    let new_in_v3 = ["hold_reason", "acknowledged_mask", "acknowledged_by", "emergency_stop"];
+    assert_eq!(read_as("wormd_state_v2", &new_in_v3), text(&[state]));
     let expected = State {
         motor_time_s: f64::NAN,
         host_paused_ns: 0,
         ..state
     };
-    assert_eq!(text(&read), text(&[expected]));
+    assert_eq!(
+        read_as("wormd_state_v1", &["motor_time_s", "host_paused_ns"]),
+        text(&[expected])
+    );
 }
 
 #[test]
@@ -107,7 +114,7 @@ fn other_files_are_refused_with_what_to_do() {
             &["channel /state: has no channel of a worm, only /tf"],
         ),
         (
-            foreign("/state", "wormd_state_v2", "cdr", "x"),
+            foreign("/state", "wormd_state_v3", "cdr", "x"),
             &[
                 "channel /state: holds messages encoded as 'cdr', not as 'json'",
                 "wormd record",
@@ -115,10 +122,10 @@ fn other_files_are_refused_with_what_to_do() {
         ),
         (
             foreign("/state", "wormd_state_v9", "json", "{}"),
-            &["channel /state: holds 'wormd_state_v9', and this version of wormd reads 'wormd_state_v2'"],
+            &["channel /state: holds 'wormd_state_v9', and this version of wormd reads 'wormd_state_v3'"],
         ),
         (
-            foreign("/state", "wormd_state_v2", "json", "{\"sequence\": -1}"),
+            foreign("/state", "wormd_state_v3", "json", "{\"sequence\": -1}"),
             &[
                 "channel /state, message 7: cannot be read: invalid value: integer `-1`",
                 "line 1 column",

@@ -7,6 +7,7 @@ mod properties;
 mod readings;
 
 use super::*;
+use crate::control::{EstimateSeen, Lease};
 use crate::link::TrackerReading;
 
 const MS: u64 = 1_000_000;
@@ -111,7 +112,12 @@ impl Rig {
             tracker: self.servo_answers.then_some(&self.tracker),
             command,
             alarms: alarm.as_slice(),
-            estimate_arrived: self.estimator_runs,
+            estimate: self.estimator_runs.then(|| EstimateSeen {
+                state_sequence: self.last.map_or(0, |last| last.state.sequence),
+                raised_mask: 0,
+            }),
+            lease: Lease::Held,
+            emergency_stop: None,
             end: self.end,
             service,
             hardware_error: None,
@@ -141,8 +147,7 @@ impl Rig {
         let reply = self
             .tick(Some(Command {
                 cycles_per_s,
-                kind: kind.code(),
-                reserved: 0,
+                ..Command::new(kind)
             }))
             .reply;
         CommandOutcome::try_from(reply.expect("every command is answered").verdict).expect("a known verdict")

@@ -43,7 +43,7 @@ proptest! {
             let mut ticks = 1;
             let mut command = None;
             match event {
-                Event::Command(kind, cycles_per_s) => command = Some(Command { cycles_per_s, kind, reserved: 0 }),
+                Event::Command(kind, cycles_per_s) => command = Some(Command { cycles_per_s, kind, ..Command::new(CommandKind::Stop) }),
                 Event::Alarm(kind) => {
                     rig.raise(AlarmKind::MotorStall);
                     if let Some(alarm) = &mut rig.alarm {
