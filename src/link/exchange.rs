@@ -91,7 +91,7 @@ pub struct ExchangeOutcome {
     pub goal_taken: bool,
     /// A reading is the late answer to an earlier exchange.
     pub late: bool,
-    /// Earlier exchanges of which it is known now that the servo's answer never comes.
+    /// Earlier exchanges of which the servo's answer counts as lost now: some time after the fact, as it might have been late.
     pub lost: u32,
     /// Bytes sent.
     pub sent_bytes: u32,
@@ -149,9 +149,6 @@ impl ReadFailure {
 
 /// Maximum number of bytes of late answers that are decoded: those of a tenth of a second at 1 kHz. The rest is discarded.
 const LATE_LIMIT: usize = 16 * 1024;
-
-/// Requests without an answer before the oldest counts as lost: those of a tenth of a second at 1 kHz.
-const MAX_OWED: u32 = 100;
 
 /// The answers received so far.
 struct Answers {
@@ -259,9 +256,10 @@ impl<P: Port> WormBus<P> {
     /// [`ReadPlan::Separate`] the servo has half of the time, so that its silence does not cost the tracker's answer.
     pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
         let before = self.bus.counters();
+        let asked = Instant::now();
         self.exchange_counters.exchanges += 1;
         let mut late = Answers::NOTHING;
-        if self.answers_owed > 0 {
+        if self.owed.is_any() {
             // A port that fails here fails in the exchange, too.
             let _ = self.bus.take_late_packets(LATE_LIMIT, |packet, counters| match packet {
                 Packet::Status(status) => late.take_status(plan, &status, counters),
@@ -285,15 +283,13 @@ impl<P: Port> WormBus<P> {
         let stale_bytes = self.bus.counters().stale_bytes - before.stale_bytes;
         let late_answers = late.servo_answers.max((stale_bytes / plan.answer_len()) as u32);
         // With separate reads, the request to the tracker throws away what the servo answers after its half of the time.
-        let discarded = late_answers.saturating_sub(self.answers_owed);
-        let lost = self.count_lost(late_answers);
+        let discarded = self.owed.take_late(late_answers);
+        let lost = self.owed.ask(asked, harvest.servo_answers + discarded);
         let counters = self.bus.counters_mut();
         for failure in [harvest.servo.err(), harvest.tracker.err()] {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
         }
         self.exchange_counters.partial_answers += u64::from(harvest.servo.is_ok() != harvest.tracker.is_ok());
-        self.answers_owed = (self.answers_owed + 1).saturating_sub(harvest.servo_answers + discarded);
-        self.was_answered = harvest.servo_answers > 0;
         let received_bytes = (counters.received_bytes - before.received_bytes) as u32;
         self.silent_in_a_row = if received_bytes == 0 {
             self.silent_in_a_row.saturating_add(1)
@@ -316,19 +312,6 @@ impl<P: Port> WormBus<P> {
             received_bytes,
             silent_in_a_row: self.silent_in_a_row,
         }
-    }
-
-    /// How many answers will never come, when `late` of those owed have come late. Answers come in the order of the questions: where
-    /// the servo has answered since and nothing more is on the line, what is still owed got lost.
-    fn count_lost(&mut self, late: u32) -> u32 {
-        self.answers_owed = self.answers_owed.saturating_sub(late);
-        let lost = if self.was_answered && late == 0 {
-            self.answers_owed
-        } else {
-            self.answers_owed.saturating_sub(MAX_OWED)
-        };
-        self.answers_owed -= lost;
-        lost
     }
 
     fn exchange_bulk(

@@ -43,6 +43,7 @@
 mod counters;
 mod exchange;
 mod operations;
+mod owed_answers;
 pub mod servo;
 mod startup;
 pub mod tracker;

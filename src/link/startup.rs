@@ -300,7 +300,12 @@ fn set_status_level<P: Port>(bus: &mut WormBus<P>, servo: DeviceId, level: u32) 
             return Ok(());
         }
     }
+    // Only the answers may have got lost, so it is asked once more, and more persistently.
     let found = bus.register(servo, register)?;
+    if found == level {
+        bus.set_writes_are_answered(level == ANSWER_ALL);
+        return Ok(());
+    }
     Err(OperationError::NotKept {
         id: servo,
         register,

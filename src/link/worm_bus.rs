@@ -2,6 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 
+use super::owed_answers::OwedAnswers;
 use super::{Bus, ExchangeCounters, LinkCounters, Port};
 
 /// A [`Bus`] with a worm's servo and tracker on it: what any bus can do, and the [exchange](Self::exchange) of a tick.
@@ -10,9 +11,7 @@ pub struct WormBus<P> {
     pub(super) bus: Bus<P>,
     pub(super) exchange_counters: ExchangeCounters,
     /// Exchanges to which the servo's answer may still come.
-    pub(super) answers_owed: u32,
-    /// Whether an answer of the servo arrived in the last exchange, even if to an earlier request.
-    pub(super) was_answered: bool,
+    pub(super) owed: OwedAnswers,
     /// Exchanges since a device last sent anything.
     pub(super) silent_in_a_row: u32,
 }
@@ -23,8 +22,7 @@ impl<P: Port> WormBus<P> {
         Self {
             bus: Bus::new(port),
             exchange_counters: ExchangeCounters::NONE,
-            answers_owed: 0,
-            was_answered: false,
+            owed: OwedAnswers::NONE,
             silent_in_a_row: 0,
         }
     }

@@ -16,8 +16,8 @@ use testkit::pseudo_terminal::PseudoTerminal;
 use worm_estimator::config::Config;
 use wormd::link::virtual_worm::{Options, VirtualWorm};
 use wormd::link::{
-    FaultInjector, Faults, LinkSettings, ReadMode, ReadPlan, StartupError, TrackerReading, TransactionError, Tty,
-    WormBus, prepare, tracker,
+    FaultInjector, Faults, LinkSettings, Port, Prepared, ReadMode, ReadPlan, StartupError, TrackerReading,
+    TransactionError, Tty, WormBus, prepare, tracker,
 };
 
 const BAUD: u32 = 1_000_000;
@@ -266,12 +266,24 @@ fn settings(read: ReadMode) -> LinkSettings {
     }
 }
 
+/// Prepares the devices: several processes answer here, and on a busy computer each may pause for longer than start-up waits.
+fn prepare_patiently<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Prepared {
+    let mut refusals = Vec::new();
+    for _ in 0..10 {
+        match prepare(bus, settings, &mut Vec::new()) {
+            Ok(prepared) => return prepared,
+            Err(refusal) => refusals.push(refusal.to_string()),
+        }
+    }
+    panic!("never ready to tick: {refusals:?}");
+}
+
 #[test]
 fn example_tracker_and_a_servo_on_one_line_are_prepared_and_exchanged_with() {
     let line = SharedLine::new(100, CELLS);
     for plan in [ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate] {
         let mut bus = WormBus::new(line.open());
-        let prepared = prepare(&mut bus, &settings(ReadMode::Always(plan)), &mut Vec::new()).expect("ready to tick");
+        let prepared = prepare_patiently(&mut bus, &settings(ReadMode::Always(plan)));
         assert_eq!((prepared.plan.read, usize::from(prepared.tracker_cells)), (plan, CELLS));
         assert_is_of_the_pattern(&prepared.tracker_reading, CELLS);
         bus.set_torque(prepared.plan.servo, true).expect("torque");
@@ -294,7 +306,7 @@ fn example_tracker_and_a_servo_on_one_line_are_prepared_and_exchanged_with() {
 fn damage_on_the_line_never_becomes_a_reading_of_the_example_tracker() {
     let line = SharedLine::new(100, CELLS);
     let mut bus = WormBus::new(FaultInjector::new(line.open(), Faults::NONE, 20_161_114));
-    let prepared = prepare(&mut bus, &settings(ReadMode::Auto), &mut Vec::new()).expect("ready to tick");
+    let prepared = prepare_patiently(&mut bus, &settings(ReadMode::Auto));
     bus.port_mut().set_faults(Faults {
         flip: 0.002,
         drop: 0.001,

@@ -46,7 +46,11 @@ fn link_and_virtual_worm_understand_each_other() {
     let worm = spawn(&[], None);
     let mut bus = open(worm.path(), BAUD);
     let mut findings = Vec::new();
-    let prepared = prepare(&mut bus, &settings(), &mut findings).expect("a worm that is ready");
+    let settings = LinkSettings {
+        watchdog_ms: 2540, // a pause of this computer must not stop the motor
+        ..settings()
+    };
+    let prepared = prepare(&mut bus, &settings, &mut findings).expect("a worm that is ready");
     assert_eq!(prepared.plan.read, ReadPlan::FastBulk);
     assert!(findings.iter().all(|finding| finding.corrected), "{findings:?}");
     bus.set_torque(prepared.plan.servo, true).expect("torque");

@@ -238,19 +238,50 @@ fn an_answer_that_the_next_request_discards_is_not_lost() {
 }
 
 #[test]
-fn an_answer_that_never_comes_is_lost_when_the_next_one_has_come() {
+fn answers_that_never_come_are_lost_when_many_later_ones_have_come() {
     let silent = Faults {
         silence: 2..5,
         ..Faults::NONE
     };
     let mut bus = bus(silent, 1);
-    let lost: Vec<u32> = (0..8)
-        .map(|_| {
+    let mut lost_of = |exchanges: u32| -> u32 {
+        let exchange = |_| {
             let wait = Instant::now() + Duration::from_millis(2);
             bus.exchange(&plan(ReadPlan::FastBulk), 1.0, wait).lost
-        })
-        .collect();
-    assert_eq!(lost, [0, 0, 0, 0, 0, 0, 3, 0]);
+        };
+        (0..exchanges).map(exchange).sum()
+    };
+    assert_eq!(lost_of(5 + 31), 0, "they might still be on their way");
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!((lost_of(1), lost_of(100)), (3, 0));
+}
+
+#[test]
+fn a_line_one_answer_behind_that_catches_up_has_lost_nothing() {
+    for read in [ReadPlan::FastBulk, ReadPlan::Bulk] {
+        for behind_for in [1, 2, 3, 10, 31] {
+            let mut worm = Worm::new(5);
+            worm.set_servo(register::STATUS_RETURN_LEVEL, 1);
+            let mut bus = WormBus::new(worm);
+            bus.set_writes_are_answered(false);
+            let exchange = |bus: &mut WormBus<Worm>| {
+                let wait = Instant::now() + Duration::from_millis(2);
+                bus.exchange(&plan(read), 1.0, wait)
+            };
+            // Each answer comes just after the next request: there is none in time, then always the one before.
+            bus.port_mut().quirks.one_late = true;
+            let mut lost = exchange(&mut bus).lost;
+            for _ in 0..behind_for {
+                let outcome = exchange(&mut bus);
+                assert!(outcome.is_complete() && !outcome.late, "{read:?}");
+                lost += outcome.lost;
+            }
+            // Then two come at once, and each in its time.
+            bus.port_mut().quirks.one_late = false;
+            lost += (0..50).map(|_| exchange(&mut bus).lost).sum::<u32>();
+            assert_eq!(lost, 0, "{read:?}, behind for {behind_for} exchanges");
+        }
+    }
 }
 
 #[test]

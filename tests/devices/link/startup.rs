@@ -3,7 +3,8 @@
 use dynamixel_bus::packet::DeviceId;
 use wormd::link::servo::register;
 use wormd::link::{
-    Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError, WormBus, prepare, tracker,
+    FaultInjector, Faults, Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError, WormBus,
+    prepare, tracker,
 };
 
 use super::worm::{SERVO, TRACKER, Worm, id};
@@ -177,6 +178,17 @@ fn setting_that_is_not_kept_is_refused() {
         found: 3,
     };
     assert_eq!(prepared, Err(StartupError::Operation(not_kept)));
+}
+
+#[test]
+fn status_level_is_set_though_its_first_answers_get_lost() {
+    let lost = Faults {
+        silence: 1..7, // after the ping: three attempts of a write and a read
+        ..Faults::NONE
+    };
+    let mut bus = WormBus::new(FaultInjector::new(Worm::new(5), lost, 1));
+    let prepared = prepare(&mut bus, &settings(), &mut Vec::new());
+    assert!(prepared.is_ok(), "{prepared:?}");
 }
 
 #[test]

@@ -1,0 +1,156 @@
+//! Which answers of the servo are still to come, and which never will.
+//!
+//! The protocol numbers no packets: an answer that comes after the next request looks like the answer to that one, and the real one may
+//! still be on its way. So the first answer in a question's time is taken for its own and a further one for that of the oldest open
+//! question. An open question counts as lost only when many later ones have been answered and some time has passed: a line that is
+//! behind by some answers has caught up by then. One that stays behind for longer counts once as having lost so many.
+
+use std::time::{Duration, Instant};
+
+/// Answered questions that have to follow an open one before it counts as lost.
+const PASSED_BY: u32 = 32;
+
+/// Time that has to pass as well: a loop that makes up for a pause may ask many questions in a moment.
+const OVERDUE: Duration = Duration::from_millis(100);
+
+/// Questions that may be open before the oldest counts as lost: those of a tenth of a second at 1 kHz.
+const MAX_OPEN: usize = 100;
+
+/// An open question.
+#[derive(Debug, Clone, Copy)]
+struct Question {
+    asked: Instant,
+    /// How many had been answered by then.
+    answered_before: u32,
+}
+
+/// Open questions to the servo. Their memory is fixed.
+#[derive(Debug)]
+pub(super) struct OwedAnswers {
+    ring: [Option<Question>; MAX_OPEN],
+    oldest: usize,
+    open: usize,
+    /// Questions answered in their own time, wrapping.
+    answered: u32,
+}
+
+impl OwedAnswers {
+    /// No question is open.
+    pub(super) const NONE: Self = Self {
+        ring: [None; MAX_OPEN],
+        oldest: 0,
+        open: 0,
+        answered: 0,
+    };
+
+    /// Whether any question is open.
+    pub(super) const fn is_any(&self) -> bool {
+        self.open > 0
+    }
+
+    /// Takes this many answers to earlier questions. Returns how many of them no question was open for.
+    pub(super) fn take_late(&mut self, answers: u32) -> u32 {
+        let taken = self.open.min(answers as usize);
+        self.forget_oldest(taken);
+        answers - taken as u32
+    }
+
+    /// Notes that a question was asked, and how many answers came in its time. Returns how many earlier ones count as lost now.
+    pub(super) fn ask(&mut self, asked: Instant, answers: u32) -> u32 {
+        let mut lost = 0;
+        if answers == 0 {
+            if self.open == MAX_OPEN {
+                self.forget_oldest(1);
+                lost += 1;
+            }
+            self.ring[(self.oldest + self.open) % MAX_OPEN] = Some(Question {
+                asked,
+                answered_before: self.answered,
+            });
+            self.open += 1;
+            return lost;
+        }
+        self.answered = self.answered.wrapping_add(1);
+        self.take_late(answers - 1);
+        while self.oldest().is_some_and(|question| {
+            self.answered.wrapping_sub(question.answered_before) >= PASSED_BY
+                && asked.saturating_duration_since(question.asked) >= OVERDUE
+        }) {
+            self.forget_oldest(1);
+            lost += 1;
+        }
+        lost
+    }
+
+    fn oldest(&self) -> Option<Question> {
+        self.ring[self.oldest].filter(|_| self.is_any())
+    }
+
+    const fn forget_oldest(&mut self, count: usize) {
+        self.oldest = (self.oldest + count) % MAX_OPEN;
+        self.open -= count;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Questions at an interval, each with so many answers; what each lost.
+    fn ask(
+        owed: &mut OwedAnswers,
+        at: &mut Instant,
+        interval: Duration,
+        answers: impl Iterator<Item = u32>,
+    ) -> Vec<u32> {
+        let lost = answers.map(|answers| {
+            *at += interval;
+            owed.ask(*at, answers)
+        });
+        lost.collect()
+    }
+
+    #[test]
+    fn an_open_question_is_lost_when_many_later_ones_are_answered_and_it_is_overdue() {
+        for (interval_ms, lost_after) in [(1, 99), (4, PASSED_BY as usize), (200, PASSED_BY as usize)] {
+            let (mut owed, mut at) = (OwedAnswers::NONE, Instant::now());
+            let interval = Duration::from_millis(interval_ms);
+            let answers = [0, 0].into_iter().chain(std::iter::repeat_n(1, 150));
+            let lost = ask(&mut owed, &mut at, interval, answers);
+            let mut expected = vec![0; 152];
+            if interval_ms == 1 {
+                // The second one is overdue a question later.
+                (expected[1 + lost_after], expected[2 + lost_after]) = (1, 1);
+            } else {
+                expected[1 + lost_after] = 2;
+            }
+            assert_eq!((lost, owed.is_any()), (expected, false), "every {interval_ms} ms");
+        }
+    }
+
+    #[test]
+    fn a_line_that_catches_up_has_lost_nothing() {
+        let ms = Duration::from_millis;
+        // (questions behind, questions for which it stays so, interval)
+        for (behind, stays, interval) in [(1, 31, ms(50)), (5, 90, ms(1)), (3, 500, Duration::from_micros(70))] {
+            let (mut owed, mut at) = (OwedAnswers::NONE, Instant::now());
+            let unanswered = std::iter::repeat_n(0, behind);
+            let answers = unanswered.chain(std::iter::repeat_n(1, stays));
+            let mut lost = ask(&mut owed, &mut at, interval, answers);
+            if behind == 1 {
+                lost.push(owed.ask(at, 2)); // both at once
+            } else {
+                assert_eq!(owed.take_late(behind as u32 + 1), 1, "one that nobody waited for");
+            }
+            assert_eq!((lost.iter().sum::<u32>(), owed.is_any()), (0, false), "{behind} behind");
+        }
+    }
+
+    #[test]
+    fn a_silent_servo_loses_the_oldest_when_too_many_are_open() {
+        let (mut owed, mut at) = (OwedAnswers::NONE, Instant::now());
+        let answers = std::iter::repeat_n(0, 3 * MAX_OPEN);
+        let lost = ask(&mut owed, &mut at, Duration::from_millis(1), answers);
+        assert_eq!((lost.iter().sum::<u32>(), owed.open), (2 * MAX_OPEN as u32, MAX_OPEN));
+    }
+}
