@@ -253,10 +253,10 @@ impl<P: Port> WormBus<P> {
     /// Sends the goal velocity and reads both devices' blocks, until both have come or `deadline` has passed.
     ///
     /// Allocates nothing, and waits nowhere but on the port. What one device says is used though the other is silent. With
-    /// [`ReadPlan::Separate`] the servo has half of the time, so that its silence does not cost the tracker's answer.
+    /// [`ReadPlan::Separate`] the servo has half of the time, so that its silence does not cost the tracker's answer. Time between
+    /// exchanges is that between their deadlines, so a caller in virtual time gives deadlines in virtual time.
     pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
         let before = self.bus.counters();
-        let asked = Instant::now();
         self.exchange_counters.exchanges += 1;
         let mut late = Answers::NOTHING;
         if self.owed.is_any() {
@@ -284,7 +284,7 @@ impl<P: Port> WormBus<P> {
         let late_answers = late.servo_answers.max((stale_bytes / plan.answer_len()) as u32);
         // With separate reads, the request to the tracker throws away what the servo answers after its half of the time.
         let discarded = self.owed.take_late(late_answers);
-        let lost = self.owed.ask(asked, harvest.servo_answers + discarded);
+        let lost = self.owed.ask(deadline, harvest.servo_answers + discarded);
         let counters = self.bus.counters_mut();
         for failure in [harvest.servo.err(), harvest.tracker.err()] {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));

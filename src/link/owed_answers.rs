@@ -19,7 +19,7 @@ const MAX_OPEN: usize = 100;
 /// An open question.
 #[derive(Debug, Clone, Copy)]
 struct Question {
-    asked: Instant,
+    deadline: Instant,
     /// How many had been answered by then.
     answered_before: u32,
 }
@@ -55,8 +55,9 @@ impl OwedAnswers {
         answers - taken as u32
     }
 
-    /// Notes that a question was asked, and how many answers came in its time. Returns how many earlier ones count as lost now.
-    pub(super) fn ask(&mut self, asked: Instant, answers: u32) -> u32 {
+    /// Notes that a question was asked with this deadline, and how many answers came in its time. Returns how many earlier ones count as
+    /// lost now.
+    pub(super) fn ask(&mut self, deadline: Instant, answers: u32) -> u32 {
         let mut lost = 0;
         if answers == 0 {
             if self.open == MAX_OPEN {
@@ -64,7 +65,7 @@ impl OwedAnswers {
                 lost += 1;
             }
             self.ring[(self.oldest + self.open) % MAX_OPEN] = Some(Question {
-                asked,
+                deadline,
                 answered_before: self.answered,
             });
             self.open += 1;
@@ -74,7 +75,7 @@ impl OwedAnswers {
         self.take_late(answers - 1);
         while self.oldest().is_some_and(|question| {
             self.answered.wrapping_sub(question.answered_before) >= PASSED_BY
-                && asked.saturating_duration_since(question.asked) >= OVERDUE
+                && deadline.saturating_duration_since(question.deadline) >= OVERDUE
         }) {
             self.forget_oldest(1);
             lost += 1;
