@@ -90,6 +90,8 @@ pub struct Wired {
     bus: WormBus<Wire>,
     settings: LinkSettings,
     plan: ExchangePlan,
+    /// Deadline of an exchange at the virtual time 0, far enough away never to pass.
+    epoch: Instant,
 }
 
 impl Wired {
@@ -106,7 +108,12 @@ impl Wired {
         let plan = prepare(&mut bus, &settings, &mut Vec::new())
             .expect("a sound worm")
             .plan;
-        Self { bus, settings, plan }
+        Self {
+            bus,
+            settings,
+            plan,
+            epoch: Instant::now() + NEVER,
+        }
     }
 
     /// When the first goal velocity other than zero was obeyed, s.
@@ -140,7 +147,9 @@ impl Machine for Wired {
         let wire = self.bus.port_mut();
         (wire.now_s, wire.timeout_s) = (now_s, TICK_PATIENCE_S);
         let goal_rad_s = f64::from(goal_counts) * scale::VELOCITY_RAD_S;
-        let outcome = self.bus.exchange(&self.plan, goal_rad_s, Instant::now() + NEVER);
+        let outcome = self
+            .bus
+            .exchange(&self.plan, goal_rad_s, self.epoch + Duration::from_secs_f64(now_s));
         Exchange {
             servo: outcome.servo.ok(),
             tracker: outcome.tracker.ok(),
