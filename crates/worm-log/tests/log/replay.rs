@@ -135,8 +135,14 @@ fn the_alarm_about_a_recorder_is_left_out() {
     let mut replay = replay(&log, &config).expect("a valid configuration");
     // What an estimator without a recorder would have found.
     replay.alarms = vec![
-        Alarm { sequence: 0, ..log.alarms[1] },
-        Alarm { sequence: 1, ..log.alarms[3] },
+        Alarm {
+            sequence: 0,
+            ..log.alarms[1]
+        },
+        Alarm {
+            sequence: 1,
+            ..log.alarms[3]
+        },
     ];
     let comparison = compare(&log, &replay);
     assert!(comparison.complete && comparison.is_identical(), "{comparison:?}");

@@ -60,10 +60,18 @@ fn a_full_disk_raises_it_at_once_until_a_new_recorder_writes() {
     bench.run(0.01);
     assert_eq!(changes(&bench), [(1, 1.0, 0.0)]);
     bench.run(60.0);
-    assert_eq!(bench.raised(), [RecordingStopped], "the recorder is gone, and the alarm stays");
+    assert_eq!(
+        bench.raised(),
+        [RecordingStopped],
+        "the recorder is gone, and the alarm stays"
+    );
     bench.restart_controller();
     bench.run(1.0);
-    assert_eq!(bench.raised(), [RecordingStopped], "a new controller changes nothing about it");
+    assert_eq!(
+        bench.raised(),
+        [RecordingStopped],
+        "a new controller changes nothing about it"
+    );
     record(&mut bench, 3);
     assert_eq!(bench.raised(), []);
 }
@@ -83,7 +91,10 @@ fn a_killed_recorder_raises_it_after_its_silence_and_a_pause_is_no_silence() {
     assert_eq!(changes(&bench), []);
     bench.run(0.2);
     let (raised, value, threshold) = changes(&bench)[0];
-    assert!((raised, threshold) == (1, 5.0) && (5.0..5.1).contains(&value), "{value}");
+    assert!(
+        (raised, threshold) == (1, 5.0) && (5.0..5.1).contains(&value),
+        "{value}"
+    );
     let since_ns = bench.changes.iter().map(|alarm| alarm.since_ns).next_back();
     assert_eq!(since_ns, Some(fell_silent_ns), "since its last report");
     report(&mut bench, RecordingState::Ended, RecordingProblem::None);
