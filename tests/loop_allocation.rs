@@ -59,40 +59,47 @@ fn a_tick_allocates_only_what_a_loan_takes() {
     assert_eq!(allocations, LOANS_PER_TICK * ticks, "{ticks} ticks");
 }
 
+/// Gait cycles of 2.5 s in a year.
+const CYCLES_PER_YEAR: u64 = 365 * 24 * 3600 * 2 / 5;
+
+/// What a year of crawling leaves with who watches it, with a change of an alarm every two minutes.
+fn watch_for_a_year() -> Telemetry {
+    // SAFETY: messages are plain numbers, of which zero is one.
+    let (mut cycle, mut timing): (Cycle, Timing) = unsafe { (std::mem::zeroed(), std::mem::zeroed()) };
+    let mut alarm = Alarm::NONE;
+    let mut telemetry = Telemetry::default();
+    for index in 0..CYCLES_PER_YEAR {
+        cycle.index = index;
+        telemetry.take_cycle(&cycle);
+        if index % 50 == 0 {
+            alarm.sequence += 1;
+            alarm.raised = 1 - alarm.raised;
+            telemetry.take_alarm(&alarm);
+        }
+        if index % 100 == 0 {
+            timing.sequence += 1;
+            // From 1 ns to far beyond the longest that is resolved, in no order.
+            timing.bus_ns = 1 << (timing.sequence * 7 % 40);
+            timing.culprit = (timing.sequence % 8) as u32;
+            timing.overrun = 1;
+            telemetry.take_timing(&timing);
+        }
+    }
+    telemetry
+}
+
 #[test]
 fn a_year_of_watching_stays_within_fifty_megabytes() {
-    const CYCLES: u64 = 365 * 24 * 3600 * 2 / 5; // of 2.5 s
-    // SAFETY: messages are plain numbers, of which zero is one.
-    let (cycle, timing): (Cycle, Timing) = unsafe { (std::mem::zeroed(), std::mem::zeroed()) };
     let mut telemetry = None;
-    let allocated = allocation_counter::measure(|| {
-        let mut watched = Telemetry::default();
-        for index in 0..CYCLES {
-            watched.take_cycle(&Cycle { index, ..cycle });
-            if index % 50 == 0 {
-                watched.take_alarm(&Alarm {
-                    sequence: index / 50,
-                    raised: (index / 50 % 2) as u32,
-                    ..Alarm::NONE
-                });
-            }
-            if index % 100 == 0 {
-                watched.take_timing(&Timing {
-                    sequence: index / 100,
-                    // From 1 ns to far beyond the longest that is resolved, in no order.
-                    bus_ns: 1 << (index / 100 * 7 % 40),
-                    culprit: (index / 100 % 8) as u32,
-                    overrun: 1,
-                    ..timing
-                });
-            }
-        }
-        telemetry = Some(watched);
-    });
+    let allocated = allocation_counter::measure(|| telemetry = Some(watch_for_a_year()));
     let telemetry = telemetry.expect("was measured");
     println!("{} bytes, {} at most", allocated.bytes_current, allocated.bytes_max);
-    assert_eq!(telemetry.cycles.total(), CYCLES);
-    assert!(telemetry.cycles.last().is_some_and(|cycle| cycle.index == CYCLES - 1));
+    assert_eq!(telemetry.cycles.total(), CYCLES_PER_YEAR);
+    assert_eq!(
+        telemetry.cycles.last().map(|cycle| cycle.index),
+        Some(CYCLES_PER_YEAR - 1)
+    );
+    assert!(telemetry.tick_stats.ticks > 100_000, "{}", telemetry.tick_stats.ticks);
     assert!(
         allocated.bytes_current < 50_000_000,
         "{} bytes",

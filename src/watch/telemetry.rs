@@ -4,7 +4,7 @@ use super::recent::Recent;
 use crate::latency::TickStats;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, RecordingStatus, State, Timing};
 
-/// How many cycles are kept: two days of the usual gait, 36 MB.
+/// How many cycles are kept: nearly two days of the usual gait, 45 MB.
 const MAX_CYCLES: usize = 1 << 16;
 
 /// How many changes of alarms are kept, 0.6 MB.

@@ -5,6 +5,7 @@
 
 mod explaining;
 mod latency;
+mod leaks;
 mod leaving;
 mod recording;
 mod recording_stops;
