@@ -32,12 +32,14 @@ pub(super) const fn has_stopped(status: &RecordingStatus) -> bool {
 
 /// What the alarm `recording-stopped` means; none for other alarms.
 pub(crate) fn alarm_text(alarm: &Alarm) -> Option<String> {
-    if alarm.kind != AlarmKind::RecordingStopped.code() {
-        return None;
+    (alarm.kind == AlarmKind::RecordingStopped.code()).then(|| text(alarm.value, alarm.threshold))
+}
+
+/// The words for value and threshold of that alarm.
+pub(super) fn text(value: f64, threshold: f64) -> String {
+    if threshold > 0.0 {
+        return format!("nothing heard of the recorder for {value:.1} s");
     }
-    if alarm.threshold > 0.0 {
-        return Some(format!("nothing heard of the recorder for {:.1} s", alarm.value));
-    }
-    let problem = RecordingProblem::try_from(alarm.value as u32).map_or("unknown", RecordingProblem::name);
-    Some(problem.to_owned())
+    let problem = RecordingProblem::try_from(value as u32).map_or("unknown", RecordingProblem::name);
+    problem.to_owned()
 }

@@ -1,7 +1,7 @@
 //! The summary of a run that `wormd up` prints, as text and as JSON. The JSON names are a contract.
 
-use super::mismatch;
 use super::telemetry::Telemetry;
+use super::{mismatch, recording};
 use crate::latency::{HostPauses, Percentiles, WorstTicks};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -332,6 +332,9 @@ impl fmt::Display for Summary {
                     format!(" ({what}; `wormd explain` names the cause)")
                 }
                 (Some(cell), None) => format!(" (cell {cell})"),
+                (None, _) if alarm.alarm == AlarmKind::RecordingStopped.name() => {
+                    format!(" ({})", recording::text(alarm.value, alarm.threshold))
+                }
                 (None, _) => String::new(),
             };
             let cleared = alarm

@@ -283,6 +283,7 @@ fn a_recording_is_shown() {
         value: 1.0,
         threshold: 0.0,
         kind: AlarmKind::RecordingStopped.code(),
+        severity: Severity::Warning.code(),
         cell: u32::MAX,
         ..alarm(3, 6_000_000_000, 1)
     });
@@ -290,6 +291,8 @@ fn a_recording_is_shown() {
     for part in ["recording stopped: disk-full", "recording-stopped: disk-full"] {
         assert!(picture.contains(part), "{part} is not in {picture}");
     }
+    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling).to_string();
+    assert!(summary.contains("recording-stopped (disk-full): warning"), "{summary}");
 }
 
 /// An alarm stays shown as raised, however many other changes came since.
