@@ -2,18 +2,21 @@
 
 use crate::failure::Failure;
 use crate::realtime::{self, Grant};
-use crate::topics::{Estimator, Hub, Notifier, PortError, PublishError, Publisher, RoleLock};
+use crate::topics::{Estimator, Hub, Notifier, PortError, PublishError, Publisher, RoleLock, Subscriber};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{Observer, ObserverOutput};
-use worm_estimator::message::{Alarm, Cycle, Estimate, State};
+use worm_estimator::message::{Alarm, Cycle, Estimate, RecordingStatus, State};
 
 /// Longest sleep without an event from the controller; should an event get lost, its state is read this much later.
 const MAX_SLEEP: Duration = Duration::from_millis(10);
 
 /// Interval at which the last estimate is published again while no state comes, so that the controller knows it is alive.
 const HEARTBEAT: Duration = Duration::from_millis(50);
+
+/// How often the recorder's reports are read, which come once a second.
+const RECORDER_POLL: Duration = Duration::from_millis(100);
 
 /// The estimator's priority lies this far below the loop's: above ordinary processes, and never in the loop's way.
 pub(crate) const PRIORITY_BELOW_LOOP: u8 = 20;
@@ -33,11 +36,17 @@ pub(crate) fn run(
 ) -> Result<(), Failure> {
     let mut observer = Observer::new(config).map_err(Failure::unusable)?;
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
+    let mut recordings = hub.subscriber::<RecordingStatus>().map_err(Failure::failed)?;
+    let mut recorder_polled = Instant::now();
     let state_event = hub.listener::<State>().map_err(Failure::failed)?;
     let mut output = OutputTopics::open(hub, role).map_err(Failure::failed)?;
     ready(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     while !end.load(Ordering::Relaxed) {
         state_event.wait(MAX_SLEEP).map_err(Failure::failed)?;
+        if recorder_polled.elapsed() >= RECORDER_POLL {
+            recorder_polled = Instant::now();
+            note_recording(&mut recordings, &mut observer);
+        }
         while let Some(state) = states.next().map_err(Failure::failed)? {
             on_state(&state);
             output.publish(&observer.update(&state)).map_err(Failure::failed)?;
@@ -47,6 +56,15 @@ pub(crate) fn run(
         }
     }
     Ok(())
+}
+
+/// Reads the recorder's reports. One that cannot be read is one that did not come.
+fn note_recording(recordings: &mut Subscriber<RecordingStatus>, observer: &mut Observer) {
+    match recordings.latest() {
+        Ok(Some(status)) => observer.note_recording(&status),
+        Ok(None) => {}
+        Err(error) => tracing::debug!("{error}"),
+    }
 }
 
 /// The topics that the estimator writes.

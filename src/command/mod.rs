@@ -13,6 +13,7 @@ pub mod latency;
 pub mod latency_floor;
 mod progress;
 pub mod record;
+mod recording_limits;
 pub mod replay;
 pub mod send_command;
 #[cfg(feature = "analysis")]

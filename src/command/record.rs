@@ -1,5 +1,6 @@
 //! `wormd record`: the topics of a worm into a log.
 
+use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::recorder::Recorder;
 use clap::Args;
@@ -15,7 +16,9 @@ pub struct RecordArgs {
     /// The log, an MCAP file
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Overwrite an existing file
+    #[command(flatten)]
+    limits: RecordingLimits,
+    /// Overwrite existing files
     #[arg(long)]
     force: bool,
     /// End after this time, counted from the first message; without it, on Ctrl-C
@@ -43,8 +46,9 @@ fn channel(name: &str) -> Result<Channel, String> {
 /// the file cannot be written.
 pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     let (config, text) = args.worm.load_with_text()?;
+    let limits = args.limits.limits().map_err(Failure::unusable)?;
     let end = end_on_signal()?;
-    let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force)?;
+    let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force, limits)?;
     let (worm, file) = (&config.worm.name, args.out.display());
     print::log_line(format_args!("recording {worm} to {file}, from its first message on"));
     print::ready();

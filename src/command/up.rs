@@ -2,6 +2,7 @@
 
 mod screen;
 
+use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::supervisor::child_process::Log;
 use crate::supervisor::crawl;
@@ -34,6 +35,8 @@ pub struct UpArgs {
     /// Record all topics to this MCAP file, from the first state to the last, as `wormd record` does
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    #[command(flatten)]
+    record_limits: RecordingLimits,
 }
 
 /// Runs `wormd up`.
@@ -48,6 +51,12 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
             "--fault is for the virtual worm, but a port is configured",
         ));
     }
+    if args.record.is_none() && !args.record_limits.is_empty() {
+        return Err(Failure::unusable(
+            "--max-size, --max-age and --keep are for a recording: give --record FILE, too",
+        ));
+    }
+    args.record_limits.limits().map_err(Failure::unusable)?;
     let end = end_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;
     let role = RoleLock::<Supervisor>::take(&instance).map_err(Failure::unusable)?;
@@ -57,6 +66,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
         config: args.worm.config.clone(),
         faults: args.fault.clone(),
         record: args.record.clone(),
+        record_limits: args.record_limits.forward(),
         verbose,
     };
     let mut processes = Processes::start(&launch, &config, &instance, &log, &end)?;

@@ -148,14 +148,8 @@ fn write_entries(shared: &Shared) {
                 Entry::PortBack => tracing::info!("the serial port is open again"),
             }
         }
-        recurring.log_what_is_due(is_over);
-        let dropped = shared.dropped.swap(0, Ordering::Relaxed);
-        if dropped > 0 {
-            tracing::warn!(
-                dropped,
-                "log entries were dropped: the loop logged faster than the entries could be written"
-            );
-        }
+        recurring.take_dropped(shared.dropped.swap(0, Ordering::Relaxed));
+        recurring.log_what_is_due(monotonic_ns(), is_over);
         if is_over {
             return;
         }
@@ -236,6 +230,7 @@ struct Recurring {
     late: Summed<LateTicks>,
     pauses: Summed<Pauses>,
     changes_of_rate: Summed<(u64, f64)>,
+    dropped: Summed<u64>,
     told_of_rate: bool,
 }
 
@@ -277,8 +272,14 @@ impl Recurring {
         }
     }
 
-    fn log_what_is_due(&mut self, is_over: bool) {
-        let now_ns = monotonic_ns();
+    /// Entries for which there was no place in the queue.
+    fn take_dropped(&mut self, entries: u64) {
+        if entries > 0 {
+            self.dropped.add(|dropped| *dropped += entries);
+        }
+    }
+
+    fn log_what_is_due(&mut self, now_ns: u64, is_over: bool) {
         if let Some(late) = self.late.take_due(now_ns, is_over) {
             late.log();
         }
@@ -287,6 +288,65 @@ impl Recurring {
         }
         if let Some((changes, newest_hz)) = self.changes_of_rate.take_due(now_ns, is_over) {
             tracing::info!(changes, newest_hz, "the loop's rate was adapted again");
+        }
+        if let Some(dropped) = self.dropped.take_due(now_ns, is_over) {
+            tracing::warn!(
+                dropped,
+                "log entries were dropped: the loop logged faster than the entries could be written"
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Read, Seek};
+
+    /// What ten minutes on a computer log that pauses, is late and starves the logging thread several times a second.
+    fn log_of_ten_bad_minutes() -> String {
+        let mut written = tempfile::tempfile().expect("a temporary file");
+        let subscriber = tracing_subscriber::fmt()
+            .with_writer(Arc::new(written.try_clone().expect("a descriptor is free")))
+            .with_ansi(false)
+            .finish();
+        tracing::subscriber::with_default(subscriber, || {
+            let mut recurring = Recurring::default();
+            let polls = 10 * 60 * 50;
+            for poll in 0..=polls {
+                if poll % 10 == 0 {
+                    recurring.take_pause(20_000_000, Counts::default());
+                    recurring.take_late(poll, 3, Culprit::Wake, 4_000);
+                    recurring.take_rate(1000.0, 500.0);
+                    recurring.take_dropped(7);
+                }
+                recurring.log_what_is_due(poll * 20_000_000, poll == polls);
+            }
+        });
+        let mut log = String::new();
+        written.rewind().expect("is a file");
+        written.read_to_string(&mut log).expect("is text");
+        log
+    }
+
+    #[test]
+    fn a_busy_computer_does_not_fill_the_log() {
+        let log = log_of_ten_bad_minutes();
+        for (what, counter, lines, sum) in [
+            ("host-paused", "pauses=", 12, 3001),
+            ("ticks ended late", "deadlines_missed=", 12, 9003),
+            ("log entries were dropped", "dropped=", 12, 21_007),
+            ("adapted again", "changes=", 11, 3000),
+            ("does not hold 1000 Hz", "", 1, 0),
+        ] {
+            let of_kind: Vec<&str> = log.lines().filter(|line| line.contains(what)).collect();
+            assert!(of_kind.len() <= lines, "{what}: {} lines", of_kind.len());
+            let count = |line: &&str| {
+                let number = line.split_once(counter)?.1.split_whitespace().next()?;
+                number.parse::<u64>().ok()
+            };
+            let counted: u64 = of_kind.iter().filter_map(count).sum();
+            assert_eq!(counted, sum, "{what}: nothing is left out\n{log}");
         }
     }
 }

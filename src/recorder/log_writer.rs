@@ -1,14 +1,16 @@
 //! The thread that writes the log, with a queue in front of it for as long as a disk may stall.
 
+use super::file_series::{FileSeries, RotationLimits, SeriesError};
+use super::log_file::{LogFile, creation_failure};
+use super::progress::Progress;
 use crate::failure::Failure;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
-use std::fs::File;
-use std::io::{self, BufWriter};
 use std::path::Path;
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
-use worm_log::{Channel, Logged, Origin, WriteError, Writer};
+use worm_log::{Channel, Origin};
 
 /// Interval of the synchronisation to disk: a power loss costs at most this, and what is in the queue.
 const SYNC_INTERVAL: Duration = Duration::from_millis(200);
@@ -36,7 +38,7 @@ impl Batch {
 /// The writing thread.
 pub(super) struct LogWriter {
     queue: Sender<Batch>,
-    thread: JoinHandle<Result<Counts, Failure>>,
+    thread: JoinHandle<Result<Counts, SeriesError>>,
 }
 
 /// Messages written, by channel.
@@ -47,32 +49,25 @@ impl LogWriter {
     ///
     /// # Errors
     /// [`Failure::Unusable`] when the file exists and `force` is not set, or it cannot be created.
-    pub(super) fn open(path: &Path, force: bool, origin: &Origin) -> Result<Self, Failure> {
-        let mut options = File::options();
-        options.write(true).create(true).truncate(true).create_new(!force);
-        let file = options.open(path).map_err(|error| {
-            let name = path.display();
-            Failure::unusable(match error.kind() {
-                io::ErrorKind::AlreadyExists => {
-                    format!("{name} exists already: choose another name, or overwrite it with `wormd record --force`")
-                }
-                _ => format!("{name} cannot be written: {error}: choose another place"),
-            })
-        })?;
-        let synced = file.try_clone().map_err(Failure::failed)?;
-        let writer = Writer::new(BufWriter::new(file), path, origin).map_err(Failure::failed)?;
+    pub(super) fn open(
+        path: &Path,
+        force: bool,
+        limits: RotationLimits,
+        origin: Origin,
+        progress: &Arc<Progress>,
+    ) -> Result<Self, Failure> {
+        let file = LogFile::create(path, force, progress).map_err(|error| creation_failure(path, &error))?;
+        if limits.is_rotating() && !file.is_regular() {
+            return Err(Failure::unusable(format!(
+                "{} is no ordinary file, which no other can follow: leave out --max-size and --max-age",
+                path.display()
+            )));
+        }
+        let series = FileSeries::begin(path, file, force, origin, limits, progress).map_err(Failure::failed)?;
         let (queue, batches) = bounded(QUEUE);
-        let path = path.to_owned();
         let thread = std::thread::Builder::new()
             .name("log".to_owned())
-            .spawn(move || {
-                write_batches(writer, &synced, &batches).map_err(|error| match error {
-                    Stopped::Write(error) => Failure::failed(error),
-                    Stopped::Sync(error) => {
-                        Failure::failed(format!("{}: {error}: is the disk still there?", path.display()))
-                    }
-                })
-            })
+            .spawn(move || write_batches(series, &batches))
             .map_err(Failure::failed)?;
         Ok(Self { queue, thread })
     }
@@ -82,9 +77,22 @@ impl LogWriter {
     /// # Errors
     /// When the thread has ended; [`LogWriter::close`] returns why.
     pub(super) fn write(&self, batch: Batch) -> Result<(), Failure> {
-        self.queue
-            .send(batch)
-            .map_err(|_| Failure::failed("the log could not be written"))
+        self.queue.send(batch).map_err(|_| Self::stopped())
+    }
+
+    /// Checks that the thread still writes, where there is nothing to write.
+    ///
+    /// # Errors
+    /// As [`LogWriter::write`].
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        if self.thread.is_finished() {
+            return Err(Self::stopped());
+        }
+        Ok(())
+    }
+
+    fn stopped() -> Failure {
+        Failure::failed("the log could not be written")
     }
 
     /// Finishes the log; returns how many messages each channel got.
@@ -94,60 +102,34 @@ impl LogWriter {
     pub(super) fn close(self) -> Result<Counts, Failure> {
         drop(self.queue);
         match self.thread.join() {
-            Ok(counts) => counts,
+            Ok(counts) => counts.map_err(Failure::failed),
             Err(panic) => std::panic::resume_unwind(panic),
         }
     }
 }
 
-/// What stopped the writing.
-enum Stopped {
-    Write(WriteError),
-    Sync(io::Error),
-}
-
-impl From<WriteError> for Stopped {
-    fn from(error: WriteError) -> Self {
-        Self::Write(error)
-    }
-}
-
 /// Writes batches until the queue is closed, and synchronises the file regularly.
-fn write_batches(
-    mut writer: Writer<BufWriter<File>>,
-    file: &File,
-    batches: &Receiver<Batch>,
-) -> Result<Counts, Stopped> {
+fn write_batches(mut series: FileSeries, batches: &Receiver<Batch>) -> Result<Counts, SeriesError> {
     let mut unsynced_since: Option<Instant> = None;
     loop {
         let left = unsynced_since.map_or(SYNC_INTERVAL, |since| SYNC_INTERVAL.saturating_sub(since.elapsed()));
         match batches.recv_timeout(left) {
             Ok(batch) => {
-                write_all(&mut writer, &batch.states)?;
-                write_all(&mut writer, &batch.timings)?;
-                write_all(&mut writer, &batch.estimates)?;
-                write_all(&mut writer, &batch.cycles)?;
-                write_all(&mut writer, &batch.alarms)?;
+                series = series.prepared(Instant::now())?;
+                series.write(&batch.states)?;
+                series.write(&batch.timings)?;
+                series.write(&batch.estimates)?;
+                series.write(&batch.cycles)?;
+                series.write(&batch.alarms)?;
                 unsynced_since.get_or_insert_with(Instant::now);
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
         if unsynced_since.is_some_and(|since| since.elapsed() >= SYNC_INTERVAL) {
-            writer.flush()?;
-            file.sync_data().map_err(Stopped::Sync)?;
+            series.sync()?;
             unsynced_since = None;
         }
     }
-    let counts = Channel::ALL
-        .iter()
-        .map(|&channel| (channel, writer.count(channel)))
-        .collect();
-    writer.finish()?;
-    file.sync_all().map_err(Stopped::Sync)?;
-    Ok(counts)
-}
-
-fn write_all<T: Logged>(writer: &mut Writer<BufWriter<File>>, messages: &[T]) -> Result<(), WriteError> {
-    messages.iter().try_for_each(|message| writer.write(message))
+    series.finish()
 }

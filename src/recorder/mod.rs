@@ -1,20 +1,30 @@
 //! The recorder process: the topics of a worm into a log.
 //!
 //! An ordinary subscriber at ordinary priority, which the loop does not notice. One thread reads the topics before they
-//! overwrite their oldest messages, another ([`LogWriter`]) writes the file, so that a slow disk delays the log and not the
-//! reading.
+//! overwrite their oldest messages, another ([`LogWriter`]) writes the files, so that a slow disk delays the log and not the
+//! reading. A full disk or another write error ends the recording and nothing else: [`StatusReporter`] reports it, the estimator raises
+//! the alarm `recording-stopped`, and what was written until then can be read.
 
+mod file_series;
+mod log_file;
 mod log_writer;
+mod progress;
+mod status_reporter;
+
+pub(crate) use file_series::RotationLimits;
 
 use crate::failure::Failure;
+use crate::realtime::monotonic_ns;
 use crate::topics::{Hub, Instance, Subscriber, Topic};
 use log_writer::{Batch, LogWriter};
-use nix::time::{ClockId, clock_gettime};
+use progress::Progress;
+use status_reporter::{Figures, StatusReporter};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, RecordingProblem, State, Timing};
 use worm_log::{Channel, Logged, Origin};
 
 /// How often the topics are emptied. At 1 kHz even the fullest holds a second.
@@ -22,8 +32,13 @@ pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// The topics of a worm on their way into a log.
 pub(crate) struct Recorder {
+    // The ports before the hub that they are of.
+    status: StatusReporter,
     topics: RecordedTopics,
+    hub: Hub,
     writer: LogWriter,
+    progress: Arc<Progress>,
+    messages: u64,
 }
 
 /// What one poll of the topics read.
@@ -39,7 +54,7 @@ pub(crate) struct Polled {
 }
 
 impl Recorder {
-    /// Begins a log that carries the configuration's text; `force` overwrites an existing file.
+    /// Begins a log that carries the configuration's text; `force` overwrites existing files.
     ///
     /// # Errors
     /// [`Failure::Unusable`] for a worm or file that cannot be used; [`Failure::Failed`] when the topics fail.
@@ -49,19 +64,29 @@ impl Recorder {
         topics: &[Channel],
         out: &Path,
         force: bool,
+        limits: RotationLimits,
     ) -> Result<Self, Failure> {
         let instance = Instance::of(config).map_err(Failure::unusable)?;
-        let now = clock_gettime(ClockId::CLOCK_MONOTONIC).map_err(Failure::failed)?;
         let origin = Origin {
             worm: config.worm.name.clone(),
             cells: config.worm.cells,
             config: text,
             begun: SystemTime::now(),
-            begun_ns: Duration::from(now).as_nanos() as u64,
+            begun_ns: monotonic_ns(),
         };
+        // A limit on the size of files then is a write error like others, and does not kill the process.
+        signal_hook::flag::register(libc::SIGXFSZ, Arc::default()).map_err(Failure::failed)?;
+        let hub = Hub::open(&instance).map_err(Failure::failed)?;
+        let topics = RecordedTopics::open(&hub, topics)?;
+        let progress = Arc::default();
+        let writer = LogWriter::open(out, force, limits, origin, &progress)?;
         Ok(Self {
-            topics: RecordedTopics::open(&instance, topics)?,
-            writer: LogWriter::open(out, force, &origin)?,
+            status: StatusReporter::open(&hub, &instance),
+            topics,
+            hub,
+            writer,
+            progress,
+            messages: 0,
         })
     }
 
@@ -87,15 +112,33 @@ impl Recorder {
     /// # Errors
     /// [`Failure::Failed`] when the topics fail or the log cannot be written.
     pub(crate) fn poll(&mut self) -> Result<Polled, Failure> {
-        let batch = self.topics.read()?;
+        let batch = self
+            .topics
+            .read()
+            .inspect_err(|_| self.progress.note_problem(RecordingProblem::TopicsUnreadable))?;
         let polled = Polled {
             messages: batch.len(),
             state: batch.states.last().copied(),
         };
         if polled.messages > 0 {
             self.writer.write(batch)?;
+            self.messages += polled.messages as u64;
         }
+        self.writer.check()?;
+        self.status.report(&self.hub, self.figures());
         Ok(polled)
+    }
+
+    fn figures(&self) -> Figures {
+        Figures {
+            bytes: self.progress.bytes(),
+            files: self.progress.files(),
+            messages: self.messages,
+            messages_lost: Channel::ALL
+                .iter()
+                .filter_map(|&channel| self.topics.lost(channel))
+                .sum(),
+        }
     }
 
     /// Finishes the log and returns a summary of what is in it.
@@ -103,7 +146,19 @@ impl Recorder {
     /// # Errors
     /// [`Failure::Failed`] when the file could not be completed; what was written until then can be read.
     pub(crate) fn close(self) -> Result<String, Failure> {
-        let counts = self.writer.close()?;
+        let figures = self.figures();
+        let closed = self.writer.close();
+        if closed.is_err() {
+            self.progress.note_problem(RecordingProblem::WriteError);
+        }
+        // Counted once more: the writer has just written what was in its queue.
+        let figures = Figures {
+            bytes: self.progress.bytes(),
+            files: self.progress.files(),
+            ..figures
+        };
+        self.status.report_end(figures, self.progress.problem());
+        let counts = closed?;
         let counts = counts.iter().map(|&(channel, count)| {
             let lost = match self.topics.lost(channel) {
                 Some(lost) => format!(" ({lost} lost)"),
@@ -128,18 +183,17 @@ struct RecordedTopics {
 }
 
 impl RecordedTopics {
-    fn open(instance: &Instance, topics: &[Channel]) -> Result<Self, Failure> {
+    fn open(hub: &Hub, topics: &[Channel]) -> Result<Self, Failure> {
         fn subscribe<T: Topic + Logged>(hub: &Hub, topics: &[Channel]) -> Result<Recorded<T>, Failure> {
             let is_wanted = topics.contains(&T::CHANNEL);
             is_wanted.then(|| hub.subscriber()).transpose().map_err(Failure::failed)
         }
-        let hub = Hub::open(instance).map_err(Failure::failed)?;
         Ok(Self {
-            state: subscribe(&hub, topics)?,
-            timing: subscribe(&hub, topics)?,
-            estimate: subscribe(&hub, topics)?,
-            cycle: subscribe(&hub, topics)?,
-            alarm: subscribe(&hub, topics)?,
+            state: subscribe(hub, topics)?,
+            timing: subscribe(hub, topics)?,
+            estimate: subscribe(hub, topics)?,
+            cycle: subscribe(hub, topics)?,
+            alarm: subscribe(hub, topics)?,
         })
     }
 

@@ -21,6 +21,8 @@ pub(crate) struct Launch {
     pub faults: Vec<String>,
     /// The log to record to, if any.
     pub record: Option<PathBuf>,
+    /// The arguments that bound the recording.
+    pub record_limits: Vec<OsString>,
     /// How many `-v` the processes get.
     pub verbose: u8,
 }
@@ -77,6 +79,7 @@ impl Processes {
         if let Some(file) = &launch.record {
             let mut arguments = launch.worm.clone();
             arguments.extend(["--out".into(), file.clone().into()]);
+            arguments.extend_from_slice(&launch.record_limits);
             let mut child = Child::start("record", &launch.arguments("record", &arguments), log)?;
             // Both must listen before the controller publishes: the log then has everything that the estimator receives.
             child.wait_until_ready(START_TIMEOUT, log, end)?;

@@ -37,6 +37,8 @@ roles! {
     Controller = "controller",
     /// The process that estimates and raises alarms.
     Estimator = "estimator",
+    /// The process that records the topics and reports how that goes: the first, if there are several.
+    Recorder = "recorder",
     /// The process that starts and ends the others: `wormd up`.
     Supervisor = "supervisor",
 }

@@ -4,10 +4,13 @@
 //! as text and as the JSON that scripts read.
 
 pub(crate) mod mismatch;
+mod recent;
+pub(crate) mod recording;
 mod summary;
 mod telemetry;
 pub mod view;
 
+pub use recent::Recent;
 pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, Summary, TimingSummary, remarks};
 pub use telemetry::Telemetry;
 

@@ -1,7 +1,7 @@
 //! The summary of a run that `wormd up` prints, as text and as JSON. The JSON names are a contract.
 
-use super::mismatch;
 use super::telemetry::Telemetry;
+use super::{mismatch, recording};
 use crate::latency::{HostPauses, Percentiles, WorstTicks};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -31,10 +31,14 @@ pub struct Summary {
     pub mode: &'static str,
     /// The latched fault, `none` where there is none.
     pub fault: &'static str,
-    /// Every finished gait cycle.
+    /// Every finished gait cycle, the newest 65,536 of a longer run.
     pub cycles: Vec<CycleSummary>,
-    /// Every alarm that was raised.
+    /// Older cycles, which are not among them.
+    pub cycles_dropped: u64,
+    /// Every alarm that was raised, as far as it is among the newest 8,192 changes.
     pub alarms: Vec<AlarmSummary>,
+    /// Older changes of alarms, which are not among them.
+    pub alarm_changes_dropped: u64,
     /// Where the ticks' time went.
     pub timing: TimingSummary,
 }
@@ -157,7 +161,9 @@ impl Summary {
             mode: end_mode.name(),
             fault: fault.name(),
             cycles: telemetry.cycles.iter().map(CycleSummary::new).collect(),
-            alarms: alarm_summaries(&telemetry.alarms, start_ns, &worm.step_order),
+            cycles_dropped: telemetry.cycles.dropped(),
+            alarms: alarm_summaries(telemetry.alarms.iter(), start_ns, &worm.step_order),
+            alarm_changes_dropped: telemetry.alarms.dropped(),
             timing: TimingSummary {
                 wake_us: tick_stats.wake.percentiles(),
                 bus_us: tick_stats.bus.percentiles(),
@@ -208,22 +214,32 @@ impl CycleSummary {
     }
 }
 
-fn alarm_summaries(changes: &[Alarm], start_ns: u64, step_order: &[usize]) -> Vec<AlarmSummary> {
-    let mut summaries = Vec::new();
-    for (index, alarm) in changes.iter().enumerate().filter(|(_, alarm)| alarm.raised != 0) {
+fn alarm_summaries<'a>(
+    changes: impl Iterator<Item = &'a Alarm>,
+    start_ns: u64,
+    step_order: &[usize],
+) -> Vec<AlarmSummary> {
+    let mut summaries: Vec<AlarmSummary> = Vec::new();
+    // Where in it are those that are not cleared yet, by kind.
+    let mut open: BTreeMap<AlarmKind, Vec<usize>> = BTreeMap::new();
+    for alarm in changes {
         let Ok(kind) = AlarmKind::try_from(alarm.kind) else {
             continue;
         };
-        let cleared = changes[index..]
-            .iter()
-            .find(|later| later.kind == alarm.kind && later.raised == 0);
+        if alarm.raised == 0 {
+            for index in open.remove(&kind).unwrap_or_default() {
+                summaries[index].cleared_s = Some(seconds_since(start_ns, alarm.time_ns));
+            }
+            continue;
+        }
+        open.entry(kind).or_default().push(summaries.len());
         summaries.push(AlarmSummary {
             alarm: kind.name(),
             severity: Severity::try_from(alarm.severity).map_or("unknown", Severity::name),
             cell: (alarm.cell != u32::MAX).then(|| alarm.cell + 1),
             raised_s: seconds_since(start_ns, alarm.time_ns),
             since_s: seconds_since(start_ns, alarm.since_ns),
-            cleared_s: cleared.map(|later| seconds_since(start_ns, later.time_ns)),
+            cleared_s: None,
             value: alarm.value,
             threshold: alarm.threshold,
             place: mismatch::place_of(alarm, step_order)
@@ -284,6 +300,9 @@ impl fmt::Display for Summary {
                 "            mm             mJ         mJ              mJ          mJ       mJ               mJ"
             )?;
         }
+        if self.cycles_dropped > 0 {
+            writeln!(f, "  …    {} older cycles", self.cycles_dropped)?;
+        }
         for cycle in &self.cycles {
             writeln!(
                 f,
@@ -313,6 +332,9 @@ impl fmt::Display for Summary {
                     format!(" ({what}; `wormd explain` names the cause)")
                 }
                 (Some(cell), None) => format!(" (cell {cell})"),
+                (None, _) if alarm.alarm == AlarmKind::RecordingStopped.name() => {
+                    format!(" ({})", recording::text(alarm.value, alarm.threshold))
+                }
                 (None, _) => String::new(),
             };
             let cleared = alarm

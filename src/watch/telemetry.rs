@@ -1,10 +1,17 @@
 //! The messages of one worm, gathered.
 
+use super::recent::Recent;
 use crate::latency::TickStats;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, RecordingStatus, State, Timing};
 
-/// Everything received so far.
-#[derive(Debug, Clone, Default)]
+/// How many cycles are kept: nearly two days of the usual gait, 45 MB.
+const MAX_CYCLES: usize = 1 << 16;
+
+/// How many changes of alarms are kept, 0.6 MB.
+const MAX_ALARMS: usize = 1 << 13;
+
+/// What was received so far, in bounded memory: of cycles and alarms the newest.
+#[derive(Debug, Clone)]
 pub struct Telemetry {
     /// The first state that was received.
     pub first_state: Option<State>,
@@ -14,12 +21,32 @@ pub struct Telemetry {
     pub estimate: Option<Estimate>,
     /// The newest timing.
     pub timing: Option<Timing>,
-    /// All cycles.
-    pub cycles: Vec<Cycle>,
-    /// All alarm changes.
-    pub alarms: Vec<Alarm>,
+    /// The newest report of a recorder.
+    pub recording: Option<RecordingStatus>,
+    /// The newest cycles.
+    pub cycles: Recent<Cycle>,
+    /// The newest changes of alarms.
+    pub alarms: Recent<Alarm>,
     /// Where the ticks' time went, and what made late ones late.
     pub tick_stats: TickStats,
+    /// The newest change of each alarm, by its code.
+    newest_changes: [Option<Alarm>; AlarmKind::ALL.len()],
+}
+
+impl Default for Telemetry {
+    fn default() -> Self {
+        Self {
+            first_state: None,
+            state: None,
+            estimate: None,
+            timing: None,
+            recording: None,
+            cycles: Recent::with_limit(MAX_CYCLES),
+            alarms: Recent::with_limit(MAX_ALARMS),
+            tick_stats: TickStats::default(),
+            newest_changes: [None; AlarmKind::ALL.len()],
+        }
+    }
 }
 
 impl Telemetry {
@@ -47,7 +74,15 @@ impl Telemetry {
 
     /// Takes an alarm change.
     pub fn take_alarm(&mut self, alarm: &Alarm) {
+        if let Some(newest) = self.newest_changes.get_mut(alarm.kind as usize) {
+            *newest = Some(*alarm);
+        }
         self.alarms.push(*alarm);
+    }
+
+    /// Takes a recorder's report.
+    pub fn take_recording(&mut self, status: &RecordingStatus) {
+        self.recording = Some(*status);
     }
 
     /// Ticks that the controller ran.
@@ -57,11 +92,7 @@ impl Telemetry {
 
     /// Alarms that are raised now, by the newest change of each.
     pub fn raised(&self) -> Vec<Alarm> {
-        AlarmKind::ALL
-            .iter()
-            .filter_map(|kind| self.alarms.iter().rev().find(|alarm| alarm.kind == kind.code()))
-            .filter(|alarm| alarm.raised != 0)
-            .copied()
-            .collect()
+        let newest = self.newest_changes.iter().flatten();
+        newest.filter(|alarm| alarm.raised != 0).copied().collect()
     }
 }

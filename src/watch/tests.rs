@@ -4,7 +4,9 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use std::collections::VecDeque;
 use worm_estimator::config::Worm as WormConfig;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Mode, Severity, State, Timing};
+use worm_estimator::message::{
+    Alarm, AlarmKind, Cycle, Estimate, Mode, RecordingProblem, RecordingState, RecordingStatus, Severity, State, Timing,
+};
 use worm_physics::MAX_CELLS;
 use worm_physics::{Motion, Outcome, Worm, steady_cycle};
 
@@ -191,12 +193,14 @@ fn the_usual_terminal_shows_the_worm() {
 #[test]
 fn an_unsettled_cycle_has_no_energy() {
     let mut telemetry = received(2.4);
-    let cycle = telemetry.cycles.last_mut().expect("two cycles");
-    cycle.settled = 0;
-    cycle.cot = 0.0;
-    cycle.energy_loss_sigma_j = f64::NAN;
+    telemetry.take_cycle(&Cycle {
+        settled: 0,
+        cot: 0.0,
+        energy_loss_sigma_j: f64::NAN,
+        ..*telemetry.cycles.last().expect("two cycles")
+    });
     let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling);
-    assert_eq!(summary.cycles[1].cot, None);
+    assert_eq!(summary.cycles[2].cot, None);
     for text in [summary.to_string(), painted(110, 34, &telemetry)] {
         assert!(!text.contains("NaN"), "{text}");
     }
@@ -253,4 +257,60 @@ fn a_mismatch_comes_with_its_place() {
     assert_eq!(json["alarms"][2]["place"]["stepping_cell"], 3);
     let picture = painted(250, 34, &telemetry);
     assert!(picture.contains("phase 0.55: +0.31"), "{picture}");
+}
+
+/// The picture shows how far a recording is, and why it stopped; the alarm says it in words.
+#[test]
+fn a_recording_is_shown() {
+    let mut telemetry = received(2.4);
+    let mut status = RecordingStatus {
+        sequence: 3,
+        time_ns: 0,
+        bytes: 12_345_678,
+        messages: 4000,
+        messages_lost: 0,
+        files: 2,
+        state: RecordingState::Recording.code(),
+        problem: RecordingProblem::None.code(),
+    };
+    telemetry.take_recording(&status);
+    let picture = painted(110, 34, &telemetry);
+    assert!(picture.contains("recording 12.3 MB, file 2"), "{picture}");
+    status.state = RecordingState::Stopped.code();
+    status.problem = RecordingProblem::DiskFull.code();
+    telemetry.take_recording(&status);
+    telemetry.take_alarm(&Alarm {
+        value: 1.0,
+        threshold: 0.0,
+        kind: AlarmKind::RecordingStopped.code(),
+        severity: Severity::Warning.code(),
+        cell: u32::MAX,
+        ..alarm(3, 6_000_000_000, 1)
+    });
+    let picture = painted(250, 34, &telemetry);
+    for part in ["recording stopped: disk-full", "recording-stopped: disk-full"] {
+        assert!(picture.contains(part), "{part} is not in {picture}");
+    }
+    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling).to_string();
+    assert!(summary.contains("recording-stopped (disk-full): warning"), "{summary}");
+}
+
+/// An alarm stays shown as raised, however many other changes came since.
+#[test]
+fn what_is_raised_does_not_depend_on_what_is_kept() {
+    let mut telemetry = Telemetry::default();
+    telemetry.take_alarm(&alarm(0, 1_000_000_000, 1));
+    for number in 1..20_000 {
+        telemetry.take_alarm(&Alarm {
+            kind: AlarmKind::LinkFault.code(),
+            ..alarm(number, 1_000_000_000 + number, (number % 2) as u32)
+        });
+    }
+    let raised: Vec<u32> = telemetry.raised().iter().map(|alarm| alarm.kind).collect();
+    assert_eq!(raised, [AlarmKind::JammedCell.code(), AlarmKind::LinkFault.code()]);
+    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling);
+    assert_eq!(
+        (summary.alarm_changes_dropped, summary.alarms.len()),
+        (20_000 - 8_192, 4_096)
+    );
 }

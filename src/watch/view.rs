@@ -1,7 +1,7 @@
 //! The live picture in a terminal: the worm in its canal, each tip, cycles, alarms and loop health.
 
-use super::mismatch;
 use super::telemetry::Telemetry;
+use super::{mismatch, recording};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -403,7 +403,8 @@ fn alarm_line(alarm: &Alarm, subject: &Subject) -> Line<'static> {
     } else {
         Color::Yellow
     };
-    let text = mismatch::text_of(alarm, &subject.step_order).map_or_else(
+    let words = mismatch::text_of(alarm, &subject.step_order).or_else(|| recording::alarm_text(alarm));
+    let text = words.map_or_else(
         || format!("{name}{cell}: {:.4} against {:.4}", alarm.value, alarm.threshold),
         |what| format!("{name}: {what}"),
     );
@@ -489,6 +490,14 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
             pauses.count, pauses.total_s
         )));
     }
+    lines.extend(telemetry.recording.as_ref().map(|status| {
+        let line = Line::raw(recording::progress_text(status));
+        if recording::has_stopped(status) {
+            line.fg(Color::Red)
+        } else {
+            line
+        }
+    }));
     if let Some(fraction) = telemetry
         .estimate
         .map(|estimate| estimate.battery_fraction)

@@ -5,8 +5,10 @@
 
 mod explaining;
 mod latency;
+mod leaks;
 mod leaving;
 mod recording;
+mod recording_stops;
 mod worm;
 
 use std::time::Duration;
@@ -128,17 +130,23 @@ impl Crawling {
     }
 
     fn start_again(worm: Worm) -> Self {
+        let crawling = Self::at_rest(worm, &[]);
+        crawling.make_crawl();
+        crawling
+    }
+
+    /// The processes with these arguments, at rest.
+    fn at_rest(worm: Worm, more: &[&str]) -> Self {
         let virtual_worm = worm.virtual_worm(&[]);
-        let estimator = worm.wormd(&["estimate"]).start();
-        let controller = worm.wormd(&["control", "--port", &worm.port()]).start();
-        let crawling = Self {
+        let estimator = worm.wormd(&[&["estimate"], more].concat()).start();
+        let port = worm.port();
+        let controller = worm.wormd(&[&["control", "--port", &port], more].concat()).start();
+        Self {
             worm,
             virtual_worm,
             estimator,
             controller,
-        };
-        crawling.make_crawl();
-        crawling
+        }
     }
 
     fn make_crawl(&self) {

@@ -144,6 +144,13 @@ fn only_what_was_asked_for_is_recorded_and_no_file_is_lost() {
             2,
             "give some of state, timing, estimate, cycle, alarm",
         ),
+        (
+            &["/nowhere/x.mcap", "--keep", "3"],
+            2,
+            "--keep needs --max-size or --max-age",
+        ),
+        (&["/nowhere/x.mcap", "--max-size", "100"], 2, "give one such as 100MB"),
+        (&["/dev/null", "--force", "--max-age", "1h"], 2, "is no ordinary file"),
         (&[file.as_str(), "--force"], 0, "recorded: state"),
     ] {
         let (found, error) = record(arguments);

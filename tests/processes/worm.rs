@@ -2,10 +2,12 @@
 //! computer that is busy or whose host is.
 
 use dynamixel_bus::packet::DeviceId;
+use nix::sys::resource::{Resource, setrlimit};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::io::{BufRead, BufReader, Read};
 use std::os::fd::OwnedFd;
+use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::mpsc::RecvTimeoutError;
@@ -64,7 +66,8 @@ impl Worm {
         }
     }
 
-    fn instance(&self) -> Instance {
+    /// Where its topics are.
+    pub fn instance(&self) -> Instance {
         let mut config = Config::default();
         config.worm.name.clone_from(&self.name);
         Instance::of(&config).expect("the topics' root can be used")
@@ -176,6 +179,16 @@ impl Invocation {
         }
     }
 
+    /// Allows it files of at most this size: as on a full disk, but for it alone.
+    pub fn with_file_size_limit(mut self, bytes: u64) -> Self {
+        // SAFETY: setrlimit is async-signal-safe, and nothing is allocated between fork and exec.
+        unsafe {
+            self.command
+                .pre_exec(move || setrlimit(Resource::RLIMIT_FSIZE, bytes, bytes).map_err(std::io::Error::from));
+        }
+        self
+    }
+
     /// Runs it to its end, which must come within three minutes: it hangs otherwise, however busy the computer is.
     pub fn output(mut self) -> Output {
         self.command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -218,6 +231,12 @@ impl Invocation {
             stdout: reader.join().expect("the reader does not panic"),
             stderr,
         }
+    }
+
+    /// As [`start`](Self::start), and keeps its log for [`Process::log_at_its_end`].
+    pub fn start_with_log(mut self) -> Process {
+        self.command.stderr(Stdio::piped());
+        self.start()
     }
 
     /// Starts it and waits until it says on standard output that it is ready.
@@ -314,6 +333,15 @@ impl Process {
             status.is_some()
         });
         status.expect("has ended")
+    }
+
+    /// Waits until it has ended without being asked to; gives its log, which must be short.
+    pub fn log_at_its_end(mut self) -> (ExitStatus, String) {
+        let mut stderr = self.child.stderr.take().expect("is piped");
+        let status = self.ends_by_itself();
+        let mut log = String::new();
+        stderr.read_to_string(&mut log).expect("is text");
+        (status, log)
     }
 
     /// Asks it to end and waits for that.

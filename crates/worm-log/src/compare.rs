@@ -1,6 +1,7 @@
 //! Whether the estimator had the same results live and on the recording.
 
 use super::log::Log;
+use super::recorder_alarm;
 use super::replay::{Replay, fresh, same};
 use serde::Serialize;
 use std::collections::HashMap;
@@ -38,7 +39,7 @@ impl Comparison {
     }
 }
 
-/// Compares the contents of a log with its replay.
+/// Compares the contents of a log with its replay. The alarm `recording-stopped` is left out: it does not follow from the states.
 pub fn compare(log: &Log, replay: &Replay) -> Comparison {
     let fed = log.states.get(replay.first..).unwrap_or_default();
     let span = Span {
@@ -47,13 +48,15 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
         // The log has no results after its last estimate.
         last_estimate_ns: log.estimates.iter().map(|estimate| estimate.time_ns).max().unwrap_or(0),
     };
-    let estimates = span.agreement("estimates", fresh(&log.estimates), &replay.estimates, |estimate| {
+    let recorded = fresh(&log.estimates).map(recorder_alarm::without);
+    let estimates = span.agreement("estimates", recorded, &replay.estimates, |estimate| {
         (estimate.state_sequence, estimate.time_ns)
     });
-    let cycles = span.agreement("cycles", log.cycles.iter(), &replay.cycles, |cycle| {
+    let cycles = span.agreement("cycles", log.cycles.iter().copied(), &replay.cycles, |cycle| {
         (cycle.index, cycle.end_ns)
     });
-    let alarms = span.agreement("alarms", log.alarms.iter(), &replay.alarms, |alarm| {
+    let recorded = recorder_alarm::others(&log.alarms);
+    let alarms = span.agreement("alarms", recorded, &replay.alarms, |alarm| {
         (alarm.sequence, alarm.time_ns)
     });
 
@@ -130,10 +133,10 @@ struct Agreement {
 }
 
 impl Span {
-    fn agreement<'a, T: JsonMessage + 'a, K: Eq + Hash>(
+    fn agreement<T: JsonMessage, K: Eq + Hash>(
         &self,
         what: &str,
-        recorded: impl Iterator<Item = &'a T>,
+        recorded: impl Iterator<Item = T>,
         replayed: &[T],
         key: impl Fn(&T) -> K,
     ) -> Agreement {
@@ -142,7 +145,7 @@ impl Span {
         // History that a recorder received when it joined is older than the states; the end of a truncated log can be newer.
         for message in recorded.filter(|message| (self.first_ns..=self.last_ns).contains(&message.made_ns())) {
             compared += 1;
-            identical += usize::from(known.get(&key(message)).is_some_and(|ours| same(*ours, message)));
+            identical += usize::from(known.get(&key(&message)).is_some_and(|ours| same(*ours, &message)));
         }
         let expected = replayed
             .iter()

@@ -21,6 +21,7 @@ mod compare;
 mod error;
 mod log;
 mod older;
+mod recorder_alarm;
 mod replay;
 mod scan;
 mod writer;

@@ -1,6 +1,7 @@
 //! Feeding a log's states to the estimator again.
 
 use super::log::Log;
+use super::recorder_alarm;
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{EstimatorError, Observer};
 use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State};
@@ -32,7 +33,10 @@ pub struct Replay {
 /// # Errors
 /// [`EstimatorError`] for a configuration that is not valid.
 pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
-    let recorded: Vec<_> = fresh(&log.estimates).take(FIRST_ESTIMATES).copied().collect();
+    let recorded: Vec<_> = fresh(&log.estimates)
+        .take(FIRST_ESTIMATES)
+        .map(recorder_alarm::without)
+        .collect();
     for first in possible_starts(&log.states, recorded.first()) {
         let mut found = run(&log.states[first..], config, recorded.len())?;
         let is_same = found.estimates.len() == recorded.len()

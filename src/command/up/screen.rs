@@ -4,7 +4,7 @@ use crate::command::{Failure, print};
 use crate::supervisor::child_process::Log;
 use crate::supervisor::crawl::Display;
 use crate::watch::view::{self, Subject};
-use crate::watch::{Telemetry, mismatch, remarks};
+use crate::watch::{Telemetry, mismatch, recording, remarks};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use ratatui::DefaultTerminal;
@@ -28,12 +28,12 @@ pub(super) enum Screen {
     },
     /// A line for each cycle and alarm.
     Lines {
-        cycles: usize,
-        alarms: usize,
+        cycles: u64,
+        alarms: u64,
         step_order: Vec<usize>,
     },
     /// Standard output is reserved for the JSON; alarms go to the log.
-    Silent { alarms: usize, step_order: Vec<usize> },
+    Silent { alarms: u64, step_order: Vec<usize> },
 }
 
 impl Screen {
@@ -125,21 +125,21 @@ impl Display for Screen {
                 step_order,
             } => {
                 forward(log);
-                for cycle in &telemetry.cycles[*cycles..] {
+                for cycle in telemetry.cycles.since(*cycles) {
                     print::line(cycle_line(cycle))?;
-                    *cycles += 1;
                 }
-                for alarm in &telemetry.alarms[*alarms..] {
+                *cycles = telemetry.cycles.total();
+                for alarm in telemetry.alarms.since(*alarms) {
                     print::line(alarm_line(alarm, step_order))?;
-                    *alarms += 1;
                 }
+                *alarms = telemetry.alarms.total();
             }
             Self::Silent { alarms, step_order } => {
                 forward(log);
-                for alarm in &telemetry.alarms[*alarms..] {
+                for alarm in telemetry.alarms.since(*alarms) {
                     print::log_line(alarm_line(alarm, step_order));
                 }
-                *alarms = telemetry.alarms.len();
+                *alarms = telemetry.alarms.total();
             }
         }
         Ok(())
@@ -204,6 +204,9 @@ fn alarm_line(alarm: &Alarm, step_order: &[usize]) -> String {
     };
     let change = if alarm.raised == 0 { "cleared" } else { "RAISED" };
     if let Some(what) = mismatch::text_of(alarm, step_order) {
+        return format!("alarm {kind}: {change}, {what}");
+    }
+    if let Some(what) = recording::alarm_text(alarm) {
         return format!("alarm {kind}: {change}, {what}");
     }
     format!(

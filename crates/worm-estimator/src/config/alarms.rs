@@ -52,6 +52,8 @@ pub struct Alarms {
     pub device_fault: AlarmConfig,
     /// Displacement in a quarter of a step, or in a whole cycle, that the model does not explain, m.
     pub model_mismatch: AlarmConfig,
+    /// Silence of a recorder, s; one that says that it stopped raises this alarm at once.
+    pub recording_stopped: AlarmConfig,
 }
 
 const fn alarm(policy: Policy, threshold: f64) -> AlarmConfig {
@@ -71,6 +73,7 @@ impl Default for Alarms {
             tracker_fault: alarm(Policy::Warn, 0.3),
             device_fault: alarm(Policy::Warn, 60.0),
             model_mismatch: alarm(Policy::Warn, 1.5e-4),
+            recording_stopped: alarm(Policy::Warn, 5.0),
         }
     }
 }
@@ -89,6 +92,7 @@ impl Alarms {
             AlarmKind::TrackerFault => self.tracker_fault,
             AlarmKind::DeviceFault => self.device_fault,
             AlarmKind::ModelMismatch => self.model_mismatch,
+            AlarmKind::RecordingStopped => self.recording_stopped,
         }
     }
 
@@ -104,6 +108,7 @@ impl Alarms {
             (AlarmKind::TrackerFault, 0.001..=1.0, "of the samples"),
             (AlarmKind::DeviceFault, 20.0..=120.0, "°C"),
             (AlarmKind::ModelMismatch, 1e-5..=1.0, "m"),
+            (AlarmKind::RecordingStopped, 3.0..=600.0, "s"),
         ] {
             let key = format!("alarms.{}.threshold", kind.name().replace('-', "_"));
             checker.range(&key, self.of(kind).threshold, range, unit);

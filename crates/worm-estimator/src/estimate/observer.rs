@@ -3,7 +3,7 @@
 use super::alarm::{self, AlarmChanges, AlarmMonitor};
 use super::{Estimator, EstimatorError, ResidualMap};
 use crate::config::Config;
-use crate::message::{Cycle, Estimate, State};
+use crate::message::{Cycle, Estimate, RecordingStatus, State};
 
 /// What one state gave.
 #[derive(Debug, Clone)]
@@ -16,7 +16,8 @@ pub struct ObserverOutput {
     pub alarms: AlarmChanges,
 }
 
-/// Follows one worm by its states. The same states give the same output, to the last bit.
+/// Follows one worm by its states. The same states give the same output, to the last bit; a recorder's reports change nothing but the
+/// alarm `recording-stopped`.
 #[derive(Debug)]
 pub struct Observer {
     estimator: Estimator,
@@ -54,6 +55,11 @@ impl Observer {
             cycle,
             alarms,
         }
+    }
+
+    /// Takes what the worm's recorder reports, for the alarm `recording-stopped`.
+    pub const fn note_recording(&mut self, status: &RecordingStatus) {
+        self.monitor.note_recording(status);
     }
 
     /// The newest estimate with the present alarms: a heartbeat while no sample comes.

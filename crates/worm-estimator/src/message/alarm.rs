@@ -27,6 +27,8 @@ coded_enum! {
         DeviceFault = 8 => "device-fault",
         /// The worm makes a displacement that the model does not explain.
         ModelMismatch = 9 => "model-mismatch",
+        /// The recorder could not go on, or was killed.
+        RecordingStopped = 10 => "recording-stopped",
     }
 }
 

@@ -310,3 +310,16 @@ proptest! {
         }
     }
 }
+
+/// A counter of a broken peer, which jumps ahead twice, is counted as far as it can be.
+#[test]
+fn a_sequence_that_jumps_to_its_end_twice_is_survived() {
+    let (mut crawl, mut estimator) = watch(&paper_worm(0.0, false), Scene::default());
+    for _ in 0..2 {
+        for sequence in [0, u64::MAX - 1] {
+            let state = crawl.tick();
+            estimator.update(&State { sequence, ..state });
+        }
+    }
+    assert_eq!(estimator.latest().states_lost, u64::MAX);
+}

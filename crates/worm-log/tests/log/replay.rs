@@ -1,6 +1,7 @@
 //! The same results live and from a log.
 
 use testkit::log_sample::{Telemetry, crawl, crawl_with_late_estimator};
+use worm_estimator::message::{Alarm, AlarmKind};
 use worm_log::{Comparison, compare, replay};
 
 fn replayed(telemetry: Telemetry) -> Comparison {
@@ -104,4 +105,47 @@ fn a_result_that_differs_in_its_last_bit_is_found() {
     assert_eq!(comparison.estimates_identical, comparison.estimates_compared - 1);
     assert_eq!(comparison.cycles_identical, comparison.cycles_compared - 1);
     assert!(!comparison.is_identical());
+}
+
+/// A recorder of the worm that failed before or during this log leaves its traces in it, and no replay can have them.
+#[test]
+fn the_alarm_about_a_recorder_is_left_out() {
+    let mut telemetry = crawl(5.0);
+    let begun_ns = telemetry.states[0].time_ns;
+    let alarm = |sequence, kind: AlarmKind| Alarm {
+        sequence,
+        time_ns: begun_ns + 1_000_000_000 * (1 + sequence),
+        kind: kind.code(),
+        raised: 1,
+        ..Alarm::NONE
+    };
+    for estimate in telemetry.estimates.iter_mut().skip(10) {
+        estimate.armed_mask |= 1 << AlarmKind::RecordingStopped.code();
+        estimate.raised_mask |= 1 << AlarmKind::RecordingStopped.code();
+    }
+    assert_eq!(telemetry.alarms, [], "a healthy worm");
+    telemetry.alarms = vec![
+        alarm(0, AlarmKind::RecordingStopped),
+        alarm(1, AlarmKind::LinkFault),
+        alarm(2, AlarmKind::RecordingStopped),
+        alarm(3, AlarmKind::LinkFault),
+    ];
+    let config = telemetry.config.clone();
+    let log = telemetry.log();
+    let mut replay = replay(&log, &config).expect("a valid configuration");
+    // What an estimator without a recorder would have found.
+    replay.alarms = vec![
+        Alarm {
+            sequence: 0,
+            ..log.alarms[1]
+        },
+        Alarm {
+            sequence: 1,
+            ..log.alarms[3]
+        },
+    ];
+    let comparison = compare(&log, &replay);
+    assert!(comparison.complete && comparison.is_identical(), "{comparison:?}");
+    assert_eq!(comparison.alarms_compared, 2);
+    assert!(comparison.estimates_compared > 400);
 }

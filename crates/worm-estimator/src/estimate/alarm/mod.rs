@@ -4,7 +4,7 @@
 //! alarms that were raised or cleared. It has no clock: time is [`State::time_ns`]. It allocates nothing.
 //!
 //! Reading order: `cam_motion` follows the cam and `sample` selects the positions to trust. Each detector (`stall`, `jam`, `stride` with
-//! `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`) describes its decision rule at
+//! `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`, `recording`) describes its decision rule at
 //! the top of its file. `latch` turns their output into one "raised" and one "cleared".
 //!
 //! **Calibration.** Baselines are learned on the first `estimator.calibration_cycles` good cycles, as functions of the gait phase:
@@ -17,8 +17,11 @@
 //! while the worm is commanded to move: they also clear two seconds after it no longer is, so that the fault that they caused can be
 //! reset. Energy, battery and model mismatch keep their alarm through pauses.
 //!
-//! **Restart.** When the controller's sequence goes back, everything raised is cleared and learned anew, except the charge of the battery,
-//! which did not change.
+//! **Restart.** When the controller's sequence goes back, everything raised is cleared and learned anew, except the charge of the battery
+//! and the state of the recorder, which did not change.
+//!
+//! **Recorder.** `recording` is the only detector with an input besides the states: [`AlarmMonitor::note_recording`]. A log does not hold
+//! that input, so a replay of the log has no `recording-stopped`, and the comparison with the log leaves that alarm out.
 
 mod battery;
 mod cam_motion;
@@ -31,6 +34,7 @@ mod latch;
 mod link;
 mod mismatch;
 mod progress;
+mod recording;
 mod sample;
 mod sliding;
 mod stall;
@@ -44,7 +48,7 @@ pub use changes::AlarmChanges;
 
 use crate::config::Config;
 use crate::estimate::ResidualMap;
-use crate::message::{AlarmKind, Cycle, Estimate, State};
+use crate::message::{AlarmKind, Cycle, Estimate, RecordingStatus, State};
 use cam_motion::{CamMotion, Tick};
 use latch::{Delays, DetectorOutput, Latch};
 use sample::VisibleCells;
@@ -70,6 +74,7 @@ pub struct AlarmMonitor {
     initial: Detectors, // as they are before the first tick
     detectors: Detectors,
     battery: battery::BatteryLow,
+    recording: recording::RecordingStopped,
     latches: [Latch; KINDS],
     armed_mask: u32,
     next_sequence: u64,
@@ -123,6 +128,7 @@ impl AlarmMonitor {
             initial: detectors.clone(),
             detectors,
             battery: battery::BatteryLow::new(config),
+            recording: recording::RecordingStopped::new(config),
             latches: std::array::from_fn(|index| {
                 let kind = AlarmKind::ALL[index];
                 Latch::new(kind, delays_of(kind))
@@ -130,6 +136,11 @@ impl AlarmMonitor {
             armed_mask: 0,
             next_sequence: 0,
         }
+    }
+
+    /// Takes what the recorder reports. It counts from the next tick on.
+    pub const fn note_recording(&mut self, status: &RecordingStatus) {
+        self.recording.note(status);
     }
 
     /// Processes one tick and returns the alarms that it raised or cleared.
@@ -237,6 +248,7 @@ impl AlarmMonitor {
             detectors.tracker.update(tick, state),
             detectors.device.update(tick, state),
             detectors.mismatch.update(tick, residuals),
+            self.recording.update(tick),
         ]
     }
 }
@@ -273,6 +285,7 @@ const fn delays_of(kind: AlarmKind) -> Delays {
         AlarmKind::TrackerFault => (0.0, 2.0),
         AlarmKind::DeviceFault => (0.0, 2.0),
         AlarmKind::ModelMismatch => (0.0, 0.0),
+        AlarmKind::RecordingStopped => (0.0, 1.0),
     };
     Delays {
         raise_after_ns: (raise_after_s * 1e9) as u64,

@@ -5,4 +5,5 @@ mod fault_table;
 mod faults;
 mod properties;
 mod quiet;
+mod recording;
 mod worm;

@@ -1,0 +1,133 @@
+//! The arguments that bound a recording, the same for `wormd record` and `wormd up --record`.
+
+use crate::recorder::RotationLimits;
+use clap::Args;
+use std::ffi::OsString;
+use std::time::Duration;
+
+/// Smallest size of a file, bytes: schemas and configuration take some tens of kB of each.
+const MIN_BYTES: u64 = 1_000_000;
+
+/// When a file of the recording is followed by the next, and how many are kept.
+#[derive(Debug, Clone, Args)]
+pub struct RecordingLimits {
+    /// Go on in the next file (run.1.mcap, run.2.mcap, …) when this one has that size, as 100MB or 2GB; without it, files
+    /// may have any size
+    #[arg(long, value_name = "SIZE", value_parser = Size::parse)]
+    max_size: Option<Size>,
+    /// Go on in the next file when this one is that old, as 30s, 10min, 2h or 1d
+    #[arg(long, value_name = "TIME", value_parser = Age::parse)]
+    max_age: Option<Age>,
+    /// Keep only this many files, at least 2: the oldest of this recording is removed when a new one is begun
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    keep: Option<u32>,
+}
+
+impl RecordingLimits {
+    /// The limits, for the recorder.
+    ///
+    /// # Errors
+    /// When `--keep` is given without anything that begins a new file.
+    pub(crate) fn limits(&self) -> Result<RotationLimits, String> {
+        if self.keep.is_some() && self.max_size.is_none() && self.max_age.is_none() {
+            return Err("--keep needs --max-size or --max-age: without them there is only one file".to_owned());
+        }
+        Ok(RotationLimits {
+            max_bytes: self.max_size.as_ref().map(|size| size.bytes),
+            max_age: self.max_age.as_ref().map(|age| age.time),
+            keep: self.keep.map(|keep| keep as usize),
+        })
+    }
+
+    /// Whether none is given.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.max_size.is_none() && self.max_age.is_none() && self.keep.is_none()
+    }
+
+    /// The same limits as arguments for another process.
+    pub(crate) fn forward(&self) -> Vec<OsString> {
+        let keep = self.keep.map(|keep| keep.to_string());
+        let arguments = [
+            ("--max-size", self.max_size.as_ref().map(|size| &size.text)),
+            ("--max-age", self.max_age.as_ref().map(|age| &age.text)),
+            ("--keep", keep.as_ref()),
+        ];
+        let given = arguments.into_iter().filter_map(|(flag, value)| Some([flag, value?]));
+        given.flatten().map(OsString::from).collect()
+    }
+}
+
+/// A size as it was given.
+#[derive(Debug, Clone, PartialEq)]
+struct Size {
+    text: String,
+    bytes: u64,
+}
+
+impl Size {
+    fn parse(text: &str) -> Result<Self, String> {
+        let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];
+        let bytes =
+            quantity(text, &units).ok_or_else(|| format!("'{text}' is no size: give one such as 100MB or 2GB"))?;
+        if !(MIN_BYTES as f64..=1e15).contains(&bytes) {
+            return Err(format!("{text} is not usable: give 1MB to 1000TB"));
+        }
+        let text = text.to_owned();
+        Ok(Self {
+            text,
+            bytes: bytes as u64,
+        })
+    }
+}
+
+/// A time span as it was given.
+#[derive(Debug, Clone, PartialEq)]
+struct Age {
+    text: String,
+    time: Duration,
+}
+
+impl Age {
+    fn parse(text: &str) -> Result<Self, String> {
+        let units = [("s", 1.0), ("min", 60.0), ("h", 3600.0), ("d", 86_400.0)];
+        let seconds = quantity(text, &units)
+            .ok_or_else(|| format!("'{text}' is no time: give one such as 30s, 10min, 2h or 1d"))?;
+        if !(1.0..=1e8).contains(&seconds) {
+            return Err(format!("{text} is not usable: give 1s to 1000d"));
+        }
+        let (text, time) = (text.to_owned(), Duration::from_secs_f64(seconds));
+        Ok(Self { text, time })
+    }
+}
+
+/// The value of a number with one of these units, by which it is multiplied.
+fn quantity(text: &str, units: &[(&str, f64)]) -> Option<f64> {
+    let unit_at = text.find(|character: char| character.is_ascii_alphabetic())?;
+    let (number, unit) = text.split_at(unit_at);
+    let (_, factor) = units.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit))?;
+    number.trim().parse::<f64>().ok().map(|number| number * factor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_times_are_read_or_refused_with_an_example() {
+        for (text, bytes) in [("100MB", 100_000_000), ("1.5 GB", 1_500_000_000), ("2000kb", 2_000_000)] {
+            assert_eq!(Size::parse(text).map(|size| size.bytes), Ok(bytes), "{text}");
+        }
+        for text in [
+            "", "100", "MB", "1 MiB", "-3MB", "1kB", "nanMB", "infGB", "1e30GB", "10 min",
+        ] {
+            let error = Size::parse(text).expect_err(text);
+            assert!(error.contains("MB"), "{text}: {error}");
+        }
+        for (text, seconds) in [("30s", 30), ("10min", 600), ("2 h", 7_200), ("1d", 86_400)] {
+            assert_eq!(Age::parse(text).map(|age| age.time.as_secs()), Ok(seconds), "{text}");
+        }
+        for text in ["", "10", "0s", "-1h", "1 week", "nans", "1e30d"] {
+            assert!(Age::parse(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! The files of a recording, one after the other: `run.mcap`, `run.1.mcap`, `run.2.mcap`, …
+//!
+//! Each is a whole log with schemas and configuration. Which file a message is in depends only on how full or old the file was when the
+//! message came, so no message is lost or written twice where one file ends and the next begins.
+
+use super::log_file::{LogFile, WrittenFile, problem_of};
+use super::progress::Progress;
+use crate::realtime::monotonic_ns;
+use std::collections::VecDeque;
+use std::ffi::OsString;
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+use worm_log::{Channel, Logged, Origin, WriteError, Writer};
+
+/// When a file is followed by the next, and how many are kept. By default there is one file, of any size.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct RotationLimits {
+    /// A file that has so many bytes is followed by the next.
+    pub max_bytes: Option<u64>,
+    /// A file whose first message is so old is followed by the next.
+    pub max_age: Option<Duration>,
+    /// Only so many files are kept, the present one among them.
+    pub keep: Option<usize>,
+}
+
+impl RotationLimits {
+    /// Whether there can be more than one file.
+    pub(super) const fn is_rotating(&self) -> bool {
+        self.max_bytes.is_some() || self.max_age.is_some()
+    }
+}
+
+/// Why the files cannot be written on.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum SeriesError {
+    /// A file cannot be created.
+    #[error("{}: cannot be created: {source}: make room or choose another place; the files before it are complete", path.display())]
+    Create { path: PathBuf, source: io::Error },
+    /// The file in use cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The file in use is not safe on the disk.
+    #[error("{}: {source}: what was written until then can be read if the file is still there", path.display())]
+    Sync { path: PathBuf, source: io::Error },
+}
+
+/// The file in use.
+struct Current {
+    writer: Writer<BufWriter<LogFile>>,
+    file: LogFile,
+    path: PathBuf,
+    /// When its first message came.
+    first_message: Option<Instant>,
+}
+
+/// The files of one recording.
+pub(super) struct FileSeries {
+    first: PathBuf,
+    overwrite: bool,
+    origin: Origin,
+    limits: RotationLimits,
+    progress: Arc<Progress>,
+    /// The number of the file in use.
+    number: u64,
+    current: Current,
+    /// The files that are kept, the oldest first, the one in use last.
+    kept: VecDeque<WrittenFile>,
+    /// Messages in the files before the one in use, by channel.
+    counts: Vec<(Channel, u64)>,
+}
+
+impl FileSeries {
+    /// Begins the first file, `first`, which is an open [`LogFile`] of that name.
+    ///
+    /// # Errors
+    /// [`WriteError`] when it cannot be written.
+    pub(super) fn begin(
+        first: &Path,
+        file: LogFile,
+        overwrite: bool,
+        origin: Origin,
+        limits: RotationLimits,
+        progress: &Arc<Progress>,
+    ) -> Result<Self, WriteError> {
+        let kept = file.identity(first).into_iter().collect();
+        Ok(Self {
+            first: first.to_owned(),
+            overwrite,
+            limits,
+            progress: Arc::clone(progress),
+            number: 0,
+            current: Current {
+                writer: Writer::new(BufWriter::new(file.clone()), first, &origin)?,
+                file,
+                path: first.to_owned(),
+                first_message: None,
+            },
+            origin,
+            kept,
+            counts: Channel::ALL.iter().map(|&channel| (channel, 0)).collect(),
+        })
+    }
+
+    /// To be called before each batch of messages at `now`: begins the next file where this one is full or old enough.
+    ///
+    /// # Errors
+    /// [`SeriesError`] when this file cannot be completed or the next one not be begun.
+    pub(super) fn prepared(mut self, now: Instant) -> Result<Self, SeriesError> {
+        let first_message = *self.current.first_message.get_or_insert(now);
+        let limits = &self.limits;
+        let is_full = limits.max_bytes.is_some_and(|max| self.current.file.bytes() >= max);
+        let age = now.saturating_duration_since(first_message);
+        let is_old = limits.max_age.is_some_and(|max| age >= max);
+        if is_full || is_old { self.rotated(now) } else { Ok(self) }
+    }
+
+    /// Writes messages into the file in use.
+    ///
+    /// # Errors
+    /// [`WriteError`] when it refuses.
+    pub(super) fn write<T: Logged>(&mut self, messages: &[T]) -> Result<(), WriteError> {
+        messages
+            .iter()
+            .try_for_each(|message| self.current.writer.write(message))
+    }
+
+    /// Writes what is only in memory yet, and waits until it is on the disk.
+    ///
+    /// # Errors
+    /// [`SeriesError`] when the file refuses, or was removed.
+    pub(super) fn sync(&mut self) -> Result<(), SeriesError> {
+        self.current.writer.flush()?;
+        self.current.file.sync().map_err(|source| SeriesError::Sync {
+            path: self.current.path.clone(),
+            source,
+        })
+    }
+
+    /// Completes the last file; returns the messages of each channel in all files.
+    ///
+    /// # Errors
+    /// [`SeriesError`] when the file could not be completed; what was written until then can be read.
+    pub(super) fn finish(self) -> Result<Vec<(Channel, u64)>, SeriesError> {
+        let Self {
+            current, mut counts, ..
+        } = self;
+        add_counts(&mut counts, &current.writer);
+        complete(current)?;
+        Ok(counts)
+    }
+
+    fn rotated(mut self, now: Instant) -> Result<Self, SeriesError> {
+        add_counts(&mut self.counts, &self.current.writer);
+        // First the old file, so that it is complete whatever becomes of the next.
+        let full = self.current.path.clone();
+        complete(self.current)?;
+        let next = create_next(&self.first, self.number, self.overwrite, &self.progress)?;
+        tracing::info!(
+            "{} is complete; the recording goes on in {}",
+            full.display(),
+            next.path.display()
+        );
+        let origin = Origin {
+            begun: SystemTime::now(),
+            begun_ns: monotonic_ns(),
+            ..self.origin.clone()
+        };
+        self.kept.extend(next.file.identity(&next.path));
+        let mut series = Self {
+            number: next.number,
+            current: Current {
+                writer: Writer::new(BufWriter::new(next.file.clone()), &next.path, &origin)?,
+                file: next.file,
+                path: next.path,
+                first_message: Some(now),
+            },
+            ..self
+        };
+        series.remove_oldest();
+        Ok(series)
+    }
+
+    fn remove_oldest(&mut self) {
+        let Some(keep) = self.limits.keep else { return };
+        while self.kept.len() > keep.max(1) {
+            let Some(oldest) = self.kept.pop_front() else { return };
+            match oldest.remove() {
+                Ok(()) => tracing::info!("removed {}, the oldest file", oldest.path().display()),
+                Err(error) => tracing::warn!(
+                    "{} cannot be removed: {error}: remove it by hand, or the disk gets full",
+                    oldest.path().display()
+                ),
+            }
+        }
+    }
+}
+
+/// The next file, created.
+struct NextFile {
+    number: u64,
+    path: PathBuf,
+    file: LogFile,
+}
+
+/// Creates the file after that with `number`. Without `overwrite`, numbers are left out that another file has.
+fn create_next(
+    first: &Path,
+    mut number: u64,
+    overwrite: bool,
+    progress: &Arc<Progress>,
+) -> Result<NextFile, SeriesError> {
+    loop {
+        number += 1;
+        let path = numbered(first, number);
+        match LogFile::create(&path, overwrite, progress) {
+            Ok(file) => return Ok(NextFile { number, path, file }),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(source) => {
+                progress.note_problem(problem_of(&source));
+                return Err(SeriesError::Create { path, source });
+            }
+        }
+    }
+}
+
+fn add_counts(counts: &mut [(Channel, u64)], writer: &Writer<BufWriter<LogFile>>) {
+    for (channel, count) in counts {
+        *count += writer.count(*channel);
+    }
+}
+
+/// Writes the index and waits until the whole file is on the disk.
+fn complete(current: Current) -> Result<(), SeriesError> {
+    let Current { writer, file, path, .. } = current;
+    let refused = |source| SeriesError::Sync {
+        path: path.clone(),
+        source,
+    };
+    let buffer = writer.finish()?;
+    buffer.into_inner().map_err(|error| refused(error.into_error()))?;
+    file.sync().map_err(refused)
+}
+
+/// The name of the file with this number: `run.mcap`, `run.1.mcap`, …
+fn numbered(first: &Path, number: u64) -> PathBuf {
+    if number == 0 {
+        return first.to_owned();
+    }
+    let mut name = first.file_stem().map_or_else(OsString::new, OsString::from);
+    name.push(format!(".{number}"));
+    if let Some(extension) = first.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    first.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests;

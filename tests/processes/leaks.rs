@@ -1,0 +1,99 @@
+//! Processes that come and go, in order or killed, leave nothing with those that stay.
+
+use super::worm::{Process, Worm, wait_for};
+use super::{Crawling, PATIENCE};
+use std::path::Path;
+
+/// Rounds in which everything grows to its usual size.
+const WARM_UP: usize = 4;
+/// Rounds that may not make anything grow.
+const ROUNDS: usize = 20;
+/// Growth of a process's memory that is no leak, bytes. One connection takes 33 kB, and each round makes a dozen.
+const TOLERANCE: u64 = 500_000;
+
+/// What a process holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Held {
+    descriptors: usize,
+    threads: usize,
+    mappings: usize,
+    resident: u64,
+}
+
+impl Held {
+    fn by(process: &Process) -> Self {
+        let folder = Path::new("/proc").join(process.id().to_string());
+        let count = |name: &str| std::fs::read_dir(folder.join(name)).expect("is alive").count();
+        let text = |name: &str| std::fs::read_to_string(folder.join(name)).expect("is alive");
+        let resident_pages = text("statm")
+            .split_whitespace()
+            .nth(1)
+            .and_then(|pages| pages.parse::<u64>().ok());
+        Self {
+            descriptors: count("fd"),
+            threads: count("task"),
+            mappings: text("maps").lines().count(),
+            resident: 4096 * resident_pages.expect("a number of pages"),
+        }
+    }
+}
+
+/// Starts an estimator and a recorder beside the controller, and ends them in order or by kill -9.
+fn come_and_go(worm: &Worm, folder: &Path, round: usize, in_order: bool) {
+    let file = folder.join("leaks.mcap").to_string_lossy().into_owned();
+    let mut recorder = worm.wormd(&["record", "--force", "--out", &file]).start();
+    let mut estimator = worm.wormd(&["estimate"]).start();
+    let length = || std::fs::metadata(&file).map_or(0, |metadata| metadata.len());
+    let begun = length();
+    wait_for("something is recorded", PATIENCE, || length() > begun);
+    match (in_order, round % 2) {
+        (true, 0) => {
+            recorder.end();
+            estimator.end();
+        }
+        (true, _) => {
+            estimator.end();
+            recorder.end();
+        }
+        (false, _) => {
+            recorder.kill();
+            estimator.kill();
+        }
+    }
+}
+
+#[test]
+fn who_stays_does_not_grow_with_who_comes_and_goes() {
+    let Crawling {
+        worm,
+        virtual_worm,
+        estimator,
+        controller,
+    } = Crawling::at_rest(Worm::on_a_steady_computer("leaks"), &[]);
+    estimator.end();
+    let folder = tempfile::tempdir().expect("a folder");
+    let stays = || [Held::by(&controller), Held::by(&virtual_worm)];
+    let mut before = None;
+    for round in 0..WARM_UP + ROUNDS {
+        // What a killed process leaves is removed at the next start, so the rounds before a look end in order.
+        let is_last = round == WARM_UP - 1 || round == WARM_UP + ROUNDS - 1;
+        come_and_go(&worm, folder.path(), round, is_last || round % 2 == 0);
+        if round == WARM_UP - 1 {
+            before = Some((stays(), worm.stale_resources()));
+        }
+    }
+    let (before, files_before) = before.expect("was looked at");
+    let files = worm.stale_resources();
+    println!("{before:?}\n{:?}\n{} files", stays(), files.len());
+    assert_eq!(files.len(), files_before.len(), "{files_before:#?} became {files:#?}");
+    for (before, now) in before.into_iter().zip(stays()) {
+        assert_eq!(
+            (now.descriptors, now.threads, now.mappings),
+            (before.descriptors, before.threads, before.mappings)
+        );
+        assert!(now.resident <= before.resident + TOLERANCE, "{before:?} became {now:?}");
+    }
+    controller.end();
+    virtual_worm.end();
+    assert_eq!(worm.stale_resources(), Vec::<String>::new());
+}
