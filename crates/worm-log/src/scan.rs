@@ -18,6 +18,8 @@ use std::path::Path;
 
 /// Largest size of an unpacked record, bytes; a greater length is damaged.
 const LARGEST_RECORD: usize = 1 << 28;
+/// lz4 makes nothing smaller than by this factor: a byte of its format stands for at most 255 bytes.
+const MAX_LZ4_RATIO: u64 = 256;
 /// Bytes of a record before its content: its opcode and its length.
 const RECORD_HEAD: u64 = 9;
 
@@ -38,15 +40,28 @@ pub struct Contents {
 /// [`ReadError`] when the file cannot be read, is not MCAP, has no channel of a worm, or has one whose messages this
 /// version cannot read; with channel and number if `take` refuses a message.
 pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>) -> Result<Contents, ReadError> {
-    let (mut file, length) = open(path)?;
+    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
+    scan_from(file, path, take)
+}
+
+/// As [`scan`], from anything that can be read and rewound; errors call it `path`.
+///
+/// # Errors
+/// As [`scan`].
+pub fn scan_from(
+    mut input: impl Read + Seek,
+    path: &Path,
+    take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>,
+) -> Result<Contents, ReadError> {
+    let length = skip_magic(&mut input, path)?;
     let mut scanner = Scanner::new(path, take);
     // Where the last whole record ends.
     let mut at = MAGIC.len() as u64;
     let framing = LinearReaderOptions::default()
         .with_emit_chunks(true)
-        .with_record_length_limit(usize::try_from(length).unwrap_or(LARGEST_RECORD).min(LARGEST_RECORD));
+        .with_record_length_limit(at_most(length));
     let mut is_whole = false;
-    let end = each_record(BufReader::new(&file), framing, |opcode, content| {
+    let end = each_record(BufReader::new(&mut input), framing, |opcode, content| {
         if opcode == op::DATA_END {
             // What follows is the index.
             is_whole = true;
@@ -64,10 +79,11 @@ pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<
         Err(Trouble::Refused(error)) => return Err(error),
     };
     let sure = scanner.count;
-    file.seek(SeekFrom::Start(at))
+    input
+        .seek(SeekFrom::Start(at))
         .map_err(|error| unreadable(path, &error))?;
-    let rest = LinearReaderOptions::default().with_record_length_limit(LARGEST_RECORD);
-    let salvaged = each_record(BufReader::new(&file), rest, |opcode, content| {
+    let rest = LinearReaderOptions::default().with_record_length_limit(unpacked_at_most(length.saturating_sub(at)));
+    let salvaged = each_record(BufReader::new(&mut input), rest, |opcode, content| {
         scanner.take_plain(opcode, content)?;
         Ok(ControlFlow::Continue(()))
     });
@@ -78,13 +94,16 @@ pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<
     scanner.into_contents()
 }
 
-/// The file after its magic bytes, and its length.
-fn open(path: &Path) -> Result<(File, u64), ReadError> {
-    let mut file = File::open(path).map_err(|error| unreadable(path, &error))?;
-    let length = file.metadata().map_err(|error| unreadable(path, &error))?.len();
+/// Goes to behind the magic bytes and returns the length of all.
+fn skip_magic(input: &mut (impl Read + Seek), path: &Path) -> Result<u64, ReadError> {
+    let length = input.seek(SeekFrom::End(0)).and_then(|length| {
+        input.rewind()?;
+        Ok(length)
+    });
+    let length = length.map_err(|error| unreadable(path, &error))?;
     let mut magic = [0; MAGIC.len()];
-    match file.read_exact(&mut magic) {
-        Ok(()) if magic == MAGIC => Ok((file, length)),
+    match input.read_exact(&mut magic) {
+        Ok(()) if magic == MAGIC => Ok(length),
         Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => Err(unreadable(path, &error)),
         Err(_) if MAGIC.starts_with(&magic[..magic.len().min(length as usize)]) => Err(refusal(
             path,
@@ -99,6 +118,16 @@ fn open(path: &Path) -> Result<(File, u64), ReadError> {
             "give it the extension of what it is",
         )),
     }
+}
+
+/// The largest record that fits into so many bytes: the reader reserves what a length field says before it reads.
+fn at_most(length: u64) -> usize {
+    usize::try_from(length).unwrap_or(LARGEST_RECORD).min(LARGEST_RECORD)
+}
+
+/// The largest record that so many compressed bytes can hold.
+fn unpacked_at_most(length: u64) -> usize {
+    at_most(length.saturating_mul(MAX_LZ4_RATIO))
 }
 
 /// Why reading ends.
@@ -178,7 +207,7 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
         head[1..].copy_from_slice(&(content.len() as u64).to_le_bytes());
         let checked = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LARGEST_RECORD);
+            .with_record_length_limit(unpacked_at_most(content.len() as u64));
         let taken = each_record(head.as_slice().chain(content), checked, |opcode, content| {
             self.take_plain(opcode, content)?;
             Ok(ControlFlow::Continue(()))

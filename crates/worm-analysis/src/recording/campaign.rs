@@ -8,7 +8,7 @@ use serde::Deserialize;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-use worm_estimator::config::{Config, ConfigError};
+use worm_estimator::config::{Config, ConfigError, read_text};
 use worm_log::ReadError;
 
 const SLOPES_DEG: RangeInclusive<f64> = -90.0..=90.0;
@@ -133,12 +133,20 @@ impl Campaign {
     /// [`CampaignError`] with the line for an unknown key, a value out of range, a missing file, a recording listed twice, an advance
     /// without its standard error, or recordings beside advances.
     pub fn load(path: &Path) -> Result<Self, CampaignError> {
-        let text = std::fs::read_to_string(path).map_err(|source| CampaignError::Read {
+        let text = read_text(path).map_err(|source| CampaignError::Read {
             file: path.to_path_buf(),
             source,
         })?;
-        let reader = Reader { path, text: &text };
-        let file: CampaignFile = toml::from_str(&text).map_err(|error| {
+        Self::from_toml(&text, path)
+    }
+
+    /// As [`load`](Self::load), from a text in memory; errors call it `path`, and the paths in it are relative to that.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), except for those of reading the file.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, CampaignError> {
+        let reader = Reader { path, text };
+        let file: CampaignFile = toml::from_str(text).map_err(|error| {
             let remedy =
                 "a campaign holds worm = \"FILE\" and [[run]] with recording (or advance_m and advance_sigma_m), slope_deg, payload_kg \
                  and cycle_s";
