@@ -23,6 +23,7 @@ mod log;
 mod older;
 mod replay;
 mod scan;
+mod shape;
 mod writer;
 
 pub use channel::{Channel, Logged};
