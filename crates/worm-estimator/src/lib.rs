@@ -5,11 +5,12 @@
 //! | [`config`] | the worm and how it is run: one TOML file, checked once, then trusted | processes, topics |
 //! | [`message`] | one plain, fixed-size type per topic, its JSON form and schema | how messages travel |
 //! | [`estimate`] | contact points, deformation, energy, cycles and alarms from the controller's states | clocks, files, topics |
-//! | [`number`] | numbers as text, for reports | everything else |
+//! | [`number`], [`abridged`] | numbers and foreign names as text, for reports and errors | everything else |
 //!
 //! Everything here is pure: time comes with the messages. The same estimator runs on the robot and on a recording, with the same results
 //! to the last bit.
 
+pub mod abridged;
 pub mod config;
 pub mod estimate;
 pub mod message;

@@ -1,6 +1,10 @@
 //! Why a file cannot be read.
 
 use std::path::{Path, PathBuf};
+use worm_estimator::abridged::abridged;
+
+/// Longest place, problem or remedy, bytes: they may quote the file.
+const MAX_TEXT_LEN: usize = 2000;
 
 /// Why something cannot be read as a recording.
 #[derive(Debug, thiserror::Error)]
@@ -23,8 +27,8 @@ impl ReadError {
         Self {
             file: file.to_path_buf(),
             place: None,
-            problem: problem.into(),
-            remedy: remedy.into(),
+            problem: abridged(problem.into(), MAX_TEXT_LEN),
+            remedy: abridged(remedy.into(), MAX_TEXT_LEN),
         }
     }
 
@@ -32,7 +36,7 @@ impl ReadError {
     #[must_use]
     pub fn at(file: &Path, place: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
-            place: Some(place.into()),
+            place: Some(abridged(place.into(), MAX_TEXT_LEN)),
             ..Self::whole(file, problem, remedy)
         }
     }

@@ -24,12 +24,13 @@ mod older;
 mod recorder_alarm;
 mod replay;
 mod scan;
+mod shape;
 mod writer;
 
 pub use channel::{Channel, Logged};
 pub use compare::{Comparison, compare};
 pub use error::ReadError;
-pub use log::{Log, messages, nothing, without_messages};
+pub use log::{Log, messages, messages_from, nothing, without_messages};
 pub use replay::{Replay, replay};
-pub use scan::{Contents, scan};
+pub use scan::{Contents, scan, scan_from};
 pub use writer::{Origin, WriteError, Writer};

@@ -1,9 +1,10 @@
 //! The contents of a log.
 
 use super::channel::Channel;
-use super::scan::{refusal, scan};
+use super::scan::{Contents, refusal, scan, scan_from};
 use crate::ReadError;
 use std::collections::BTreeMap;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use worm_estimator::config::{Config, ConfigError};
 use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
@@ -51,11 +52,26 @@ impl Log {
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is not the log of a worm, or is of another version.
 pub fn messages(path: &Path) -> Result<Log, ReadError> {
+    gather(path, |take| scan(path, take))
+}
+
+/// As [`messages`], from anything that can be read and rewound; errors call it `path`.
+///
+/// # Errors
+/// As [`messages`].
+pub fn messages_from(input: impl Read + Seek, path: &Path) -> Result<Log, ReadError> {
+    gather(path, |take| scan_from(input, path, take))
+}
+
+/// What receives the messages of a log, still as JSON.
+type Take<'t> = &'t mut dyn FnMut(Channel, &[u8]) -> serde_json::Result<()>;
+
+fn gather(path: &Path, scan: impl FnOnce(Take<'_>) -> Result<Contents, ReadError>) -> Result<Log, ReadError> {
     let mut log = Log {
         file: path.to_owned(),
         ..Log::default()
     };
-    let contents = scan(path, |channel, text| {
+    let contents = scan(&mut |channel, text| {
         match channel {
             Channel::State => log.states.push(State::read_json(text)?),
             Channel::Timing => log.timings.push(Timing::read_json(text)?),

@@ -9,6 +9,11 @@ use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State};
 /// So many recorded estimates must be reproduced to identify the estimator's first state.
 const FIRST_ESTIMATES: usize = 20;
 
+/// The search for the first state ends after so many passes through the log, so that its time grows as the log and not as its square …
+const TRIES: usize = 20;
+/// … and not before so many states.
+const MIN_TRIED_STATES: usize = 100_000;
+
 /// The estimator's results on a log's states.
 #[derive(Debug, Clone)]
 pub struct Replay {
@@ -33,12 +38,13 @@ pub struct Replay {
 /// # Errors
 /// [`EstimatorError`] for a configuration that is not valid.
 pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
+    let mut budget = MIN_TRIED_STATES + TRIES * log.states.len();
     let recorded: Vec<_> = fresh(&log.estimates)
         .take(FIRST_ESTIMATES)
         .map(recorder_alarm::without)
         .collect();
     for first in possible_starts(&log.states, recorded.first()) {
-        let mut found = run(&log.states[first..], config, recorded.len())?;
+        let (mut found, fed) = run(&log.states[first..], config, recorded.len())?;
         let is_same = found.estimates.len() == recorded.len()
             && found
                 .estimates
@@ -46,12 +52,14 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
                 .zip(&recorded)
                 .all(|(ours, theirs)| same(ours, theirs));
         if is_same {
-            found = run(&log.states[first..], config, usize::MAX)?;
+            (found, _) = run(&log.states[first..], config, usize::MAX)?;
             (found.first, found.first_is_known) = (first, true);
             return Ok(found);
         }
+        let Some(left) = budget.checked_sub(fed) else { break };
+        budget = left;
     }
-    run(&log.states, config, usize::MAX)
+    Ok(run(&log.states, config, usize::MAX)?.0)
 }
 
 /// Indices of the states at which an estimator with this first estimate can have started.
@@ -67,8 +75,8 @@ fn possible_starts(states: &[State], first_estimate: Option<&Estimate>) -> std::
     sample_before.map_or(0, |index| index + 1)..last + 1
 }
 
-/// Runs the estimator until it has made so many estimates.
-fn run(states: &[State], config: &Config, enough: usize) -> Result<Replay, EstimatorError> {
+/// Runs the estimator until it has made so many estimates, and returns how many states that took.
+fn run(states: &[State], config: &Config, enough: usize) -> Result<(Replay, usize), EstimatorError> {
     let mut observer = Observer::new(config)?;
     let mut replay = Replay {
         first: 0,
@@ -77,7 +85,9 @@ fn run(states: &[State], config: &Config, enough: usize) -> Result<Replay, Estim
         cycles: Vec::new(),
         alarms: Vec::new(),
     };
+    let mut fed = 0;
     for state in states {
+        fed += 1;
         let report = observer.update(state);
         replay.alarms.extend(report.alarms.iter());
         replay.estimates.extend(report.estimate);
@@ -86,7 +96,7 @@ fn run(states: &[State], config: &Config, enough: usize) -> Result<Replay, Estim
             break;
         }
     }
-    Ok(replay)
+    Ok((replay, fed))
 }
 
 /// The estimates without heartbeats, which repeat the last estimate with the present alarms, or are sent before the first.

@@ -6,6 +6,7 @@
 
 use super::channel::{CONFIG_ATTACHMENT, Channel, MESSAGE_ENCODING, METADATA};
 use super::older::{completed, lacking_members};
+use super::shape::{are_whole_records, is_whole, uncompressed_records};
 use crate::ReadError;
 use mcap::records::{Channel as FileChannel, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -15,11 +16,23 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::Path;
+use worm_estimator::abridged::{abridged, first_of};
 
 /// Largest size of an unpacked record, bytes; a greater length is damaged.
 const LARGEST_RECORD: usize = 1 << 28;
+/// lz4 makes nothing smaller than by this factor: a byte of its format stands for at most 255 bytes.
+const MAX_LZ4_RATIO: u64 = 256;
+/// More bytes than a chunk has before its records, with the name of any compression that is known.
+const MAX_CHUNK_HEAD: usize = 64;
 /// Bytes of a record before its content: its opcode and its length.
 const RECORD_HEAD: u64 = 9;
+
+/// Most damaged chunks that are named.
+const MAX_DAMAGED_NAMED: usize = 20;
+/// Most foreign channels that are named.
+const MAX_FOREIGN_NAMED: usize = 20;
+/// Longest name from the file that is quoted, bytes.
+const MAX_NAME_LEN: usize = 200;
 
 /// The contents of a log besides its messages, and remarks on it.
 #[derive(Debug, Clone, Default)]
@@ -38,15 +51,28 @@ pub struct Contents {
 /// [`ReadError`] when the file cannot be read, is not MCAP, has no channel of a worm, or has one whose messages this
 /// version cannot read; with channel and number if `take` refuses a message.
 pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>) -> Result<Contents, ReadError> {
-    let (mut file, length) = open(path)?;
+    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
+    scan_from(file, path, take)
+}
+
+/// As [`scan`], from anything that can be read and rewound; errors call it `path`.
+///
+/// # Errors
+/// As [`scan`].
+pub fn scan_from(
+    mut input: impl Read + Seek,
+    path: &Path,
+    take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>,
+) -> Result<Contents, ReadError> {
+    let length = skip_magic(&mut input, path)?;
     let mut scanner = Scanner::new(path, take);
     // Where the last whole record ends.
     let mut at = MAGIC.len() as u64;
     let framing = LinearReaderOptions::default()
         .with_emit_chunks(true)
-        .with_record_length_limit(usize::try_from(length).unwrap_or(LARGEST_RECORD).min(LARGEST_RECORD));
+        .with_record_length_limit(at_most(length));
     let mut is_whole = false;
-    let end = each_record(BufReader::new(&file), framing, |opcode, content| {
+    let end = each_record(BufReader::new(&mut input), framing, |opcode, content| {
         if opcode == op::DATA_END {
             // What follows is the index.
             is_whole = true;
@@ -64,13 +90,26 @@ pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<
         Err(Trouble::Refused(error)) => return Err(error),
     };
     let sure = scanner.count;
-    file.seek(SeekFrom::Start(at))
+    input
+        .seek(SeekFrom::Start(at))
         .map_err(|error| unreadable(path, &error))?;
-    let rest = LinearReaderOptions::default().with_record_length_limit(LARGEST_RECORD);
-    let salvaged = each_record(BufReader::new(&file), rest, |opcode, content| {
-        scanner.take_plain(opcode, content)?;
-        Ok(ControlFlow::Continue(()))
-    });
+    let mut head = Vec::with_capacity(MAX_CHUNK_HEAD);
+    let head_read = input.by_ref().take(MAX_CHUNK_HEAD as u64).read_to_end(&mut head);
+    head_read.map_err(|error| unreadable(path, &error))?;
+    let begun = match head.split_first() {
+        // Its records stand as they are.
+        Some((&op::CHUNK, rest)) => rest.get(RECORD_HEAD as usize - 1..).and_then(uncompressed_records),
+        _ => None,
+    };
+    let rest = LinearReaderOptions::default().with_record_length_limit(unpacked_at_most(length.saturating_sub(at)));
+    let salvaged = each_record(
+        begun.unwrap_or(&head).chain(BufReader::new(&mut input)),
+        rest,
+        |opcode, content| {
+            scanner.take_plain(opcode, content)?;
+            Ok(ControlFlow::Continue(()))
+        },
+    );
     if let Err(Trouble::Unreadable(error)) = salvaged {
         return Err(unreadable(path, &error));
     }
@@ -78,13 +117,16 @@ pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<
     scanner.into_contents()
 }
 
-/// The file after its magic bytes, and its length.
-fn open(path: &Path) -> Result<(File, u64), ReadError> {
-    let mut file = File::open(path).map_err(|error| unreadable(path, &error))?;
-    let length = file.metadata().map_err(|error| unreadable(path, &error))?.len();
+/// Goes to behind the magic bytes and returns the length of all.
+fn skip_magic(input: &mut (impl Read + Seek), path: &Path) -> Result<u64, ReadError> {
+    let length = input.seek(SeekFrom::End(0)).and_then(|length| {
+        input.rewind()?;
+        Ok(length)
+    });
+    let length = length.map_err(|error| unreadable(path, &error))?;
     let mut magic = [0; MAGIC.len()];
-    match file.read_exact(&mut magic) {
-        Ok(()) if magic == MAGIC => Ok((file, length)),
+    match input.read_exact(&mut magic) {
+        Ok(()) if magic == MAGIC => Ok(length),
         Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => Err(unreadable(path, &error)),
         Err(_) if MAGIC.starts_with(&magic[..magic.len().min(length as usize)]) => Err(refusal(
             path,
@@ -99,6 +141,16 @@ fn open(path: &Path) -> Result<(File, u64), ReadError> {
             "give it the extension of what it is",
         )),
     }
+}
+
+/// The largest record that fits into so many bytes: the reader reserves what a length field says before it reads.
+fn at_most(length: u64) -> usize {
+    usize::try_from(length).unwrap_or(LARGEST_RECORD).min(LARGEST_RECORD)
+}
+
+/// The largest record that so many compressed bytes can hold.
+fn unpacked_at_most(length: u64) -> usize {
+    at_most(length.saturating_mul(MAX_LZ4_RATIO))
 }
 
 /// Why reading ends.
@@ -150,6 +202,7 @@ struct Scanner<'a, F> {
     /// The channels of the file by their IDs, with the members that their messages lack; none for unknown channels.
     channels: HashMap<u16, Option<(Channel, Option<&'static str>)>>,
     foreign: Vec<String>,
+    damaged_chunks: usize,
     contents: Contents,
     count: u64,
     latest_ns: u64,
@@ -163,6 +216,7 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
             schemas: HashMap::new(),
             channels: HashMap::new(),
             foreign: Vec::new(),
+            damaged_chunks: 0,
             contents: Contents::default(),
             count: 0,
             latest_ns: 0,
@@ -174,28 +228,45 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
         if opcode != op::CHUNK {
             return self.take_plain(opcode, content);
         }
+        if uncompressed_records(content).is_some_and(|records| !are_whole_records(records)) {
+            self.warn_of_a_chunk(at, &McapError::UnexpectedEoc);
+            return Ok(());
+        }
         let mut head = [opcode; RECORD_HEAD as usize];
         head[1..].copy_from_slice(&(content.len() as u64).to_le_bytes());
         let checked = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LARGEST_RECORD);
+            .with_record_length_limit(unpacked_at_most(content.len() as u64));
         let taken = each_record(head.as_slice().chain(content), checked, |opcode, content| {
             self.take_plain(opcode, content)?;
             Ok(ControlFlow::Continue(()))
         });
         match taken {
             Err(Trouble::Broken(error)) => {
-                let warning = format!("the chunk at byte {at} is damaged ({error}): its messages are left out");
-                self.contents.warnings.push(warning);
+                self.warn_of_a_chunk(at, &error);
                 Ok(())
             }
             taken => taken,
         }
     }
 
+    fn warn_of_a_chunk(&mut self, at: u64, error: &McapError) {
+        self.damaged_chunks += 1;
+        if self.damaged_chunks <= MAX_DAMAGED_NAMED {
+            let warning = format!("the chunk at byte {at} is damaged ({error}): its messages are left out");
+            self.contents.warnings.push(abridged(warning, MAX_NAME_LEN));
+        }
+    }
+
     /// Processes a record that is not a chunk.
     fn take_plain(&mut self, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
-        if opcode == op::ATTACHMENT && !is_whole_attachment(content) {
+        if !matches!(
+            opcode,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT
+        ) {
+            return Ok(());
+        }
+        if !is_whole(opcode, content) {
             return Err(McapError::UnexpectedEof.into());
         }
         match ::mcap::parse_record(opcode, content)? {
@@ -305,35 +376,28 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
     }
 
     fn into_contents(mut self) -> Result<Contents, ReadError> {
+        if self.damaged_chunks > MAX_DAMAGED_NAMED {
+            let more = self.damaged_chunks - MAX_DAMAGED_NAMED;
+            let warning = format!("{more} more chunks are damaged: their messages are left out");
+            self.contents.warnings.push(warning);
+        }
+        let foreign = first_of(&self.foreign, MAX_FOREIGN_NAMED, MAX_NAME_LEN);
         if self.channels.values().any(Option::is_some) {
             if !self.foreign.is_empty() {
-                let ignored = self.foreign.join(", ");
                 self.contents
                     .warnings
-                    .push(format!("channels that are not a worm's are ignored: {ignored}"));
+                    .push(format!("channels that are not a worm's are ignored: {foreign}"));
             }
             return Ok(self.contents);
         }
         let problem = match self.contents.warnings.last() {
             Some(warning) if self.foreign.is_empty() => format!("has no channel at all; {warning}"),
             _ if self.foreign.is_empty() => "has no channel at all".to_owned(),
-            _ => format!("has no channel of a worm, only {}", self.foreign.join(", ")),
+            _ => format!("has no channel of a worm, only {foreign}"),
         };
         let remedy = "give a file that `wormd record` or `wormd up --record` wrote";
         Err(refusal(self.path, Some("channel /state".to_owned()), problem, remedy))
     }
-}
-
-/// Whether an attachment is as long as its length fields say; `mcap` relies on it.
-fn is_whole_attachment(content: &[u8]) -> bool {
-    fn skip_text(rest: &[u8]) -> Option<&[u8]> {
-        let (length, rest) = rest.split_first_chunk::<4>()?;
-        rest.get(u32::from_le_bytes(*length) as usize..)
-    }
-    let times_skipped = content.get(16..);
-    let data = times_skipped.and_then(skip_text).and_then(skip_text);
-    let behind_length = data.and_then(|data| data.get(8..));
-    behind_length.is_some_and(|rest| rest.len() >= 4)
 }
 
 /// An error that names the file and, where there is one, the place in it.

@@ -8,7 +8,8 @@ use serde::Deserialize;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
-use worm_estimator::config::{Config, ConfigError};
+use worm_estimator::abridged::abridged;
+use worm_estimator::config::{Config, ConfigError, read_text};
 use worm_log::ReadError;
 
 const SLOPES_DEG: RangeInclusive<f64> = -90.0..=90.0;
@@ -17,6 +18,9 @@ pub const PAYLOADS_KG: RangeInclusive<f64> = 0.0..=100.0;
 const CYCLES_S: RangeInclusive<f64> = 0.5..=120.0;
 /// The smallest standard error that is accepted for an advance, m.
 const MIN_SIGMA_M: f64 = 1e-6;
+
+/// Longest problem or remedy, bytes: they may quote the file.
+const MAX_TEXT_LEN: usize = 2000;
 
 /// Why a campaign cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -109,7 +113,7 @@ pub struct CampaignRun {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CampaignFile {
-    worm: Option<PathBuf>,
+    worm: Option<Spanned<PathBuf>>,
     #[serde(default)]
     run: Vec<RunEntry>,
 }
@@ -133,12 +137,20 @@ impl Campaign {
     /// [`CampaignError`] with the line for an unknown key, a value out of range, a missing file, a recording listed twice, an advance
     /// without its standard error, or recordings beside advances.
     pub fn load(path: &Path) -> Result<Self, CampaignError> {
-        let text = std::fs::read_to_string(path).map_err(|source| CampaignError::Read {
+        let text = read_text(path).map_err(|source| CampaignError::Read {
             file: path.to_path_buf(),
             source,
         })?;
-        let reader = Reader { path, text: &text };
-        let file: CampaignFile = toml::from_str(&text).map_err(|error| {
+        Self::from_toml(&text, path)
+    }
+
+    /// As [`load`](Self::load), from a text in memory; errors call it `path`, and the paths in it are relative to that.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), except for those of reading the file.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, CampaignError> {
+        let reader = Reader { path, text };
+        let file: CampaignFile = toml::from_str(text).map_err(|error| {
             let remedy =
                 "a campaign holds worm = \"FILE\" and [[run]] with recording (or advance_m and advance_sigma_m), slope_deg, payload_kg \
                  and cycle_s";
@@ -148,7 +160,7 @@ impl Campaign {
             let remedy = "add a section [[run]] with recording and slope_deg for each recording";
             return Err(reader.invalid(0..0, "there is no run in it", remedy));
         }
-        let worm = file.worm.map(|worm| reader.beside(&worm));
+        let worm = file.worm.map(|worm| reader.worm(&worm)).transpose()?;
         let (config, config_text) = match worm.as_deref() {
             Some(worm) => {
                 let (config, text) = Config::load_with_text(worm)?;
@@ -242,14 +254,26 @@ impl Reader<'_> {
         CampaignError::Invalid {
             file: self.path.to_path_buf(),
             line: before.matches('\n').count() + 1,
-            problem: problem.to_owned(),
-            remedy: remedy.to_owned(),
+            problem: abridged(problem.to_owned(), MAX_TEXT_LEN),
+            remedy: abridged(remedy.to_owned(), MAX_TEXT_LEN),
         }
     }
 
     /// A path relative to the campaign's file.
     fn beside(&self, path: &Path) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(path)
+    }
+
+    /// The worm's configuration. A device or a pipe in its place may never end.
+    fn worm(&self, worm: &Spanned<PathBuf>) -> Result<PathBuf, CampaignError> {
+        let path = self.beside(worm.get_ref());
+        match path.metadata() {
+            Ok(metadata) if !metadata.is_file() => {
+                let problem = format!("{} is not a file", path.display());
+                Err(self.invalid(worm.span(), &problem, "give the worm's configuration file"))
+            }
+            _ => Ok(path),
+        }
     }
 
     fn run(&self, entry: &RunEntry, recording: &Spanned<PathBuf>) -> Result<CampaignRun, CampaignError> {

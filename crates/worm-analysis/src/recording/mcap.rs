@@ -5,10 +5,12 @@ mod write;
 pub use write::write;
 
 use super::{Motor, Recording};
+use std::fs::File;
+use std::io::{Read, Seek};
 use std::path::Path;
 use worm_estimator::estimate::{Capture, MotorTime};
 use worm_estimator::message::{JsonMessage, State};
-use worm_log::{Channel, ReadError, nothing, scan};
+use worm_log::{Channel, ReadError, nothing, scan_from};
 
 /// Reads a log's states as a recording: one sample for each new sample of the tracker.
 ///
@@ -19,8 +21,23 @@ use worm_log::{Channel, ReadError, nothing, scan};
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is no log of a worm, is of another version, or has no samples.
 pub fn read(path: &Path) -> Result<Recording, ReadError> {
+    let file = File::open(path).map_err(|error| {
+        ReadError::whole(
+            path,
+            format!("cannot be read: {error}"),
+            "check that the file is there and may be read",
+        )
+    })?;
+    read_from(file, path)
+}
+
+/// As [`read`], from anything that can be read and rewound; errors call it `path`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, ReadError> {
     let mut runs: Vec<ControllerRun> = Vec::new();
-    let contents = scan(path, |channel, text| {
+    let contents = scan_from(input, path, |channel, text| {
         if channel != Channel::State {
             return Ok(());
         }

@@ -40,7 +40,7 @@ mod write;
 
 pub use campaign::PAYLOADS_KG;
 pub use campaign::{Advance, Campaign, CampaignError, CampaignRun};
-pub use open::{open, open_with_progress};
+pub use open::{open, open_with_progress, read_from};
 pub use options::OpenOptions;
 pub use projection::{Axis, AxisError};
 pub use series::{Motor, Recording};

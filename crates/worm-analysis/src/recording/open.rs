@@ -5,7 +5,7 @@ use super::series::Recording;
 use super::text::Text;
 use super::{c3d, mcap, projection, sanity_check, table, vicon};
 use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 use worm_log::ReadError;
 
@@ -33,45 +33,65 @@ pub fn open_with_progress(
     options: &OpenOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Recording, ReadError> {
-    options.check(path)?;
-    let cannot = |error: std::io::Error| {
-        ReadError::whole(
-            path,
-            format!("cannot be read: {error}"),
-            "give an existing recording that you may read",
-        )
-    };
+    let cannot = |error: std::io::Error| cannot_read(path, &error);
     let metadata = std::fs::metadata(path).map_err(cannot)?;
     if !metadata.is_file() {
         return Err(ReadError::whole(path, "is not a file", FORMATS));
     }
-    let mut file = File::open(path).map_err(cannot)?;
+    let file = File::open(path).map_err(cannot)?;
+    read_from(file, metadata.len(), path, options, progress)
+}
+
+/// As [`open`], from `length` bytes that can be read and rewound; errors and the recording call them `path`.
+///
+/// # Errors
+/// As [`open`].
+pub fn read_from(
+    mut input: impl Read + Seek,
+    length: u64,
+    path: &Path,
+    options: &OpenOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Recording, ReadError> {
+    options.check(path)?;
+    let cannot = |error: std::io::Error| cannot_read(path, &error);
     let mut head = Vec::with_capacity(HEAD);
-    file.by_ref().take(HEAD as u64).read_to_end(&mut head).map_err(cannot)?;
+    input
+        .by_ref()
+        .take(HEAD as u64)
+        .read_to_end(&mut head)
+        .map_err(cannot)?;
     let begin = if head.starts_with(BYTE_ORDER_MARK) {
         BYTE_ORDER_MARK.len()
     } else {
         0
     };
     let along_canal = |markers| projection::project(markers, options.axis, path);
-    let format = Format::of(path, &head)?;
-    let text = Text::new(Cursor::new(&head[begin..]).chain(&file), metadata.len(), progress);
-    let mut recording = match format {
+    let mut recording = match Format::of(path, &head)? {
         Format::Table => {
-            let mut recording = table::read(path, text)?;
+            let mut recording = table::read(
+                path,
+                Text::new(Cursor::new(&head[begin..]).chain(input), length, progress),
+            )?;
             if options.axis.is_some() {
                 let note = "--axis is not used: the positions in this file lie along the canal already";
                 recording.warnings.push(note.to_owned());
             }
             recording
         }
-        Format::Vicon => along_canal(vicon::read(path, text)?)?,
+        Format::Vicon => along_canal(vicon::read(
+            path,
+            Text::new(Cursor::new(&head[begin..]).chain(input), length, progress),
+        )?)?,
         Format::C3d => {
             let mut bytes = head;
-            file.read_to_end(&mut bytes).map_err(cannot)?;
+            input.read_to_end(&mut bytes).map_err(cannot)?;
             along_canal(c3d::read(path, &bytes)?)?
         }
-        Format::Mcap => mcap::read(path)?,
+        Format::Mcap => {
+            input.rewind().map_err(cannot)?;
+            mcap::read_from(input, path)?
+        }
     };
     let full_range_s = recording.time_s.first().copied().zip(recording.time_s.last().copied());
     if options.from_s.is_some() || options.to_s.is_some() {
@@ -79,6 +99,11 @@ pub fn open_with_progress(
     }
     sanity_check::check(&mut recording, options, full_range_s)?;
     Ok(recording)
+}
+
+fn cannot_read(path: &Path, error: &std::io::Error) -> ReadError {
+    let problem = format!("cannot be read: {error}");
+    ReadError::whole(path, problem, "give an existing recording that you may read")
 }
 
 /// The formats that are recognised.

@@ -13,6 +13,10 @@ use worm_physics::MAX_CELLS;
 
 /// Most characters of a file that are quoted in an error.
 const MAX_QUOTED: usize = 32;
+/// Most columns of a table: some for each cell and the motor, and room for those of other programs.
+const MAX_COLUMNS: usize = 1000;
+/// Most columns that are named because they are not known.
+const MAX_UNKNOWN_NAMED: usize = 20;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,6 +147,12 @@ impl<R: Read> Rows<'_, R> {
 
     /// Parses the header row; returns a recording with its series, all of them empty.
     fn read_header(&mut self, header: &ByteRecord) -> Result<Recording, ReadError> {
+        if header.len() > MAX_COLUMNS {
+            return self.refuse_line(
+                format!("there are {} columns", header.len()),
+                format!("leave out what is not a worm's: at most {MAX_COLUMNS} columns are read"),
+            );
+        }
         let names: Vec<String> = header
             .iter()
             .map(|name| String::from_utf8_lossy(name).trim().to_owned())
@@ -156,6 +166,7 @@ impl<R: Read> Rows<'_, R> {
             );
         }
         let mut warnings = Vec::new();
+        let mut unknown = 0;
         for (index, name) in names.iter().enumerate() {
             let column = column_of(name);
             if let Some(unit) = unit_problem(name) {
@@ -166,11 +177,13 @@ impl<R: Read> Rows<'_, R> {
                 );
             }
             match self.columns.iter().position(|&other| other == column) {
-                _ if column == Column::Unknown => warnings.push(format!(
-                    "column {} ({}) is not known and not used",
-                    index + 1,
-                    quoted(name)
-                )),
+                _ if column == Column::Unknown => {
+                    unknown += 1;
+                    if unknown <= MAX_UNKNOWN_NAMED {
+                        let name = quoted(name);
+                        warnings.push(format!("column {} ({name}) is not known and not used", index + 1));
+                    }
+                }
                 Some(first) => {
                     return self.refuse(
                         index,
@@ -181,6 +194,10 @@ impl<R: Read> Rows<'_, R> {
                 None => {}
             }
             self.columns.push(column);
+        }
+        if unknown > MAX_UNKNOWN_NAMED {
+            let more = unknown - MAX_UNKNOWN_NAMED;
+            warnings.push(format!("{more} more columns are not known and not used"));
         }
         if names.iter().all(|name| name.parse::<f64>().is_ok()) {
             return self.refuse_line(

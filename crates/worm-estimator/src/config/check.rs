@@ -1,8 +1,18 @@
 //! Checking values, and errors that say what to do.
 
+use crate::abridged::abridged;
 use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+
+/// Most problems that are reported at once: nobody reads more.
+const MAX_PROBLEMS: usize = 20;
+/// Longest value that is quoted, bytes.
+const MAX_VALUE_LEN: usize = 100;
+/// Longest remedy, bytes; it may quote a name from the file.
+const MAX_REMEDY_LEN: usize = 600;
+/// Longest message of the TOML parser, bytes; it may quote a key from the file.
+const MAX_SYNTAX_LEN: usize = 2000;
 
 /// A configuration that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -76,7 +86,7 @@ pub(super) fn syntax(text: &str, file: &Path, error: &toml::de::Error) -> Config
         file: file.to_path_buf(),
         line: before.matches('\n').count() + 1,
         column: before.chars().rev().take_while(|&c| c != '\n').count() + 1,
-        message: error.message().trim().to_owned(),
+        message: abridged(error.message().trim().to_owned(), MAX_SYNTAX_LEN),
     }
 }
 
@@ -89,11 +99,11 @@ pub(super) struct Checker {
 impl Checker {
     /// Adds a problem unless `holds`.
     pub(super) fn require(&mut self, holds: bool, key: &str, value: impl Display, remedy: impl Display) {
-        if !holds {
+        if !holds && self.problems.len() < MAX_PROBLEMS {
             self.problems.push(ConfigProblem {
                 key: key.to_owned(),
-                value: value.to_string(),
-                remedy: remedy.to_string(),
+                value: abridged(value.to_string(), MAX_VALUE_LEN),
+                remedy: abridged(remedy.to_string(), MAX_REMEDY_LEN),
             });
         }
     }

@@ -26,6 +26,8 @@ pub use virtual_worm::VirtualWorm;
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
 
 use serde::Deserialize;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// The whole configuration. Values from [`Config::load`] and [`Config::from_toml`] are checked.
@@ -64,6 +66,23 @@ pub struct Config {
     pub virtual_worm: VirtualWorm,
 }
 
+/// Longest configuration or campaign that is read, bytes: one that names every key and a thousand runs is far shorter.
+const MAX_TEXT_LEN: u64 = 1 << 20;
+
+/// Reads a text file of at most a megabyte, as configurations and campaigns are.
+///
+/// # Errors
+/// When it cannot be read, is no text, or is longer: a device such as `/dev/zero` has no end.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let length = File::open(path)?.take(MAX_TEXT_LEN + 1).read_to_string(&mut text)?;
+    if length as u64 > MAX_TEXT_LEN {
+        let problem = format!("longer than {MAX_TEXT_LEN} bytes");
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
+    }
+    Ok(text)
+}
+
 impl Config {
     /// `config/worm.toml`: every key with its meaning, and the defaults as values.
     pub const COMMENTED: &'static str = include_str!("../../../../config/worm.toml");
@@ -82,7 +101,7 @@ impl Config {
     /// # Errors
     /// As [`Config::load`].
     pub fn load_with_text(path: &Path) -> Result<(Self, String), ConfigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+        let text = read_text(path).map_err(|source| ConfigError::Read {
             file: path.to_path_buf(),
             source,
         })?;

@@ -38,13 +38,13 @@ impl PerCell {
     ) {
         match self {
             Self::Same(value) => checker.range(key, *value, range, unit),
+            Self::Each(values) if values.len() != cells => checker.require(
+                false,
+                key,
+                format!("a list of {}", values.len()),
+                format!("give one value, or one for each of the {cells} cells"),
+            ),
             Self::Each(values) => {
-                checker.require(
-                    values.len() == cells,
-                    key,
-                    format!("a list of {}", values.len()),
-                    format!("give one value, or one for each of the {cells} cells"),
-                );
                 for (index, value) in values.iter().enumerate() {
                     checker.range(&format!("{key}[{}]", index + 1), *value, range.clone(), unit);
                 }

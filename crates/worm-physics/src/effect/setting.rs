@@ -83,10 +83,11 @@ impl Setting {
         Self::new(effect, cell, &values, cells)
     }
 
-    /// An effect with its values clamped to their ranges.
+    /// An effect with its values clamped to their ranges; one that is not a number becomes the neutral one.
     pub fn within(effect: &'static Effect, cell: Option<usize>, values: &[f64]) -> Self {
         let mut kept = [0.0; MAX_PARAMETERS];
         for ((kept, parameter), value) in kept.iter_mut().zip(effect.parameters).zip(values) {
+            let value = if value.is_nan() { parameter.neutral } else { *value };
             *kept = value.clamp(parameter.min, parameter.max);
         }
         Self {

@@ -233,9 +233,7 @@ fn count_frames(header: &Header, parameters: &Parameters<'_>) -> Result<usize, S
 }
 
 fn unit_m(parameters: &Parameters<'_>, path: &Path) -> Result<f64, ReadError> {
-    let unit = parameters
-        .texts("POINT", "UNITS")
-        .and_then(|texts| texts.into_iter().next());
+    let unit = parameters.texts("POINT", "UNITS").and_then(|mut texts| texts.next());
     let problem = match &unit {
         Some(unit) => match metres_in(unit) {
             Some(metres) => return Ok(metres),

@@ -15,7 +15,8 @@ pub(super) struct Parameters<'b> {
 struct Value<'b> {
     /// −1 text, 1 byte, 2 integer, 4 floating point.
     kind: i8,
-    dimensions: Vec<usize>,
+    /// The first of its dimensions: the length of each of its texts.
+    first_dimension: Option<usize>,
     data: Bytes<'b>,
 }
 
@@ -73,11 +74,11 @@ impl<'b> Parameters<'b> {
     }
 
     /// The texts of a parameter, trimmed.
-    pub(super) fn texts(&self, group: &str, name: &str) -> Option<Vec<String>> {
+    pub(super) fn texts(&self, group: &str, name: &str) -> Option<impl Iterator<Item = String> + use<'b>> {
         let value = self.get(group, name).filter(|value| value.kind == -1)?;
-        let length = value.dimensions.first().copied().unwrap_or(1).max(1);
+        let length = value.first_dimension.unwrap_or(1).max(1);
         let trim = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_matches(['\0', ' ']).to_owned();
-        Some(value.data.bytes.chunks(length).map(trim).collect())
+        Some(value.data.bytes.chunks(length).map(trim))
     }
 }
 
@@ -85,19 +86,18 @@ impl<'b> Value<'b> {
     fn read(file: Bytes<'b>, at: usize) -> Option<Self> {
         let kind = file.u8(at)?.cast_signed();
         let count = usize::from(file.u8(at + 1)?);
-        let dimensions: Vec<usize> = file
-            .slice(at + 2, count)?
-            .iter()
-            .map(|&size| usize::from(size))
-            .collect();
+        let mut dimensions = file.slice(at + 2, count)?.iter().map(|&size| usize::from(size));
+        let first_dimension = dimensions.clone().next();
         let element = usize::from(kind.unsigned_abs());
-        let length = dimensions
-            .iter()
-            .try_fold(element, |length, size| length.checked_mul(*size))?;
+        let length = dimensions.try_fold(element, usize::checked_mul)?;
         let data = Bytes {
             bytes: file.slice(at + 2 + count, length)?,
             ..file
         };
-        Some(Self { kind, dimensions, data })
+        Some(Self {
+            kind,
+            first_dimension,
+            data,
+        })
     }
 }

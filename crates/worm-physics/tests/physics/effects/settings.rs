@@ -140,3 +140,17 @@ fn what_is_no_effect_is_refused_with_a_remedy() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+#[test]
+fn clamped_values_are_always_numbers_in_range() {
+    for effect in LIBRARY {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0] {
+            let setting = Setting::within(effect, None, &[value; 3]);
+            for (kept, parameter) in setting.values().iter().zip(effect.parameters) {
+                let (name, range) = (effect.name, parameter.min..=parameter.max);
+                assert!(range.contains(kept), "{name}, {}: {kept} from {value}", parameter.name);
+                assert!(!value.is_nan() || *kept == parameter.neutral, "{name}: {kept}");
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Logs of the topics, and the messages in them.
+
+use crate::{MAX_WARNINGS_LEN, readable, recording};
+use std::io::Cursor;
+use std::path::Path;
+use worm_analysis::recording::mcap;
+use worm_estimator::config::Config;
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+use worm_log::{Log, compare, messages_from, replay};
+
+/// A log: as its messages, as a recording, and through the estimator.
+pub(crate) fn mcap_log(data: &[u8]) {
+    let path = Path::new("worm.mcap");
+    match messages_from(Cursor::new(data), path) {
+        Ok(log) => check(&log),
+        Err(error) => drop(readable(error)),
+    }
+    match mcap::read_from(Cursor::new(data), path) {
+        Ok(read) => assert!(read.time_s.iter().all(|time_s| time_s.is_finite()), "a time"),
+        Err(error) => drop(readable(error)),
+    }
+    let options = worm_analysis::recording::OpenOptions::default();
+    let opened = worm_analysis::recording::read_from(
+        Cursor::new(data),
+        data.len() as u64,
+        path,
+        &options,
+        &mut |_fraction| {},
+    );
+    match opened {
+        Ok(opened) => recording::check(&opened),
+        Err(error) => drop(readable(error)),
+    }
+}
+
+/// Messages as JSON, one a line, and the log that they make.
+pub(crate) fn log_messages(data: &[u8]) {
+    let mut log = Log::default();
+    for line in data.split(|&byte| byte == b'\n') {
+        log.states.extend(read::<State>(line));
+        log.estimates.extend(read::<Estimate>(line));
+        log.cycles.extend(read::<Cycle>(line));
+        log.alarms.extend(read::<Alarm>(line));
+        read::<Timing>(line);
+    }
+    check(&log);
+}
+
+/// Reads a message, if it is one; then it is written and read to the same text again.
+fn read<T: JsonMessage>(text: &[u8]) -> Option<T> {
+    let message = T::read_json(text).ok()?;
+    let once = written(&message);
+    let again = T::read_json(&once).expect("what was written can be read");
+    assert_eq!(once, written(&again), "read and written again");
+    Some(message)
+}
+
+fn written<T: JsonMessage>(message: &T) -> Vec<u8> {
+    let mut text = Vec::new();
+    message.write_json(&mut text).expect("every message can be written");
+    text
+}
+
+fn check(log: &Log) {
+    let warnings: usize = log.warnings.iter().map(String::len).sum();
+    assert!(warnings <= MAX_WARNINGS_LEN, "{warnings} bytes of warnings");
+    for state in log.states.iter().take(8) {
+        assert_eq!(
+            written(state),
+            written(&read::<State>(&written(state)).expect("a state"))
+        );
+    }
+    let config = match log.config() {
+        Ok(config) => config,
+        Err(error) => {
+            readable(error);
+            Config::default()
+        }
+    };
+    let replayed = replay(log, &config).expect("a checked configuration has an estimator");
+    assert!(
+        replayed.estimates.len() <= log.states.len(),
+        "an estimate for a state at most"
+    );
+    let comparison = compare(log, &replayed);
+    assert!(
+        comparison.estimates_identical <= comparison.estimates_compared,
+        "{comparison:?}"
+    );
+    serde_json::to_string(&comparison).expect("a comparison is written as JSON");
+}
