@@ -61,8 +61,10 @@ pub fn link_settings(config: &Config, baud: u32) -> Result<LinkSettings, DriveEr
         },
         watchdog_ms: config.servo.watchdog_ms,
         current_limit_a: config.servo.current_limit_a,
+        winding_resistance_ohm: config.servo.winding_resistance_ohm,
         velocity_limit_rad_s: config.servo.velocity_limit_rev_per_min * TAU / 60.0,
         temperature_limit_c: f64::from(config.servo.temperature_limit_c),
+        accept_unsafe_watchdog: config.servo.accept_unsafe_watchdog,
     })
 }
 

@@ -31,8 +31,10 @@ fn settings() -> LinkSettings {
         read: ReadMode::Auto,
         watchdog_ms: 100,
         current_limit_a: 1.0,
+        winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 6.0,
         temperature_limit_c: 70.0,
+        accept_unsafe_watchdog: false,
     }
 }
 

@@ -80,6 +80,10 @@ pub struct ServoConditions {
     pub hardware_errors: u8,
     /// Model number that it says it has.
     pub model_number: Option<u16>,
+    /// Version of the firmware that it says it has.
+    pub firmware: Option<u8>,
+    /// Its bus watchdog latches without stopping the motor.
+    pub watchdog_defect: bool,
 }
 
 /// The cable.

@@ -242,6 +242,19 @@ pub(super) const KINDS: &[FaultKind] = &[
         }],
         |c, v| c.servo.model_number = Some(v[0] as u16),
     ),
+    kind(
+        "watchdog-defect",
+        "the servo's bus watchdog latches without stopping the motor, as with this firmware",
+        &[Parameter {
+            name: "firmware",
+            domain: Domain::Integer(8),
+            default: Some(51.0),
+        }],
+        |c, v| {
+            c.servo.watchdog_defect = true;
+            c.servo.firmware = Some(v[0] as u8);
+        },
+    ),
 ];
 
 impl FaultKind {

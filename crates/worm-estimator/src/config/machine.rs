@@ -85,7 +85,7 @@ pub struct Servo {
     pub winding_resistance_ohm: f64,
     /// Torque of the output shaft per current, N m/A, before inner friction.
     pub torque_constant_n_m_per_a: f64,
-    /// Current limit written to the servo, A.
+    /// Greatest current of the motor, that of a blocked one, A. The servo gets it as a limit of its duty.
     pub current_limit_a: f64,
     /// Velocity limit written to the servo, rev/min.
     pub velocity_limit_rev_per_min: f64,
@@ -93,6 +93,8 @@ pub struct Servo {
     pub temperature_limit_c: u8,
     /// Silence after which the servo stops the motor by itself, ms, in steps of 20 ms.
     pub watchdog_ms: u32,
+    /// Whether to arm a servo whose firmware is known not to stop the motor when its bus watchdog acts.
+    pub accept_unsafe_watchdog: bool,
 }
 
 impl Default for Servo {
@@ -108,6 +110,7 @@ impl Default for Servo {
             velocity_limit_rev_per_min: 60.0,
             temperature_limit_c: 70,
             watchdog_ms: 100,
+            accept_unsafe_watchdog: false,
         }
     }
 }
