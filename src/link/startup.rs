@@ -69,6 +69,8 @@ pub struct LinkSettings {
     pub velocity_limit_rad_s: f64,
     /// Temperature in °C at which the servo shuts down; XL330: up to 100, 70 by default.
     pub temperature_limit_c: f64,
+    /// Bits of the tracker's switches of which each means that the emergency stop is pressed; without it they are not read.
+    pub emergency_stop_mask: Option<u8>,
     /// Whether a servo is used whose firmware is known not to stop the motor when its bus watchdog acts.
     pub accept_unsafe_watchdog: bool,
 }
@@ -156,6 +158,12 @@ pub enum StartupError {
         /// Cells configured.
         configured: usize,
     },
+    /// The tracker does not have the emergency stop's register.
+    #[error(
+        "the tracker has no {}: set emergency_stop.source = \"gpio\", or give the tracker that register",
+        tracker::register::SWITCHES
+    )]
+    NoEmergencyStop,
     /// A limit that the register cannot hold.
     #[error("{value} is no {register} that the servo can hold: correct it in the config")]
     Limit {
@@ -210,6 +218,16 @@ pub fn prepare<P: Port>(
             found: tracker_cells,
             configured: settings.cells,
         });
+    }
+
+    if settings.emergency_stop_mask.is_some() {
+        match bus.register(tracker_id, tracker::register::SWITCHES) {
+            Err(OperationError::Transaction {
+                error: TransactionError::Refused { .. },
+                ..
+            }) => return Err(StartupError::NoEmergencyStop),
+            read => read?,
+        };
     }
 
     set_up(bus, settings, findings)?;
@@ -479,6 +497,7 @@ fn choose_read_plan<P: Port>(
             tracker,
             cells: settings.cells,
             read,
+            emergency_stop_mask: settings.emergency_stop_mask,
         };
         for _ in 0..READ_ATTEMPTS {
             let outcome = bus.exchange(&plan, 0.0, Instant::now() + REPLY_TIME);

@@ -264,6 +264,7 @@ fn settings(read: ReadMode) -> LinkSettings {
         winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 6.0,
         temperature_limit_c: 70.0,
+        emergency_stop_mask: None,
         accept_unsafe_watchdog: false,
     }
 }

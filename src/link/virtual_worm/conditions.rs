@@ -12,6 +12,8 @@ pub struct Conditions {
     pub plant: PlantConditions,
     /// What the tracker sees.
     pub camera: CameraConditions,
+    /// The tracker's switches, one bit each; the emergency stop is one of them.
+    pub switches: u8,
     /// The servo's electronics.
     pub servo: ServoConditions,
     /// The cable.

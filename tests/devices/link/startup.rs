@@ -23,6 +23,7 @@ pub fn settings() -> LinkSettings {
         winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 10.0,
         temperature_limit_c: 70.0,
+        emergency_stop_mask: None,
         accept_unsafe_watchdog: false,
     }
 }

@@ -182,6 +182,71 @@ impl Tracker {
     }
 }
 
+/// Where the emergency stop is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EmergencyStopSource {
+    /// Register 127 of the tracker, in the same read as the samples.
+    Tracker,
+    /// A GPIO line of this computer.
+    Gpio,
+}
+
+/// The emergency stop's input.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EmergencyStop {
+    /// Where it is read.
+    pub source: EmergencyStopSource,
+    /// Bits of the tracker's register of which each means pressed.
+    #[serde(default = "default_emergency_mask")]
+    pub mask: u8,
+    /// Device file of the GPIO chip.
+    #[serde(default = "default_gpio_chip")]
+    pub chip: String,
+    /// Line of the chip.
+    pub line: Option<u32>,
+    /// Whether a low level means pressed.
+    #[serde(default)]
+    pub active_low: bool,
+    /// Time without a reading after which it counts as pressed, s.
+    #[serde(default = "default_emergency_timeout_s")]
+    pub timeout_s: f64,
+}
+
+fn default_emergency_mask() -> u8 {
+    1
+}
+
+fn default_gpio_chip() -> String {
+    "/dev/gpiochip0".to_owned()
+}
+
+fn default_emergency_timeout_s() -> f64 {
+    0.1
+}
+
+impl EmergencyStop {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("emergency_stop.mask", self.mask, 1..=255, "");
+        checker.range("emergency_stop.timeout_s", self.timeout_s, 0.005..=5.0, "s");
+        if self.source == EmergencyStopSource::Gpio {
+            checker.require(
+                self.chip.starts_with('/'),
+                "emergency_stop.chip",
+                format!("\"{}\"", self.chip),
+                "name the device file of the chip, such as \"/dev/gpiochip0\"",
+            );
+            checker.require(
+                self.line.is_some(),
+                "emergency_stop.line",
+                "none",
+                "name the line of the chip; `gpioinfo` lists them",
+            );
+        }
+    }
+}
+
 /// The control loop and its timeouts.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]

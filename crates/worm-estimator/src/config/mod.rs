@@ -18,7 +18,10 @@ pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
-pub use machine::{Battery, Control, Estimator, Limits, Port, ReadMode, Realtime, Servo, Topics, Tracker};
+pub use machine::{
+    Battery, Control, EmergencyStop, EmergencyStopSource, Estimator, Limits, Port, ReadMode, Realtime, Servo, Topics,
+    Tracker,
+};
 pub use physics::PhysicsError;
 pub use virtual_worm::VirtualWorm;
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
@@ -44,6 +47,8 @@ pub struct Config {
     pub servo: Servo,
     /// The device that measures cell positions.
     pub tracker: Tracker,
+    /// The emergency stop's input; absent: there is none.
+    pub emergency_stop: Option<EmergencyStop>,
     /// The control loop.
     pub control: Control,
     /// Limits at which the controller stops by itself.
@@ -118,6 +123,9 @@ impl Config {
         }
         self.servo.check(&mut checker);
         self.tracker.check(self.servo.id, &mut checker);
+        if let Some(emergency_stop) = &self.emergency_stop {
+            emergency_stop.check(&mut checker);
+        }
         self.control.check(&mut checker);
         self.limits.check(&mut checker);
         self.estimator.check(&mut checker);
