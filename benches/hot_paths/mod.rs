@@ -96,6 +96,7 @@ impl AnsweredExchange {
             tracker: id(100),
             cells: 4,
             read: ReadPlan::FastBulk,
+            emergency_stop_mask: None,
         };
         Self {
             bus: WormBus::new(AnsweringPort::new(&plan)),

@@ -10,7 +10,7 @@ use dynamixel_bus::packet::DeviceId;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use worm_estimator::config::{Config, ReadMode as ConfiguredRead};
+use worm_estimator::config::{Config, EmergencyStopSource, ReadMode as ConfiguredRead};
 
 /// Why the worm's devices cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -61,9 +61,19 @@ pub fn link_settings(config: &Config, baud: u32) -> Result<LinkSettings, DriveEr
         },
         watchdog_ms: config.servo.watchdog_ms,
         current_limit_a: config.servo.current_limit_a,
+        winding_resistance_ohm: config.servo.winding_resistance_ohm,
         velocity_limit_rad_s: config.servo.velocity_limit_rev_per_min * TAU / 60.0,
         temperature_limit_c: f64::from(config.servo.temperature_limit_c),
+        emergency_stop_mask: emergency_stop_mask(config),
+        accept_unsafe_watchdog: config.servo.accept_unsafe_watchdog,
     })
+}
+
+/// The tracker's bits that mean a pressed emergency stop, if the tracker reads one.
+fn emergency_stop_mask(config: &Config) -> Option<u8> {
+    let configured = config.emergency_stop.as_ref();
+    let at_tracker = configured.filter(|stop| stop.source == EmergencyStopSource::Tracker);
+    at_tracker.map(|stop| stop.mask)
 }
 
 /// The open port with a servo and a tracker on it that have passed the start-up checks.

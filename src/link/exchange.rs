@@ -56,14 +56,17 @@ pub struct ExchangePlan {
     pub cells: usize,
     /// How they are read.
     pub read: ReadPlan,
+    /// Bits of the tracker's switches of which each means that the emergency stop is pressed; without it they are not read.
+    pub emergency_stop_mask: Option<u8>,
 }
 
 impl ExchangePlan {
     fn spans(&self) -> [ReadSpan; 2] {
-        [
-            servo::block_span(self.servo),
-            tracker::block_span(self.tracker, self.cells),
-        ]
+        let tracker = match self.emergency_stop_mask {
+            None => tracker::block_span(self.tracker, self.cells),
+            Some(_) => tracker::block_span_with_switches(self.tracker, self.cells),
+        };
+        [servo::block_span(self.servo), tracker]
     }
 
     /// Bytes of an answer of the servo; of the whole reply where both devices answer in one.
@@ -89,6 +92,8 @@ pub struct ExchangeOutcome {
     /// The servo reports the goal that was sent. If not, though it was read: the goal got lost, is beyond the velocity limit,
     /// or is locked by a latched watchdog; or the answer is a late one to an earlier question.
     pub goal_taken: bool,
+    /// Whether the emergency stop that the tracker reads is pressed; nothing where none is planned, or it was not read this time.
+    pub emergency_stop: Option<bool>,
     /// A reading is the late answer to an earlier exchange.
     pub late: bool,
     /// Earlier exchanges of which the servo's answer counts as lost now: some time after the fact, as it might have been late.
@@ -154,6 +159,8 @@ const LATE_LIMIT: usize = 16 * 1024;
 struct Answers {
     servo: Result<ServoReading, ReadFailure>,
     tracker: Result<TrackerReading, ReadFailure>,
+    /// The tracker's switches, where they are read.
+    switches: Option<u8>,
     /// Whole answers of the servo.
     servo_answers: u32,
 }
@@ -162,6 +169,7 @@ impl Answers {
     const NOTHING: Self = Self {
         servo: Err(ReadFailure::Silent),
         tracker: Err(ReadFailure::Silent),
+        switches: None,
         servo_answers: 0,
     };
 
@@ -180,8 +188,13 @@ impl Answers {
             self.servo == Err(ReadFailure::Malformed)
         } else if id == plan.tracker {
             let of_length = flags.error.is_none() && data.len() == usize::from(plan.spans()[1].length);
+            let (switches, block) = match data.split_first() {
+                Some((&switches, block)) if plan.emergency_stop_mask.is_some() => (Some(switches), block),
+                _ => (None, data),
+            };
             let reading = if of_length {
-                TrackerReading::from_block(data).ok()
+                self.switches = switches;
+                TrackerReading::from_block(block).ok()
             } else {
                 None
             };
@@ -302,8 +315,13 @@ impl<P: Port> WormBus<P> {
         let servo_is_late = harvest.servo.is_err() && late.servo.is_ok();
         let tracker_is_late = harvest.tracker.is_err() && late.tracker.is_ok();
         self.exchange_counters.late_answers += u64::from(servo_is_late || tracker_is_late);
+        let switches = harvest.switches.or(late.switches);
         ExchangeOutcome {
             goal_taken,
+            emergency_stop: plan
+                .emergency_stop_mask
+                .zip(switches)
+                .map(|(mask, switches)| switches & mask != 0),
             late: servo_is_late || tracker_is_late,
             lost,
             servo: if servo_is_late { late.servo } else { harvest.servo },

@@ -41,6 +41,7 @@
 //! meanwhile, [`ExchangeOutcome::goal_taken`] reveals the mix-up; so may the tracker's sample counter.
 
 mod counters;
+mod emergency_stop;
 mod exchange;
 mod operations;
 mod owed_answers;
@@ -55,6 +56,7 @@ pub use dynamixel_bus::{
     Bus, BusCounters, FaultInjector, Faults, Finding, Identity, OpenError, Port, PortError, RefusalCounters, Register,
     TransactionError, Tty, WaitEnd, packet,
 };
+pub use emergency_stop::{EmergencyStopError, EmergencyStopInput};
 pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPlan};
 pub use operations::OperationError;
 pub use servo::ServoReading;

@@ -23,18 +23,27 @@ pub mod register {
     pub const BAUD_RATE: Register = Register::new(8, 1, "baud rate");
     /// Wait before an answer, in 2 µs; 250 (500 µs) as the factory sets it.
     pub const RETURN_DELAY: Register = Register::new(9, 1, "return delay time");
+    /// Bit 0: reverse; bit 2: profiles by time; bit 3: a goal switches torque on.
+    pub const DRIVE_MODE: Register = Register::new(10, 1, "drive mode");
     /// What the goal is: see [`VELOCITY_MODE`](super::VELOCITY_MODE).
     pub const OPERATING_MODE: Register = Register::new(11, 1, "operating mode");
+    /// Added to the present position, signed.
+    pub const HOMING_OFFSET: Register = Register::new(20, 4, "homing offset");
     /// Beyond this, in °C, the servo shuts down.
     pub const TEMPERATURE_LIMIT: Register = Register::new(31, 1, "temperature limit");
     /// Beyond this, in 0.1 V, the servo shuts down.
     pub const MAX_VOLTAGE_LIMIT: Register = Register::new(32, 2, "max voltage limit");
     /// Below this, in 0.1 V, the servo shuts down.
     pub const MIN_VOLTAGE_LIMIT: Register = Register::new(34, 2, "min voltage limit");
-    /// Greatest goal current, in 1 mA.
+    /// Greatest goal PWM, in 0.113 % of full duty.
+    pub const PWM_LIMIT: Register = Register::new(36, 2, "PWM limit");
+    /// Greatest goal current, in 1 mA. It limits the current in the current modes only, not in velocity mode.
     pub const CURRENT_LIMIT: Register = Register::new(38, 2, "current limit");
     /// Greatest goal velocity, in 0.229 rev/min.
     pub const VELOCITY_LIMIT: Register = Register::new(44, 4, "velocity limit");
+    /// What the servo does when it gets power; bit 0: torque on, bit 1: gains and profile from a backup. Servos with an older firmware do
+    /// not have it.
+    pub const STARTUP_CONFIGURATION: Register = Register::new(60, 1, "startup configuration");
     /// Which hardware errors switch torque off.
     pub const SHUTDOWN: Register = Register::new(63, 1, "shutdown");
     /// 1: the motor obeys; 0: it is free.
@@ -45,8 +54,14 @@ pub mod register {
     pub const HARDWARE_ERROR_STATUS: Register = Register::new(70, 1, "hardware error status");
     /// Silence after which the motor stops by itself, in 20 ms; 0 is never, 0xFF says that it has happened.
     pub const BUS_WATCHDOG: Register = Register::new(98, 1, "bus watchdog");
+    /// Limit of the duty in all modes but PWM mode, in 0.113 %; the PWM limit after a start and a change of mode.
+    pub const GOAL_PWM: Register = Register::new(100, 2, "goal PWM");
     /// What the motor shall do, in 0.229 rev/min, signed.
     pub const GOAL_VELOCITY: Register = Register::new(104, 4, "goal velocity");
+    /// Ramp of the velocity, in 214.577 rev/min²; 0 is none.
+    pub const PROFILE_ACCELERATION: Register = Register::new(108, 4, "profile acceleration");
+    /// Velocity on the way to a goal position, in 0.229 rev/min; 0 is the velocity limit.
+    pub const PROFILE_VELOCITY: Register = Register::new(112, 4, "profile velocity");
     /// Milliseconds, 0 to 32767 and over again. Read-only.
     pub const REALTIME_TICK: Register = Register::new(120, 2, "realtime tick");
     /// 1 while the velocity is above a threshold. Read-only.
@@ -81,6 +96,8 @@ pub mod scale {
     pub const VOLTAGE_V: f64 = 0.1;
     /// Full duty of a PWM count: 0.113 %.
     pub const DUTY: f64 = 0.113e-2;
+    /// rad/s² of a profile acceleration count: 214.577 rev/min².
+    pub const ACCELERATION_RAD_S2: f64 = 214.577 * TAU / 3600.0;
     /// Seconds of a return delay count.
     pub const RETURN_DELAY_S: f64 = 2e-6;
     /// Milliseconds of a bus watchdog count.
@@ -107,6 +124,9 @@ pub mod scale {
 
 /// Model number of the XL330-M288-T.
 pub const XL330_M288_MODEL: u16 = 1200;
+
+/// Full duty in counts of 0.113 %.
+pub const FULL_PWM: u16 = 885;
 
 /// Operating mode in which the goal is a velocity.
 pub const VELOCITY_MODE: u8 = 1;

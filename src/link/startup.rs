@@ -5,8 +5,8 @@
 //!    scanned, so that the error names the cause.
 //! 2. **Is the motor at rest?** Torque goes off before anything else is checked; it would lock the settings, too. During the checks
 //!    the servo answers writes (status return level 2), so that a refusal has a reason.
-//! 3. **Are they the right ones, and set up?** Model numbers; no hardware error; cells of the tracker; mode, limits, return
-//!    delay. A setting that is right is not written: EEPROM wears.
+//! 3. **Are they the right ones, and set up?** Model numbers; no hardware error; a watchdog that works; cells of the tracker; direction
+//!    of counting, modes, limits, profiles, shutdown, return delay. A setting that is right is not written: EEPROM wears.
 //! 4. **Ready to tick:** status return level 1 (answer reads only, see the exchange), goal zero, watchdog cleared and set.
 //! 5. **How are they read?** The read mode is tried with real requests, and the first reading is kept.
 
@@ -34,6 +34,13 @@ const READ_ATTEMPTS: usize = 5;
 /// 4814): XL330-M077 and -M288, XC330-T181, -T288, -M181, -M288.
 const MODELS_OF_SIZE_330: [u16; 6] = [1190, 1200, 1210, 1220, 1230, 1240];
 const LAST_FIRMWARE_WITH_WATCHDOG_DEFECT: u8 = 51;
+/// Hardware errors at which the servo has to switch torque off by itself.
+const REQUIRED_SHUTDOWN: HardwareErrors =
+    HardwareErrors(HardwareErrors::OVERHEATING.0 | HardwareErrors::ELECTRICAL_SHOCK.0 | HardwareErrors::OVERLOAD.0);
+/// Resistance of copper grows by this share per kelvin.
+const COPPER_PER_K: f64 = 0.00393;
+/// Temperature at which the configured resistance holds, °C.
+const RESISTANCE_AT_C: f64 = 25.0;
 
 /// What the link has to know of a worm. The config fills it in.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,12 +61,18 @@ pub struct LinkSettings {
     pub read: ReadMode,
     /// Silence in ms after which the motor stops by itself, rounded up to 20 ms; 20 to 2540.
     pub watchdog_ms: u32,
-    /// The servo's current limit in A; XL330: up to 1.75.
+    /// Greatest current of the motor, that of one that is blocked, in A; XL330: up to 1.75. The servo gets it as a limit of its duty.
     pub current_limit_a: f64,
+    /// Resistance of the winding at 25 °C in ohm.
+    pub winding_resistance_ohm: f64,
     /// The servo's velocity limit in rad/s; XL330: up to 49.
     pub velocity_limit_rad_s: f64,
     /// Temperature in °C at which the servo shuts down; XL330: up to 100, 70 by default.
     pub temperature_limit_c: f64,
+    /// Bits of the tracker's switches of which each means that the emergency stop is pressed; without it they are not read.
+    pub emergency_stop_mask: Option<u8>,
+    /// Whether a servo is used whose firmware is known not to stop the motor when its bus watchdog acts.
+    pub accept_unsafe_watchdog: bool,
 }
 
 /// A worm that is ready to tick. Torque is off, the goal is zero, the watchdog is set.
@@ -73,6 +86,8 @@ pub struct Prepared {
     pub tracker: Identity,
     /// Cells that the tracker tracks.
     pub tracker_cells: u8,
+    /// Greatest duty of the motor, in (0, 1].
+    pub duty_limit: f64,
     /// The servo as it stands.
     pub servo_reading: ServoReading,
     /// The cells as they lie.
@@ -123,6 +138,16 @@ pub enum StartupError {
     /// The servo has shut down.
     #[error("the servo reports a hardware error: {0}; remove the cause, then reboot the servo (a reset does so)")]
     HardwareError(HardwareErrors),
+    /// Nothing would stop the motor when the computer falls silent.
+    #[error(
+        "the servo's firmware {firmware} is known not to stop the motor when its bus watchdog acts: update it with DYNAMIXEL \
+         Wizard 2.0 and try `wormd check --try-watchdog`, or set servo.accept_unsafe_watchdog = true and keep a hand on the supply's \
+         switch"
+    )]
+    UnsafeWatchdog {
+        /// Version of the firmware.
+        firmware: u8,
+    },
     /// The tracker sees too few cells.
     #[error(
         "the tracker tracks {found} cells, the config says {configured}: correct worm.cells, or set up the tracker"
@@ -133,6 +158,12 @@ pub enum StartupError {
         /// Cells configured.
         configured: usize,
     },
+    /// The tracker does not have the emergency stop's register.
+    #[error(
+        "the tracker has no {}: set emergency_stop.source = \"gpio\", or give the tracker that register",
+        tracker::register::SWITCHES
+    )]
+    NoEmergencyStop,
     /// A limit that the register cannot hold.
     #[error("{value} is no {register} that the servo can hold: correct it in the config")]
     Limit {
@@ -178,7 +209,7 @@ pub fn prepare<P: Port>(
     if !errors.is_none() {
         return Err(StartupError::HardwareError(errors));
     }
-    warn_of_watchdog_defect(servo, findings);
+    check_watchdog(servo, settings.accept_unsafe_watchdog, findings)?;
 
     let tracker = identify(bus, settings, "tracker", tracker_id, settings.tracker_model)?;
     let tracker_cells = bus.register(tracker_id, tracker::register::CELL_COUNT)? as u8;
@@ -189,7 +220,18 @@ pub fn prepare<P: Port>(
         });
     }
 
+    if settings.emergency_stop_mask.is_some() {
+        match bus.register(tracker_id, tracker::register::SWITCHES) {
+            Err(OperationError::Transaction {
+                error: TransactionError::Refused { .. },
+                ..
+            }) => return Err(StartupError::NoEmergencyStop),
+            read => read?,
+        };
+    }
+
     set_up(bus, settings, findings)?;
+    let duty_limit = limit_duty(bus, settings)?;
     set_status_level(bus, servo_id, ANSWER_READS)?;
     bus.rearm_watchdog(servo_id, settings.watchdog_ms)?;
 
@@ -199,6 +241,7 @@ pub fn prepare<P: Port>(
         servo,
         tracker,
         tracker_cells,
+        duty_limit,
         servo_reading,
         tracker_reading,
     })
@@ -272,16 +315,24 @@ fn who_is_there<P: Port>(bus: &mut WormBus<P>) -> String {
     }
 }
 
-fn warn_of_watchdog_defect(servo: Identity, findings: &mut Vec<Finding>) {
-    if MODELS_OF_SIZE_330.contains(&servo.model) && servo.firmware <= LAST_FIRMWARE_WITH_WATCHDOG_DEFECT {
-        findings.push(Finding::open(
-            format!(
-                "with firmware {} a servo of this size may turn on when its bus watchdog latches",
-                servo.firmware
-            ),
-            "update it with DYNAMIXEL Wizard 2.0, then pull the plug while it turns, to see that it stops",
-        ));
+/// Whether a servo is known to turn on when its bus watchdog has acted.
+fn has_watchdog_defect(servo: Identity) -> bool {
+    MODELS_OF_SIZE_330.contains(&servo.model) && servo.firmware <= LAST_FIRMWARE_WITH_WATCHDOG_DEFECT
+}
+
+fn check_watchdog(servo: Identity, accept_unsafe: bool, findings: &mut Vec<Finding>) -> Result<(), StartupError> {
+    let firmware = servo.firmware;
+    if !has_watchdog_defect(servo) {
+        return Ok(());
     }
+    if !accept_unsafe {
+        return Err(StartupError::UnsafeWatchdog { firmware });
+    }
+    findings.push(Finding::open(
+        format!("with firmware {firmware} a servo of this size may turn on when its bus watchdog latches"),
+        "update it with DYNAMIXEL Wizard 2.0, then try `wormd check --try-watchdog`",
+    ));
+    Ok(())
 }
 
 /// Sets the status return level, whatever it is now.
@@ -353,32 +404,78 @@ fn set_up<P: Port>(
         settings.velocity_limit_rad_s,
         scale::VELOCITY_RAD_S,
     )?;
+    let servo_id = settings.servo_id;
+    let shutdown = bus.register(servo_id, register::SHUTDOWN)? | u32::from(REQUIRED_SHUTDOWN.0);
     let wanted = [
         (register::RETURN_DELAY, 0),
+        (register::DRIVE_MODE, 0),
         (register::OPERATING_MODE, u32::from(servo::VELOCITY_MODE)),
+        (register::HOMING_OFFSET, 0),
         (
             register::TEMPERATURE_LIMIT,
             counts(register::TEMPERATURE_LIMIT, settings.temperature_limit_c, 1.0)?,
         ),
+        (register::PWM_LIMIT, u32::from(servo::FULL_PWM)),
         (
             register::CURRENT_LIMIT,
             counts(register::CURRENT_LIMIT, settings.current_limit_a, scale::CURRENT_A)?,
         ),
         (register::VELOCITY_LIMIT, velocity_limit),
+        (register::STARTUP_CONFIGURATION, 0),
+        (register::SHUTDOWN, shutdown),
+        (register::PROFILE_ACCELERATION, 0),
+        (register::PROFILE_VELOCITY, 0),
     ];
     for (register, wanted) in wanted {
-        let found = bus.register(settings.servo_id, register)?;
+        let found = match bus.register(servo_id, register) {
+            Err(OperationError::Transaction {
+                error: TransactionError::Refused { .. },
+                ..
+            }) if register == register::STARTUP_CONFIGURATION => continue, // an older firmware without it
+            found => found?,
+        };
         if found != wanted {
-            bus.set_register(settings.servo_id, register, wanted)?;
-            let what = if register == register::RETURN_DELAY {
-                format!("the servo waited {} µs before each answer", found * 2)
-            } else {
-                format!("{register} of the servo was {found}")
-            };
-            findings.push(Finding::corrected(what, format!("set to {wanted}")));
+            bus.set_register(servo_id, register, wanted)?;
+            findings.push(Finding::corrected(
+                describe_setting(register, found),
+                format!("set to {wanted}"),
+            ));
         }
     }
     Ok(())
+}
+
+/// What it means that a register was found with a value that it must not have.
+fn describe_setting(register: Register, found: u32) -> String {
+    let was = format!("{register} of the servo was {found}");
+    match register {
+        register::RETURN_DELAY => format!("the servo waited {} µs before each answer", found * 2),
+        register::DRIVE_MODE if found & 1 != 0 => format!("{was}: it turned in reverse"),
+        register::DRIVE_MODE if found & 8 != 0 => format!("{was}: any goal would have switched torque on"),
+        register::HOMING_OFFSET => format!(
+            "{register} of the servo was {0}: its positions read {0} counts too high, so look at servo.home_position",
+            found as i32
+        ),
+        register::STARTUP_CONFIGURATION if found & 1 != 0 => format!("{was}: torque would have come on with the power"),
+        register::SHUTDOWN => format!("{was}: it would have gone on in spite of overheating, shock or overload"),
+        _ => was,
+    }
+}
+
+/// Limits the duty so that a blocked motor draws no more than the configured current, as far as resistance and supply now say. Returns
+/// the limit, in (0, 1].
+///
+/// In velocity mode the servo limits nothing but its duty (e-manual, "Goal PWM(100)"; "Current Limit(38)" is of the current modes). The
+/// goal PWM is in RAM: a limit that follows the supply's voltage wears no EEPROM.
+fn limit_duty<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<f64, StartupError> {
+    let servo_id = settings.servo_id;
+    let voltage_v = f64::from(bus.register(servo_id, register::PRESENT_INPUT_VOLTAGE)?) * scale::VOLTAGE_V;
+    let temperature_c = f64::from(bus.register(servo_id, register::PRESENT_TEMPERATURE)?);
+    let resistance_ohm = settings.winding_resistance_ohm * (1.0 + COPPER_PER_K * (temperature_c - RESISTANCE_AT_C));
+    let share = settings.current_limit_a * resistance_ohm / voltage_v; // infinite without a voltage
+    let counts = (share / scale::DUTY).floor().clamp(1.0, f64::from(servo::FULL_PWM));
+    bus.set_register(servo_id, register::GOAL_PWM, counts as u32)?;
+    Ok((counts * scale::DUTY).min(1.0))
 }
 
 fn choose_read_plan<P: Port>(
@@ -400,6 +497,7 @@ fn choose_read_plan<P: Port>(
             tracker,
             cells: settings.cells,
             read,
+            emergency_stop_mask: settings.emergency_stop_mask,
         };
         for _ in 0..READ_ATTEMPTS {
             let outcome = bus.exchange(&plan, 0.0, Instant::now() + REPLY_TIME);

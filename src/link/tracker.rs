@@ -7,6 +7,7 @@
 //! | 0 | 2 | model number, [`MODEL`] |
 //! | 6 | 1 | firmware version |
 //! | 7 | 1 | ID, 100 by default |
+//! | 127 | 1 | emergency stop and other switches, one bit each; only where one is configured |
 //! | 128 | 4 | sample counter, one more with each capture |
 //! | 132 | 4 | time of the capture in µs of the tracker's clock, wraps after 71.6 minutes |
 //! | 136 | 1 | number of cells it tracks, 1 to 16 |
@@ -30,6 +31,8 @@ pub mod register {
     pub const FIRMWARE_VERSION: Register = Register::new(6, 1, "firmware version");
     /// The device's ID, 0 to 252.
     pub const ID: Register = Register::new(7, 1, "ID");
+    /// Emergency stop and other switches, one bit each. It need not be there.
+    pub const SWITCHES: Register = Register::new(127, 1, "switches");
     /// One more with each capture, wrapping.
     pub const SAMPLE: Register = Register::new(128, 4, "sample counter");
     /// In µs of the tracker's clock, wrapping.
@@ -74,6 +77,17 @@ pub const fn block_span(id: DeviceId, cells: usize) -> ReadSpan {
         id,
         address: BLOCK_ADDRESS,
         length: block_len(cells) as u16,
+    }
+}
+
+/// What a tick reads of a tracker with switches: as [`block_span`], with the byte of the switches in front.
+#[must_use]
+pub const fn block_span_with_switches(id: DeviceId, cells: usize) -> ReadSpan {
+    let ReadSpan { length, .. } = block_span(id, cells);
+    ReadSpan {
+        id,
+        address: register::SWITCHES.address,
+        length: length + register::SWITCHES.size,
     }
 }
 

@@ -261,8 +261,11 @@ fn settings(read: ReadMode) -> LinkSettings {
         read,
         watchdog_ms: 2_000,
         current_limit_a: 1.0,
+        winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 6.0,
         temperature_limit_c: 70.0,
+        emergency_stop_mask: None,
+        accept_unsafe_watchdog: false,
     }
 }
 

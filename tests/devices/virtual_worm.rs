@@ -31,8 +31,11 @@ fn settings() -> LinkSettings {
         read: ReadMode::Auto,
         watchdog_ms: 100,
         current_limit_a: 1.0,
+        winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 6.0,
         temperature_limit_c: 70.0,
+        emergency_stop_mask: None,
+        accept_unsafe_watchdog: false,
     }
 }
 
@@ -168,4 +171,34 @@ fn faults_reach_the_link() {
         "{refused:?}"
     );
     worm.stop().expect("it ran");
+}
+
+#[test]
+fn emergency_stop_comes_with_each_reading_of_the_tracker() {
+    for read in [ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate] {
+        for (bits, pressed) in [(2, true), (5, false)] {
+            let worm = spawn(&[&format!("emergency-stop:bits={bits}@0.2")], None);
+            let mut bus = open(worm.path(), BAUD);
+            let settings = LinkSettings {
+                read: ReadMode::Always(read),
+                emergency_stop_mask: Some(2),
+                watchdog_ms: 2540,
+                ..settings()
+            };
+            let prepared = prepare(&mut bus, &settings, &mut Vec::new()).expect("a worm that is ready");
+            bus.set_torque(prepared.plan.servo, true).expect("torque");
+            let began = Instant::now();
+            let mut seen = Vec::new();
+            while began.elapsed() < Duration::from_millis(500) {
+                let outcome = bus.exchange(&prepared.plan, 2.5, Instant::now() + Duration::from_millis(50));
+                assert_eq!(outcome.emergency_stop.is_some(), outcome.tracker.is_ok());
+                if let (Some(pressed), Ok(tracker)) = (outcome.emergency_stop, outcome.tracker) {
+                    assert_eq!((tracker.cell_count, tracker.valid), (4, 0b1111));
+                    seen.push(pressed);
+                }
+            }
+            assert_eq!((seen.first(), seen.last()), (Some(&false), Some(&pressed)), "{read:?}");
+            worm.stop().expect("it ran");
+        }
+    }
 }

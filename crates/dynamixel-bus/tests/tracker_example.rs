@@ -121,6 +121,20 @@ fn block_holds_one_capture() {
 }
 
 #[test]
+fn emergency_stop_is_read_in_front_of_the_capture() {
+    let mut tracker = tracker();
+    let read = Instruction::Read {
+        address: 127,
+        length: 2,
+    };
+    for (pressed, sample) in [(false, 7), (true, 8), (false, 9)] {
+        tracker.set_emergency_stop(pressed);
+        let (_, error, data) = ask(&mut tracker, read, sample * PERIOD_US);
+        assert_eq!((error, data), (None, vec![u8::from(pressed), sample as u8]));
+    }
+}
+
+#[test]
 fn errors_are_those_of_the_protocol() {
     let write = |address, data| Instruction::Write { address, data };
     let table: [(Instruction<'_>, Option<StatusError>); 11] = [

@@ -5,7 +5,7 @@ use super::{Devices, Options};
 use crate::link::Register;
 use crate::link::servo::{ServoReading, WATCHDOG_LATCHED, register, scale};
 use crate::link::tracker::TrackerReading;
-use dynamixel_bus::packet::Instruction;
+use dynamixel_bus::packet::{BackupAction, Instruction};
 use worm_estimator::config::Config;
 
 #[test]
@@ -247,4 +247,52 @@ fn stall_at_a_time_counts_from_the_crawl() {
     harness.wait(0.2);
     assert_eq!(harness.devices.plant().motor().velocity_rad_per_s(), 0.0);
     assert!(scale::CURRENT_A * harness.read(register::PRESENT_CURRENT) as f64 > 1.0);
+}
+
+#[test]
+fn settings_of_an_earlier_use_act_as_the_manual_says() {
+    let mut harness = harness(&[]);
+    // A ramp: 3 counts of 214.577 rev/min² are 1.12 rad/s².
+    assert_eq!(harness.write(register::PROFILE_ACCELERATION, 3), 0);
+    harness.crawl(105);
+    harness.wait(1.0);
+    let velocity_rad_s = harness.devices.plant().motor().velocity_rad_per_s();
+    assert!((velocity_rad_s - 1.12).abs() < 0.1, "{velocity_rad_s}");
+    // A PWM limit is all that the motor gets.
+    assert_eq!(harness.write(register::TORQUE_ENABLE, 0), 0);
+    assert_eq!(harness.write(register::PWM_LIMIT, 100), 0);
+    assert_eq!(harness.write(register::PROFILE_ACCELERATION, 0), 0);
+    harness.crawl(105);
+    harness.wait(0.5);
+    assert!((harness.devices.plant().motor().duty() - 0.113).abs() < 1e-3);
+    // A goal switches torque on.
+    assert_eq!(harness.write(register::TORQUE_ENABLE, 0), 0);
+    assert_eq!(harness.write(register::DRIVE_MODE, 8), 0);
+    assert_eq!(harness.write(register::GOAL_VELOCITY, 10), 0);
+    assert_eq!(harness.read(register::TORQUE_ENABLE), 1);
+    // Torque and the profile of the backup come back with the power.
+    assert_eq!(harness.write(register::TORQUE_ENABLE, 0), 0);
+    assert_eq!(harness.write(register::STARTUP_CONFIGURATION, 3), 0);
+    assert_eq!(harness.write(register::PROFILE_VELOCITY, 77), 0);
+    let store = Instruction::ControlTableBackup(BackupAction::Store);
+    assert_eq!(harness.ask_one(SERVO, store).0, 0);
+    assert_eq!(harness.ask_one(SERVO, Instruction::Reboot).0, 0);
+    harness.wait(0.3);
+    assert_eq!(harness.read(register::TORQUE_ENABLE), 1);
+    assert_eq!(harness.read(register::PROFILE_VELOCITY), 77);
+}
+
+#[test]
+fn watchdog_with_the_defect_latches_and_the_motor_turns_on() {
+    for (faults, turns_on) in [(&[][..], false), (&["watchdog-defect"][..], true)] {
+        let mut harness = harness(faults);
+        assert_eq!(harness.write(register::BUS_WATCHDOG, 5), 0);
+        harness.crawl(105);
+        harness.wait(0.5);
+        assert_eq!(harness.read(register::BUS_WATCHDOG) as u8, WATCHDOG_LATCHED);
+        let turns = harness.devices.plant().motor().velocity_rad_per_s() > 2.0;
+        assert_eq!(turns, turns_on);
+        let firmware = if turns_on { 51 } else { 53 };
+        assert_eq!(harness.read(register::FIRMWARE_VERSION), firmware);
+    }
 }

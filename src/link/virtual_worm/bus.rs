@@ -108,6 +108,7 @@ impl Bus {
         if conditions.servo != self.conditions.servo {
             self.servo.set_conditions(conditions.servo, &mut self.plant, self.now_s);
         }
+        self.tracker.set_switches(conditions.switches);
         self.line.set_conditions(conditions.wire);
         self.conditions = conditions;
         Ok(())

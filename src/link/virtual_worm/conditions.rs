@@ -12,6 +12,8 @@ pub struct Conditions {
     pub plant: PlantConditions,
     /// What the tracker sees.
     pub camera: CameraConditions,
+    /// The tracker's switches, one bit each; the emergency stop is one of them.
+    pub switches: u8,
     /// The servo's electronics.
     pub servo: ServoConditions,
     /// The cable.
@@ -80,6 +82,10 @@ pub struct ServoConditions {
     pub hardware_errors: u8,
     /// Model number that it says it has.
     pub model_number: Option<u16>,
+    /// Version of the firmware that it says it has.
+    pub firmware: Option<u8>,
+    /// Its bus watchdog latches without stopping the motor.
+    pub watchdog_defect: bool,
 }
 
 /// The cable.

@@ -104,6 +104,14 @@ impl ControlTable {
         }
     }
 
+    /// Takes these registers from a copy.
+    pub(super) fn take_registers(&mut self, registers: &[Register], copy: &[u8]) {
+        for register in registers {
+            let range = usize::from(register.address)..usize::from(register.end());
+            self.bytes[range.clone()].copy_from_slice(&copy[range]);
+        }
+    }
+
     fn ranges_of(&self, area: Area) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
         let in_area = self.entries.iter().filter(move |entry| entry.area == area);
         in_area.map(|entry| usize::from(entry.register.address)..usize::from(entry.register.end()))

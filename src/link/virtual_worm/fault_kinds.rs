@@ -242,6 +242,29 @@ pub(super) const KINDS: &[FaultKind] = &[
         }],
         |c, v| c.servo.model_number = Some(v[0] as u16),
     ),
+    kind(
+        "emergency-stop",
+        "switches of the tracker are pressed (register 127)",
+        &[Parameter {
+            name: "bits",
+            domain: Domain::Integer(8),
+            default: Some(1.0),
+        }],
+        |c, v| c.switches |= v[0] as u8,
+    ),
+    kind(
+        "watchdog-defect",
+        "the servo's bus watchdog latches without stopping the motor, as with this firmware",
+        &[Parameter {
+            name: "firmware",
+            domain: Domain::Integer(8),
+            default: Some(51.0),
+        }],
+        |c, v| {
+            c.servo.watchdog_defect = true;
+            c.servo.firmware = Some(v[0] as u8);
+        },
+    ),
 ];
 
 impl FaultKind {

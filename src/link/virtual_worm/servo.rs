@@ -4,9 +4,10 @@
 //! are the manual's. Where the manual is silent:
 //! - The unit of the velocity gains' time is open; the loop settles in about 20 ms with the factory's gains.
 //! - Switching torque on, and the watchdog, set the velocity goal to 0, so that nothing moves without a new command.
-//! - A position goal is pursued by a velocity goal in proportion to the error. Profiles are kept but not followed, except
-//!   that the profile velocity bounds the velocity of the position modes.
-//! - An overload is a motor that stands at full duty for 2 s; an input voltage error is one that lasts 0.1 s.
+//! - A position goal is pursued by a velocity goal in proportion to the error, bounded by the profile velocity. The profile
+//!   acceleration ramps velocity mode; profiles by time are not followed.
+//! - An overload is a motor that stands at its greatest duty for 2 s; an input voltage error is one that lasts 0.1 s.
+//! - A backup holds the EEPROM, gains and profiles; the startup configuration brings back the latter two.
 //! - Below 2.8 V it does not run, and comes up as after a reboot.
 //! - After a shutdown, writing 1 to torque enable fails (result fail) until a reboot.
 
@@ -15,6 +16,7 @@ use super::control_table::{Area, ControlTable, Entry};
 use super::motor::{Drive, Gains};
 use super::plant::Plant;
 use super::servo_table::*;
+use crate::link::Register;
 use crate::link::servo::register::*;
 use crate::link::servo::{BAUD_RATES, HardwareErrors, VELOCITY_MODE, WATCHDOG_LATCHED, scale};
 use dynamixel_bus::packet::{BackupAction, DeviceId, ResetScope, StatusError};
@@ -38,18 +40,35 @@ const POSITION_P_PER_S: f64 = 0.05;
 /// Counts of a turn.
 const TURN: f64 = 4096.0;
 
+/// Drive mode: a goal switches torque on.
+const GOAL_SWITCHES_TORQUE_ON: u32 = 1 << 3;
+/// Startup configuration: torque comes on with the power.
+const STARTUP_TORQUE_ON: u32 = 1 << 0;
+/// Startup configuration: gains and profiles come back from the backup.
+const STARTUP_RESTORES_RAM: u32 = 1 << 1;
+
+/// What a control table backup holds.
+#[derive(Debug, Clone)]
+struct Backup {
+    eeprom: Vec<u8>,
+    ram: Vec<u8>,
+}
+
 /// The servo's electronics.
 #[derive(Debug, Clone)]
 pub(super) struct Servo {
     table: ControlTable,
-    backup: Option<Vec<u8>>,
+    backup: Option<Backup>,
     registered: Option<(u16, Vec<u8>)>,
     sign: f64, // +1 where positive is forward, −1 where it is not
     home_counts: f64,
     turn_base_counts: f64, // whole turns that were forgotten at a start
+    ramped_goal: f64,      // the velocity goal behind the profile acceleration, counts
+    duty_limit: f64,       // in force
     conditions: ServoConditions,
     starved: bool, // below the brownout voltage
     boots_until_s: f64,
+    supervised_s: f64,
     instruction_at_s: f64,
     shut_down: bool,
     voltage_bad_since_s: Option<f64>,
@@ -73,9 +92,12 @@ impl Servo {
             sign: if config.servo.positive_is_forward { 1.0 } else { -1.0 },
             home_counts: f64::from(config.servo.home_position),
             turn_base_counts: 0.0,
+            ramped_goal: 0.0,
+            duty_limit: 1.0,
             conditions: ServoConditions::default(),
             starved: false,
             boots_until_s: 0.0,
+            supervised_s: 0.0,
             instruction_at_s: 0.0,
             shut_down: false,
             voltage_bad_since_s: None,
@@ -140,6 +162,8 @@ impl Servo {
             .model_number
             .map_or_else(|| i64::from(crate::link::servo::XL330_M288_MODEL), i64::from);
         self.table.set(MODEL_NUMBER, model_number);
+        let firmware = conditions.firmware.map_or(FIRMWARE, i64::from);
+        self.table.set(FIRMWARE_VERSION, firmware);
     }
 
     /// Looks after itself: watchdog, voltage, temperature, load. To be called at least every few ms.
@@ -153,6 +177,7 @@ impl Servo {
             return;
         }
         self.supervise_watchdog(plant, now_s);
+        self.follow_profile(plant, now_s);
         let motor = plant.motor();
         let mut errors = self.conditions.hardware_errors;
         let voltage_counts = motor.bus_v() / scale::VOLTAGE_V;
@@ -164,7 +189,8 @@ impl Servo {
         if motor.case_c() > f64::from(self.table.get(TEMPERATURE_LIMIT)) {
             errors |= HardwareErrors::OVERHEATING.0;
         }
-        let overloaded = motor.duty().abs() > 0.99 && motor.velocity_rad_per_s().abs() < STANDING_RAD_PER_S;
+        let at_limit = self.torque_on() && motor.duty().abs() > 0.99 * self.duty_limit;
+        let overloaded = at_limit && motor.velocity_rad_per_s().abs() < STANDING_RAD_PER_S;
         if lasts(&mut self.overloaded_since_s, overloaded, now_s, OVERLOAD_PATIENCE_S) {
             errors |= HardwareErrors::OVERLOAD.0;
         }
@@ -185,13 +211,29 @@ impl Servo {
         let patience_s = f64::from(watchdog * scale::WATCHDOG_MS) * 1e-3;
         if armed && now_s - self.instruction_at_s >= patience_s {
             self.table.set(BUS_WATCHDOG, i64::from(WATCHDOG_LATCHED));
-            self.stand(plant);
+            if !self.conditions.watchdog_defect {
+                self.stand(plant);
+            }
         }
+    }
+
+    /// Moves the velocity goal on by the profile acceleration, since it was last called.
+    fn follow_profile(&mut self, plant: &mut Plant, now_s: f64) {
+        let elapsed_s = now_s - std::mem::replace(&mut self.supervised_s, now_s);
+        let goal = f64::from(self.table.signed(GOAL_VELOCITY));
+        let acceleration = f64::from(self.table.get(PROFILE_ACCELERATION));
+        if acceleration == 0.0 || self.ramped_goal == goal || !self.torque_on() {
+            return;
+        }
+        let step = acceleration * scale::ACCELERATION_RAD_S2 / scale::VELOCITY_RAD_S * elapsed_s;
+        self.ramped_goal += (goal - self.ramped_goal).clamp(-step, step);
+        self.drive(plant);
     }
 
     /// Sets every goal so that the motor stands.
     fn stand(&mut self, plant: &mut Plant) {
         self.table.set(GOAL_VELOCITY, 0);
+        self.ramped_goal = 0.0;
         let position = self.position_counts(plant);
         self.table.set(GOAL_POSITION, i64::from(position));
         if self.table.get(OPERATING_MODE) as u8 == PWM_MODE {
@@ -234,7 +276,7 @@ impl Servo {
         self.turn_base_counts = (self.raw_counts(cam_rad) / TURN).floor() * TURN;
     }
 
-    /// Power up: RAM as it is initially, no torque, no errors, position within a turn.
+    /// Power up: RAM as it is initially, no torque unless the startup configuration says otherwise, no errors, position within a turn.
     fn restart(&mut self, plant: &mut Plant, now_s: f64) {
         self.table.reset(Area::Ram, &[]);
         self.table.set(GOAL_PWM, i64::from(self.table.get(PWM_LIMIT)));
@@ -246,6 +288,16 @@ impl Servo {
         self.overloaded_since_s = None;
         self.boots_until_s = now_s + BOOT_S;
         self.forget_turns(plant.motor().angle_rad());
+        let startup = self.table.get(STARTUP_CONFIGURATION);
+        if startup & STARTUP_RESTORES_RAM != 0
+            && let Some(backup) = &self.backup
+        {
+            self.table.take_registers(&BACKED_UP_RAM, &backup.ram);
+        }
+        if startup & STARTUP_TORQUE_ON != 0 && !self.conditions.unpowered && !self.starved {
+            self.table.set(TORQUE_ENABLE, 1);
+            self.stand(plant);
+        }
         self.drive(plant);
     }
 
@@ -255,18 +307,25 @@ impl Servo {
         let gain = |register, unit: f64| f64::from(self.table.get(register)) * unit;
         let mode = self.table.get(OPERATING_MODE) as u8;
         let goal_duty = f64::from(self.table.signed(GOAL_PWM)) * scale::DUTY;
+        let duty_limit = (if mode == PWM_MODE { 1.0 } else { goal_duty.abs() })
+            .min(f64::from(self.table.get(PWM_LIMIT)) * scale::DUTY)
+            .min(1.0);
+        self.duty_limit = duty_limit;
+        if self.table.get(PROFILE_ACCELERATION) == 0 {
+            self.ramped_goal = f64::from(self.table.signed(GOAL_VELOCITY));
+        }
         let gains = Gains {
             velocity_p: gain(VELOCITY_P_GAIN, per_count / 128.0),
             velocity_i: gain(VELOCITY_I_GAIN, per_count / 65_536.0 / INTEGRAL_TICK_S),
             position_p: gain(POSITION_P_GAIN, POSITION_P_PER_S),
-            duty_limit: (if mode == PWM_MODE { 1.0 } else { goal_duty.abs() }).min(1.0),
+            duty_limit,
         };
         let drive = if !self.torque_on() {
             Drive::Off
         } else if mode == VELOCITY_MODE {
-            Drive::Velocity(self.sign() * f64::from(self.table.signed(GOAL_VELOCITY)) * scale::VELOCITY_RAD_S)
+            Drive::Velocity(self.sign() * self.ramped_goal * scale::VELOCITY_RAD_S)
         } else if mode == PWM_MODE {
-            Drive::Duty((self.sign() * goal_duty).clamp(-1.0, 1.0))
+            Drive::Duty((self.sign() * goal_duty).clamp(-duty_limit, duty_limit))
         } else {
             let profile = match self.table.get(PROFILE_VELOCITY) {
                 0 => self.table.get(VELOCITY_LIMIT),
@@ -300,7 +359,7 @@ impl Servo {
         let counts = |value: f64, unit: f64| (value / unit).round() as i64;
         let moving = velocity.unsigned_abs() > self.table.get(MOVING_THRESHOLD);
         let position = i64::from(self.position_counts(plant));
-        let goal_velocity = i64::from(self.table.signed(GOAL_VELOCITY));
+        let ramped_goal = self.ramped_goal.round() as i64;
         for (register, value) in [
             (REALTIME_TICK, (now_s * 1e3) as i64 % 32_768),
             (MOVING, i64::from(moving)),
@@ -308,7 +367,7 @@ impl Servo {
             (PRESENT_CURRENT, counts(sign * motor.current_a(), scale::CURRENT_A)),
             (PRESENT_VELOCITY, i64::from(velocity)),
             (PRESENT_POSITION, position),
-            (VELOCITY_TRAJECTORY, goal_velocity),
+            (VELOCITY_TRAJECTORY, ramped_goal),
             (POSITION_TRAJECTORY, i64::from(self.table.signed(GOAL_POSITION))),
             (PRESENT_INPUT_VOLTAGE, counts(motor.bus_v(), scale::VOLTAGE_V)),
             (PRESENT_TEMPERATURE, counts(motor.case_c().clamp(0.0, 255.0), 1.0)),
@@ -324,8 +383,7 @@ impl Servo {
         for &(entry, value) in &writes {
             let magnitude = value.unsigned_abs();
             let beyond = |limit| magnitude > u64::from(self.table.get(limit));
-            let is_goal = [GOAL_PWM, GOAL_CURRENT, GOAL_VELOCITY, GOAL_POSITION].contains(&entry.register);
-            if latched && (is_goal || (entry.register == BUS_WATCHDOG && value != 0)) {
+            if latched && (is_goal(entry.register) || (entry.register == BUS_WATCHDOG && value != 0)) {
                 return Err(StatusError::DataRange);
             }
             let beyond_limit = match entry.register {
@@ -353,6 +411,9 @@ impl Servo {
 
     pub(super) fn write(&mut self, address: u16, data: &[u8], plant: &mut Plant) -> Result<(), StatusError> {
         for (entry, value) in self.check_write(address, data)? {
+            if is_goal(entry.register) && self.table.get(DRIVE_MODE) & GOAL_SWITCHES_TORQUE_ON != 0 && !self.shut_down {
+                self.table.set(TORQUE_ENABLE, 1);
+            }
             let before = self.table.get(entry.register);
             self.table.set(entry.register, value);
             match entry.register {
@@ -417,17 +478,25 @@ impl Servo {
         match action {
             BackupAction::Store if self.torque_on() => return Err(StatusError::Access),
             BackupAction::Store => {
-                self.backup = Some(self.table.copy_of(Area::Eeprom));
+                self.backup = Some(Backup {
+                    eeprom: self.table.copy_of(Area::Eeprom),
+                    ram: self.table.copy_of(Area::Ram),
+                });
                 self.table.set(BACKUP_READY, 1);
             }
             BackupAction::Restore => {
                 let backup = self.backup.as_ref().ok_or(StatusError::ResultFail)?;
-                self.table.take_from(Area::Eeprom, backup);
+                self.table.take_from(Area::Eeprom, &backup.eeprom);
                 self.restart(plant, now_s);
             }
         }
         Ok(())
     }
+}
+
+/// Whether a write to this register is a command to the motor.
+fn is_goal(register: Register) -> bool {
+    [GOAL_PWM, GOAL_CURRENT, GOAL_VELOCITY, GOAL_POSITION].contains(&register)
 }
 
 /// Whether what `holds` has held for `patience_s`.

@@ -9,10 +9,10 @@ use crate::link::servo::register::*;
 use crate::link::servo::{VELOCITY_MODE, XL330_M288_MODEL};
 
 /// Firmware version: one whose bus watchdog stops the motor.
-const FIRMWARE: i64 = 53;
+pub(super) const FIRMWARE: i64 = 53;
 
 /// Full duty in counts of 0.113 %.
-pub(super) const FULL_PWM: i64 = 885;
+const FULL_PWM: i64 = crate::link::servo::FULL_PWM as i64;
 /// Position within one turn, and the turn's angle in counts.
 pub(super) const POSITION_MODE: u8 = 3;
 /// Position over many turns.
@@ -22,16 +22,12 @@ pub(super) const PWM_MODE: u8 = 16;
 /// Operating modes that the virtual servo has.
 pub(super) const MODES: [u8; 4] = [VELOCITY_MODE, POSITION_MODE, EXTENDED_POSITION_MODE, PWM_MODE];
 
-pub(super) const DRIVE_MODE: Register = Register::new(10, 1, "drive mode");
 pub(super) const SECONDARY_ID: Register = Register::new(12, 1, "secondary ID");
 const MODEL_INFORMATION: Register = Register::new(2, 4, "model information");
 const PROTOCOL_TYPE: Register = Register::new(13, 1, "protocol type");
-pub(super) const HOMING_OFFSET: Register = Register::new(20, 4, "homing offset");
 pub(super) const MOVING_THRESHOLD: Register = Register::new(24, 4, "moving threshold");
-pub(super) const PWM_LIMIT: Register = Register::new(36, 2, "PWM limit");
 pub(super) const MAX_POSITION_LIMIT: Register = Register::new(48, 4, "max position limit");
 pub(super) const MIN_POSITION_LIMIT: Register = Register::new(52, 4, "min position limit");
-const STARTUP_CONFIGURATION: Register = Register::new(60, 1, "startup configuration");
 const PWM_SLOPE: Register = Register::new(62, 1, "PWM slope");
 const LED: Register = Register::new(65, 1, "LED");
 pub(super) const REGISTERED_INSTRUCTION: Register = Register::new(69, 1, "registered instruction");
@@ -42,14 +38,24 @@ const POSITION_I_GAIN: Register = Register::new(82, 2, "position I gain");
 pub(super) const POSITION_P_GAIN: Register = Register::new(84, 2, "position P gain");
 const FEEDFORWARD_2ND_GAIN: Register = Register::new(88, 2, "feedforward 2nd gain");
 const FEEDFORWARD_1ST_GAIN: Register = Register::new(90, 2, "feedforward 1st gain");
-pub(super) const GOAL_PWM: Register = Register::new(100, 2, "goal PWM");
 pub(super) const GOAL_CURRENT: Register = Register::new(102, 2, "goal current");
-const PROFILE_ACCELERATION: Register = Register::new(108, 4, "profile acceleration");
-pub(super) const PROFILE_VELOCITY: Register = Register::new(112, 4, "profile velocity");
 pub(super) const GOAL_POSITION: Register = Register::new(116, 4, "goal position");
 pub(super) const VELOCITY_TRAJECTORY: Register = Register::new(136, 4, "velocity trajectory");
 pub(super) const POSITION_TRAJECTORY: Register = Register::new(140, 4, "position trajectory");
 pub(super) const BACKUP_READY: Register = Register::new(147, 1, "backup ready");
+
+/// What a control table backup holds of the RAM (e-manual, Protocol 2.0, "Control Table Backup").
+pub(super) const BACKED_UP_RAM: [Register; 9] = [
+    VELOCITY_I_GAIN,
+    VELOCITY_P_GAIN,
+    POSITION_D_GAIN,
+    POSITION_I_GAIN,
+    POSITION_P_GAIN,
+    FEEDFORWARD_2ND_GAIN,
+    FEEDFORWARD_1ST_GAIN,
+    PROFILE_ACCELERATION,
+    PROFILE_VELOCITY,
+];
 
 const I32: (i64, i64) = (i32::MIN as i64, i32::MAX as i64);
 
@@ -60,7 +66,7 @@ static ENTRIES: [Entry; 54] = [
     eeprom(ID, 1, 0, 252),
     eeprom(BAUD_RATE, 1, 0, 6),
     eeprom(RETURN_DELAY, 250, 0, 254),
-    eeprom(DRIVE_MODE, 0, 0, 1),
+    eeprom(DRIVE_MODE, 0, 0, 13),
     eeprom(OPERATING_MODE, POSITION_MODE as i64, 0, 16),
     eeprom(SECONDARY_ID, 255, 0, 255),
     eeprom(PROTOCOL_TYPE, 2, 2, 2),

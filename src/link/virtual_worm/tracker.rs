@@ -2,7 +2,7 @@
 
 use super::control_table::{Area, ControlTable, Entry, eeprom, read_only};
 use super::plant::Plant;
-use crate::link::tracker::register::{FIRMWARE_VERSION, ID, MODEL_NUMBER};
+use crate::link::tracker::register::{FIRMWARE_VERSION, ID, MODEL_NUMBER, SWITCHES};
 use crate::link::tracker::{BLOCK_ADDRESS, DEFAULT_ID, MAX_BLOCK_LEN, MODEL};
 use dynamixel_bus::packet::{DeviceId, ResetScope, StatusError};
 use worm_estimator::config::Config;
@@ -10,10 +10,11 @@ use worm_estimator::config::Config;
 /// Firmware version.
 const FIRMWARE: i64 = 1;
 
-static ENTRIES: [Entry; 3] = [
+static ENTRIES: [Entry; 4] = [
     read_only(MODEL_NUMBER, MODEL as i64),
     read_only(FIRMWARE_VERSION, FIRMWARE),
     eeprom(ID, DEFAULT_ID as i64, 0, 252),
+    read_only(SWITCHES, 0),
 ];
 
 /// The tracker's electronics. It answers without delay, everything, whatever its registers say.
@@ -34,6 +35,11 @@ impl Tracker {
             bytes: vec![0; usize::from(BLOCK_ADDRESS) + MAX_BLOCK_LEN],
             registered: None,
         }
+    }
+
+    /// Sets the switches, one bit each.
+    pub(super) fn set_switches(&mut self, switches: u8) {
+        self.table.set(SWITCHES, i64::from(switches));
     }
 
     pub(super) fn id(&self) -> DeviceId {

@@ -17,6 +17,7 @@ fn plan(read: ReadPlan) -> ExchangePlan {
         tracker: id(TRACKER),
         cells: CELLS,
         read,
+        emergency_stop_mask: None,
     }
 }
 

@@ -24,6 +24,7 @@ fn plan(read: ReadPlan) -> ExchangePlan {
         tracker: id(TRACKER),
         cells: 5,
         read,
+        emergency_stop_mask: None,
     }
 }
 

@@ -20,8 +20,11 @@ pub fn settings() -> LinkSettings {
         read: ReadMode::Auto,
         watchdog_ms: 100,
         current_limit_a: 1.0,
+        winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 10.0,
         temperature_limit_c: 70.0,
+        emergency_stop_mask: None,
+        accept_unsafe_watchdog: false,
     }
 }
 
@@ -59,8 +62,11 @@ fn servo_from_the_factory_is_set_up() {
         register::BUS_WATCHDOG,
         register::TORQUE_ENABLE,
         register::RETURN_DELAY,
+        register::GOAL_PWM,
     ];
-    assert_eq!(registers.map(|register| worm.servo(register)), [1, 5, 0, 0]);
+    // 1 A through 3.4 ohm at 5 V and 31 degrees C is a duty of 0.696.
+    assert_eq!(registers.map(|register| worm.servo(register)), [1, 5, 0, 0, 615]);
+    assert!((prepared.duty_limit - 615.0 * 0.113e-2).abs() < 1e-9);
     // The second time there is nothing to correct.
     let (prepared, findings) = prepare_worm(&mut worm, &settings());
     assert!(prepared.is_ok());
@@ -84,6 +90,66 @@ fn servo_left_alone_by_a_crash_is_brought_to_rest() {
         ]
     );
     assert_eq!(worm.servo(register::GOAL_VELOCITY), 0);
+}
+
+#[test]
+fn settings_of_an_earlier_use_are_put_right() {
+    let mut worm = Worm::new(5);
+    let spoilt = [
+        (register::DRIVE_MODE, 13),
+        (register::HOMING_OFFSET, -300i32 as u32),
+        (register::PWM_LIMIT, 400),
+        (register::STARTUP_CONFIGURATION, 3),
+        (register::SHUTDOWN, 1),
+        (register::PROFILE_ACCELERATION, 50),
+        (register::PROFILE_VELOCITY, 20),
+    ];
+    for (register, value) in spoilt {
+        worm.set_servo(register, value);
+    }
+    let (prepared, findings) = prepare_worm(&mut worm, &settings());
+    assert!(prepared.is_ok());
+    let said = said(&findings);
+    for expected in [
+        "drive mode (register 10) of the servo was 13: it turned in reverse (corrected: set to 0)",
+        "homing offset (register 20) of the servo was -300: its positions read -300 counts too high, so look at \
+         servo.home_position (corrected: set to 0)",
+        "PWM limit (register 36) of the servo was 400 (corrected: set to 885)",
+        "startup configuration (register 60) of the servo was 3: torque would have come on with the power (corrected: set to 0)",
+        "shutdown (register 63) of the servo was 1: it would have gone on in spite of overheating, shock or overload \
+         (corrected: set to 53)",
+        "profile acceleration (register 108) of the servo was 50 (corrected: set to 0)",
+        "profile velocity (register 112) of the servo was 20 (corrected: set to 0)",
+    ] {
+        assert!(said.iter().any(|said| said == expected), "{expected}\n{said:#?}");
+    }
+    assert_eq!(
+        spoilt.map(|(register, _)| worm.servo(register)),
+        [0, 0, 885, 0, 53, 0, 0]
+    );
+}
+
+#[test]
+fn duty_is_limited_by_supply_and_temperature() {
+    // (supply in 0.1 V, °C, current limit in A, goal PWM)
+    for (voltage, temperature, current_limit_a, goal_pwm) in [
+        (50, 25, 1.0, 601),
+        (60, 25, 1.0, 501),
+        (50, 65, 1.0, 696),
+        (50, 25, 0.5, 300),
+        (37, 25, 1.75, 885),
+        (0, 25, 1.0, 885),
+    ] {
+        let mut worm = Worm::new(5);
+        worm.set_servo(register::PRESENT_INPUT_VOLTAGE, voltage);
+        worm.set_servo(register::PRESENT_TEMPERATURE, temperature);
+        let settings = LinkSettings {
+            current_limit_a,
+            ..settings()
+        };
+        assert!(prepare_worm(&mut worm, &settings).0.is_ok());
+        assert_eq!(worm.servo(register::GOAL_PWM), goal_pwm, "{voltage} {temperature}");
+    }
 }
 
 #[test]
@@ -192,10 +258,18 @@ fn status_level_is_set_though_its_first_answers_get_lost() {
 }
 
 #[test]
-fn firmware_whose_watchdog_does_not_stop_the_motor_is_named() {
+fn firmware_whose_watchdog_does_not_stop_the_motor_is_refused_unless_it_is_accepted() {
     let mut worm = Worm::new(5);
     worm.set_servo(register::FIRMWARE_VERSION, 51);
-    let (prepared, findings) = prepare_worm(&mut worm, &settings());
+    worm.set_servo(register::TORQUE_ENABLE, 1);
+    let (refused, _) = prepare_worm(&mut worm, &settings());
+    assert_eq!(refused, Err(StartupError::UnsafeWatchdog { firmware: 51 }));
+    assert_eq!(worm.servo(register::TORQUE_ENABLE), 0, "the motor comes to rest first");
+    let accepted = LinkSettings {
+        accept_unsafe_watchdog: true,
+        ..settings()
+    };
+    let (prepared, findings) = prepare_worm(&mut worm, &accepted);
     assert!(prepared.is_ok());
     assert!(
         !findings[0].corrected && findings[0].what.contains("firmware 51"),

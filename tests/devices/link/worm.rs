@@ -64,6 +64,8 @@ impl Worm {
         worm.set_servo(servo_register::TEMPERATURE_LIMIT, 70);
         worm.set_servo(servo_register::CURRENT_LIMIT, 1750);
         worm.set_servo(servo_register::VELOCITY_LIMIT, 445);
+        worm.set_servo(servo_register::PWM_LIMIT, 885);
+        worm.set_servo(servo_register::SHUTDOWN, 53);
         worm.set_servo(servo_register::STATUS_RETURN_LEVEL, 2);
         worm.set_servo(servo_register::PRESENT_INPUT_VOLTAGE, 50);
         worm.set_servo(servo_register::PRESENT_TEMPERATURE, 31);

@@ -8,6 +8,7 @@
 //! | 6 | 1 | read | firmware version |
 //! | 7 | 1 | read, write | ID, 0 to 252 |
 //! | 68 | 1 | read, write | status return level: 0 answers pings, 1 pings and reads, 2 everything |
+//! | 127 | 1 | read | switches: bit 0 is set while the emergency stop is pressed |
 //! | 128 | 4 | read | sample counter, one more with each capture |
 //! | 132 | 4 | read | time of the capture in µs, wraps |
 //! | 136 | 1 | read | number of cells |
@@ -48,6 +49,7 @@ const MODEL_NUMBER: Register = Register::new(0, 2, "model number");
 const FIRMWARE_VERSION: Register = Register::new(6, 1, "firmware version");
 const ID: Register = Register::new(7, 1, "ID");
 const STATUS_RETURN_LEVEL: Register = Register::new(68, 1, "status return level");
+const SWITCHES: Register = Register::new(127, 1, "switches");
 const SAMPLE: Register = Register::new(128, 4, "sample counter");
 const CAPTURE_TIME: Register = Register::new(132, 4, "capture time");
 const CELL_COUNT: Register = Register::new(136, 1, "cell count");
@@ -73,9 +75,16 @@ impl Tracker {
                 id,
                 cells: cells.min(MAX_CELLS),
                 status_return_level: 2,
+                emergency_stop: false,
                 turn: Turn::None,
             },
         }
+    }
+
+    /// Notes whether the emergency stop is pressed. Call it before each [`receive`](Self::receive), so that an answer never says what
+    /// was true a while ago.
+    pub fn set_emergency_stop(&mut self, pressed: bool) {
+        self.device.emergency_stop = pressed;
     }
 
     /// Takes a byte from the line. `send` gets what is to be sent at once, if anything.
@@ -205,6 +214,7 @@ struct Device {
     id: DeviceId,
     cells: usize,            // in 0..=MAX_CELLS
     status_return_level: u8, // in 0..=2
+    emergency_stop: bool,
     turn: Turn,
 }
 
@@ -448,6 +458,7 @@ impl Device {
         put(FIRMWARE_VERSION, &[FIRMWARE]);
         put(ID, &[self.id.get()]);
         put(STATUS_RETURN_LEVEL, &[self.status_return_level]);
+        put(SWITCHES, &[u8::from(self.emergency_stop)]);
         put(SAMPLE, &capture.sample.to_le_bytes());
         put(CAPTURE_TIME, &capture.time_us.to_le_bytes());
         put(CELL_COUNT, &[self.cells as u8]);

@@ -8,7 +8,8 @@
 //! tracker < port > port           # standard input and output, for a pseudo-terminal or a pipe
 //! ```
 //!
-//! It has ID 100 and tracks 5 cells, unless `TRACKER_ID` and `TRACKER_CELLS` say otherwise.
+//! It has ID 100 and tracks 5 cells, unless `TRACKER_ID` and `TRACKER_CELLS` say otherwise. Its emergency stop is a file, for want of
+//! a switch: it is pressed while the file that `TRACKER_EMERGENCY_STOP` names exists.
 
 mod capture;
 mod device;
@@ -18,7 +19,7 @@ use dynamixel_bus::packet::DeviceId;
 use dynamixel_bus::{Port, PortError, Tty};
 use std::error::Error;
 use std::io::{Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -30,11 +31,12 @@ const SEND_TIME: Duration = Duration::from_millis(100);
 fn main() -> Result<(), Box<dyn Error>> {
     let id = DeviceId::new(number("TRACKER_ID", 100)?).ok_or("TRACKER_ID: an ID is 0 to 252")?;
     let tracker = Tracker::new(id, usize::from(number("TRACKER_CELLS", 5)?));
+    let switch = std::env::var_os("TRACKER_EMERGENCY_STOP").map(PathBuf::from);
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let ended = match arguments.as_slice() {
-        [] => run(tracker, StandardIo::new()),
-        [path] => run(tracker, Tty::open(Path::new(path), 1_000_000)?.0),
-        [path, baud] => run(tracker, Tty::open(Path::new(path), baud.parse()?)?.0),
+        [] => run(tracker, switch.as_deref(), StandardIo::new()),
+        [path] => run(tracker, switch.as_deref(), Tty::open(Path::new(path), 1_000_000)?.0),
+        [path, baud] => run(tracker, switch.as_deref(), Tty::open(Path::new(path), baud.parse()?)?.0),
         _ => return Err("usage: tracker [PORT [BAUD]]".into()),
     };
     match ended {
@@ -51,7 +53,7 @@ fn number(variable: &str, default: u8) -> Result<u8, Box<dyn Error>> {
 }
 
 /// Runs the device until the port fails.
-fn run(mut tracker: Tracker, mut port: impl Port) -> PortError {
+fn run(mut tracker: Tracker, switch: Option<&Path>, mut port: impl Port) -> PortError {
     let started = Instant::now();
     let mut bytes = [0; 256];
     loop {
@@ -60,6 +62,7 @@ fn run(mut tracker: Tracker, mut port: impl Port) -> PortError {
             Err(error) => return error,
         };
         let now_us = started.elapsed().as_micros() as u64;
+        tracker.set_emergency_stop(switch.is_some_and(Path::exists));
         let mut failed = None;
         let mut send = |answer: &[u8]| failed = port.send(answer, Instant::now() + SEND_TIME).err().or(failed);
         for &byte in &bytes[..received] {

@@ -85,7 +85,7 @@ pub struct Servo {
     pub winding_resistance_ohm: f64,
     /// Torque of the output shaft per current, N m/A, before inner friction.
     pub torque_constant_n_m_per_a: f64,
-    /// Current limit written to the servo, A.
+    /// Greatest current of the motor, that of a blocked one, A. The servo gets it as a limit of its duty.
     pub current_limit_a: f64,
     /// Velocity limit written to the servo, rev/min.
     pub velocity_limit_rev_per_min: f64,
@@ -93,6 +93,8 @@ pub struct Servo {
     pub temperature_limit_c: u8,
     /// Silence after which the servo stops the motor by itself, ms, in steps of 20 ms.
     pub watchdog_ms: u32,
+    /// Whether to arm a servo whose firmware is known not to stop the motor when its bus watchdog acts.
+    pub accept_unsafe_watchdog: bool,
 }
 
 impl Default for Servo {
@@ -108,6 +110,7 @@ impl Default for Servo {
             velocity_limit_rev_per_min: 60.0,
             temperature_limit_c: 70,
             watchdog_ms: 100,
+            accept_unsafe_watchdog: false,
         }
     }
 }
@@ -176,6 +179,71 @@ impl Tracker {
         checker.require(self.id != servo_id, "tracker.id", self.id, "must differ from servo.id");
         checker.range("tracker.rate_hz", self.rate_hz, 20.0..=2000.0, "Hz");
         checker.range("tracker.noise_m", self.noise_m, 1e-7..=5e-3, "m");
+    }
+}
+
+/// Where the emergency stop is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EmergencyStopSource {
+    /// Register 127 of the tracker, in the same read as the samples.
+    Tracker,
+    /// A GPIO line of this computer.
+    Gpio,
+}
+
+/// The emergency stop's input.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EmergencyStop {
+    /// Where it is read.
+    pub source: EmergencyStopSource,
+    /// Bits of the tracker's register of which each means pressed.
+    #[serde(default = "default_emergency_mask")]
+    pub mask: u8,
+    /// Device file of the GPIO chip.
+    #[serde(default = "default_gpio_chip")]
+    pub chip: String,
+    /// Line of the chip.
+    pub line: Option<u32>,
+    /// Whether a low level means pressed.
+    #[serde(default)]
+    pub active_low: bool,
+    /// Time without a reading after which it counts as pressed, s.
+    #[serde(default = "default_emergency_timeout_s")]
+    pub timeout_s: f64,
+}
+
+fn default_emergency_mask() -> u8 {
+    1
+}
+
+fn default_gpio_chip() -> String {
+    "/dev/gpiochip0".to_owned()
+}
+
+fn default_emergency_timeout_s() -> f64 {
+    0.1
+}
+
+impl EmergencyStop {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("emergency_stop.mask", self.mask, 1..=255, "");
+        checker.range("emergency_stop.timeout_s", self.timeout_s, 0.005..=5.0, "s");
+        if self.source == EmergencyStopSource::Gpio {
+            checker.require(
+                self.chip.starts_with('/'),
+                "emergency_stop.chip",
+                format!("\"{}\"", self.chip),
+                "name the device file of the chip, such as \"/dev/gpiochip0\"",
+            );
+            checker.require(
+                self.line.is_some(),
+                "emergency_stop.line",
+                "none",
+                "name the line of the chip; `gpioinfo` lists them",
+            );
+        }
     }
 }
 

@@ -19,7 +19,8 @@ pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use machine::{
-    Battery, Control, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode, Realtime, Servo, Topics, Tracker,
+    Battery, Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode, Realtime,
+    Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;
 pub use virtual_worm::VirtualWorm;
@@ -48,6 +49,8 @@ pub struct Config {
     pub servo: Servo,
     /// The device that measures cell positions.
     pub tracker: Tracker,
+    /// The emergency stop's input; absent: there is none.
+    pub emergency_stop: Option<EmergencyStop>,
     /// The control loop.
     pub control: Control,
     /// Limits at which the controller stops by itself.
@@ -139,6 +142,9 @@ impl Config {
         }
         self.servo.check(&mut checker);
         self.tracker.check(self.servo.id, &mut checker);
+        if let Some(emergency_stop) = &self.emergency_stop {
+            emergency_stop.check(&mut checker);
+        }
         self.control.check(&mut checker);
         self.limits.check(&mut checker);
         self.estimator.check(&mut checker);
