@@ -184,6 +184,7 @@ impl Estimator {
         let Some((sequence, last_s, _)) = self.last else { return };
         if state.sequence > sequence && time_s >= last_s {
             let lost = state.sequence - sequence - 1;
+            // The sequence may be anything; the total stays at its end rather than to begin again.
             self.estimate.states_lost = self.estimate.states_lost.saturating_add(lost);
             return;
         }
