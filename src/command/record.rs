@@ -1,7 +1,9 @@
 //! `wormd record`: the topics of a worm into a log.
 
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
+use crate::attendance::end_after_controller;
 use crate::recorder::Recorder;
+use crate::topics::Instance;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -24,6 +26,9 @@ pub struct RecordArgs {
     /// Only these topics
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = "state,timing,estimate,cycle,alarm")]
     topics: Vec<Channel>,
+    /// Standard input is a pipe from the process that watches over the worm
+    #[arg(long, hide = true)]
+    supervised: bool,
 }
 
 fn channel(name: &str) -> Result<Channel, String> {
@@ -44,6 +49,9 @@ fn channel(name: &str) -> Result<Channel, String> {
 pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     let (config, text) = args.worm.load_with_text()?;
     let end = end_on_signal()?;
+    if args.supervised {
+        end_after_controller(&Instance::of(&config).map_err(Failure::unusable)?, &end)?;
+    }
     let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force)?;
     let (worm, file) = (&config.worm.name, args.out.display());
     print::log_line(format_args!("recording {worm} to {file}, from its first message on"));

@@ -9,15 +9,16 @@ use super::loop_clock::{ExchangeTimes, MIN_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
 use super::sched_counters::{Counts, Parts, find_culprit};
 use super::schedule::{Schedule, bus_allowed_ns};
+use crate::attendance::{Attendance, Parent};
 use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
 use crate::topics::{
-    AnswerError, CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher,
-    Responder, RoleLock, Subscriber,
+    CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher, Responder,
+    RoleLock, Subscriber,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Command, Culprit, Estimate, Mode, State, Timing};
 
 /// Maximum number of alarm changes that one tick reads; more wait for the next tick.
 const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
@@ -86,7 +87,8 @@ pub struct Ending {
     pub unpublished: u64,
 }
 
-/// Runs the worm until `end` is set and the motor is off. `ready` is called once, when topics and operating system are set
+/// Runs the worm until `end` is set and the motor is off; a worm whose parent is gone also until the motor is off for another
+/// reason. `ready` is called once, when topics and operating system are set
 /// up, with what the operating system granted.
 ///
 /// # Errors
@@ -96,6 +98,7 @@ pub fn run(
     drive: &mut Drive,
     hub: &Hub,
     role: &RoleLock<ControllerRole>,
+    attendance: &Attendance,
     end: &AtomicBool,
     ready: impl FnOnce(&[Grant]),
 ) -> Result<Ending, RunError> {
@@ -129,7 +132,7 @@ pub fn run(
         ticks: 0,
         was_gone: false,
     };
-    while !tick_loop.tick(drive, end.load(Ordering::Relaxed)) {}
+    while !tick_loop.tick(drive, attendance, end.load(Ordering::Relaxed)) {}
     Ok(Ending {
         ticks: tick_loop.ticks,
         overruns: tick_loop.schedule.skipped(),
@@ -186,7 +189,7 @@ struct Times {
 
 impl Loop {
     /// One tick; true when the loop is over.
-    fn tick(&mut self, drive: &mut Drive, end: bool) -> bool {
+    fn tick(&mut self, drive: &mut Drive, attendance: &Attendance, end: bool) -> bool {
         let deadline = self.schedule.deadline_ns();
         while monotonic_ns() < deadline {
             realtime::sleep_until(deadline);
@@ -219,7 +222,8 @@ impl Loop {
 
         let alarm_count = self.ports.take_alarms(&mut self.alarms);
         let estimate = self.ports.estimates.latest().ok().flatten();
-        let (command, responder) = split(self.ports.commands.take());
+        let (command, responder) = take_command(&self.ports.commands, attendance);
+        let lease = lease_of(attendance.parent());
         let inputs = Inputs {
             // A service takes long, and no reading is requested meanwhile: silences count from its end.
             now_ns: resumed,
@@ -230,9 +234,9 @@ impl Loop {
             command,
             alarms: &self.alarms[..alarm_count],
             estimate: estimate.as_deref().map(EstimateSeen::from),
-            lease: Lease::None,
+            lease,
             emergency_stop: None,
-            end,
+            end: end || (attendance.parent() == Parent::Gone && is_without_torque(self.controller.mode())),
             service: served.map(|(outcome, _)| outcome),
             hardware_error: served.and_then(|(_, hardware_error)| hardware_error),
         };
@@ -247,9 +251,14 @@ impl Loop {
         // One system call for each listener, none without. A listener that cannot be woken is not the loop's problem.
         let _ = self.ports.state_event.notify();
         let notified = monotonic_ns();
-        if let (Some(responder), Some(reply)) = (responder, &outputs.reply) {
-            // A client that has gone meanwhile needs no answer.
-            let _ = responder.answer(reply);
+        attendance.note(self.controller.mode(), self.controller.fault());
+        if let Some(reply) = &outputs.reply {
+            match responder {
+                // A client that has gone meanwhile needs no answer.
+                Some(Asker::Topic(responder)) => drop(responder.answer(reply)),
+                Some(Asker::StopSocket(number)) => attendance.answer(number, reply),
+                None => {}
+            }
         }
         self.finish(
             Times {
@@ -405,12 +414,33 @@ fn serve(drive: &mut Drive, service: Service) -> (ServiceOutcome, Option<u8>) {
     }
 }
 
-fn split(
-    taken: Result<Option<(worm_estimator::message::Command, Responder)>, AnswerError>,
-) -> (Option<worm_estimator::message::Command>, Option<Responder>) {
-    match taken {
-        Ok(Some((command, responder))) => (Some(command), Some(responder)),
+/// Who asked for a command, and gets the answer.
+enum Asker {
+    Topic(Responder),
+    StopSocket(u64),
+}
+
+/// The next command: from the stop socket, else from the topics.
+fn take_command(topic: &CommandServer, attendance: &Attendance) -> (Option<Command>, Option<Asker>) {
+    if let Some((number, command)) = attendance.take_command() {
+        return (Some(command), Some(Asker::StopSocket(number)));
+    }
+    match topic.take() {
+        Ok(Some((command, responder))) => (Some(command), Some(Asker::Topic(responder))),
         // A request that cannot be read is not answered; its sender times out.
         Ok(None) | Err(_) => (None, None),
+    }
+}
+
+/// Whether the worm rests without torque, or with none that could be switched off: an orphaned controller then has nothing left to do.
+fn is_without_torque(mode: Mode) -> bool {
+    matches!(mode, Mode::Disarmed | Mode::Fault)
+}
+
+fn lease_of(parent: Parent) -> Lease {
+    match parent {
+        Parent::None => Lease::None,
+        Parent::Here => Lease::Held,
+        Parent::Silent | Parent::Gone => Lease::Lapsed,
     }
 }
