@@ -40,7 +40,8 @@
 //! | [`realtime`] | what a process requests from the operating system, what it really gets, how the computer is set up for it | |
 //! | [`topics`] | iceoryx2: one namespace per worm, publishers, subscribers, the command service, the guard at start-up | |
 //! | [`link`] | the servo and the tracker on the bus; [`link::virtual_worm`] simulates both | |
-//! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | `link`, `topics`, `realtime` |
+//! | [`attendance`] | the pipe from a parent, and the stop socket | `topics`, `realtime` |
+//! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | `link`, `topics`, `realtime`, `attendance` |
 //! | `estimator` | the process around the estimator | `topics`, `realtime` |
 //! | `recorder` | the process that logs the topics | `topics` |
 //! | [`latency`] | durations in histograms, where each tick's time went, the page about it | |
@@ -61,6 +62,7 @@
 //! - Names carry SI units: `stroke_m`, `energy_j`. People read millimetres, millijoules and degrees.
 //! - Faults are injected by a wrapper, never by an `if` in the product.
 
+pub mod attendance;
 mod benchmark;
 pub mod command;
 pub mod control;

@@ -3,7 +3,11 @@
 use clap::{Parser, Subcommand};
 use std::io::IsTerminal;
 use std::process::ExitCode;
+use std::time::Duration;
 use wormd::command::{self, Failure};
+
+/// How long a log that is printed in the background may take at the end; a terminal that nobody reads takes for ever.
+const LOG_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Real-time controller and telemetry daemon for an untethered earthworm robot
 #[derive(Debug, Parser)]
@@ -62,20 +66,22 @@ fn main() -> ExitCode {
     };
     tracing_subscriber::fmt()
         .with_max_level(level)
-        .with_writer(std::io::stderr)
+        .with_writer(|| command::LogOutput)
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
         // It would panic when standard error is closed: the parent was killed, or the terminal closed.
         .log_internal_errors(false)
         .compact()
         .init();
-    match run(arguments.command, arguments.verbose) {
+    let code = match run(arguments.command, arguments.verbose) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             command::log_line(format_args!("wormd: {failure}"));
             failure.exit_code()
         }
-    }
+    };
+    command::finish_log(LOG_PATIENCE);
+    code
 }
 
 fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use worm_estimator::config::Config;
 use worm_estimator::message::{Alarm, Cycle, Timing};
+use wormd::attendance::Attendance;
 use wormd::control::{self, Drive, Ending, link_settings};
 use wormd::link::virtual_worm::{Options, VirtualWorm};
 use wormd::topics::{Controller, Hub, Instance, RoleLock};
@@ -32,7 +33,7 @@ fn run_for(time: Duration) -> (Ending, u64) {
     let mut ending = None;
     let allocations = allocation_counter::measure(|| {
         let timer = Arc::clone(&end);
-        let outcome = control::run(&config, &mut drive, &hub, &role, &end, |_| {
+        let outcome = control::run(&config, &mut drive, &hub, &role, &Attendance::default(), &end, |_| {
             std::thread::spawn(move || {
                 std::thread::sleep(time);
                 timer.store(true, Ordering::Relaxed);

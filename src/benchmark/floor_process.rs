@@ -26,7 +26,7 @@ impl FloorProcess {
         ] {
             arguments.extend([name.into(), ns.to_string().into()]);
         }
-        let mut child = Child::start("bare sleeper", &arguments, log)?;
+        let mut child = Child::start_unsupervised("bare sleeper", &arguments, log)?;
         child.wait_until_ready(START_TIMEOUT, log, end)?;
         Ok(Self { child, cpu: None })
     }

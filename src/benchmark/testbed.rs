@@ -214,6 +214,8 @@ fn start_controller(
     }
     let mut child = Child::start("control", &with_verbosity(arguments, benchmark.options.verbose), log)?;
     child.extend_end_timeout(Duration::from_secs_f64(benchmark.config.gait.ramp_s));
+    // Only a virtual worm is ever moved here.
+    child.keep_lease()?;
     Ok(child)
 }
 

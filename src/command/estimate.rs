@@ -1,6 +1,7 @@
 //! `wormd estimate`: the estimator alone, beside a running controller.
 
 use super::{Failure, WormArgs, end_on_signal, print, report_grants};
+use crate::attendance::end_after_controller;
 use crate::estimator;
 use crate::topics::{Estimator, Hub, Instance, RoleLock};
 use clap::Args;
@@ -10,6 +11,9 @@ use clap::Args;
 pub struct EstimateArgs {
     #[command(flatten)]
     worm: WormArgs,
+    /// Standard input is a pipe from the process that watches over the worm
+    #[arg(long, hide = true)]
+    supervised: bool,
 }
 
 /// Runs `wormd estimate` until a signal ends it. Prints the line "ready" on standard output once it listens.
@@ -20,6 +24,9 @@ pub fn run(args: &EstimateArgs) -> Result<(), Failure> {
     let config = args.worm.load()?;
     let end = end_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;
+    if args.supervised {
+        end_after_controller(&instance, &end)?;
+    }
     let role = RoleLock::<Estimator>::take(&instance).map_err(Failure::unusable)?;
     let hub = Hub::open(&instance).map_err(Failure::failed)?;
     let ready = |grants: &[_]| {

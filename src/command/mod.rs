@@ -23,7 +23,7 @@ pub mod up;
 pub mod virtual_worm;
 
 pub use crate::failure::Failure;
-pub use crate::print::log_line;
+pub use crate::print::{LogOutput, finish_log, log_line};
 
 use crate::print;
 use clap::Args;
@@ -128,6 +128,19 @@ pub fn end_on_signal() -> Result<Arc<AtomicBool>, Failure> {
         signal_hook::flag::register(signal, Arc::clone(&end)).map_err(|error| cannot_handle(signal, &error))?;
     }
     Ok(end)
+}
+
+/// A flag that SIGTSTP (Ctrl-Z) sets, instead of suspending the process. SIGTSTP stays ignored if it was.
+///
+/// # Errors
+/// When the operating system refuses the handler.
+fn suspend_on_signal() -> Result<Arc<AtomicBool>, Failure> {
+    let suspend = Arc::new(AtomicBool::new(false));
+    if !is_ignored(libc::SIGTSTP) {
+        signal_hook::flag::register(libc::SIGTSTP, Arc::clone(&suspend))
+            .map_err(|error| cannot_handle(libc::SIGTSTP, &error))?;
+    }
+    Ok(suspend)
 }
 
 /// As [`end_on_signal`], until the second flag is set: from then on a signal kills the process again.

@@ -2,7 +2,9 @@
 
 use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
+use crate::attendance::end_after_controller;
 use crate::recorder::Recorder;
+use crate::topics::Instance;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -27,6 +29,9 @@ pub struct RecordArgs {
     /// Only these topics
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = "state,timing,estimate,cycle,alarm")]
     topics: Vec<Channel>,
+    /// Standard input is a pipe from the process that watches over the worm
+    #[arg(long, hide = true)]
+    supervised: bool,
 }
 
 fn channel(name: &str) -> Result<Channel, String> {
@@ -48,6 +53,9 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     let (config, text) = args.worm.load_with_text()?;
     let limits = args.limits.limits().map_err(Failure::unusable)?;
     let end = end_on_signal()?;
+    if args.supervised {
+        end_after_controller(&Instance::of(&config).map_err(Failure::unusable)?, &end)?;
+    }
     let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force, limits)?;
     let (worm, file) = (&config.worm.name, args.out.display());
     print::log_line(format_args!("recording {worm} to {file}, from its first message on"));

@@ -1,10 +1,13 @@
 //! `wormd command`: a command to a running controller.
 
-use super::{Failure, WormArgs, print};
-use crate::supervisor::controller;
+use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
+use crate::supervisor::attend;
+use crate::supervisor::controller::{self, Answer};
 use crate::topics::{Hub, Instance};
 use clap::{Args, ValueEnum};
-use worm_estimator::message::CommandKind;
+use std::time::Duration;
+use worm_estimator::config::Config;
+use worm_estimator::message::{AlarmKind, Command, CommandKind};
 
 /// Arguments of `wormd command`.
 #[derive(Debug, Args)]
@@ -12,9 +15,18 @@ pub struct SendCommandArgs {
     /// What the controller shall do
     #[arg(ignore_case = true)]
     order: Order,
+    /// The alarms that `acknowledge` is about; without any, all that there are
+    #[arg(value_name = "ALARM", value_parser = alarm)]
+    alarms: Vec<AlarmKind>,
     /// Speed of a crawl in gait cycles per second, negative for backward; without it, the configured gait
     #[arg(long, value_name = "CYCLES_PER_S", allow_negative_numbers = true)]
     speed: Option<f64>,
+    /// Crawl for so long, then hold; without it, as long as `wormd up` runs or `control.crawl_limit_s` allows
+    #[arg(long = "for", value_name = "SECONDS", value_parser = positive_seconds, conflicts_with = "attend")]
+    limit: Option<Duration>,
+    /// Crawl as long as this command runs in the foreground: Ctrl-C, or its end however it comes, makes the worm hold
+    #[arg(long)]
+    attend: bool,
     #[command(flatten)]
     worm: WormArgs,
     /// Print one JSON object instead of text
@@ -30,10 +42,12 @@ enum Order {
     Crawl,
     /// Keep the cam where it is, actively
     Hold,
-    /// Ramp down, then torque off
+    /// Ramp down, then torque off; works in every mode, and without the topics
     Stop,
     /// Leave the fault state; the worm is re-armed from the measured position
     Reset,
+    /// Note that you have seen these alarms; permits nothing
+    Acknowledge,
 }
 
 impl Order {
@@ -44,8 +58,17 @@ impl Order {
             Self::Hold => CommandKind::Hold,
             Self::Stop => CommandKind::Stop,
             Self::Reset => CommandKind::Reset,
+            Self::Acknowledge => CommandKind::Acknowledge,
         }
     }
+}
+
+fn alarm(name: &str) -> Result<AlarmKind, String> {
+    let named = AlarmKind::ALL.iter().find(|kind| kind.name() == name).copied();
+    named.ok_or_else(|| {
+        let names: Vec<_> = AlarmKind::ALL.iter().map(|kind| kind.name()).collect();
+        format!("there is no alarm of this name: give some of {}", names.join(", "))
+    })
 }
 
 /// Runs `wormd command`.
@@ -54,27 +77,110 @@ impl Order {
 /// [`Failure::Unusable`] for arguments that cannot be used, [`Failure::Failed`] when there is no controller or it refuses.
 pub fn run(args: &SendCommandArgs) -> Result<(), Failure> {
     let config = args.worm.load()?;
-    let kind = args.order.kind();
-    if args.speed.is_some() && kind != CommandKind::Crawl {
-        return Err(Failure::unusable("--speed goes with `wormd command crawl`"));
-    }
-    if args.speed.is_some_and(|speed| !speed.is_normal()) {
-        return Err(Failure::unusable(
-            "--speed must be a number other than 0: to stand still, `wormd command hold` or `stop`",
-        ));
-    }
-    let instance = Instance::of(&config).map_err(Failure::unusable)?;
-    let hub = Hub::open(&instance).map_err(Failure::failed)?;
+    args.check()?;
+    let answer = match args.order {
+        Order::Stop => match controller::stop_by_socket(&config) {
+            Ok(answer) => answer,
+            Err(Some(failure)) => return Err(failure),
+            Err(None) => send(args, &config)?,
+        },
+        Order::Crawl if args.attend => return attend(args, &config),
+        _ => send(args, &config)?,
+    };
+    args.print(&config, &answer)
+}
+
+fn send(args: &SendCommandArgs, config: &Config) -> Result<Answer, Failure> {
+    let hub = open(config)?;
     let client = hub.command_client().map_err(Failure::failed)?;
-    let answer = controller::send(&client, kind, args.speed.unwrap_or(0.0))?;
-    if args.json {
-        print::line(answer.to_json())?;
-    }
-    if let Some(refusal) = answer.refusal() {
-        return Err(Failure::failed(refusal));
-    }
-    if !args.json {
-        print::line(format_args!("{}: {kind} accepted", config.worm.name))?;
-    }
+    controller::send(&client, args.command())
+}
+
+/// Crawls as long as this process runs.
+fn attend(args: &SendCommandArgs, config: &Config) -> Result<(), Failure> {
+    let end = end_on_signal()?;
+    let hub = open(config)?;
+    let worm = &config.worm.name;
+    attend::crawl(&hub, args.speed.unwrap_or(0.0), &end, || {
+        print::log_line(format_args!("{worm}: crawls until Ctrl-C, or until this command ends"));
+        print::ready();
+    })?;
+    print::log_line(format_args!("{worm}: holds"));
     Ok(())
+}
+
+fn open(config: &Config) -> Result<Hub, Failure> {
+    let instance = Instance::of(config).map_err(Failure::unusable)?;
+    Hub::open(&instance).map_err(Failure::failed)
+}
+
+impl SendCommandArgs {
+    fn check(&self) -> Result<(), Failure> {
+        let is_crawl = matches!(self.order, Order::Crawl);
+        for (flag, is_given) in [
+            ("--speed", self.speed.is_some()),
+            ("--for", self.limit.is_some()),
+            ("--attend", self.attend),
+        ] {
+            if is_given && !is_crawl {
+                return Err(Failure::unusable(format!("{flag} goes with `wormd command crawl`")));
+            }
+        }
+        if !self.alarms.is_empty() && !matches!(self.order, Order::Acknowledge) {
+            return Err(Failure::unusable("names of alarms go with `wormd command acknowledge`"));
+        }
+        if self.speed.is_some_and(|speed| !speed.is_normal()) {
+            return Err(Failure::unusable(
+                "--speed must be a number other than 0: to stand still, `wormd command hold` or `stop`",
+            ));
+        }
+        Ok(())
+    }
+
+    fn command(&self) -> Command {
+        let all = AlarmKind::ALL;
+        let alarms = if self.alarms.is_empty() { all } else { &self.alarms };
+        let is_about_alarms = matches!(self.order, Order::Acknowledge);
+        Command {
+            cycles_per_s: self.speed.unwrap_or(0.0),
+            limit_s: self.limit.map_or(0.0, |limit| limit.as_secs_f64()),
+            alarm_mask: match is_about_alarms {
+                true => alarms.iter().fold(0, |mask, alarm| mask | 1 << alarm.code()),
+                false => 0,
+            },
+            ..controller::command(self.order.kind())
+        }
+    }
+
+    fn print(&self, config: &Config, answer: &Answer) -> Result<(), Failure> {
+        let refusal = answer.refusal();
+        let limit_s = match (self.order, &refusal) {
+            (Order::Crawl, None) => self
+                .limit
+                .map(|limit| limit.as_secs_f64())
+                .or_else(|| controller::crawl_limit_s(config)),
+            _ => None,
+        };
+        if self.json {
+            let mut json = answer.to_json();
+            if matches!(self.order, Order::Crawl) {
+                json["limit_s"] = limit_s.into();
+            }
+            print::line(json)?;
+        }
+        if let Some(refusal) = refusal {
+            return Err(Failure::failed(refusal));
+        }
+        if self.json {
+            return Ok(());
+        }
+        let (worm, kind) = (&config.worm.name, self.order.kind());
+        match (limit_s, self.limit) {
+            (Some(limit_s), None) => print::line(format_args!(
+                "{worm}: {kind} accepted, for {limit_s} s at most (control.crawl_limit_s; --for and --attend say it otherwise)"
+            )),
+            (Some(limit_s), Some(_)) => print::line(format_args!("{worm}: {kind} accepted, for {limit_s} s")),
+            (None, _) => print::line(format_args!("{worm}: {kind} accepted")),
+        }
+    }
 }

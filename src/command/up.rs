@@ -3,10 +3,11 @@
 mod screen;
 
 use super::recording_limits::RecordingLimits;
-use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
+use super::{Failure, WormArgs, end_on_signal, positive_seconds, print, suspend_on_signal};
 use crate::supervisor::child_process::Log;
-use crate::supervisor::crawl;
+use crate::supervisor::crawl::{self, Limits, SharedTelemetry};
 use crate::supervisor::processes::{Launch, Processes};
+use crate::supervisor::takeover;
 use crate::topics::{Instance, RoleLock, Supervisor};
 use crate::watch::{Summary, Telemetry};
 use clap::Args;
@@ -14,6 +15,9 @@ use screen::Screen;
 use std::path::PathBuf;
 use std::time::Duration;
 use worm_estimator::message::{AlarmKind, Fault, Mode};
+
+/// How long standard output may take nothing of the summary.
+const OUTPUT_PATIENCE: Duration = Duration::from_secs(5);
 
 /// Arguments of `wormd up`.
 #[derive(Debug, Args)]
@@ -57,9 +61,13 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
         ));
     }
     args.record_limits.limits().map_err(Failure::unusable)?;
+    // From here on nothing that this thread does waits for a terminal.
+    print::log_in_background()?;
     let end = end_on_signal()?;
+    let suspend = suspend_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;
     let role = RoleLock::<Supervisor>::take(&instance).map_err(Failure::unusable)?;
+    takeover::end_orphans(&config, &instance, &end)?;
     let log = Log::new();
     let launch = Launch {
         worm: args.worm.forward(),
@@ -70,33 +78,41 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
         verbose,
     };
     let mut processes = Processes::start(&launch, &config, &instance, &log, &end)?;
+    let telemetry = SharedTelemetry::default();
     // Opened only now: until here Ctrl-C is a signal, and errors are visible.
-    let mut screen = Screen::open(args.json, args.plain, &config)?;
+    let mut screen = Screen::open(args.json, args.plain, &config, &telemetry, &log)?;
+    let limits = Limits {
+        duration: args.duration,
+        end: &end,
+        suspend: &suspend,
+    };
     let outcome = crawl::run(
-        args.duration,
+        limits,
         &config,
         &instance,
         &mut processes,
         &mut screen,
+        &telemetry,
         &log,
-        &end,
     );
     let incomplete_recording = processes.end();
-    screen.close(&log);
+    let display_problem = screen.close();
     drop(role);
     let run = outcome?;
 
-    let summary = Summary::new(&config.worm, &run.telemetry, run.mode);
+    let telemetry = std::mem::take(&mut *telemetry.lock());
+    let summary = Summary::new(&config.worm, &telemetry, run.mode);
     if args.json {
-        print::line(serde_json::to_string(&summary).map_err(Failure::failed)?)?;
+        let text = serde_json::to_string(&summary).map_err(Failure::failed)?;
+        print::line_within(text, OUTPUT_PATIENCE)?;
     } else {
-        print::line(summary.to_string().trim_end())?;
+        print::line_within(summary.to_string().trim_end(), OUTPUT_PATIENCE)?;
     }
-    match (run.problem.or(incomplete_recording), run.mode) {
+    match (run.problem.or(display_problem).or(incomplete_recording), run.mode) {
         (Some(problem), _) => Err(Failure::failed(problem)),
         (None, Mode::Fault) => Err(Failure::failed(format!(
             "the worm was stopped by a fault: {}",
-            fault_in_words(&run.telemetry)
+            fault_in_words(&telemetry)
         ))),
         (None, _) => Ok(()),
     }

@@ -1,11 +1,13 @@
 //! `wormd virtual-worm`: the simulated devices on a pseudo-terminal.
 
 use super::{Failure, end_on_signal, print, report_grants};
+use crate::attendance::{Parent, ParentPipe};
 use crate::link::servo::BAUD_RATES;
 use crate::link::virtual_worm::{Fault, Options, PortLink, Server, ServerError, VirtualWormReport};
 use crate::realtime;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use worm_estimator::config::Config;
 
 /// The devices' priority lies this far below the loop's: a real servo answers however busy the computer is, and so must this one.
@@ -35,6 +37,9 @@ pub struct VirtualWormArgs {
     /// Seed of all randomness, in place of the configured one
     #[arg(long)]
     pub seed: Option<u64>,
+    /// Standard input is a pipe from the process that watches over the worm
+    #[arg(long, hide = true)]
+    pub supervised: bool,
 }
 
 fn parse_baud(text: &str) -> Result<u32, String> {
@@ -63,10 +68,15 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
         // A ledger that cannot be written is reported now, not after hours.
         std::fs::write(file, "").map_err(|error| Failure::unusable(ledger_error(file, &error)))?;
     }
-    let server = Server::open(&config, &options).map_err(|error| match error {
+    let mut server = Server::open(&config, &options).map_err(|error| match error {
         ServerError::Devices(_) => Failure::unusable(error),
         _ => Failure::failed(error),
     })?;
+    if args.supervised {
+        let parent = ParentPipe::watch(Duration::MAX, 0)
+            .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))?;
+        server.end_when_unused(move || parent.state() == Parent::Gone);
+    }
     let link = PortLink::create(&args.link, server.path()).map_err(Failure::unusable)?;
     report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     // A parent that does not wait for this line may have closed the pipe.

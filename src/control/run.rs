@@ -9,15 +9,17 @@ use super::loop_clock::{ExchangeTimes, MIN_PAUSE_NS, Silence, absent_ns};
 use super::rate::RateKeeper;
 use super::sched_counters::{Counts, Parts, find_culprit};
 use super::schedule::{Schedule, bus_allowed_ns};
+use crate::attendance::{Attendance, Parent};
+use crate::link::{EmergencyStopError, EmergencyStopInput};
 use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
 use crate::topics::{
-    AnswerError, CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher,
-    Responder, RoleLock, Subscriber,
+    CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher, Responder,
+    RoleLock, Subscriber,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, AlarmKind, Culprit, Estimate, Mode, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Command, Culprit, Estimate, Mode, State, Timing};
 
 /// Maximum number of alarm changes that one tick reads; more wait for the next tick.
 const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
@@ -35,6 +37,9 @@ pub enum RunError {
     /// A topic cannot be used.
     #[error(transparent)]
     Topic(#[from] PortError),
+    /// The emergency stop cannot be read.
+    #[error(transparent)]
+    EmergencyStop(#[from] EmergencyStopError),
     /// A thread beside the loop cannot be started.
     #[error("a thread beside the loop cannot be started: {0}")]
     Thread(std::io::Error),
@@ -86,7 +91,8 @@ pub struct Ending {
     pub unpublished: u64,
 }
 
-/// Runs the worm until `end` is set and the motor is off. `ready` is called once, when topics and operating system are set
+/// Runs the worm until `end` is set and the motor is off; a worm whose parent is gone also until the motor is off for another
+/// reason. `ready` is called once, when topics and operating system are set
 /// up, with what the operating system granted.
 ///
 /// # Errors
@@ -96,9 +102,11 @@ pub fn run(
     drive: &mut Drive,
     hub: &Hub,
     role: &RoleLock<ControllerRole>,
+    attendance: &Attendance,
     end: &AtomicBool,
     ready: impl FnOnce(&[Grant]),
 ) -> Result<Ending, RunError> {
+    let emergency_stop = EmergencyStopInput::open(config)?;
     let ports = Ports::open(hub, role)?;
     let journal = Journal::start().map_err(RunError::Thread)?;
     let witness_priority = config.realtime.priority.saturating_sub(WITNESS_BELOW_LOOP);
@@ -111,6 +119,8 @@ pub fn run(
         journal,
         witness,
         silence: Silence::new(config),
+        emergency_stop,
+        absent_ns: 0,
         controller: Controller::new(config),
         schedule: Schedule::new(config.control.rate_hz, monotonic_ns()),
         rate: RateKeeper::new(
@@ -130,7 +140,7 @@ pub fn run(
         ticks: 0,
         was_gone: false,
     };
-    while !tick_loop.tick(drive, end.load(Ordering::Relaxed)) {}
+    while !tick_loop.tick(drive, attendance, end.load(Ordering::Relaxed)) {}
     Ok(Ending {
         ticks: tick_loop.ticks,
         overruns: tick_loop.schedule.skipped(),
@@ -152,6 +162,9 @@ struct Loop {
     journal: Journal,
     witness: CpuWitness,
     silence: Silence,
+    emergency_stop: Option<EmergencyStopInput>,
+    /// How long the loop could not run although it was due, in all.
+    absent_ns: u64,
     controller: Controller,
     schedule: Schedule,
     rate: RateKeeper,
@@ -206,7 +219,7 @@ struct Times {
 
 impl Loop {
     /// One tick; true when the loop is over.
-    fn tick(&mut self, drive: &mut Drive, end: bool) -> bool {
+    fn tick(&mut self, drive: &mut Drive, attendance: &Attendance, end: bool) -> bool {
         let deadline = self.schedule.deadline_ns();
         while monotonic_ns() < deadline {
             realtime::sleep_until(deadline);
@@ -231,9 +244,15 @@ impl Loop {
             self.schedule.period_ns(),
         ) + self.unanswerable_ns(outcome.servo.is_ok(), drive.is_gone());
 
+        self.absent_ns += absent_ns;
+        let present_ns = exchanged.saturating_sub(self.absent_ns);
+        let emergency_stop = self.emergency_stop.as_mut();
+        let emergency_stop = emergency_stop.map(|input| input.is_pressed(present_ns, &outcome));
+
         let alarm_count = self.ports.take_alarms(&mut self.alarms);
         let estimate = self.ports.estimates.latest().ok().flatten();
-        let (command, responder) = split(self.ports.commands.take());
+        let (command, responder) = take_command(&self.ports.commands, attendance);
+        let lease = lease_of(attendance.parent());
         let inputs = Inputs {
             now_ns: exchanged,
             absent_ns,
@@ -243,9 +262,9 @@ impl Loop {
             command,
             alarms: &self.alarms[..alarm_count],
             estimate: estimate.as_deref().map(EstimateSeen::from),
-            lease: Lease::None,
-            emergency_stop: None,
-            end,
+            lease,
+            emergency_stop,
+            end: end || (attendance.parent() == Parent::Gone && is_without_torque(self.controller.mode())),
             service: self.served.outcome,
             service_ns: self.served.took_ns,
             hardware_error: self.served.hardware_error,
@@ -261,9 +280,14 @@ impl Loop {
         // One system call for each listener, none without. A listener that cannot be woken is not the loop's problem.
         let _ = self.ports.state_event.notify();
         let notified = monotonic_ns();
-        if let (Some(responder), Some(reply)) = (responder, &outputs.reply) {
-            // A client that has gone meanwhile needs no answer.
-            let _ = responder.answer(reply);
+        attendance.note(self.controller.mode(), self.controller.fault());
+        if let Some(reply) = &outputs.reply {
+            match responder {
+                // A client that has gone meanwhile needs no answer.
+                Some(Asker::Topic(responder)) => drop(responder.answer(reply)),
+                Some(Asker::StopSocket(number)) => attendance.answer(number, reply),
+                None => {}
+            }
         }
         // At once, because it may be to switch torque off. A finished loop has done what it could.
         let service = outputs.service.filter(|_| !outputs.finished);
@@ -429,12 +453,33 @@ fn serve(drive: &mut Drive, service: Service) -> Served {
     }
 }
 
-fn split(
-    taken: Result<Option<(worm_estimator::message::Command, Responder)>, AnswerError>,
-) -> (Option<worm_estimator::message::Command>, Option<Responder>) {
-    match taken {
-        Ok(Some((command, responder))) => (Some(command), Some(responder)),
+/// Who asked for a command, and gets the answer.
+enum Asker {
+    Topic(Responder),
+    StopSocket(u64),
+}
+
+/// The next command: from the stop socket, else from the topics.
+fn take_command(topic: &CommandServer, attendance: &Attendance) -> (Option<Command>, Option<Asker>) {
+    if let Some((number, command)) = attendance.take_command() {
+        return (Some(command), Some(Asker::StopSocket(number)));
+    }
+    match topic.take() {
+        Ok(Some((command, responder))) => (Some(command), Some(Asker::Topic(responder))),
         // A request that cannot be read is not answered; its sender times out.
         Ok(None) | Err(_) => (None, None),
+    }
+}
+
+/// Whether the worm rests without torque, or with none that could be switched off: an orphaned controller then has nothing left to do.
+fn is_without_torque(mode: Mode) -> bool {
+    matches!(mode, Mode::Disarmed | Mode::Fault)
+}
+
+fn lease_of(parent: Parent) -> Lease {
+    match parent {
+        Parent::None => Lease::None,
+        Parent::Here => Lease::Held,
+        Parent::Silent | Parent::Gone => Lease::Lapsed,
     }
 }

@@ -15,6 +15,7 @@ mod request;
 mod witness;
 
 pub use effective::{EffectiveSettings, Policy};
+pub(crate) use request::set_fifo;
 pub use request::{Grant, Refusal, request};
 pub use witness::{CpuWitness, visit_every_cpu};
 

@@ -105,7 +105,7 @@ fn lock_memory() -> io::Result<()> {
     mlockall(flags).map_err(io::Error::from)
 }
 
-pub(super) fn set_fifo(priority: u8) -> io::Result<()> {
+pub(crate) fn set_fifo(priority: u8) -> io::Result<()> {
     let parameters = libc::sched_param {
         sched_priority: i32::from(priority),
     };

@@ -1,8 +1,10 @@
 //! Commands to a running controller, and why it refuses one.
 
+use crate::attendance::{Request, StopError, ask};
 use crate::failure::Failure;
 use crate::topics::CommandClient;
 use std::time::Duration;
+use worm_estimator::config::Config;
 use worm_estimator::message::{AlarmKind, Command, CommandKind, CommandOutcome, Fault, Mode, Reply};
 
 /// How long the controller may take to answer: a reset prepares the servo again, which takes a while on a slow bus.
@@ -15,18 +17,54 @@ pub(crate) struct Answer {
     reply: Reply,
 }
 
-/// Sends a command. `cycles_per_s` is the speed of a crawl; 0 stands for the configured gait.
+/// A command of the calling user.
+pub(crate) fn command(kind: CommandKind) -> Command {
+    Command {
+        user: nix::unistd::getuid().as_raw(),
+        ..Command::new(kind)
+    }
+}
+
+/// Sends a command.
 ///
 /// # Errors
 /// [`Failure::Failed`] when no controller answers, or its answer is unknown.
-pub(crate) fn send(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Result<Answer, Failure> {
-    let command = Command {
-        cycles_per_s,
-        ..Command::new(kind)
-    };
+pub(crate) fn send(client: &CommandClient, command: Command) -> Result<Answer, Failure> {
     let reply = client.call(command, REPLY_TIMEOUT).map_err(Failure::failed)?;
-    let outcome = CommandOutcome::try_from(reply.verdict).map_err(Failure::failed)?;
-    Ok(Answer { kind, outcome, reply })
+    let kind = CommandKind::try_from(command.kind).map_err(Failure::failed)?;
+    Answer::new(kind, reply)
+}
+
+/// Stops the worm through the controller's stop socket, which needs neither the topics' folder nor room in `/dev/shm`.
+///
+/// # Errors
+/// None when nobody answers there, so that the topics have to do; [`Failure::Failed`] when the answer is a refusal.
+pub(crate) fn stop_by_socket(config: &Config) -> Result<Answer, Option<Failure>> {
+    let answer = ask(config, Request::Stop).map_err(|error| match error {
+        StopError::SeveralUsers { .. } => Some(Failure::failed(error)),
+        StopError::NoSocket { .. } | StopError::NoAnswer { .. } => {
+            tracing::debug!("{error}");
+            None
+        }
+    })?;
+    let Some(reply) = answer.reply else {
+        return Err(answer.refusal.map(Failure::failed));
+    };
+    let reply = Reply {
+        sequence: reply.sequence,
+        verdict: reply.verdict,
+        mode: answer.mode,
+        fault: answer.fault,
+        alarm_mask: reply.alarm_mask,
+    };
+    Answer::new(CommandKind::Stop, reply).map_err(Some)
+}
+
+/// How long the worm may crawl by a command that names no time, s: as long as the one who watches over it is there, if somebody
+/// does. `None` then, and also when the controller does not say.
+pub(crate) fn crawl_limit_s(config: &Config) -> Option<f64> {
+    let answer = ask(config, Request::Status).ok()?;
+    (!answer.is_supervised()).then_some(answer.crawl_limit_s)
 }
 
 /// Sends a command that has to be accepted, with the configured gait.
@@ -34,13 +72,18 @@ pub(crate) fn send(client: &CommandClient, kind: CommandKind, cycles_per_s: f64)
 /// # Errors
 /// [`Failure::Failed`] when the controller does not answer, or refuses.
 pub(super) fn order(client: &CommandClient, kind: CommandKind) -> Result<(), Failure> {
-    match send(client, kind, 0.0)?.refusal() {
+    match send(client, command(kind))?.refusal() {
         None => Ok(()),
         Some(refusal) => Err(Failure::failed(format!("the controller: {refusal}"))),
     }
 }
 
 impl Answer {
+    fn new(kind: CommandKind, reply: Reply) -> Result<Self, Failure> {
+        let outcome = CommandOutcome::try_from(reply.verdict).map_err(Failure::failed)?;
+        Ok(Self { kind, outcome, reply })
+    }
+
     /// The answer as the JSON that `wormd command --json` prints.
     pub(crate) fn to_json(&self) -> serde_json::Value {
         serde_json::json!({

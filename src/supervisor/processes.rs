@@ -100,6 +100,11 @@ impl Processes {
         })
     }
 
+    /// Tells the controller that this process attends to the worm. Never waits.
+    pub(super) fn renew_lease(&mut self) {
+        self.controller.renew_lease();
+    }
+
     /// How the controller ended, if it has.
     pub(super) fn controller_exit_status(&mut self) -> Option<ExitStatus> {
         self.controller.exit_status()

@@ -1,12 +1,13 @@
 //! One worm's namespace on this computer.
 
+use super::folder::{WormFolder, auto_root};
 use iceoryx2::prelude::{Config as IoxConfig, FileName, Path as IoxPath, SemanticString};
-use std::fs::{DirBuilder, Permissions};
+use std::borrow::Cow;
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use worm_estimator::config::Config;
+use worm_estimator::config::{Config, Topics};
 
 /// Longest path of a unix socket, bytes, without the closing zero.
 const SOCKET_PATH_MAX: usize = 107;
@@ -43,6 +44,32 @@ pub enum InstanceError {
         /// The user of this process.
         user: u32,
     },
+    /// The folder of all worms belongs to another user than root, who could exchange what is in it.
+    #[error(
+        "topics.root: {} belongs to user {owner}, who could exchange the files of this user's worms: give a folder of user \
+         {user} or of root, such as /dev/shm/wormd-{user}, or leave topics.root = \"auto\"",
+        root.display()
+    )]
+    ForeignRoot {
+        /// The folder.
+        root: PathBuf,
+        /// The folder's owner.
+        owner: u32,
+        /// The user of this process.
+        user: u32,
+    },
+    /// In the folder of all worms anybody may exchange anything.
+    #[error(
+        "topics.root: in {} (mode {mode:o}) others may remove and replace what this user creates: chmod +t it, or give \
+         another folder",
+        root.display()
+    )]
+    OpenRoot {
+        /// The folder.
+        root: PathBuf,
+        /// Its mode.
+        mode: u32,
+    },
     /// Socket paths in it would be too long, or have characters that iceoryx2 does not take.
     #[error(
         "topics.root: {} and the name {worm} do not make a usable path: letters, digits and '/-_.' only, and the \
@@ -69,13 +96,11 @@ pub enum InstanceError {
 #[derive(Debug, Clone)]
 pub struct Instance {
     worm: String,
+    worm_folder: WormFolder,
     folder: PathBuf,
     prefix: String,
     iceoryx: IoxConfig,
 }
-
-/// Mode of a worm's folder: its user's alone.
-const PRIVATE: u32 = 0o700;
 
 impl Instance {
     /// The namespace of the configured worm.
@@ -83,21 +108,18 @@ impl Instance {
     /// # Errors
     /// As [`Instance::new`].
     pub fn of(config: &Config) -> Result<Self, InstanceError> {
-        Self::new(Path::new(&config.topics.root), &config.worm.name)
+        Self::new(&root_of(config), &config.worm.name)
     }
 
     /// The namespace of the worm `name` under `root`; creates the folders where they are missing: the worm's for its user
-    /// alone (0700), the root for every user if its own parent allows that (1777 in `/dev/shm`), else 0755.
+    /// alone (0700), the root for every user if its own parent allows that (1777 in `/dev/shm`), else 0755. The root must be this
+    /// user's or root's, and sticky if others may write in it.
     ///
     /// # Errors
     /// [`InstanceError`] when a folder cannot be used; its text says why and what to do.
     pub fn new(root: &Path, name: &str) -> Result<Self, InstanceError> {
-        let unusable = |source| InstanceError::Unusable {
-            folder: root.to_path_buf(),
-            source,
-        };
-        create_root(root).map_err(unusable)?;
-        let root = root.canonicalize().map_err(unusable)?;
+        let worm_folder = WormFolder::new(root, name)?;
+        let root = worm_folder.root().to_path_buf();
         let hash = crc::Crc::<u16>::new(&crc::CRC_16_XMODEM).checksum(root.as_os_str().as_encoded_bytes());
         let prefix = format!("wormd_{name}_{hash:04x}_");
         let folder = root.join(name);
@@ -109,11 +131,12 @@ impl Instance {
         })?;
         let instance = Self {
             worm: name.to_owned(),
+            worm_folder,
             folder,
             prefix,
             iceoryx,
         };
-        instance.create_folder()?;
+        instance.open_folder()?;
         Ok(instance)
     }
 
@@ -145,61 +168,19 @@ impl Instance {
         self.folder.join(format!("{name}.lock"))
     }
 
-    /// Creates the folder, for its user alone; the last process of a worm removes it, so a start must expect it gone.
-    fn create_folder(&self) -> Result<(), InstanceError> {
-        let unusable = |source| InstanceError::Unusable {
-            folder: self.folder.clone(),
-            source,
-        };
-        DirBuilder::new()
-            .recursive(true)
-            .mode(PRIVATE)
-            .create(&self.folder)
-            .map_err(unusable)?;
-        let (owner, mode) = match self.folder.symlink_metadata() {
-            Ok(metadata) => (metadata.uid(), metadata.mode() & 0o777),
-            // A leaving process has just removed it; the next lock creates it again.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            Err(error) => return Err(unusable(error)),
-        };
-        let user = nix::unistd::geteuid().as_raw();
-        if owner != user {
-            return Err(InstanceError::Foreign {
-                folder: self.folder.clone(),
-                owner,
-                user,
-            });
-        }
-        if mode == PRIVATE {
-            return Ok(());
-        }
-        // Made under another umask, which iceoryx2 changes for moments in its own threads.
-        match std::fs::set_permissions(&self.folder, Permissions::from_mode(PRIVATE)) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(unusable(error)),
-            _ => Ok(()),
-        }
+    /// Opens the folder, verified as this user's, and creates it where it is missing: the last process of a worm removes it, so a
+    /// start must expect it gone.
+    pub(super) fn open_folder(&self) -> Result<OwnedFd, InstanceError> {
+        self.worm_folder.open()
     }
 }
 
-/// Creates the folder of all worms. Where everybody may create folders, and remove only their own, everybody may do so in it
-/// as well: the first user's worm must not keep out the worms of the others.
-fn create_root(root: &Path) -> io::Result<()> {
-    const SHARED: u32 = 0o1002;
-    if let Some(parent) = root.parent() {
-        DirBuilder::new().recursive(true).mode(0o755).create(parent)?;
+/// The folder of all worms that a configuration selects.
+fn root_of(config: &Config) -> Cow<'_, Path> {
+    match config.topics.root.as_str() {
+        Topics::AUTO => Cow::Owned(auto_root(&config.worm.name)),
+        root => Cow::Borrowed(Path::new(root)),
     }
-    match DirBuilder::new().mode(0o755).create(root) {
-        Ok(()) => {}
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists && root.is_dir() => return Ok(()),
-        Err(error) => return Err(error),
-    }
-    let parent_mode = root
-        .parent()
-        .map_or(Ok(0), |parent| parent.metadata().map(|it| it.mode()))?;
-    if parent_mode & SHARED == SHARED {
-        std::fs::set_permissions(root, Permissions::from_mode(0o1777))?;
-    }
-    Ok(())
 }
 
 /// iceoryx2's settings for one instance, or `None` when the paths do not fit.

@@ -1,10 +1,14 @@
 //! A lock file that may be removed while others wait for it.
 
+use super::instance::Instance;
 use nix::errno::Errno;
-use nix::fcntl::{Flock, FlockArg};
-use std::fs::{DirBuilder, File, OpenOptions};
+use nix::fcntl::{AtFlags, Flock, FlockArg, OFlag, openat};
+use nix::sys::stat::{FileStat, Mode, SFlag, fstat, fstatat};
+use nix::unistd::{UnlinkatFlags, unlinkat};
+use std::fs::File;
 use std::io::{self, Write};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::fd::OwnedFd;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// A lock file that cannot be used.
@@ -39,20 +43,29 @@ impl LockKind {
 #[derive(Debug)]
 pub(super) struct LockFile {
     flock: Flock<File>,
+    /// The folder that it was opened in.
+    folder: OwnedFd,
+    /// Its name in there.
+    name: String,
     path: PathBuf,
 }
 
 impl LockFile {
-    /// Locks the file at `path`, without waiting; `None` when someone else has it.
-    pub(super) fn try_lock(path: &Path, kind: LockKind) -> Result<Option<Self>, LockError> {
+    /// Locks the worm's lock file `<name>.lock`, without waiting; `None` when someone else has it.
+    pub(super) fn try_lock(instance: &Instance, name: &str, kind: LockKind) -> Result<Option<Self>, LockError> {
+        let path = instance.lock_path(name);
+        let name = format!("{name}.lock");
         let failed = |source| LockError {
-            file: path.to_path_buf(),
+            file: path.clone(),
             source,
         };
         loop {
-            let file = match open(path) {
+            let folder = instance
+                .open_folder()
+                .map_err(|error| failed(io::Error::other(error)))?;
+            let file = match open(&folder, &name) {
                 Ok(file) => file,
-                // The folder was removed between its creation and the opening of the file, by a process that left.
+                // The folder was removed between its opening and that of the file, by a process that left.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(error) => return Err(failed(error)),
             };
@@ -63,10 +76,12 @@ impl LockFile {
                 Err((_, errno)) => return Err(failed(errno.into())),
             };
             // The last holder may have removed the file meanwhile; a lock on a file without a name locks nothing.
-            if is_still_at(&flock, path) {
+            if is_at(&path, &flock) {
                 return Ok(Some(Self {
                     flock,
-                    path: path.to_path_buf(),
+                    folder,
+                    name,
+                    path,
                 }));
             }
         }
@@ -91,27 +106,70 @@ impl LockFile {
 
     /// Removes the file's name. Only an exclusive holder may do that: it then is the last to have used it.
     pub(super) fn remove(&self) {
-        if let Err(error) = std::fs::remove_file(&self.path) {
+        // If somebody has removed the file, another one may be there by now, locked by another process.
+        let is_ours = fstat(&*self.flock).is_ok_and(|ours| {
+            fstatat(&self.folder, self.name.as_str(), AtFlags::AT_SYMLINK_NOFOLLOW)
+                .is_ok_and(|there| (there.st_dev, there.st_ino) == (ours.st_dev, ours.st_ino))
+        });
+        if is_ours && let Err(error) = unlinkat(&self.folder, self.name.as_str(), UnlinkatFlags::NoRemoveDir) {
             tracing::debug!("{}: {error}", self.path.display());
         }
     }
-}
 
-fn open(path: &Path) -> io::Result<File> {
-    if let Some(folder) = path.parent() {
-        DirBuilder::new().recursive(true).mode(0o700).create(folder)?;
+    /// Where the file is, as long as nobody removes it.
+    pub(super) fn place(&self) -> io::Result<LockPlace> {
+        let metadata = self.flock.metadata()?;
+        Ok(LockPlace {
+            path: self.path.clone(),
+            identity: (metadata.dev(), metadata.ino()),
+        })
     }
-    OpenOptions::new()
-        .read(true)
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .mode(0o600)
-        .open(path)
 }
 
-fn is_still_at(file: &File, path: &Path) -> bool {
-    match (file.metadata(), path.metadata()) {
+/// A lock file's name and identity, by which its removal can be noticed.
+#[derive(Debug, Clone)]
+pub(crate) struct LockPlace {
+    path: PathBuf,
+    identity: (u64, u64),
+}
+
+impl LockPlace {
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether the file still has its name.
+    pub(crate) fn is_kept(&self) -> bool {
+        self.path
+            .symlink_metadata()
+            .is_ok_and(|there| (there.dev(), there.ino()) == self.identity)
+    }
+}
+
+/// Opens a lock file in a folder that is known to be this user's; never through a link, and never somebody else's file.
+fn open(folder: &OwnedFd, name: &str) -> io::Result<File> {
+    let flags = OFlag::O_RDWR | OFlag::O_CREAT | OFlag::O_NOFOLLOW | OFlag::O_CLOEXEC | OFlag::O_NONBLOCK;
+    let file = openat(folder, name, flags, Mode::from_bits_truncate(0o600))?;
+    let status = fstat(&file)?;
+    let user = nix::unistd::geteuid().as_raw();
+    if status.st_uid != user {
+        return Err(io::Error::other(format!(
+            "it belongs to user {}, not {user}",
+            status.st_uid
+        )));
+    }
+    if !is_regular(&status) {
+        return Err(io::Error::other("it is not a regular file"));
+    }
+    Ok(File::from(file))
+}
+
+fn is_regular(status: &FileStat) -> bool {
+    SFlag::from_bits_truncate(status.st_mode) & SFlag::S_IFMT == SFlag::S_IFREG
+}
+
+fn is_at(path: &Path, file: &File) -> bool {
+    match (file.metadata(), path.symlink_metadata()) {
         (Ok(ours), Ok(there)) => ours.ino() == there.ino() && ours.dev() == there.dev(),
         _ => false,
     }

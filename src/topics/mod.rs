@@ -84,6 +84,7 @@
 mod command;
 mod error;
 mod event;
+mod folder;
 mod hub;
 mod instance;
 mod lock;
@@ -102,6 +103,7 @@ pub use event::{Listener, Notifier, NotifyError, WaitError};
 pub use hub::Hub;
 pub use instance::{Instance, InstanceError};
 pub use lock::LockError;
+pub(crate) use lock::LockPlace;
 pub use publisher::{PublishError, Publisher};
 pub use role::{AlreadyRunning, Controller, Estimator, Recorder, Role, RoleError, RoleLock, Supervisor};
 pub use stale_resources::Peer;

@@ -1,7 +1,7 @@
 //! Roles that only one process of a worm can have.
 
 use super::instance::Instance;
-use super::lock::{LockError, LockFile, LockKind};
+use super::lock::{LockError, LockFile, LockKind, LockPlace};
 use super::stale_resources;
 use std::io;
 use std::marker::PhantomData;
@@ -83,7 +83,7 @@ impl<R: Role> RoleLock<R> {
         let path = instance.lock_path(R::NAME);
         let begun = Instant::now();
         loop {
-            if let Some(mut file) = LockFile::try_lock(&path, LockKind::Exclusive)? {
+            if let Some(mut file) = LockFile::try_lock(instance, R::NAME, LockKind::Exclusive)? {
                 file.write(&format!("{}\n", std::process::id()))?;
                 return Ok(Self {
                     file,
@@ -117,6 +117,14 @@ impl<R: Role> RoleLock<R> {
     pub(super) fn instance(&self) -> &Instance {
         &self.instance
     }
+
+    /// Where the role's lock file is, as long as nobody removes it.
+    ///
+    /// # Errors
+    /// When the system does not say.
+    pub(crate) fn place(&self) -> io::Result<LockPlace> {
+        self.file.place()
+    }
 }
 
 impl<R: Role> Drop for RoleLock<R> {
@@ -128,10 +136,10 @@ impl<R: Role> Drop for RoleLock<R> {
 
 /// Removes the lock files of roles whose holders were killed.
 pub(super) fn remove_abandoned(instance: &Instance) {
-    for path in NAMES.iter().map(|name| instance.lock_path(name)) {
+    for name in NAMES {
         // A lock that a process holds is not abandoned. (Locking creates a missing file.)
-        if path.exists()
-            && let Ok(Some(file)) = LockFile::try_lock(&path, LockKind::Exclusive)
+        if instance.lock_path(name).exists()
+            && let Ok(Some(file)) = LockFile::try_lock(instance, name, LockKind::Exclusive)
         {
             file.remove();
         }

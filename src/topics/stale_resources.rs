@@ -4,7 +4,9 @@ use super::instance::Instance;
 use std::fmt;
 use std::fs;
 use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 use std::thread;
 use std::time::Duration;
 
@@ -67,11 +69,14 @@ fn others(takes_part: impl Fn(&Path) -> bool) -> Vec<Peer> {
     let Ok(processes) = fs::read_dir("/proc") else {
         return Vec::new();
     };
+    // Other users cannot take part in this user's topics; what they open under such a name is theirs.
+    let user = nix::unistd::geteuid().as_raw();
+    let may_take_part = |path: &Path| path.metadata().is_ok_and(|it| it.uid() == user || it.uid() == 0);
     let pid_of = |entry: &fs::DirEntry| entry.file_name().to_str()?.parse::<u32>().ok();
     let mut found: Vec<Peer> = processes
         .flatten()
         .filter_map(|entry| Some((pid_of(&entry)?, entry.path())))
-        .filter(|(pid, path)| *pid != std::process::id() && takes_part(path))
+        .filter(|(pid, path)| *pid != std::process::id() && may_take_part(path) && takes_part(path))
         .map(|(pid, path)| Peer {
             pid,
             name: fs::read_to_string(path.join("comm"))
@@ -94,8 +99,11 @@ fn opens(process: &Path, is_meant: impl Fn(&Path) -> bool) -> bool {
         .any(|file| is_meant(&file))
 }
 
-/// Files of this worm: shared-memory segments, and what iceoryx2 put into the folder. Locks are not among them.
+/// Files of this worm: shared-memory segments, and what iceoryx2 put into the folder. Locks are not among them, nor files of other
+/// users in `/dev/shm`, where everybody may give a file any name.
 fn files(instance: &Instance) -> io::Result<Vec<PathBuf>> {
+    static WARNED: Once = Once::new();
+    let user = nix::unistd::geteuid().as_raw();
     let mut found = Vec::new();
     for folder in [Path::new(SHARED_MEMORY), instance.folder()] {
         for entry in or_empty(fs::read_dir(folder))?.into_iter().flatten().flatten() {
@@ -104,7 +112,17 @@ fn files(instance: &Instance) -> io::Result<Vec<PathBuf>> {
                 .as_encoded_bytes()
                 .starts_with(instance.prefix().as_bytes())
             {
-                found.push(entry.path());
+                let path = entry.path();
+                match path.symlink_metadata().map(|it| it.uid()) {
+                    Ok(owner) if owner != user => WARNED.call_once(|| {
+                        tracing::warn!(
+                            "{} is named like a file of this worm, but belongs to user {owner}: it is left alone",
+                            path.display()
+                        );
+                    }),
+                    // One that has just gone is not there.
+                    _ => found.push(path),
+                }
             }
         }
     }

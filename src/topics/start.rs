@@ -8,7 +8,6 @@ use super::services::Services;
 use super::stale_resources::{self, Peer};
 use std::fmt;
 use std::io;
-use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -85,7 +84,7 @@ impl Presence {
 impl Drop for Presence {
     /// The last process removes what is left: empty folders, and what killed peers had.
     fn drop(&mut self) {
-        let Ok(Some(start)) = LockFile::try_lock(&self.instance.lock_path("start"), LockKind::Exclusive) else {
+        let Ok(Some(start)) = LockFile::try_lock(&self.instance, "start", LockKind::Exclusive) else {
             return;
         };
         if !self.lock.try_change(LockKind::Exclusive) {
@@ -146,18 +145,18 @@ pub(super) fn open(instance: &Instance, limit: Duration) -> Result<(Services, Pr
 
 /// Starts go one after another, so that none sees another's incomplete files.
 fn wait_for_start_lock(instance: &Instance, limit: Duration) -> Result<LockFile, StartError> {
-    wait_for_lock(instance, "start", limit, |path| {
-        LockFile::try_lock(path, LockKind::Exclusive)
+    wait_for_lock(instance, "start", limit, |name| {
+        LockFile::try_lock(instance, name, LockKind::Exclusive)
     })
 }
 
 /// Marks this process as present; the second value says whether it is the only one.
 fn enter(instance: &Instance, limit: Duration) -> Result<(LockFile, bool), StartError> {
-    wait_for_lock(instance, "presence", limit, |path| {
-        if let Some(lock) = LockFile::try_lock(path, LockKind::Exclusive)? {
+    wait_for_lock(instance, "presence", limit, |name| {
+        if let Some(lock) = LockFile::try_lock(instance, name, LockKind::Exclusive)? {
             return Ok(Some((lock, true)));
         }
-        Ok(LockFile::try_lock(path, LockKind::Shared)?.map(|lock| (lock, false)))
+        Ok(LockFile::try_lock(instance, name, LockKind::Shared)?.map(|lock| (lock, false)))
     })
 }
 
@@ -166,19 +165,18 @@ fn wait_for_lock<T>(
     instance: &Instance,
     name: &str,
     limit: Duration,
-    attempt: impl Fn(&Path) -> Result<Option<T>, LockError>,
+    attempt: impl Fn(&str) -> Result<Option<T>, LockError>,
 ) -> Result<T, StartError> {
-    let path = instance.lock_path(name);
     let begun = Instant::now();
     loop {
-        if let Some(lock) = attempt(&path)? {
+        if let Some(lock) = attempt(name)? {
             return Ok(lock);
         }
         if begun.elapsed() > limit {
             return Err(StartError::Busy {
                 worm: instance.worm().to_owned(),
                 waited: limit,
-                peers: stale_resources::who_has_open(&path),
+                peers: stale_resources::who_has_open(&instance.lock_path(name)),
             });
         }
         thread::sleep(Duration::from_millis(1));

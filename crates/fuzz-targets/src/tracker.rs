@@ -63,6 +63,7 @@ fn exchange(data: &[u8], read: ReadPlan) {
         tracker,
         cells: 4,
         read,
+        emergency_stop_mask: Some(1),
     };
     let mut bus = WormBus::new(Answers { rest: data });
     for _ in 0..MAX_TICKS {

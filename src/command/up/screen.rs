@@ -1,218 +1,210 @@
 //! What `wormd up` shows while the worm crawls: the live display, plain lines, or only the log.
+//!
+//! A thread of its own writes to the terminal: one that nobody reads takes nothing any more, and who writes to it waits for ever.
+//! The thread that attends to the worm only looks at the keyboard, which never waits.
 
-use crate::command::{Failure, print};
+mod painter;
+
+use crate::command::Failure;
 use crate::supervisor::child_process::Log;
-use crate::supervisor::crawl::Display;
-use crate::watch::view::{self, Subject};
-use crate::watch::{Telemetry, mismatch, recording, remarks};
+use crate::supervisor::crawl::{Display, SharedTelemetry, Wish};
+use crossbeam::channel::{Receiver, Sender, bounded};
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use ratatui::DefaultTerminal;
-use std::collections::VecDeque;
+use painter::Painter;
 use std::io::IsTerminal;
 use std::os::fd::AsFd;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
-use worm_estimator::config::{Config, Direction};
-use worm_estimator::message::{Alarm, AlarmKind, Cycle};
+use worm_estimator::config::Config;
 
-/// How many lines of the log the live display keeps.
-const LOG_LINES: usize = 100;
+/// How often the display is refreshed.
+const FRAME: Duration = Duration::from_millis(50);
+
+/// How long the terminal may take to be entered, left or finished.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// How a run is shown.
-pub(super) enum Screen {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Style {
     /// The live display.
-    Live {
-        terminal: Box<DefaultTerminal>,
-        subject: Subject,
-        log: VecDeque<String>,
-    },
+    Live,
     /// A line for each cycle and alarm.
-    Lines {
-        cycles: u64,
-        alarms: u64,
-        step_order: Vec<usize>,
-    },
+    Lines,
     /// Standard output is reserved for the JSON; alarms go to the log.
-    Silent { alarms: u64, step_order: Vec<usize> },
+    Silent,
+}
+
+/// What the thread is told.
+enum Order {
+    Suspend,
+    Resume,
+    Close,
+}
+
+/// The display, from the side of the thread that attends to the worm.
+pub(super) struct Screen {
+    style: Style,
+    orders: Sender<Order>,
+    /// One message for each order that was carried out.
+    done: Receiver<()>,
+    problem: Arc<OnceLock<String>>,
 }
 
 impl Screen {
-    pub(super) fn open(json: bool, plain: bool, config: &Config) -> Result<Self, Failure> {
-        let step_order = config.worm.step_order.clone();
-        if json {
-            return Ok(Self::Silent { alarms: 0, step_order });
-        }
-        if plain || !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
-            return Ok(Self::Lines {
-                cycles: 0,
-                alarms: 0,
-                step_order,
-            });
-        }
-        let terminal = ratatui::try_init()
-            .map_err(|error| Failure::failed(format!("the terminal cannot be used ({error}): try --plain")))?;
-        let bounds_m = config.worm.max_deformation_m.to_vec(config.worm.cells);
-        let subject = Subject {
-            name: config.worm.name.clone(),
-            port: config
-                .port
-                .as_ref()
-                .map_or("the virtual worm".to_owned(), |port| port.path.clone()),
-            slope_deg: config.canal.slope_deg,
-            backward: config.gait.direction == Direction::Backward,
-            rate_hz: config.control.rate_hz,
-            step_order,
-            full_scale_m: bounds_m.into_iter().fold(0.0, f64::max),
+    /// Starts the thread, and waits a little until it has the terminal.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when the terminal cannot be used, or there is no thread to be had.
+    pub(super) fn open(
+        json: bool,
+        plain: bool,
+        config: &Config,
+        telemetry: &SharedTelemetry,
+        log: &Log,
+    ) -> Result<Self, Failure> {
+        let style = if json {
+            Style::Silent
+        } else if plain || !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
+            Style::Lines
+        } else {
+            Style::Live
         };
-        Ok(Self::Live {
-            terminal: Box::new(terminal),
-            subject,
-            log: VecDeque::with_capacity(LOG_LINES),
-        })
+        let (orders, receiver) = bounded(4);
+        let (tell, done) = bounded(8);
+        let problem = Arc::new(OnceLock::new());
+        let (config, telemetry, lines) = (config.clone(), telemetry.clone(), log.share());
+        let problem_there = Arc::clone(&problem);
+        let (opened, is_open) = bounded(1);
+        let work = move || {
+            let mut painter = match Painter::open(style, &config, telemetry, lines) {
+                Ok(painter) => painter,
+                Err(failure) => return drop(opened.send(failure)),
+            };
+            drop(opened);
+            if let Err(failure) = paint(&mut painter, &receiver, &tell) {
+                painter.close();
+                // Told once, by this thread alone.
+                let _ = problem_there.set(failure.to_string());
+            }
+        };
+        std::thread::Builder::new()
+            .name("display".to_owned())
+            .spawn(work)
+            .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))?;
+        // A terminal that does not take the picture is no reason to keep the worm waiting.
+        match is_open.recv_timeout(PATIENCE) {
+            Ok(failure) => Err(failure),
+            Err(_) => Ok(Self {
+                style,
+                orders,
+                done,
+                problem,
+            }),
+        }
     }
 
-    /// Restores the terminal and prints what the processes logged.
-    pub(super) fn close(self, log: &Log) {
-        if let Self::Live {
-            mut terminal,
-            log: shown,
-            ..
-        } = self
-        {
-            let cursor = terminal.show_cursor();
-            if let Err(error) = ratatui::try_restore().and(cursor) {
+    /// Restores the terminal and prints what the processes logged. Returns what went wrong.
+    pub(super) fn close(mut self) -> Option<String> {
+        let is_done = self.order(Order::Close);
+        if !is_done && self.style == Style::Live {
+            // The thread waits for a terminal that nobody reads; its keyboard at least can be restored.
+            if let Err(error) = ratatui::crossterm::terminal::disable_raw_mode() {
                 tracing::debug!("the terminal could not be restored: {error}");
-                // Its drop would print to a standard error that is gone, and panic.
-                Box::leak(terminal);
-            }
-            for line in shown {
-                print::log_line(line);
             }
         }
-        forward(log);
+        let stalled = || "the terminal took nothing any more, so the last lines were not shown".to_owned();
+        self.problem().or_else(|| (!is_done).then(stalled))
+    }
+
+    /// Tells the thread, and waits a little until it has carried that out.
+    fn order(&mut self, order: Order) -> bool {
+        // The thread may have carried out an earlier order after the patience for it was over.
+        while self.done.try_recv().is_ok() {}
+        // A thread that has ended has no receiver any more, and nothing to carry out.
+        self.orders.try_send(order).is_err() || self.done.recv_timeout(PATIENCE).is_ok()
+    }
+}
+
+/// Shows what is new until it is told to close.
+fn paint(painter: &mut Painter, orders: &Receiver<Order>, done: &Sender<()>) -> Result<(), Failure> {
+    loop {
+        match orders.recv_timeout(FRAME) {
+            Ok(Order::Suspend) => painter.leave(),
+            Ok(Order::Resume) => painter.enter()?,
+            Ok(Order::Close) => {
+                let shown = painter.show();
+                painter.close();
+                // Whoever gave the order may have run out of patience.
+                let _ = done.try_send(());
+                return shown;
+            }
+            Err(error) if error.is_timeout() => {
+                painter.show()?;
+                continue;
+            }
+            Err(_) => return Ok(()),
+        }
+        let _ = done.try_send(());
     }
 }
 
 impl Display for Screen {
-    fn wait_for_stop(&mut self, time: Duration) -> bool {
-        let Self::Live { .. } = self else {
+    fn wait_for_wish(&mut self, time: Duration) -> Wish {
+        if self.style != Style::Live {
             std::thread::sleep(time);
-            return false;
-        };
-        is_stop_pressed(time)
+            return Wish::GoOn;
+        }
+        read_wish(time)
     }
 
-    fn show(&mut self, telemetry: &Telemetry, log: &Log) -> Result<(), Failure> {
-        match self {
-            Self::Live {
-                terminal,
-                subject,
-                log: shown,
-            } => {
-                for line in log.lines.try_iter() {
-                    if shown.len() == LOG_LINES {
-                        shown.pop_front();
-                    }
-                    shown.push_back(line.to_string());
-                }
-                terminal
-                    .draw(|frame| view::draw(frame, subject, telemetry, shown))
-                    .map_err(|error| Failure::failed(format!("the terminal is gone: {error}")))?;
-            }
-            Self::Lines {
-                cycles,
-                alarms,
-                step_order,
-            } => {
-                forward(log);
-                for cycle in telemetry.cycles.since(*cycles) {
-                    print::line(cycle_line(cycle))?;
-                }
-                *cycles = telemetry.cycles.total();
-                for alarm in telemetry.alarms.since(*alarms) {
-                    print::line(alarm_line(alarm, step_order))?;
-                }
-                *alarms = telemetry.alarms.total();
-            }
-            Self::Silent { alarms, step_order } => {
-                forward(log);
-                for alarm in telemetry.alarms.since(*alarms) {
-                    print::log_line(alarm_line(alarm, step_order));
-                }
-                *alarms = telemetry.alarms.total();
-            }
-        }
-        Ok(())
+    fn problem(&self) -> Option<String> {
+        self.problem.get().cloned()
+    }
+
+    fn suspend(&mut self) {
+        self.order(Order::Suspend);
+    }
+
+    fn resume(&mut self) {
+        self.order(Order::Resume);
     }
 }
 
-/// Waits for `time` or a key; true for a key that stops the worm, and when the terminal is gone, since nobody could press one.
+/// Waits for `time` or a key. When the terminal is gone, nobody could press one that stops the worm.
 ///
 /// crossterm's own events do not serve here: once the terminal is gone they loop forever and ignore signals.
-fn is_stop_pressed(time: Duration) -> bool {
+fn read_wish(time: Duration) -> Wish {
     let stdin = std::io::stdin();
     let mut keyboard = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
     let timeout = PollTimeout::try_from(time).unwrap_or(PollTimeout::ZERO);
     match poll(&mut keyboard, timeout) {
-        Ok(0) | Err(Errno::EINTR) => return false,
+        Ok(0) | Err(Errno::EINTR) => return Wish::GoOn,
         Ok(_) => {}
-        Err(_) => return true,
+        Err(_) => return Wish::Stop,
     }
     let mut keys = [0; 64];
     match nix::unistd::read(stdin.as_fd(), &mut keys) {
-        Ok(0) => true,
-        Ok(count) => means_stop(&keys[..count]),
-        Err(Errno::EINTR | Errno::EAGAIN) => false,
-        Err(_) => true,
+        Ok(0) => Wish::Stop,
+        Ok(count) => wish_of(&keys[..count]),
+        Err(Errno::EINTR | Errno::EAGAIN) => Wish::GoOn,
+        Err(_) => Wish::Stop,
     }
 }
 
-/// Whether this input of a terminal in raw mode contains Ctrl-C or q. Keys that send several characters begin with escape.
-fn means_stop(keys: &[u8]) -> bool {
+/// What this input of a terminal in raw mode means: Ctrl-C or q stops, Ctrl-Z suspends. Keys that send several characters begin
+/// with escape.
+fn wish_of(keys: &[u8]) -> Wish {
     const CTRL_C: u8 = 3;
+    const CTRL_Z: u8 = 26;
     const ESCAPE: u8 = 27;
-    keys.contains(&CTRL_C) || (keys.first() != Some(&ESCAPE) && keys.contains(&b'q'))
-}
-
-fn forward(log: &Log) {
-    for line in log.lines.try_iter() {
-        print::log_line(line);
-    }
-}
-
-fn cycle_line(cycle: &Cycle) -> String {
-    let head = format!("cycle {:>4}: advance {:6.2} mm, ", cycle.index, cycle.advance_m * 1e3);
-    let electrical = format!("{:.1} mJ electrical", cycle.energy_electrical_j * 1e3);
-    let remarks = remarks(cycle.settled != 0, cycle.host_paused_s);
-    if !cycle.energy_loss_sigma_j.is_finite() {
-        return format!("{head}{electrical}{remarks}");
-    }
-    format!(
-        "{head}energy {:6.2} ± {:.2} mJ by losses, {:6.2} mJ by the actuator, {electrical}{remarks}",
-        cycle.energy_loss_j * 1e3,
-        cycle.energy_loss_sigma_j * 1e3,
-        cycle.energy_actuator_net_j * 1e3,
-    )
-}
-
-fn alarm_line(alarm: &Alarm, step_order: &[usize]) -> String {
-    let kind = AlarmKind::try_from(alarm.kind).map_or("unknown", AlarmKind::name);
-    let cell = if alarm.cell == u32::MAX {
-        String::new()
+    if keys.contains(&CTRL_C) || (keys.first() != Some(&ESCAPE) && keys.contains(&b'q')) {
+        Wish::Stop
+    } else if keys.contains(&CTRL_Z) {
+        Wish::Suspend
     } else {
-        format!(", cell {}", alarm.cell + 1)
-    };
-    let change = if alarm.raised == 0 { "cleared" } else { "RAISED" };
-    if let Some(what) = mismatch::text_of(alarm, step_order) {
-        return format!("alarm {kind}: {change}, {what}");
+        Wish::GoOn
     }
-    if let Some(what) = recording::alarm_text(alarm) {
-        return format!("alarm {kind}: {change}, {what}");
-    }
-    format!(
-        "alarm {kind}{cell}: {change}, {:.4} against {:.4}",
-        alarm.value, alarm.threshold
-    )
 }
 
 #[cfg(test)]
@@ -220,16 +212,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_ctrl_c_and_q_stop_the_worm() {
-        for (keys, stops) in [
-            (b"q".as_slice(), true),
-            (b"\x03", true),
-            (b"xq", true),
-            (b"\x1b[A", false),
-            (b"\x1bq", false),
-            (b"\x1a", false),
+    fn only_ctrl_c_and_q_stop_the_worm_and_ctrl_z_suspends() {
+        for (keys, wish) in [
+            (b"q".as_slice(), Wish::Stop),
+            (b"\x03", Wish::Stop),
+            (b"xq", Wish::Stop),
+            (b"\x1b[A", Wish::GoOn),
+            (b"\x1bq", Wish::GoOn),
+            (b"\x1a", Wish::Suspend),
         ] {
-            assert_eq!(means_stop(keys), stops, "{keys:?}");
+            assert_eq!(wish_of(keys), wish, "{keys:?}");
         }
     }
 }

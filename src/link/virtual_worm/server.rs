@@ -35,6 +35,8 @@ const IDLE_AFTER: Duration = Duration::from_millis(100);
 const GONE_AFTER: Duration = Duration::from_secs(1);
 /// Silence of an active controller after which the server checks whether all CPUs of the computer run.
 const CHECK_CPUS_AFTER: Duration = Duration::from_millis(20);
+/// Without requests for this long it counts as unused.
+const UNUSED_AFTER: Duration = Duration::from_secs(2);
 /// Up to this delay a wake-up was merely late, and the world catches up; beyond it this process did not run, and the world stood
 /// still. Half of the shortest bus watchdog.
 const MAX_DELAY: Duration = Duration::from_millis(10);
@@ -67,12 +69,23 @@ pub enum ServerError {
     Panicked,
 }
 
+/// Says whether the server may end.
+struct MayEnd(Box<dyn Fn() -> bool + Send>);
+
+impl std::fmt::Debug for MayEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("MayEnd")
+    }
+}
+
 /// Devices on a pseudo-terminal, not yet running.
 #[derive(Debug)]
 pub struct Server {
     pty: Pty,
     devices: Devices,
     strict_baud: bool,
+    /// Whether it may end by itself once nobody uses it.
+    may_end: Option<MayEnd>,
 }
 
 impl Server {
@@ -85,12 +98,18 @@ impl Server {
             devices: Devices::new(config, options)?,
             pty: Pty::open()?,
             strict_baud: options.baud.is_some(),
+            may_end: None,
         })
     }
 
     /// Path of the port that a controller opens.
     pub fn path(&self) -> &Path {
         self.pty.path()
+    }
+
+    /// Lets it also end when it was not asked anything for two seconds while `may_end` is true.
+    pub fn end_when_unused(&mut self, may_end: impl Fn() -> bool + Send + 'static) {
+        self.may_end = Some(MayEnd(Box::new(may_end)));
     }
 
     /// Runs until `stop` is true; returns the devices as they are then. Signals interrupt the sleep, so a handler that sets
@@ -119,6 +138,9 @@ impl Server {
                 Err(errno) => return Err(failed("wait")(errno.into())),
             }
             let silent = clock.world.saturating_sub(last_byte);
+            if silent > UNUSED_AFTER && self.may_end.as_ref().is_some_and(|may_end| (may_end.0)()) {
+                break;
+            }
             if !peer_gone && silent > CHECK_CPUS_AFTER {
                 // The controller may have its CPU taken away while this process runs on another. Then this comes back late, and
                 // the world stands still for the gap.

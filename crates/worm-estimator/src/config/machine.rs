@@ -487,28 +487,31 @@ impl Realtime {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Topics {
-    /// Folder for locks and service files of all worms on this computer; best on a tmpfs.
+    /// Folder for locks and service files of all worms on this computer, best on a tmpfs; or [`Topics::AUTO`].
     pub root: String,
 }
 
 impl Default for Topics {
     fn default() -> Self {
         Self {
-            root: "/dev/shm/wormd".to_owned(),
+            root: Self::AUTO.to_owned(),
         }
     }
 }
 
 impl Topics {
+    /// The [`root`](Self::root) that leaves it to the daemon: `/dev/shm/wormd` for root, `/run/user/UID/wormd` for other users.
+    pub const AUTO: &str = "auto";
+
     pub(super) fn check(&self, worm_name: &str, checker: &mut Checker) {
         // A service's socket lies in the root and holds the name twice; a socket's path is short.
         let max = 48_usize.saturating_sub(2 * worm_name.len());
         checker.require(
-            self.root.starts_with('/') && self.root.len() <= max,
+            self.root == Self::AUTO || (self.root.starts_with('/') && self.root.len() <= max),
             "topics.root",
             format!("\"{}\"", self.root),
             format!(
-                "must be an absolute path of at most {max} characters for a worm of this name (socket paths are short)"
+                "must be an absolute path of at most {max} characters for a worm of this name (socket paths are short), or \"auto\""
             ),
         );
     }

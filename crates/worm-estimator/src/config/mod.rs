@@ -19,8 +19,8 @@ pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use machine::{
-    Battery, Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode, Realtime,
-    Servo, Topics, Tracker,
+    Battery, Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode,
+    Realtime, Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;
 pub use virtual_worm::VirtualWorm;

@@ -1,0 +1,57 @@
+//! What reaches a process from beside the topics: the life of its parent, and a way to stop it that needs no shared memory.
+//!
+//! - [`parent_pipe`]: a pipe from the parent. Bytes say that it is there, the end of the pipe that it is gone.
+//! - [`stop_socket`]: an abstract Unix socket in the controller that takes `stop` and says how the worm stands.
+//! - [`stop_client`]: the other end of that socket.
+//! - [`orphan`]: how the processes around the controller end when their parent is gone.
+//! - [`lock_watch`]: notices that the lock file of a role has been removed.
+
+mod lock_watch;
+mod orphan;
+mod parent_pipe;
+mod stop_client;
+mod stop_socket;
+
+pub(crate) use lock_watch::LockWatch;
+pub(crate) use orphan::end_after_controller;
+pub use parent_pipe::{Parent, ParentPipe};
+pub(crate) use stop_client::{StopError, ask};
+pub(crate) use stop_socket::Request;
+pub use stop_socket::StopSocket;
+
+use worm_estimator::message::{Command, Fault, Mode, Reply};
+
+/// Who attends to a controller. Everything here is without locks and without system calls on the side of the loop.
+#[derive(Debug, Default)]
+pub struct Attendance {
+    /// The pipe from the process that started this one, if that one watches over it.
+    pub parent: Option<ParentPipe>,
+    /// The stop socket, if it could be bound.
+    pub stop: Option<StopSocket>,
+}
+
+impl Attendance {
+    /// What is known of the parent.
+    pub fn parent(&self) -> Parent {
+        self.parent.as_ref().map_or(Parent::None, ParentPipe::state)
+    }
+
+    /// The next command from the stop socket, and the number to answer it with.
+    pub fn take_command(&self) -> Option<(u64, Command)> {
+        self.stop.as_ref()?.take_command()
+    }
+
+    /// Answers a command from the stop socket.
+    pub fn answer(&self, number: u64, reply: &Reply) {
+        if let Some(stop) = &self.stop {
+            stop.answer(number, reply);
+        }
+    }
+
+    /// Notes where the controller stands, for who asks at the stop socket.
+    pub fn note(&self, mode: Mode, fault: Fault) {
+        if let Some(stop) = &self.stop {
+            stop.note(mode, fault);
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! The controller's stop socket: how to stop a worm whose topics have gone.
+//!
+//! It is an abstract Unix socket, which lies in no folder and needs no room in `/dev/shm`. Its name is
+//! `wormd/<user>/<worm>/<root>/<process>`, where the root is the CRC-16/XMODEM of `topics.root` as configured. Who connects must be
+//! the same user, or root. One line of JSON asks, one line answers.
+
+use super::parent_pipe::{Parent, ParentPipe};
+use crossbeam::queue::ArrayQueue;
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::socket::{UnixCredentials, getsockopt, sockopt::PeerCredentials};
+use serde::{Deserialize, Serialize};
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::os::fd::AsFd;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+use worm_estimator::message::{Command, CommandKind, Fault, Mode, Reply};
+
+/// Commands that may wait for the next tick.
+const QUEUE: usize = 8;
+/// How long a client may take to ask.
+const ASK_TIMEOUT: Duration = Duration::from_millis(250);
+/// How long the loop may take to answer: as long as a client of the topics waits.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
+/// How often the socket looks whether it is to close, and for the loop's answer.
+const POLL_MS: u8 = 50;
+const ANSWER_POLL: Duration = Duration::from_millis(1);
+/// Longest question, bytes.
+const MAX_LINE: u64 = 256;
+
+/// What may be asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Request {
+    /// Stop the worm, as [`CommandKind::Stop`].
+    Stop,
+    /// Say how the worm stands.
+    Status,
+    /// End in order, if nobody watches over this controller any more.
+    End,
+}
+
+/// The question on the wire.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Question {
+    pub(super) request: Request,
+}
+
+/// The answer on the wire.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Answer {
+    /// Process of the controller.
+    pub(crate) pid: u32,
+    /// [`Mode`] as a code.
+    pub(crate) mode: u32,
+    /// [`Fault`] as a code.
+    pub(crate) fault: u32,
+    /// [`Parent`] as a word.
+    pub(crate) parent: String,
+    /// The canal's slope by the controller's configuration, degrees.
+    pub(crate) slope_deg: f64,
+    /// `control.crawl_limit_s` of the controller's configuration, s.
+    pub(crate) crawl_limit_s: f64,
+    /// The reply to a command: its tick and its verdict.
+    pub(crate) reply: Option<CommandReply>,
+    /// Why the request was not carried out.
+    pub(crate) refusal: Option<String>,
+}
+
+impl Answer {
+    /// Whether somebody watches over the controller now.
+    pub(crate) fn is_supervised(&self) -> bool {
+        self.parent == Parent::Here.name()
+    }
+
+    /// Whether the parent of the controller is gone.
+    pub(crate) fn is_orphaned(&self) -> bool {
+        self.parent == Parent::Gone.name()
+    }
+}
+
+/// What a tick replied to a command.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct CommandReply {
+    pub(crate) sequence: u64,
+    pub(crate) verdict: u32,
+    pub(crate) alarm_mask: u32,
+}
+
+/// The beginning of the names of a worm's stop sockets; `user` is none for those of all users.
+pub(super) fn name_parts(worm: &str, root: &str) -> (String, String) {
+    let hash = crc::Crc::<u16>::new(&crc::CRC_16_XMODEM).checksum(root.as_bytes());
+    ("wormd/".to_owned(), format!("/{worm}/{hash:04x}/"))
+}
+
+/// The bound socket, and its thread. Dropping it closes it.
+#[derive(Debug)]
+pub struct StopSocket {
+    shared: Arc<Shared>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    /// Commands on their way to the loop, numbered.
+    commands: ArrayQueue<(u64, Command)>,
+    /// Replies on their way back.
+    replies: ArrayQueue<(u64, Reply)>,
+    /// Mode in the lower half, fault in the upper.
+    standing: AtomicU64,
+    closing: AtomicBool,
+}
+
+impl StopSocket {
+    /// Binds the socket and serves it in a thread. `end` is set on [`Request::End`].
+    ///
+    /// # Errors
+    /// When the socket cannot be bound, or there is no thread to be had.
+    pub fn bind(config: &Config, parent: Option<ParentPipe>, end: &Arc<AtomicBool>) -> io::Result<Self> {
+        let (head, tail) = name_parts(&config.worm.name, &config.topics.root);
+        let user = nix::unistd::geteuid();
+        let name = format!("{head}{user}{tail}{}", std::process::id());
+        let listener = UnixListener::bind_addr(&SocketAddr::from_abstract_name(name)?)?;
+        listener.set_nonblocking(true)?;
+        let shared = Arc::new(Shared {
+            commands: ArrayQueue::new(QUEUE),
+            replies: ArrayQueue::new(QUEUE),
+            standing: AtomicU64::new(0),
+            closing: AtomicBool::new(false),
+        });
+        let server = Server {
+            shared: Arc::clone(&shared),
+            parent,
+            end: Arc::clone(end),
+            slope_deg: config.canal.slope_deg,
+            crawl_limit_s: config.control.crawl_limit_s,
+            numbers: 0,
+        };
+        let thread = std::thread::Builder::new()
+            .name("stop-socket".to_owned())
+            .spawn(move || server.serve(&listener))?;
+        Ok(Self {
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    pub(super) fn take_command(&self) -> Option<(u64, Command)> {
+        self.shared.commands.pop()
+    }
+
+    pub(super) fn answer(&self, number: u64, reply: &Reply) {
+        // As many fit as there can be commands; one that nobody waits for any more makes room.
+        let _ = self.shared.replies.force_push((number, *reply));
+    }
+
+    pub(super) fn note(&self, mode: Mode, fault: Fault) {
+        let standing = u64::from(mode.code()) | u64::from(fault.code()) << 32;
+        self.shared.standing.store(standing, Ordering::Relaxed);
+    }
+}
+
+impl Drop for StopSocket {
+    fn drop(&mut self) {
+        self.shared.closing.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // It has nothing to say about how it ended.
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Server {
+    shared: Arc<Shared>,
+    parent: Option<ParentPipe>,
+    end: Arc<AtomicBool>,
+    slope_deg: f64,
+    crawl_limit_s: f64,
+    numbers: u64,
+}
+
+impl Server {
+    fn serve(mut self, listener: &UnixListener) {
+        while !self.shared.closing.load(Ordering::Relaxed) {
+            let mut waiting = [PollFd::new(listener.as_fd(), PollFlags::POLLIN)];
+            match poll(&mut waiting, PollTimeout::from(POLL_MS)) {
+                Ok(0) | Err(Errno::EINTR) => continue,
+                Ok(_) => {}
+                // No signal would wake it any more; a socket that cannot be served is no reason to spin.
+                Err(_) => std::thread::sleep(Duration::from_millis(POLL_MS.into())),
+            }
+            let Ok((stream, _)) = listener.accept() else { continue };
+            // A client that leaves early, or asks nonsense, is its own problem.
+            if let Err(error) = self.attend(stream) {
+                tracing::debug!("stop socket: {error}");
+            }
+        }
+    }
+
+    fn attend(&mut self, mut stream: UnixStream) -> io::Result<()> {
+        let peer = peer_of(&stream)?;
+        let user = nix::unistd::geteuid().as_raw();
+        if peer.uid() != user && peer.uid() != 0 {
+            return self.send(
+                &mut stream,
+                None,
+                Some(format!(
+                    "this worm belongs to user {user}: only that user and root may stop it"
+                )),
+            );
+        }
+        stream.set_nonblocking(false)?;
+        stream.set_read_timeout(Some(ASK_TIMEOUT))?;
+        stream.set_write_timeout(Some(ASK_TIMEOUT))?;
+        let mut line = String::new();
+        BufReader::new((&stream).take(MAX_LINE)).read_line(&mut line)?;
+        let question: Question = serde_json::from_str(&line)?;
+        match question.request {
+            Request::Status => self.send(&mut stream, None, None),
+            Request::Stop => {
+                let reply = self.command(Command {
+                    user: peer.uid(),
+                    ..Command::new(CommandKind::Stop)
+                });
+                let refusal = reply
+                    .is_none()
+                    .then(|| format!("the loop did not answer within {ANSWER_TIMEOUT:?}"));
+                self.send(&mut stream, reply, refusal)
+            }
+            Request::End => {
+                let is_orphan = self.parent() == Parent::Gone;
+                let refusal = (!is_orphan).then(|| "whoever started this controller is still there".to_owned());
+                if is_orphan {
+                    self.end.store(true, Ordering::Relaxed);
+                }
+                self.send(&mut stream, None, refusal)
+            }
+        }
+    }
+
+    fn parent(&self) -> Parent {
+        self.parent.as_ref().map_or(Parent::None, ParentPipe::state)
+    }
+
+    /// Hands a command to the loop and waits for its reply.
+    fn command(&mut self, command: Command) -> Option<Reply> {
+        self.numbers += 1;
+        let number = self.numbers;
+        self.shared.commands.push((number, command)).ok()?;
+        let begun = Instant::now();
+        while begun.elapsed() < ANSWER_TIMEOUT && !self.shared.closing.load(Ordering::Relaxed) {
+            while let Some((of, reply)) = self.shared.replies.pop() {
+                if of == number {
+                    return Some(reply);
+                }
+            }
+            std::thread::sleep(ANSWER_POLL);
+        }
+        None
+    }
+
+    fn send(&self, stream: &mut UnixStream, reply: Option<Reply>, refusal: Option<String>) -> io::Result<()> {
+        let standing = self.shared.standing.load(Ordering::Relaxed);
+        let answer = Answer {
+            pid: std::process::id(),
+            mode: reply.map_or(standing as u32, |reply| reply.mode),
+            fault: reply.map_or((standing >> 32) as u32, |reply| reply.fault),
+            parent: self.parent().name().to_owned(),
+            slope_deg: self.slope_deg,
+            crawl_limit_s: self.crawl_limit_s,
+            reply: reply.map(|reply| CommandReply {
+                sequence: reply.sequence,
+                verdict: reply.verdict,
+                alarm_mask: reply.alarm_mask,
+            }),
+            refusal,
+        };
+        let mut text = serde_json::to_string(&answer)?;
+        text.push('\n');
+        stream.write_all(text.as_bytes())
+    }
+}
+
+/// Who is at the other end of a socket.
+pub(super) fn peer_of(stream: &UnixStream) -> io::Result<UnixCredentials> {
+    getsockopt(stream, PeerCredentials).map_err(io::Error::from)
+}

@@ -1,0 +1,65 @@
+//! A crawl that lasts as long as a process in the foreground attends to it.
+
+use super::controller::{command, send};
+use crate::failure::Failure;
+use crate::topics::{CommandClient, Hub, Subscriber};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use worm_estimator::message::{Command, CommandKind, Mode, State};
+
+/// For how long each command permits the crawl, s: the worm holds this long after its last attendant has gone.
+const LIMIT_S: f64 = 1.0;
+/// How often the crawl is permitted anew.
+const RENEWAL: Duration = Duration::from_millis(250);
+/// How often the end is looked for.
+const POLL: Duration = Duration::from_millis(10);
+
+/// Makes the worm crawl, and permits that anew until `end` is set; then it holds. Calls `begun` once it crawls.
+///
+/// # Errors
+/// [`Failure::Failed`] when the controller refuses or is gone, or when somebody else has ended the crawl.
+pub(crate) fn crawl(hub: &Hub, cycles_per_s: f64, end: &AtomicBool, begun: impl FnOnce()) -> Result<(), Failure> {
+    let client = hub.command_client().map_err(Failure::failed)?;
+    let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
+    permit(&client, cycles_per_s)?;
+    begun();
+    let mut renewed = Instant::now();
+    while !end.load(Ordering::Relaxed) {
+        std::thread::sleep(POLL);
+        if let Some(mode) = newest_mode(&mut states)
+            && mode != Mode::Crawling
+            && renewed.elapsed() > RENEWAL / 2
+        {
+            // Another command, an alarm or a fault; a new command would overrule it.
+            return Err(Failure::failed(format!(
+                "the worm does not crawl any more, it is {mode}"
+            )));
+        }
+        if renewed.elapsed() >= RENEWAL {
+            permit(&client, cycles_per_s)?;
+            renewed = Instant::now();
+        }
+    }
+    accepted(&client, command(CommandKind::Hold))
+}
+
+fn permit(client: &CommandClient, cycles_per_s: f64) -> Result<(), Failure> {
+    let crawl = Command {
+        cycles_per_s,
+        limit_s: LIMIT_S,
+        ..command(CommandKind::Crawl)
+    };
+    accepted(client, crawl)
+}
+
+fn accepted(client: &CommandClient, command: Command) -> Result<(), Failure> {
+    match send(client, command)?.refusal() {
+        None => Ok(()),
+        Some(refusal) => Err(Failure::failed(refusal)),
+    }
+}
+
+fn newest_mode(states: &mut Subscriber<State>) -> Option<Mode> {
+    let state = states.latest().ok().flatten()?;
+    Mode::try_from(state.mode).ok()
+}
