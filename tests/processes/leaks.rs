@@ -7,7 +7,7 @@ use std::path::Path;
 /// Rounds in which everything grows to its usual size.
 const WARM_UP: usize = 4;
 /// Rounds that may not make anything grow.
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 14;
 /// Growth of a process's memory that is no leak, bytes. One connection takes 33 kB, and each round makes a dozen.
 const TOLERANCE: u64 = 500_000;
 
