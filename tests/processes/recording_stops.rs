@@ -3,7 +3,7 @@
 use super::worm::{Worm, wait_for};
 use super::{Crawling, PATIENCE};
 use std::path::PathBuf;
-use worm_estimator::message::{Alarm, AlarmKind, Estimate, Mode, RecordingProblem, State};
+use worm_estimator::message::{Alarm, AlarmKind, Estimate, Mode, RecordingProblem};
 use worm_log::messages;
 use wormd::topics::{Hub, Subscriber};
 
@@ -58,29 +58,26 @@ fn a_recording_in_several_files_loses_and_doubles_nothing() {
 
 /// What the test hears of the worm.
 struct Listener {
-    states: Subscriber<State>,
     estimates: Subscriber<Estimate>,
     alarms: Subscriber<Alarm>,
     changes: Vec<Alarm>,
-    raised_mask: u32,
+    newest: Option<Estimate>,
 }
 
 impl Listener {
     fn open(worm: &Worm) -> Self {
         let hub = Hub::open(&worm.instance()).expect("the topics open");
         Self {
-            states: hub.subscriber().expect("a subscriber"),
             estimates: hub.subscriber().expect("a subscriber"),
             alarms: hub.subscriber().expect("a subscriber"),
             changes: Vec::new(),
-            raised_mask: 0,
+            newest: None,
         }
     }
 
     fn listen(&mut self) {
-        while self.states.next().expect("readable").is_some() {}
         while let Some(estimate) = self.estimates.next().expect("readable") {
-            self.raised_mask = estimate.raised_mask;
+            self.newest = Some(*estimate);
         }
         while let Some(alarm) = self.alarms.next().expect("readable") {
             self.changes.push(*alarm);
@@ -93,7 +90,8 @@ impl Listener {
         wait_for("a change of the alarm", PATIENCE, || {
             self.listen();
             let last = self.changes.iter().rfind(|alarm| alarm.kind == kind);
-            last.is_some_and(|alarm| alarm.raised == u32::from(raised)) && (self.raised_mask >> kind & 1 == 1) == raised
+            let is_raised = |estimate: Estimate| estimate.raised_mask >> kind & 1 == 1;
+            last.is_some_and(|alarm| alarm.raised == u32::from(raised)) && self.newest.map(is_raised) == Some(raised)
         });
         *self
             .changes
@@ -150,7 +148,8 @@ fn a_full_disk_or_a_killed_recorder_raises_an_alarm_and_the_worm_crawls_on() {
         alarm.value > 3.0 && alarm.threshold == 3.0,
         "a silence of 3 s: {alarm:?}"
     );
-    assert!(messages(second.as_ref()).is_ok_and(|log| log.states.len() > 500));
+    let log = messages(second.as_ref()).expect("what was recorded can be read");
+    assert!(log.states.len() > 100, "{} states", log.states.len());
 
     // Its file removed, and one that ends in order.
     let third = path("third.mcap");
@@ -170,7 +169,12 @@ fn a_full_disk_or_a_killed_recorder_raises_an_alarm_and_the_worm_crawls_on() {
     assert!(log.estimates.iter().any(was_raised), "the alarm of the recorder before");
 
     listener.listen();
-    assert_eq!(listener.states.lost(), 0, "no tick is missing");
+    let newest = listener.newest.expect("was heard");
+    assert_eq!(
+        newest.states_lost, 0,
+        "the loop has published every state, and the estimator has received it"
+    );
     let state = worm.state().expect("was heard");
+    assert!(newest.state_sequence > 1000, "{newest:?}");
     assert_eq!(state.mode, Mode::Crawling.code(), "the worm has crawled all the time");
 }
