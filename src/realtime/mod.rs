@@ -19,7 +19,8 @@ pub(crate) use request::set_fifo;
 pub use request::{Grant, Refusal, request};
 pub use witness::{CpuWitness, visit_every_cpu};
 
-use nix::time::ClockId;
+use nix::sys::time::TimeSpec;
+use nix::time::{ClockId, ClockNanosleepFlags, clock_nanosleep};
 
 /// Time of `CLOCK_MONOTONIC`, ns: the clock of all deadlines and time stamps.
 pub fn monotonic_ns() -> u64 {
@@ -41,17 +42,8 @@ fn clock_ns(clock: ClockId) -> u64 {
 
 /// Sleeps until `deadline_ns` of `CLOCK_MONOTONIC`; a signal ends the sleep early.
 pub fn sleep_until(deadline_ns: u64) {
-    let deadline = libc::timespec {
-        tv_sec: (deadline_ns / 1_000_000_000) as libc::time_t,
-        tv_nsec: (deadline_ns % 1_000_000_000) as libc::c_long,
-    };
-    // SAFETY: the pointer is to a live timespec; with TIMER_ABSTIME the remaining time is not written.
-    unsafe {
-        libc::clock_nanosleep(
-            libc::CLOCK_MONOTONIC,
-            libc::TIMER_ABSTIME,
-            &raw const deadline,
-            std::ptr::null_mut(),
-        );
-    }
+    let seconds = (deadline_ns / 1_000_000_000) as libc::time_t;
+    let deadline = TimeSpec::new(seconds, (deadline_ns % 1_000_000_000) as libc::c_long);
+    // The only failure of this clock with a valid time is a signal.
+    let _interrupted = clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &deadline);
 }

@@ -7,6 +7,7 @@ mod experiment_reproduction;
 mod explain;
 mod latency_page;
 mod latency_sample;
+mod licences;
 mod mcap_python;
 mod simulate;
 mod workspace;

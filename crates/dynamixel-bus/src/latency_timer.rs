@@ -32,6 +32,29 @@ struct SerialStruct {
     iomap_base: libc::c_ulong,
 }
 
+impl SerialStruct {
+    const EMPTY: Self = Self {
+        kind: 0,
+        line: 0,
+        port: 0,
+        irq: 0,
+        flags: 0,
+        xmit_fifo_size: 0,
+        custom_divisor: 0,
+        baud_base: 0,
+        close_delay: 0,
+        io_type: 0,
+        reserved: [0],
+        hub6: 0,
+        closing_wait: 0,
+        closing_wait2: 0,
+        iomem_base: std::ptr::null_mut(),
+        iomem_reg_shift: 0,
+        port_high: 0,
+        iomap_base: 0,
+    };
+}
+
 /// `ASYNC_LOW_LATENCY` of `linux/tty_flags.h`.
 const LOW_LATENCY: libc::c_int = 1 << 13;
 
@@ -70,13 +93,12 @@ pub(super) fn correct(port: BorrowedFd<'_>, path: &Path) -> Option<Finding> {
 }
 
 fn ask_for_low_latency(port: BorrowedFd<'_>) -> std::io::Result<()> {
-    let mut settings = std::mem::MaybeUninit::<SerialStruct>::zeroed();
-    // SAFETY: the descriptor is open; TIOCGSERIAL fills in a `serial_struct`, which `SerialStruct` is laid out as.
-    if unsafe { libc::ioctl(port.as_raw_fd(), libc::TIOCGSERIAL, settings.as_mut_ptr()) } != 0 {
+    let mut settings = SerialStruct::EMPTY;
+    // SAFETY: the descriptor is open; TIOCGSERIAL fills in a `serial_struct`, which `SerialStruct` is laid out as, and any bytes are
+    // valid in its integers and its raw pointer.
+    if unsafe { libc::ioctl(port.as_raw_fd(), libc::TIOCGSERIAL, &raw mut settings) } != 0 {
         return Err(std::io::Error::last_os_error());
     }
-    // SAFETY: every field is an integer or a raw pointer, for which zero bytes are valid too.
-    let mut settings = unsafe { settings.assume_init() };
     if settings.flags & LOW_LATENCY != 0 {
         return Ok(());
     }
