@@ -1,12 +1,18 @@
 //! The checks of `wormd check`: what keeps this worm from running on this computer with this configuration, and the remedies.
 
-use crate::control::{Drive, link_settings};
+mod trials;
+
+use crate::control::{Drive, DriveError, link_settings};
+use crate::link::{EmergencyStopInput, LinkSettings, Prepared, StartupError};
 use crate::realtime::machine::{self, Setting};
 use crate::realtime::{self, EffectiveSettings};
 use crate::topics::{Hub, Instance};
 use serde::Serialize;
+use std::f64::consts::TAU;
 use std::path::Path;
 use worm_estimator::config::{Config, Realtime};
+
+pub(crate) use trials::Trials;
 
 /// How much a finding matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -53,8 +59,8 @@ pub(crate) struct CheckReport {
 }
 
 impl CheckReport {
-    /// Runs all checks. `source` says where the configuration comes from.
-    pub(crate) fn new(config: &Config, source: &str) -> Self {
+    /// Runs all checks, and the trials that are asked for. `source` says where the configuration comes from.
+    pub(crate) fn new(config: &Config, source: &str, trials: Trials) -> Self {
         let mut report = Self {
             worm: config.worm.name.clone(),
             findings: Vec::new(),
@@ -65,7 +71,8 @@ impl CheckReport {
             report.findings.push(setting.into());
         }
         check_topics(config, &mut report);
-        check_port(config, &mut report);
+        check_emergency_stop(config, &mut report);
+        check_port(config, trials, &mut report);
         report
     }
 
@@ -179,14 +186,44 @@ fn check_topics(config: &Config, report: &mut CheckReport) {
     }
 }
 
-fn check_port(config: &Config, report: &mut CheckReport) {
+/// Requests a GPIO line, as the loop would. That of a tracker is checked with the port.
+fn check_emergency_stop(config: &Config, report: &mut CheckReport) {
+    match EmergencyStopInput::open(config) {
+        Ok(None) => {}
+        Ok(Some(_)) => report.good("emergency stop", "its input can be read"),
+        // The error's text includes the remedy.
+        Err(error) => report.note(Level::Error, "emergency stop", "cannot be read", error.to_string()),
+    }
+}
+
+fn check_port(config: &Config, trials: Trials, report: &mut CheckReport) {
     let Some(port) = &config.port else {
         report.good("port", "none configured: the virtual worm is used");
         return;
     };
-    let opened = link_settings(config, port.baud).and_then(|settings| Drive::open(Path::new(&port.path), settings));
+    let path = Path::new(&port.path);
+    let settings = match link_settings(config, port.baud) {
+        Ok(settings) => settings,
+        Err(error) => return report.note(Level::Error, "port", "cannot be used", error.to_string()),
+    };
+    let mut opened = Drive::open(path, settings.clone());
+    if let Err(
+        error @ DriveError::Startup {
+            source: StartupError::UnsafeWatchdog { .. },
+            ..
+        },
+    ) = &opened
+    {
+        report.note(Level::Error, "port", "the worm would not be armed", error.to_string());
+        // The rest can be checked all the same.
+        let accepting = LinkSettings {
+            accept_unsafe_watchdog: true,
+            ..settings
+        };
+        opened = Drive::open(path, accepting);
+    }
     match opened {
-        Ok((_drive, prepared, findings)) => {
+        Ok((mut drive, prepared, findings)) => {
             report.good(
                 "port",
                 format!(
@@ -203,8 +240,30 @@ fn check_port(config: &Config, report: &mut CheckReport) {
                 let level = if finding.corrected { Level::Good } else { Level::Warning };
                 report.note(level, "port", finding.what, finding.remedy);
             }
+            report_current(config, &prepared, report);
+            trials.run(config, &mut drive, &prepared, report);
         }
         // The error's text includes the remedy.
         Err(error) => report.note(Level::Error, "port", "cannot be used", error.to_string()),
+    }
+}
+
+/// What limits the motor's current, and what is left of it at the speed of the gait.
+fn report_current(config: &Config, prepared: &Prepared, report: &mut CheckReport) {
+    const LEAST_SHARE: f64 = 0.3;
+    let servo = &config.servo;
+    let available_v = prepared.duty_limit * prepared.servo_reading.voltage_v;
+    let blocked_a = available_v / servo.winding_resistance_ohm;
+    let back_emf_v = servo.torque_constant_n_m_per_a * (config.gait_cycles_per_s() * TAU).abs();
+    let crawling_a = ((available_v - back_emf_v) / servo.winding_resistance_ohm).max(0.0);
+    let found = format!(
+        "limited by a duty of {:.0} %: {blocked_a:.2} A of a blocked motor, {crawling_a:.2} A at the speed of the gait",
+        100.0 * prepared.duty_limit
+    );
+    if crawling_a < LEAST_SHARE * blocked_a {
+        let remedy = "raise servo.current_limit_a or gait.cycle_s: little torque is left at this speed";
+        report.note(Level::Warning, "motor current", found, remedy);
+    } else {
+        report.good("motor current", found);
     }
 }

@@ -1,7 +1,7 @@
 //! `wormd check`: what stands between this computer, this configuration and a crawling worm.
 
 use super::{Failure, WormArgs, print};
-use crate::preflight::{CheckReport, Level};
+use crate::preflight::{CheckReport, Level, Trials};
 use clap::Args;
 
 /// Arguments of `wormd check`.
@@ -9,6 +9,12 @@ use clap::Args;
 pub struct CheckArgs {
     #[command(flatten)]
     worm: WormArgs,
+    /// Turn the cam slowly, fall silent, and measure how long the servo's watchdog lets it turn on; needs a real port
+    #[arg(long)]
+    try_watchdog: bool,
+    /// Turn the cam a little there and back with little torque: direction, position, home; needs a real port
+    #[arg(long)]
+    try_motion: bool,
     /// Print one JSON object instead of text
     #[arg(long)]
     json: bool,
@@ -24,7 +30,16 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
         Some(file) => file.display().to_string(),
         None => "the built-in defaults".to_owned(),
     };
-    let report = CheckReport::new(&config, &source);
+    let trials = Trials {
+        watchdog: args.try_watchdog,
+        motion: args.try_motion,
+    };
+    if trials.is_any() && config.port.is_none() {
+        return Err(Failure::unusable(
+            "a trial needs a serial port: name one in the section [port] or with --port",
+        ));
+    }
+    let report = CheckReport::new(&config, &source, trials);
     if args.json {
         print::line(serde_json::to_string_pretty(&report).map_err(Failure::failed)?)?;
     } else {

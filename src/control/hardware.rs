@@ -1,10 +1,11 @@
 //! The port and what is on it, as the loop uses it: exchanges, and the services that take longer than a tick.
 
 use super::Service;
+use super::replaceable_port::ReplaceablePort;
 use crate::link::servo::scale;
 use crate::link::{
-    ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, OpenError, OperationError, Prepared, ReadMode,
-    ReadPlan, StartupError, Tty, WormBus, prepare,
+    ArmError, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, MotionTrial, OpenError,
+    OperationError, Prepared, ReadMode, ReadPlan, StartupError, TrialError, Tty, WatchdogTrial, WormBus, arm, prepare,
 };
 use dynamixel_bus::packet::DeviceId;
 use std::f64::consts::TAU;
@@ -25,6 +26,36 @@ pub enum DriveError {
         path: PathBuf,
         /// What is wrong.
         source: StartupError,
+    },
+    /// The port is gone.
+    #[error("{path}: the port is gone: plug it in again; it is opened as soon as it is back", path = path.display())]
+    Gone {
+        /// The port.
+        path: PathBuf,
+    },
+    /// The thread that opens a port again cannot be started.
+    #[error("{path}: a thread cannot be started: {source}", path = path.display())]
+    Thread {
+        /// The port.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Torque was asked for, and may be on although arming failed.
+    #[error("{path}: {source}", path = path.display())]
+    TorqueUnknown {
+        /// The port.
+        path: PathBuf,
+        /// What went wrong.
+        source: ArmError,
+    },
+    /// A trial could not be made.
+    #[error("{path}: {source}", path = path.display())]
+    Trial {
+        /// The port.
+        path: PathBuf,
+        /// What went wrong.
+        source: TrialError,
     },
     /// A device did not obey.
     #[error("{path}: {source}", path = path.display())]
@@ -83,9 +114,8 @@ fn emergency_stop_mask(config: &Config) -> Option<u8> {
 pub struct Drive {
     path: PathBuf,
     settings: LinkSettings,
-    bus: WormBus<Tty>,
+    bus: WormBus<ReplaceablePort>,
     plan: ExchangePlan,
-    is_gone: bool,
 }
 
 impl Drive {
@@ -95,6 +125,10 @@ impl Drive {
     /// [`DriveError`], whose text names port, device and remedy.
     pub fn open(path: &Path, settings: LinkSettings) -> Result<(Self, Prepared, Vec<Finding>), DriveError> {
         let (port, mut findings) = Tty::open(path, settings.baud)?;
+        let port = ReplaceablePort::new(port, path, settings.baud).map_err(|source| DriveError::Thread {
+            path: path.to_owned(),
+            source,
+        })?;
         let mut bus = WormBus::new(port);
         let prepared = prepare(&mut bus, &settings, &mut findings).map_err(|source| DriveError::Startup {
             path: path.to_owned(),
@@ -107,7 +141,6 @@ impl Drive {
                 settings,
                 bus,
                 plan,
-                is_gone: false,
             },
             prepared,
             findings,
@@ -115,17 +148,40 @@ impl Drive {
     }
 
     /// One exchange: sends the goal and receives the readings, until `deadline` at the latest. Allocates nothing.
+    ///
+    /// A port that turns out to be gone is closed, and used again when it is back.
     pub fn exchange(&mut self, goal_counts: i32, deadline: Instant) -> ExchangeOutcome {
+        self.bus.port_mut().take_back();
         let outcome = self
             .bus
             .exchange(&self.plan, f64::from(goal_counts) * scale::VELOCITY_RAD_S, deadline);
-        self.is_gone = outcome.is_disconnected();
+        if outcome.is_disconnected() {
+            self.bus.port_mut().give_up();
+        }
         outcome
     }
 
     /// Whether the port has gone.
     pub fn is_gone(&self) -> bool {
-        self.is_gone
+        self.bus.port().is_gone()
+    }
+
+    /// Turns the cam slowly, falls silent, and measures what the servo's watchdog does. Torque is off afterwards.
+    ///
+    /// # Errors
+    /// [`DriveError::Trial`]
+    pub fn try_watchdog(&mut self) -> Result<WatchdogTrial, DriveError> {
+        let trial = self.bus.try_watchdog(&self.settings);
+        trial.map_err(|source| self.trial(source))
+    }
+
+    /// Turns the cam a little there and back, there in the servo's positive direction if `positive`. Torque is off afterwards.
+    ///
+    /// # Errors
+    /// [`DriveError::Trial`]
+    pub fn try_motion(&mut self, positive: bool) -> Result<MotionTrial, DriveError> {
+        let trial = self.bus.try_motion(&self.settings, if positive { 1.0 } else { -1.0 });
+        trial.map_err(|source| self.trial(source))
     }
 
     /// The link's counters.
@@ -145,10 +201,11 @@ impl Drive {
     }
 
     fn arm(&mut self) -> Result<(), DriveError> {
-        if self.is_gone {
-            let (port, _) = Tty::open(&self.path, self.settings.baud)?;
-            self.bus = WormBus::new(port);
-            self.is_gone = false;
+        self.bus.port_mut().take_back();
+        if self.is_gone() {
+            return Err(DriveError::Gone {
+                path: self.path.clone(),
+            });
         }
         if self.hardware_errors().is_ok_and(|bits| bits != 0) {
             // The only way out of a hardware error is a restart (XL330-M288 e-manual, "Hardware Error Status").
@@ -156,12 +213,16 @@ impl Drive {
             self.bus.reboot_servo(servo).map_err(|source| self.operation(source))?;
         }
         let mut findings = Vec::new();
-        let prepared = prepare(&mut self.bus, &self.settings, &mut findings).map_err(|source| DriveError::Startup {
-            path: self.path.clone(),
-            source,
+        let path = || self.path.clone();
+        let prepared = arm(&mut self.bus, &self.settings, &mut findings).map_err(|error| match error {
+            ArmError::NotArmed(source) => DriveError::Startup { path: path(), source },
+            source @ ArmError::TorqueUnknown { .. } => DriveError::TorqueUnknown { path: path(), source },
         })?;
+        for finding in findings.iter().filter(|finding| finding.corrected) {
+            tracing::info!("{}: {} ({})", self.path.display(), finding.what, finding.remedy);
+        }
         self.plan = prepared.plan;
-        self.set_torque(true)
+        Ok(())
     }
 
     fn disarm(&mut self) -> Result<u8, DriveError> {
@@ -183,6 +244,13 @@ impl Drive {
         Ok(errors.0)
     }
 
+    fn trial(&self, source: TrialError) -> DriveError {
+        DriveError::Trial {
+            path: self.path.clone(),
+            source,
+        }
+    }
+
     fn operation(&self, source: OperationError) -> DriveError {
         DriveError::Operation {
             path: self.path.clone(),
@@ -193,7 +261,7 @@ impl Drive {
 
 impl Drop for Drive {
     fn drop(&mut self) {
-        if self.is_gone {
+        if self.is_gone() {
             return;
         }
         let servo = self.settings.servo_id;

@@ -22,6 +22,7 @@ mod journal;
 mod loop_clock;
 mod ramp;
 mod rate;
+mod replaceable_port;
 mod resume;
 mod run;
 mod safety;

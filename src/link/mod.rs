@@ -40,6 +40,7 @@
 //! that one. If it is received first, it is taken for it; if both are present, the newer one counts. When the goal has changed
 //! meanwhile, [`ExchangeOutcome::goal_taken`] reveals the mix-up; so may the tracker's sample counter.
 
+mod arm;
 mod counters;
 mod emergency_stop;
 mod exchange;
@@ -48,9 +49,11 @@ mod owed_answers;
 pub mod servo;
 mod startup;
 pub mod tracker;
+mod trial;
 pub mod virtual_worm;
 mod worm_bus;
 
+pub use arm::{ArmError, arm};
 pub use counters::{ExchangeCounters, LinkCounters};
 pub use dynamixel_bus::{
     Bus, BusCounters, FaultInjector, Faults, Finding, Identity, OpenError, Port, PortError, RefusalCounters, Register,
@@ -62,4 +65,5 @@ pub use operations::OperationError;
 pub use servo::ServoReading;
 pub use startup::{LinkSettings, Prepared, StartupError, prepare};
 pub use tracker::{NoTrackerBlock, TrackerReading};
+pub use trial::{MotionTrial, TrialError, WatchdogTrial};
 pub use worm_bus::WormBus;

@@ -157,3 +157,101 @@ fn a_servo_whose_watchdog_is_known_not_to_stop_the_motor_is_not_armed() {
     let (mut drive, _, _) = Drive::open(worm.path(), settings).expect("accepted");
     drive.serve(Service::Arm).expect("torque comes on");
 }
+
+/// A link with a lasting name to the port of a virtual worm, which can be pulled and plugged in again.
+struct Plug {
+    folder: tempfile::TempDir,
+}
+
+impl Plug {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        Self { folder }
+    }
+
+    fn path(&self) -> std::path::PathBuf {
+        self.folder.path().join("port")
+    }
+
+    fn plug_in(&self, worm: &VirtualWorm) {
+        std::os::unix::fs::symlink(worm.path(), self.path()).expect("a link");
+    }
+
+    fn unplug(&self) {
+        std::fs::remove_file(self.path()).expect("the link is there");
+    }
+}
+
+#[test]
+fn a_port_that_is_gone_is_closed_and_used_again_when_it_is_back() {
+    let config = Config::default();
+    let plug = Plug::new();
+    let settings = || link_settings(&config, 1_000_000).expect("valid IDs");
+    let spawn = || VirtualWorm::spawn(&config, &Options::default()).expect("a virtual worm");
+    let worm = spawn();
+    plug.plug_in(&worm);
+    let (mut drive, _, _) = Drive::open(&plug.path(), settings()).expect("the devices are ready");
+    drive.serve(Service::Arm).expect("torque comes on");
+    turn_by(&mut drive, 50.0);
+
+    plug.unplug();
+    let old_path = worm.path().to_owned();
+    worm.stop().expect("it ran");
+    let soon = || Instant::now() + Duration::from_millis(20);
+    let begun = Instant::now();
+    while !drive.is_gone() {
+        drive.exchange(100, soon());
+        assert!(begun.elapsed() < Duration::from_secs(20), "the port never goes");
+    }
+    let refused = drive.serve(Service::Arm);
+    assert!(matches!(refused, Err(DriveError::Gone { .. })), "{refused:?}");
+    // The kernel gives the number of a terminal away again only when nobody holds it open.
+    while std::fs::metadata(&old_path).is_ok() {
+        assert!(begun.elapsed() < Duration::from_secs(20), "the port is still held open");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let asked = Instant::now();
+    assert!(drive.exchange(0, soon()).is_disconnected());
+    assert!(
+        asked.elapsed() < Duration::from_millis(500),
+        "a tick without a port waits for nothing"
+    );
+
+    let worm = spawn();
+    plug.plug_in(&worm);
+    let back = Instant::now();
+    while drive.exchange(0, soon()).servo.is_err() {
+        std::thread::sleep(Duration::from_millis(1));
+        assert!(back.elapsed() < Duration::from_secs(20), "the port never comes back");
+    }
+    println!("readings {:?} after the port was back", back.elapsed());
+    drive.serve(Service::Arm).expect("one reset is enough");
+    turn_by(&mut drive, 50.0);
+    drop(drive);
+    worm.stop().expect("it ran");
+}
+
+#[test]
+fn a_servo_that_restarts_shows_it_in_its_first_reading() {
+    let config = Config::default();
+    let options = Options {
+        faults: vec!["reboot:off=0.05@0.3".parse().expect("a fault")],
+        ..Options::default()
+    };
+    let worm = VirtualWorm::spawn(&config, &options).expect("a virtual worm");
+    let settings = link_settings(&config, 1_000_000).expect("valid IDs");
+    let (mut drive, _, _) = Drive::open(worm.path(), settings).expect("the devices are ready");
+    drive.serve(Service::Arm).expect("torque comes on");
+    let begun = Instant::now();
+    loop {
+        let outcome = drive.exchange(100, Instant::now() + Duration::from_millis(5));
+        if let Ok(servo) = outcome.servo {
+            // It had been set when torque came on.
+            match servo.watchdog {
+                5 => {}
+                found => return assert_eq!((found, servo.current_a), (0, 0.0), "torque is off, and the watchdog"),
+            }
+        }
+        assert!(begun.elapsed() < Duration::from_secs(20), "it never restarts");
+    }
+}

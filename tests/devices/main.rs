@@ -4,4 +4,5 @@ mod drive;
 mod example_tracker;
 mod link;
 mod official_sdk;
+mod trials;
 mod virtual_worm;

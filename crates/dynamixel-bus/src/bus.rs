@@ -102,6 +102,11 @@ impl<P: Port> Bus<P> {
         &mut self.counters
     }
 
+    /// The port.
+    pub const fn port(&self) -> &P {
+        &self.port
+    }
+
     /// The port, for anything that is not a transaction.
     pub const fn port_mut(&mut self) -> &mut P {
         &mut self.port

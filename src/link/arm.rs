@@ -1,0 +1,39 @@
+//! Arming: torque comes on only on a worm that is prepared, and never stays on when arming fails.
+
+use super::{Finding, LinkSettings, OperationError, Port, Prepared, StartupError, WormBus, prepare};
+
+/// Why a worm was not armed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ArmError {
+    /// Torque is off, or was never asked for.
+    #[error(transparent)]
+    NotArmed(#[from] StartupError),
+    /// Torque may be on: neither the answer to switching it on nor that to switching it off came.
+    #[error("{cause}; torque could not be switched off again either ({off}): it may be on")]
+    TorqueUnknown {
+        /// Why arming failed.
+        cause: OperationError,
+        /// Why torque could not be switched off.
+        off: OperationError,
+    },
+}
+
+/// Prepares the worm as [`prepare`], and switches torque on. Where that cannot be verified, torque goes off again.
+///
+/// # Errors
+/// [`ArmError`]
+pub fn arm<P: Port>(
+    bus: &mut WormBus<P>,
+    settings: &LinkSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<Prepared, ArmError> {
+    let prepared = prepare(bus, settings, findings)?;
+    if let Err(cause) = bus.set_torque(settings.servo_id, true) {
+        // The servo may have obeyed though it was not heard.
+        return Err(match bus.set_torque(settings.servo_id, false) {
+            Ok(()) => ArmError::NotArmed(cause.into()),
+            Err(off) => ArmError::TorqueUnknown { cause, off },
+        });
+    }
+    Ok(prepared)
+}
