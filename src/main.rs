@@ -48,6 +48,8 @@ enum Subcommands {
     /// The bare sleeper of `wormd latency`
     #[command(hide = true)]
     LatencyFloor(command::latency_floor::LatencyFloorArgs),
+    /// Many hours in virtual time with drawn worms and faults: do alarms and stops come when they must, and only then?
+    Soak(command::soak::SoakArgs),
     /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
     Check(command::check::CheckArgs),
 }
@@ -96,6 +98,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Latency(args) => command::latency::run(&args, verbose),
         Subcommands::LatencyFloor(args) => command::latency_floor::run(&args),
+        Subcommands::Soak(args) => command::soak::run(&args),
         Subcommands::Check(args) => command::check::run(&args),
     }
 }

@@ -17,6 +17,7 @@ pub mod replay;
 pub mod send_command;
 #[cfg(feature = "analysis")]
 pub mod simulate;
+pub mod soak;
 pub mod study;
 pub mod up;
 pub mod virtual_worm;
