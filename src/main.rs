@@ -26,6 +26,8 @@ enum Subcommands {
     Estimate(command::estimate::EstimateArgs),
     /// The simulated devices on a pseudo-terminal
     VirtualWorm(command::virtual_worm::VirtualWormArgs),
+    /// A fault of a running virtual worm, switched on or off
+    Fault(command::fault::FaultArgs),
     /// A command to a running controller
     Command(command::send_command::SendCommandArgs),
     /// The topics of a worm into a log (MCAP)
@@ -86,6 +88,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Control(args) => command::control::run(&args),
         Subcommands::Estimate(args) => command::estimate::run(&args),
         Subcommands::VirtualWorm(args) => command::virtual_worm::run(&args),
+        Subcommands::Fault(args) => command::fault::run(&args),
         Subcommands::Command(args) => command::send_command::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),

@@ -26,6 +26,9 @@ pub struct VirtualWormArgs {
     /// A fault, as listed below; may be given several times
     #[arg(long = "fault", value_name = "SPEC")]
     pub faults: Vec<Fault>,
+    /// Take faults from `wormd fault` while it runs
+    #[arg(long)]
+    pub allow_faults: bool,
     /// Set the servo to this baud rate, and answer only a peer that uses the servo's; without it any rate is understood
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     pub baud: Option<u32>,
@@ -63,10 +66,13 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
         // A ledger that cannot be written is reported now, not after hours.
         std::fs::write(file, "").map_err(|error| Failure::unusable(ledger_error(file, &error)))?;
     }
-    let server = Server::open(&config, &options).map_err(|error| match error {
+    let mut server = Server::open(&config, &options).map_err(|error| match error {
         ServerError::Devices(_) => Failure::unusable(error),
         _ => Failure::failed(error),
     })?;
+    if args.allow_faults {
+        server.allow_faults(&args.link).map_err(Failure::unusable)?;
+    }
     let link = PortLink::create(&args.link, server.path()).map_err(Failure::unusable)?;
     report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     // A parent that does not wait for this line may have closed the pipe.

@@ -504,7 +504,14 @@ impl Segment {
     }
 
     fn broken<T>(&mut self, rule: &str, text: String) -> Result<T, Over> {
-        self.find(FindingKind::Invariant, format!("{rule}: {text}"));
+        let during = self.episode.as_ref().map_or_else(String::new, |episode| {
+            let for_s = self.session.now_s() - episode.began_s;
+            format!(
+                "; {for_s:.3} s after the beginning of {:?}, which lasts {:.3} s",
+                episode.drawn.cause, episode.drawn.lasts_s
+            )
+        });
+        self.find(FindingKind::Invariant, format!("{rule}: {text}{during}"));
         Err(Over)
     }
 }

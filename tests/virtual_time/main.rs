@@ -13,6 +13,7 @@
 
 mod accuracy;
 mod bare;
+mod fault_table;
 mod faults;
 mod harness;
 mod hours;
