@@ -19,23 +19,23 @@ fn a_fault_is_switched_on_listed_and_cleared_while_the_worm_crawls() {
     let worm = Worm::new("faulted");
     let up = worm.wormd(&["up", "--plain", "--allow-faults"]).start_silent();
     wait_for("a crawling worm", PATIENCE, || is(&worm, Mode::Crawling));
-    assert_eq!(
-        fault(&worm, &["--list"]),
-        (Some(0), "faulted: no faults\n".to_owned(), String::new())
-    );
+    let (code, text, error) = fault(&worm, &["--list"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(text.ends_with(": no faults\n"), "{text}");
     let (code, _, error) = fault(&worm, &["jam:cell=9"]);
     assert_eq!(code, Some(1), "{error}");
     assert!(error.contains("names cell 9, but the worm has 4 cells"), "{error}");
     let (code, text, error) = fault(&worm, &["silence:device=servo"]);
     assert_eq!(code, Some(0), "{error}");
-    assert!(text.starts_with("faulted: silence:device=servo ("), "{text}");
+    assert!(text.contains(": silence:device=servo ("), "{text}");
     wait_for("the fault", PATIENCE, || {
         is(&worm, Mode::Fault) && worm.state().is_some_and(|state| state.fault == Fault::LinkLost.code())
     });
     let (_, text, _) = fault(&worm, &["--list"]);
-    assert_eq!(text, "faulted: silence:device=servo (on)\n");
+    assert!(text.ends_with(": silence:device=servo (on)\n"), "{text}");
     let (code, text, _) = fault(&worm, &["--clear", "silence"]);
-    assert_eq!((code, text.as_str()), (Some(0), "faulted: 1 faults cleared\n"));
+    assert_eq!(code, Some(0));
+    assert!(text.ends_with(": 1 faults cleared\n"), "{text}");
     wait_for("a reset", PATIENCE, || {
         worm.order(CommandKind::Reset) == CommandOutcome::Accepted || is(&worm, Mode::Armed)
     });
