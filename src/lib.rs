@@ -48,6 +48,7 @@
 //! | [`watch`] | telemetry of a running worm: gathered, as a live display, as a summary | `latency` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
+//! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
 //! | `preflight` | the checks of `wormd check` | `control`, `topics`, `realtime` |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | all |
 //!
@@ -75,6 +76,7 @@ mod preflight;
 mod print;
 pub mod realtime;
 mod recorder;
+pub mod soak;
 mod supervisor;
 pub mod topics;
 pub mod watch;

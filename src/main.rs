@@ -30,6 +30,8 @@ enum Subcommands {
     Estimate(command::estimate::EstimateArgs),
     /// The simulated devices on a pseudo-terminal
     VirtualWorm(command::virtual_worm::VirtualWormArgs),
+    /// A fault of a running virtual worm, switched on or off
+    Fault(command::fault::FaultArgs),
     /// A command to a running controller
     Command(command::send_command::SendCommandArgs),
     /// The topics of a worm into a log (MCAP)
@@ -52,6 +54,8 @@ enum Subcommands {
     /// The bare sleeper of `wormd latency`
     #[command(hide = true)]
     LatencyFloor(command::latency_floor::LatencyFloorArgs),
+    /// Many hours in virtual time with drawn worms and faults: do alarms and stops come when they must, and only then?
+    Soak(command::soak::SoakArgs),
     /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
     Check(command::check::CheckArgs),
 }
@@ -90,6 +94,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Control(args) => command::control::run(&args),
         Subcommands::Estimate(args) => command::estimate::run(&args),
         Subcommands::VirtualWorm(args) => command::virtual_worm::run(&args),
+        Subcommands::Fault(args) => command::fault::run(&args),
         Subcommands::Command(args) => command::send_command::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
@@ -102,6 +107,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Latency(args) => command::latency::run(&args, verbose),
         Subcommands::LatencyFloor(args) => command::latency_floor::run(&args),
+        Subcommands::Soak(args) => command::soak::run(&args),
         Subcommands::Check(args) => command::check::run(&args),
     }
 }

@@ -9,6 +9,7 @@ mod dataset;
 pub mod estimate;
 #[cfg(feature = "analysis")]
 pub mod explain;
+pub mod fault;
 pub mod latency;
 pub mod latency_floor;
 mod progress;
@@ -18,6 +19,7 @@ pub mod replay;
 pub mod send_command;
 #[cfg(feature = "analysis")]
 pub mod simulate;
+pub mod soak;
 pub mod study;
 pub mod up;
 pub mod virtual_worm;

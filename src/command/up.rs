@@ -36,6 +36,9 @@ pub struct UpArgs {
     /// A fault of the virtual worm, as in `wormd virtual-worm --fault`; can be given several times
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
+    /// Let the virtual worm take faults from `wormd fault` while it runs
+    #[arg(long)]
+    allow_faults: bool,
     /// Record all topics to this MCAP file, from the first state to the last, as `wormd record` does
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -50,9 +53,9 @@ pub struct UpArgs {
 /// the worm ended by itself, or the worm was stopped by a fault.
 pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
     let config = args.worm.load()?;
-    if config.port.is_some() && !args.fault.is_empty() {
+    if config.port.is_some() && (args.allow_faults || !args.fault.is_empty()) {
         return Err(Failure::unusable(
-            "--fault is for the virtual worm, but a port is configured",
+            "--fault and --allow-faults are for the virtual worm, but a port is configured",
         ));
     }
     if args.record.is_none() && !args.record_limits.is_empty() {
@@ -73,6 +76,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
         worm: args.worm.forward(),
         config: args.worm.config.clone(),
         faults: args.fault.clone(),
+        allow_faults: args.allow_faults,
         record: args.record.clone(),
         record_limits: args.record_limits.forward(),
         verbose,

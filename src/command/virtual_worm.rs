@@ -28,6 +28,9 @@ pub struct VirtualWormArgs {
     /// A fault, as listed below; may be given several times
     #[arg(long = "fault", value_name = "SPEC")]
     pub faults: Vec<Fault>,
+    /// Take faults from `wormd fault` while it runs
+    #[arg(long)]
+    pub allow_faults: bool,
     /// Set the servo to this baud rate, and answer only a peer that uses the servo's; without it any rate is understood
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     pub baud: Option<u32>,
@@ -76,6 +79,9 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
         let parent = ParentPipe::watch(Duration::MAX, 0)
             .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))?;
         server.end_when_unused(move || parent.state() == Parent::Gone);
+    }
+    if args.allow_faults {
+        server.allow_faults(&args.link).map_err(Failure::unusable)?;
     }
     let link = PortLink::create(&args.link, server.path()).map_err(Failure::unusable)?;
     report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));

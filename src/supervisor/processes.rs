@@ -19,6 +19,8 @@ pub(crate) struct Launch {
     pub config: Option<PathBuf>,
     /// Faults of the virtual worm, as on its command line.
     pub faults: Vec<String>,
+    /// Whether the virtual worm takes faults while it runs.
+    pub allow_faults: bool,
     /// The log to record to, if any.
     pub record: Option<PathBuf>,
     /// The arguments that bound the recording.
@@ -68,6 +70,9 @@ impl Processes {
             }
             for fault in &launch.faults {
                 arguments.extend(["--fault".into(), fault.into()]);
+            }
+            if launch.allow_faults {
+                arguments.push("--allow-faults".into());
             }
             let mut child = Child::start("virtual-worm", &launch.arguments("virtual-worm", &arguments), log)?;
             child.wait_until_ready(START_TIMEOUT, log, end)?;

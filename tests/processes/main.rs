@@ -4,6 +4,7 @@
 //! These tests wait for conditions with a generous bound; they check what happens, never how fast a shared machine is.
 
 mod explaining;
+mod faulting;
 mod latency;
 mod leaks;
 mod leaving;

@@ -3,12 +3,12 @@
 //! The truth scatters by 1 % from cycle to cycle, the tracker has 0.3 mm of noise, and the servo's registers resolve 1 mA
 //! and 0.1 V. A table that changes is printed in full; if the change is meant, the new one belongs here.
 
-use super::harness::{Session, config};
-use super::machine::{Machine, Wired};
+use super::harness::{config, crawling, wired};
 use std::fmt::Write;
 use worm_estimator::config::Config;
 use worm_estimator::message::Cycle;
 use wormd::link::virtual_worm::{Options, PlantLedger};
+use wormd::soak::Machine;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
 const SETTLED_CYCLES: usize = 10;
@@ -68,8 +68,8 @@ fn worm(slope_deg: i32, deformation: &str, seed: u64) -> Config {
 
 /// Crawls for so many gait cycles and hands over what was measured and what was true.
 fn crawl(config: &Config, cycles: f64) -> (Vec<Cycle>, Vec<PlantLedger>) {
-    let wired = Wired::new(config, &Options::default());
-    let mut session = Session::crawling(config, wired, 1000.0);
+    let wired = wired(config, &Options::default());
+    let mut session = crawling(config, wired, 1000.0);
     session.cycles = Some(Vec::new());
     session.run_s(config.gait.cycle_s * (cycles + 0.3), |_| {});
     assert_eq!(session.raised_kinds(), [], "seed {}", config.virtual_worm.seed);

@@ -1,10 +1,10 @@
 //! What each fault of the virtual worm brings about: which alarms, which fault of the controller, by when, and nothing else.
 
-use super::harness::{Session, config};
-use super::machine::{Machine, Wired};
+use super::harness::{Obeying, config, crawling, wired};
 use std::fmt::Write;
 use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
 use wormd::link::virtual_worm::Options;
+use wormd::soak::Machine;
 
 /// When the fault begins, s since the crawl began: the alarms have calibrated on three cycles of 2.5 s.
 const BEGINS_S: f64 = 16.3;
@@ -221,7 +221,7 @@ fn run(case: &Case) -> (String, String) {
         faults: vec![format!("{what}@{begins_s}").parse().expect("a fault")],
         ..Options::default()
     };
-    let mut session = Session::crawling(&config, Wired::new(&config, &options), 1000.0);
+    let mut session = crawling(&config, wired(&config, &options), 1000.0);
     session.run_s(BEGINS_S + WATCHED_S, |_| {});
     let began_s = session.machine.crawl_began_s().expect("it has crawled") + begins_s;
     let after_s = |time_ns: u64| time_ns as f64 * 1e-9 - began_s;
@@ -318,7 +318,7 @@ fn once_the_cause_is_over_a_reset_lets_the_worm_crawl_on() {
             faults: vec![fault.parse().expect("a fault")],
             ..Options::default()
         };
-        let mut session = Session::crawling(&config, Wired::new(&config, &options), 1000.0);
+        let mut session = crawling(&config, wired(&config, &options), 1000.0);
         session.run_s(25.0, |_| {});
         assert_eq!((session.mode(), session.fault()), (Faulty, by), "{fault}");
         let raised = session.raised.len();

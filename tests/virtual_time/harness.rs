@@ -1,119 +1,51 @@
-//! One worm with its controller and its estimator, tick by tick, wired like the processes: what the estimator publishes in one
-//! tick reaches the controller in the next.
+//! Sessions as the tests want them: a configuration from what differs, a sound worm, commands that must be accepted.
 
-use super::machine::{Exchange, Machine, Served};
 use worm_estimator::config::Config;
-use worm_estimator::estimate::Observer;
-use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, State};
-use wormd::control::{Controller, EstimateSeen, Inputs, Lease, Outputs};
+use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
+use wormd::link::virtual_worm::Options;
+use wormd::soak::{Machine, Session, Wired};
 
-/// The estimator's heartbeat while no sample comes, s.
-const HEARTBEAT_S: f64 = 0.1;
-
-/// What a pause keeps from running.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Paused {
-    /// The whole computer: worm, controller and estimator.
-    Computer,
-    Controller,
-    /// The virtual worm, whose world then stands still.
-    Worm,
-    Estimator,
+/// A configuration from what differs.
+pub fn config(toml: &str) -> Config {
+    Config::from_toml(toml, "test".as_ref()).expect("a valid test configuration")
 }
 
-/// The loop around one worm.
-pub struct Session<M> {
-    pub machine: M,
-    controller: Controller,
-    pub observer: Observer,
-    period_ns: u64,
-    now_ns: u64,
-    /// How long the worm's world has stood still.
-    stood_ns: u64,
-    /// For how long the controller has not run since its last tick.
-    absent_ns: u64,
-    worm_stands_until_ns: u64,
-    estimator_stands_until_ns: u64,
-    /// States that the estimator has not taken yet.
-    waiting: Vec<State>,
-    last: Option<Outputs>,
-    /// What became of the service that the last tick requested, and how long it took.
-    served: Option<(Served, u64)>,
-    on_the_way: Vec<Alarm>,
-    estimate_on_the_way: Option<EstimateSeen>,
-    spoken_ns: u64,
-    /// Every alarm that was raised.
-    pub raised: Vec<Alarm>,
-    /// Every cycle that ended, if they are collected.
-    pub cycles: Option<Vec<Cycle>>,
+/// The virtual worm behind the packet codec.
+pub fn wired(config: &Config, options: &Options) -> Wired {
+    Wired::new(config, options).expect("a sound worm")
 }
 
-/// What a tick showed.
-pub struct Tick {
-    pub state: State,
-    pub goal_counts: i32,
-    pub verdict: Option<CommandOutcome>,
+/// A disarmed worm; ticks at `rate_hz`.
+pub fn session<M: Machine>(config: &Config, machine: M, rate_hz: f64) -> Session<M> {
+    Session::new(config, machine, rate_hz).expect("a valid configuration")
 }
 
-impl<M: Machine> Session<M> {
-    /// A disarmed worm; ticks at `rate_hz`.
-    pub fn new(config: &Config, machine: M, rate_hz: f64) -> Self {
-        Self {
-            machine,
-            controller: Controller::new(config),
-            observer: Observer::new(config).expect("a valid configuration"),
-            period_ns: (1e9 / rate_hz) as u64,
-            now_ns: 1_000_000_000, // what start-up took, and more
-            stood_ns: 0,
-            absent_ns: 0,
-            worm_stands_until_ns: 0,
-            estimator_stands_until_ns: 0,
-            waiting: Vec::new(),
-            last: None,
-            served: None,
-            on_the_way: Vec::new(),
-            estimate_on_the_way: None,
-            spoken_ns: 0,
-            raised: Vec::new(),
-            cycles: None,
-        }
-    }
+/// A worm that was armed and commanded to crawl with the configured gait.
+pub fn crawling<M: Machine>(config: &Config, machine: M, rate_hz: f64) -> Session<M> {
+    let mut session = session(config, machine, rate_hz);
+    session.begin();
+    session.command(CommandKind::Crawl, 0.0);
+    session
+}
 
-    /// A worm that was armed and commanded to crawl with the configured gait.
-    pub fn crawling(config: &Config, machine: M, rate_hz: f64) -> Self {
-        let mut session = Self::new(config, machine, rate_hz);
-        session.begin();
-        session.command(CommandKind::Crawl, 0.0);
-        session
-    }
-
+/// Commands that must be accepted.
+pub trait Obeying {
     /// Waits for the estimator, then arms.
-    pub fn begin(&mut self) {
+    fn begin(&mut self);
+    /// Gives a command.
+    fn command(&mut self, kind: CommandKind, cycles_per_s: f64);
+}
+
+impl<M: Machine> Obeying for Session<M> {
+    fn begin(&mut self) {
         self.run_s(0.05, |_| {});
         self.command(CommandKind::Arm, 0.0);
         self.run_s(0.05, |_| {});
-        assert_eq!(self.controller.mode(), Mode::Armed, "a sound worm can be armed");
+        assert_eq!(self.mode(), Mode::Armed, "a sound worm can be armed");
     }
 
-    pub fn now_s(&self) -> f64 {
-        self.now_ns as f64 * 1e-9
-    }
-
-    pub fn mode(&self) -> Mode {
-        self.controller.mode()
-    }
-
-    pub fn fault(&self) -> Fault {
-        self.controller.fault()
-    }
-
-    /// Gives a command, which must be accepted.
-    pub fn command(&mut self, kind: CommandKind, cycles_per_s: f64) {
-        let command = Command {
-            cycles_per_s,
-            ..Command::new(kind)
-        };
-        let verdict = self.tick(Some(command)).verdict;
+    fn command(&mut self, kind: CommandKind, cycles_per_s: f64) {
+        let verdict = self.send(kind, cycles_per_s).verdict;
         assert_eq!(
             verdict,
             Some(CommandOutcome::Accepted),
@@ -121,129 +53,4 @@ impl<M: Machine> Session<M> {
             self.now_s()
         );
     }
-
-    /// Ticks for this long and shows every tick.
-    pub fn run_s(&mut self, seconds: f64, mut look: impl FnMut(&Tick)) {
-        let until_ns = self.now_ns + (seconds * 1e9) as u64;
-        while self.now_ns < until_ns {
-            look(&self.tick(None));
-        }
-    }
-
-    /// Pauses a part of it for this long, beginning now.
-    pub fn pause(&mut self, paused: Paused, ms: u64) {
-        let pause_ns = ms * 1_000_000;
-        match paused {
-            Paused::Computer => {
-                self.stood_ns += pause_ns;
-                self.absent_ns += pause_ns;
-                self.now_ns += pause_ns;
-            }
-            Paused::Controller => {
-                self.absent_ns += pause_ns;
-                self.now_ns += pause_ns;
-            }
-            Paused::Worm => self.worm_stands_until_ns = self.now_ns + pause_ns,
-            Paused::Estimator => self.estimator_stands_until_ns = self.now_ns + pause_ns,
-        }
-    }
-
-    /// Time in the worm's world, s.
-    fn world_s(&self) -> f64 {
-        (self.now_ns - self.stood_ns) as f64 * 1e-9
-    }
-
-    /// One exchange with a worm whose world goes on; one that stands still answers nothing until it goes on.
-    fn exchange(&mut self) -> Exchange {
-        let goal_counts = self.last.map_or(0, |last| last.goal_counts);
-        if self.now_ns < self.worm_stands_until_ns {
-            self.stood_ns += self.period_ns;
-            return Exchange {
-                servo: None,
-                tracker: None,
-                lost: 0,
-            };
-        }
-        let world_s = self.world_s();
-        self.machine.exchange(goal_counts, world_s)
-    }
-
-    /// One tick, in the order of `control::run`.
-    pub fn tick(&mut self, command: Option<Command>) -> Tick {
-        self.now_ns += self.period_ns;
-        let exchange = self.exchange();
-        let now_ns = self.now_ns;
-        let served = self.served.take();
-        let outputs = self.controller.tick(&Inputs {
-            now_ns,
-            absent_ns: std::mem::take(&mut self.absent_ns),
-            lost_exchanges: exchange.lost,
-            servo: exchange.servo.as_ref(),
-            tracker: exchange.tracker.as_ref(),
-            command,
-            alarms: &self.on_the_way,
-            estimate: self.estimate_on_the_way.take(),
-            lease: Lease::Held,
-            emergency_stop: None,
-            end: false,
-            service: served.as_ref().map(|(served, _)| served.outcome),
-            service_ns: served.as_ref().map_or(0, |(_, took_ns)| *took_ns),
-            hardware_error: served.and_then(|(served, _)| served.hardware_error),
-        });
-        self.last = Some(outputs);
-        let world_s = self.world_s();
-        self.served = outputs.service.map(|service| {
-            let served = self.machine.serve(service, world_s);
-            // A service pauses the schedule.
-            let ended_ns = now_ns.max((served.ended_s * 1e9) as u64 + self.stood_ns);
-            self.now_ns = ended_ns;
-            (served, ended_ns - now_ns)
-        });
-        self.on_the_way.clear();
-        self.waiting.push(outputs.state);
-        if self.now_ns >= self.estimator_stands_until_ns {
-            for state in std::mem::take(&mut self.waiting) {
-                self.estimate(&state);
-            }
-        }
-        Tick {
-            state: outputs.state,
-            goal_counts: outputs.goal_counts,
-            verdict: outputs
-                .reply
-                .map(|reply| CommandOutcome::try_from(reply.verdict).expect("a verdict")),
-        }
-    }
-
-    fn estimate(&mut self, state: &State) {
-        let report = self.observer.update(state);
-        self.on_the_way.extend_from_slice(&report.alarms);
-        self.raised
-            .extend(report.alarms.iter().filter(|alarm| alarm.raised == 1));
-        let beats = state.time_ns.saturating_sub(self.spoken_ns) as f64 * 1e-9 >= HEARTBEAT_S;
-        if report.estimate.is_some() || beats {
-            self.estimate_on_the_way = Some((&self.observer.latest()).into());
-            self.spoken_ns = state.time_ns;
-        }
-        if let (Some(cycles), Some(cycle)) = (&mut self.cycles, report.cycle) {
-            cycles.push(cycle);
-        }
-    }
-
-    /// The names of the alarms that were raised, each once, in the order in which they came.
-    pub fn raised_kinds(&self) -> Vec<AlarmKind> {
-        let mut kinds = Vec::new();
-        for alarm in &self.raised {
-            let kind = AlarmKind::try_from(alarm.kind).expect("a known alarm");
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
-            }
-        }
-        kinds
-    }
-}
-
-/// A configuration from what differs.
-pub fn config(toml: &str) -> Config {
-    Config::from_toml(toml, "test".as_ref()).expect("a valid test configuration")
 }

@@ -4,8 +4,8 @@
 //! Through the packets and at 1 kHz for some of it. For many hours the plant runs in steps of 2 ms and the loop at 250 Hz,
 //! without the packets, so that an hour takes about a second of two processors.
 
-use super::harness::{Session, config};
-use super::machine::{Bare, Machine, Wired};
+use super::bare::Bare;
+use super::harness::{Obeying, config, session, wired};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::sync::Mutex;
@@ -14,6 +14,7 @@ use std::time::Instant;
 use worm_estimator::config::Config;
 use worm_estimator::message::{AlarmKind, CommandKind, Mode};
 use wormd::link::virtual_worm::Options;
+use wormd::soak::Machine;
 
 const RATE_HZ: f64 = 250.0;
 const STEP_S: f64 = 2e-3;
@@ -80,7 +81,7 @@ fn journey<M: Machine>(
     let config = config(&toml);
     let seed = number as u64 + 1;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut session = Session::new(&config, machine(&config, seed), rate_hz);
+    let mut session = session(&config, machine(&config, seed), rate_hz);
     let gait = config.gait_cycles_per_s();
     let until_s = session.now_s() + 3600.0 * hours;
     let mut speed = gait;
@@ -185,6 +186,6 @@ fn healthy_worms_raise_no_alarm_through_the_packets() {
             seed: Some(seed),
             ..Options::default()
         };
-        Wired::new(config, &options)
+        wired(config, &options)
     });
 }

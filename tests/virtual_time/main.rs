@@ -12,10 +12,11 @@
 //! Everything is seeded; a failure names its seed.
 
 mod accuracy;
+mod bare;
+mod fault_table;
 mod faults;
 mod harness;
 mod hours;
-mod machine;
 mod mismatch;
 mod pauses;
 mod stall;

@@ -2,11 +2,11 @@
 //!
 //! The virtual worm is made from another configuration than the one that controller and estimator read.
 
-use super::harness::{Session, config};
-use super::machine::Wired;
+use super::harness::{self, Obeying, config, wired};
 use std::fmt::Write;
 use worm_estimator::message::{Alarm, AlarmKind, CommandKind};
 use wormd::link::virtual_worm::Options;
+use wormd::soak::{Session, Wired};
 
 const RATE_HZ: f64 = 250.0;
 const CYCLE_S: f64 = 2.5;
@@ -91,8 +91,8 @@ fn crawling(file: &World, world: &World, faults: &[&str], seed: u64) -> Session<
         step_s: Some(1e-3),
         ..Options::default()
     };
-    let machine = Wired::new(&config(&world.toml()), &options);
-    Session::crawling(&config(&file.toml()), machine, RATE_HZ)
+    let machine = wired(&config(&world.toml()), &options);
+    harness::crawling(&config(&file.toml()), machine, RATE_HZ)
 }
 
 fn told(session: &Session<Wired>) -> Option<Alarm> {

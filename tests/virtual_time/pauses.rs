@@ -4,12 +4,12 @@
 //! worm. Real faults are still reported.
 
 use super::accuracy::{QUANTITIES, percent};
-use super::harness::{Paused, Session, config};
-use super::machine::{Machine, Wired};
+use super::harness::{Obeying, config, crawling, wired};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
 use wormd::link::virtual_worm::Options;
+use wormd::soak::{Machine, Paused, Session, Wired};
 
 /// How near the energies of a settled cycle come to the virtual worm's own ledger, %.
 const NEAR_PERCENT: f64 = 3.0;
@@ -18,8 +18,8 @@ const CYCLES: f64 = 8.0;
 /// Crawls with a pause about once a second, drawn from `who` and from so many milliseconds.
 fn crawl_with_pauses(seed: u64, who: &[(Paused, std::ops::Range<u64>)]) -> Session<Wired> {
     let config = config(&format!("virtual_worm.seed = {seed}\n"));
-    let wired = Wired::new(&config, &Options::default());
-    let mut session = Session::crawling(&config, wired, 1000.0);
+    let wired = wired(&config, &Options::default());
+    let mut session = crawling(&config, wired, 1000.0);
     session.cycles = Some(Vec::new());
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     while session.machine.plant().ledger().cycles().len() < CYCLES as usize {
@@ -89,7 +89,7 @@ fn a_stall_in_the_middle_of_pauses_is_told_as_ever() {
             faults: vec!["stall@2".parse().expect("a fault")],
             ..Options::default()
         };
-        let mut session = Session::crawling(&config, Wired::new(&config, &options), 1000.0);
+        let mut session = crawling(&config, wired(&config, &options), 1000.0);
         session.run_s(1.9, |_| {});
         let began_s = session.machine.crawl_began_s().expect("it crawls");
         let blocked_s = began_s + 2.0;
@@ -117,7 +117,7 @@ fn a_controller_that_pauses_for_longer_than_the_watchdog_waits_says_so_and_may_c
         ("control.resume_after_pause = true\n", Mode::Crawling, Fault::None),
     ] {
         let config = config(toml);
-        let mut session = Session::crawling(&config, Wired::new(&config, &Options::default()), 1000.0);
+        let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
         session.run_s(2.0, |_| {});
         session.pause(Paused::Controller, 150);
         session.run_s(0.2, |_| {});
@@ -132,7 +132,7 @@ fn a_controller_that_pauses_for_longer_than_the_watchdog_waits_says_so_and_may_c
     }
     // Silence of the line is still the line's.
     let config = config("");
-    let mut session = Session::crawling(&config, Wired::new(&config, &Options::default()), 1000.0);
+    let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
     session.run_s(2.0, |_| {});
     session.pause(Paused::Worm, 1000);
     session.run_s(0.105, |_| {});

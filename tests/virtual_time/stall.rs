@@ -1,7 +1,6 @@
 //! A hard stall: how soon it is reported, and how far a healthy worm stays from the threshold. Through the packet codec at 1 kHz.
 
-use super::harness::{Session, config};
-use super::machine::Wired;
+use super::harness::{Obeying, config, crawling, wired};
 use std::fmt::Write;
 use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
 use wormd::link::virtual_worm::Options;
@@ -22,8 +21,8 @@ fn options(faults: &[String]) -> Options {
 /// Time from the block to the stop, ms.
 fn delay_ms(cycle_s: f64, direction: &str, blocked_at_s: f64) -> f64 {
     let config = config(&format!("gait.cycle_s = {cycle_s}\ngait.direction = \"{direction}\"\n"));
-    let wired = Wired::new(&config, &options(&[format!("stall@{blocked_at_s}")]));
-    let mut session = Session::crawling(&config, wired, 1000.0);
+    let wired = wired(&config, &options(&[format!("stall@{blocked_at_s}")]));
+    let mut session = crawling(&config, wired, 1000.0);
     let mut stopped_s = f64::NAN;
     session.run_s(blocked_at_s + 0.5, |tick| {
         if stopped_s.is_nan() && tick.state.mode == Mode::Fault.code() && tick.goal_counts == 0 {
@@ -89,7 +88,7 @@ fn alarms_at(threshold: f64, cycle_s: f64, slope_deg: f64, friction: f64) -> boo
         "gait.cycle_s = {cycle_s}\ncanal.slope_deg = {slope_deg}\nalarms.motor_stall.threshold = {threshold}\n\
          alarms.motor_stall.policy = \"warn\"\nvirtual_worm.scatter_share = 0.03\n"
     ));
-    let wired = Wired::new(
+    let wired = wired(
         &config,
         &options(&[format!(
             "friction-inside:scale={friction}@{}..{}",
@@ -97,7 +96,7 @@ fn alarms_at(threshold: f64, cycle_s: f64, slope_deg: f64, friction: f64) -> boo
             3.3 * cycle_s
         )]),
     );
-    let mut session = Session::crawling(&config, wired, 1000.0);
+    let mut session = crawling(&config, wired, 1000.0);
     let gait = 1.0 / cycle_s;
     session.run_s(4.4 * cycle_s, |_| {});
     if session.raised_kinds().contains(&AlarmKind::MotorStall) {

@@ -83,6 +83,11 @@ impl<P: Port> FaultInjector<P> {
         self.faults = faults;
     }
 
+    /// The port without faults.
+    pub fn port_mut(&mut self) -> &mut P {
+        &mut self.port
+    }
+
     fn happens(&mut self, probability: f64) -> bool {
         // A float in 0..1 has 53 bits. Nothing is drawn for a probability of 0, so that one more kind of fault does not change the
         // others.

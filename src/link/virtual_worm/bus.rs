@@ -24,7 +24,8 @@ pub(super) struct Bus {
     now_s: f64,
     crawl_began_s: Option<f64>,
     faults: Vec<Fault>,
-    holding: Vec<bool>, // one for each fault
+    holding: Vec<bool>,   // one for each fault
+    faults_changed: bool, // faults were removed since the last look
     conditions: Conditions,
     plant: Plant,
     servo: Servo,
@@ -46,6 +47,7 @@ impl Bus {
             crawl_began_s: None,
             faults: options.faults.clone(),
             holding: vec![false; options.faults.len()],
+            faults_changed: false,
             conditions: Conditions::default(),
             plant: Plant::with_step(config, options.seed, options.step_s.unwrap_or(DEFAULT_STEP_S))?,
             servo: Servo::new(config, options.baud),
@@ -76,6 +78,41 @@ impl Bus {
         self.crawl_began_s
     }
 
+    /// Adds a fault that counts from now.
+    pub(super) fn switch_on(&mut self, fault: Fault) {
+        // One whose time is over would be looked at for ever.
+        let (now_s, crawl_began_s) = (self.now_s, self.crawl_began_s);
+        let is_over = |fault: &Fault| fault.is_over(now_s, crawl_began_s.map(|began_s| now_s - began_s));
+        let kept: Vec<bool> = self.faults.iter().map(|fault| !is_over(fault)).collect();
+        self.keep(&kept);
+        self.faults.push(fault.switched_on(now_s));
+        self.holding.push(false);
+    }
+
+    /// Ends all faults, or those of a kind.
+    pub(super) fn clear_faults(&mut self, kind: Option<&str>) -> usize {
+        let kept: Vec<bool> = self
+            .faults
+            .iter()
+            .map(|fault| kind.is_some_and(|kind| kind != fault.name()))
+            .collect();
+        self.keep(&kept);
+        kept.iter().filter(|kept| !**kept).count()
+    }
+
+    /// Removes faults; what remains of their effect goes with the next slice.
+    fn keep(&mut self, kept: &[bool]) {
+        let mut flags = kept.iter();
+        self.faults.retain(|_| flags.next().copied().unwrap_or(true));
+        let mut flags = kept.iter();
+        self.holding.retain(|_| flags.next().copied().unwrap_or(true));
+        self.faults_changed = true;
+    }
+
+    pub(super) fn faults(&self) -> impl Iterator<Item = (&Fault, bool)> {
+        self.faults.iter().zip(self.holding.iter().copied())
+    }
+
     pub(super) fn advance_to(&mut self, now_s: f64) -> Result<(), WormError> {
         while self.now_s < now_s {
             self.now_s = (self.now_s + SLICE_S).min(now_s);
@@ -91,7 +128,7 @@ impl Bus {
             self.crawl_began_s = Some(self.now_s);
         }
         let crawl_s = self.crawl_began_s.map(|began_s| self.now_s - began_s);
-        let mut changed = false;
+        let mut changed = std::mem::take(&mut self.faults_changed);
         for (fault, holding) in self.faults.iter().zip(&mut self.holding) {
             let holds = fault.holds(self.now_s, crawl_s);
             changed |= holds != *holding;
@@ -118,7 +155,7 @@ impl Bus {
     pub(super) fn take(&mut self, packet: Result<Packet<'_>, DecodeError>) {
         match packet {
             Ok(Packet::Instruction(packet)) => {
-                self.servo.note_instruction(self.now_s);
+                self.note_instruction();
                 self.obey(&packet);
             }
             Ok(Packet::Status(_) | Packet::FastReply(_)) => {} // an echo
@@ -128,7 +165,7 @@ impl Bus {
                 }
             }
             Err(DecodeError::Instruction { recipient, error }) => {
-                self.servo.note_instruction(self.now_s);
+                self.note_instruction();
                 let error = match error {
                     MalformedInstruction::UnknownCode { .. } => StatusError::Instruction,
                     MalformedInstruction::Parameters { .. } => StatusError::DataLength,
@@ -140,6 +177,13 @@ impl Bus {
                 }
             }
             Err(DecodeError::ReservedId { .. } | DecodeError::EmptyStatus { .. }) => {}
+        }
+    }
+
+    /// Feeds the servo's bus watchdog, unless nothing reaches the servo.
+    fn note_instruction(&mut self) {
+        if !self.conditions.wire.servo_silent {
+            self.servo.note_instruction(self.now_s);
         }
     }
 

@@ -9,6 +9,7 @@
 
 use super::body::BodyError;
 use super::bus::Bus;
+use super::fault::Fault;
 use super::options::Options;
 use super::plant::Plant;
 use crate::link::servo::BAUD_RATES;
@@ -49,6 +50,7 @@ pub struct Devices {
     decoder: Decoder,
     last_byte_s: f64,
     bus: Bus,
+    has_battery: bool,
     /// When the worm began to crawl on the clock of the real-time server, ns.
     pub(super) crawl_began_ns: Option<u64>,
 }
@@ -59,15 +61,9 @@ impl Devices {
     /// # Errors
     /// [`DevicesError`]
     pub fn new(config: &Config, options: &Options) -> Result<Self, DevicesError> {
+        let (cells, has_battery) = (config.worm.cells, config.battery.is_some());
         for fault in &options.faults {
-            let (cell, cells) = (fault.greatest_cell(), config.worm.cells);
-            if cell > cells {
-                let fault = fault.name();
-                return Err(DevicesError::NoSuchCell { fault, cell, cells });
-            }
-            if fault.name() == "battery" && config.battery.is_none() {
-                return Err(DevicesError::NoBattery);
-            }
+            check_fault(fault, cells, has_battery)?;
         }
         if let Some(baud) = options.baud
             && !BAUD_RATES.contains(&baud)
@@ -78,8 +74,29 @@ impl Devices {
             decoder: Decoder::new(),
             last_byte_s: 0.0,
             bus: Bus::new(config, options)?,
+            has_battery,
             crawl_began_ns: None,
         })
+    }
+
+    /// Switches a fault on from now on, beside those that there are; START and END of its window are seconds from now.
+    ///
+    /// # Errors
+    /// [`DevicesError`] when this worm cannot have it.
+    pub fn switch_on(&mut self, fault: Fault) -> Result<(), DevicesError> {
+        check_fault(&fault, self.bus.plant().body().cells(), self.has_battery)?;
+        self.bus.switch_on(fault);
+        Ok(())
+    }
+
+    /// Ends all faults, or those of a kind, also those that have not begun. Returns how many there were.
+    pub fn clear_faults(&mut self, kind: Option<&str>) -> usize {
+        self.bus.clear_faults(kind)
+    }
+
+    /// Every fault that there is, and whether it holds at the moment.
+    pub fn faults(&self) -> impl Iterator<Item = (&Fault, bool)> {
+        self.bus.faults()
     }
 
     /// Lets time pass until `now_s`.
@@ -134,4 +151,17 @@ impl Devices {
     pub fn crawl_began_s(&self) -> Option<f64> {
         self.bus.crawl_began_s()
     }
+}
+
+/// Whether a worm can have this fault.
+fn check_fault(fault: &Fault, cells: usize, has_battery: bool) -> Result<(), DevicesError> {
+    let cell = fault.greatest_cell();
+    if cell > cells {
+        let fault = fault.name();
+        return Err(DevicesError::NoSuchCell { fault, cell, cells });
+    }
+    if fault.name() == "battery" && !has_battery {
+        return Err(DevicesError::NoBattery);
+    }
+    Ok(())
 }

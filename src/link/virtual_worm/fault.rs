@@ -4,6 +4,8 @@
 //! since the worm began to crawl**, that is since the first goal velocity other than zero that the motor obeyed; `@..END`
 //! holds from the start of the process, `@START` to the end of it.
 //!
+//! A fault that is switched on while the worm runs holds from that moment on, and START and END are seconds since then.
+//!
 //! What kinds there are, with which parameters and what effect, stands in one table, `fault_kinds`.
 
 use super::conditions::Conditions;
@@ -71,6 +73,8 @@ pub struct Fault {
     values: Vec<f64>, // one for each parameter of the kind
     from_s: Option<f64>,
     until_s: Option<f64>,
+    /// Time of the process from which on everything is counted, s, for one that was switched on while the worm ran.
+    switched_on_s: Option<f64>,
 }
 
 impl std::fmt::Debug for Fault {
@@ -86,11 +90,14 @@ impl std::fmt::Debug for Fault {
 impl Fault {
     /// Whether it holds, `process_s` after the start of the process and `crawl_s` after the worm began to crawl.
     pub fn holds(&self, process_s: f64, crawl_s: Option<f64>) -> bool {
-        let began_s = match self.from_s {
-            None => Some(process_s),
-            Some(from_s) => crawl_s.map(|crawl_s| crawl_s - from_s),
-        };
-        let began = began_s.is_some_and(|since_s| since_s >= 0.0);
+        let began_s = self.since_s(process_s, crawl_s);
+        began_s.is_some_and(|since_s| since_s >= 0.0) && !self.is_over(process_s, crawl_s)
+    }
+
+    /// Whether it will not hold any more, `process_s` after the start of the process and `crawl_s` after the worm began to crawl.
+    pub fn is_over(&self, process_s: f64, crawl_s: Option<f64>) -> bool {
+        let began_s = self.since_s(process_s, crawl_s);
+        let (_, crawl_s) = self.clock(process_s, crawl_s);
         let spent = self
             .kind
             .lasts
@@ -100,7 +107,32 @@ impl Fault {
             .until_s
             .zip(crawl_s)
             .is_some_and(|(until_s, crawl_s)| crawl_s >= until_s);
-        began && !spent && !over
+        spent || over
+    }
+
+    /// Time since it began, s; negative before.
+    fn since_s(&self, process_s: f64, crawl_s: Option<f64>) -> Option<f64> {
+        let (process_s, crawl_s) = self.clock(process_s, crawl_s);
+        match self.from_s {
+            None => Some(process_s),
+            Some(from_s) => crawl_s.map(|crawl_s| crawl_s - from_s),
+        }
+    }
+
+    /// The times from which on its start and its window are counted.
+    fn clock(&self, process_s: f64, crawl_s: Option<f64>) -> (f64, Option<f64>) {
+        match self.switched_on_s {
+            Some(switched_on_s) => (process_s - switched_on_s, Some(process_s - switched_on_s)),
+            None => (process_s, crawl_s),
+        }
+    }
+
+    /// The same fault, switched on while the worm runs, `process_s` after the start of the process.
+    pub fn switched_on(self, process_s: f64) -> Self {
+        Self {
+            switched_on_s: Some(process_s),
+            ..self
+        }
     }
 
     /// Changes what it changes.
@@ -186,7 +218,30 @@ impl FromStr for Fault {
             values: values.collect::<Result<_, _>>()?,
             from_s,
             until_s,
+            switched_on_s: None,
         })
+    }
+}
+
+/// As one would write it; without the moment at which it was switched on.
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.kind.name)?;
+        for (index, (parameter, &value)) in self.kind.parameters.iter().zip(&self.values).enumerate() {
+            let separator = if index == 0 { ':' } else { ',' };
+            write!(f, "{separator}{}={}", parameter.name, parameter.domain.text(value))?;
+        }
+        match (self.from_s, self.until_s) {
+            (None, None) => Ok(()),
+            (Some(from_s), None) => write!(f, "@{from_s}"),
+            (from_s, Some(until_s)) => {
+                f.write_str("@")?;
+                if let Some(from_s) = from_s {
+                    write!(f, "{from_s}")?;
+                }
+                write!(f, "..{until_s}")
+            }
+        }
     }
 }
 

@@ -310,6 +310,15 @@ impl std::fmt::Display for Domain {
 }
 
 impl Domain {
+    /// A value as it is written.
+    pub(super) fn text(&self, value: f64) -> String {
+        match self {
+            Self::Cell if value == ALL_CELLS => "all".to_owned(),
+            Self::Word(words) => words.get(value as usize).copied().unwrap_or_default().to_owned(),
+            Self::Number(..) | Self::Cell | Self::Integer(_) => value.to_string(),
+        }
+    }
+
     pub(super) fn parse(&self, text: &str) -> Option<f64> {
         match self {
             &Self::Number(from, to, _) => text.parse().ok().filter(|value| (from..=to).contains(value)),

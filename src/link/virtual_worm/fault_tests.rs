@@ -120,3 +120,22 @@ fn windows() {
     assert!(!holds("stall@..3", 9.0, Some(3.0)));
     assert!(holds("reboot:off=0.5@2", 9.0, Some(2.4)) && !holds("reboot:off=0.5@2", 9.0, Some(2.5)));
 }
+
+#[test]
+fn a_fault_that_is_switched_on_counts_from_then_and_is_written_as_it_was_read() {
+    let holds = |text: &str, process_s: f64| parse(text).switched_on(100.0).holds(process_s, Some(50.0));
+    assert!(holds("stall", 100.0) && holds("stall", 200.0));
+    assert!(!holds("stall@2..5", 101.9) && holds("stall@2..5", 102.0) && !holds("stall@2..5", 105.0));
+    assert!(holds("reboot:off=0.5", 100.4) && !holds("reboot:off=0.5", 100.5));
+    let is_over = |text: &str, process_s: f64| parse(text).switched_on(100.0).is_over(process_s, None);
+    assert!(!is_over("stall", 1e6) && !is_over("stall@2..5", 101.0) && is_over("stall@2..5", 105.0));
+    for text in [
+        "stall",
+        "jam:cell=2,share=0.5@3",
+        "slip:friction=0.3,cell=all@..4",
+        "silence:device=servo@1.5..2",
+        "hardware-error:bits=32",
+    ] {
+        assert_eq!(parse(text).to_string(), text);
+    }
+}

@@ -29,6 +29,7 @@ mod control_table;
 mod devices;
 pub mod fault;
 mod fault_kinds;
+mod fault_switch;
 pub mod ledger;
 mod line;
 pub mod motor;
@@ -51,6 +52,7 @@ mod protocol_tests;
 
 pub use devices::{Devices, DevicesError};
 pub use fault::{Fault, FaultError};
+pub use fault_switch::{FaultAnswer, FaultRequest, ListedFault, ask as ask_fault_switch};
 pub use ledger::PlantLedger;
 pub use options::Options;
 pub use plant::{DEFAULT_STEP_S, Plant};

@@ -9,6 +9,7 @@
 //! servo's bus watchdog.
 
 use super::devices::{Devices, DevicesError};
+use super::fault_switch::FaultSwitch;
 use super::options::Options;
 use super::pty::{Pty, PtyError};
 use crate::logging::Summed;
@@ -61,6 +62,9 @@ pub enum ServerError {
     /// The plant refused.
     #[error(transparent)]
     Worm(#[from] WormError),
+    /// Faults cannot be switched at run time.
+    #[error("faults cannot be switched while the virtual worm runs: {0}; is another one running behind the same link?")]
+    FaultSwitch(io::Error),
     /// No thread.
     #[error("cannot start a thread: {0}")]
     Thread(io::Error),
@@ -86,6 +90,8 @@ pub struct Server {
     strict_baud: bool,
     /// Whether it may end by itself once nobody uses it.
     may_end: Option<MayEnd>,
+    /// Takes faults while it runs.
+    fault_switch: Option<FaultSwitch>,
 }
 
 impl Server {
@@ -99,6 +105,7 @@ impl Server {
             pty: Pty::open()?,
             strict_baud: options.baud.is_some(),
             may_end: None,
+            fault_switch: None,
         })
     }
 
@@ -110,6 +117,15 @@ impl Server {
     /// Lets it also end when it was not asked anything for two seconds while `may_end` is true.
     pub fn end_when_unused(&mut self, may_end: impl Fn() -> bool + Send + 'static) {
         self.may_end = Some(MayEnd(Box::new(may_end)));
+    }
+
+    /// Lets [`ask_fault_switch`](super::ask_fault_switch) switch faults while it runs; `link` is the path under which it is known.
+    ///
+    /// # Errors
+    /// [`ServerError::FaultSwitch`] when another virtual worm is known under this path, or the path is too long.
+    pub fn allow_faults(&mut self, link: &Path) -> Result<(), ServerError> {
+        self.fault_switch = Some(FaultSwitch::bind(link).map_err(ServerError::FaultSwitch)?);
+        Ok(())
     }
 
     /// Runs until `stop` is true; returns the devices as they are then. Signals interrupt the sleep, so a handler that sets
@@ -169,6 +185,9 @@ impl Server {
             {
                 let since_then = now.saturating_sub(Duration::from_secs_f64(crawl_s));
                 self.devices.crawl_began_ns = Some(monotonic_ns() - since_then.as_nanos() as u64);
+            }
+            if let Some(fault_switch) = &mut self.fault_switch {
+                fault_switch.serve(&mut self.devices);
             }
             outgoing.clear();
             self.devices.take_due(now_s, &mut outgoing);

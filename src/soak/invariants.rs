@@ -1,0 +1,214 @@
+//! What must hold in every tick, whatever happens to the worm.
+
+use worm_estimator::config::Config;
+use worm_estimator::message::{Cycle, Fault, Mode, State};
+
+/// After the motor's last reason to turn, it may take this long to stand, s: the servo's own deceleration.
+const DECELERATION_S: f64 = 0.06;
+/// Cam velocity below which the motor stands, rad/s. A worm on a slope may creep against the friction of its gears.
+const STANDING_RAD_S: f64 = 0.06;
+/// How far the phase that is published may be from the true one, cycles: a count of the encoder, and the motion since the
+/// reading.
+const PHASE_TOLERANCE: f64 = 0.02;
+/// Rounding of the ramp.
+const RAMP_TOLERANCE: f64 = 1e-6;
+
+/// What is true at the end of a tick, and no controller can know.
+#[derive(Debug, Clone, Copy)]
+pub struct Truth {
+    /// Velocity of the cam, rad/s.
+    pub velocity_rad_s: f64,
+    /// Gait phase, cycles.
+    pub phase: f64,
+    /// How long the worm's world has stood still, ns.
+    pub stood_ns: u64,
+}
+
+/// A rule that was broken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Broken {
+    /// The rule.
+    pub rule: &'static str,
+    /// How.
+    pub text: String,
+}
+
+/// The rules, with what they remember from tick to tick.
+#[derive(Debug, Clone)]
+pub struct Invariants {
+    acceleration_rad_s2: f64,
+    tick_s: f64,
+    watchdog_s: f64,
+    last: Option<State>,
+    /// When the motor lost its last reason to turn, s.
+    resting_since_s: Option<f64>,
+    /// How long it may turn after that, s.
+    may_turn_s: f64,
+    stood_ns: u64,
+    /// Servo readings in a row without a miss.
+    answers: u32,
+    /// Difference of the published phase from the true one, cycles, as first seen after the servo came up.
+    phase_offset: Option<f64>,
+}
+
+impl Invariants {
+    /// For a worm whose controller has not ticked yet.
+    pub fn new(config: &Config) -> Self {
+        let gait_rad_s = config.gait_cycles_per_s().abs() * std::f64::consts::TAU;
+        Self {
+            acceleration_rad_s2: gait_rad_s / config.gait.ramp_s,
+            tick_s: 1.0 / config.control.rate_hz,
+            watchdog_s: f64::from(config.servo.watchdog_ms) * 1e-3,
+            last: None,
+            resting_since_s: None,
+            may_turn_s: 0.0,
+            stood_ns: 0,
+            answers: 0,
+            phase_offset: None,
+        }
+    }
+
+    /// Holds a tick against the rules; the first one that it breaks.
+    pub fn look(&mut self, state: &State, goal_counts: i32, truth: &Truth) -> Option<Broken> {
+        let broken = self
+            .sequence(state)
+            .or_else(|| self.first_reason(state))
+            .or_else(|| self.goal(state, goal_counts))
+            .or_else(|| self.ramp(state))
+            .or_else(|| self.rest(state, truth))
+            .or_else(|| self.phase(state, truth));
+        self.last = Some(*state);
+        broken
+    }
+
+    /// Holds a finished cycle against the rules. NaN says that an energy is not known, which is no surprise while a fault hides
+    /// the positions, but is one in a settled cycle of an undisturbed worm.
+    pub fn look_at_cycle(cycle: &Cycle, undisturbed: bool) -> Option<Broken> {
+        let must_be_known = undisturbed && cycle.settled == 1;
+        let energies = [
+            cycle.energy_loss_j,
+            cycle.energy_actuator_net_j,
+            cycle.energy_actuator_positive_j,
+            cycle.energy_electrical_j,
+            cycle.energy_copper_j,
+            cycle.energy_friction_inside_j,
+            cycle.duration_s,
+        ];
+        let is_wrong = |energy: &f64| energy.is_infinite() || (must_be_known && energy.is_nan());
+        energies.iter().any(is_wrong).then(|| Broken {
+            rule: "energies are finite",
+            text: format!("cycle {}: {energies:?}", cycle.index),
+        })
+    }
+
+    fn sequence(&self, state: &State) -> Option<Broken> {
+        let last = self.last.as_ref()?;
+        let is_next = state.sequence == last.sequence + 1 && state.time_ns > last.time_ns;
+        (!is_next).then(|| Broken {
+            rule: "states have no gap",
+            text: format!(
+                "state {} at {} ns after {} at {} ns",
+                state.sequence, state.time_ns, last.sequence, last.time_ns
+            ),
+        })
+    }
+
+    fn first_reason(&self, state: &State) -> Option<Broken> {
+        let last = self.last.as_ref()?;
+        let stays = last.mode == Mode::Fault.code() && state.mode == Mode::Fault.code();
+        let reason = |state: &State| (state.fault, state.fault_alarm);
+        (stays && reason(last) != reason(state)).then(|| Broken {
+            rule: "the first reason is kept",
+            text: format!("{:?} became {:?}", reason(last), reason(state)),
+        })
+    }
+
+    fn goal(&self, state: &State, goal_counts: i32) -> Option<Broken> {
+        let mode = Mode::try_from(state.mode).ok()?;
+        let must_rest = matches!(mode, Mode::Disarmed | Mode::Armed | Mode::Fault);
+        (must_rest && goal_counts != 0).then(|| Broken {
+            rule: "no goal but 0 unless the worm is to move",
+            text: format!("{goal_counts} counts while {mode}"),
+        })
+    }
+
+    /// The commanded velocity follows the ramp: it never jumps to what it was before a fault or a rest.
+    fn ramp(&self, state: &State) -> Option<Broken> {
+        let last = self.last.as_ref()?;
+        let ramps = |state: &State| [Mode::Crawling.code(), Mode::Stopping.code()].contains(&state.mode);
+        let rests =
+            |state: &State| [Mode::Disarmed.code(), Mode::Armed.code(), Mode::Fault.code()].contains(&state.mode);
+        if !ramps(state) || !(ramps(last) || rests(last)) {
+            return None;
+        }
+        let from_rad_s = if rests(last) { 0.0 } else { last.goal_velocity_rad_s };
+        let dt_s = (state.time_ns - last.time_ns) as f64 * 1e-9;
+        let jump_rad_s = (state.goal_velocity_rad_s - from_rad_s).abs();
+        (jump_rad_s > self.acceleration_rad_s2 * dt_s + RAMP_TOLERANCE).then(|| Broken {
+            rule: "the goal follows the ramp",
+            text: format!("from {from_rad_s} to {} rad/s in {dt_s} s", state.goal_velocity_rad_s),
+        })
+    }
+
+    /// Without a torque command, and in a fault, the motor stands: two ticks, the servo's deceleration and, if the servo cannot be
+    /// reached, its own watchdog after the last reason to turn.
+    fn rest(&mut self, state: &State, truth: &Truth) -> Option<Broken> {
+        let now_s = (state.time_ns - truth.stood_ns.min(state.time_ns)) as f64 * 1e-9;
+        let may_turn = [Mode::Crawling.code(), Mode::Holding.code(), Mode::Stopping.code()].contains(&state.mode);
+        if may_turn {
+            self.resting_since_s = None;
+            return None;
+        }
+        let since_s = match self.resting_since_s {
+            Some(since_s) => since_s,
+            None => {
+                let reachable = state.motor_is_new == 1
+                    && ![
+                        Fault::LinkLost,
+                        Fault::HostPaused,
+                        Fault::WatchdogTripped,
+                        Fault::ServoRestarted,
+                    ]
+                    .iter()
+                    .any(|fault| state.fault == fault.code());
+                self.may_turn_s = 2.0 * self.tick_s + DECELERATION_S + if reachable { 0.0 } else { self.watchdog_s };
+                self.resting_since_s = Some(now_s);
+                now_s
+            }
+        };
+        let moves = truth.velocity_rad_s.abs() > STANDING_RAD_S;
+        (moves && now_s - since_s > self.may_turn_s).then(|| Broken {
+            rule: "the motor stands when nothing commands it",
+            text: format!(
+                "{:.3} rad/s in mode {} (fault {}) after {:.3} s",
+                truth.velocity_rad_s,
+                state.mode,
+                state.fault,
+                now_s - since_s
+            ),
+        })
+    }
+
+    /// The published phase is the true one, but for whole cycles after the servo lost its turns in a restart.
+    fn phase(&mut self, state: &State, truth: &Truth) -> Option<Broken> {
+        if state.motor_is_new == 0 || truth.stood_ns != self.stood_ns {
+            (self.answers, self.stood_ns) = (0, truth.stood_ns);
+            return None;
+        }
+        self.answers = self.answers.saturating_add(1);
+        if self.answers < 3 || state.phase.is_nan() {
+            return None;
+        }
+        let offset = state.phase - truth.phase;
+        let known = *self.phase_offset.get_or_insert(offset);
+        let age_s = 2.0 * self.tick_s;
+        let tolerance = PHASE_TOLERANCE + age_s * (truth.velocity_rad_s / std::f64::consts::TAU).abs();
+        ((offset - known).abs() > tolerance).then(|| Broken {
+            rule: "the phase is continuous",
+            text: format!(
+                "published {:.4}, true {:.4}, {known:.4} apart before",
+                state.phase, truth.phase
+            ),
+        })
+    }
+}

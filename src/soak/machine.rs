@@ -1,0 +1,240 @@
+//! The worm's end of the loop in virtual time: the real link code on a port in memory, and the virtual worm's devices at its other end.
+
+use crate::control::{DriveError, Service, ServiceOutcome, link_settings};
+use crate::link::servo::register::HARDWARE_ERROR_STATUS;
+use crate::link::servo::scale;
+use crate::link::virtual_worm::{Devices, DevicesError, Fault, Options, Plant};
+use crate::link::{
+    ExchangePlan, FaultInjector, Faults, LinkSettings, Port, PortError, ServoReading, StartupError, TrackerReading,
+    WormBus, prepare,
+};
+use std::time::{Duration, Instant};
+use worm_estimator::config::Config;
+
+/// What one exchange brought.
+#[derive(Debug, Clone, Copy)]
+pub struct Exchange {
+    /// The servo's answer, if it came.
+    pub servo: Option<ServoReading>,
+    /// The tracker's answer, if it came.
+    pub tracker: Option<TrackerReading>,
+    /// Earlier exchanges whose answer never comes.
+    pub lost: u32,
+}
+
+/// What became of a service.
+#[derive(Debug, Clone, Copy)]
+pub struct Served {
+    /// Whether it was done.
+    pub outcome: ServiceOutcome,
+    /// What the servo's hardware error register said.
+    pub hardware_error: Option<u8>,
+    /// When it was over, s.
+    pub ended_s: f64,
+}
+
+/// Something that takes goals and gives readings, at times that are given to it.
+pub trait Machine {
+    /// Sends a goal velocity in counts at `now_s`, and receives the readings.
+    fn exchange(&mut self, goal_counts: i32, now_s: f64) -> Exchange;
+    /// Executes a service that begins at `now_s`.
+    fn serve(&mut self, service: Service, now_s: f64) -> Served;
+    /// The truth.
+    fn plant(&mut self) -> &Plant;
+}
+
+/// Why there is no worm to simulate.
+#[derive(Debug, thiserror::Error)]
+pub enum MachineError {
+    /// The devices cannot be simulated.
+    #[error(transparent)]
+    Devices(#[from] DevicesError),
+    /// The configuration names impossible devices.
+    #[error(transparent)]
+    Settings(#[from] DriveError),
+    /// The devices failed the start-up checks.
+    #[error(transparent)]
+    Startup(#[from] StartupError),
+}
+
+/// How long a service waits for one answer, s.
+const SERVICE_TIMEOUT_S: f64 = 0.06;
+/// The codec's own deadlines are on the real clock, which means nothing here.
+const NEVER: Duration = Duration::from_secs(3600);
+
+/// A port in memory with the virtual worm's devices at its other end. Its time runs only while the link waits, and then for at most
+/// `timeout_s`.
+struct Wire {
+    devices: Devices,
+    now_s: f64,
+    timeout_s: f64,
+    give_up_s: f64,
+    line: Vec<u8>,
+}
+
+/// The physics refuse only a configuration that was not checked.
+fn simulated<E>(result: Result<(), E>) -> Result<(), PortError> {
+    result.map_err(|_| PortError::Os {
+        doing: "simulate the worm",
+        kind: std::io::ErrorKind::InvalidInput,
+    })
+}
+
+impl Port for Wire {
+    fn send(&mut self, bytes: &[u8], _: Instant) -> Result<(), PortError> {
+        simulated(self.devices.receive(bytes, self.now_s))?;
+        self.give_up_s = self.now_s + self.timeout_s;
+        Ok(())
+    }
+
+    fn receive(&mut self, into: &mut [u8], _: Instant) -> Result<usize, PortError> {
+        if self.line.is_empty() {
+            self.devices.take_due(self.now_s, &mut self.line);
+        }
+        if self.line.is_empty() {
+            let due_s = self.devices.next_due_s().unwrap_or(f64::INFINITY);
+            self.now_s = due_s.min(self.give_up_s).max(self.now_s);
+            simulated(self.devices.advance_to(self.now_s))?;
+            self.devices.take_due(self.now_s, &mut self.line);
+        }
+        let count = into.len().min(self.line.len());
+        into[..count].copy_from_slice(&self.line[..count]);
+        self.line.drain(..count);
+        Ok(count)
+    }
+
+    fn discard_input(&mut self) -> Result<usize, PortError> {
+        self.devices.take_due(self.now_s, &mut self.line);
+        let count = self.line.len();
+        self.line.clear();
+        Ok(count)
+    }
+
+    fn set_baud_rate(&mut self, _: u32) -> Result<(), PortError> {
+        Ok(())
+    }
+}
+
+/// The virtual worm behind the real codec: every goal and every reading are packets.
+pub struct Wired {
+    bus: WormBus<FaultInjector<Wire>>,
+    settings: LinkSettings,
+    plan: ExchangePlan,
+    /// How long a tick waits for answers, s.
+    tick_timeout_s: f64,
+    /// Deadline of an exchange at the virtual time 0, far enough away never to pass.
+    epoch: Instant,
+}
+
+impl Wired {
+    /// The devices after the controller's start-up checks, at time 0.
+    ///
+    /// # Errors
+    /// [`MachineError`] when there is nothing to simulate, or the devices fail the checks.
+    pub fn new(config: &Config, options: &Options) -> Result<Self, MachineError> {
+        let wire = Wire {
+            devices: Devices::new(config, options)?,
+            now_s: 0.0,
+            timeout_s: SERVICE_TIMEOUT_S,
+            give_up_s: 0.0,
+            line: Vec::new(),
+        };
+        let seed = options.seed.unwrap_or(config.virtual_worm.seed);
+        let mut bus = WormBus::new(FaultInjector::new(wire, Faults::NONE, seed));
+        let settings = link_settings(config, 4_000_000)?;
+        let plan = prepare(&mut bus, &settings, &mut Vec::new())?.plan;
+        Ok(Self {
+            bus,
+            settings,
+            plan,
+            tick_timeout_s: config.control.bus_wait_share / config.control.rate_hz,
+            epoch: Instant::now() + NEVER,
+        })
+    }
+
+    fn wire(&mut self) -> &mut Wire {
+        self.bus.port_mut().port_mut()
+    }
+
+    /// When the first goal velocity other than zero was obeyed, s.
+    pub fn crawl_began_s(&mut self) -> Option<f64> {
+        self.wire().devices.crawl_began_s()
+    }
+
+    /// Switches a fault on from now on; START and END of its window are seconds from now.
+    ///
+    /// # Errors
+    /// [`DevicesError`] when this worm cannot have it.
+    pub fn switch_on(&mut self, fault: Fault) -> Result<(), DevicesError> {
+        self.wire().devices.switch_on(fault)
+    }
+
+    /// Ends all faults, or those of a kind. Returns how many there were.
+    pub fn clear_faults(&mut self, kind: Option<&str>) -> usize {
+        self.wire().devices.clear_faults(kind)
+    }
+
+    /// Changes the faults of the cable, byte by byte.
+    pub fn set_line_faults(&mut self, faults: Faults) {
+        self.bus.port_mut().set_faults(faults);
+    }
+
+    /// As [`Drive`](crate::control::Drive) arms.
+    fn arm(&mut self) -> bool {
+        if self.hardware_errors().is_some_and(|bits| bits != 0)
+            && self.bus.reboot_servo(self.settings.servo_id).is_err()
+        {
+            return false;
+        }
+        prepare(&mut self.bus, &self.settings, &mut Vec::new()).is_ok_and(|prepared| {
+            self.plan = prepared.plan;
+            self.bus.set_torque(self.settings.servo_id, true).is_ok()
+        })
+    }
+
+    fn hardware_errors(&mut self) -> Option<u8> {
+        let servo = self.settings.servo_id;
+        let deadline = Instant::now() + NEVER;
+        let bits = self.bus.read_register(servo, HARDWARE_ERROR_STATUS, deadline);
+        bits.ok().map(|bits| bits as u8)
+    }
+}
+
+impl Machine for Wired {
+    fn exchange(&mut self, goal_counts: i32, now_s: f64) -> Exchange {
+        let timeout_s = self.tick_timeout_s;
+        let wire = self.wire();
+        (wire.now_s, wire.timeout_s) = (now_s, timeout_s);
+        let goal_rad_s = f64::from(goal_counts) * scale::VELOCITY_RAD_S;
+        let deadline = self.epoch + Duration::from_secs_f64(now_s);
+        let outcome = self.bus.exchange(&self.plan, goal_rad_s, deadline);
+        Exchange {
+            servo: outcome.servo.ok(),
+            tracker: outcome.tracker.ok(),
+            lost: outcome.lost,
+        }
+    }
+
+    fn serve(&mut self, service: Service, now_s: f64) -> Served {
+        let wire = self.wire();
+        (wire.now_s, wire.timeout_s) = (wire.now_s.max(now_s), SERVICE_TIMEOUT_S);
+        let done = match service {
+            Service::Arm => self.arm(),
+            Service::Disarm => self.bus.set_torque(self.settings.servo_id, false).is_ok(),
+        };
+        let hardware_error = self.hardware_errors();
+        Served {
+            outcome: if done {
+                ServiceOutcome::Done(service)
+            } else {
+                ServiceOutcome::Failed(service)
+            },
+            hardware_error,
+            ended_s: self.wire().now_s,
+        }
+    }
+
+    fn plant(&mut self) -> &Plant {
+        self.wire().devices.plant()
+    }
+}

@@ -1,0 +1,294 @@
+//! What a soak found, as text and as JSON.
+
+use serde::Serialize;
+use std::fmt;
+
+/// The energies of a cycle that are held against the ledger.
+pub const QUANTITIES: [&str; 6] = [
+    "loss (11)",
+    "net (13)",
+    "positive (13)",
+    "electrical",
+    "copper",
+    "inside",
+];
+
+/// Findings that are listed; more are only counted.
+const LISTED: usize = 20;
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FindingKind {
+    /// An invariant is broken.
+    Invariant,
+    /// An alarm that no fault explains.
+    FalseAlarm,
+    /// A fault that had to be noticed and was not.
+    Missed,
+    /// A fault that was noticed after its bound.
+    Late,
+}
+
+/// One thing that is wrong.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// What.
+    pub kind: FindingKind,
+    /// The segment.
+    pub segment: u64,
+    /// Time in the segment, s.
+    pub time_s: f64,
+    /// What happened.
+    pub text: String,
+    /// A command line that runs exactly this segment again.
+    pub command: String,
+}
+
+/// One kind of fault.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FaultTally {
+    /// Its name.
+    pub fault: &'static str,
+    /// How often it was drawn.
+    pub drawn: u64,
+    /// How often something was noticed of it.
+    pub noticed: u64,
+    /// How often it was noticed after its bound.
+    pub late: u64,
+    /// How often it had to be noticed and was not.
+    pub missed: u64,
+    /// The longest time until it was noticed, where it had to be, s.
+    pub slowest_s: f64,
+}
+
+/// Error of one energy per settled cycle against the ledger.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct EnergyError {
+    /// Which energy.
+    pub energy: &'static str,
+    /// Cycles that were compared.
+    pub cycles: u64,
+    /// Mean error, %.
+    pub mean_percent: f64,
+    /// Root mean square of the errors, %.
+    pub rms_percent: f64,
+    /// Largest error, %.
+    pub worst_percent: f64,
+}
+
+/// Sums over errors, %.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ErrorSums {
+    count: u64,
+    sum: f64,
+    squares: f64,
+    worst: f64,
+}
+
+impl ErrorSums {
+    /// Adds one error, %.
+    pub fn add(&mut self, percent: f64) {
+        self.count += 1;
+        self.sum += percent;
+        self.squares += percent * percent;
+        if percent.abs() > self.worst.abs() {
+            self.worst = percent;
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sum += other.sum;
+        self.squares += other.squares;
+        if other.worst.abs() > self.worst.abs() {
+            self.worst = other.worst;
+        }
+    }
+}
+
+/// What one segment came to.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// Its number.
+    pub segment: u64,
+    /// Simulated time, s.
+    pub time_s: f64,
+    /// Gait cycles that the worm did.
+    pub cycles: u64,
+    /// Alarms that a fault explains.
+    pub true_alarms: u64,
+    /// By kind of fault, in the order of the table.
+    pub faults: Vec<FaultTally>,
+    /// By energy.
+    pub energies: [ErrorSums; QUANTITIES.len()],
+    /// What is wrong: kind, time in the segment in s, and what happened.
+    pub findings: Vec<(FindingKind, f64, String)>,
+}
+
+/// What a soak found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SoakReport {
+    /// Seed of everything that was drawn.
+    pub seed: u64,
+    /// Segments that were run.
+    pub segments: u64,
+    /// Simulated time, h.
+    pub hours: f64,
+    /// Time that it took, s.
+    pub took_s: f64,
+    /// Simulated hours per minute.
+    pub hours_per_minute: f64,
+    /// Ticks per second.
+    pub rate_hz: f64,
+    /// Length of the plant's steps, s.
+    pub step_s: f64,
+    /// Gait cycles.
+    pub cycles: u64,
+    /// Faults that were drawn.
+    pub drawn: u64,
+    /// Alarms that a fault explains.
+    pub alarms_true: u64,
+    /// Alarms that no fault explains.
+    pub alarms_false: u64,
+    /// Faults that had to be noticed and were not.
+    pub missed: u64,
+    /// Faults that were noticed after their bound.
+    pub late: u64,
+    /// Segments in which an invariant was broken; each ends there.
+    pub broken: u64,
+    /// By kind of fault.
+    pub faults: Vec<FaultTally>,
+    /// Energy per settled cycle without a fault, against the virtual worm's ledger.
+    pub energies: Vec<EnergyError>,
+    /// The first things that are wrong, in the order of the segments, broken invariants first.
+    pub findings: Vec<Finding>,
+}
+
+impl SoakReport {
+    /// Sums up the segments.
+    pub fn of(seed: u64, tallies: &[Tally], took_s: f64) -> Self {
+        let sum = |part: fn(&Tally) -> u64| tallies.iter().map(part).sum::<u64>();
+        let count = |kind| {
+            let of_kind = |tally: &Tally| tally.findings.iter().filter(|finding| finding.0 == kind).count() as u64;
+            tallies.iter().map(of_kind).sum::<u64>()
+        };
+        let hours = tallies.iter().map(|tally| tally.time_s).sum::<f64>() / 3600.0;
+        let mut faults: Vec<FaultTally> = Vec::new();
+        for tally in tallies {
+            for one in &tally.faults {
+                match faults.iter_mut().find(|fault| fault.fault == one.fault) {
+                    Some(fault) => {
+                        fault.drawn += one.drawn;
+                        fault.noticed += one.noticed;
+                        fault.late += one.late;
+                        fault.missed += one.missed;
+                        fault.slowest_s = fault.slowest_s.max(one.slowest_s);
+                    }
+                    None => faults.push(one.clone()),
+                }
+            }
+        }
+        let energies = QUANTITIES.iter().enumerate().map(|(index, energy)| {
+            let mut sums = ErrorSums::default();
+            tallies.iter().for_each(|tally| sums.merge(&tally.energies[index]));
+            let count = (sums.count as f64).max(1.0);
+            EnergyError {
+                energy,
+                cycles: sums.count,
+                mean_percent: sums.sum / count,
+                rms_percent: (sums.squares / count).sqrt(),
+                worst_percent: sums.worst,
+            }
+        });
+        let mut findings: Vec<Finding> = tallies
+            .iter()
+            .flat_map(|tally| {
+                tally.findings.iter().map(|(kind, time_s, text)| Finding {
+                    kind: *kind,
+                    segment: tally.segment,
+                    time_s: *time_s,
+                    text: text.clone(),
+                    command: format!("wormd soak --seed {seed} --segment {}", tally.segment),
+                })
+            })
+            .collect();
+        findings.sort_by_key(|finding| (finding.kind, finding.segment));
+        findings.truncate(LISTED);
+        Self {
+            seed,
+            segments: tallies.len() as u64,
+            hours,
+            took_s,
+            hours_per_minute: hours / (took_s / 60.0),
+            rate_hz: super::RATE_HZ,
+            step_s: super::STEP_S,
+            cycles: sum(|tally| tally.cycles),
+            drawn: faults.iter().map(|fault| fault.drawn).sum(),
+            alarms_true: sum(|tally| tally.true_alarms),
+            alarms_false: count(FindingKind::FalseAlarm),
+            missed: count(FindingKind::Missed),
+            late: count(FindingKind::Late),
+            broken: count(FindingKind::Invariant),
+            faults,
+            energies: energies.collect(),
+            findings,
+        }
+    }
+
+    /// Whether everything was as it must be.
+    pub fn passed(&self) -> bool {
+        self.findings.is_empty()
+    }
+}
+
+impl fmt::Display for SoakReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "seed {}: {:.1} h in {} segments, {} gait cycles, {} faults; ticks at {} Hz, steps of {} ms; took {:.0} s ({:.1} h per minute)",
+            self.seed,
+            self.hours,
+            self.segments,
+            self.cycles,
+            self.drawn,
+            self.rate_hz,
+            self.step_s * 1e3,
+            self.took_s,
+            self.hours_per_minute
+        )?;
+        writeln!(
+            f,
+            "alarms: {} true, {} false; faults: {} missed, {} late; invariants: {} broken",
+            self.alarms_true, self.alarms_false, self.missed, self.late, self.broken
+        )?;
+        writeln!(
+            f,
+            "\n{:<28} {:>6} {:>8} {:>6} {:>6}  slowest",
+            "fault", "drawn", "noticed", "late", "missed"
+        )?;
+        for fault in &self.faults {
+            writeln!(
+                f,
+                "{:<28} {:>6} {:>8} {:>6} {:>6}  {:.3} s",
+                fault.fault, fault.drawn, fault.noticed, fault.late, fault.missed, fault.slowest_s
+            )?;
+        }
+        writeln!(f, "\nenergy per settled cycle against the ledger, %")?;
+        for energy in &self.energies {
+            writeln!(
+                f,
+                "{:<16} mean {:+.2}  rms {:.2}  worst {:+.1}  ({} cycles)",
+                energy.energy, energy.mean_percent, energy.rms_percent, energy.worst_percent, energy.cycles
+            )?;
+        }
+        for finding in &self.findings {
+            write!(
+                f,
+                "\n{:?} at {:.3} s of segment {}: {}\n  {}",
+                finding.kind, finding.time_s, finding.segment, finding.text, finding.command
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,532 @@
+//! One segment: a drawn worm with its operator, quiet stretches and faults in turn.
+
+use super::draw::{self, Cause, Drawn, ROWS};
+use super::invariants::{Broken, Invariants, Truth};
+use super::machine::{Machine, Wired};
+use super::report::{FaultTally, FindingKind, QUANTITIES, Tally};
+use super::session::{Paused, Session, Tick};
+use super::{RATE_HZ, SEGMENT_S, STEP_S, worm};
+use crate::link::virtual_worm::{Options, PlantLedger};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::collections::VecDeque;
+use worm_estimator::config::Config;
+use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, State};
+
+/// How much of a segment is without a fault at the least between two, s.
+const QUIET_S: std::ops::Range<f64> = 60.0..420.0;
+/// Cycles at a steady speed before a fault: the alarms have calibrated on three.
+const STEADY_CYCLES: std::ops::Range<f64> = 4.5..7.0;
+/// A cycle of the ledger is the estimator's when they end within this share of a cycle.
+const SAME_END: f64 = 0.03;
+
+type Energy = (fn(&Cycle) -> f64, fn(&PlantLedger) -> f64);
+
+/// In the order of [`QUANTITIES`].
+const ENERGIES: [Energy; QUANTITIES.len()] = [
+    (|c| c.energy_loss_j, |t| t.loss_j),
+    (|c| c.energy_actuator_net_j, |t| t.actuator_net_j),
+    (|c| c.energy_actuator_positive_j, |t| t.actuator_positive_j),
+    (|c| c.energy_electrical_j, |t| t.electrical_j),
+    (|c| c.energy_copper_j, |t| t.copper_j),
+    (|c| c.energy_friction_inside_j, |t| t.friction_inside_j),
+];
+
+/// The segment is over: its time is up, or an invariant is broken.
+struct Over;
+
+/// The fault under way, or one that ended not long ago.
+struct Episode {
+    drawn: Drawn,
+    began_s: f64,
+    /// Whether it had to be noticed.
+    must_s: Option<f64>,
+    noticed_s: Option<f64>,
+    /// Until when it explains alarms, s; none while it lasts.
+    explains_until_s: Option<f64>,
+}
+
+struct Segment {
+    config: Config,
+    rng: Xoshiro256PlusPlus,
+    session: Session<Wired>,
+    invariants: Invariants,
+    began_s: f64,
+    /// Alarms of the session that were looked at.
+    alarms_seen: usize,
+    last_mode: Mode,
+    episode: Option<Episode>,
+    /// Time from which on cycles are undisturbed, s.
+    undisturbed_since_s: f64,
+    /// Cycles of the ledger that were looked at, and the newest ones with their ends.
+    ledger_seen: usize,
+    accounts: VecDeque<(f64, PlantLedger)>,
+    /// What the operator wants, cycles per second.
+    speed: f64,
+    tally: Tally,
+}
+
+/// Runs segment `number` of a soak with this seed.
+pub fn run(seed: u64, number: u64) -> Tally {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ number.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    let tally = Tally {
+        segment: number,
+        faults: ROWS
+            .iter()
+            .map(|row| FaultTally {
+                fault: row.name,
+                ..FaultTally::default()
+            })
+            .collect(),
+        ..Tally::default()
+    };
+    match Segment::new(&mut rng, tally.clone()) {
+        Ok(mut segment) => {
+            // Either way it is over.
+            let _over: Result<(), Over> = segment.live();
+            segment.close()
+        }
+        Err(error) => Tally {
+            findings: vec![(FindingKind::Invariant, 0.0, format!("a sound worm starts: {error}"))],
+            ..tally
+        },
+    }
+}
+
+impl Segment {
+    fn new(rng: &mut Xoshiro256PlusPlus, tally: Tally) -> Result<Self, Box<dyn std::error::Error>> {
+        let config = worm::draw(rng)?;
+        let options = Options {
+            seed: Some(rng.random()),
+            step_s: Some(STEP_S),
+            ..Options::default()
+        };
+        let mut session = Session::new(&config, Wired::new(&config, &options)?, RATE_HZ)?;
+        session.cycles = Some(Vec::new());
+        Ok(Self {
+            invariants: Invariants::new(&config),
+            began_s: session.now_s(),
+            session,
+            rng: rng.clone(),
+            alarms_seen: 0,
+            last_mode: Mode::Disarmed,
+            episode: None,
+            undisturbed_since_s: 0.0,
+            ledger_seen: 0,
+            accounts: VecDeque::new(),
+            speed: config.gait_cycles_per_s(),
+            config,
+            tally,
+        })
+    }
+
+    fn live(&mut self) -> Result<(), Over> {
+        self.pass_s(0.1)?;
+        self.must_accept(CommandKind::Arm, 0.0)?;
+        self.pass_s(0.1)?;
+        loop {
+            self.crawl_quietly()?;
+            self.suffer()?;
+        }
+    }
+
+    fn close(mut self) -> Tally {
+        let ledger = self.session.machine.plant().ledger();
+        self.tally.cycles = ledger.cycles().len() as u64 + ledger.forgotten_cycles();
+        self.tally.time_s = self.session.now_s() - self.began_s;
+        self.tally
+    }
+
+    /// Without a fault, as an operator would have it.
+    fn crawl_quietly(&mut self) -> Result<(), Over> {
+        let until_s = self.session.now_s() + self.rng.random_range(QUIET_S);
+        let gait = self.config.gait_cycles_per_s();
+        while self.session.now_s() < until_s {
+            match self.rng.random_range(0..6) {
+                0 => self.must_accept(CommandKind::Hold, 0.0)?,
+                1 if self.session.mode() == Mode::Crawling => {
+                    self.must_accept(CommandKind::Stop, 0.0)?;
+                    let rest_s = self.rng.random_range(1.0..8.0);
+                    self.pass_s(rest_s)?;
+                    self.must_accept(CommandKind::Arm, 0.0)?;
+                }
+                2 => self.speed = -self.speed,
+                3 => self.speed = gait.copysign(self.speed) * self.rng.random_range(0.6..1.2),
+                _ => {}
+            }
+            let pause_s = self.rng.random_range(0.5..6.0);
+            self.pass_s(pause_s)?;
+            let speed = self.speed;
+            self.must_accept(CommandKind::Crawl, speed)?;
+            let cycles = self.rng.random_range(0.3..20.0);
+            self.pass_s(cycles / speed.abs())?;
+            if self.session.mode() != Mode::Crawling {
+                let text = format!("{} instead of crawling", self.session.mode());
+                return self.broken("a sound worm crawls on", text);
+            }
+        }
+        Ok(())
+    }
+
+    /// A fault at some moment of some mode, until the worm crawls again.
+    fn suffer(&mut self) -> Result<(), Over> {
+        let drawn = draw::draw(&mut self.rng, &self.config, 1.0 / self.speed.abs());
+        let speed = self.speed;
+        self.must_accept(CommandKind::Crawl, speed)?;
+        let steady_s = self.rng.random_range(STEADY_CYCLES) / speed.abs();
+        self.pass_s(steady_s)?;
+        match self.rng.random_range(0..10) {
+            0 => {
+                self.must_accept(CommandKind::Hold, 0.0)?;
+                let rest_s = self.rng.random_range(0.0..3.0);
+                self.pass_s(rest_s)?;
+            }
+            1 => self.must_accept(CommandKind::Stop, 0.0)?,
+            _ => {}
+        }
+        self.tally_of(&drawn).drawn += 1;
+        self.episode = Some(Episode {
+            began_s: self.session.now_s(),
+            // Torque is on in every mode but disarmed; only a crawling worm shows everything.
+            must_s: drawn.must_s.filter(|_| match self.session.mode() {
+                Mode::Crawling => true,
+                Mode::Holding => !drawn.crawling,
+                _ => false,
+            }),
+            noticed_s: None,
+            explains_until_s: None,
+            drawn: drawn.clone(),
+        });
+        let lasts_s = drawn.lasts_s;
+        match &drawn.cause {
+            Cause::VirtualWorm(spec) => {
+                let switched_on = spec
+                    .parse()
+                    .map_err(|error| format!("{spec}: {error}"))
+                    .and_then(|fault| self.session.machine.switch_on(fault).map_err(|error| error.to_string()));
+                if let Err(error) = switched_on {
+                    return self.broken("a drawn fault can be switched on", error);
+                }
+            }
+            Cause::Pause(paused, ms) => self.session.pause(*paused, *ms),
+        }
+        if matches!(&drawn.cause, Cause::Pause(Paused::Controller | Paused::Computer, _)) {
+            // Nobody could notice anything while nothing ran.
+            if let Some(episode) = &mut self.episode {
+                episode.began_s = self.session.now_s();
+            }
+        }
+        self.pass_s(lasts_s)?;
+        self.session.machine.clear_faults(None);
+        self.judge();
+        self.recover(drawn.row.recovery_s)?;
+        // Crawls on until nothing that follows can be the fault's.
+        let speed = self.speed;
+        let aftermath_s = draw::AFTERMATH_CYCLES / speed.abs() + 10.0;
+        if let Some(episode) = &mut self.episode {
+            episode.explains_until_s = Some(self.session.now_s() + aftermath_s);
+        }
+        self.crawl_to_the_end_of_the_episode()?;
+        self.episode = None;
+        self.undisturbed_since_s = self.session.now_s();
+        Ok(())
+    }
+
+    fn crawl_to_the_end_of_the_episode(&mut self) -> Result<(), Over> {
+        while let Some(until_s) = self.episode.as_ref().and_then(|episode| episode.explains_until_s)
+            && self.session.now_s() < until_s
+        {
+            self.pass_s(1.0)?;
+            if self.session.mode() != Mode::Crawling {
+                self.recover(draw::RECOVERY_S)?;
+            }
+        }
+        // What follows is calibrated anew.
+        self.recover(draw::RECOVERY_S)
+    }
+
+    /// The fault is over: was it noticed, and in time?
+    fn judge(&mut self) {
+        let Some(episode) = &self.episode else { return };
+        let (row, must_s) = (episode.drawn.row, episode.must_s);
+        let noticed_s = episode.noticed_s.map(|noticed_s| noticed_s - episode.began_s);
+        let what = format!("{} ({:?})", row.name, episode.drawn.cause);
+        let drawn = episode.drawn.clone();
+        let tally = self.tally_of(&drawn);
+        tally.noticed += u64::from(noticed_s.is_some());
+        let Some(must_s) = must_s else { return };
+        match noticed_s {
+            None => {
+                tally.missed += 1;
+                self.find(
+                    FindingKind::Missed,
+                    format!("{what}: nothing within {:.2} s", drawn.lasts_s),
+                );
+            }
+            Some(noticed_s) => {
+                tally.slowest_s = tally.slowest_s.max(noticed_s);
+                if noticed_s > must_s {
+                    tally.late += 1;
+                    self.find(
+                        FindingKind::Late,
+                        format!("{what}: after {noticed_s:.3} s, {must_s:.3} s at most"),
+                    );
+                }
+            }
+        }
+    }
+
+    /// The operator makes the worm crawl again: resets, arms, commands, until it does.
+    fn recover(&mut self, within_s: f64) -> Result<(), Over> {
+        let until_s = self.session.now_s() + within_s;
+        let mut refused = 0;
+        while self.session.now_s() < until_s {
+            let speed = self.speed;
+            match self.session.mode() {
+                Mode::Fault => {
+                    self.try_command(CommandKind::Reset, 0.0)?;
+                    self.pass_s(1.0)?;
+                }
+                Mode::Disarmed => {
+                    self.try_command(CommandKind::Arm, 0.0)?;
+                    self.pass_s(0.5)?;
+                }
+                Mode::Stopping => self.pass_s(0.5)?,
+                Mode::Armed | Mode::Holding => {
+                    if self.try_command(CommandKind::Crawl, speed)? == Some(CommandOutcome::AlarmStands) {
+                        refused += 1;
+                        if refused > 2 {
+                            self.try_command(CommandKind::Reset, 0.0)?;
+                        }
+                        self.pass_s(1.5)?;
+                    }
+                }
+                Mode::Crawling => {
+                    let phase = self.session.machine.plant().body().phase();
+                    self.pass_s(1.0 / speed.abs())?;
+                    let done = (self.session.machine.plant().body().phase() - phase).abs();
+                    if self.session.mode() == Mode::Crawling && done > 0.7 {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+        let text = format!(
+            "{} (fault {}) {within_s} s later, {refused} times refused because of {:?}",
+            self.session.mode(),
+            self.session.fault(),
+            self.standing()
+        );
+        self.broken("a worm whose fault is over crawls again", text)
+    }
+
+    /// The alarms that stand.
+    fn standing(&self) -> Vec<&'static str> {
+        let mask = self.session.observer.latest().raised_mask;
+        let kinds = AlarmKind::ALL.iter().filter(|kind| mask >> kind.code() & 1 == 1);
+        kinds.map(|kind| kind.name()).collect()
+    }
+
+    fn try_command(&mut self, kind: CommandKind, cycles_per_s: f64) -> Result<Option<CommandOutcome>, Over> {
+        let command = Command {
+            cycles_per_s,
+            ..Command::new(kind)
+        };
+        self.tick(Some(command)).map(|tick| tick.verdict)
+    }
+
+    fn must_accept(&mut self, kind: CommandKind, cycles_per_s: f64) -> Result<(), Over> {
+        match self.try_command(kind, cycles_per_s)? {
+            Some(CommandOutcome::Accepted) => Ok(()),
+            other => {
+                let text = format!(
+                    "{kind} while {}: {other:?}, alarms {:?}",
+                    self.session.mode(),
+                    self.standing()
+                );
+                self.broken("a sound worm obeys", text)
+            }
+        }
+    }
+
+    fn pass_s(&mut self, seconds: f64) -> Result<(), Over> {
+        let until_s = self.session.now_s() + seconds;
+        while self.session.now_s() < until_s {
+            self.tick(None)?;
+        }
+        Ok(())
+    }
+
+    /// One tick, and everything that is to be said about it.
+    fn tick(&mut self, command: Option<Command>) -> Result<Tick, Over> {
+        let tick = self.session.tick(command);
+        self.take_accounts();
+        let stood_ns = self.session.stood_ns();
+        let plant = self.session.machine.plant();
+        let truth = Truth {
+            velocity_rad_s: plant.motor().velocity_rad_per_s(),
+            phase: plant.body().phase(),
+            stood_ns,
+        };
+        if let Some(broken) = self.invariants.look(&tick.state, tick.goal_counts, &truth) {
+            return self.end_with(broken);
+        }
+        while self.alarms_seen < self.session.raised.len() {
+            let alarm = self.session.raised[self.alarms_seen];
+            self.alarms_seen += 1;
+            self.take_alarm(&alarm);
+        }
+        self.take_mode(&tick.state)?;
+        for cycle in self.session.cycles.as_mut().map(std::mem::take).unwrap_or_default() {
+            let undisturbed = self.is_undisturbed(&cycle);
+            if let Some(broken) = Invariants::look_at_cycle(&cycle, undisturbed) {
+                return self.end_with(broken);
+            }
+            if undisturbed {
+                self.compare(&cycle);
+            }
+        }
+        if self.session.now_s() - self.began_s >= SEGMENT_S {
+            return Err(Over);
+        }
+        Ok(tick)
+    }
+
+    fn take_alarm(&mut self, alarm: &Alarm) {
+        let now_s = self.session.now_s();
+        let kind = AlarmKind::try_from(alarm.kind).ok();
+        let explained = self.episode.as_mut().filter(|episode| {
+            kind.is_some_and(|kind| episode.drawn.row.alarms.contains(&kind) || follows_from_fault(kind, episode))
+        });
+        match explained {
+            Some(episode) => {
+                episode.noticed_s.get_or_insert(now_s);
+                self.tally.true_alarms += 1;
+            }
+            None => {
+                let during = self.episode.as_ref().map_or_else(
+                    || "no fault".to_owned(),
+                    |episode| format!("{} ({:?})", episode.drawn.row.name, episode.drawn.cause),
+                );
+                let name = kind.map_or("unknown", AlarmKind::name);
+                let text = format!(
+                    "{name}: {:.4} beyond {:.4}, cell {}, phase {:.2}, speed {:.3}, slope {}°, with {during}",
+                    alarm.value,
+                    alarm.threshold,
+                    alarm.cell as i32,
+                    alarm.phase,
+                    self.speed,
+                    self.config.canal.slope_deg
+                );
+                self.find(FindingKind::FalseAlarm, text);
+            }
+        }
+    }
+
+    fn take_mode(&mut self, state: &State) -> Result<(), Over> {
+        let Ok(mode) = Mode::try_from(state.mode) else {
+            return self.broken("the mode is known", format!("mode {}", state.mode));
+        };
+        let was = std::mem::replace(&mut self.last_mode, mode);
+        if mode != Mode::Fault || was == Mode::Fault {
+            return Ok(());
+        }
+        let now_s = self.session.now_s();
+        let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
+        match &mut self.episode {
+            Some(episode) if episode.drawn.row.faults.contains(&fault) => {
+                episode.noticed_s.get_or_insert(now_s);
+                Ok(())
+            }
+            episode => {
+                let text = format!(
+                    "{fault} (alarm {}) from {was}, with {}",
+                    state.fault_alarm as i32,
+                    episode
+                        .as_ref()
+                        .map_or_else(|| "no fault".to_owned(), |episode| format!("{:?}", episode.drawn.cause))
+                );
+                self.broken("a stop has the right reason", text)
+            }
+        }
+    }
+
+    /// Notes the cycles that the ledger has closed.
+    fn take_accounts(&mut self) {
+        let offset_s = self.session.now_s() - self.session.world_s();
+        let plant = self.session.machine.plant();
+        let cycles = plant.ledger().cycles();
+        while self.ledger_seen < cycles.len() {
+            self.accounts
+                .push_back((plant.time_s() + offset_s, cycles[self.ledger_seen].clone()));
+            self.ledger_seen += 1;
+        }
+        while self.accounts.len() > 4 {
+            self.accounts.pop_front();
+        }
+    }
+
+    /// Whether neither a fault nor a pause can have anything to do with this cycle.
+    fn is_undisturbed(&self, cycle: &Cycle) -> bool {
+        let before_s = cycle.end_ns as f64 * 1e-9 - 2.0 * cycle.duration_s;
+        self.episode.is_none() && before_s >= self.undisturbed_since_s && cycle.host_paused_s == 0.0
+    }
+
+    /// Holds a settled cycle against the ledger's.
+    fn compare(&mut self, cycle: &Cycle) {
+        let (end_s, tolerance_s) = (cycle.end_ns as f64 * 1e-9, SAME_END * cycle.duration_s);
+        if cycle.settled != 1 {
+            return;
+        }
+        let same = |(true_end_s, truth): &&(f64, PlantLedger)| {
+            (true_end_s - end_s).abs() < tolerance_s && (truth.duration_s - cycle.duration_s).abs() < tolerance_s
+        };
+        if let Some((_, truth)) = self.accounts.iter().find(same) {
+            for ((measured, true_value), sums) in ENERGIES.iter().zip(&mut self.tally.energies) {
+                sums.add(100.0 * (measured(cycle) / true_value(truth) - 1.0));
+            }
+        }
+    }
+
+    fn tally_of(&mut self, drawn: &Drawn) -> &mut FaultTally {
+        let index = ROWS.iter().position(|row| row.name == drawn.row.name).unwrap_or(0);
+        &mut self.tally.faults[index]
+    }
+
+    fn find(&mut self, kind: FindingKind, text: String) {
+        self.tally
+            .findings
+            .push((kind, self.session.now_s() - self.began_s, text));
+    }
+
+    fn end_with<T>(&mut self, broken: Broken) -> Result<T, Over> {
+        self.broken(broken.rule, broken.text)
+    }
+
+    fn broken<T>(&mut self, rule: &str, text: String) -> Result<T, Over> {
+        let during = self.episode.as_ref().map_or_else(String::new, |episode| {
+            let for_s = self.session.now_s() - episode.began_s;
+            format!(
+                "; {for_s:.3} s after the beginning of {:?}, which lasts {:.3} s",
+                episode.drawn.cause, episode.drawn.lasts_s
+            )
+        });
+        self.find(FindingKind::Invariant, format!("{rule}: {text}{during}"));
+        Err(Over)
+    }
+}
+
+/// The estimator reports the controller's own faults, too.
+fn follows_from_fault(kind: AlarmKind, episode: &Episode) -> bool {
+    let stopped_by_device = episode.drawn.row.faults.iter().any(|fault| {
+        [
+            Fault::WatchdogTripped,
+            Fault::ServoRestarted,
+            Fault::ServoHardware,
+            Fault::OverTemperature,
+            Fault::UnderVoltage,
+        ]
+        .contains(fault)
+    });
+    kind == AlarmKind::DeviceFault && stopped_by_device
+}

@@ -1,0 +1,97 @@
+//! A worm, drawn: its cells, contacts, canal, gait, motor and what its tracker sees.
+
+use rand::RngExt;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use worm_estimator::config::{Config, ConfigError};
+
+/// How often a worm is drawn anew that cannot hold itself on its slope.
+const ATTEMPTS: u32 = 100;
+
+/// Draws configurations until one is valid.
+///
+/// # Errors
+/// What is wrong with the last one; never seen with the ranges below.
+pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Result<Config, ConfigError> {
+    let mut config = Err(ConfigError::Values {
+        file: "drawn worm".into(),
+        problems: Vec::new(),
+    });
+    for _ in 0..ATTEMPTS {
+        config = Config::from_toml(&toml(rng), "drawn worm".as_ref());
+        if config.is_ok() {
+            break;
+        }
+    }
+    config
+}
+
+/// A number between, evenly on a logarithmic scale.
+fn log_uniform(rng: &mut Xoshiro256PlusPlus, from: f64, to: f64) -> f64 {
+    rng.random_range(from.ln()..to.ln()).exp()
+}
+
+fn toml(rng: &mut Xoshiro256PlusPlus) -> String {
+    let cells: usize = rng.random_range(3..=6);
+    // Three cells hold less, and a steeper canal leaves them next to no advance.
+    let slopes: &[f64] = match cells {
+        3 => &[0.0, 0.0, 10.0, 20.0],
+        _ => &[0.0, 0.0, 10.0, 20.0, 30.0, 45.0],
+    };
+    let slope_deg = slopes[rng.random_range(0..slopes.len())];
+    let order: Vec<String> = (1..=cells).map(|cell| cell.to_string()).collect();
+    let deformation_m = rng.random_range(0.0015..0.0019);
+    let bounds: Vec<String> = (0..cells)
+        .map(|_| format!("{:.6}", deformation_m * rng.random_range(0.85..1.15)))
+        .collect();
+    let bounds = format!("[{}]", bounds.join(", "));
+    // Known bounds, or a first guess that the estimator has to improve, as after the first power-up.
+    let (known, source) = if rng.random_bool(0.7) {
+        (bounds.clone(), "measured")
+    } else {
+        (format!("{:.6}", 0.9 * deformation_m), "identified")
+    };
+    let noise_m = log_uniform(rng, 5e-5, 3e-4);
+    let dropout_share = if rng.random_bool(0.5) {
+        0.0
+    } else {
+        rng.random_range(0.0..0.1)
+    };
+    format!(
+        "canal.slope_deg = {slope_deg}\n\
+         gait.cycle_s = {cycle_s:.4}\n\
+         gait.direction = \"{direction}\"\n\
+         tracker.noise_m = {noise_m:.7}\n\
+         servo.winding_resistance_ohm = {resistance:.3}\n\
+         servo.torque_constant_n_m_per_a = {torque_constant:.4}\n\
+         control.rate_hz = {rate_hz}\n\
+         [worm]\n\
+         cells = {cells}\n\
+         step_order = [{order}]\n\
+         mass_kg = {mass:.4}\n\
+         stroke_m = {stroke:.5}\n\
+         stiffness_n_per_m = {stiffness:.1}\n\
+         max_deformation_m = {known}\n\
+         max_deformation = \"{source}\"\n\
+         [virtual_worm]\n\
+         max_deformation_m = {bounds}\n\
+         noise_m = {noise_m:.7}\n\
+         dropout_share = {dropout_share:.4}\n\
+         scatter_share = {scatter:.4}\n\
+         inner_friction_n_m = {friction:.4}\n\
+         inertia_kg_m2 = {inertia:.6}\n\
+         ambient_c = {ambient:.1}\n",
+        cycle_s = log_uniform(rng, 1.25, 10.0),
+        direction = if rng.random_bool(0.8) { "forward" } else { "backward" },
+        resistance = rng.random_range(3.1..3.7),
+        torque_constant = rng.random_range(0.36..0.42),
+        rate_hz = super::RATE_HZ,
+        order = order.join(", "),
+        mass = 0.083 * cells as f64 * rng.random_range(0.9..1.1),
+        stroke = rng.random_range(0.0105..0.0135),
+        stiffness = rng.random_range(850.0..1100.0),
+        scatter = rng.random_range(0.0..0.015),
+        friction = rng.random_range(0.035..0.065),
+        inertia = rng.random_range(1.5e-4..3e-4),
+        ambient = rng.random_range(10.0..35.0),
+    )
+}
