@@ -8,12 +8,14 @@
 //! it.
 
 use super::markers::Markers;
+use super::sanity_check::MAX_POSITION_M;
 use super::series::Recording;
 use super::statistics::moves;
 use super::statistics::{quantile, spread};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 use std::str::FromStr;
+use worm_estimator::abridged::first_of;
 use worm_log::ReadError;
 use worm_physics::MAX_CELLS;
 
@@ -26,6 +28,10 @@ const CLEAR_FRACTION: f64 = 0.5;
 const MIN_NET_FRACTION: f64 = 0.2;
 /// Motion across the canal, as a fraction of that along it, above which a warning is given.
 const STRAIGHT_FRACTION: f64 = 0.05;
+/// Most markers that are named because they were left out.
+const MAX_LEFT_OUT_NAMED: usize = 20;
+/// Longest name of a marker that is quoted in a list, bytes.
+const MAX_QUOTED_NAME: usize = 100;
 const AXIS_REMEDY: &str = "give the direction up the canal with --axis x, -x, y, -y, z, -z or a vector dx,dy,dz";
 
 /// A direction in the space of the markers.
@@ -74,6 +80,18 @@ impl FromStr for Axis {
 /// markers crawl.
 pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> Result<Recording, ReadError> {
     let mut warnings = std::mem::take(&mut markers.warnings);
+    let is_beyond = |position_m: &[f64; 3]| position_m.iter().any(|part| part.abs() > MAX_POSITION_M);
+    let beyond = markers
+        .position_m
+        .iter()
+        .position(|series| series.iter().any(is_beyond));
+    if let Some(name) = beyond.and_then(|marker| markers.names.get(marker)) {
+        return Err(ReadError::whole(
+            path,
+            format!("marker {name} is more than {MAX_POSITION_M} m away"),
+            "leave the field empty where it was not seen, or export the file again",
+        ));
+    }
     leave_out_unseen(&mut markers, &mut warnings);
     if markers.names.is_empty() {
         let remedy = "export the trajectories of the markers on the cells";
@@ -84,7 +102,10 @@ pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> 
     if !(2..=MAX_CELLS).contains(&cells) {
         return Err(ReadError::whole(
             path,
-            format!("{cells} of the markers crawl ({})", markers.names.join(", ")),
+            format!(
+                "{cells} of the markers crawl ({})",
+                first_of(&markers.names, MAX_LEFT_OUT_NAMED, MAX_QUOTED_NAME)
+            ),
             format!("export one marker for each cell, 2 to {MAX_CELLS}, on a worm that crawls"),
         ));
     }
@@ -128,6 +149,15 @@ pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> 
     })
 }
 
+/// Keeps the first warnings and says how many more markers were left out.
+fn summarise(warnings: &mut Vec<String>, max_warnings: usize) {
+    let more = warnings.len().saturating_sub(max_warnings);
+    if more > 0 {
+        warnings.truncate(max_warnings);
+        warnings.push(format!("{more} more markers were left out"));
+    }
+}
+
 fn as_text(direction: &Vector3<f64>) -> String {
     // Adding 0 turns a negative zero into a plain one.
     let [x, y, z] = [direction.x, direction.y, direction.z].map(|part| (part * 1e3).round() / 1e3 + 0.0);
@@ -152,6 +182,7 @@ fn leave_out_unseen(markers: &mut Markers, warnings: &mut Vec<String>) {
     for (name, _) in markers.names.iter().zip(&seen).filter(|(_, seen)| !**seen) {
         warnings.push(format!("marker {name} is never seen and was left out"));
     }
+    summarise(warnings, MAX_LEFT_OUT_NAMED);
     retain(markers, &seen);
 }
 
@@ -193,6 +224,7 @@ fn leave_out_still_or_stray(markers: &mut Markers, warnings: &mut Vec<String>) {
             spread_m.norm() * 1e3
         ));
     }
+    summarise(warnings, 2 * MAX_LEFT_OUT_NAMED);
     retain(markers, &kept);
 }
 

@@ -14,6 +14,11 @@ const TOO_LARGE_M: f64 = 5.0;
 /// A time step of more than so many median periods is a gap.
 const MAX_STEP_PERIODS: f64 = 5.0;
 
+/// A position beyond this is none, m: sums of its square would lose all others.
+pub(super) const MAX_POSITION_M: f64 = 1e6;
+/// No recording takes longer than this, s: 30 years.
+const MAX_DURATION_S: f64 = 1e9;
+
 /// Checks a recording that has just been read and cut, and bridges short gaps in its phase. `full_range_s` is the time of
 /// the first and the last sample before the cut.
 ///
@@ -26,6 +31,7 @@ pub(super) fn check(
 ) -> Result<(), ReadError> {
     check_samples(recording, options, full_range_s)?;
     check_seen(recording)?;
+    check_positions(recording)?;
     check_time(recording, options.max_gap_s)?;
     recording.check_gaps(options.max_gap_s)?;
     complete_phase(recording, options.max_gap_s)?;
@@ -70,7 +76,32 @@ fn check_seen(recording: &Recording) -> Result<(), ReadError> {
     Err(ReadError::whole(&recording.source, problem, remedy))
 }
 
+fn check_positions(recording: &Recording) -> Result<(), ReadError> {
+    for (cell, series) in recording.position_m.iter().enumerate() {
+        let beyond = series.iter().zip(&recording.time_s);
+        if let Some((position_m, time_s)) = beyond
+            .into_iter()
+            .find(|(position_m, _)| position_m.abs() > MAX_POSITION_M)
+        {
+            return Err(ReadError::whole(
+                &recording.source,
+                format!("{} is at {position_m:.1e} m at {time_s:.3} s", recording.name_of(cell)),
+                "leave the field empty where nothing was seen",
+            ));
+        }
+    }
+    Ok(())
+}
+
 fn check_time(recording: &Recording, max_gap_s: f64) -> Result<(), ReadError> {
+    let (first_s, last_s) = (recording.time_s[0], recording.time_s[recording.samples() - 1]);
+    if last_s - first_s > MAX_DURATION_S {
+        return Err(ReadError::whole(
+            &recording.source,
+            format!("it lasts from {first_s:.1e} s to {last_s:.1e} s"),
+            "give times in seconds",
+        ));
+    }
     let steps = || recording.time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let period_s = quantile(steps(), 0.5).unwrap_or(0.0);
     let longest_s = max_gap_s.max(MAX_STEP_PERIODS * period_s);

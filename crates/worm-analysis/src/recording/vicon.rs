@@ -17,6 +17,7 @@ use super::table::quoted;
 use super::text::Text;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+use worm_estimator::abridged::abridged;
 use worm_log::ReadError;
 
 /// Titles of sections; a file begins with one of them.
@@ -33,6 +34,8 @@ const TRAJECTORIES: &str = "Trajectories";
 const MAX_RATE_HZ: f64 = 1e5;
 /// Longest line that is read, bytes: thousands of markers.
 const MAX_LINE: u64 = 1 << 20;
+/// Longest name of a marker that is kept whole, bytes.
+const MAX_NAME: usize = 200;
 const EXPORT_AGAIN: &str = "export the trajectories again, as ASCII with rate, names and units";
 
 /// Whether a file begins as a Vicon export.
@@ -163,7 +166,7 @@ impl Header {
         let names: Vec<&str> = names_line.split(separator).map(clean).collect();
         let name_of = |marker: usize| match names.get(2 + 3 * marker) {
             Some(&"") | None => None,
-            Some(&name) => Some(name.to_owned()),
+            Some(&name) => Some(abridged(name.to_owned(), MAX_NAME)),
         };
         let Some(names) = (0..markers).map(name_of).collect::<Option<Vec<_>>>() else {
             return Err(ReadError::at(

@@ -47,7 +47,7 @@ impl MotorTime {
                 self.compare(last, reading);
             }
         }
-        state.time_ns.saturating_add_signed(-self.standstill_ns)
+        state.time_ns.saturating_add_signed(self.standstill_ns.saturating_neg())
     }
 
     /// Forgets both clocks, but not the standstills so far.
@@ -62,19 +62,22 @@ impl MotorTime {
         if !motor_s.is_finite() || motor_s < 0.0 {
             return;
         }
-        let behind_ns = elapsed_ns as i64 - (motor_s * 1e9).round() as i64;
-        let tolerance_ns = TOLERANCE_NS + (TOLERANCE_FRACTION * elapsed_ns as f64) as i64;
+        // A log may hold any numbers.
+        let elapsed_as_signed_ns = i64::try_from(elapsed_ns).unwrap_or(i64::MAX);
+        let behind_ns = elapsed_as_signed_ns.saturating_sub((motor_s * 1e9).round() as i64);
+        let tolerance_ns = TOLERANCE_NS.saturating_add((TOLERANCE_FRACTION * elapsed_ns as f64) as i64);
         if behind_ns > tolerance_ns {
-            self.standstill_ns += behind_ns;
+            self.standstill_ns = self.standstill_ns.saturating_add(behind_ns);
             self.suspected = Some(SuspectedStandstill {
-                until_ns: to.time_ns + LATE_READING_NS,
+                until_ns: to.time_ns.saturating_add(LATE_READING_NS),
                 standstill_ns: behind_ns,
             });
         } else if behind_ns < -tolerance_ns
             && let Some(doubt) = self.suspected.take_if(|doubt| to.time_ns <= doubt.until_ns)
         {
             // The motor has caught up: it did not stand still, its reading was late.
-            self.standstill_ns -= doubt.standstill_ns.min(-behind_ns);
+            let late_ns = doubt.standstill_ns.min(behind_ns.saturating_neg());
+            self.standstill_ns = self.standstill_ns.saturating_sub(late_ns);
         }
     }
 }
@@ -96,6 +99,23 @@ mod tests {
             });
         }
         (now_ns + 500_000) / 1_000_000
+    }
+
+    #[test]
+    fn any_numbers_give_a_time() {
+        let times_ns = [u64::MAX, 0, u64::MAX - 1, u64::MAX, 1 << 63, u64::MAX];
+        for (first, &time_ns) in times_ns.iter().enumerate() {
+            let mut motor_time = MotorTime::default();
+            for (&next_ns, motor_time_s) in times_ns[first..].iter().zip([0.0, 1e300, 0.0, 1e-300, f64::MAX, 1e18]) {
+                let state = State {
+                    time_ns: next_ns.max(time_ns),
+                    motor_time_s,
+                    motor_is_new: 1,
+                    ..State::unknown(4)
+                };
+                motor_time.update(&state);
+            }
+        }
     }
 
     #[test]

@@ -274,3 +274,26 @@ fn a_direction_is_a_name_or_three_numbers() {
         assert!(error.contains(&format!("{text:?}")), "{error}");
     }
 }
+
+#[test]
+fn a_marker_far_beyond_the_laboratory_is_refused() {
+    let mut markers = markers_along(&crawl(), [1.0, 0.0, 0.0]);
+    markers.position_m[1][50] = [0.0, 1e200, 0.0];
+    let error = project(markers, None, Path::new("trial.csv")).expect_err("no position");
+    let text = error.to_string();
+    assert!(text.contains("marker c1 is more than 1000000 m away"), "{text}");
+}
+
+#[test]
+fn many_markers_left_out_are_summed_up() {
+    let mut markers = markers_along(&crawl(), [1.0, 0.0, 0.0]);
+    for number in 0..1000 {
+        markers.names.push(format!("stray{number}"));
+        markers.position_m.push(vec![UNSEEN; markers.time_s.len()]);
+    }
+    let recording = project(markers, None, Path::new("trial.csv")).expect("a crawl");
+    let warnings = recording.warnings.join("\n");
+    assert!(warnings.contains("marker stray19 is never seen"), "{warnings}");
+    assert!(warnings.contains("980 more markers were left out"), "{warnings}");
+    assert!(!warnings.contains("stray20"), "{warnings}");
+}

@@ -53,6 +53,14 @@ fn what_no_worm_could_have_recorded_is_refused() {
         "no cell is ever seen",
     );
     assert_refused(
+        |recording| recording.position_m[2][8] = -1e200,
+        "cell 3 (x3_m) is at -1.0e200 m at 0.200 s: leave the field empty",
+    );
+    assert_refused(
+        |recording| recording.time_s.iter_mut().for_each(|time_s| *time_s *= 1e20),
+        "it lasts from 0.0e0 s to 2.5e20 s: give times in seconds",
+    );
+    assert_refused(
         |recording| recording.time_s[50..].iter_mut().for_each(|time_s| *time_s += 1.0),
         "there is no sample from 1.225 s to 2.250 s, while one comes every 0.0250 s otherwise: give --max-gap 1.1",
     );
