@@ -297,7 +297,11 @@ impl<P: Port> WormBus<P> {
         let late_answers = late.servo_answers.max((stale_bytes / plan.answer_len()) as u32);
         // With separate reads, the request to the tracker throws away what the servo answers after its half of the time.
         let discarded = self.owed.take_late(late_answers);
-        let lost = self.owed.ask(deadline, harvest.servo_answers + discarded);
+        let reported_rad_s = harvest.servo.map(|servo| servo.goal_velocity_rad_s);
+        let goal_taken = reported_rad_s.is_ok_and(|found| goal_counts(found) == goal_counts(goal_velocity_rad_s));
+        let goal = servo::scale::velocity_counts(goal_velocity_rad_s);
+        let answers = harvest.servo_answers + discarded;
+        let lost = self.owed.ask(deadline, goal, answers, goal_taken);
         let counters = self.bus.counters_mut();
         for failure in [harvest.servo.err(), harvest.tracker.err()] {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
@@ -309,8 +313,6 @@ impl<P: Port> WormBus<P> {
         } else {
             0
         };
-        let reported_rad_s = harvest.servo.map(|servo| servo.goal_velocity_rad_s);
-        let goal_taken = reported_rad_s.is_ok_and(|found| goal_counts(found) == goal_counts(goal_velocity_rad_s));
         self.exchange_counters.goals_not_taken += u64::from(harvest.servo.is_ok() && !goal_taken);
         let servo_is_late = harvest.servo.is_err() && late.servo.is_ok();
         let tracker_is_late = harvest.tracker.is_err() && late.tracker.is_ok();

@@ -2,8 +2,12 @@
 //!
 //! The protocol numbers no packets: an answer that comes after the next request looks like the answer to that one, and the real one may
 //! still be on its way. So the first answer in a question's time is taken for its own and a further one for that of the oldest open
-//! question. An open question counts as lost only when many later ones have been answered and some time has passed: a line that is
-//! behind by some answers has caught up by then. One that stays behind for longer counts once as having lost so many.
+//! question. What is still open then is lost, or late:
+//!
+//! - The servo repeats the goal that came with the question. Where an answer repeats one that no question had since the oldest open one,
+//!   it is the answer to the newest question. Answers come in order, so all open ones are lost.
+//! - Otherwise an open question counts as lost only when many later ones have been answered and some time has passed: a line that is behind
+//!   by some answers has caught up by then. One that stays behind for longer counts once as having lost so many.
 
 use std::time::{Duration, Instant};
 
@@ -32,6 +36,8 @@ pub(super) struct OwedAnswers {
     open: usize,
     /// Questions answered in their own time, wrapping.
     answered: u32,
+    /// Smallest and greatest goal since the oldest open question; none while nothing is open.
+    goals: Option<(i32, i32)>,
 }
 
 impl OwedAnswers {
@@ -41,6 +47,7 @@ impl OwedAnswers {
         oldest: 0,
         open: 0,
         answered: 0,
+        goals: None,
     };
 
     /// Whether any question is open.
@@ -55,9 +62,26 @@ impl OwedAnswers {
         answers - taken as u32
     }
 
-    /// Notes that a question was asked with this deadline, and how many answers came in its time. Returns how many earlier ones count as
-    /// lost now.
-    pub(super) fn ask(&mut self, deadline: Instant, answers: u32) -> u32 {
+    /// Notes that a question was asked with this deadline and goal, how many answers came in its time, and whether the newest repeats the goal.
+    /// Returns how many earlier questions count as lost now.
+    pub(super) fn ask(&mut self, deadline: Instant, goal: i32, answers: u32, goal_repeated: bool) -> u32 {
+        let is_new_goal = self.goals.is_some_and(|(least, most)| !(least..=most).contains(&goal));
+        if answers > 0 && goal_repeated && is_new_goal {
+            self.take_late(answers - 1);
+            let lost = self.open as u32;
+            self.forget_oldest(self.open);
+            return lost;
+        }
+        let lost = self.note(deadline, answers);
+        self.goals = match self.goals {
+            _ if !self.is_any() => None,
+            None => Some((goal, goal)),
+            Some((least, most)) => Some((least.min(goal), most.max(goal))),
+        };
+        lost
+    }
+
+    fn note(&mut self, deadline: Instant, answers: u32) -> u32 {
         let mut lost = 0;
         if answers == 0 {
             if self.open == MAX_OPEN {
@@ -90,6 +114,9 @@ impl OwedAnswers {
     const fn forget_oldest(&mut self, count: usize) {
         self.oldest = (self.oldest + count) % MAX_OPEN;
         self.open -= count;
+        if self.open == 0 {
+            self.goals = None;
+        }
     }
 }
 
@@ -106,7 +133,7 @@ mod tests {
     ) -> Vec<u32> {
         let lost = answers.map(|answers| {
             *at += interval;
-            owed.ask(*at, answers)
+            owed.ask(*at, 0, answers, true)
         });
         lost.collect()
     }
@@ -130,6 +157,32 @@ mod tests {
     }
 
     #[test]
+    fn an_answer_that_repeats_a_new_goal_leaves_all_open_questions_lost() {
+        let (mut owed, at) = (OwedAnswers::NONE, Instant::now());
+        // (goal, answers, whether the newest repeats the goal, lost)
+        for (step, (goal, answers, repeated, lost)) in [
+            (104, 0, false, 0),
+            (104, 1, true, 0), // it may be the answer to the one before
+            (105, 1, false, 0),
+            (104, 1, true, 0),
+            (106, 1, false, 0), // an answer to an earlier one
+            (107, 1, true, 1),
+            (107, 0, false, 0),
+            (105, 0, false, 0),
+            (104, 1, true, 2),
+            (107, 0, false, 0),
+            (104, 2, true, 0), // the late one, and its own
+            (103, 1, true, 0),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            assert_eq!(owed.ask(at, goal, answers, repeated), lost, "step {step}");
+        }
+        assert!(!owed.is_any());
+    }
+
+    #[test]
     fn a_line_that_catches_up_has_lost_nothing() {
         let ms = Duration::from_millis;
         // (questions behind, questions for which it stays so, interval)
@@ -139,7 +192,7 @@ mod tests {
             let answers = unanswered.chain(std::iter::repeat_n(1, stays));
             let mut lost = ask(&mut owed, &mut at, interval, answers);
             if behind == 1 {
-                lost.push(owed.ask(at, 2)); // both at once
+                lost.push(owed.ask(at, 0, 2, true)); // both at once
             } else {
                 assert_eq!(owed.take_late(behind as u32 + 1), 1, "one that nobody waited for");
             }

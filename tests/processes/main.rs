@@ -278,6 +278,37 @@ fn one_worm_has_one_controller() {
 }
 
 #[test]
+fn check_tries_motion_and_watchdog() {
+    // (fault, exit code, level of the watchdog's finding)
+    for (name, fault, code, level) in [
+        ("sound", &[][..], 0, "good"),
+        ("unsafe", &["--fault", "watchdog-defect"][..], 1, "error"),
+    ] {
+        let worm = Worm::new(name);
+        let _devices = worm.virtual_worm(fault);
+        let config = format!("[port]\npath = \"{}\"\n[servo]\nwatchdog_ms = 400\n", worm.port());
+        let config = worm.config(&config);
+        let output = worm
+            .wormd(&["check", "--json", "--try-motion", "--try-watchdog", "--config", &config])
+            .output();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(code), "{text}");
+        let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let findings = report["findings"].as_array().expect("a list");
+        let level_of = |subject: &str| {
+            findings
+                .iter()
+                .find(|finding| finding["subject"] == subject)
+                .map(|finding| &finding["level"])
+        };
+        for subject in ["motion", "direction", "home", "motor current"] {
+            assert_eq!(level_of(subject), Some(&"good".into()), "{subject}: {text}");
+        }
+        assert_eq!(level_of("watchdog"), Some(&level.into()), "{text}");
+    }
+}
+
+#[test]
 fn devices_that_do_not_fit_are_refused_by_name() {
     // (arguments of the virtual worm, configuration of the controller, what the error says)
     let table = [
@@ -298,6 +329,12 @@ fn devices_that_do_not_fit_are_refused_by_name() {
             &["--fault", "wrong-model:number=1190"][..],
             "[port]\npath = \"PORT\"\n",
             "1190",
+        ),
+        (
+            "watchdog",
+            &["--fault", "watchdog-defect"][..],
+            "[port]\npath = \"PORT\"\n",
+            "accept_unsafe_watchdog",
         ),
         (
             "mute",

@@ -258,29 +258,55 @@ fn answers_that_never_come_are_lost_when_many_later_ones_have_come() {
 }
 
 #[test]
+fn answers_that_never_come_are_lost_at_once_when_the_next_one_repeats_a_new_goal() {
+    let silent = Faults {
+        silence: 2..5,
+        ..Faults::NONE
+    };
+    let mut bus = bus(silent, 1);
+    let lost: Vec<u32> = (0..8)
+        .map(|exchange| {
+            let wait = Instant::now() + Duration::from_millis(2);
+            let goal_rad_s = if exchange == 5 { 1.1 } else { 1.0 };
+            bus.exchange(&plan(ReadPlan::FastBulk), goal_rad_s, wait).lost
+        })
+        .collect();
+    assert_eq!(lost, [0, 0, 0, 0, 0, 3, 0, 0]);
+}
+
+/// Each answer comes just after the next request, for some exchanges in a row; then the line catches up.
+fn assert_catches_up(read: ReadPlan, behind_for: u32, change_rad_s: f64) {
+    let mut worm = Worm::new(5);
+    worm.set_servo(register::STATUS_RETURN_LEVEL, 1);
+    let mut bus = WormBus::new(worm);
+    bus.set_writes_are_answered(false);
+    let mut goal_rad_s = 1.0;
+    let mut exchange = |bus: &mut WormBus<Worm>| {
+        let wait = Instant::now() + Duration::from_millis(2);
+        goal_rad_s += change_rad_s;
+        bus.exchange(&plan(read), goal_rad_s, wait)
+    };
+    bus.port_mut().quirks.one_late = true;
+    let mut lost = exchange(&mut bus).lost;
+    for _ in 0..behind_for {
+        let outcome = exchange(&mut bus);
+        assert!(outcome.is_complete() && !outcome.late, "{read:?}");
+        lost += outcome.lost;
+    }
+    // Two come at once, and then each in its time.
+    bus.port_mut().quirks.one_late = false;
+    lost += (0..50).map(|_| exchange(&mut bus).lost).sum::<u32>();
+    assert_eq!(lost, 0, "{read:?}, behind for {behind_for} exchanges");
+}
+
+#[test]
 fn a_line_one_answer_behind_that_catches_up_has_lost_nothing() {
     for read in [ReadPlan::FastBulk, ReadPlan::Bulk] {
-        for behind_for in [1, 2, 3, 10, 31] {
-            let mut worm = Worm::new(5);
-            worm.set_servo(register::STATUS_RETURN_LEVEL, 1);
-            let mut bus = WormBus::new(worm);
-            bus.set_writes_are_answered(false);
-            let exchange = |bus: &mut WormBus<Worm>| {
-                let wait = Instant::now() + Duration::from_millis(2);
-                bus.exchange(&plan(read), 1.0, wait)
-            };
-            // Each answer comes just after the next request: there is none in time, then always the one before.
-            bus.port_mut().quirks.one_late = true;
-            let mut lost = exchange(&mut bus).lost;
-            for _ in 0..behind_for {
-                let outcome = exchange(&mut bus);
-                assert!(outcome.is_complete() && !outcome.late, "{read:?}");
-                lost += outcome.lost;
+        for behind_for in [1, 2, 3, 10, 31, 90] {
+            // Goals that differ show which question an answer belongs to; equal ones do not.
+            for change_rad_s in [0.0, 0.05] {
+                assert_catches_up(read, behind_for, change_rad_s);
             }
-            // Then two come at once, and each in its time.
-            bus.port_mut().quirks.one_late = false;
-            lost += (0..50).map(|_| exchange(&mut bus).lost).sum::<u32>();
-            assert_eq!(lost, 0, "{read:?}, behind for {behind_for} exchanges");
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The link against a worm in memory: exchange, faults, start-up.
 
+mod arm;
 mod exchange;
 mod faults;
 mod startup;
