@@ -36,7 +36,7 @@ pub struct Replay {
 /// estimates is used; if there is none, the first state.
 ///
 /// # Errors
-/// [`EstimatorError`] for a configuration that is not valid.
+/// [`EstimatorError`] for a configuration that is not valid, or is of a worm with another number of cells.
 pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
     let mut budget = MIN_TRIED_STATES + TRIES * log.states.len();
     let recorded: Vec<_> = fresh(&log.estimates)
@@ -88,6 +88,7 @@ fn run(states: &[State], config: &Config, enough: usize) -> Result<(Replay, usiz
     let mut fed = 0;
     for state in states {
         fed += 1;
+        observer.check(state)?;
         let report = observer.update(state);
         replay.alarms.extend(report.alarms.iter());
         replay.estimates.extend(report.estimate);
