@@ -73,6 +73,7 @@ pub struct Controller {
     /// When to switch torque off; none when it is off, or is to stay on.
     disarm_due_ns: Option<u64>,
     disarm_failures: u32,
+    limit_ns: Option<u64>,
 }
 
 impl Controller {
@@ -108,6 +109,7 @@ impl Controller {
             pending: None,
             disarm_due_ns: None,
             disarm_failures: 0,
+            limit_ns: None,
         }
     }
 
@@ -169,6 +171,23 @@ impl Controller {
             self.begin_end(now_ns);
         }
 
+        // STOPGAP
+        if inputs.lease == super::interface::Lease::Lapsed && self.mode == Mode::Crawling {
+            self.ramp.halt();
+            self.enter(Mode::Holding, now_ns);
+        }
+        if self.mode == Mode::Crawling && self.limit_ns.is_some_and(|limit| now_ns >= limit) {
+            self.enter(Mode::Holding, now_ns);
+        }
+        if let Some(c) = inputs.command
+            && c.kind == CommandKind::Crawl.code()
+        {
+            self.limit_ns = if c.limit_s > 0.0 {
+                Some(now_ns + (c.limit_s * 1e9) as u64)
+            } else {
+                None
+            };
+        }
         let velocity_rad_s = self.command_velocity(now_ns, dt_s);
         let service = self.due_service(now_ns);
         let finished = inputs.end && self.is_over();
@@ -339,7 +358,7 @@ impl Controller {
                 self.enter(Mode::Stopping, now_ns);
                 CommandOutcome::Accepted
             }
-            (CommandKind::Stop, Mode::Stopping | Mode::Disarmed) => CommandOutcome::Accepted,
+            (CommandKind::Stop, Mode::Stopping | Mode::Disarmed | Mode::Fault) => CommandOutcome::Accepted,
             (CommandKind::Reset, Mode::Fault) => {
                 if self.safety.persists(self.fault, now_ns, servo, &self.assembler) {
                     CommandOutcome::FaultPersists
@@ -348,6 +367,7 @@ impl Controller {
                     CommandOutcome::Accepted
                 }
             }
+            (CommandKind::Acknowledge, _) => CommandOutcome::Accepted,
             _ => CommandOutcome::WrongMode,
         }
     }

@@ -3,10 +3,14 @@
 //!
 //! These tests wait for conditions with a generous bound; they check what happens, never how fast a shared machine is.
 
+mod any_order;
+mod attending;
 mod explaining;
+mod kills;
 mod latency;
 mod leaving;
 mod recording;
+mod stopping;
 mod worm;
 
 use std::time::Duration;
