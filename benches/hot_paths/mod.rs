@@ -69,13 +69,14 @@ impl Crawling {
             command,
             alarms: &[],
             estimate: Some(EstimateSeen {
-                state_sequence: self.tick,
+                state_sequence: self.tick.saturating_sub(2),
                 raised_mask: 0,
             }),
             lease: Lease::Held,
             emergency_stop: Some(false),
             end: false,
             service,
+            service_ns: 0,
             hardware_error: None,
         };
         black_box(self.controller.tick(black_box(&inputs)));

@@ -1,25 +1,25 @@
 //! The tick: inputs and time in, outputs out. All of the controller's behaviour and none of its I/O.
 
-use super::interface::{Inputs, Outputs, Service, ServiceOutcome};
-use super::loop_clock::{ClockStep, LoopClock};
+mod commands;
+mod motion;
+
+use super::crawl_limit::CrawlLimit;
+use super::estimator_watch::EstimatorWatch;
+use super::interface::{Inputs, Lease, Note, Notes, Outputs, Service, ServiceOutcome};
+use super::loop_clock::{ClockStep, LoopClock, seconds_to_ns};
 use super::ramp::{CountRounding, Ramp};
 use super::resume::Resume;
 use super::safety::{Safety, SafetyInputs};
+use super::standing_alarms::{StandingAlarms, bit};
 use super::state_assembler::StateAssembler;
-use crate::link::ServoReading;
+use motion::BackOff;
 use std::f64::consts::TAU;
-use worm_estimator::config::{Config, Policy};
-use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Fault, Mode, Reply, State};
+use worm_estimator::config::{Config, IdleDisarm, OnLapsedLease, Policy};
+use worm_estimator::message::{AlarmKind, Fault, HoldReason, Mode, State};
 use worm_estimator::time::seconds;
 
 /// Goal velocity per count, rad/s (XL330-M288 e-manual, register 104: 0.229 rev/min).
 const RAD_S_PER_COUNT: f64 = 0.229 * TAU / 60.0;
-
-/// Cam velocity below which the motor counts as standing still, rad/s: two counts.
-const STANDSTILL_RAD_S: f64 = 2.0 * RAD_S_PER_COUNT;
-
-/// Longest wait for the cam to stand still before torque goes off, ns.
-const STANDSTILL_TIMEOUT_NS: u64 = 500_000_000;
 
 /// Interval of the attempts to switch torque off on a servo that does not answer, ns.
 const RETRY_NS: u64 = 500_000_000;
@@ -30,15 +30,18 @@ const DISARM_ATTEMPTS: u32 = 3;
 /// The controller: a state machine that is advanced by [`Controller::tick`].
 ///
 /// ```text
-///             arm              crawl                hold, alarm
+///             arm              crawl             hold, alarm, lapsed lease, time limit
 /// disarmed ────────► armed ───────────► crawling ───────────────► holding
 ///    ▲                 │                   │  ▲                      │
-///    │                 │ stop              │  └──────── crawl ───────┤
-///    │                 ▼                   ▼ stop                    │
+///    │                 │ stop, idle        │  └──────── crawl ───────┤
+///    │                 ▼                   ▼ stop                    │ stop, idle
 ///    └───────────── stopping ◄───────────────────────────────────────┘
 ///
-/// any of these but disarmed ── limit, silence, alarm with policy stop ──► fault ── reset ──► armed
+/// any of these but disarmed ── limit, silence, alarm with policy stop, emergency stop ──► fault ── reset ──► armed
 /// ```
+///
+/// An arming that fails may have left torque on: a disarmed worm then goes through `stopping`, a faulty one stays in its fault,
+/// until torque is confirmed to be off.
 #[derive(Debug, Clone)]
 pub struct Controller {
     gait_velocity_rad_s: f64,
@@ -46,70 +49,94 @@ pub struct Controller {
     hold_gain_per_s: f64,
     back_off_cycles: f64,
     require_estimator: bool,
-    policies: [Policy; AlarmKind::ALL.len()],
+    estimator_timeout_ns: u64,
+    crawl_limit_s: f64,
+    on_lapsed_lease: OnLapsedLease,
+    /// Time without motion after which torque goes off, ns; none where it stays on.
+    idle_limit_ns: Option<u64>,
 
     loop_clock: LoopClock,
     assembler: StateAssembler,
     safety: Safety,
+    estimator: EstimatorWatch,
+    alarms: StandingAlarms,
     ramp: Ramp,
     rounding: CountRounding,
 
     mode: Mode,
     fault: Fault,
     fault_alarm: Option<AlarmKind>,
+    /// The link is lost while torque was on, and the servo has not answered since.
+    is_silence_unexplained: bool,
     /// How long the computer has paused since the servo last answered in a tick without a pause, ns; frozen when a fault is
     /// latched.
     paused_unanswered_ns: u64,
     resume: Resume,
-    /// Cam angle that a hold keeps; none until the ramp has come to rest.
+    hold_reason: HoldReason,
+    /// Cam angle that a hold keeps; none until the cam has come to rest.
     hold_angle_rad: Option<f64>,
-    /// Cam angle at which a back-off ends.
-    back_off_until_rad: Option<f64>,
+    /// Since when a hold commands the cam to stand.
+    at_rest_since_ns: Option<u64>,
+    back_off: Option<BackOff>,
+    crawl_limit: CrawlLimit,
+    /// Since when torque is on and no motion is commanded.
+    idle_since_ns: Option<u64>,
     mode_since_ns: u64,
     armed_ns: u64,
-    estimate_seen_ns: Option<u64>,
-    /// The service that the next output requests.
+    emergency_stop: Option<bool>,
+    /// The service that a command, or a resume, has requested.
     pending: Option<Service>,
     /// When to switch torque off; none when it is off, or is to stay on.
     disarm_due_ns: Option<u64>,
     disarm_failures: u32,
-    limit_ns: Option<u64>,
+    notes: Notes,
 }
 
 impl Controller {
     /// A disarmed controller.
     pub fn new(config: &Config) -> Self {
         let gait_velocity_rad_s = config.gait_cycles_per_s() * TAU;
-        let mut policies = [Policy::Warn; AlarmKind::ALL.len()];
-        for kind in AlarmKind::ALL {
-            policies[kind.code() as usize] = config.alarms.of(*kind).policy;
-        }
+        let idles_out = match config.control.idle_disarm {
+            IdleDisarm::Level => config.canal.slope_deg.abs() <= IdleDisarm::LEVEL_DEG,
+            IdleDisarm::Always => true,
+            IdleDisarm::Never => false,
+        };
         Self {
             gait_velocity_rad_s,
             velocity_limit_rad_s: config.servo.velocity_limit_rev_per_min * TAU / 60.0,
             hold_gain_per_s: config.control.hold_gain_per_s,
             back_off_cycles: config.control.back_off_cycles,
             require_estimator: config.control.require_estimator,
-            policies,
+            estimator_timeout_ns: seconds_to_ns(config.control.estimator_timeout_s),
+            crawl_limit_s: config.control.crawl_limit_s,
+            on_lapsed_lease: config.control.on_lapsed_lease,
+            idle_limit_ns: idles_out.then(|| seconds_to_ns(config.control.idle_disarm_s)),
             loop_clock: LoopClock::default(),
             assembler: StateAssembler::new(config),
             safety: Safety::new(config),
+            estimator: EstimatorWatch::default(),
+            alarms: StandingAlarms::new(config),
             ramp: Ramp::at_rest(gait_velocity_rad_s.abs() / config.gait.ramp_s),
             rounding: CountRounding::default(),
             mode: Mode::Disarmed,
             fault: Fault::None,
             fault_alarm: None,
+            is_silence_unexplained: false,
             paused_unanswered_ns: 0,
             resume: Resume::new(config),
+            hold_reason: HoldReason::None,
             hold_angle_rad: None,
-            back_off_until_rad: None,
+            at_rest_since_ns: None,
+            back_off: None,
+            crawl_limit: CrawlLimit::NONE,
+            idle_since_ns: None,
             mode_since_ns: 0,
             armed_ns: 0,
-            estimate_seen_ns: None,
+            emergency_stop: None,
             pending: None,
             disarm_due_ns: None,
             disarm_failures: 0,
-            limit_ns: None,
+            notes: Notes::default(),
         }
     }
 
@@ -128,74 +155,62 @@ impl Controller {
         self.paused_unanswered_ns
     }
 
-    /// One tick. All times in it are of the loop's own clock, which stands still while the computer pauses.
+    /// One tick. All times in it are of the loop's own clock, which stands still while the computer pauses and during services.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let ClockStep {
             present_ns: now_ns,
             step_ns,
             pause_ns,
-        } = self.loop_clock.advance(inputs.now_ns, inputs.absent_ns);
+        } = self
+            .loop_clock
+            .advance(inputs.now_ns, inputs.absent_ns, inputs.service_ns);
         let dt_s = seconds(step_ns);
+        self.notes = Notes::default();
 
         self.assembler.state.link_failures += u64::from(inputs.lost_exchanges);
         self.assembler.take_servo(inputs.now_ns, now_ns, inputs.servo);
         self.assembler.take_tracker(inputs.now_ns, now_ns, inputs.tracker);
-        if inputs.estimate.is_some() {
-            self.estimate_seen_ns = Some(now_ns);
-        }
         if let Some(bits) = inputs.hardware_error {
             self.assembler.state.hardware_error = u32::from(bits);
         }
         if let Some(outcome) = inputs.service {
             self.take_service(outcome, now_ns);
         }
-        self.resume.take_alarms(inputs.alarms);
+        self.emergency_stop = inputs.emergency_stop;
+        if self.is_emergency() {
+            self.enter_emergency(now_ns);
+        }
         if self.mode != Mode::Fault {
             self.paused_unanswered_ns += pause_ns;
         }
         if self.has_torque() {
             self.check_safety(inputs, now_ns, dt_s);
         }
+        self.explain_silence(inputs);
         // A reading in the tick of the pause itself may be older than the pause.
         if self.mode != Mode::Fault && inputs.servo.is_some() && pause_ns == 0 {
             self.paused_unanswered_ns = 0;
         }
-        for alarm in inputs.alarms {
-            self.take_alarm(alarm, now_ns);
-        }
+        self.take_alarms(inputs, now_ns);
+        self.check_crawl_limit(inputs.lease, now_ns);
         self.resume_after_pause(now_ns, pause_ns, inputs);
         let reply = inputs
             .command
-            .map(|command| self.take_command(&command, now_ns, inputs.servo));
+            .map(|command| self.take_command(&command, now_ns, inputs));
         if inputs.end {
             self.begin_end(now_ns);
         }
 
-        // STOPGAP
-        if inputs.lease == super::interface::Lease::Lapsed && self.mode == Mode::Crawling {
-            self.ramp.halt();
-            self.enter(Mode::Holding, now_ns);
-        }
-        if self.mode == Mode::Crawling && self.limit_ns.is_some_and(|limit| now_ns >= limit) {
-            self.enter(Mode::Holding, now_ns);
-        }
-        if let Some(c) = inputs.command
-            && c.kind == CommandKind::Crawl.code()
-        {
-            self.limit_ns = if c.limit_s > 0.0 {
-                Some(now_ns + (c.limit_s * 1e9) as u64)
-            } else {
-                None
-            };
-        }
         let velocity_rad_s = self.command_velocity(now_ns, dt_s);
+        self.watch_idling(velocity_rad_s, now_ns);
         let service = self.due_service(now_ns);
         let finished = inputs.end && self.is_over();
         let servo_rad_s = self.assembler.cam().servo_velocity_rad_s(velocity_rad_s);
         Outputs {
-            state: self.fill_state(inputs.now_ns, velocity_rad_s),
+            state: self.fill_state(inputs.now_ns, now_ns, velocity_rad_s),
             goal_counts: self.rounding.round(servo_rad_s / RAD_S_PER_COUNT),
             service,
+            notes: self.notes,
             reply,
             host_paused_ns: pause_ns,
             finished,
@@ -209,14 +224,22 @@ impl Controller {
     fn enter(&mut self, mode: Mode, now_ns: u64) {
         self.mode = mode;
         self.mode_since_ns = now_ns;
+        self.hold_reason = HoldReason::None;
         self.hold_angle_rad = None;
-        self.back_off_until_rad = None;
+        self.at_rest_since_ns = None;
+        self.back_off = None;
+    }
+
+    fn enter_hold(&mut self, reason: HoldReason, now_ns: u64) {
+        self.enter(Mode::Holding, now_ns);
+        self.hold_reason = reason;
     }
 
     fn enter_fault(&mut self, fault: Fault, alarm: Option<AlarmKind>, now_ns: u64) {
         self.enter(Mode::Fault, now_ns);
         self.fault = fault;
         self.fault_alarm = alarm;
+        self.is_silence_unexplained = fault == Fault::LinkLost;
         self.ramp.halt();
         self.request_disarm(now_ns);
     }
@@ -226,24 +249,55 @@ impl Controller {
         self.disarm_failures = 0;
     }
 
+    fn is_emergency(&self) -> bool {
+        self.emergency_stop == Some(true)
+    }
+
+    fn enter_emergency(&mut self, now_ns: u64) {
+        self.resume.cancel();
+        self.pending = None;
+        if self.has_torque() {
+            self.enter_fault(Fault::EmergencyStop, None, now_ns);
+        }
+    }
+
     fn check_safety(&mut self, inputs: &Inputs<'_>, now_ns: u64, dt_s: f64) {
+        // A servo that could not be prepared need not look like one that was.
+        let is_unprepared = inputs.service == Some(ServiceOutcome::Failed(Service::Arm));
         let fault = self.safety.check(&SafetyInputs {
             now_ns,
             dt_s,
-            // A reading from before a service says nothing about the servo after it.
-            servo: inputs.servo.filter(|_| inputs.service.is_none()),
+            servo: inputs.servo.filter(|_| !is_unprepared),
             assembler: &self.assembler,
-            estimate_seen_ns: self.estimate_seen_ns,
+            estimator: &self.estimator,
             paused_ns: self.paused_unanswered_ns,
             armed_ns: self.armed_ns,
             crawling_since_ns: (self.mode == Mode::Crawling).then_some(self.mode_since_ns),
         });
         if let Some(fault) = fault {
-            if fault == Fault::HostPaused && self.mode == Mode::Crawling && self.back_off_until_rad.is_none() {
+            if fault == Fault::HostPaused && self.mode == Mode::Crawling && self.back_off.is_none() {
                 self.resume.begin(now_ns, self.ramp.target_rad_s());
             }
             self.enter_fault(fault, None, now_ns);
         }
+    }
+
+    /// The first answer after a lost link shows whether the servo was silent because it restarted: its watchdog is then off. The
+    /// fault keeps its time and gets its real reason.
+    fn explain_silence(&mut self, inputs: &Inputs<'_>) {
+        let Some(servo) = inputs.servo.filter(|_| self.is_silence_unexplained) else {
+            return;
+        };
+        self.is_silence_unexplained = false;
+        if self.fault == Fault::LinkLost && servo.watchdog == 0 {
+            self.fault = Fault::ServoRestarted;
+            self.notes.add(Note::SilenceWasRestart);
+        }
+    }
+
+    /// Whether the estimator forbids to crawl.
+    fn lacks_estimator(&self, now_ns: u64) -> bool {
+        self.require_estimator && !self.estimator.keeps_up(now_ns, self.estimator_timeout_ns)
     }
 
     /// Prepares the servo again after a pause of the computer, if this is configured and safe.
@@ -253,19 +307,28 @@ impl Controller {
             && !self
                 .safety
                 .persists(Fault::TrackerStale, now_ns, inputs.servo, &self.assembler);
+        let may_crawl = self.alarms.blocking() == 0
+            && self.crawl_limit.reached(now_ns, inputs.lease).is_none()
+            && !self.lacks_estimator(now_ns);
         if inputs.end || inputs.command.is_some() {
             self.resume.cancel();
-        } else if self.resume.is_due(now_ns, pause_ns, is_disarmed && devices_answer) {
+        } else if self
+            .resume
+            .is_due(now_ns, pause_ns, is_disarmed && devices_answer && may_crawl)
+        {
             self.pending = Some(Service::Arm);
         }
     }
 
     fn take_service(&mut self, outcome: ServiceOutcome, now_ns: u64) {
-        self.pending = None;
         match outcome {
             ServiceOutcome::Done(Service::Arm) => {
                 self.fault = Fault::None;
                 self.fault_alarm = None;
+                self.is_silence_unexplained = false;
+                // An attempt to switch torque off that is still due would undo this.
+                self.disarm_due_ns = None;
+                self.disarm_failures = 0;
                 self.armed_ns = now_ns;
                 self.safety.rearm();
                 self.ramp.halt();
@@ -281,8 +344,15 @@ impl Controller {
                     self.enter(Mode::Disarmed, now_ns);
                 }
             }
-            // A disarmed worm stays disarmed, a faulty one in its fault; the loop has logged the reason.
-            ServiceOutcome::Failed(Service::Arm) => self.resume.cancel(),
+            // The loop has logged the reason. The servo may have switched torque on, and only its answer was lost.
+            ServiceOutcome::Failed(Service::Arm) => {
+                self.resume.cancel();
+                if self.mode != Mode::Fault {
+                    self.enter(Mode::Stopping, now_ns);
+                    self.armed_ns = now_ns;
+                }
+                self.request_disarm(now_ns);
+            }
             ServiceOutcome::Failed(Service::Disarm) => {
                 self.disarm_failures += 1;
                 self.disarm_due_ns = Some(now_ns + RETRY_NS);
@@ -294,102 +364,75 @@ impl Controller {
         }
     }
 
-    fn take_alarm(&mut self, alarm: &Alarm, now_ns: u64) {
-        // Unknown kinds, of a newer estimator, have no policy.
-        let Ok(kind) = AlarmKind::try_from(alarm.kind) else {
-            return;
-        };
-        if alarm.raised == 0 || !self.has_torque() {
+    /// Reacts to the alarms that were raised, by a message or by the level, and while crawling to every one that stands.
+    fn take_alarms(&mut self, inputs: &Inputs<'_>, now_ns: u64) {
+        let sequence = self.assembler.state.sequence;
+        let estimate = inputs
+            .estimate
+            .filter(|estimate| self.estimator.take(*estimate, sequence, now_ns));
+        if !self.require_estimator && self.estimator.silent_ns(now_ns, 0) > self.estimator_timeout_ns {
+            self.alarms.forget();
+        }
+        let raised = self
+            .alarms
+            .take(inputs.alarms, estimate.map(|estimate| estimate.raised_mask));
+        if raised == 0 && self.alarms.blocking() == 0 {
             return;
         }
+        for kind in AlarmKind::ALL {
+            let is_raised_now = raised & bit(*kind) != 0;
+            let stands_in_the_way = self.mode == Mode::Crawling && self.alarms.blocking() & bit(*kind) != 0;
+            if is_raised_now || stands_in_the_way {
+                self.react(*kind, is_raised_now, now_ns);
+            }
+        }
+    }
+
+    fn react(&mut self, kind: AlarmKind, is_raised_now: bool, now_ns: u64) {
         let is_crawling = self.mode == Mode::Crawling;
-        match self.policies[kind.code() as usize] {
-            Policy::Stop if self.mode != Mode::Stopping => self.enter_fault(Fault::Alarm, Some(kind), now_ns),
-            Policy::Hold if is_crawling => self.enter(Mode::Holding, now_ns),
-            // An alarm during a back-off does not begin another one.
-            Policy::BackOff if is_crawling && self.back_off_until_rad.is_none() => self.begin_back_off(),
+        match self.alarms.policy(kind) {
+            Policy::Stop if self.has_torque() && self.mode != Mode::Stopping => {
+                self.enter_fault(Fault::Alarm, Some(kind), now_ns);
+            }
+            Policy::Hold if is_crawling => self.hold_by_alarm(kind, now_ns),
+            Policy::BackOff if is_crawling => match self.back_off {
+                None => {
+                    self.begin_back_off(now_ns);
+                    self.notes.add(Note::BackedOff(kind));
+                }
+                // Raised on the way back: going back does not help. Before that it belongs to the same trouble.
+                Some(_) if is_raised_now && self.ramp.has_turned() => self.hold_by_alarm(kind, now_ns),
+                Some(_) => {}
+            },
             _ => {}
         }
     }
 
-    fn begin_back_off(&mut self) {
-        let backward = -self.ramp.direction_of_target();
-        self.ramp.aim(backward * self.gait_velocity_rad_s.abs());
-        self.back_off_until_rad = Some(self.assembler.state.motor_angle_rad + backward * self.back_off_cycles * TAU);
+    fn hold_by_alarm(&mut self, kind: AlarmKind, now_ns: u64) {
+        self.enter_hold(HoldReason::Alarm, now_ns);
+        self.notes.add(Note::HeldByAlarm(kind));
     }
 
-    fn take_command(&mut self, command: &Command, now_ns: u64, servo: Option<&ServoReading>) -> Reply {
-        let verdict = match CommandKind::try_from(command.kind) {
-            Err(_) => CommandOutcome::Unknown,
-            Ok(kind) => self.execute(kind, command.cycles_per_s, now_ns, servo),
+    /// Ends a crawl whose lease has lapsed, or whose time is over.
+    fn check_crawl_limit(&mut self, lease: Lease, now_ns: u64) {
+        let Some(reason) = self.crawl_limit.reached(now_ns, lease) else {
+            return;
         };
-        Reply {
-            sequence: self.assembler.state.sequence,
-            verdict: verdict.code(),
-            mode: self.mode.code(),
-            fault: self.fault.code(),
-            alarm_mask: 0,
-        }
-    }
-
-    fn execute(
-        &mut self,
-        kind: CommandKind,
-        cycles_per_s: f64,
-        now_ns: u64,
-        servo: Option<&ServoReading>,
-    ) -> CommandOutcome {
-        match (kind, self.mode) {
-            (CommandKind::Arm, Mode::Disarmed) => {
-                self.pending.get_or_insert(Service::Arm);
-                CommandOutcome::Accepted
-            }
-            (CommandKind::Arm, Mode::Armed) => CommandOutcome::Accepted,
-            (CommandKind::Crawl, Mode::Armed | Mode::Crawling | Mode::Holding) => {
-                self.begin_crawl(cycles_per_s, now_ns)
-            }
-            (CommandKind::Hold, Mode::Armed | Mode::Crawling | Mode::Holding) => {
-                if self.mode != Mode::Holding {
-                    self.enter(Mode::Holding, now_ns);
-                }
-                CommandOutcome::Accepted
-            }
-            (CommandKind::Stop, Mode::Armed | Mode::Crawling | Mode::Holding) => {
-                self.enter(Mode::Stopping, now_ns);
-                CommandOutcome::Accepted
-            }
-            (CommandKind::Stop, Mode::Stopping | Mode::Disarmed | Mode::Fault) => CommandOutcome::Accepted,
-            (CommandKind::Reset, Mode::Fault) => {
-                if self.safety.persists(self.fault, now_ns, servo, &self.assembler) {
-                    CommandOutcome::FaultPersists
-                } else {
-                    self.pending.get_or_insert(Service::Arm);
-                    CommandOutcome::Accepted
-                }
-            }
-            (CommandKind::Acknowledge, _) => CommandOutcome::Accepted,
-            _ => CommandOutcome::WrongMode,
-        }
-    }
-
-    fn begin_crawl(&mut self, cycles_per_s: f64, now_ns: u64) -> CommandOutcome {
-        let velocity_rad_s = if cycles_per_s == 0.0 {
-            self.gait_velocity_rad_s
-        } else {
-            cycles_per_s * TAU
-        };
-        if velocity_rad_s.is_nan() || velocity_rad_s.abs() > self.velocity_limit_rad_s {
-            return CommandOutcome::BadSpeed;
-        }
-        if self.require_estimator && self.estimate_seen_ns.is_none() {
-            return CommandOutcome::NoEstimator;
+        let is_lapsed = reason == HoldReason::LeaseLapsed;
+        if is_lapsed && self.has_torque() {
+            // Without a ramp, also where one has begun: nobody watches over the worm.
+            self.ramp.halt();
         }
         if self.mode != Mode::Crawling {
-            self.enter(Mode::Crawling, now_ns);
+            return;
         }
-        self.back_off_until_rad = None;
-        self.ramp.aim(velocity_rad_s);
-        CommandOutcome::Accepted
+        self.notes
+            .add(if is_lapsed { Note::LeaseLapsed } else { Note::TimeLimit });
+        if is_lapsed && self.on_lapsed_lease == OnLapsedLease::Stop {
+            self.enter(Mode::Stopping, now_ns);
+        } else {
+            self.enter_hold(reason, now_ns);
+        }
     }
 
     fn begin_end(&mut self, now_ns: u64) {
@@ -397,60 +440,29 @@ impl Controller {
             Mode::Armed | Mode::Crawling | Mode::Holding => self.enter(Mode::Stopping, now_ns),
             Mode::Disarmed | Mode::Stopping | Mode::Fault => {}
         }
-        self.pending = self.pending.filter(|service| *service == Service::Disarm);
+        self.pending = None;
     }
 
-    /// The cam velocity commanded in this tick, rad/s.
-    fn command_velocity(&mut self, now_ns: u64, dt_s: f64) -> f64 {
-        let angle_rad = self.assembler.state.motor_angle_rad;
-        match self.mode {
-            Mode::Disarmed | Mode::Armed | Mode::Fault => {
-                self.ramp.halt();
-                0.0
-            }
-            Mode::Crawling => {
-                if self
-                    .back_off_until_rad
-                    .is_some_and(|until_rad| (angle_rad - until_rad) * self.ramp.direction_of_target() >= 0.0)
-                {
-                    self.enter(Mode::Holding, now_ns);
-                }
-                self.ramp.advance(dt_s)
-            }
-            Mode::Holding => self.hold_velocity(angle_rad, dt_s),
-            Mode::Stopping => {
-                self.ramp.aim(0.0);
-                let velocity_rad_s = self.ramp.advance(dt_s);
-                let is_standing =
-                    self.ramp.is_at_rest() && self.assembler.state.motor_velocity_rad_s.abs() < STANDSTILL_RAD_S;
-                let is_timed_out = now_ns.saturating_sub(self.mode_since_ns) > STANDSTILL_TIMEOUT_NS;
-                if self.disarm_due_ns.is_none() && (is_standing || (self.ramp.is_at_rest() && is_timed_out)) {
-                    self.request_disarm(now_ns);
-                }
-                velocity_rad_s
-            }
+    /// Switches torque off after a long time without motion, where it is configured.
+    fn watch_idling(&mut self, velocity_rad_s: f64, now_ns: u64) {
+        if !matches!(self.mode, Mode::Armed | Mode::Holding) || velocity_rad_s != 0.0 {
+            self.idle_since_ns = None;
+            return;
+        }
+        let since_ns = *self.idle_since_ns.get_or_insert(now_ns);
+        if self.idle_limit_ns.is_some_and(|limit_ns| now_ns - since_ns >= limit_ns) {
+            self.notes.add(Note::Idle);
+            self.enter(Mode::Stopping, now_ns);
         }
     }
 
-    /// A hold first ramps down, then keeps the angle at which the cam came to rest.
-    fn hold_velocity(&mut self, angle_rad: f64, dt_s: f64) -> f64 {
-        let Some(hold_rad) = self.hold_angle_rad else {
-            self.ramp.aim(0.0);
-            let velocity_rad_s = self.ramp.advance(dt_s);
-            if self.ramp.is_at_rest() {
-                self.hold_angle_rad = Some(angle_rad);
-            }
-            return velocity_rad_s;
-        };
-        let max_rad_s = self.gait_velocity_rad_s.abs();
-        (self.hold_gain_per_s * (hold_rad - angle_rad)).clamp(-max_rad_s, max_rad_s)
-    }
-
+    /// The service of this tick. Torque goes off before anything else; but when that has failed, an arming, which opens a lost port
+    /// and prepares the servo, comes before the next attempt.
     fn due_service(&mut self, now_ns: u64) -> Option<Service> {
-        if self.disarm_due_ns.is_some_and(|due_ns| now_ns >= due_ns) {
+        let is_disarm_due = self.disarm_due_ns.is_some_and(|due_ns| now_ns >= due_ns);
+        if is_disarm_due && (self.pending.is_none() || self.disarm_failures == 0) {
             // Not again until the outcome of this one is known.
             self.disarm_due_ns = Some(u64::MAX);
-            self.pending = None;
             return Some(Service::Disarm);
         }
         self.pending.take()
@@ -464,14 +476,21 @@ impl Controller {
         }
     }
 
-    fn fill_state(&mut self, now_ns: u64, velocity_rad_s: f64) -> State {
+    fn fill_state(&mut self, time_ns: u64, now_ns: u64, velocity_rad_s: f64) -> State {
         let state = &mut self.assembler.state;
-        state.time_ns = now_ns;
+        state.time_ns = time_ns;
         state.host_paused_ns = self.loop_clock.paused_ns();
         state.goal_velocity_rad_s = velocity_rad_s;
         state.mode = self.mode.code();
         state.fault = self.fault.code();
         state.fault_alarm = self.fault_alarm.map_or(u32::MAX, AlarmKind::code);
+        state.hold_reason = self.hold_reason.code();
+        state.acknowledged_mask = self.alarms.acknowledged();
+        state.acknowledged_by = self.alarms.acknowledged_by();
+        state.emergency_stop = self.emergency_stop.map_or(u32::MAX, u32::from);
+        if state.sample_is_new == 1 && state.phase.is_finite() {
+            self.estimator.note_sample(state.sequence, now_ns);
+        }
         let published = *state;
         state.sequence += 1;
         published

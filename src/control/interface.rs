@@ -1,12 +1,12 @@
 //! What goes into a tick and what comes out of it.
 
 use crate::link::{ServoReading, TrackerReading};
-use worm_estimator::message::{Alarm, Command, Estimate, Reply, State};
+use worm_estimator::message::{Alarm, AlarmKind, Command, Estimate, Reply, State};
 
 /// Inputs of one tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
-    /// When the exchange with the bus ended, and the service behind it if there was one, ns of `CLOCK_MONOTONIC`.
+    /// When the exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
     pub now_ns: u64,
     /// How long the loop could not run since the last tick although it was due, ns: silence in that time does not count.
     pub absent_ns: u64,
@@ -28,8 +28,10 @@ pub struct Inputs<'a> {
     pub emergency_stop: Option<bool>,
     /// Whether the process was asked to end.
     pub end: bool,
-    /// The outcome of the service that the last tick requested, if any.
+    /// The outcome of the service that the last tick requested, if any; the readings of this tick are from after it.
     pub service: Option<ServiceOutcome>,
+    /// How long that service took, ns; 0 where there was none. It does not count as silence.
+    pub service_ns: u64,
     /// The servo's hardware error status, if it was read since the last tick.
     pub hardware_error: Option<u8>,
 }
@@ -63,7 +65,8 @@ pub enum Lease {
     Lapsed,
 }
 
-/// Work on the bus beyond the tick's exchange. It takes several milliseconds, so it is done only while the worm stands still.
+/// Work on the bus beyond the tick's exchange, done at the end of the tick that requests it. It takes several milliseconds, so it is
+/// done only while the worm stands still, or to make it stand still.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Service {
     /// Prepare the servo as at start-up (which clears a tripped watchdog), then switch torque on.
@@ -88,12 +91,65 @@ pub struct Outputs {
     pub state: State,
     /// Goal velocity for the next exchange, servo counts of 0.229 rev/min.
     pub goal_counts: i32,
-    /// Work on the bus to do before the next exchange.
+    /// Work on the bus to do at once, before the next exchange.
     pub service: Option<Service>,
+    /// What is worth an entry in the journal, besides the mode.
+    pub notes: Notes,
     /// The answer to this tick's command.
     pub reply: Option<Reply>,
     /// The pause of the computer that ended in this tick, ns; 0 where there was none.
     pub host_paused_ns: u64,
     /// Whether the process may end: it was asked to, and the motor is off (or cannot be reached).
     pub finished: bool,
+}
+
+/// An event of a tick, for the record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Note {
+    /// The crawl ended because its lease lapsed.
+    LeaseLapsed,
+    /// The crawl ended because its time was over.
+    TimeLimit,
+    /// Torque goes off because the worm has idled.
+    Idle,
+    /// An alarm made the worm hold.
+    HeldByAlarm(AlarmKind),
+    /// An alarm made the worm back off.
+    BackedOff(AlarmKind),
+    /// A back-off did not reach its end in time.
+    BackOffTimedOut,
+    /// A user permitted motion despite the alarms of the mask.
+    Permitted {
+        /// Bit k set: the alarm with code k.
+        mask: u32,
+        /// User ID.
+        user: u32,
+    },
+    /// A user has seen the alarms of the mask.
+    Acknowledged {
+        /// Bit k set: the alarm with code k.
+        mask: u32,
+        /// User ID.
+        user: u32,
+    },
+    /// The silence that was taken for a lost link was a restart of the servo.
+    SilenceWasRestart,
+}
+
+/// The notes of one tick, in their order.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Notes([Option<Note>; 4]);
+
+impl Notes {
+    /// Adds a note. A tick makes fewer than there is room for; a further one would be dropped.
+    pub(super) fn add(&mut self, note: Note) {
+        if let Some(free) = self.0.iter_mut().find(|note| note.is_none()) {
+            *free = Some(note);
+        }
+    }
+
+    /// The notes.
+    pub fn iter(&self) -> impl Iterator<Item = Note> {
+        self.0.into_iter().flatten()
+    }
 }

@@ -1,6 +1,7 @@
 //! The loop's log, without a log call in a tick: entries go through a bounded queue to a thread that logs. The same thread reads
 //! the loop's counters regularly, as [evidence](super::sched_counters) for late ticks.
 
+use super::interface::Note;
 use super::sched_counters::{Counters, Counts, Snapshot};
 use crate::logging::Summed;
 use crate::realtime::monotonic_ns;
@@ -9,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
-use worm_estimator::message::{Culprit, Fault, Mode};
+use worm_estimator::message::{AlarmKind, Culprit, Fault, Mode};
 
 /// Length of the queue; further entries are dropped and counted.
 const CAPACITY: usize = 256;
@@ -44,6 +45,7 @@ pub(super) enum Entry {
     },
     PortLost,
     PortBack,
+    Noted(Note),
 }
 
 struct Shared {
@@ -145,6 +147,7 @@ fn write_entries(shared: &Shared) {
                 Entry::PortLost => {
                     tracing::error!("the serial port is gone: plug it in again, then `wormd command reset`")
                 }
+                Entry::Noted(note) => log_note(note),
                 Entry::PortBack => tracing::info!("the serial port is open again"),
             }
         }
@@ -176,12 +179,42 @@ fn log_host_paused(from: Mode, pause_ns: u64) {
 
 fn log_mode(from: Mode, to: Mode, fault: Fault, alarm: u32) {
     if to == Mode::Fault {
-        let alarm =
-            worm_estimator::message::AlarmKind::try_from(alarm).map_or("", worm_estimator::message::AlarmKind::name);
+        let alarm = AlarmKind::try_from(alarm).map_or("", AlarmKind::name);
         tracing::error!(%fault, alarm, "the worm was stopped while {from}: remove the cause, then `wormd command reset`");
     } else {
         tracing::info!("{from} -> {to}");
     }
+}
+
+fn log_note(note: Note) {
+    match note {
+        Note::LeaseLapsed => tracing::error!(
+            "the lease of the crawl has lapsed: whoever made the worm crawl is gone or silent; the motor was stopped"
+        ),
+        Note::TimeLimit => tracing::warn!("the time for which the worm was to crawl is over: it holds"),
+        Note::Idle => tracing::info!("no motion for control.idle_disarm_s: torque goes off"),
+        Note::HeldByAlarm(kind) => tracing::warn!(alarm = kind.name(), "the worm holds because of an alarm"),
+        Note::BackedOff(kind) => tracing::warn!(alarm = kind.name(), "the worm backs off because of an alarm"),
+        Note::BackOffTimedOut => tracing::warn!("the back-off did not get to its end in time: the worm holds"),
+        Note::Permitted { mask, user } => {
+            for kind in kinds_of(mask) {
+                tracing::warn!("motion despite alarm {kind} permitted by user {user}");
+            }
+        }
+        Note::Acknowledged { mask, user } => {
+            for kind in kinds_of(mask) {
+                tracing::info!("alarm {kind} acknowledged by user {user}");
+            }
+        }
+        Note::SilenceWasRestart => tracing::error!(
+            "the servo has restarted: it was silent because it had no power, or was rebooted; check supply and connectors"
+        ),
+    }
+}
+
+fn kinds_of(mask: u32) -> impl Iterator<Item = AlarmKind> {
+    let kinds = AlarmKind::ALL.iter().copied();
+    kinds.filter(move |kind| mask >> kind.code() & 1 == 1)
 }
 
 /// Ticks that ended late.

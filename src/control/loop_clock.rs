@@ -10,6 +10,11 @@ use worm_estimator::config::Config;
 /// what a loaded computer without a real-time kernel takes to run a woken thread, and half of the shortest bus watchdog, ns.
 pub(super) const MIN_PAUSE_NS: u64 = 10_000_000;
 
+/// A time in nanoseconds; the longest time that fits for one that does not.
+pub(super) fn seconds_to_ns(seconds: f64) -> u64 {
+    (seconds * 1e9) as u64
+}
+
 /// How one tick advanced the clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ClockStep {
@@ -30,9 +35,11 @@ pub(super) struct LoopClock {
 }
 
 impl LoopClock {
-    /// Takes a tick at `now_ns` of the computer's clock, in or before which the loop was kept from running for `absent_ns`.
-    pub(super) fn advance(&mut self, now_ns: u64, absent_ns: u64) -> ClockStep {
+    /// Takes a tick at `now_ns` of the computer's clock, in or before which the loop was kept from running for `absent_ns`, and after
+    /// a service that took `service_ns`. In a service no reading is requested, so the clock stands still as in a pause.
+    pub(super) fn advance(&mut self, now_ns: u64, absent_ns: u64, service_ns: u64) -> ClockStep {
         let elapsed_ns = self.last_ns.map_or(0, |last_ns| now_ns.saturating_sub(last_ns));
+        let elapsed_ns = elapsed_ns.saturating_sub(service_ns);
         if self.last_ns.replace(now_ns).is_none() {
             self.present_ns = now_ns;
         }
@@ -72,7 +79,7 @@ impl Silence {
         Self {
             silent_ns: 0,
             uncharged_ns: 0,
-            max_uncharged_ns: (2e9 * config.control.link_timeout_s) as u64,
+            max_uncharged_ns: seconds_to_ns(2.0 * config.control.link_timeout_s),
         }
     }
 
@@ -135,12 +142,15 @@ mod tests {
             (1318, 50, 1003, 1),
         ];
         for (now, absent, present, pause) in table {
-            let passed = loop_clock.advance(now * MS, absent * MS);
+            let passed = loop_clock.advance(now * MS, absent * MS, 0);
             assert_eq!(passed.present_ns, present * MS, "at {now} ms");
             let expected = if pause >= 10 { pause * MS } else { 0 };
             assert_eq!(passed.pause_ns, expected, "at {now} ms");
         }
         assert_eq!(loop_clock.paused_ns(), 310 * MS);
+        // A service is no pause, and takes none of the clock's time either.
+        let passed = loop_clock.advance(1569 * MS, 0, 250 * MS);
+        assert_eq!((passed.present_ns, passed.step_ns, passed.pause_ns), (1004 * MS, MS, 0));
     }
 
     #[test]

@@ -21,7 +21,7 @@ impl Ramp {
         self.target_rad_s = target_rad_s;
     }
 
-    /// Stops at once: for faults, in which torque goes off.
+    /// Stops at once: for faults, in which torque goes off, and for a lapsed lease.
     pub(super) fn halt(&mut self) {
         self.velocity_rad_s = 0.0;
         self.target_rad_s = 0.0;
@@ -39,6 +39,11 @@ impl Ramp {
 
     pub(super) fn direction_of_target(&self) -> f64 {
         if self.target_rad_s < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    /// Whether the velocity has the direction of its target already.
+    pub(super) fn has_turned(&self) -> bool {
+        self.velocity_rad_s * self.target_rad_s > 0.0
     }
 
     pub(super) fn is_at_rest(&self) -> bool {

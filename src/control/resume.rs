@@ -4,15 +4,15 @@
 //! pipe there is no operator to reset it. It resumes from rest, with the usual ramp, when
 //! - the pause caused the stop: any other fault needs an operator;
 //! - it was crawling, and not backing off after an alarm;
-//! - no alarm is raised whose policy is more than a warning;
-//! - servo and tracker answer, and the computer has not paused for [`SETTLED_NS`];
+//! - no alarm stands whose policy is more than a warning, except those despite which an operator permitted motion;
+//! - what limits the crawl has not ended it: its lease is held, its time is not over, no emergency stop is pressed;
+//! - servo, tracker and estimator answer, and the computer has not paused for [`SETTLED_NS`];
 //! - it has resumed fewer than [`MAX_RESUMES`] times within [`RESUME_WINDOW_NS`]: a computer that pauses more often cannot run a
 //!   worm.
 //!
 //! Any command, and the end of the process, take precedence.
 
-use worm_estimator::config::{Config, Policy};
-use worm_estimator::message::{Alarm, AlarmKind};
+use worm_estimator::config::Config;
 
 /// How long the computer must have run without a pause, ns.
 const SETTLED_NS: u64 = 1_000_000_000;
@@ -25,8 +25,6 @@ const RESUME_WINDOW_NS: u64 = 60_000_000_000;
 #[derive(Debug, Clone)]
 pub(super) struct Resume {
     allowed: bool,
-    only_warns: [bool; AlarmKind::ALL.len()],
-    raised: [bool; AlarmKind::ALL.len()],
     velocity_rad_s: Option<f64>,
     settled_since_ns: u64,
     is_requested: bool,
@@ -35,27 +33,12 @@ pub(super) struct Resume {
 
 impl Resume {
     pub(super) fn new(config: &Config) -> Self {
-        let mut only_warns = [true; AlarmKind::ALL.len()];
-        for kind in AlarmKind::ALL {
-            only_warns[kind.code() as usize] = config.alarms.of(*kind).policy == Policy::Warn;
-        }
         Self {
             allowed: config.control.resume_after_pause,
-            only_warns,
-            raised: [false; AlarmKind::ALL.len()],
             velocity_rad_s: None,
             settled_since_ns: 0,
             is_requested: false,
             begun_ns: [None; MAX_RESUMES],
-        }
-    }
-
-    /// Keeps track of the raised alarms.
-    pub(super) fn take_alarms(&mut self, changes: &[Alarm]) {
-        for alarm in changes {
-            if let Some(raised) = self.raised.get_mut(alarm.kind as usize) {
-                *raised = alarm.raised != 0;
-            }
         }
     }
 
@@ -82,20 +65,15 @@ impl Resume {
         self.is_requested = false;
     }
 
-    /// Whether to prepare the servo now. `is_ready`: the worm stands without torque and its devices answer. True once.
+    /// Whether to prepare the servo now. `is_ready`: the worm stands without torque, its devices answer and nothing forbids to crawl.
+    /// True once.
     pub(super) fn is_due(&mut self, now_ns: u64, pause_ns: u64, is_ready: bool) -> bool {
         if pause_ns > 0 {
             self.settled_since_ns = now_ns;
         }
-        let is_safe = self
-            .raised
-            .iter()
-            .zip(self.only_warns)
-            .all(|(raised, only_warns)| !raised || only_warns);
         let is_due = self.velocity_rad_s.is_some()
             && !self.is_requested
             && is_ready
-            && is_safe
             && now_ns - self.settled_since_ns >= SETTLED_NS;
         self.is_requested |= is_due;
         is_due

@@ -125,6 +125,7 @@ pub fn run(
         bus_wait_share: config.control.bus_wait_share,
         alarms: [Alarm::NONE; ALARMS_PER_TICK],
         last: None,
+        served: Served::NOTHING,
         publish_ns: 0,
         work_ns: 0,
         host_pauses: 0,
@@ -162,14 +163,35 @@ struct Loop {
     alarms: [Alarm; ALARMS_PER_TICK],
     /// What the last tick decided.
     last: Option<Outputs>,
+    /// What became of the service that it requested.
+    served: Served,
     /// How long the last tick's publishing took.
     publish_ns: u64,
-    /// How long the last tick worked after its exchange, without a service.
+    /// How long the last tick worked after its exchange, without its service.
     work_ns: u64,
     host_pauses: u64,
     unpublished: u64,
     ticks: u64,
     was_gone: bool,
+}
+
+/// What became of a service.
+#[derive(Clone, Copy)]
+struct Served {
+    outcome: Option<ServiceOutcome>,
+    /// The servo's hardware error status, if it was read.
+    hardware_error: Option<u8>,
+    /// How long it took.
+    took_ns: u64,
+}
+
+impl Served {
+    /// No service was requested.
+    const NOTHING: Self = Self {
+        outcome: None,
+        hardware_error: None,
+        took_ns: 0,
+    };
 }
 
 /// Times of one tick, ns of `CLOCK_MONOTONIC`.
@@ -180,8 +202,6 @@ struct Times {
     /// How long the devices had for their answer.
     bus_allowed: u64,
     exchanged: u64,
-    /// As `exchanged`, or after the service, if one was executed.
-    resumed: u64,
     computed: u64,
     published: u64,
     notified: u64,
@@ -214,19 +234,12 @@ impl Loop {
             self.schedule.period_ns(),
         ) + self.unanswerable_ns(outcome.servo.is_ok(), drive.is_gone());
 
-        let served = self
-            .last
-            .and_then(|last| last.service)
-            .map(|service| serve(drive, service));
-        let resumed = monotonic_ns();
-
         let alarm_count = self.ports.take_alarms(&mut self.alarms);
         let estimate = self.ports.estimates.latest().ok().flatten();
         let (command, responder) = take_command(&self.ports.commands, attendance);
         let lease = lease_of(attendance.parent());
         let inputs = Inputs {
-            // A service takes long, and no reading is requested meanwhile: silences count from its end.
-            now_ns: resumed,
+            now_ns: exchanged,
             absent_ns,
             lost_exchanges: outcome.lost,
             servo: outcome.servo.as_ref().ok(),
@@ -237,8 +250,9 @@ impl Loop {
             lease,
             emergency_stop: None,
             end: end || (attendance.parent() == Parent::Gone && is_without_torque(self.controller.mode())),
-            service: served.map(|(outcome, _)| outcome),
-            hardware_error: served.and_then(|(_, hardware_error)| hardware_error),
+            service: self.served.outcome,
+            service_ns: self.served.took_ns,
+            hardware_error: self.served.hardware_error,
         };
         let mode = self.controller.mode();
         let outputs = self.controller.tick(&inputs);
@@ -260,18 +274,19 @@ impl Loop {
                 None => {}
             }
         }
+        // At once, because it may be to switch torque off. A finished loop has done what it could.
+        let service = outputs.service.filter(|_| !outputs.finished);
+        self.served = service.map_or(Served::NOTHING, |service| serve(drive, service));
         self.finish(
             Times {
                 deadline,
                 woken,
                 bus_allowed,
                 exchanged,
-                resumed,
                 computed,
                 published,
                 notified,
             },
-            served.is_some(),
             outputs.host_paused_ns,
             outcome.late,
         );
@@ -309,6 +324,9 @@ impl Loop {
                 pause_ns: self.controller.pause_of_fault_ns(),
             });
         }
+        for note in outputs.notes.iter() {
+            self.journal.note(Entry::Noted(note));
+        }
     }
 
     fn count_unpublished(&mut self, outcome: Result<(), PublishError>) {
@@ -317,9 +335,9 @@ impl Loop {
 
     /// Ends the tick on the schedule and publishes where its time went. A tick with a service has paused on purpose, while the worm
     /// stood still: it is no overrun.
-    fn finish(&mut self, times: Times, served: bool, host_paused_ns: u64, late_answer: bool) {
+    fn finish(&mut self, times: Times, host_paused_ns: u64, late_answer: bool) {
         let period_ns = self.schedule.period_ns();
-        let skipped = if served {
+        let skipped = if self.served.outcome.is_some() {
             self.schedule.finish_pause(monotonic_ns());
             0
         } else {
@@ -336,7 +354,7 @@ impl Loop {
                 pause_ns: host_paused_ns,
                 evidence,
             });
-        } else if skipped > 0 && times.notified - times.resumed < MIN_PAUSE_NS {
+        } else if skipped > 0 && times.notified - times.exchanged < MIN_PAUSE_NS {
             // A pause in the middle of the tick's own work is reported as a pause by the next tick.
             let late_us = (times.notified - times.deadline) / 1000;
             self.journal.note(Entry::Overrun {
@@ -351,7 +369,7 @@ impl Loop {
             deadline_ns: times.deadline,
             wake_lateness_ns: times.woken - times.deadline,
             bus_ns: times.exchanged - times.woken,
-            compute_ns: times.computed - times.resumed,
+            compute_ns: times.computed - times.exchanged,
             publish_ns: self.publish_ns,
             notify_ns: times.notified - times.published,
             waited_ns: evidence.waited_ns,
@@ -368,8 +386,8 @@ impl Loop {
         let published = self.ports.timing.publish(&timing);
         self.count_unpublished(published);
         let end = monotonic_ns();
-        self.publish_ns = end - times.notified + times.published - times.computed;
-        self.work_ns = end - times.resumed;
+        self.publish_ns = (end - times.notified + times.published - times.computed).saturating_sub(self.served.took_ns);
+        self.work_ns = (end - times.exchanged).saturating_sub(self.served.took_ns);
         // The deadlines that a pause cost say nothing about the rate.
         let is_paused = host_paused_ns > 0 || self.work_ns >= MIN_PAUSE_NS;
         let (skipped, late_answer) = if is_paused { (0, false) } else { (skipped, late_answer) };
@@ -389,7 +407,7 @@ impl Loop {
             wake: times.woken - times.deadline,
             bus: times.exchanged - times.woken,
             bus_allowed: times.bus_allowed,
-            compute: times.computed - times.resumed,
+            compute: times.computed - times.exchanged,
             publish: times.notified - times.computed,
         };
         (find_culprit(&parts, &evidence), evidence)
@@ -403,14 +421,20 @@ fn prefault_stack() {
     std::hint::black_box(&mut stack);
 }
 
-/// Executes a service and returns its outcome. Logging is allowed here, because the worm stands still.
-fn serve(drive: &mut Drive, service: Service) -> (ServiceOutcome, Option<u8>) {
-    match drive.serve(service) {
+/// Executes a service and returns what became of it. Logging is allowed here, because the worm stands still, or is to.
+fn serve(drive: &mut Drive, service: Service) -> Served {
+    let begun = monotonic_ns();
+    let (outcome, hardware_error) = match drive.serve(service) {
         Ok(hardware_error) => (ServiceOutcome::Done(service), hardware_error),
         Err(error) => {
             tracing::error!("{service:?} failed: {error}");
             (ServiceOutcome::Failed(service), None)
         }
+    };
+    Served {
+        outcome: Some(outcome),
+        hardware_error,
+        took_ns: monotonic_ns() - begun,
     }
 }
 

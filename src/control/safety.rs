@@ -2,10 +2,17 @@
 //!
 //! All times are of the loop's own clock (`loop_clock`): a pause of the computer does not count as silence.
 
+use super::estimator_watch::EstimatorWatch;
+use super::loop_clock::seconds_to_ns;
 use super::state_assembler::StateAssembler;
 use crate::link::ServoReading;
 use worm_estimator::config::{Config, Limits};
 use worm_estimator::message::Fault;
+use worm_estimator::time::seconds;
+
+/// How much faster the time above the current limit is forgotten than it is counted: a motor that is above it for more than four
+/// fifths of the time is stopped, and one that is below it in single readings is not excused.
+const CURRENT_FORGETTING: f64 = 4.0;
 
 /// Time over which the bus voltage is averaged, s: motor current steps pull it down for milliseconds.
 const VOLTAGE_AVERAGING_S: f64 = 0.1;
@@ -19,7 +26,10 @@ pub(super) struct Safety {
     estimator_timeout_ns: u64,
     watchdog_ns: u64,
     require_estimator: bool,
-    over_current_since_ns: Option<u64>,
+    /// How long the current was above its limit, less what is forgotten, s.
+    over_current_s: f64,
+    /// When the current was last read.
+    current_read_ns: Option<u64>,
     voltage_v: Option<f64>,
 }
 
@@ -29,17 +39,13 @@ pub(super) struct SafetyInputs<'a> {
     pub(super) dt_s: f64,
     pub(super) servo: Option<&'a ServoReading>,
     pub(super) assembler: &'a StateAssembler,
-    pub(super) estimate_seen_ns: Option<u64>,
+    pub(super) estimator: &'a EstimatorWatch,
     /// How long the computer paused since the servo answered before, ns.
     pub(super) paused_ns: u64,
     /// When torque came on: silences are counted from then at the earliest.
     pub(super) armed_ns: u64,
     /// When crawling began, while the worm crawls.
     pub(super) crawling_since_ns: Option<u64>,
-}
-
-fn seconds_to_ns(seconds: f64) -> u64 {
-    (seconds * 1e9) as u64
 }
 
 impl Safety {
@@ -51,14 +57,16 @@ impl Safety {
             estimator_timeout_ns: seconds_to_ns(config.control.estimator_timeout_s),
             watchdog_ns: u64::from(config.servo.watchdog_ms) * 1_000_000,
             require_estimator: config.control.require_estimator,
-            over_current_since_ns: None,
+            over_current_s: 0.0,
+            current_read_ns: None,
             voltage_v: None,
         }
     }
 
     /// Resets what earlier readings have accumulated: torque was switched on again.
     pub(super) fn rearm(&mut self) {
-        self.over_current_since_ns = None;
+        self.over_current_s = 0.0;
+        self.current_read_ns = None;
         self.voltage_v = None;
     }
 
@@ -79,7 +87,7 @@ impl Safety {
         if silent_for(inputs.assembler.sample_seen_ns, since_ns) > self.tracker_timeout_ns {
             return Some(Fault::TrackerStale);
         }
-        let estimator_is_silent = silent_for(inputs.estimate_seen_ns, since_ns) > self.estimator_timeout_ns;
+        let estimator_is_silent = inputs.estimator.silent_ns(inputs.now_ns, since_ns) > self.estimator_timeout_ns;
         (self.require_estimator && estimator_is_silent).then_some(Fault::EstimatorSilent)
     }
 
@@ -111,13 +119,14 @@ impl Safety {
         if voltage_v < self.limits.voltage_v {
             return Some(Fault::UnderVoltage);
         }
+        let read_ns = self.current_read_ns.replace(inputs.now_ns).unwrap_or(inputs.now_ns);
+        let elapsed_s = seconds(inputs.now_ns.saturating_sub(read_ns));
         if servo.current_a.abs() <= self.limits.current_a {
-            self.over_current_since_ns = None;
+            self.over_current_s = (self.over_current_s - CURRENT_FORGETTING * elapsed_s).max(0.0);
             return None;
         }
-        let since_ns = *self.over_current_since_ns.get_or_insert(inputs.now_ns);
-        let too_long = inputs.now_ns.saturating_sub(since_ns) > seconds_to_ns(self.limits.current_time_s);
-        too_long.then_some(Fault::OverCurrent)
+        self.over_current_s += elapsed_s;
+        (self.over_current_s > self.limits.current_time_s).then_some(Fault::OverCurrent)
     }
 
     /// Whether the cause of `fault` is still present, so that a reset would fail.

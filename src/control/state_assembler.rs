@@ -24,12 +24,36 @@ impl Cam {
         }
     }
 
-    pub(super) fn angle_rad(&self, servo: &ServoReading) -> f64 {
-        self.sign * (servo.position_rad - self.home_rad)
+    fn angle_rad(&self, servo_rad: f64) -> f64 {
+        self.sign * (servo_rad - self.home_rad)
     }
 
     pub(super) fn servo_velocity_rad_s(&self, cam_velocity_rad_s: f64) -> f64 {
         self.sign * cam_velocity_rad_s
+    }
+}
+
+/// Range of the servo's position, rad: a register of 32 bits, which passes its end after 15 days at 24 rev/min.
+const POSITION_RANGE_RAD: f64 = (1_u64 << 32) as f64 / COUNTS_PER_TURN * TAU;
+
+/// Follows the servo's position over the ends of its register, so that the cam's angle goes on and a hold never turns the cam back
+/// by a whole range.
+#[derive(Debug, Clone, Copy, Default)]
+struct PositionUnwrapper {
+    last_rad: Option<f64>,
+    ranges: f64,
+}
+
+impl PositionUnwrapper {
+    fn unwrap_rad(&mut self, position_rad: f64) -> f64 {
+        let step_rad = position_rad - self.last_rad.replace(position_rad).unwrap_or(position_rad);
+        // No servo turns by half of the range between two readings; one that restarts, from any position, jumps by less.
+        if step_rad > POSITION_RANGE_RAD / 2.0 {
+            self.ranges -= 1.0;
+        } else if step_rad < -POSITION_RANGE_RAD / 2.0 {
+            self.ranges += 1.0;
+        }
+        position_rad + self.ranges * POSITION_RANGE_RAD
     }
 }
 
@@ -38,6 +62,7 @@ impl Cam {
 pub(super) struct StateAssembler {
     cam: Cam,
     pub(super) state: State,
+    position: PositionUnwrapper,
     servo_clock: Option<ServoClock>,
     /// The servo's clock without its wrapping, ns; counted from when it was first seen to count.
     motor_time_ns: u64,
@@ -82,6 +107,7 @@ impl StateAssembler {
         Self {
             cam: Cam::new(config),
             state: State::unknown(config.worm.cells),
+            position: PositionUnwrapper::default(),
             servo_clock: None,
             motor_time_ns: 0,
             tracker: None,
@@ -101,7 +127,7 @@ impl StateAssembler {
         state.motor_is_new = u32::from(reading.is_some());
         let Some(reading) = reading else { return };
         self.servo_seen_ns = Some(present_ns);
-        state.motor_angle_rad = self.cam.angle_rad(reading);
+        state.motor_angle_rad = self.cam.angle_rad(self.position.unwrap_rad(reading.position_rad));
         state.phase = state.motor_angle_rad / TAU;
         state.motor_velocity_rad_s = self.cam.sign * reading.velocity_rad_s;
         state.motor_current_a = self.cam.sign * reading.current_a;

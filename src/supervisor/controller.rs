@@ -144,6 +144,11 @@ impl Answer {
         Some(format!("{} refused: {why}", self.kind))
     }
 
+    /// The controller's tick that took the command.
+    pub(crate) fn tick(&self) -> u64 {
+        self.reply.sequence
+    }
+
     fn mode(&self) -> &'static str {
         Mode::try_from(self.reply.mode).map_or("unknown", Mode::name)
     }

@@ -1,7 +1,7 @@
 //! One worm with its controller and its estimator, tick by tick, wired like the processes: what the estimator publishes in one
 //! tick reaches the controller in the next.
 
-use super::machine::{Exchange, Machine};
+use super::machine::{Exchange, Machine, Served};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::Observer;
 use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, State};
@@ -37,6 +37,8 @@ pub struct Session<M> {
     /// States that the estimator has not taken yet.
     waiting: Vec<State>,
     last: Option<Outputs>,
+    /// What became of the service that the last tick requested, and how long it took.
+    served: Option<(Served, u64)>,
     on_the_way: Vec<Alarm>,
     estimate_on_the_way: Option<EstimateSeen>,
     spoken_ns: u64,
@@ -68,6 +70,7 @@ impl<M: Machine> Session<M> {
             estimator_stands_until_ns: 0,
             waiting: Vec::new(),
             last: None,
+            served: None,
             on_the_way: Vec::new(),
             estimate_on_the_way: None,
             spoken_ns: 0,
@@ -170,13 +173,7 @@ impl<M: Machine> Session<M> {
         self.now_ns += self.period_ns;
         let exchange = self.exchange();
         let now_ns = self.now_ns;
-        let service = self.last.and_then(|last| last.service);
-        let world_s = self.world_s();
-        let served = service.map(|service| self.machine.serve(service, world_s));
-        if let Some(served) = &served {
-            // A service pauses the schedule.
-            self.now_ns = self.now_ns.max((served.ended_s * 1e9) as u64 + self.stood_ns);
-        }
+        let served = self.served.take();
         let outputs = self.controller.tick(&Inputs {
             now_ns,
             absent_ns: std::mem::take(&mut self.absent_ns),
@@ -189,10 +186,19 @@ impl<M: Machine> Session<M> {
             lease: Lease::Held,
             emergency_stop: None,
             end: false,
-            service: served.as_ref().map(|served| served.outcome),
-            hardware_error: served.and_then(|served| served.hardware_error),
+            service: served.as_ref().map(|(served, _)| served.outcome),
+            service_ns: served.as_ref().map_or(0, |(_, took_ns)| *took_ns),
+            hardware_error: served.and_then(|(served, _)| served.hardware_error),
         });
         self.last = Some(outputs);
+        let world_s = self.world_s();
+        self.served = outputs.service.map(|service| {
+            let served = self.machine.serve(service, world_s);
+            // A service pauses the schedule.
+            let ended_ns = now_ns.max((served.ended_s * 1e9) as u64 + self.stood_ns);
+            self.now_ns = ended_ns;
+            (served, ended_ns - now_ns)
+        });
         self.on_the_way.clear();
         self.waiting.push(outputs.state);
         if self.now_ns >= self.estimator_stands_until_ns {

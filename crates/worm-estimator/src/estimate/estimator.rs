@@ -183,7 +183,9 @@ impl Estimator {
     fn detect_restart(&mut self, state: &State, time_s: f64) {
         let Some((sequence, last_s, _)) = self.last else { return };
         if state.sequence > sequence && time_s >= last_s {
-            self.estimate.states_lost += state.sequence - sequence - 1;
+            let lost = state.sequence - sequence - 1;
+            // The sequence may be anything; the total stays at its end rather than to begin again.
+            self.estimate.states_lost = self.estimate.states_lost.saturating_add(lost);
             return;
         }
         self.filter.forget();

@@ -30,6 +30,13 @@ coded_enum! {
     }
 }
 
+impl AlarmKind {
+    /// Whether it exists only in motion: it then clears two seconds after the worm is no longer commanded to move.
+    pub const fn clears_at_rest(self) -> bool {
+        matches!(self, Self::MotorStall | Self::JammedCell | Self::NoProgress)
+    }
+}
+
 coded_enum! {
     /// How serious an alarm is.
     Severity, "severity" {

@@ -76,7 +76,7 @@ message! {
     State = "wormd_state_v3", made: time_ns, cells: |state| state.cell_count, {
         /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
         sequence: u64,
-        /// When the tick's work on the bus ended, ns of `CLOCK_MONOTONIC`: its exchange, or a service after it, such as arming.
+        /// When the tick's exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
         time_ns: u64,
         /// Gait cycles done, unwrapped: the cam angle over one turn, zero at the configured home.
         phase: f64,

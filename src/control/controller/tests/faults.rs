@@ -26,8 +26,10 @@ fn what_stops_the_worm_and_how_fast() {
             (rig.mode(), rig.controller.fault(), rig.goal_counts),
             (Mode::Fault, fault, 0)
         );
-        rig.run(1);
-        assert_eq!(rig.disarms, 1, "{fault}: torque is switched off");
+        assert_eq!(
+            rig.disarms, 1,
+            "{fault}: torque is switched off in the tick that sees it"
+        );
         // The first reason stays, whatever comes after it.
         rig.servo.alert = true;
         rig.run(50);
@@ -124,5 +126,18 @@ fn alarms_do_what_the_configuration_says() {
             (min..=max).contains(&turns),
             "{policy}: the cam went on by {turns} turns"
         );
+    }
+}
+
+#[test]
+fn an_over_current_with_single_low_readings_is_still_one() {
+    // (share of the readings that are above the limit, in per cent; whether the worm is stopped)
+    for (high_percent, stops) in [(99, true), (90, true), (75, false), (50, false)] {
+        let mut rig = Rig::crawling("");
+        for tick in 0..20_000_u32 {
+            rig.servo.current_a = if tick % 100 < high_percent { -0.95 } else { 0.2 };
+            rig.run(1);
+        }
+        assert_eq!(rig.controller.fault() == Fault::OverCurrent, stops, "{high_percent} %");
     }
 }

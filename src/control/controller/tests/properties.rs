@@ -46,7 +46,7 @@ proptest! {
                 Event::Command(kind, cycles_per_s) => command = Some(Command { cycles_per_s, kind, ..Command::new(CommandKind::Stop) }),
                 Event::Alarm(kind) => {
                     rig.raise(AlarmKind::MotorStall);
-                    if let Some(alarm) = &mut rig.alarm {
+                    if let Some(alarm) = rig.messages.last_mut() {
                         alarm.kind = kind;
                     }
                 }

@@ -51,3 +51,51 @@ fn missed_and_restarted_tracker_samples_are_counted_apart() {
         );
     }
 }
+
+#[test]
+fn the_servo_s_position_passes_the_end_of_its_register_without_a_jump() {
+    let range_rad = 4_294_967_296.0 / 4096.0 * TAU;
+    for sign in [1.0, -1.0] {
+        let toml = format!("servo.positive_is_forward = {}\n", sign > 0.0);
+        for direction in [1.0, -1.0] {
+            let mut rig = Rig::new(&toml);
+            // Five turns before the end in this direction.
+            rig.servo.position_rad = direction * (range_rad / 2.0 - 5.0 * TAU);
+            rig.run(10);
+            rig.command(CommandKind::Arm, 0.0);
+            rig.run(2);
+            let began = rig.state().phase;
+            rig.command(CommandKind::Crawl, sign * direction * 0.4);
+            let mut last = began;
+            for _ in 0..30_000 {
+                if rig.servo.position_rad.abs() >= range_rad / 2.0 {
+                    rig.servo.position_rad -= direction * range_rad;
+                }
+                let phase = rig.tick(None).state.phase;
+                assert!((phase - last).abs() < 1e-3, "from {last} to {phase} cycles");
+                last = phase;
+            }
+            assert!(
+                (last - began) * sign * direction > 11.0,
+                "it went on: {began} to {last}"
+            );
+            assert!(rig.servo.position_rad * direction < 0.0, "the end was passed");
+            rig.command(CommandKind::Hold, 0.0);
+            rig.run(1000);
+            // Held just at the end, and pushed back and forth over it.
+            let past_rad = direction * rig.servo.position_rad + range_rad / 2.0;
+            rig.servo.position_rad -= direction * past_rad; // to the very end, by hand
+            rig.controller.hold_angle_rad = Some(rig.state().motor_angle_rad - sign * direction * past_rad);
+            for push in [-0.01, 0.01, -0.01, 0.01] {
+                rig.servo.position_rad += push;
+                if rig.servo.position_rad >= range_rad / 2.0 {
+                    rig.servo.position_rad -= range_rad;
+                } else if rig.servo.position_rad < -range_rad / 2.0 {
+                    rig.servo.position_rad += range_rad;
+                }
+                rig.run(1);
+                assert!(rig.goal_counts.abs() <= 5, "{} counts", rig.goal_counts);
+            }
+        }
+    }
+}
