@@ -113,7 +113,9 @@ fn a_worm_that_is_held_on_a_slope_is_not_taken_over_but_stopped_by_command() {
 #[test]
 fn a_suspended_parent_leaves_a_worm_that_holds() {
     let worm = Worm::on_a_steady_computer("suspended");
-    let up = worm.wormd(&["up", "--plain", "--duration", "12"]).start_silent();
+    let up = worm
+        .wormd(&["up", "--plain", "--duration", "12"])
+        .start_without_reader();
     wait_for_mode(&worm, Mode::Crawling);
     // Ctrl-Z.
     up.signal(Signal::SIGTSTP);

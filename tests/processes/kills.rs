@@ -84,7 +84,12 @@ fn the_motor_stands_soon_after_any_kill() {
     let mut config = Config::default();
     // A motor that is still warm from the last round is no fault.
     config.virtual_worm.ambient_c = 20.0;
+    let mut wanted = Some(config.realtime.clone());
     let devices = VirtualWorm::spawn_observed(&config, &Options::default(), move |devices, now_s| {
+        if let Some(wanted) = wanted.take() {
+            // As `wormd virtual-worm` does: a servo answers however busy the computer is.
+            wormd::realtime::request(&wanted, 10);
+        }
         let speed = (devices.plant().motor().velocity_rad_per_s().abs() / COUNT_RAD_S).round();
         there.lock().expect("no holder panics").measured.push((now_s, speed));
     })

@@ -293,6 +293,12 @@ impl Invocation {
         self.spawn()
     }
 
+    /// Starts it, and discards its standard output.
+    pub fn start_without_reader(mut self) -> Process {
+        self.command.stdout(Stdio::null());
+        self.spawn()
+    }
+
     /// Starts it with a terminal of its own.
     pub fn start_in(mut self, terminal: OwnedFd) -> Process {
         let copy = || terminal.try_clone().expect("a descriptor is free");
