@@ -2,7 +2,7 @@
 """Read a worm's state topic from Python, without a copy, while wormd runs.
 
     pip install iceoryx2==0.10.0
-    python3 read_state.py --worm worm1 --root /dev/shm/wormd --count 10
+    python3 read_state.py --worm worm1 --count 10
 
 Prints one JSON object a line. A reader needs three things from wormd:
   - the folder and the prefix of the worm's shared memory (`join` below),
@@ -105,10 +105,21 @@ def states(worm, root, timeout_s):
             sample.delete()
 
 
+def auto_root(worm):
+    """The folder that `topics.root = "auto"` stands for; `wormd check` names it."""
+    user = os.geteuid()
+    if user == 0:
+        return "/dev/shm/wormd"
+    runtime = f"/run/user/{user}"
+    root = f"{runtime}/wormd"
+    is_own = os.path.isdir(runtime) and os.stat(runtime).st_uid == user
+    return root if is_own and len(root) + 2 * len(worm) <= 48 else f"/dev/shm/wormd-{user}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worm", default="worm1", help="worm.name of the configuration")
-    parser.add_argument("--root", default="/dev/shm/wormd", help="topics.root of the configuration")
+    parser.add_argument("--root", default="auto", help="topics.root of the configuration")
     parser.add_argument("--count", type=int, default=10, help="how many states to print")
     parser.add_argument("--timeout", type=float, default=5.0, help="give up after this many seconds without one")
     parser.add_argument("--layout", action="store_true", help="print offset and size of each field, and end")
@@ -118,7 +129,8 @@ def main():
         print(json.dumps({name: [field.offset, field.size] for name, field in fields.items()}))
         return
     printed = 0
-    for state in states(arguments.worm, arguments.root, arguments.timeout):
+    root = auto_root(arguments.worm) if arguments.root == "auto" else arguments.root
+    for state in states(arguments.worm, root, arguments.timeout):
         if printed == arguments.count:
             return
         printed += 1

@@ -1,5 +1,6 @@
 //! The checks of `wormd check`: what keeps this worm from running on this computer with this configuration, and the remedies.
 
+mod logout;
 mod trials;
 
 use crate::control::{Drive, DriveError, link_settings};
@@ -161,20 +162,21 @@ fn check_realtime(wanted: &Realtime, report: &mut CheckReport) {
 }
 
 fn check_topics(config: &Config, report: &mut CheckReport) {
-    let root = Path::new(&config.topics.root);
+    report.findings.extend(logout::findings());
     // What every process of the worm does first. It does not disturb a running worm.
-    let opened = Instance::of(config)
-        .map_err(|error| error.to_string())
-        .and_then(|instance| Hub::open(&instance).map_err(|error| error.to_string()));
-    match opened {
+    let instance = match Instance::of(config) {
+        Ok(instance) => instance,
+        // The error's text includes the remedy.
+        Err(error) => return report.note(Level::Error, "topics", "cannot be used", error.to_string()),
+    };
+    match Hub::open(&instance) {
         Ok(_) => report.good(
             "topics",
-            format!("those of {} open in {}", config.worm.name, root.display()),
+            format!("those of {} open in {}", config.worm.name, instance.root().display()),
         ),
-        // The error's text includes the remedy.
-        Err(error) => report.note(Level::Error, "topics", "cannot be used", error),
+        Err(error) => report.note(Level::Error, "topics", "cannot be used", error.to_string()),
     }
-    match nix::sys::statfs::statfs(root) {
+    match nix::sys::statfs::statfs(instance.root()) {
         Ok(stat) if stat.filesystem_type() == nix::sys::statfs::TMPFS_MAGIC => report.good("topics", "on a tmpfs"),
         Ok(_) => report.note(
             Level::Warning,

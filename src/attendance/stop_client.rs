@@ -23,6 +23,19 @@ pub(crate) enum StopError {
         /// The worm.
         worm: String,
     },
+    /// Other users have a worm of this name, and this one has none.
+    #[error(
+        "{worm} is a worm of user {}, this process runs as user {user}: only its own user may command a worm, and root may stop it",
+        users.join(", ")
+    )]
+    Foreign {
+        /// The worm.
+        worm: String,
+        /// The users' ids.
+        users: Vec<String>,
+        /// The user of this process.
+        user: u32,
+    },
     /// Worms of several users have the name.
     #[error("{worm} is the name of several users' worms ({}): act as one of them (sudo -u)", users.join(", "))]
     SeveralUsers {
@@ -85,17 +98,21 @@ fn sockets_of(worm: &str, root: &str) -> io::Result<BTreeSet<(u32, String)>> {
 /// Those that the calling user may ask: its own, or for root those of the only user who has a worm of this name.
 fn choose(worm: &str, sockets: BTreeSet<(u32, String)>, caller: u32) -> Result<Vec<(u32, String)>, StopError> {
     let own: Vec<_> = sockets.iter().filter(|(user, _)| *user == caller).cloned().collect();
-    if !own.is_empty() || caller != 0 {
+    let users: BTreeSet<_> = sockets.iter().map(|(user, _)| *user).collect();
+    if !own.is_empty() || users.is_empty() {
         return Ok(own);
     }
-    let users: BTreeSet<_> = sockets.iter().map(|(user, _)| *user).collect();
-    if users.len() > 1 {
-        return Err(StopError::SeveralUsers {
-            worm: worm.to_owned(),
-            users: users.iter().map(u32::to_string).collect(),
-        });
+    let named = users.iter().map(u32::to_string).collect();
+    let worm = worm.to_owned();
+    match (caller, users.len()) {
+        (0, 1) => Ok(sockets.into_iter().collect()),
+        (0, _) => Err(StopError::SeveralUsers { worm, users: named }),
+        _ => Err(StopError::Foreign {
+            worm,
+            users: named,
+            user: caller,
+        }),
     }
-    Ok(sockets.into_iter().collect())
 }
 
 fn ask_at(name: &str, user: u32, request: Request) -> io::Result<Answer> {
@@ -131,7 +148,8 @@ mod tests {
                 .map(|chosen| chosen.iter().map(|(user, _)| *user).collect::<Vec<_>>())
         };
         assert_eq!(chosen(&[0, 1000], 1000).expect("one"), [1000]);
-        assert_eq!(chosen(&[0, 1000], 1001).expect("none"), [0_u32; 0]);
+        assert_eq!(chosen(&[], 1001).expect("none"), [0_u32; 0]);
+        assert!(matches!(chosen(&[0, 1000], 1001), Err(StopError::Foreign { .. })));
         assert_eq!(chosen(&[0, 1000], 0).expect("one"), [0]);
         assert_eq!(chosen(&[1000], 0).expect("one"), [1000]);
         assert!(matches!(chosen(&[1000, 1001], 0), Err(StopError::SeveralUsers { .. })));

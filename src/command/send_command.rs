@@ -110,6 +110,7 @@ fn attend(args: &SendCommandArgs, config: &Config) -> Result<(), Failure> {
 }
 
 fn open(config: &Config) -> Result<Hub, Failure> {
+    controller::refuse_foreign(config)?;
     let instance = Instance::of(config).map_err(Failure::unusable)?;
     Hub::open(&instance).map_err(Failure::failed)
 }

@@ -18,6 +18,7 @@ use worm_estimator::message::{AlarmKind, Fault, Mode};
 
 /// How long standard output may take nothing of the summary.
 const OUTPUT_PATIENCE: Duration = Duration::from_secs(5);
+const STALLED_PATIENCE: Duration = Duration::from_millis(200);
 
 /// Arguments of `wormd up`.
 #[derive(Debug, Args)]
@@ -105,12 +106,17 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
     let run = outcome?;
 
     let telemetry = std::mem::take(&mut *telemetry.lock());
+    // A terminal that does not take the display will not take the summary either.
+    let patience = match display_problem {
+        Some(_) => STALLED_PATIENCE,
+        None => OUTPUT_PATIENCE,
+    };
     let summary = Summary::new(&config.worm, &telemetry, run.mode);
     if args.json {
         let text = serde_json::to_string(&summary).map_err(Failure::failed)?;
-        print::line_within(text, OUTPUT_PATIENCE)?;
+        print::line_within(text, patience)?;
     } else {
-        print::line_within(summary.to_string().trim_end(), OUTPUT_PATIENCE)?;
+        print::line_within(summary.to_string().trim_end(), patience)?;
     }
     match (run.problem.or(display_problem).or(incomplete_recording), run.mode) {
         (Some(problem), _) => Err(Failure::failed(problem)),

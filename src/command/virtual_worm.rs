@@ -89,6 +89,12 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
     let _ = print::line(args.link.display());
     let devices = server.run(&end).map_err(Failure::failed)?;
     drop(link);
+    if args.supervised
+        && let Some(folder) = args.link.parent()
+    {
+        // The link lay in the worm's folder. After its parent was killed this is the last process to leave it.
+        let _ = std::fs::remove_dir(folder);
+    }
     match &args.ledger {
         Some(file) => write_ledger(file, &devices.report()),
         None => Ok(()),

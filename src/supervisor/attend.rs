@@ -2,7 +2,7 @@
 
 use super::controller::{command, send};
 use crate::failure::Failure;
-use crate::topics::{CommandClient, Hub, Subscriber};
+use crate::topics::{CommandClient, Hub};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::message::{Command, CommandKind, Mode, State};
@@ -21,29 +21,32 @@ const POLL: Duration = Duration::from_millis(10);
 pub(crate) fn crawl(hub: &Hub, cycles_per_s: f64, end: &AtomicBool, begun: impl FnOnce()) -> Result<(), Failure> {
     let client = hub.command_client().map_err(Failure::failed)?;
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
-    permit(&client, cycles_per_s)?;
+    let mut permitted = permit(&client, cycles_per_s)?;
     begun();
     let mut renewed = Instant::now();
     while !end.load(Ordering::Relaxed) {
         std::thread::sleep(POLL);
-        if let Some(mode) = newest_mode(&mut states)
-            && mode != Mode::Crawling
-            && renewed.elapsed() > RENEWAL / 2
+        let newest = states.latest().ok().flatten().map(|state| (state.sequence, state.mode));
+        if let Some((tick, mode)) = newest
+            && tick > permitted
+            && mode != Mode::Crawling.code()
         {
             // Another command, an alarm or a fault; a new command would overrule it.
+            let mode = Mode::try_from(mode).map_err(Failure::failed)?;
             return Err(Failure::failed(format!(
                 "the worm does not crawl any more, it is {mode}"
             )));
         }
         if renewed.elapsed() >= RENEWAL {
-            permit(&client, cycles_per_s)?;
+            permitted = permit(&client, cycles_per_s)?;
             renewed = Instant::now();
         }
     }
-    accepted(&client, command(CommandKind::Hold))
+    accepted(&client, command(CommandKind::Hold)).map(drop)
 }
 
-fn permit(client: &CommandClient, cycles_per_s: f64) -> Result<(), Failure> {
+/// Permits the crawl anew; returns the controller's tick that did.
+fn permit(client: &CommandClient, cycles_per_s: f64) -> Result<u64, Failure> {
     let crawl = Command {
         cycles_per_s,
         limit_s: LIMIT_S,
@@ -52,14 +55,10 @@ fn permit(client: &CommandClient, cycles_per_s: f64) -> Result<(), Failure> {
     accepted(client, crawl)
 }
 
-fn accepted(client: &CommandClient, command: Command) -> Result<(), Failure> {
-    match send(client, command)?.refusal() {
-        None => Ok(()),
+fn accepted(client: &CommandClient, command: Command) -> Result<u64, Failure> {
+    let answer = send(client, command)?;
+    match answer.refusal() {
+        None => Ok(answer.tick()),
         Some(refusal) => Err(Failure::failed(refusal)),
     }
-}
-
-fn newest_mode(states: &mut Subscriber<State>) -> Option<Mode> {
-    let state = states.latest().ok().flatten()?;
-    Mode::try_from(state.mode).ok()
 }

@@ -41,7 +41,7 @@ pub(crate) fn send(client: &CommandClient, command: Command) -> Result<Answer, F
 /// None when nobody answers there, so that the topics have to do; [`Failure::Failed`] when the answer is a refusal.
 pub(crate) fn stop_by_socket(config: &Config) -> Result<Answer, Option<Failure>> {
     let answer = ask(config, Request::Stop).map_err(|error| match error {
-        StopError::SeveralUsers { .. } => Some(Failure::failed(error)),
+        StopError::SeveralUsers { .. } | StopError::Foreign { .. } => Some(Failure::failed(error)),
         StopError::NoSocket { .. } | StopError::NoAnswer { .. } => {
             tracing::debug!("{error}");
             None
@@ -58,6 +58,18 @@ pub(crate) fn stop_by_socket(config: &Config) -> Result<Answer, Option<Failure>>
         alarm_mask: reply.alarm_mask,
     };
     Answer::new(CommandKind::Stop, reply).map_err(Some)
+}
+
+/// Refuses a worm of another user, by name.
+///
+/// # Errors
+/// [`Failure::Failed`] when only others have a worm of this name.
+pub(crate) fn refuse_foreign(config: &Config) -> Result<(), Failure> {
+    match ask(config, Request::Status) {
+        Err(error @ StopError::Foreign { .. }) => Err(Failure::failed(error)),
+        // A controller that does not answer here may do so at the topics.
+        _ => Ok(()),
+    }
 }
 
 /// How long the worm may crawl by a command that names no time, s: as long as the one who watches over it is there, if somebody
@@ -130,6 +142,11 @@ impl Answer {
             }
         };
         Some(format!("{} refused: {why}", self.kind))
+    }
+
+    /// The controller's tick that took the command.
+    pub(crate) fn tick(&self) -> u64 {
+        self.reply.sequence
     }
 
     fn mode(&self) -> &'static str {

@@ -150,6 +150,11 @@ impl Instance {
         &self.folder
     }
 
+    /// The folder of all worms, symbolic links resolved.
+    pub fn root(&self) -> &Path {
+        self.worm_folder.root()
+    }
+
     /// The prefix that a peer's iceoryx2 must be given; every shared-memory segment of this worm begins with it.
     pub fn prefix(&self) -> &str {
         &self.prefix

@@ -3,13 +3,17 @@
 //!
 //! These tests wait for conditions with a generous bound; they check what happens, never how fast a shared machine is.
 
+mod any_order;
+mod attending;
 mod explaining;
 mod faulting;
+mod kills;
 mod latency;
 mod leaks;
 mod leaving;
 mod recording;
 mod recording_stops;
+mod stopping;
 mod worm;
 
 use std::time::Duration;

@@ -142,9 +142,44 @@ impl Worm {
         })
     }
 
+    /// The folder of its topics.
+    pub fn folder(&self) -> PathBuf {
+        self.instance().folder().to_path_buf()
+    }
+
+    /// Closes the test's own ports, so that it does not count as one who uses the topics.
+    pub fn forget_topics(&self) {
+        *self.receiver.lock().expect("no test thread has panicked") = None;
+    }
+
     /// Pauses that were made so far.
     pub fn pauses(&self) -> u64 {
         self.pauses.as_ref().map_or(0, |pauses| pauses.made())
+    }
+
+    /// The name that no other worm has.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Processes of this worm on this computer, by their command lines: started by this test, or by those that it started.
+    pub fn processes(&self) -> Vec<String> {
+        let processes = std::fs::read_dir("/proc").expect("/proc").flatten();
+        let lines = processes.filter_map(|process| {
+            let line = std::fs::read(process.path().join("cmdline")).ok()?;
+            Some(String::from_utf8_lossy(&line).replace('\0', " "))
+        });
+        lines
+            .filter(|line| line.contains(&self.name) && line.contains("wormd"))
+            .collect()
+    }
+
+    /// Waits until nothing of this worm is left: no process, and no file.
+    pub fn wait_until_nothing_is_left(&self) {
+        wait_for("nothing is left of the worm", Duration::from_secs(20), || {
+            self.processes().is_empty()
+        });
+        assert_eq!(self.stale_resources(), Vec::<String>::new());
     }
 
     /// Files of this worm that are left in shared memory.
@@ -266,9 +301,20 @@ impl Invocation {
         }
     }
 
+    /// The call itself, for what is not done here.
+    pub fn into_command(self) -> Command {
+        self.command
+    }
+
     /// Starts it, and discards its output.
     pub fn start_silent(mut self) -> Process {
         self.command.stdout(Stdio::null()).stderr(Stdio::null());
+        self.spawn()
+    }
+
+    /// Starts it, and discards its standard output.
+    pub fn start_without_reader(mut self) -> Process {
+        self.command.stdout(Stdio::null());
         self.spawn()
     }
 
@@ -289,6 +335,11 @@ pub struct Process {
 impl Process {
     pub fn id(&self) -> u32 {
         self.child.id()
+    }
+
+    /// Sends it a signal.
+    pub fn signal(&self, signal: Signal) {
+        kill(Pid::from_raw(self.child.id() as i32), signal).expect("is alive");
     }
 
     /// Suspends it for this long.
@@ -326,9 +377,14 @@ impl Process {
     }
 
     /// Waits until it has ended without being asked to.
-    pub fn ends_by_itself(mut self) -> ExitStatus {
+    pub fn ends_by_itself(self) -> ExitStatus {
+        self.ends_within(Duration::from_secs(20))
+    }
+
+    /// Waits no longer than this until it has ended.
+    pub fn ends_within(mut self, timeout: Duration) -> ExitStatus {
         let mut status = None;
-        wait_for("an end without being asked", Duration::from_secs(20), || {
+        wait_for("an end without being asked", timeout, || {
             status = self.exit_status();
             status.is_some()
         });

@@ -1,5 +1,6 @@
 //! The topics in real shared memory: publishing, starting and leaving, readers in Python.
 
+mod foreign;
 mod home;
 mod publishing;
 mod python;

@@ -82,6 +82,15 @@ impl std::fmt::Debug for MayEnd {
     }
 }
 
+/// Watches the devices.
+struct Observer(Box<dyn FnMut(&Devices, f64) + Send>);
+
+impl std::fmt::Debug for Observer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Observer")
+    }
+}
+
 /// Devices on a pseudo-terminal, not yet running.
 #[derive(Debug)]
 pub struct Server {
@@ -92,6 +101,8 @@ pub struct Server {
     may_end: Option<MayEnd>,
     /// Takes faults while it runs.
     fault_switch: Option<FaultSwitch>,
+    /// Who watches the devices, with the world's time in s.
+    observer: Option<Observer>,
 }
 
 impl Server {
@@ -106,6 +117,7 @@ impl Server {
             strict_baud: options.baud.is_some(),
             may_end: None,
             fault_switch: None,
+            observer: None,
         })
     }
 
@@ -179,6 +191,9 @@ impl Server {
                 self.devices.receive(&incoming[..count], now_s)?;
             } else {
                 self.devices.advance_to(now_s)?;
+            }
+            if let Some(observer) = &mut self.observer {
+                (observer.0)(&self.devices, now_s);
             }
             if self.devices.crawl_began_ns.is_none()
                 && let Some(crawl_s) = self.devices.crawl_began_s()
@@ -287,7 +302,24 @@ impl VirtualWorm {
     /// # Errors
     /// As [`Server::open`], and when no thread can be started.
     pub fn spawn(config: &Config, options: &Options) -> Result<Self, ServerError> {
-        let server = Server::open(config, options)?;
+        Self::run(Server::open(config, options)?)
+    }
+
+    /// As [`spawn`](Self::spawn); `observer` sees the devices at least every few milliseconds, with the world's time in s.
+    ///
+    /// # Errors
+    /// As [`spawn`](Self::spawn).
+    pub fn spawn_observed(
+        config: &Config,
+        options: &Options,
+        observer: impl FnMut(&Devices, f64) + Send + 'static,
+    ) -> Result<Self, ServerError> {
+        let mut server = Server::open(config, options)?;
+        server.observer = Some(Observer(Box::new(observer)));
+        Self::run(server)
+    }
+
+    fn run(server: Server) -> Result<Self, ServerError> {
         let path = server.path().to_path_buf();
         let stop = Arc::new(AtomicBool::new(false));
         let stop_there = Arc::clone(&stop);

@@ -1,0 +1,173 @@
+//! kill -9 at random moments: the motor stands within 200 ms of the death of whoever holds the lease or runs the loop.
+//!
+//! The servo is simulated in the test itself, so that it goes on when processes die, and its own clock tells the time: it stands still
+//! while the computer does. `WORMD_KILLS` sets the number of kills (500 for the long run), `WORMD_SEED` the seed.
+
+use super::attending::stalled_terminal;
+use super::worm::{Process, Worm, wait_for};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use worm_estimator::config::Config;
+use wormd::link::virtual_worm::{Options, VirtualWorm};
+
+const KILLS: usize = 12;
+/// By the servo's clock, s.
+const BOUND_S: f64 = 0.2;
+/// For so long it is watched whether the motor starts again, s.
+const WATCHED_S: f64 = 0.6;
+/// One count of the servo's measured speed, rad/s (register 128: 0.229 rev/min).
+const COUNT_RAD_S: f64 = 0.229 * std::f64::consts::TAU / 60.0;
+/// A hold corrects its angle with no more than this, counts.
+const CORRECTION: f64 = 2.0;
+
+/// What the servo measured: its clock, s, and its speed, counts.
+#[derive(Default)]
+struct Servo {
+    measured: Vec<(f64, f64)>,
+}
+
+impl Servo {
+    fn now_s(&self) -> f64 {
+        self.measured.last().map_or(0.0, |(time_s, _)| *time_s)
+    }
+
+    fn speed(&self) -> f64 {
+        self.measured.last().map_or(0.0, |(_, speed)| *speed)
+    }
+
+    /// How long after `death_s` the motor first stood, and how long after it last turned, s.
+    fn stopped_after(&self, death_s: f64) -> (f64, f64) {
+        let after = || self.measured.iter().filter(|(time_s, _)| *time_s >= death_s);
+        let first_stood = after()
+            .find(|(_, speed)| *speed == 0.0)
+            .map_or(f64::INFINITY, |(time_s, _)| time_s - death_s);
+        let last_turned = after()
+            .rfind(|(_, speed)| *speed > CORRECTION)
+            .map_or(0.0, |(time_s, _)| time_s - death_s);
+        (first_stood, last_turned)
+    }
+}
+
+/// Whom to kill, and whether it holds the lease or runs the loop.
+const VICTIMS: [(&str, bool); 3] = [("up", true), ("control", true), ("estimate", false)];
+
+/// The process of the worm that runs a subcommand.
+fn find(up: &Process, subcommand: &str) -> Option<Pid> {
+    if subcommand == "up" {
+        return Some(Pid::from_raw(up.id() as i32));
+    }
+    let children = std::fs::read_to_string(format!("/proc/{0}/task/{0}/children", up.id())).ok()?;
+    children.split_whitespace().find_map(|pid| {
+        let line = std::fs::read(format!("/proc/{pid}/cmdline")).ok()?;
+        let is_it = line.split(|byte| *byte == 0).nth(1) == Some(subcommand.as_bytes());
+        is_it.then(|| pid.parse().ok().map(Pid::from_raw)).flatten()
+    })
+}
+
+fn setting(name: &str) -> Option<u64> {
+    std::env::var(name).ok()?.parse().ok()
+}
+
+#[test]
+fn the_motor_stands_soon_after_any_kill() {
+    let kills = setting("WORMD_KILLS").map_or(KILLS, |kills| kills as usize);
+    let seed = setting("WORMD_SEED").unwrap_or(15);
+    println!("{kills} kills with seed {seed}");
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let worm = Worm::on_a_steady_computer("kills");
+    let servo = Arc::new(Mutex::new(Servo::default()));
+    let there = Arc::clone(&servo);
+    let mut config = Config::default();
+    // A motor that is still warm from the last round is no fault.
+    config.virtual_worm.ambient_c = 20.0;
+    let mut wanted = Some(config.realtime.clone());
+    let devices = VirtualWorm::spawn_observed(&config, &Options::default(), move |devices, now_s| {
+        if let Some(wanted) = wanted.take() {
+            // As `wormd virtual-worm` does: a servo answers however busy the computer is.
+            wormd::realtime::request(&wanted, 10);
+        }
+        let speed = (devices.plant().motor().velocity_rad_per_s().abs() / COUNT_RAD_S).round();
+        there.lock().expect("no holder panics").measured.push((now_s, speed));
+    })
+    .expect("a virtual worm");
+    let port = devices.path().to_string_lossy().into_owned();
+    let servo = || servo.lock().expect("no holder panics");
+
+    let mut delays: Vec<(&str, f64)> = Vec::new();
+    for round in 0..kills {
+        let (victim, holds_it) = VICTIMS[round % VICTIMS.len()];
+        let is_stalled = random.random_bool(0.5);
+        let pty = is_stalled.then(stalled_terminal);
+        let (invocation, master) = (
+            worm.wormd(&["up", "--port", &port]),
+            pty.as_ref().map(|pty| pty.master.try_clone()),
+        );
+        let up = match pty {
+            Some(pty) => invocation.start_in(pty.slave),
+            None => invocation.start_silent(),
+        };
+        // Mostly while it crawls, and now and then somewhere in the start.
+        if random.random_bool(0.8) {
+            wait_for("the cam turns", Duration::from_secs(60), || servo().speed() > 50.0);
+        } else {
+            wait_for("the process is there", Duration::from_secs(60), || {
+                find(&up, victim).is_some()
+            });
+        }
+        std::thread::sleep(Duration::from_millis(random.random_range(0..1200)));
+        let pid = find(&up, victim).expect("it has not ended by itself");
+        let death_s = {
+            let mut servo = servo();
+            let now_s = servo.now_s();
+            servo.measured.retain(|(time_s, _)| *time_s >= now_s);
+            kill(pid, Signal::SIGKILL).expect("is alive");
+            now_s
+        };
+        wait_for("the servo's clock goes on", Duration::from_secs(60), || {
+            servo().now_s() > death_s + if holds_it { WATCHED_S } else { 2.0 }
+        });
+        let (first_stood, last_turned) = servo().stopped_after(death_s);
+        let bound_s = if holds_it {
+            BOUND_S
+        } else {
+            config.control.estimator_timeout_s + BOUND_S
+        };
+        assert!(
+            first_stood.max(last_turned) <= bound_s,
+            "round {round}, {victim} killed, terminal stalled: {is_stalled}: stood after {first_stood:.3} s, turned until {last_turned:.3} s"
+        );
+        delays.push((victim, first_stood.max(last_turned)));
+        // Killed, or because another process has ended.
+        up.ends_within(Duration::from_secs(60));
+        drop(master);
+    }
+    for (victim, _) in VICTIMS {
+        let mut of_victim: Vec<f64> = delays
+            .iter()
+            .filter(|(of, _)| *of == victim)
+            .map(|(_, delay_s)| *delay_s)
+            .collect();
+        of_victim.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            of_victim
+                .get((share * (of_victim.len() as f64 - 1.0)).round() as usize)
+                .map_or(0.0, |delay_s| delay_s * 1e3)
+        };
+        println!(
+            "{victim}: {} kills, stopped after {:.0} ms (median), {:.0} ms (p99), {:.0} ms (max)",
+            of_victim.len(),
+            at(0.5),
+            at(0.99),
+            at(1.0)
+        );
+    }
+    let output = worm
+        .wormd(&["up", "--port", &port, "--json", "--duration", "1"])
+        .output();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    worm.wait_until_nothing_is_left();
+}
