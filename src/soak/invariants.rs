@@ -212,3 +212,7 @@ impl Invariants {
         })
     }
 }
+
+#[cfg(test)]
+#[path = "invariants_tests.rs"]
+mod tests;
