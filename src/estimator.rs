@@ -35,11 +35,18 @@ pub(crate) fn run(
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
     let state_event = hub.listener::<State>().map_err(Failure::failed)?;
     let mut output = OutputTopics::open(hub, role).map_err(Failure::failed)?;
+    let mut told_of_mismatch = false;
     ready(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     while !end.load(Ordering::Relaxed) {
         state_event.wait(MAX_SLEEP).map_err(Failure::failed)?;
         while let Some(state) = states.next().map_err(Failure::failed)? {
             on_state(&state);
+            // Such states get no estimate, so the controller refuses to crawl.
+            if let Err(error) = observer.check(&state)
+                && !std::mem::replace(&mut told_of_mismatch, true)
+            {
+                tracing::error!("the controller's states are ignored: {error}");
+            }
             output.publish(&observer.update(&state)).map_err(Failure::failed)?;
         }
         if output.last_published.elapsed() >= HEARTBEAT {

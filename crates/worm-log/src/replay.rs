@@ -30,7 +30,7 @@ pub struct Replay {
 /// estimates is used; if there is none, the first state.
 ///
 /// # Errors
-/// [`EstimatorError`] for a configuration that is not valid.
+/// [`EstimatorError`] for a configuration that is not valid, or is of a worm with another number of cells.
 pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
     let recorded: Vec<_> = fresh(&log.estimates).take(FIRST_ESTIMATES).copied().collect();
     for first in possible_starts(&log.states, recorded.first()) {
@@ -74,6 +74,7 @@ fn run(states: &[State], config: &Config, enough: usize) -> Result<Replay, Estim
         alarms: Vec::new(),
     };
     for state in states {
+        observer.check(state)?;
         let report = observer.update(state);
         replay.alarms.extend(report.alarms.iter());
         replay.estimates.extend(report.estimate);

@@ -144,8 +144,29 @@ impl Estimator {
         self.mismatch.disturb();
     }
 
-    /// Processes one state.
+    /// Whether the state is of a worm with as many cells as the configured one.
+    ///
+    /// # Errors
+    /// [`EstimatorError::CellCount`] where it is not: [`update`](Self::update) ignores such a state.
+    pub fn check(&self, state: &State) -> Result<(), EstimatorError> {
+        if state.cell_count as usize == self.cells {
+            Ok(())
+        } else {
+            Err(EstimatorError::CellCount {
+                states: state.cell_count,
+                configured: self.cells,
+            })
+        }
+    }
+
+    /// Processes one state. A state with another number of cells than the configured worm is ignored.
     pub fn update(&mut self, state: &State) -> Update<'_> {
+        if self.check(state).is_err() {
+            return Update {
+                estimate: None,
+                cycle: None,
+            };
+        }
         let time_s = state.time_ns as f64 * 1e-9;
         self.detect_restart(state, time_s);
         let motor_ns = self.motor_time.update(state);

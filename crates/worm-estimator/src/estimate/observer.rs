@@ -35,8 +35,23 @@ impl Observer {
         })
     }
 
-    /// Processes the controller's next state.
+    /// Whether the state is of a worm with as many cells as the configured one.
+    ///
+    /// # Errors
+    /// [`EstimatorError::CellCount`] where it is not: [`update`](Self::update) ignores such a state.
+    pub fn check(&self, state: &State) -> Result<(), EstimatorError> {
+        self.estimator.check(state)
+    }
+
+    /// Processes the controller's next state. A state with another number of cells than the configured worm is ignored.
     pub fn update(&mut self, state: &State) -> ObserverOutput {
+        if self.check(state).is_err() {
+            return ObserverOutput {
+                estimate: None,
+                cycle: None,
+                alarms: AlarmChanges::none(),
+            };
+        }
         let update = self.estimator.update(state);
         let (estimate, cycle) = (update.estimate.copied(), update.cycle.copied());
         let observation = alarm::Observation {

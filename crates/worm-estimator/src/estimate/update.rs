@@ -4,7 +4,7 @@ use crate::config::ConfigProblem;
 use crate::config::PhysicsError;
 use crate::message::{Cycle, Estimate};
 
-/// Why an estimator cannot be made.
+/// Why an estimator cannot be made, or cannot work on these states.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EstimatorError {
     /// The configuration was changed after it was checked.
@@ -13,6 +13,17 @@ pub enum EstimatorError {
     /// The model refuses the configured worm.
     #[error("the model refuses the configured worm: {0}")]
     Physics(#[from] PhysicsError),
+    /// The states are of a worm with another number of cells.
+    #[error(
+        "the states have {states} cells and the configuration has {configured}: start controller and estimator with the same \
+         configuration, or correct worm.cells"
+    )]
+    CellCount {
+        /// Cells in the states.
+        states: u32,
+        /// Cells in the configuration.
+        configured: usize,
+    },
 }
 
 /// What one state gave.

@@ -246,6 +246,46 @@ fn an_invalid_configuration_is_refused() {
     assert!(Estimator::new(&config).is_err());
 }
 
+#[test]
+fn the_count_of_lost_states_stays_at_its_end() {
+    let (mut crawl, mut estimator) = watch(&paper_worm(0.0, false), Scene::default());
+    for sequence in [0, u64::MAX / 2, 0, u64::MAX, 5, u64::MAX] {
+        let state = State {
+            sequence,
+            ..crawl.tick()
+        };
+        estimator.update(&state);
+    }
+    for _ in 0..20 {
+        estimator.update(&crawl.tick());
+    }
+    assert_eq!(estimator.latest().states_lost, u64::MAX);
+}
+
+#[test]
+fn states_of_a_worm_with_another_number_of_cells_are_ignored() {
+    let (mut crawl, mut estimator) = watch(&paper_worm(0.0, false), Scene::default());
+    crawl_cycles(&mut crawl, &mut estimator, 3.0);
+    let before = bytes_of(estimator.latest());
+    for cell_count in [0, 3, 5, 16, u32::MAX] {
+        for _ in 0..100 {
+            let state = State {
+                cell_count,
+                ..crawl.tick()
+            };
+            let error = estimator.check(&state).expect_err("another worm").to_string();
+            assert!(
+                error.contains(&format!("{cell_count} cells")) && error.contains("worm.cells"),
+                "{error}"
+            );
+            let update = estimator.update(&state);
+            assert!(update.estimate.is_none() && update.cycle.is_none());
+        }
+    }
+    assert_eq!(bytes_of(estimator.latest()), before);
+    assert!(estimator.check(&crawl.tick()).is_ok());
+}
+
 /// Numbers as a broken device, file or peer may send them.
 fn anything() -> impl Strategy<Value = f64> {
     prop_oneof![
@@ -265,7 +305,7 @@ prop_compose! {
         position_m in proptest::array::uniform4(anything()),
         valid_mask in any::<u32>(),
         flags in proptest::array::uniform2(0..3u32),
-        cell_count in prop_oneof![Just(4u32), any::<u32>()],
+        cell_count in prop_oneof![4 => Just(4u32), 1 => any::<u32>()],
     ) -> State {
         let mut state = State::unknown(4);
         state.position_m = [f64::NAN; MAX_CELLS];

@@ -7,6 +7,9 @@ use proptest::prelude::*;
 enum Event {
     Command(u32, f64),
     Alarm(u32),
+    Level(u32),
+    Lease(Lease),
+    EmergencyStop(Option<bool>),
     Servo(bool),
     Tracker(bool),
     Estimator(bool),
@@ -18,9 +21,12 @@ enum Event {
 
 fn event() -> impl Strategy<Value = Event> {
     prop_oneof![
-        (0u32..7, prop_oneof![Just(0.0), -1.5f64..1.5, Just(f64::NAN)])
+        (0u32..8, prop_oneof![Just(0.0), -1.5f64..1.5, Just(f64::NAN)])
             .prop_map(|(kind, speed)| Event::Command(kind, speed)),
         (0u32..12).prop_map(Event::Alarm),
+        prop_oneof![Just(0u32), any::<u32>()].prop_map(Event::Level),
+        prop_oneof![Just(Lease::None), Just(Lease::Held), Just(Lease::Lapsed)].prop_map(Event::Lease),
+        prop_oneof![Just(None), Just(Some(false)), Just(Some(true))].prop_map(Event::EmergencyStop),
         any::<bool>().prop_map(Event::Servo),
         any::<bool>().prop_map(Event::Tracker),
         any::<bool>().prop_map(Event::Estimator),
@@ -50,6 +56,9 @@ proptest! {
                         alarm.kind = kind;
                     }
                 }
+                Event::Level(mask) => rig.raised_mask = mask,
+                Event::Lease(lease) => rig.lease = lease,
+                Event::EmergencyStop(pressed) => rig.emergency_stop = pressed,
                 Event::Servo(on) => rig.servo_answers = on,
                 Event::Tracker(on) => rig.tracker_runs = on,
                 Event::Estimator(on) => rig.estimator_runs = on,
@@ -69,6 +78,11 @@ proptest! {
                 }
                 prop_assert!(outputs.goal_counts.abs() <= limit_counts);
                 prop_assert_eq!(mode == Mode::Fault, outputs.state.fault != Fault::None.code());
+                if rig.emergency_stop == Some(true) {
+                    prop_assert!(matches!(mode, Mode::Disarmed | Mode::Fault), "{} in an emergency", mode);
+                }
+                prop_assert_eq!(mode == Mode::Holding, outputs.state.hold_reason != HoldReason::None.code());
+                prop_assert_eq!(outputs.state.acknowledged_mask & !((1 << AlarmKind::ALL.len()) - 1), 0);
                 let may_arm = matches!(mode, Mode::Disarmed | Mode::Fault);
                 prop_assert!(outputs.service != Some(Service::Arm) || may_arm, "arming while {}", mode);
             }

@@ -14,7 +14,7 @@ pub struct AlarmChanges {
 }
 
 impl AlarmChanges {
-    pub(super) const fn none() -> Self {
+    pub(in crate::estimate) const fn none() -> Self {
         Self {
             alarms: [Alarm::NONE; CAPACITY],
             count: 0,
