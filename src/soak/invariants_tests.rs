@@ -46,6 +46,11 @@ fn every_rule_can_be_broken() {
         Some("the first reason is kept")
     );
     assert_eq!(
+        broken(&[fault(1, Fault::LinkLost), fault(2, Fault::ServoRestarted)]),
+        None,
+        "the same event, known better"
+    );
+    assert_eq!(
         broken(&[(state(1, |_| {}), 3, REST)]),
         Some("no goal but 0 unless the worm is to move")
     );
