@@ -117,7 +117,9 @@ impl Invariants {
         let last = self.last.as_ref()?;
         let stays = last.mode == Mode::Fault.code() && state.mode == Mode::Fault.code();
         let reason = |state: &State| (state.fault, state.fault_alarm);
-        (stays && reason(last) != reason(state)).then(|| Broken {
+        // The same event, known better: when the servo answers again, it turns out why it was silent.
+        let is_explained = last.fault == Fault::LinkLost.code() && state.fault == Fault::ServoRestarted.code();
+        (stays && !is_explained && reason(last) != reason(state)).then(|| Broken {
             rule: "the first reason is kept",
             text: format!("{:?} became {:?}", reason(last), reason(state)),
         })
@@ -212,3 +214,7 @@ impl Invariants {
         })
     }
 }
+
+#[cfg(test)]
+#[path = "invariants_tests.rs"]
+mod tests;
