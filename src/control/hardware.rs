@@ -47,7 +47,7 @@ pub enum DriveError {
         /// The port.
         path: PathBuf,
         /// What went wrong.
-        source: ArmError,
+        source: Box<ArmError>,
     },
     /// A trial could not be made.
     #[error("{path}: {source}", path = path.display())]
@@ -55,7 +55,7 @@ pub enum DriveError {
         /// The port.
         path: PathBuf,
         /// What went wrong.
-        source: TrialError,
+        source: Box<TrialError>,
     },
     /// A device did not obey.
     #[error("{path}: {source}", path = path.display())]
@@ -216,7 +216,10 @@ impl Drive {
         let path = || self.path.clone();
         let prepared = arm(&mut self.bus, &self.settings, &mut findings).map_err(|error| match error {
             ArmError::NotArmed(source) => DriveError::Startup { path: path(), source },
-            source @ ArmError::TorqueUnknown { .. } => DriveError::TorqueUnknown { path: path(), source },
+            error @ ArmError::TorqueUnknown { .. } => DriveError::TorqueUnknown {
+                path: path(),
+                source: Box::new(error),
+            },
         })?;
         for finding in findings.iter().filter(|finding| finding.corrected) {
             tracing::info!("{}: {} ({})", self.path.display(), finding.what, finding.remedy);
@@ -247,7 +250,7 @@ impl Drive {
     fn trial(&self, source: TrialError) -> DriveError {
         DriveError::Trial {
             path: self.path.clone(),
-            source,
+            source: Box::new(source),
         }
     }
 

@@ -5,7 +5,7 @@
 //!
 //! 1. [`Schedule`] says when the tick is due; the loop in [`run()`] sleeps until then. `rate` slows it down when the computer cannot
 //!    sustain the configured rate.
-//! 2. The link exchanges the goal velocity for readings.
+//! 2. The link exchanges the goal velocity for readings. A port that is gone comes back by itself (`replaceable_port`).
 //! 3. [`Controller::tick`] turns readings, commands and alarms into a [`State`](worm_estimator::message::State), the next
 //!    goal and, rarely, a [`Service`]. It enforces the limits (`safety`, `estimator_watch`, `crawl_limit`), reacts to alarms
 //!    (`standing_alarms`), ramps (`ramp`), assembles the state (`state_assembler`), and handles pauses of the computer (`loop_clock`,

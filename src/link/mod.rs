@@ -15,7 +15,10 @@
 //!    blocks, then the answers until the deadline. It allocates nothing, logs nothing, and uses what a partial answer contains.
 //! 7. [`WormBus::set_torque`], [`WormBus::stop_motor`], [`WormBus::rearm_watchdog`] and [`WormBus::reboot_servo`] serve between ticks;
 //!    each change is verified by reading back.
-//! 8. [`virtual_worm`] is the other end of the line: the same devices, simulated on a pseudo-terminal.
+//!    [`arm`] prepares and switches torque on, and off again where that cannot be verified. [`WormBus::try_watchdog`] and
+//!    [`WormBus::try_motion`] are trials that turn the cam.
+//! 8. [`EmergencyStopInput`] reads the emergency stop, from the exchange or from a GPIO line.
+//! 9. [`virtual_worm`] is the other end of the line: the same devices, simulated on a pseudo-terminal.
 //!
 //! ```no_run
 //! use std::path::Path;

@@ -82,16 +82,9 @@ fn motion_trial_of_a_blocked_cam_fails_with_little_current() {
     let worm = spawn(&config, &["stall"]);
     let mut drive = open(worm.path(), &config);
     let failed = drive.try_motion(true).expect_err("it cannot turn");
-    assert!(
-        matches!(
-            failed,
-            DriveError::Trial {
-                source: TrialError::NoMotion { .. },
-                ..
-            }
-        ),
-        "{failed}"
-    );
+    let cannot_turn =
+        matches!(&failed, DriveError::Trial { source, .. } if matches!(**source, TrialError::NoMotion { .. }));
+    assert!(cannot_turn, "{failed}");
     drop(drive);
     assert!(torque_is_off(worm.path(), &config));
 }
