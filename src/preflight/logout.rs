@@ -70,8 +70,8 @@ fn settings() -> Vec<String> {
 /// Whether these settings let logind remove shared memory: by default it does, and the last word counts.
 fn removes_ipc(settings: &[String]) -> bool {
     let lines = settings.iter().flat_map(|text| text.lines());
-    let values = lines.filter_map(|line| line.trim().strip_prefix("RemoveIPC")?.trim_start().strip_prefix('='));
-    values.last().is_none_or(|value| {
+    let mut values = lines.filter_map(|line| line.trim().strip_prefix("RemoveIPC")?.trim_start().strip_prefix('='));
+    values.next_back().is_none_or(|value| {
         let value = value.trim().to_ascii_lowercase();
         value.is_empty() || ["yes", "true", "on", "1"].contains(&value.as_str())
     })

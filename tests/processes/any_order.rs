@@ -10,7 +10,7 @@ use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
 const ROUNDS: usize = 8;
 
 /// Does what the worm's mode asks for until it crawls: a person with `wormd command` would do the same.
-fn make_crawl_again(worm: &Worm) {
+pub fn make_crawl_again(worm: &Worm) {
     wait_for("it crawls again", PATIENCE, || {
         let Some(mode) = worm.state().and_then(|state| Mode::try_from(state.mode).ok()) else {
             return false;

@@ -357,7 +357,7 @@ impl Process {
     }
 
     /// How it ended, once it has. Nobody may signal its number any more when the system gives it to another process.
-    fn exit_status(&mut self) -> Option<ExitStatus> {
+    pub fn exit_status(&mut self) -> Option<ExitStatus> {
         let mut paused = self.pauses.as_ref().map(|pauses| pauses.processes());
         let status = self.child.try_wait().expect("can be waited for");
         if let (Some(paused), Some(_)) = (&mut paused, status) {

@@ -83,7 +83,9 @@ impl std::fmt::Debug for MayEnd {
 }
 
 /// Watches the devices.
-struct Observer(Box<dyn FnMut(&Devices, f64) + Send>);
+struct Observer(Box<Watch>);
+/// What an observer does with the devices and the world's time in s.
+type Watch = dyn FnMut(&Devices, f64) + Send;
 
 impl std::fmt::Debug for Observer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -179,7 +179,7 @@ impl Live {
 
     fn enter(&mut self) -> Result<(), Failure> {
         // The old one has nothing left to restore.
-        self.terminal = Box::new(init()?);
+        *self.terminal = init()?;
         Ok(())
     }
 }
