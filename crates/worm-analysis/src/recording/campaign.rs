@@ -21,6 +21,8 @@ const MIN_SIGMA_M: f64 = 1e-6;
 
 /// Longest problem or remedy, bytes: they may quote the file.
 const MAX_TEXT_LEN: usize = 2000;
+/// Longest path of a file, bytes: no Linux system takes a longer one (PATH_MAX).
+const MAX_PATH_LEN: usize = 4096;
 
 /// Why a campaign cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -267,6 +269,11 @@ impl Reader<'_> {
     /// The worm's configuration. A device or a pipe in its place may never end.
     fn worm(&self, worm: &Spanned<PathBuf>) -> Result<PathBuf, CampaignError> {
         let path = self.beside(worm.get_ref());
+        let length = path.as_os_str().len();
+        if length > MAX_PATH_LEN {
+            let problem = format!("a path of {length} bytes");
+            return Err(self.invalid(worm.span(), &problem, "give the worm's configuration file"));
+        }
         match path.metadata() {
             Ok(metadata) if !metadata.is_file() => {
                 let problem = format!("{} is not a file", path.display());
