@@ -360,6 +360,11 @@ impl Segment {
     /// One tick, and everything that is to be said about it.
     fn tick(&mut self, command: Option<Command>) -> Result<Tick, Over> {
         let tick = self.session.tick(command);
+        if command.is_some_and(|command| command.kind == CommandKind::Reset.code())
+            && tick.verdict == Some(CommandOutcome::Accepted)
+        {
+            self.invariants.note_reset();
+        }
         self.take_accounts();
         let stood_ns = self.session.stood_ns();
         let plant = self.session.machine.plant();
