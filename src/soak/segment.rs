@@ -398,7 +398,8 @@ impl Segment {
     }
 
     fn take_alarm(&mut self, alarm: &Alarm) {
-        let now_s = self.session.now_s();
+        // A service behind the tick takes its time.
+        let now_s = alarm.time_ns as f64 * 1e-9;
         let kind = AlarmKind::try_from(alarm.kind).ok();
         let explained = self.episode.as_mut().filter(|episode| {
             kind.is_some_and(|kind| episode.drawn.row.alarms.contains(&kind) || follows_from_fault(kind, episode))
@@ -436,7 +437,7 @@ impl Segment {
         if mode != Mode::Fault || was == Mode::Fault {
             return Ok(());
         }
-        let now_s = self.session.now_s();
+        let now_s = state.time_ns as f64 * 1e-9;
         let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
         match &mut self.episode {
             Some(episode) if episode.drawn.row.faults.contains(&fault) => {
