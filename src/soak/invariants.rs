@@ -10,6 +10,8 @@ const STANDING_RAD_S: f64 = 0.06;
 /// How far the phase that is published may be from the true one, cycles: a count of the encoder, and the motion since the
 /// reading.
 const PHASE_TOLERANCE: f64 = 0.02;
+/// Fastest crawl over the configured gait.
+const MAX_SPEED: f64 = 1.25;
 /// Rounding of the ramp.
 const RAMP_TOLERANCE: f64 = 1e-6;
 
@@ -37,6 +39,8 @@ pub struct Broken {
 #[derive(Debug, Clone)]
 pub struct Invariants {
     acceleration_rad_s2: f64,
+    /// Fastest crawl that is commanded here, cycles per second.
+    max_cycles_per_s: f64,
     tick_s: f64,
     watchdog_s: f64,
     last: Option<State>,
@@ -66,6 +70,7 @@ impl Invariants {
         let gait_rad_s = config.gait_cycles_per_s().abs() * std::f64::consts::TAU;
         Self {
             acceleration_rad_s2: gait_rad_s / config.gait.ramp_s,
+            max_cycles_per_s: MAX_SPEED * config.gait_cycles_per_s().abs(),
             tick_s: 1.0 / config.control.rate_hz,
             watchdog_s: f64::from(config.servo.watchdog_ms) * 1e-3,
             last: None,
@@ -238,7 +243,7 @@ impl Invariants {
         let ahead_s = (state.time_ns - truth.stood_ns.min(state.time_ns)) as f64 * 1e-9 - state.motor_time_s;
         self.clock_offset_s = self.clock_offset_s.min(ahead_s);
         let age_s = 2.0 * self.tick_s + (ahead_s - self.clock_offset_s);
-        let tolerance = PHASE_TOLERANCE + age_s * (truth.velocity_rad_s / std::f64::consts::TAU).abs();
+        let tolerance = PHASE_TOLERANCE + age_s * self.max_cycles_per_s;
         ((offset - known).abs() > tolerance).then(|| Broken {
             rule: "the phase is continuous",
             text: format!(

@@ -115,6 +115,11 @@ impl Strides {
         self.newest
     }
 
+    /// Forgets what lies behind: the next stride is the advance of the next whole cycle.
+    pub(super) fn begin_anew(&mut self) {
+        self.bin = None;
+    }
+
     /// Whether a rest ends in which the worm moved.
     fn was_carried(&mut self, tick: &Tick, positions: &Positions) -> bool {
         if tick.still {
