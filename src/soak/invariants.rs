@@ -10,6 +10,8 @@ const STANDING_RAD_S: f64 = 0.06;
 /// How far the phase that is published may be from the true one, cycles: a count of the encoder, and the motion since the
 /// reading.
 const PHASE_TOLERANCE: f64 = 0.02;
+/// Fastest crawl over the configured gait.
+const MAX_SPEED: f64 = 1.25;
 /// Rounding of the ramp.
 const RAMP_TOLERANCE: f64 = 1e-6;
 
@@ -37,6 +39,8 @@ pub struct Broken {
 #[derive(Debug, Clone)]
 pub struct Invariants {
     acceleration_rad_s2: f64,
+    /// Fastest crawl that is commanded here, cycles per second.
+    max_cycles_per_s: f64,
     tick_s: f64,
     watchdog_s: f64,
     last: Option<State>,
@@ -47,8 +51,17 @@ pub struct Invariants {
     stood_ns: u64,
     /// Servo readings in a row without a miss.
     answers: u32,
+    /// A reset was accepted since the worm stood in a fault for the last time: a new reason may take the place of the old one.
+    was_reset: bool,
+    /// By how much the virtual worm's clock was ahead of the servo's at the least since torque came on, s.
+    clock_offset_s: f64,
     /// Difference of the published phase from the true one, cycles, as first seen after the servo came up.
     phase_offset: Option<f64>,
+}
+
+/// The latched reason of a fault.
+fn reason(state: &State) -> (u32, u32) {
+    (state.fault, state.fault_alarm)
 }
 
 impl Invariants {
@@ -57,6 +70,7 @@ impl Invariants {
         let gait_rad_s = config.gait_cycles_per_s().abs() * std::f64::consts::TAU;
         Self {
             acceleration_rad_s2: gait_rad_s / config.gait.ramp_s,
+            max_cycles_per_s: MAX_SPEED * config.gait_cycles_per_s().abs(),
             tick_s: 1.0 / config.control.rate_hz,
             watchdog_s: f64::from(config.servo.watchdog_ms) * 1e-3,
             last: None,
@@ -64,8 +78,15 @@ impl Invariants {
             may_turn_s: 0.0,
             stood_ns: 0,
             answers: 0,
+            was_reset: false,
+            clock_offset_s: f64::INFINITY,
             phase_offset: None,
         }
+    }
+
+    /// A reset was accepted in the next tick that is looked at.
+    pub fn note_reset(&mut self) {
+        self.was_reset = true;
     }
 
     /// Holds a tick against the rules; the first one that it breaks.
@@ -77,6 +98,9 @@ impl Invariants {
             .or_else(|| self.ramp(state))
             .or_else(|| self.rest(state, truth))
             .or_else(|| self.phase(state, truth));
+        if state.mode != Mode::Fault.code() || self.last.is_some_and(|last| reason(&last) != reason(state)) {
+            self.was_reset = false;
+        }
         self.last = Some(*state);
         broken
     }
@@ -116,10 +140,9 @@ impl Invariants {
     fn first_reason(&self, state: &State) -> Option<Broken> {
         let last = self.last.as_ref()?;
         let stays = last.mode == Mode::Fault.code() && state.mode == Mode::Fault.code();
-        let reason = |state: &State| (state.fault, state.fault_alarm);
         // The same event, known better: when the servo answers again, it turns out why it was silent.
         let is_explained = last.fault == Fault::LinkLost.code() && state.fault == Fault::ServoRestarted.code();
-        (stays && !is_explained && reason(last) != reason(state)).then(|| Broken {
+        (stays && !is_explained && !self.was_reset && reason(last) != reason(state)).then(|| Broken {
             rule: "the first reason is kept",
             text: format!("{:?} became {:?}", reason(last), reason(state)),
         })
@@ -202,9 +225,25 @@ impl Invariants {
             return None;
         }
         let offset = state.phase - truth.phase;
-        let known = *self.phase_offset.get_or_insert(offset);
-        let age_s = 2.0 * self.tick_s;
-        let tolerance = PHASE_TOLERANCE + age_s * (truth.velocity_rad_s / std::f64::consts::TAU).abs();
+        let mut known = *self.phase_offset.get_or_insert(offset);
+        let moves = |state: &State| {
+            [Mode::Crawling, Mode::Holding, Mode::Stopping]
+                .iter()
+                .any(|mode| state.mode == mode.code())
+        };
+        let lost_turns = (offset - known).round();
+        if lost_turns != 0.0 && !(moves(state) && self.last.as_ref().is_some_and(moves)) {
+            known += lost_turns;
+            self.phase_offset = Some(known);
+        }
+        // A late answer is right for the moment at which it was given.
+        if state.mode == Mode::Armed.code() {
+            self.clock_offset_s = f64::INFINITY;
+        }
+        let ahead_s = (state.time_ns - truth.stood_ns.min(state.time_ns)) as f64 * 1e-9 - state.motor_time_s;
+        self.clock_offset_s = self.clock_offset_s.min(ahead_s);
+        let age_s = 2.0 * self.tick_s + (ahead_s - self.clock_offset_s);
+        let tolerance = PHASE_TOLERANCE + age_s * self.max_cycles_per_s;
         ((offset - known).abs() > tolerance).then(|| Broken {
             rule: "the phase is continuous",
             text: format!(

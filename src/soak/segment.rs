@@ -360,6 +360,11 @@ impl Segment {
     /// One tick, and everything that is to be said about it.
     fn tick(&mut self, command: Option<Command>) -> Result<Tick, Over> {
         let tick = self.session.tick(command);
+        if command.is_some_and(|command| command.kind == CommandKind::Reset.code())
+            && tick.verdict == Some(CommandOutcome::Accepted)
+        {
+            self.invariants.note_reset();
+        }
         self.take_accounts();
         let stood_ns = self.session.stood_ns();
         let plant = self.session.machine.plant();
@@ -393,7 +398,8 @@ impl Segment {
     }
 
     fn take_alarm(&mut self, alarm: &Alarm) {
-        let now_s = self.session.now_s();
+        // A service behind the tick takes its time.
+        let now_s = alarm.time_ns as f64 * 1e-9;
         let kind = AlarmKind::try_from(alarm.kind).ok();
         let explained = self.episode.as_mut().filter(|episode| {
             kind.is_some_and(|kind| episode.drawn.row.alarms.contains(&kind) || follows_from_fault(kind, episode))
@@ -431,7 +437,7 @@ impl Segment {
         if mode != Mode::Fault || was == Mode::Fault {
             return Ok(());
         }
-        let now_s = self.session.now_s();
+        let now_s = state.time_ns as f64 * 1e-9;
         let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
         match &mut self.episode {
             Some(episode) if episode.drawn.row.faults.contains(&fault) => {

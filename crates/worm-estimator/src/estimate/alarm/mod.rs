@@ -260,6 +260,10 @@ impl Detectors {
         positions: &sample::Positions,
         fault_free: bool,
     ) -> [DetectorOutput; 3] {
+        if self.progress.rests_after_no_progress(tick) {
+            // The cycle without progress must not stop the worm again as soon as it crawls on.
+            self.strides.begin_anew();
+        }
         let stride = self.strides.update(tick, positions);
         let progress = self.progress.update(tick, &self.strides, stride.as_ref(), fault_free);
         let baseline_m = self.progress.baseline_m(tick.direction);

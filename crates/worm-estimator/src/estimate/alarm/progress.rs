@@ -63,6 +63,14 @@ impl NoProgress {
         baseline.is_known(self.calibration_cycles).then(|| baseline.mean_m())
     }
 
+    /// Whether the last stride before a rest was one without progress.
+    pub(super) fn rests_after_no_progress(&self, tick: &Tick) -> bool {
+        let was_bad = self
+            .reading
+            .is_some_and(|reading| matches!(reading.verdict, ReadingState::Bad));
+        (tick.still || !tick.torque) && was_bad
+    }
+
     /// Processes a stride; `fault_free` says that nothing else is wrong, so that it may be used for calibration.
     pub(super) fn update(
         &mut self,

@@ -9,6 +9,8 @@ use super::sample::Positions;
 
 /// Phases per cycle at which positions are kept.
 pub(super) const BINS: usize = 32;
+/// A worm that moved by more than this while its cam stood still was carried or slid: what its gait does begins anew, m.
+const CARRIED_M: f64 = 1e-3;
 
 /// The newest advance over one cycle.
 #[derive(Debug, Clone, Copy)]
@@ -56,6 +58,8 @@ pub(super) struct Strides {
     began_phase: f64, // where the uninterrupted travel in this direction began
     reversals: u32,
     torque: bool,
+    /// Positions at the beginning of a rest; none while the cam turns.
+    rested: Option<Positions>,
     after_reversal: bool,
     newest: Option<Stride>,
     newest_at: Positions,
@@ -69,6 +73,7 @@ impl Strides {
             began_phase: 0.0,
             reversals: 0,
             torque: false,
+            rested: None,
             after_reversal: false,
             newest: None,
             newest_at: Positions::NONE,
@@ -80,7 +85,8 @@ impl Strides {
         let phase = tick.phase?;
         let bin = (phase * BINS as f64).floor() as i64;
         let reversed = tick.reversals != self.reversals;
-        if reversed || !tick.torque || !self.torque || self.bin.is_none() {
+        let carried = self.was_carried(tick, positions);
+        if reversed || !tick.torque || !self.torque || self.bin.is_none() || carried {
             // Without torque the worm may be carried; after a reversal the tips must first unload.
             self.after_reversal = reversed && self.bin.is_some() || self.after_reversal && self.newest.is_none();
             self.slots.fill((i64::MIN, Positions::NONE));
@@ -107,6 +113,23 @@ impl Strides {
         });
         self.newest_at = *positions;
         self.newest
+    }
+
+    /// Forgets what lies behind: the next stride is the advance of the next whole cycle.
+    pub(super) fn begin_anew(&mut self) {
+        self.bin = None;
+    }
+
+    /// Whether a rest ends in which the worm moved.
+    fn was_carried(&mut self, tick: &Tick, positions: &Positions) -> bool {
+        if tick.still {
+            if self.rested.is_none() && positions.mask != 0 {
+                self.rested = Some(*positions);
+            }
+            return false;
+        }
+        let moved_m = self.rested.take().and_then(|rested| positions.moved_since(&rested));
+        moved_m.is_some_and(|moved_m| moved_m.abs() > CARRIED_M)
     }
 
     /// The newest stride plus the displacement since, along the crawling direction, m.

@@ -90,6 +90,41 @@ fn a_stopped_worm_is_no_longer_stalled() {
     }
 }
 
+/// What a worm slid while it held is no lack of progress of the next cycle; else it would hold again and again.
+#[test]
+fn a_slide_during_a_hold_is_no_lack_of_progress_after_it() {
+    let mut bench = Bench::new(Config::default(), 1);
+    bench.crawl_cycles(6.0);
+    bench.command(Mode::Holding, 0.0);
+    bench.run(1.0);
+    bench.trouble.slide_m_per_s = 0.01;
+    bench.run(4.0);
+    assert_eq!(bench.raised(), [SlidingDown]);
+    bench.trouble.slide_m_per_s = 0.0;
+    bench.run(6.0);
+    assert_eq!(bench.raised(), []);
+    bench.changes.clear();
+    bench.crawl_cycles(3.0);
+    assert_eq!(bench.changes, []);
+}
+
+/// A worm that held because it slipped may crawl on once it has grip again.
+#[test]
+fn a_cycle_without_progress_does_not_stop_the_crawl_after_the_hold() {
+    let mut bench = Bench::new(Config::default(), 1);
+    bench.crawl_cycles(6.0);
+    bench.trouble.slipping = true;
+    bench.crawl_cycles(1.0);
+    assert_eq!(bench.raised(), [NoProgress]);
+    bench.command(Mode::Holding, 0.0);
+    bench.run(4.0);
+    assert_eq!(bench.raised(), []);
+    bench.trouble.slipping = false;
+    bench.changes.clear();
+    bench.crawl_cycles(3.0);
+    assert_eq!(bench.changes, []);
+}
+
 #[test]
 fn arming_is_visible() {
     let mut bench = Bench::new(Config::default(), 1);
