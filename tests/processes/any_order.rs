@@ -57,15 +57,19 @@ fn processes_end_and_start_in_any_order() {
             _ => &mut recorder,
         };
         if is_killed {
-            process.kill();
+            if which == 2 {
+                crawling.kill_virtual_worm();
+            } else {
+                process.kill();
+            }
             std::thread::sleep(Duration::from_millis(random.random_range(0..300)));
             let worm = &crawling.worm;
-            *process = match which {
-                0 => worm.wormd(&["control", "--port", &worm.port()]).start(),
-                1 => worm.wormd(&["estimate"]).start(),
-                2 => worm.virtual_worm(&[]),
-                _ => record(worm, &file),
-            };
+            match which {
+                0 => crawling.controller = worm.wormd(&["control", "--port", &worm.port()]).start(),
+                1 => crawling.estimator = worm.wormd(&["estimate"]).start(),
+                2 => crawling.virtual_worm = worm.virtual_worm(&[]),
+                _ => recorder = record(worm, &file),
+            }
         } else {
             process.pause(Duration::from_millis(random.random_range(50..900)));
         }

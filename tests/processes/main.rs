@@ -165,6 +165,13 @@ impl Crawling {
         });
     }
 
+    /// kill -9, and no link is left: the system soon gives the number of its pseudo-terminal to another test's worm, and a
+    /// controller that waits for its port to come back would take that.
+    fn kill_virtual_worm(&mut self) {
+        self.virtual_worm.kill();
+        std::fs::remove_file(self.worm.port()).expect("the link is there");
+    }
+
     fn wait_for_mode(&self, mode: Mode) {
         wait_for(mode.name(), PATIENCE, || {
             self.worm.state().is_some_and(|state| state.mode == mode.code())
@@ -230,7 +237,7 @@ fn a_killed_estimator_stops_the_worm_and_restarts_beside_it() {
 #[test]
 fn a_pulled_cable_is_a_lost_link_until_it_is_back() {
     let mut crawling = Crawling::start("kill-w");
-    crawling.virtual_worm.kill();
+    crawling.kill_virtual_worm();
     crawling.wait_for_mode(Mode::Fault);
     assert_eq!(crawling.fault(), Some(Fault::LinkLost));
     crawling.virtual_worm = crawling.worm.virtual_worm(&[]);

@@ -52,7 +52,7 @@ fn a_stop_is_accepted_in_every_mode() {
     accepted(&crawling.worm, "holding");
     crawling.wait_for_mode(Mode::Disarmed);
     crawling.make_crawl();
-    crawling.virtual_worm.kill();
+    crawling.kill_virtual_worm();
     crawling.wait_for_mode(Mode::Fault);
     accepted(&crawling.worm, "fault");
 }

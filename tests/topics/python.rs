@@ -47,7 +47,8 @@ fn the_python_structure_has_the_layout_of_the_rust_one() {
     compare! {
         sequence time_ns phase motor_angle_rad motor_velocity_rad_s goal_velocity_rad_s motor_current_a motor_duty
         bus_voltage_v motor_temperature_c motor_time_s sample_time_s position_m sample samples_missed link_failures host_paused_ns
-        cell_count valid_mask sample_is_new motor_is_new mode fault fault_alarm hardware_error
+        cell_count valid_mask sample_is_new motor_is_new mode fault fault_alarm hardware_error hold_reason
+        acknowledged_mask acknowledged_by emergency_stop
     }
     assert_eq!(
         bytes,
