@@ -38,14 +38,14 @@ fn delay_ms(cycle_s: f64, direction: &str, blocked_at_s: f64) -> f64 {
 
 const DELAYS: &str = "\
 delay in ms, blocked after [0.3, 0.62, 1.01, 1.37, 1.49, 2.24] cycles
- 1.25 s forward    17   18   18   18   18   18
- 1.25 s backward   17   18   18   18   18   18
-  2.5 s forward    32   32   31   32   32   32
-  2.5 s backward   32   32   31   32   32   32
-    5 s forward    62   62   62   62   63   65
-    5 s backward   62   62   62   62   63   65
-   10 s forward    80   79   83   79   87   84
-   10 s backward   80   79   83   79   87   84
+ 1.25 s forward    17   17   18   18   18   18
+ 1.25 s backward   17   17   18   18   18   18
+  2.5 s forward    32   32   32   32   33   33
+  2.5 s backward   32   32   32   32   33   33
+    5 s forward    61   62   63   62   65   65
+    5 s backward   61   62   63   62   65   65
+   10 s forward    78   80   82   80   82   82
+   10 s backward   78   80   82   80   82   82
 ";
 
 #[test]
