@@ -17,6 +17,8 @@ use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOut
 const QUIET_S: std::ops::Range<f64> = 60.0..420.0;
 /// Cycles at a steady speed before a fault: the alarms have calibrated on three.
 const STEADY_CYCLES: std::ops::Range<f64> = 4.5..7.0;
+/// How many gait cycles the operator may need beyond the usual time until the worm crawls again.
+const RECOVERY_CYCLES: f64 = 6.0;
 /// A cycle of the ledger is the estimator's when they end within this share of a cycle.
 const SAME_END: f64 = 0.03;
 
@@ -278,6 +280,8 @@ impl Segment {
 
     /// The operator makes the worm crawl again: resets, arms, commands, until it does.
     fn recover(&mut self, within_s: f64) -> Result<(), Over> {
+        // A slow worm needs cycles to show that it crawls, too.
+        let within_s = within_s + RECOVERY_CYCLES / self.speed.abs();
         let until_s = self.session.now_s() + within_s;
         let mut refused = 0;
         while self.session.now_s() < until_s {
