@@ -280,8 +280,8 @@ slope, fault: alarms and how long after it they came, how it ended
  0° overheat:ambient=90        device-fault 0.98 s, fault (over-temperature)
  0° hardware-error:bits=32     device-fault 0.00 s, fault (servo-hardware)
  0° reboot:off=0.05            link-fault 0.10 s, device-fault 0.16 s, fault (servo-restarted)
- 0° drop:share=0.3             link-fault 0.33 s, crawling
- 0° corrupt:share=0.3          link-fault 0.83 s, crawling
+ 0° drop:share=0.3             link-fault 0.43 s, crawling
+ 0° corrupt:share=0.3          link-fault 0.93 s, crawling
  0° drop:share=0.02            crawling
  0° delay:ms=2                 crawling
  0° drag:force=0.3             model-mismatch 13.83 s, crawling
