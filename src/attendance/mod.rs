@@ -1,10 +1,10 @@
 //! What reaches a process from beside the topics: the life of its parent, and a way to stop it that needs no shared memory.
 //!
-//! - [`parent_pipe`]: a pipe from the parent. Bytes say that it is there, the end of the pipe that it is gone.
-//! - [`stop_socket`]: an abstract Unix socket in the controller that takes `stop` and says how the worm stands.
-//! - [`stop_client`]: the other end of that socket.
-//! - [`orphan`]: how the processes around the controller end when their parent is gone.
-//! - [`lock_watch`]: notices that the lock file of a role has been removed.
+//! - `parent_pipe`: a pipe from the parent. Bytes say that it is there, the end of the pipe that it is gone.
+//! - `stop_socket`: an abstract Unix socket in the controller that takes `stop` and says how the worm stands.
+//! - `stop_client`: the other end of that socket.
+//! - `orphan`: how the processes around the controller end when their parent is gone.
+//! - `lock_watch`: notices that the lock file of a role has been removed.
 
 mod lock_watch;
 mod orphan;

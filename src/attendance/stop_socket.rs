@@ -116,7 +116,7 @@ struct Shared {
 }
 
 impl StopSocket {
-    /// Binds the socket and serves it in a thread. `end` is set on [`Request::End`].
+    /// Binds the socket and serves it in a thread. `end` is set on `Request::End`.
     ///
     /// # Errors
     /// When the socket cannot be bound, or there is no thread to be had.

@@ -10,9 +10,14 @@ pub fn abridged(text: String, max_len: usize) -> String {
     if text.len() <= max_len {
         return text;
     }
-    let beginning = text.floor_char_boundary(max_len - max_len / 4);
-    let end = text.ceil_char_boundary(text.len() - max_len / 4);
+    let beginning = boundary((0..=max_len - max_len / 4).rev(), &text);
+    let end = boundary(text.len() - max_len / 4..=text.len(), &text);
     [&text[..beginning], ELLIPSIS, &text[end..]].concat()
+}
+
+/// The first of these indices at which a character begins or the text ends.
+fn boundary(mut indices: impl Iterator<Item = usize>, text: &str) -> usize {
+    indices.find(|&index| text.is_char_boundary(index)).unwrap_or_default()
 }
 
 /// The first of some names, and how many more there are: `a, b and 3 more`.
