@@ -255,5 +255,4 @@ impl Invariants {
 }
 
 #[cfg(test)]
-#[path = "invariants_tests.rs"]
 mod tests;

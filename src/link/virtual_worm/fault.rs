@@ -266,5 +266,4 @@ fn parse_window(window: &str) -> Result<(Option<f64>, Option<f64>), FaultError> 
 }
 
 #[cfg(test)]
-#[path = "fault_tests.rs"]
 mod tests;

@@ -214,5 +214,4 @@ fn standing(time_s: f64, body: &Body) -> Standing<'_> {
 }
 
 #[cfg(test)]
-#[path = "plant_tests.rs"]
 mod tests;

@@ -12,6 +12,7 @@ fn state(tick: u64, change: impl FnOnce(&mut State)) -> State {
     (state.sequence, state.time_ns) = (tick, 1_000_000_000 + tick * 4_000_000);
     (state.mode, state.motor_is_new) = (Mode::Armed.code(), 1);
     (state.phase, state.motor_angle_rad) = (0.0, 0.0);
+    state.motor_time_s = tick as f64 * 4e-3;
     change(&mut state);
     state
 }
