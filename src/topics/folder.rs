@@ -3,7 +3,7 @@
 //! Everything goes through directory descriptors that were verified after they were opened: between a check and a use by path,
 //! another user could exchange what lies there.
 
-use super::instance::InstanceError;
+use super::error::InstanceError;
 use nix::errno::Errno;
 use nix::fcntl::{OFlag, open, openat};
 use nix::sys::stat::{FileStat, Mode, fchmod, fstat, mkdirat};

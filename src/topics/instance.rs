@@ -1,9 +1,9 @@
 //! One worm's namespace on this computer.
 
+use super::error::InstanceError;
 use super::folder::{WormFolder, auto_root};
 use iceoryx2::prelude::{Config as IoxConfig, FileName, Path as IoxPath, SemanticString};
 use std::borrow::Cow;
-use std::io;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -15,78 +15,6 @@ const SOCKET_PATH_MAX: usize = 107;
 const SOCKET_NAME: usize = 1 + 39 + 6;
 /// How long iceoryx2 itself waits for a half-made service to be finished by its maker.
 const CREATION_TIMEOUT: Duration = Duration::from_millis(500);
-
-/// An instance that cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum InstanceError {
-    /// The folder cannot be created or entered.
-    #[error(
-        "topics.root: {}: {source}: give a folder on a tmpfs that this user may write, such as /dev/shm/wormd-{}",
-        folder.display(), nix::unistd::geteuid()
-    )]
-    Unusable {
-        /// The folder.
-        folder: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The folder belongs to someone else.
-    #[error(
-        "topics.root: {} belongs to user {owner}, this process runs as user {user}: run all processes of a worm as \
-         one user, or give this user's worm another name (worm.name, --name)",
-        folder.display()
-    )]
-    Foreign {
-        /// The folder.
-        folder: PathBuf,
-        /// The folder's owner.
-        owner: u32,
-        /// The user of this process.
-        user: u32,
-    },
-    /// The folder of all worms belongs to another user than root, who could exchange what is in it.
-    #[error(
-        "topics.root: {} belongs to user {owner}, who could exchange the files of this user's worms: give a folder of user \
-         {user} or of root, such as /dev/shm/wormd-{user}, or leave topics.root = \"auto\"",
-        root.display()
-    )]
-    ForeignRoot {
-        /// The folder.
-        root: PathBuf,
-        /// The folder's owner.
-        owner: u32,
-        /// The user of this process.
-        user: u32,
-    },
-    /// In the folder of all worms anybody may exchange anything.
-    #[error(
-        "topics.root: in {} (mode {mode:o}) others may remove and replace what this user creates: chmod +t it, or give \
-         another folder",
-        root.display()
-    )]
-    OpenRoot {
-        /// The folder.
-        root: PathBuf,
-        /// Its mode.
-        mode: u32,
-    },
-    /// Socket paths in it would be too long, or have characters that iceoryx2 does not take.
-    #[error(
-        "topics.root: {} and the name {worm} do not make a usable path: letters, digits and '/-_.' only, and the \
-         length of the folder plus twice that of the name must be at most {limit} characters, not {length}",
-        root.display()
-    )]
-    BadPath {
-        /// `topics.root`, symbolic links resolved.
-        root: PathBuf,
-        /// The worm.
-        worm: String,
-        /// Length of folder plus twice the name.
-        length: usize,
-        /// Longest allowed.
-        limit: usize,
-    },
-}
 
 /// One worm's namespace: everything that its processes share lies in one folder and under one prefix in `/dev/shm`.
 ///

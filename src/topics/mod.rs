@@ -98,10 +98,10 @@ mod subscriber;
 mod topic;
 
 pub use command::{AnswerError, CommandClient, CommandError, CommandServer, Responder};
-pub use error::PortError;
+pub use error::{InstanceError, PortError};
 pub use event::{Listener, Notifier, NotifyError, WaitError};
 pub use hub::Hub;
-pub use instance::{Instance, InstanceError};
+pub use instance::Instance;
 pub use lock::LockError;
 pub(crate) use lock::LockPlace;
 pub use publisher::{PublishError, Publisher};

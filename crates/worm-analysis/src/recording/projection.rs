@@ -8,7 +8,6 @@
 //! it.
 
 use super::markers::Markers;
-use super::sanity_check::MAX_POSITION_M;
 use super::series::Recording;
 use super::statistics::moves;
 use super::statistics::{quantile, spread};
@@ -19,6 +18,8 @@ use worm_estimator::abridged::first_of;
 use worm_log::ReadError;
 use worm_physics::MAX_CELLS;
 
+/// A position beyond this is none, m: sums of its square would lose all others.
+pub(super) const MAX_POSITION_M: f64 = 1e6;
 /// A marker that moves over less than this fraction of the median range, or whose own range exceeds the median as much, does
 /// not crawl with the others.
 const CRAWLING_FRACTION: f64 = 0.2;

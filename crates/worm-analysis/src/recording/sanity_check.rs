@@ -2,6 +2,7 @@
 
 use super::gaps::{bridge, is_longer, round_up, unseen_runs};
 use super::options::OpenOptions;
+use super::projection::MAX_POSITION_M;
 use super::series::Recording;
 use super::statistics::{moves, quantile, spread};
 use worm_log::ReadError;
@@ -13,9 +14,6 @@ const MIN_SAMPLES: usize = 10;
 const TOO_LARGE_M: f64 = 5.0;
 /// A time step of more than so many median periods is a gap.
 const MAX_STEP_PERIODS: f64 = 5.0;
-
-/// A position beyond this is none, m: sums of its square would lose all others.
-pub(super) const MAX_POSITION_M: f64 = 1e6;
 /// No recording takes longer than this, s: 30 years.
 const MAX_DURATION_S: f64 = 1e9;
 
