@@ -64,7 +64,7 @@ pub(super) struct Servo {
     home_counts: f64,
     turn_base_counts: f64, // whole turns that were forgotten at a start
     ramped_goal: f64,      // the velocity goal behind the profile acceleration, counts
-    duty_limit: f64,       // in force
+    duty_limit: f64,       // the smaller of PWM limit and goal PWM
     conditions: ServoConditions,
     starved: bool, // below the brownout voltage
     boots_until_s: f64,
