@@ -1,5 +1,7 @@
 //! What must hold in every tick, whatever happens to the worm.
 
+use super::machine::Machine;
+use super::session::Session;
 use worm_estimator::config::Config;
 use worm_estimator::message::{Cycle, Fault, Mode, State};
 
@@ -24,6 +26,19 @@ pub struct Truth {
     pub phase: f64,
     /// How long the worm's world has stood still, ns.
     pub stood_ns: u64,
+}
+
+impl Truth {
+    /// The truth of a session as it stands.
+    pub fn of<M: Machine>(session: &mut Session<M>) -> Self {
+        let stood_ns = session.stood_ns();
+        let plant = session.machine.plant();
+        Self {
+            velocity_rad_s: plant.motor().velocity_rad_per_s(),
+            phase: plant.body().phase(),
+            stood_ns,
+        }
+    }
 }
 
 /// A rule that was broken.

@@ -370,13 +370,7 @@ impl Segment {
             self.invariants.note_reset();
         }
         self.take_accounts();
-        let stood_ns = self.session.stood_ns();
-        let plant = self.session.machine.plant();
-        let truth = Truth {
-            velocity_rad_s: plant.motor().velocity_rad_per_s(),
-            phase: plant.body().phase(),
-            stood_ns,
-        };
+        let truth = Truth::of(&mut self.session);
         if let Some(broken) = self.invariants.look(&tick.state, tick.goal_counts, &truth) {
             return self.end_with(broken);
         }

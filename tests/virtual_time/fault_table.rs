@@ -228,13 +228,7 @@ impl Run {
         if kind == Some(CommandKind::Reset) && tick.verdict == Some(CommandOutcome::Accepted) {
             self.invariants.note_reset();
         }
-        let stood_ns = self.session.stood_ns();
-        let plant = self.session.machine.plant();
-        let truth = Truth {
-            velocity_rad_s: plant.motor().velocity_rad_per_s(),
-            phase: plant.body().phase(),
-            stood_ns,
-        };
+        let truth = Truth::of(&mut self.session);
         match self.invariants.look(&tick.state, tick.goal_counts, &truth) {
             None => Ok(tick.verdict),
             Some(broken) => Err(format!(
