@@ -33,27 +33,23 @@ impl Cam {
     }
 }
 
-/// Range of the servo's position, rad: a register of 32 bits, which passes its end after 15 days at 24 rev/min.
-const POSITION_RANGE_RAD: f64 = (1_u64 << 32) as f64 / COUNTS_PER_TURN * TAU;
-
-/// Follows the servo's position over the ends of its register, so that the cam's angle goes on and a hold never turns the cam back
-/// by a whole range.
+/// Follows the servo's position where its register forgets whole turns, so that the cam's angle goes on: after 15 days at 24 rev/min the
+/// register of 32 bits passes its end, and a servo that restarts counts from within one turn again (XL330-M288 e-manual, present
+/// position). Otherwise the worm would seem to have stepped back by all that was forgotten, and a hold would turn the cam to make up
+/// for it.
 #[derive(Debug, Clone, Copy, Default)]
 struct PositionUnwrapper {
     last_rad: Option<f64>,
-    ranges: f64,
+    forgotten_turns: f64,
 }
 
 impl PositionUnwrapper {
     fn unwrap_rad(&mut self, position_rad: f64) -> f64 {
         let step_rad = position_rad - self.last_rad.replace(position_rad).unwrap_or(position_rad);
-        // No servo turns by half of the range between two readings; one that restarts, from any position, jumps by less.
-        if step_rad > POSITION_RANGE_RAD / 2.0 {
-            self.ranges -= 1.0;
-        } else if step_rad < -POSITION_RANGE_RAD / 2.0 {
-            self.ranges += 1.0;
-        }
-        position_rad + self.ranges * POSITION_RANGE_RAD
+        // No cam turns by half a turn between two readings: at its fastest that takes more than a second, and without instructions
+        // the servo's watchdog stops it long before.
+        self.forgotten_turns -= (step_rad / TAU).round();
+        position_rad + self.forgotten_turns * TAU
     }
 }
 

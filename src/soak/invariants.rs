@@ -70,7 +70,7 @@ pub struct Invariants {
     was_reset: bool,
     /// By how much the virtual worm's clock was ahead of the servo's at the least since torque came on, s.
     clock_offset_s: f64,
-    /// Difference of the published phase from the true one, cycles, as first seen after the servo came up.
+    /// Difference of the published phase from the true one, cycles, as first seen.
     phase_offset: Option<f64>,
 }
 
@@ -229,7 +229,7 @@ impl Invariants {
         })
     }
 
-    /// The published phase is the true one, but for whole cycles after the servo lost its turns in a restart.
+    /// The published phase is the true one, but for the whole cycles that the servo had forgotten before it was first heard.
     fn phase(&mut self, state: &State, truth: &Truth) -> Option<Broken> {
         if state.motor_is_new == 0 || truth.stood_ns != self.stood_ns {
             (self.answers, self.stood_ns) = (0, truth.stood_ns);
@@ -240,17 +240,7 @@ impl Invariants {
             return None;
         }
         let offset = state.phase - truth.phase;
-        let mut known = *self.phase_offset.get_or_insert(offset);
-        let moves = |state: &State| {
-            [Mode::Crawling, Mode::Holding, Mode::Stopping]
-                .iter()
-                .any(|mode| state.mode == mode.code())
-        };
-        let lost_turns = (offset - known).round();
-        if lost_turns != 0.0 && !(moves(state) && self.last.as_ref().is_some_and(moves)) {
-            known += lost_turns;
-            self.phase_offset = Some(known);
-        }
+        let known = *self.phase_offset.get_or_insert(offset);
         // A late answer is right for the moment at which it was given.
         if state.mode == Mode::Armed.code() {
             self.clock_offset_s = f64::INFINITY;

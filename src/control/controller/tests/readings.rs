@@ -85,7 +85,8 @@ fn the_servo_s_position_passes_the_end_of_its_register_without_a_jump() {
             // Held just at the end, and pushed back and forth over it.
             let past_rad = direction * rig.servo.position_rad + range_rad / 2.0;
             rig.servo.position_rad -= direction * past_rad; // to the very end, by hand
-            rig.controller.hold_angle_rad = Some(rig.state().motor_angle_rad - sign * direction * past_rad);
+            let within_a_turn_rad = past_rad - (past_rad / TAU).round() * TAU;
+            rig.controller.hold_angle_rad = Some(rig.state().motor_angle_rad - sign * direction * within_a_turn_rad);
             for push in [-0.01, 0.01, -0.01, 0.01] {
                 rig.servo.position_rad += push;
                 if rig.servo.position_rad >= range_rad / 2.0 {
@@ -96,6 +97,23 @@ fn the_servo_s_position_passes_the_end_of_its_register_without_a_jump() {
                 rig.run(1);
                 assert!(rig.goal_counts.abs() <= 5, "{} counts", rig.goal_counts);
             }
+        }
+    }
+}
+
+#[test]
+fn a_servo_that_counts_its_turns_anew_after_a_restart_does_not_move_the_phase() {
+    for sign in [1.0, -1.0] {
+        let mut rig = Rig::crawling(&format!("servo.positive_is_forward = {}\n", sign > 0.0));
+        for turns in [1.0, 3.0, -2.0] {
+            rig.run(9_000);
+            let before = rig.state().phase;
+            rig.servo.position_rad -= turns * TAU;
+            let after = rig.tick(None).state.phase;
+            assert!(
+                (0.0..1e-3).contains(&(after - before)),
+                "from {before} to {after} cycles when {turns} turns are forgotten"
+            );
         }
     }
 }
