@@ -260,8 +260,8 @@ impl Detectors {
         positions: &sample::Positions,
         fault_free: bool,
     ) -> [DetectorOutput; 3] {
-        if self.progress.rests_after_no_progress(tick) {
-            // The cycle without progress must not stop the worm again as soon as it crawls on.
+        if self.progress.rests_after_no_progress(tick) || self.sliding.rests_after_slide(tick) {
+            // The cycle in which that was must not stop the worm again as soon as it crawls on.
             self.strides.begin_anew();
         }
         let stride = self.strides.update(tick, positions);

@@ -9,7 +9,8 @@
 //! - **crawling down**: displacement down in the last cycle (see [`super::stride`]) less the baseline per cycle; before that is calibrated,
 //!   and just after a reversal, a whole stroke, which is the most that a gait can gain.
 //!
-//! It clears when the worm has not sunk further for a while, and then monitors from there.
+//! It clears when the worm has not sunk further for a while, and then monitors from there. A rest before that ends the cycle in which it
+//! slid: no later advance over a cycle reaches back into it.
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
@@ -101,6 +102,11 @@ impl SlidingDown {
             since_ns: 0,
             sliding: false,
         }
+    }
+
+    /// Whether the worm rests and a slide is not over yet.
+    pub(super) const fn rests_after_slide(&self, tick: &Tick) -> bool {
+        (tick.still || !tick.torque) && self.sliding
     }
 
     /// Processes a sample. `baseline_m` is the calibrated advance per cycle in the present direction; `fault_free` says that nothing else is

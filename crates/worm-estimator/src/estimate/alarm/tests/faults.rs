@@ -125,6 +125,25 @@ fn a_cycle_without_progress_does_not_stop_the_crawl_after_the_hold() {
     assert_eq!(bench.changes, []);
 }
 
+/// Likewise a worm that slid while it crawled down: the cycle in which it slid is not held against it twice.
+#[test]
+fn a_slide_on_the_way_down_does_not_stop_the_crawl_after_the_hold() {
+    let mut bench = Bench::new(config(20.0, -0.4), 1);
+    bench.command(Mode::Crawling, -0.4);
+    bench.run(15.0);
+    bench.trouble.slide_m_per_s = 0.01;
+    bench.run(0.7);
+    assert_eq!(bench.raised(), [SlidingDown]);
+    bench.command(Mode::Holding, 0.0);
+    bench.trouble.slide_m_per_s = 0.0;
+    bench.run(6.0);
+    assert_eq!(bench.raised(), []);
+    bench.changes.clear();
+    bench.command(Mode::Crawling, -0.4);
+    bench.run(7.5);
+    assert_eq!(bench.changes, []);
+}
+
 #[test]
 fn arming_is_visible() {
     let mut bench = Bench::new(Config::default(), 1);
