@@ -19,7 +19,7 @@ pub struct LatencyArgs {
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
     /// How long to measure the loop; the start, busy subscribers and the search for the highest rate take additional time
-    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, default_value = "20")]
+    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, allow_negative_numbers = true, default_value = "20")]
     duration: Duration,
     /// Keep all CPUs, the memory and the disk busy meanwhile
     #[arg(long)]

@@ -24,7 +24,7 @@ pub struct RecordArgs {
     #[arg(long)]
     force: bool,
     /// End after this time, counted from the first message; without it, on Ctrl-C
-    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, allow_negative_numbers = true)]
     duration: Option<Duration>,
     /// Only these topics
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = "state,timing,estimate,cycle,alarm")]

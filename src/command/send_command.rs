@@ -22,7 +22,7 @@ pub struct SendCommandArgs {
     #[arg(long, value_name = "CYCLES_PER_S", allow_negative_numbers = true)]
     speed: Option<f64>,
     /// Crawl for so long, then hold; without it, as long as `wormd up` runs or `control.crawl_limit_s` allows
-    #[arg(long = "for", value_name = "SECONDS", value_parser = positive_seconds, conflicts_with = "attend")]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = positive_seconds, allow_negative_numbers = true, conflicts_with = "attend")]
     limit: Option<Duration>,
     /// Crawl as long as this command runs in the foreground: Ctrl-C, or its end however it comes, makes the worm hold
     #[arg(long)]

@@ -26,7 +26,7 @@ pub struct UpArgs {
     #[command(flatten)]
     worm: WormArgs,
     /// Stop after this time of crawling; without it, on Ctrl-C
-    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, allow_negative_numbers = true)]
     duration: Option<Duration>,
     /// Print the summary as one JSON object on standard output, and nothing else there
     #[arg(long)]

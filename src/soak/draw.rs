@@ -228,7 +228,8 @@ pub const ROWS: &[Row] = &[
         Lasts::Seconds(3.0, 15.0),
         Some((2.0, 0.0)),
         &[LinkFault, TrackerFault],
-        &[],
+        // Now and then every answer in a row, or each of a service's.
+        &[Fault::LinkLost],
     ),
     row(
         "lost answers, few",
@@ -244,7 +245,8 @@ pub const ROWS: &[Row] = &[
         Lasts::Seconds(3.0, 15.0),
         Some((2.0, 0.0)),
         &[LinkFault, TrackerFault],
-        &[],
+        // Now and then every answer in a row, or each of a service's.
+        &[Fault::LinkLost],
     ),
     row(
         "late answers",
@@ -273,7 +275,8 @@ pub const ROWS: &[Row] = &[
             |rng, _| spec(format!("overheat:ambient={:.0}", rng.random_range(70.0..76.0))),
             Lasts::Seconds(6.0, 9.0),
             Some((6.0, 0.0)),
-            &[DeviceFault],
+            // A hot winding takes more current through more resistance.
+            &[DeviceFault, EnergyOverBudget],
             &[Fault::OverTemperature, Fault::ServoHardware],
         )
     },

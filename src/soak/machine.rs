@@ -5,8 +5,8 @@ use crate::link::servo::register::HARDWARE_ERROR_STATUS;
 use crate::link::servo::scale;
 use crate::link::virtual_worm::{Devices, DevicesError, Fault, Options, Plant};
 use crate::link::{
-    ExchangePlan, FaultInjector, Faults, LinkSettings, Port, PortError, ServoReading, StartupError, TrackerReading,
-    WormBus, prepare,
+    EmergencyStopError, EmergencyStopInput, ExchangePlan, FaultInjector, Faults, LinkSettings, Port, PortError,
+    ServoReading, StartupError, TrackerReading, WormBus, prepare,
 };
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
@@ -20,6 +20,8 @@ pub struct Exchange {
     pub tracker: Option<TrackerReading>,
     /// Earlier exchanges whose answer never comes.
     pub lost: u32,
+    /// Whether the emergency stop is pressed, where there is one.
+    pub emergency_stop: Option<bool>,
 }
 
 /// What became of a service.
@@ -55,6 +57,9 @@ pub enum MachineError {
     /// The devices failed the start-up checks.
     #[error(transparent)]
     Startup(#[from] StartupError),
+    /// The emergency stop cannot be read.
+    #[error(transparent)]
+    EmergencyStop(#[from] EmergencyStopError),
 }
 
 /// How long a service waits for one answer, s.
@@ -120,6 +125,7 @@ pub struct Wired {
     bus: WormBus<FaultInjector<Wire>>,
     settings: LinkSettings,
     plan: ExchangePlan,
+    emergency_stop: Option<EmergencyStopInput>,
     /// How long a tick waits for answers, s.
     tick_timeout_s: f64,
     /// Deadline of an exchange at the virtual time 0, far enough away never to pass.
@@ -147,6 +153,7 @@ impl Wired {
             bus,
             settings,
             plan,
+            emergency_stop: EmergencyStopInput::open(config)?,
             tick_timeout_s: config.control.bus_wait_share / config.control.rate_hz,
             epoch: Instant::now() + NEVER,
         })
@@ -204,11 +211,14 @@ impl Machine for Wired {
     fn exchange(&mut self, goal_counts: i32, now_s: f64) -> Exchange {
         let timeout_s = self.tick_timeout_s;
         let wire = self.wire();
-        (wire.now_s, wire.timeout_s) = (now_s, timeout_s);
+        // Late answers are taken before the request is sent, without waiting for them.
+        (wire.now_s, wire.timeout_s, wire.give_up_s) = (now_s, timeout_s, now_s);
         let goal_rad_s = f64::from(goal_counts) * scale::VELOCITY_RAD_S;
         let deadline = self.epoch + Duration::from_secs_f64(now_s);
         let outcome = self.bus.exchange(&self.plan, goal_rad_s, deadline);
+        let emergency_stop = self.emergency_stop.as_mut();
         Exchange {
+            emergency_stop: emergency_stop.map(|input| input.is_pressed((now_s * 1e9) as u64, &outcome)),
             servo: outcome.servo.ok(),
             tracker: outcome.tracker.ok(),
             lost: outcome.lost,

@@ -158,6 +158,7 @@ impl<M: Machine> Session<M> {
                 servo: None,
                 tracker: None,
                 lost: 0,
+                emergency_stop: None,
             };
         }
         let world_s = self.world_s();
@@ -180,7 +181,7 @@ impl<M: Machine> Session<M> {
             alarms: &self.on_the_way,
             estimate: self.estimate_on_the_way.take(),
             lease: Lease::Held,
-            emergency_stop: None,
+            emergency_stop: exchange.emergency_stop,
             end: false,
             service: served.as_ref().map(|(served, _)| served.outcome),
             service_ns: served.as_ref().map_or(0, |(_, took_ns)| *took_ns),

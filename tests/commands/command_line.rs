@@ -36,7 +36,7 @@ fn unusable_input_is_named_and_ends_with_status_2() {
             &["1200", "1190"],
         ),
         (&["up", "--name", "No Name"], &["worm.name", "a-z"]),
-        (&["up", "--duration", "-3"], &["-3"]),
+        (&["up", "--duration", "-3"], &["-3", "more than 0 s"]),
         (&["up", "--duration", "nan"], &["nan"]),
         (
             &["up", "--fault", "earthquake", "--name", "cl-fault"],
@@ -56,6 +56,7 @@ fn unusable_input_is_named_and_ends_with_status_2() {
         (&["command", "hold", "--speed", "1"], &["--speed", "crawl"]),
         (&["command", "crawl", "--speed", "0"], &["--speed", "hold"]),
         (&["command", "crawl", "--speed", "nan"], &["--speed", "number"]),
+        (&["command", "crawl", "--for", "-3"], &["-3", "more than 0 s"]),
         (&["study", "--efficiency", "0.5"], &["--efficiency", "--battery"]),
         (&["study", "--json", "--battery=-5"], &["-5", "above 0"]),
         (&["study", "--cells", "1"], &["1 cells", "2 to 16"]),

@@ -59,6 +59,7 @@ impl Machine for Bare {
             servo: Some(servo),
             tracker: Some(*self.plant.capture()),
             lost: 0,
+            emergency_stop: None,
         }
     }
 

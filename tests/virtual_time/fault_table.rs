@@ -65,6 +65,8 @@ const STEEP: &str = "canal.slope_deg = 30\n";
 const BATTERY: &str = "[battery]\ncapacity_j = 400.0\nfull_v = 5.6\nempty_v = 4.0\ninternal_resistance_ohm = 0.2\n\
                        hotel_power_w = 0.5\nreserve_share = 0.1\n";
 
+const SWITCH: &str = "[emergency_stop]\nsource = \"tracker\"\n";
+
 use Cause::{Cable, Pause, Worm};
 
 const CASES: &[Case] = &[
@@ -107,6 +109,9 @@ const CASES: &[Case] = &[
     case(Mild, 4.0, LEVEL, || Worm("noise:m=0.0003")),
     // The model number is read only when torque is switched on.
     case(Mild, 2.0, LEVEL, || Worm("wrong-model:number=1190")),
+    // So is the firmware; the motor of such a servo goes on when the link breaks.
+    case(Mild, 2.0, LEVEL, || Worm("watchdog-defect:firmware=51")),
+    case(Severe, 1.0, SWITCH, || Worm("emergency-stop:bits=1")),
     case(Mild, 3.0, LEVEL, || {
         Cable(
             "bytes lost: 1 in 1000",
