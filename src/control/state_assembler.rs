@@ -48,7 +48,9 @@ impl PositionUnwrapper {
         let step_rad = position_rad - self.last_rad.replace(position_rad).unwrap_or(position_rad);
         // No cam turns by half a turn between two readings: at its fastest that takes more than a second, and without instructions
         // the servo's watchdog stops it long before.
-        self.forgotten_turns -= (step_rad / TAU).round();
+        if step_rad.abs() > TAU / 2.0 {
+            self.forgotten_turns -= (step_rad / TAU).round();
+        }
         position_rad + self.forgotten_turns * TAU
     }
 }
