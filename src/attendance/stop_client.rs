@@ -1,15 +1,19 @@
 //! Asking a controller at its stop socket.
 
-use super::stop_socket::{Answer, Question, Request, name_parts, peer_of};
+use super::stop_socket::{ANSWER_TIMEOUT, Answer, Question, Request, name_parts, peer_of};
+use nix::sys::socket::{self, AddressFamily, SockFlag, SockType, UnixAddr};
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader, Write};
-use std::os::linux::net::SocketAddrExt;
-use std::os::unix::net::{SocketAddr, UnixStream};
-use std::time::Duration;
+use std::os::fd::AsRawFd;
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 
-/// How long the controller may take to answer; it itself waits up to two seconds for its loop.
-const TIMEOUT: Duration = Duration::from_secs(3);
+/// How long the controller may take to answer; it itself waits up to [`ANSWER_TIMEOUT`] for its loop.
+const TIMEOUT: Duration = ANSWER_TIMEOUT.saturating_add(Duration::from_secs(1));
+/// How long a socket that takes no connection is tried, and how often.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+const CONNECT_POLL: Duration = Duration::from_millis(10);
 
 /// Where the kernel lists the sockets.
 const SOCKETS: &str = "/proc/net/unix";
@@ -54,28 +58,75 @@ pub(crate) enum StopError {
     },
 }
 
-/// Asks the worm's controller.
+/// Asks the worm's controller. [`Request::Stop`] goes to every controller of that name, should there be several, and only counts as
+/// accepted when all of them accept it.
 ///
 /// # Errors
 /// [`StopError`] when there is no stop socket of a controller that this user may ask, or it does not answer.
 pub(crate) fn ask(config: &Config, request: Request) -> Result<Answer, StopError> {
     let worm = &config.worm.name;
-    let sockets = sockets_of(worm, &config.topics.root).map_err(|source| StopError::NoAnswer {
+    let no_answer = |source| StopError::NoAnswer {
         worm: worm.clone(),
         source,
-    })?;
+    };
+    let caller = nix::unistd::geteuid().as_raw();
+    let sockets = sockets_of(worm, &config.topics.root).map_err(no_answer)?;
+    let (connected, is_one_busy) = connect_all(sockets, caller);
+    let mut answers = Vec::new();
     let mut failure = None;
-    for (user, name) in choose(worm, sockets, nix::unistd::geteuid().as_raw())? {
-        match ask_at(&name, user, request) {
-            Ok(answer) => return Ok(answer),
+    for (_, stream) in choose(worm, connected, caller)? {
+        match question(stream, request) {
+            Ok(answer) => answers.push(answer),
             Err(source) => failure = Some(source),
         }
+        if request != Request::Stop && !answers.is_empty() {
+            break;
+        }
     }
-    let worm = worm.clone();
-    Err(match failure {
-        Some(source) => StopError::NoAnswer { worm, source },
-        None => StopError::NoSocket { worm },
-    })
+    match failure {
+        Some(source) if answers.is_empty() || request == Request::Stop => Err(no_answer(source)),
+        _ => {
+            let answer = answers.into_iter().max_by_key(|answer| answer.refusal.is_some());
+            answer.ok_or_else(|| match is_one_busy {
+                true => no_answer(io::Error::new(io::ErrorKind::WouldBlock, "it takes no connection")),
+                false => StopError::NoSocket { worm: worm.clone() },
+            })
+        }
+    }
+}
+
+/// Connects to all of them, and leaves out those that are nobody's, or not their name's user's: anybody may bind any abstract name.
+/// Those that take no connection are tried for a while, unless one of the caller's own does; whether one was left comes second.
+fn connect_all(sockets: BTreeSet<(u32, String)>, caller: u32) -> (Vec<(u32, UnixStream)>, bool) {
+    let mut connected = Vec::new();
+    let mut waiting: Vec<_> = sockets.into_iter().collect();
+    let begun = Instant::now();
+    loop {
+        waiting.retain(|(user, name)| match connect(name) {
+            Ok(stream) => {
+                if peer_of(&stream).is_ok_and(|peer| peer.uid() == *user) {
+                    connected.push((*user, stream));
+                }
+                false
+            }
+            Err(error) => error.kind() == io::ErrorKind::WouldBlock,
+        });
+        let has_own = connected.iter().any(|(user, _)| *user == caller);
+        if waiting.is_empty() || has_own || begun.elapsed() > CONNECT_TIMEOUT {
+            return (connected, !waiting.is_empty());
+        }
+        std::thread::sleep(CONNECT_POLL);
+    }
+}
+
+/// Connects without waiting for room in the queue of the other side.
+fn connect(name: &str) -> io::Result<UnixStream> {
+    let flags = SockFlag::SOCK_NONBLOCK | SockFlag::SOCK_CLOEXEC;
+    let socket = socket::socket(AddressFamily::Unix, SockType::Stream, flags, None)?;
+    socket::connect(socket.as_raw_fd(), &UnixAddr::new_abstract(name.as_bytes())?)?;
+    let stream = UnixStream::from(socket);
+    stream.set_nonblocking(false)?;
+    Ok(stream)
 }
 
 /// The stop sockets of a worm on this computer: their user and name.
@@ -96,16 +147,15 @@ fn sockets_of(worm: &str, root: &str) -> io::Result<BTreeSet<(u32, String)>> {
 }
 
 /// Those that the calling user may ask: its own, or for root those of the only user who has a worm of this name.
-fn choose(worm: &str, sockets: BTreeSet<(u32, String)>, caller: u32) -> Result<Vec<(u32, String)>, StopError> {
-    let own: Vec<_> = sockets.iter().filter(|(user, _)| *user == caller).cloned().collect();
+fn choose<S>(worm: &str, sockets: Vec<(u32, S)>, caller: u32) -> Result<Vec<(u32, S)>, StopError> {
     let users: BTreeSet<_> = sockets.iter().map(|(user, _)| *user).collect();
-    if !own.is_empty() || users.is_empty() {
-        return Ok(own);
+    if users.is_empty() || users.contains(&caller) {
+        return Ok(sockets.into_iter().filter(|(user, _)| *user == caller).collect());
     }
     let named = users.iter().map(u32::to_string).collect();
     let worm = worm.to_owned();
     match (caller, users.len()) {
-        (0, 1) => Ok(sockets.into_iter().collect()),
+        (0, 1) => Ok(sockets),
         (0, _) => Err(StopError::SeveralUsers { worm, users: named }),
         _ => Err(StopError::Foreign {
             worm,
@@ -115,12 +165,7 @@ fn choose(worm: &str, sockets: BTreeSet<(u32, String)>, caller: u32) -> Result<V
     }
 }
 
-fn ask_at(name: &str, user: u32, request: Request) -> io::Result<Answer> {
-    let mut stream = UnixStream::connect_addr(&SocketAddr::from_abstract_name(name)?)?;
-    // Anybody may bind any abstract name.
-    if peer_of(&stream)?.uid() != user {
-        return Err(io::Error::other("it belongs to another user than its name says"));
-    }
+fn question(mut stream: UnixStream, request: Request) -> io::Result<Answer> {
     stream.set_read_timeout(Some(TIMEOUT))?;
     stream.set_write_timeout(Some(TIMEOUT))?;
     let mut question = serde_json::to_string(&Question { request })?;
@@ -137,12 +182,7 @@ mod tests {
 
     #[test]
     fn a_user_asks_its_own_worm_and_root_the_only_one_there_is() {
-        let sockets = |users: &[u32]| {
-            users
-                .iter()
-                .map(|user| (*user, format!("s{user}")))
-                .collect::<BTreeSet<_>>()
-        };
+        let sockets = |users: &[u32]| users.iter().map(|user| (*user, ())).collect();
         let chosen = |users: &[u32], caller| {
             choose("worm1", sockets(users), caller)
                 .map(|chosen| chosen.iter().map(|(user, _)| *user).collect::<Vec<_>>())
@@ -153,5 +193,33 @@ mod tests {
         assert_eq!(chosen(&[0, 1000], 0).expect("one"), [0]);
         assert_eq!(chosen(&[1000], 0).expect("one"), [1000]);
         assert!(matches!(chosen(&[1000, 1001], 0), Err(StopError::SeveralUsers { .. })));
+    }
+
+    #[test]
+    fn names_that_others_have_bound_neither_hold_up_a_question_nor_count() {
+        let user = nix::unistd::geteuid().as_raw();
+        let name = |what: &str| format!("wormd-test/{}/{what}", std::process::id());
+        let bind = |what: &str, backlog: i32| {
+            let flags = SockFlag::SOCK_CLOEXEC;
+            let socket = socket::socket(AddressFamily::Unix, SockType::Stream, flags, None).expect("a socket");
+            let address = UnixAddr::new_abstract(name(what).as_bytes()).expect("a short name");
+            socket::bind(socket.as_raw_fd(), &address).expect("a free name");
+            socket::listen(&socket, socket::Backlog::new(backlog).expect("a small number")).expect("it listens");
+            socket
+        };
+        // One that takes no more connections, one whose name says another user, and one that is as it should be.
+        let _full = bind("full", 0);
+        let _first = connect(&name("full")).expect("room for one");
+        let _foreign = bind("foreign", 8);
+        let _own = bind("own", 8);
+        let sockets = |named: &[(u32, &str)]| named.iter().map(|(user, what)| (*user, name(what))).collect();
+        let (connected, is_one_busy) =
+            connect_all(sockets(&[(user, "full"), (user + 1, "foreign"), (user, "own")]), user);
+        let users: Vec<_> = connected.iter().map(|(user, _)| *user).collect();
+        assert_eq!((users, is_one_busy), (vec![user], true));
+        let (connected, is_one_busy) = connect_all(sockets(&[(user, "full"), (user + 1, "foreign")]), user);
+        assert_eq!((connected.len(), is_one_busy), (0, true));
+        let (connected, is_one_busy) = connect_all(sockets(&[(user, "gone")]), user);
+        assert_eq!((connected.len(), is_one_busy), (0, false));
     }
 }

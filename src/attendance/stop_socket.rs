@@ -10,7 +10,7 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::socket::{UnixCredentials, getsockopt, sockopt::PeerCredentials};
 use serde::{Deserialize, Serialize};
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io::{self, Read, Write};
 use std::os::fd::AsFd;
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
@@ -22,15 +22,15 @@ use worm_estimator::message::{Command, CommandKind, Fault, Mode, Reply};
 
 /// Commands that may wait for the next tick.
 const QUEUE: usize = 8;
-/// How long a client may take to ask.
+/// How long a client may take to ask, however many pieces it asks in.
 const ASK_TIMEOUT: Duration = Duration::from_millis(250);
-/// How long the loop may take to answer: as long as a client of the topics waits.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long the loop may take to answer: longer than its longest service, a restart of the servo.
+pub(super) const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 /// How often the socket looks whether it is to close, and for the loop's answer.
 const POLL_MS: u8 = 50;
 const ANSWER_POLL: Duration = Duration::from_millis(1);
 /// Longest question, bytes.
-const MAX_LINE: u64 = 256;
+const MAX_LINE: usize = 256;
 
 /// What may be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -214,11 +214,8 @@ impl Server {
             );
         }
         stream.set_nonblocking(false)?;
-        stream.set_read_timeout(Some(ASK_TIMEOUT))?;
         stream.set_write_timeout(Some(ASK_TIMEOUT))?;
-        let mut line = String::new();
-        BufReader::new((&stream).take(MAX_LINE)).read_line(&mut line)?;
-        let question: Question = serde_json::from_str(&line)?;
+        let question: Question = serde_json::from_slice(&read_line(&stream)?)?;
         match question.request {
             Request::Status => self.send(&mut stream, None, None),
             Request::Stop => {
@@ -283,6 +280,25 @@ impl Server {
         text.push('\n');
         stream.write_all(text.as_bytes())
     }
+}
+
+/// A line, or what came of it before the client closed.
+fn read_line(mut stream: &UnixStream) -> io::Result<Vec<u8>> {
+    let begun = Instant::now();
+    let (mut line, mut filled) = ([0; MAX_LINE], 0);
+    while filled < MAX_LINE {
+        let left = ASK_TIMEOUT.saturating_sub(begun.elapsed());
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        stream.set_read_timeout(Some(left))?;
+        let read = stream.read(&mut line[filled..])?;
+        filled += read;
+        if read == 0 || line[..filled].contains(&b'\n') {
+            break;
+        }
+    }
+    Ok(line[..filled].to_vec())
 }
 
 /// Who is at the other end of a socket.

@@ -347,6 +347,8 @@ impl Controller {
             // The loop has logged the reason. The servo may have switched torque on, and only its answer was lost.
             ServiceOutcome::Failed(Service::Arm) => {
                 self.resume.cancel();
+                // The attempt has changed the servo's settings: they tell nothing about the silence before any more.
+                self.is_silence_unexplained = false;
                 if self.mode != Mode::Fault {
                     self.enter(Mode::Stopping, now_ns);
                     self.armed_ns = now_ns;
@@ -415,6 +417,9 @@ impl Controller {
 
     /// Ends a crawl whose lease has lapsed, or whose time is over.
     fn check_crawl_limit(&mut self, lease: Lease, now_ns: u64) {
+        if self.mode == Mode::Crawling {
+            self.crawl_limit.lean_on(lease);
+        }
         let Some(reason) = self.crawl_limit.reached(now_ns, lease) else {
             return;
         };

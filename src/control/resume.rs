@@ -7,6 +7,7 @@
 //! - no alarm stands whose policy is more than a warning, except those despite which an operator permitted motion;
 //! - what limits the crawl has not ended it: its lease is held, its time is not over, no emergency stop is pressed;
 //! - servo, tracker and estimator answer, and the computer has not paused for [`SETTLED_NS`];
+//! - that is so within [`WORTH_WAITING_NS`] after the pause: later somebody may be working at the worm;
 //! - it has resumed fewer than [`MAX_RESUMES`] times within [`RESUME_WINDOW_NS`]: a computer that pauses more often cannot run a
 //!   worm.
 //!
@@ -16,6 +17,8 @@ use worm_estimator::config::Config;
 
 /// How long the computer must have run without a pause, ns.
 const SETTLED_NS: u64 = 1_000_000_000;
+/// How long after the pause it resumes at the latest, ns.
+const WORTH_WAITING_NS: u64 = 10_000_000_000;
 /// How often it resumes at most …
 const MAX_RESUMES: usize = 3;
 /// … within this time, ns.
@@ -70,6 +73,9 @@ impl Resume {
     pub(super) fn is_due(&mut self, now_ns: u64, pause_ns: u64, is_ready: bool) -> bool {
         if pause_ns > 0 {
             self.settled_since_ns = now_ns;
+        }
+        if self.begun_ns[0].is_some_and(|begun_ns| now_ns - begun_ns > WORTH_WAITING_NS) && !self.is_requested {
+            self.cancel();
         }
         let is_due = self.velocity_rad_s.is_some()
             && !self.is_requested

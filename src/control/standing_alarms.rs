@@ -90,8 +90,7 @@ impl StandingAlarms {
 
     /// The estimator is silent and not required: nothing is known of its alarms.
     pub(super) fn forget(&mut self) {
-        self.raised = 0;
-        self.acknowledged = 0;
+        self.clear(KNOWN);
     }
 
     pub(super) fn policy(&self, kind: AlarmKind) -> Policy {

@@ -14,14 +14,15 @@ const RENEWAL: Duration = Duration::from_millis(250);
 /// How often the end is looked for.
 const POLL: Duration = Duration::from_millis(10);
 
-/// Makes the worm crawl, and permits that anew until `end` is set; then it holds. Calls `begun` once it crawls.
+/// Makes the worm crawl, and permits that anew until `end` is set; then it holds. Calls `begun` once it crawls. Nothing here makes it
+/// crawl a second time: a hold of somebody else ends it, whenever it comes.
 ///
 /// # Errors
 /// [`Failure::Failed`] when the controller refuses or is gone, or when somebody else has ended the crawl.
 pub(crate) fn crawl(hub: &Hub, cycles_per_s: f64, end: &AtomicBool, begun: impl FnOnce()) -> Result<(), Failure> {
     let client = hub.command_client().map_err(Failure::failed)?;
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
-    let mut permitted = permit(&client, cycles_per_s)?;
+    let mut permitted = permit(&client, CommandKind::Crawl, cycles_per_s)?;
     begun();
     let mut renewed = Instant::now();
     while !end.load(Ordering::Relaxed) {
@@ -38,21 +39,21 @@ pub(crate) fn crawl(hub: &Hub, cycles_per_s: f64, end: &AtomicBool, begun: impl 
             )));
         }
         if renewed.elapsed() >= RENEWAL {
-            permitted = permit(&client, cycles_per_s)?;
+            permitted = permit(&client, CommandKind::Renew, cycles_per_s)?;
             renewed = Instant::now();
         }
     }
     accepted(&client, command(CommandKind::Hold)).map(drop)
 }
 
-/// Permits the crawl anew; returns the controller's tick that did.
-fn permit(client: &CommandClient, cycles_per_s: f64) -> Result<u64, Failure> {
-    let crawl = Command {
+/// Permits the crawl for a little longer; returns the controller's tick that did.
+fn permit(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Result<u64, Failure> {
+    let permission = Command {
         cycles_per_s,
         limit_s: LIMIT_S,
-        ..command(CommandKind::Crawl)
+        ..command(kind)
     };
-    accepted(client, crawl)
+    accepted(client, permission)
 }
 
 fn accepted(client: &CommandClient, command: Command) -> Result<u64, Failure> {

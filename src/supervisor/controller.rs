@@ -124,13 +124,24 @@ impl Answer {
                     self.fault()
                 )
             }
+            CommandOutcome::WrongMode if self.kind == CommandKind::Renew => {
+                format!("the worm does not crawl any more, it is {mode}")
+            }
             CommandOutcome::WrongMode => format!("not while {mode}"),
             CommandOutcome::FaultPersists => format!("the cause is still present ({}): remove it first", self.fault()),
             CommandOutcome::BadSpeed => {
-                "the speed is not a number, or beyond servo.velocity_limit_rev_per_min".to_owned()
+                "the speed or the time is not a number, or the speed is beyond servo.velocity_limit_rev_per_min"
+                    .to_owned()
             }
             CommandOutcome::NoEstimator => {
-                "no estimator is running: start `wormd estimate`, or set control.require_estimator = false".to_owned()
+                "no estimator is running, or it does not keep up: start `wormd estimate`, or set \
+                 control.require_estimator = false"
+                    .to_owned()
+            }
+            CommandOutcome::NoLease => {
+                "`wormd up` does not watch over the worm at present: say for how long it may crawl \
+                                        (--for SECONDS), or watch over it yourself (--attend)"
+                    .to_owned()
             }
             CommandOutcome::AlarmStands => format!(
                 "an alarm stands ({}): remove its cause; alarms of motion clear after two seconds at rest, the others let \

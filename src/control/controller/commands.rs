@@ -44,6 +44,15 @@ impl Controller {
             (CommandKind::Crawl, Mode::Armed | Mode::Crawling | Mode::Holding) => {
                 self.begin_crawl(command, now_ns, inputs)
             }
+            (CommandKind::Renew, Mode::Crawling) => {
+                match CrawlLimit::of_command(command.limit_s, self.crawl_limit_s, inputs.lease, now_ns) {
+                    Ok(limit) => {
+                        self.crawl_limit = limit;
+                        ACCEPTED
+                    }
+                    Err(refusal) => (refusal, 0),
+                }
+            }
             (CommandKind::Hold, Mode::Armed | Mode::Crawling | Mode::Holding) => {
                 if self.mode != Mode::Holding {
                     self.enter_hold(HoldReason::Command, now_ns);
@@ -93,9 +102,13 @@ impl Controller {
         } else {
             command.cycles_per_s * TAU
         };
-        let limit = CrawlLimit::of_command(command.limit_s, self.crawl_limit_s, inputs.lease, now_ns);
-        let Some(limit) = limit.filter(|_| velocity_rad_s.abs() <= self.velocity_limit_rad_s) else {
+        // A speed that is no number is beyond the limit, too.
+        if !(velocity_rad_s.abs() <= self.velocity_limit_rad_s) {
             return (CommandOutcome::BadSpeed, 0);
+        }
+        let limit = match CrawlLimit::of_command(command.limit_s, self.crawl_limit_s, inputs.lease, now_ns) {
+            Ok(limit) => limit,
+            Err(refusal) => return (refusal, 0),
         };
         if self.lacks_estimator(now_ns) {
             return (CommandOutcome::NoEstimator, 0);

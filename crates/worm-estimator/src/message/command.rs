@@ -19,6 +19,9 @@ coded_enum! {
         Reset = 4 => "reset",
         /// Note that somebody has seen the alarms of [`Command::alarm_mask`]. Permits nothing.
         Acknowledge = 5 => "acknowledge",
+        /// Go on crawling for [`Command::limit_s`] from now on. Never begins a crawl, and changes neither speed nor direction: whoever
+        /// attends to a crawl must not overrule a hold.
+        Renew = 6 => "renew",
     }
 }
 
@@ -39,6 +42,8 @@ coded_enum! {
         NoEstimator = 5 => "no-estimator",
         /// An alarm stands whose policy is more than a warning; [`Reply::alarm_mask`] has it.
         AlarmStands = 6 => "alarm-stands",
+        /// The lease of the supervisor has lapsed, and the command gives no time of its own.
+        NoLease = 7 => "no-lease",
     }
 }
 
@@ -49,8 +54,8 @@ coded_enum! {
 pub struct Command {
     /// Gait cycles per second for [`CommandKind::Crawl`], negative for backward; 0 means the configured gait.
     pub cycles_per_s: f64,
-    /// For [`CommandKind::Crawl`], how long the worm may crawl before it holds, s. 0 leaves it to the controller: as long as the lease of
-    /// `wormd up` lasts, and without one `control.crawl_limit_s`.
+    /// For [`CommandKind::Crawl`] and [`CommandKind::Renew`], how long the worm may crawl before it holds, s. 0 leaves it to the controller:
+    /// as long as the lease of `wormd up` lasts, and where nobody holds one `control.crawl_limit_s`.
     pub limit_s: f64,
     /// [`CommandKind`] as a code.
     pub kind: u32,

@@ -79,7 +79,6 @@ fn a_crawl_ends_after_its_time() {
         (Lease::None, 0.0, 5),
         (Lease::None, 2.0, 2),
         (Lease::None, 8.0, 8),
-        (Lease::Lapsed, 0.0, 5),
         (Lease::Lapsed, 8.0, 8),
         (Lease::Held, 3.0, 3),
     ] {
@@ -113,6 +112,69 @@ fn every_crawl_command_renews_the_time() {
     }
     rig.run(101);
     assert_eq!(rig.mode(), Mode::Holding);
+}
+
+#[test]
+fn a_renewal_never_overrules_a_hold() {
+    let mut rig = Rig::armed("[control]\ncrawl_limit_s = 5.0\n");
+    rig.lease = Lease::None;
+    let renewal = Command {
+        limit_s: 1.0,
+        cycles_per_s: 0.1,
+        ..Command::new(CommandKind::Renew)
+    };
+    assert_eq!(rig.send(renewal).0, CommandOutcome::WrongMode, "it begins no crawl");
+    assert_eq!(rig.send(crawl_for(1.0)).0, CommandOutcome::Accepted);
+    for _ in 0..20 {
+        rig.run(900);
+        assert_eq!(rig.send(renewal).0, CommandOutcome::Accepted);
+    }
+    let speed_counts = rig.goal_counts;
+    rig.run(900);
+    assert_eq!(rig.goal_counts, speed_counts, "the speed stays as it was commanded");
+    // A hold, and in the very next tick the renewal that was on its way.
+    assert_eq!(rig.command(CommandKind::Hold, 0.0), CommandOutcome::Accepted);
+    assert_eq!(rig.send(renewal).0, CommandOutcome::WrongMode);
+    rig.run(1000);
+    assert_eq!((rig.mode(), rig.goal_counts), (Mode::Holding, 0));
+}
+
+#[test]
+fn a_renewed_crawl_backs_off_to_the_end() {
+    let mut rig = Rig::armed(BACK_OFF);
+    rig.lease = Lease::None;
+    assert_eq!(rig.send(crawl_for(1.0)).0, CommandOutcome::Accepted);
+    rig.run(500);
+    rig.raise(AlarmKind::NoProgress);
+    let renewal = Command {
+        limit_s: 1.0,
+        ..Command::new(CommandKind::Renew)
+    };
+    let mut renewals = 0;
+    while rig.mode() == Mode::Crawling {
+        assert_eq!(rig.send(renewal).0, CommandOutcome::Accepted);
+        renewals += 1;
+        rig.run(249);
+    }
+    assert!(renewals > 8, "a back-off takes a cycle");
+    assert_eq!(rig.hold_reason(), HoldReason::Alarm);
+}
+
+#[test]
+fn without_its_lease_a_crawl_needs_a_time() {
+    let mut rig = Rig::armed("");
+    rig.lease = Lease::Lapsed;
+    // The last command of a supervisor that has died.
+    assert_eq!(rig.command(CommandKind::Crawl, 0.0), CommandOutcome::NoLease);
+    assert_eq!(rig.mode(), Mode::Armed);
+    assert_eq!(rig.send(crawl_for(600.0)).0, CommandOutcome::Accepted);
+    rig.run(500);
+    // The supervisor is back, and watches over this crawl, too.
+    rig.lease = Lease::Held;
+    rig.run(500);
+    rig.lease = Lease::Lapsed;
+    rig.run(1);
+    assert_eq!((rig.mode(), rig.goal_counts), (Mode::Holding, 0));
 }
 
 #[test]
