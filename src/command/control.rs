@@ -30,6 +30,7 @@ pub struct ControlArgs {
 /// [`Failure::Unusable`] for a configuration, port, device or worm that cannot be used; [`Failure::Failed`] when the topics
 /// cannot be opened, or were removed while the worm ran.
 pub fn run(args: &ControlArgs) -> Result<(), Failure> {
+    print::log_in_background()?;
     let config = args.worm.load()?;
     let Some(port) = &config.port else {
         return Err(Failure::unusable(

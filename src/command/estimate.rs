@@ -21,6 +21,7 @@ pub struct EstimateArgs {
 /// # Errors
 /// [`Failure::Unusable`] for a configuration or worm that cannot be used; [`Failure::Failed`] when the topics fail.
 pub fn run(args: &EstimateArgs) -> Result<(), Failure> {
+    print::log_in_background()?;
     let config = args.worm.load()?;
     let end = end_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;

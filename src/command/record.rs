@@ -50,6 +50,7 @@ fn channel(name: &str) -> Result<Channel, String> {
 /// [`Failure::Unusable`] for a configuration, worm or file that cannot be used; [`Failure::Failed`] when the topics fail or
 /// the file cannot be written.
 pub fn run(args: &RecordArgs) -> Result<(), Failure> {
+    print::log_in_background()?;
     let (config, text) = args.worm.load_with_text()?;
     let limits = args.limits.limits().map_err(Failure::unusable)?;
     let end = end_on_signal()?;

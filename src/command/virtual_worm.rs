@@ -56,6 +56,7 @@ fn parse_baud(text: &str) -> Result<u32, String> {
 /// [`Failure::Unusable`] for a configuration, fault, link or ledger that cannot be used; [`Failure::Failed`] when the devices or
 /// their port fail while they run.
 pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
+    print::log_in_background()?;
     let config = args
         .config
         .as_deref()

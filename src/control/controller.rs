@@ -177,14 +177,19 @@ impl Controller {
             self.take_service(outcome, now_ns);
         }
         self.emergency_stop = inputs.emergency_stop;
-        if self.is_emergency() {
-            self.enter_emergency(now_ns);
+        // A line that is dead silences the switch, too: the reason is the line then.
+        let is_line_silent = inputs.servo.is_none();
+        if !is_line_silent {
+            self.heed_emergency_stop(now_ns);
         }
         if self.mode != Mode::Fault {
             self.paused_unanswered_ns += pause_ns;
         }
         if self.has_torque() {
             self.check_safety(inputs, now_ns, dt_s);
+        }
+        if is_line_silent {
+            self.heed_emergency_stop(now_ns);
         }
         self.explain_silence(inputs);
         // A reading in the tick of the pause itself may be older than the pause.
@@ -253,7 +258,10 @@ impl Controller {
         self.emergency_stop == Some(true)
     }
 
-    fn enter_emergency(&mut self, now_ns: u64) {
+    fn heed_emergency_stop(&mut self, now_ns: u64) {
+        if !self.is_emergency() {
+            return;
+        }
         self.resume.cancel();
         self.pending = None;
         if self.has_torque() {

@@ -11,6 +11,7 @@ use super::sched_counters::{Counts, Parts, find_culprit};
 use super::schedule::{Schedule, bus_allowed_ns};
 use crate::attendance::{Attendance, Parent};
 use crate::link::{EmergencyStopError, EmergencyStopInput};
+use crate::logging::Summed;
 use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
 use crate::topics::{
     CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher, Responder,
@@ -133,6 +134,7 @@ pub fn run(
         alarms: [Alarm::NONE; ALARMS_PER_TICK],
         last: None,
         served: Served::NOTHING,
+        failed_services: Summed::default(),
         publish_ns: 0,
         work_ns: 0,
         host_pauses: 0,
@@ -175,6 +177,7 @@ struct Loop {
     last: Option<Outputs>,
     /// What became of the service that it requested.
     served: Served,
+    failed_services: Summed<u64>,
     /// How long the last tick's publishing took.
     publish_ns: u64,
     /// How long the last tick worked after its exchange, without its service.
@@ -291,7 +294,9 @@ impl Loop {
         }
         // At once, because it may be to switch torque off. A finished loop has done what it could.
         let service = outputs.service.filter(|_| !outputs.finished);
-        self.served = service.map_or(Served::NOTHING, |service| serve(drive, service));
+        self.served = service.map_or(Served::NOTHING, |service| {
+            serve(drive, service, &mut self.failed_services)
+        });
         self.finish(
             Times {
                 deadline,
@@ -436,13 +441,21 @@ fn prefault_stack() {
     std::hint::black_box(&mut stack);
 }
 
-/// Executes a service and returns what became of it. Logging is allowed here, because the worm stands still, or is to.
-fn serve(drive: &mut Drive, service: Service) -> Served {
+/// Executes a service and returns what became of it. Logging is allowed here, because the worm stands still, or is to, and because it
+/// waits for no reader (`print::log_in_background`). While a port is gone, torque is tried to be switched off twice a second.
+fn serve(drive: &mut Drive, service: Service, failures: &mut Summed<u64>) -> Served {
     let begun = monotonic_ns();
     let (outcome, hardware_error) = match drive.serve(service) {
         Ok(hardware_error) => (ServiceOutcome::Done(service), hardware_error),
         Err(error) => {
-            tracing::error!("{service:?} failed: {error}");
+            failures.add(|count| *count += 1);
+            match failures.take_due(begun, false) {
+                Some(1) => tracing::error!("{service:?} failed: {error}"),
+                Some(count) => {
+                    tracing::error!("{service:?} failed: {error}; {count} failures since this was last said")
+                }
+                None => {}
+            }
             (ServiceOutcome::Failed(service), None)
         }
     };

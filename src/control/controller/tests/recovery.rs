@@ -232,3 +232,52 @@ fn a_servo_that_was_silent_because_it_restarted_is_reported_so() {
         assert_eq!(rig.mode(), Mode::Armed);
     }
 }
+
+#[test]
+fn a_dead_line_is_the_reason_where_it_silences_the_emergency_stop_too() {
+    let silent = |emergency_after_ms: u64| {
+        let mut rig = Rig::crawling("");
+        rig.emergency_stop = Some(false);
+        rig.run(10);
+        rig.servo_answers = false;
+        let mut passed_ms = 0;
+        while rig.mode() != Mode::Fault {
+            passed_ms += 1;
+            rig.emergency_stop = Some(passed_ms >= emergency_after_ms);
+            rig.run(1);
+        }
+        (rig, passed_ms)
+    };
+    let (_, link_lost_ms) = silent(u64::MAX);
+    for (emergency_ms, reason) in [
+        (link_lost_ms - 1, Fault::EmergencyStop),
+        (link_lost_ms, Fault::LinkLost),
+        (link_lost_ms + 1, Fault::LinkLost),
+    ] {
+        let (mut rig, stopped_ms) = silent(emergency_ms);
+        assert_eq!(rig.controller.fault(), reason, "unread from {emergency_ms} ms on");
+        assert_eq!(stopped_ms, emergency_ms.min(link_lost_ms));
+        rig.emergency_stop = Some(true);
+        rig.servo_answers = true;
+        rig.run(100);
+        assert_eq!(rig.controller.fault(), reason, "the first reason stays");
+        assert_eq!(rig.command(CommandKind::Reset, 0.0), CommandOutcome::FaultPersists);
+    }
+}
+
+#[test]
+fn a_worm_does_not_resume_long_after_the_pause() {
+    for (silent_s, resumes) in [(5, true), (15, false)] {
+        let mut rig = Rig::crawling("[control]\nresume_after_pause = true\n");
+        rig.pause(150);
+        rig.servo.watchdog = 0xFF;
+        rig.run(10);
+        assert_eq!(rig.controller.fault(), Fault::HostPaused);
+        rig.tracker_runs = false;
+        rig.run(silent_s * 1000);
+        assert_eq!(rig.mode(), Mode::Fault);
+        rig.tracker_runs = true;
+        rig.run(3000);
+        assert_eq!(rig.mode() == Mode::Crawling, resumes, "{silent_s} s without a tracker");
+    }
+}
