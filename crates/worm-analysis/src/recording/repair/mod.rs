@@ -1,0 +1,176 @@
+//! Repairs a capture, and reports every repair.
+//!
+//! Trackers confuse markers, lose and freeze them, and are knocked. What the rest of the recording decides beyond doubt is put right
+//! here, in this order, because each step relies on those before it:
+//! 1. `labels`: cells cannot pass one another in a canal, so their order tells which marker is which.
+//! 2. `frozen`: a marker without noise is no measurement.
+//! 3. `jumps`: a marker that jumps away alone is left out until it comes back; one that stays away has moved on its cell.
+//!
+//! Positions are given to another cell or left out, never changed. A recording without such faults stays as it is, to the last bit.
+//! Where too much would have to be repaired, or a label has two explanations, the recording is refused.
+//! Knocks of the camera look like slips of the body until the gait is known: [`identify`](crate::identify) finds those.
+
+mod frozen;
+mod jumps;
+mod labels;
+mod note;
+pub(super) mod stamps;
+
+pub use note::{Repair, RepairKind};
+
+use super::gaps::{is_longer, round_up};
+use super::options::OpenOptions;
+use super::series::Recording;
+use super::statistics::noise;
+use worm_log::ReadError;
+
+/// Most samples in which labels may be swapped for a while, as a fraction of the recording, and the time that is always accepted, s. A swap
+/// that lasts to an end of the recording is one event, however long, and does not count.
+const MAX_RELABELLED: (f64, f64) = (0.02, 0.5);
+/// Largest fraction of a cell's positions that may be left out.
+const MAX_LEFT_OUT: f64 = 0.1;
+/// Most markers that may move on their cells in a run.
+const MAX_MOVED: usize = 3;
+/// A repair can bring another fault to light; one that needs more rounds than this is none.
+const MAX_ROUNDS: usize = 4;
+
+/// Repairs a recording whose times and positions are usable, and notes each repair.
+///
+/// # Errors
+/// [`ReadError`] names what was seen and where, when it is too much to repair or cannot be decided.
+pub(super) fn repair(recording: &mut Recording, options: &OpenOptions) -> Result<(), ReadError> {
+    recording.repairs.extend(stamps::missing(&recording.time_s));
+    let before = recording.position_m.clone();
+    for _ in 0..MAX_ROUNDS {
+        let mut found = labels::undo_swaps(recording)?;
+        found.extend(frozen::leave_out(recording));
+        let jumps = jumps::find(recording);
+        jumps::leave_out(recording, &jumps);
+        let (changes, moved): (Vec<Repair>, Vec<Repair>) = jumps
+            .into_iter()
+            .map(|jump| jump.repair)
+            .partition(|repair| repair.what == RepairKind::MarkerJump);
+        found.extend(changes);
+        let is_stable = found.is_empty();
+        recording.repairs.extend(found);
+        if is_stable {
+            recording.repairs.extend(moved);
+            return check_extent(recording, &before, options);
+        }
+    }
+    Err(ReadError::whole(
+        &recording.source,
+        "the labels of its markers contradict one another in more ways than one",
+        "label the markers again in the tracker's software, or cut the recording to where they are right (--from, --to)",
+    ))
+}
+
+/// Refuses a recording of which too much had to be repaired.
+fn check_extent(recording: &Recording, before: &[Vec<f64>], options: &OpenOptions) -> Result<(), ReadError> {
+    let samples = recording.samples();
+    let (first_s, last_s) = (recording.time_s[0], recording.time_s[samples - 1]);
+    let refuse = |problem: String| {
+        let remedy = "label the markers again in the tracker's software, or leave that part out with --from or --to";
+        Err(ReadError::whole(&recording.source, problem, remedy))
+    };
+    if let Some(frozen) = recording.repairs.iter().find(|repair| {
+        repair.what == RepairKind::FrozenMarker && is_longer(repair.to_s - repair.from_s, options.max_gap_s)
+    }) {
+        return Err(ReadError::whole(
+            &recording.source,
+            format!(
+                "{} is frozen from {:.3} s to {:.3} s: its position does not change as its noise would, and {} s may be bridged",
+                recording.name_of(frozen.cell.unwrap_or(1) - 1),
+                frozen.from_s,
+                frozen.to_s,
+                options.max_gap_s
+            ),
+            format!(
+                "give --max-gap {:.1} to accept it, or leave it out with --from or --to",
+                round_up(frozen.to_s - frozen.from_s)
+            ),
+        ));
+    }
+    let relabelled = relabelled_for_a_while(recording, first_s, last_s);
+    let rate = (samples - 1) as f64 / (last_s - first_s);
+    if relabelled as f64 > (MAX_RELABELLED.0 * samples as f64).max(MAX_RELABELLED.1 * rate) {
+        let (from_s, to_s) = span(recording, RepairKind::SwappedLabel, None);
+        return refuse(format!(
+            "markers carry the labels of others in {relabelled} of {samples} samples, between {from_s:.3} s and {to_s:.3} s, and {:.0} % \
+             may be undone",
+            MAX_RELABELLED.0 * 100.0
+        ));
+    }
+    for (cell, (series, before)) in recording.position_m.iter().zip(before).enumerate() {
+        let unseen = |series: &[f64]| series.iter().filter(|at_m| at_m.is_nan()).count();
+        let left_out = unseen(series).saturating_sub(unseen(before));
+        if left_out as f64 > MAX_LEFT_OUT * samples as f64 {
+            let cells_own = |repair: &&Repair| {
+                repair.cell == Some(cell + 1)
+                    && !matches!(repair.what, RepairKind::MarkerMoved | RepairKind::MissingSamples)
+            };
+            let what = recording
+                .repairs
+                .iter()
+                .filter(cells_own)
+                .max_by_key(|repair| repair.samples)
+                .map_or(String::new(), |repair| format!(", such as: {repair}"));
+            return refuse(format!(
+                "{left_out} of {samples} positions of {} cannot be used{what}",
+                recording.name_of(cell)
+            ));
+        }
+    }
+    let moved: Vec<&Repair> = recording
+        .repairs
+        .iter()
+        .filter(|repair| repair.what == RepairKind::MarkerMoved)
+        .collect();
+    if moved.len() > MAX_MOVED {
+        let places: Vec<String> = moved
+            .iter()
+            .take(MAX_MOVED + 1)
+            .map(|repair| format!("cell {} at {:.3} s", repair.cell.unwrap_or(0), repair.from_s))
+            .collect();
+        return refuse(format!(
+            "markers change their places on their cells {} times ({})",
+            moved.len(),
+            places.join(", ")
+        ));
+    }
+    Ok(())
+}
+
+/// Samples relabelled for a while, of the cell that has most of them.
+fn relabelled_for_a_while(recording: &Recording, first_s: f64, last_s: f64) -> usize {
+    (1..=recording.cells())
+        .map(|cell| {
+            recording
+                .repairs
+                .iter()
+                .filter(|repair| repair.what == RepairKind::SwappedLabel && repair.cell == Some(cell))
+                .filter(|repair| repair.from_s > first_s && repair.to_s < last_s)
+                .map(|repair| repair.samples)
+                .sum()
+        })
+        .max()
+        .unwrap_or(0)
+}
+
+/// From the first to the last time of repairs of a kind, s.
+fn span(recording: &Recording, what: RepairKind, cell: Option<usize>) -> (f64, f64) {
+    recording
+        .repairs
+        .iter()
+        .filter(|repair| repair.what == what && (cell.is_none() || repair.cell == cell))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(from_s, to_s), repair| {
+            (from_s.min(repair.from_s), to_s.max(repair.to_s))
+        })
+}
+
+/// The usual noise of a position, m: the median over the cells, so that one faulty marker does not count.
+fn usual_noise(position_m: &[Vec<f64>]) -> f64 {
+    let mut noises: Vec<f64> = position_m.iter().map(|series| noise(series)).collect();
+    let middle = noises.len() / 2;
+    *noises.select_nth_unstable_by(middle, f64::total_cmp).1
+}
