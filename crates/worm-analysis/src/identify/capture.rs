@@ -5,12 +5,15 @@
 
 use super::gait::{IdentifiedGait, steps_made};
 use super::gait_error::GaitError;
-use super::knock;
+use super::{clock, knock, rest};
 use crate::recording::{Recording, Repair, RepairKind};
 use std::borrow::Cow;
 
 /// Most knocks that are taken out of a recording.
 const MAX_KNOCKS: usize = 3;
+
+/// Fraction of the first estimate of a marker's move that the cycles around it must confirm.
+const CONFIRMED: f64 = 0.5;
 
 /// A shift of some cells from one sample on.
 ///
@@ -37,7 +40,7 @@ pub struct Steadied<'a> {
     pub gait: IdentifiedGait,
     /// What was taken out, in order of time.
     pub shifts: Vec<Shift>,
-    /// Every repair of the recording, those of its reader first.
+    /// Every repair of the recording, and what was only noticed; those of its reader first.
     pub repairs: Vec<Repair>,
 }
 
@@ -65,14 +68,19 @@ pub fn steady<'a>(
     let mut steadied = without(Cow::Borrowed(recording), &shifts);
     let mut gait = gait_of(&steadied)?;
     if !shifts.is_empty() {
-        let left: Vec<Shift> = shifts
-            .iter()
-            .map(|shift| refine(&steadied.position_m, &gait, shift))
-            .collect();
-        steadied = without(steadied, &left);
-        for (shift, left) in shifts.iter_mut().zip(left) {
+        let first_m: Vec<f64> = shifts.iter().map(|shift| shift.shift_m).collect();
+        for shift in &mut shifts {
+            let left = refine(&steadied.position_m, &gait, shift);
             (shift.shift_m, shift.sigma_m) = (shift.shift_m + left.shift_m, left.sigma_m);
         }
+        // What a cycle before and one after do not confirm was no move.
+        let mut first_m = first_m.into_iter();
+        shifts.retain(|shift| {
+            first_m
+                .next()
+                .is_some_and(|first_m| shift.shift_m / first_m >= CONFIRMED)
+        });
+        steadied = without(Cow::Borrowed(recording), &shifts);
         gait = gait_of(&steadied)?;
     }
     let knocks = knock::find(time_s, &steadied.position_m, &gait);
@@ -97,6 +105,10 @@ pub fn steady<'a>(
     }
     shifts.sort_by_key(|shift| shift.sample);
     repairs.extend(shifts.iter().map(|shift| report(shift, time_s)));
+    repairs.extend(rest::drift(time_s, &gait));
+    if recording.gait_phase.is_some() {
+        repairs.extend(clock::drift(time_s, &steadied.position_m, &gait));
+    }
     Ok(Steadied {
         recording: steadied,
         gait,

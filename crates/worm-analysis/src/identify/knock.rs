@@ -17,6 +17,12 @@ const NEAR: f64 = 1.0 / 48.0;
 const NOISES: f64 = 8.0;
 /// and this fraction of the stroke.
 const MIN_STROKE: f64 = 0.05;
+/// and so many times every other displacement that no other cycle has the like of.
+const STANDS_OUT: f64 = 3.0;
+/// Fraction of its shift that happens from one sample to the next, but for so many standard deviations of the noise.
+const ABRUPT: (f64, f64) = (0.8, 2.0);
+/// Cycles at the start that are not looked at.
+const FIRST_CYCLES: f64 = 1.0;
 /// How far a cell's own shift may be from that of all: in standard deviations of its noise, and as a fraction of the shift (a camera that
 /// turns shifts cells by their places).
 const AGREE: (f64, f64) = (4.0, 0.25);
@@ -49,26 +55,52 @@ struct Around {
 /// Finds the knocks in a recording whose gait is known, in order of time.
 pub fn find(time_s: &[f64], position_m: &[Vec<f64>], gait: &IdentifiedGait) -> Vec<Knock> {
     let around = displacements(time_s, gait);
-    let excesses: Vec<Option<f64>> = (0..around.len()).map(|at| excess_m(&around, at)).collect();
-    let limit_m = |at: usize| (NOISES * around[at].sigma_m).max(MIN_STROKE * gait.stroke_m);
-    let mut knocks = Vec::new();
-    for at in 0..around.len() {
-        let Some(excess) = excesses[at].filter(|excess| excess.abs() > limit_m(at)) else {
+    let excesses: Vec<f64> = (0..around.len())
+        .map(|at| excess_m(&around, at).unwrap_or(0.0))
+        .collect();
+    let from_phase = gait.phase[0] + FIRST_CYCLES;
+    let (mut knocks, mut largest_other_m) = (Vec::new(), 0.0_f64);
+    for at in peaks(&excesses) {
+        let size_m = excesses[at].abs();
+        let here = &around[at];
+        if here.phase < from_phase {
             continue;
-        };
-        let near = at.saturating_sub(SIDE)..(at + SIDE + 1).min(around.len());
-        let is_largest = near.clone().all(|other| {
-            let other_m = excesses[other].map_or(0.0, f64::abs);
-            other_m < excess.abs() || (other >= at && other_m == excess.abs())
-        });
-        if is_largest
-            && let Some(knock) = estimate(&around, at)
-            && cells_agree(position_m, gait, &knock)
+        }
+        let is_large = size_m > (NOISES * here.sigma_m).max(MIN_STROKE * gait.stroke_m);
+        match estimate(&around, at)
+            .filter(|knock| is_large && is_abrupt(gait, knock) && cells_agree(position_m, gait, knock))
         {
-            knocks.push(knock);
+            Some(knock) => knocks.push((knock, size_m)),
+            None => largest_other_m = largest_other_m.max(size_m),
         }
     }
-    knocks
+    let standing_out = knocks
+        .into_iter()
+        .filter(|(_, size_m)| *size_m >= STANDS_OUT * largest_other_m);
+    standing_out.map(|(knock, _)| knock).collect()
+}
+
+/// Where the size is largest among its neighbours.
+fn peaks(excesses_m: &[f64]) -> impl Iterator<Item = usize> + '_ {
+    (0..excesses_m.len()).filter(|&at| {
+        let size_m = excesses_m[at].abs();
+        let near = at.saturating_sub(2 * SIDE)..(at + 2 * SIDE + 1).min(excesses_m.len());
+        size_m > 0.0
+            && near
+                .into_iter()
+                .all(|other| excesses_m[other].abs() < size_m || (other >= at && excesses_m[other].abs() == size_m))
+    })
+}
+
+/// Whether most of the shift happens from one sample to the next.
+fn is_abrupt(gait: &IdentifiedGait, knock: &Knock) -> bool {
+    let near = knock.sample.saturating_sub(2)..=(knock.sample + 1).min(gait.phase.len() - 2);
+    let steps_m = near.map(|sample| gait.body_m[sample + 1] - gait.body_m[sample]);
+    let largest_m = steps_m
+        .filter(|step_m| step_m.is_finite())
+        .fold(0.0, |max: f64, step_m| max.max(step_m * knock.shift_m.signum()));
+    let noise_m = gait.noise_m * (2.0 / gait.seen[knock.sample].max(1) as f64).sqrt();
+    largest_m + ABRUPT.1 * noise_m >= ABRUPT.0 * knock.shift_m.abs()
 }
 
 /// The displacement of the body around every sample that has enough on both sides.

@@ -30,25 +30,24 @@ pub(super) fn leave_out(recording: &mut Recording) -> Vec<Repair> {
     };
     let mut repairs = Vec::new();
     for (cell, series) in recording.position_m.iter_mut().enumerate() {
-        let mut frozen = vec![false; series.len()];
-        for run in equal_runs(series).filter(|run| run.len() >= too_many) {
+        let seen: Vec<usize> = (0..series.len()).filter(|&sample| series[sample].is_finite()).collect();
+        let values: Vec<f64> = seen.iter().map(|&sample| series[sample]).collect();
+        let mut frozen = vec![false; seen.len()];
+        for run in equal_runs(&values).filter(|run| run.len() >= too_many) {
             frozen[run].fill(true);
         }
-        for at in 0..series.len().saturating_sub(WINDOW - 1) {
+        for at in 0..values.len().saturating_sub(WINDOW - 1) {
             let window = at..at + WINDOW;
-            if deviation(&series[window.clone()]) < NO_NOISE * noise_m {
+            if deviation(&values[window.clone()]) < NO_NOISE * noise_m {
                 frozen[window].fill(true);
             }
         }
         for run in marked_runs(&frozen) {
-            let (from_s, to_s) = (recording.time_s[run.start], recording.time_s[run.end - 1]);
-            repairs.push(Repair::new(
-                RepairKind::FrozenMarker,
-                Some(cell),
-                (from_s, to_s),
-                run.len(),
-            ));
-            series[run].fill(f64::NAN);
+            let when_s = (recording.time_s[seen[run.start]], recording.time_s[seen[run.end - 1]]);
+            repairs.push(Repair::new(RepairKind::FrozenMarker, Some(cell), when_s, run.len()));
+            for &sample in &seen[run] {
+                series[sample] = f64::NAN;
+            }
         }
     }
     repairs
@@ -101,7 +100,7 @@ fn marked_runs(marked: &[bool]) -> Vec<Range<usize>> {
     runs.collect()
 }
 
-/// Standard deviation of some values, m; `NaN` where one was not seen.
+/// Standard deviation of some values, m.
 fn deviation(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;

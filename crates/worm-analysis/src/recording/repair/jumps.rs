@@ -17,6 +17,8 @@ const BEYOND: f64 = 0.825;
 const JUMP: f64 = 8.0;
 /// It also exceeds so many times what the steps themselves, with the corners of the cam, reach in all but this fraction of the samples.
 const STEPS: (f64, f64) = (2.0, 0.99);
+/// Smallest jump, m: what plays and compliant drives do to a single cell is less.
+const MIN_JUMP_M: f64 = 5e-4;
 /// Longest time after which a marker that comes back has jumped, s; one that stays away longer has moved.
 const MAX_AWAY_S: f64 = 1.0;
 /// How near a marker comes to where it was, as a fraction of its jump, to have come back.
@@ -61,16 +63,18 @@ fn find_of_cell(recording: &Recording, filled_m: &[Vec<f64>], cell: usize, noise
     let own_m: Vec<f64> = (0..seen.len()).map(|at| jump_of(cell, at)).collect();
     let steps_m = quantile(own_m.iter().map(|jump_m| jump_m.abs()), STEPS.1).unwrap_or(0.0);
     let sigma_m = noise_m * (2.0 * BEYOND).sqrt();
-    let limit_m = (JUMP * sigma_m).max(STEPS.0 * steps_m);
-    if limit_m == 0.0 {
-        return Vec::new();
-    }
+    let limit_m = (JUMP * sigma_m).max(STEPS.0 * steps_m).max(MIN_JUMP_M);
+    let steps_s = time_s.windows(2).map(|pair| pair[1] - pair[0]);
+    let period_s = quantile(steps_s, 0.5).unwrap_or(0.0);
     let against_others_m = |(at, own_m): (usize, &f64)| {
         if own_m.abs() <= limit_m {
             return 0.0;
         }
         let all_m = (0..filled_m.len()).map(|cell| jump_of(cell, at));
-        own_m - quantile(all_m, 0.5).unwrap_or(0.0)
+        let jump_m = own_m - quantile(all_m, 0.5).unwrap_or(0.0);
+        // Where samples are missing between the two lines they are continued so much further, and err so much more.
+        let longer = (times_s[at + LINE - 1] - times_s[at - LINE]) / period_s - (2 * LINE - 2) as f64;
+        if jump_m.abs() > limit_m * longer { jump_m } else { 0.0 }
     };
     let jump_m: Vec<f64> = own_m.iter().enumerate().map(against_others_m).collect();
     let peaks = peaks(&jump_m, limit_m);

@@ -73,21 +73,18 @@ fn check_extent(recording: &Recording, before: &[Vec<f64>], options: &OpenOption
         let remedy = "label the markers again in the tracker's software, or leave that part out with --from or --to";
         Err(ReadError::whole(&recording.source, problem, remedy))
     };
-    if let Some(frozen) = recording.repairs.iter().find(|repair| {
-        repair.what == RepairKind::FrozenMarker && is_longer(repair.to_s - repair.from_s, options.max_gap_s)
-    }) {
+    let is_too_long = |repair: &&Repair| {
+        let is_left_out = matches!(repair.what, RepairKind::FrozenMarker | RepairKind::MarkerJump);
+        is_left_out && is_longer(repair.to_s - repair.from_s, options.max_gap_s)
+    };
+    if let Some(repair) = recording.repairs.iter().find(is_too_long) {
+        let length_s = repair.to_s - repair.from_s;
         return Err(ReadError::whole(
             &recording.source,
-            format!(
-                "{} is frozen from {:.3} s to {:.3} s: its position does not change as its noise would, and {} s may be bridged",
-                recording.name_of(frozen.cell.unwrap_or(1) - 1),
-                frozen.from_s,
-                frozen.to_s,
-                options.max_gap_s
-            ),
+            format!("{repair}, and {} s may be bridged", options.max_gap_s),
             format!(
                 "give --max-gap {:.1} to accept it, or leave it out with --from or --to",
-                round_up(frozen.to_s - frozen.from_s)
+                round_up(length_s)
             ),
         ));
     }

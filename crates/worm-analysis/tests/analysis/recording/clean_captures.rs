@@ -72,7 +72,7 @@ fn value(parameter: &Parameter, rng: &mut Xoshiro256PlusPlus) -> f64 {
 }
 
 /// A worm of the model's own kind, with up to two effects of the library, as any laboratory might record it.
-fn drawn(seed: u64) -> (String, Recording, Config) {
+pub fn drawn(seed: u64) -> (String, Recording, Config) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     loop {
         let mut config = Config::default();

@@ -4,6 +4,7 @@ mod c3d;
 mod campaign;
 mod capture;
 mod clean_captures;
+mod damaged_captures;
 mod round_trip;
 mod seen;
 mod table;
