@@ -2,55 +2,50 @@
 //!
 //! Where the phase was recorded by another device than the positions, the stepping cell shows how late the positions are: its extension
 //! should be the stroke times the part of the step that has passed. A lag that stays is one of the worm or its sensor; one that grows evenly
-//! from the first third of the recording over the second to the last is that of two clocks.
+//! over the whole recording is that of two clocks.
 
 use super::gait::IdentifiedGait;
 use crate::recording::{Repair, RepairKind};
 
 /// Part of a step that counts: cams have rounded corners.
 const MIDDLE: std::ops::Range<f64> = 0.25..0.75;
-/// Parts of the recording in time.
-const THIRDS: usize = 3;
-/// Fewest steps in each.
-const MIN_STEPS: usize = 6;
-/// The lags of the first and last third differ by more than so many standard errors, and by more than this, s.
+/// Parts of the recording in time, and the fewest steps in each.
+const PARTS: usize = 6;
+const MIN_STEPS: usize = 4;
+/// The lag changes over the recording by more than so many standard errors, and by more than this, s.
 const DIFFERENT: f64 = 8.0;
 const MIN_LAG_S: f64 = 0.01;
-/// How far the lag in the middle may be from half way, as a fraction of the whole change, besides so many standard errors.
-const EVENLY: (f64, f64) = (0.2, 3.0);
+/// How far the lag of a part may be from the straight line through all, as a fraction of the whole change, besides so many standard
+/// errors.
+const EVENLY: (f64, f64) = (0.1, 3.0);
 
 /// The drift of the clocks, where the recorded phase shows one.
 pub(super) fn drift(time_s: &[f64], position_m: &[Vec<f64>], gait: &IdentifiedGait) -> Option<Repair> {
     let lags = lags(time_s, position_m, gait);
     let (begin_s, end_s) = (lags.first()?.0, lags.last()?.0);
-    let third_s = (end_s - begin_s) / THIRDS as f64;
-    let mut thirds = Vec::with_capacity(THIRDS);
-    for third in 0..THIRDS {
-        let from_s = begin_s + third as f64 * third_s;
+    let part_s = (end_s - begin_s) / PARTS as f64;
+    let mut parts = Vec::with_capacity(PARTS);
+    for part in 0..PARTS {
+        let from_s = begin_s + part as f64 * part_s;
         let within = lags
             .iter()
-            .filter(|(at_s, _)| (from_s..=from_s + third_s).contains(at_s));
-        thirds.push(mean_and_error(within.map(|(_, lag_s)| *lag_s).collect())?);
+            .filter(|(at_s, _)| (from_s..=from_s + part_s).contains(at_s));
+        let (lag_s, sigma_s) = mean_and_error(within.map(|(_, lag_s)| *lag_s).collect())?;
+        parts.push((part as f64 - 0.5 * (PARTS - 1) as f64, lag_s, sigma_s));
     }
-    let [
-        (first_s, first_sigma_s),
-        (middle_s, middle_sigma_s),
-        (last_s, last_sigma_s),
-    ] = thirds[..]
-    else {
-        return None;
-    };
-    let change_s = last_s - first_s;
-    let sigma_s = first_sigma_s.hypot(last_sigma_s);
-    let off_s = (middle_s - 0.5 * (first_s + last_s)).abs();
-    let is_even = off_s <= EVENLY.0 * change_s.abs() + EVENLY.1 * middle_sigma_s;
+    let mean_s = parts.iter().map(|part| part.1).sum::<f64>() / PARTS as f64;
+    let spread = parts.iter().map(|part| part.0 * part.0).sum::<f64>();
+    let per_part_s = parts.iter().map(|part| part.0 * part.1).sum::<f64>() / spread;
+    let change_s = PARTS as f64 * per_part_s;
+    let sigma_s = PARTS as f64 * parts.iter().map(|part| (part.0 * part.2).powi(2)).sum::<f64>().sqrt() / spread;
+    let is_even = parts.iter().all(|(place, lag_s, sigma_s)| {
+        (lag_s - mean_s - per_part_s * place).abs() <= EVENLY.0 * change_s.abs() + EVENLY.1 * sigma_s
+    });
     if change_s.abs() < MIN_LAG_S || change_s.abs() < DIFFERENT * sigma_s || !is_even {
         return None;
     }
-    // The means of the outer thirds are two thirds of the recording apart.
-    let rate = change_s / (2.0 * third_s);
     Some(Repair {
-        rate: Some(rate),
+        rate: Some(per_part_s / part_s),
         ..Repair::new(RepairKind::ClockDrift, None, (begin_s, end_s), 0)
     })
 }

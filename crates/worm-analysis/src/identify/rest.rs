@@ -18,6 +18,8 @@ const PARTS: usize = 6;
 /// A speed differs from 0 by more, and from another by less, than so many standard errors.
 const MOVES: f64 = 6.0;
 const ALIKE: f64 = 3.0;
+/// How far the speeds in both halves of a rest may differ, as a fraction of the whole, besides so many standard errors.
+const EVEN: f64 = 0.25;
 /// Smallest drift that is reported, m per gait cycle.
 const MIN_PER_CYCLE_M: f64 = 2e-5;
 
@@ -70,7 +72,7 @@ fn rests(time_s: &[f64], phase: &[f64]) -> Vec<Range<usize>> {
     rests
 }
 
-/// Speed of the body in a rest, by a straight line through the means of its parts.
+/// Speed of the body in a rest, by a straight line through the means of its parts; none where it changes.
 fn speed(time_s: &[f64], gait: &IdentifiedGait, rest: &Range<usize>) -> Option<Speed> {
     let count = rest.len() / PARTS;
     let means: Vec<(f64, f64)> = (0..PARTS)
@@ -97,7 +99,12 @@ fn speed(time_s: &[f64], gait: &IdentifiedGait, rest: &Range<usize>) -> Option<S
     // The noise of the samples is the least error, should the few means lie on a line by chance.
     let least = gait.noise_m.powi(2) / (gait.step_order.len() as f64 * count as f64);
     let sigma_m_per_s = (scatter.max(least) / spread).sqrt();
-    (m_per_s.is_finite() && sigma_m_per_s.is_finite()).then_some(Speed { m_per_s, sigma_m_per_s })
+    let half = PARTS / 2;
+    let over = |from: usize, to: usize| (means[to].1 - means[from].1) / (means[to].0 - means[from].0);
+    let change = over(0, half - 1) - over(half, PARTS - 1);
+    let change_sigma = 2.0 * least.sqrt() / (means[half - 1].0 - means[0].0);
+    let is_even = change.abs() <= EVEN * m_per_s.abs() + ALIKE * change_sigma;
+    (is_even && m_per_s.is_finite() && sigma_m_per_s.is_finite()).then_some(Speed { m_per_s, sigma_m_per_s })
 }
 
 #[cfg(test)]

@@ -15,8 +15,10 @@ const LINE: usize = 5;
 const BEYOND: f64 = 0.825;
 /// A jump exceeds this many standard deviations of the noise of the comparison.
 const JUMP: f64 = 8.0;
-/// It also exceeds so many times what the steps themselves, with the corners of the cam, reach in all but this fraction of the samples.
-const STEPS: (f64, f64) = (2.0, 0.99);
+/// It also exceeds so many times what the fastest step moves from sample to sample: a corner of the cam looks like half as much.
+const STEPS: f64 = 5.0;
+/// Fraction of the samples in which a cell is slower than in its fastest step.
+const SLOWER: f64 = 0.95;
 /// Smallest jump, m: what plays and compliant drives do to a single cell is less.
 const MIN_JUMP_M: f64 = 5e-4;
 /// Longest time after which a marker that comes back has jumped, s; one that stays away longer has moved.
@@ -61,9 +63,10 @@ fn find_of_cell(recording: &Recording, filled_m: &[Vec<f64>], cell: usize, noise
     let times_s: Vec<f64> = seen.iter().map(|&sample| time_s[sample]).collect();
     let jump_of = |cell: usize, at: usize| jump_before(&times_s, at, |at| filled_m[cell][seen[at]]);
     let own_m: Vec<f64> = (0..seen.len()).map(|at| jump_of(cell, at)).collect();
-    let steps_m = quantile(own_m.iter().map(|jump_m| jump_m.abs()), STEPS.1).unwrap_or(0.0);
+    let moved_m = (LINE..seen.len()).map(|at| (filled_m[cell][seen[at]] - filled_m[cell][seen[at - LINE]]).abs());
+    let step_m = quantile(moved_m, SLOWER).unwrap_or(0.0) / LINE as f64;
     let sigma_m = noise_m * (2.0 * BEYOND).sqrt();
-    let limit_m = (JUMP * sigma_m).max(STEPS.0 * steps_m).max(MIN_JUMP_M);
+    let limit_m = (JUMP * sigma_m).max(STEPS * step_m).max(MIN_JUMP_M);
     let steps_s = time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let period_s = quantile(steps_s, 0.5).unwrap_or(0.0);
     let against_others_m = |(at, own_m): (usize, &f64)| {

@@ -33,7 +33,9 @@ fn equal_values_are_left_out_where_chance_does_not_make_them() {
     assert_eq!(left_out(as_measured, 1), 0);
     assert_eq!(left_out(as_measured, 4), 0, "four may be");
     assert_eq!(left_out(as_measured, 5), 5);
-    assert_eq!(left_out(as_measured, 40), 40);
+    // A neighbour may lie as near by chance.
+    let found = left_out(as_measured, 40);
+    assert!((40..44).contains(&found), "{found}");
     // In steps of a third of the noise, five in a row do come by chance and forty do not.
     let in_steps = |_, at_m: f64| (at_m / 3e-5).round() * 3e-5;
     assert_eq!(left_out(in_steps, 5), 0);
