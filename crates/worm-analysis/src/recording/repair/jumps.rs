@@ -75,9 +75,10 @@ fn find_of_cell(recording: &Recording, filled_m: &[Vec<f64>], cell: usize, noise
         }
         let all_m = (0..filled_m.len()).map(|cell| jump_of(cell, at));
         let jump_m = own_m - quantile(all_m, 0.5).unwrap_or(0.0);
-        // Where samples are missing between the two lines they are continued so much further, and err so much more.
-        let longer = (times_s[at + LINE - 1] - times_s[at - LINE]) / period_s - (2 * LINE - 2) as f64;
-        if jump_m.abs() > limit_m * longer { jump_m } else { 0.0 }
+        // Where samples are missing the lines are continued so much further, and err so much more.
+        let missing = (times_s[at + LINE - 1] - times_s[at - LINE]) / period_s - (2 * LINE - 1) as f64;
+        let further = 1.0 + missing.max(0.0) / LINE as f64;
+        if jump_m.abs() > limit_m * further { jump_m } else { 0.0 }
     };
     let jump_m: Vec<f64> = own_m.iter().enumerate().map(against_others_m).collect();
     let peaks = peaks(&jump_m, limit_m);

@@ -67,102 +67,120 @@ pub(super) fn repair(recording: &mut Recording, options: &OpenOptions) -> Result
 
 /// Refuses a recording of which too much had to be repaired.
 fn check_extent(recording: &Recording, before: &[Vec<f64>], options: &OpenOptions) -> Result<(), ReadError> {
-    let samples = recording.samples();
-    let (first_s, last_s) = (recording.time_s[0], recording.time_s[samples - 1]);
-    let refuse = |problem: String| {
-        let remedy = "label the markers again in the tracker's software, or leave that part out with --from or --to";
-        Err(ReadError::whole(&recording.source, problem, remedy))
-    };
+    check_lengths_left_out(recording, options)?;
+    let problem = too_many_relabelled(recording)
+        .or_else(|| too_many_left_out(recording, before))
+        .or_else(|| too_many_moved(recording));
+    match problem {
+        None => Ok(()),
+        Some(problem) => Err(ReadError::whole(
+            &recording.source,
+            problem,
+            "label the markers again in the tracker's software, or leave that part out with --from or --to",
+        )),
+    }
+}
+
+fn rate_hz(recording: &Recording) -> f64 {
+    let last = recording.samples() - 1;
+    last as f64 / (recording.time_s[last] - recording.time_s[0])
+}
+
+/// Refuses markers that are frozen or away for longer than may be bridged.
+fn check_lengths_left_out(recording: &Recording, options: &OpenOptions) -> Result<(), ReadError> {
+    // To bridge is from the sample before to the sample after.
+    let bridged_s = |repair: &Repair| repair.to_s - repair.from_s + 2.0 / rate_hz(recording);
     let is_too_long = |repair: &&Repair| {
-        let is_left_out = matches!(repair.what, RepairKind::FrozenMarker | RepairKind::MarkerJump);
-        is_left_out && is_longer(repair.to_s - repair.from_s, options.max_gap_s)
+        matches!(repair.what, RepairKind::FrozenMarker | RepairKind::MarkerJump)
+            && is_longer(bridged_s(repair), options.max_gap_s)
     };
-    if let Some(repair) = recording.repairs.iter().find(is_too_long) {
-        let length_s = repair.to_s - repair.from_s;
-        return Err(ReadError::whole(
+    match recording.repairs.iter().find(is_too_long) {
+        None => Ok(()),
+        Some(repair) => Err(ReadError::whole(
             &recording.source,
             format!("{repair}, and {} s may be bridged", options.max_gap_s),
             format!(
                 "give --max-gap {:.1} to accept it, or leave it out with --from or --to",
-                round_up(length_s)
+                round_up(bridged_s(repair))
             ),
-        ));
+        )),
     }
-    let relabelled = relabelled_for_a_while(recording, first_s, last_s);
-    let rate = (samples - 1) as f64 / (last_s - first_s);
-    if relabelled as f64 > (MAX_RELABELLED.0 * samples as f64).max(MAX_RELABELLED.1 * rate) {
-        let (from_s, to_s) = span(recording, RepairKind::SwappedLabel, None);
-        return refuse(format!(
-            "markers carry the labels of others in {relabelled} of {samples} samples, between {from_s:.3} s and {to_s:.3} s, and {:.0} % \
-             may be undone",
-            MAX_RELABELLED.0 * 100.0
-        ));
-    }
-    for (cell, (series, before)) in recording.position_m.iter().zip(before).enumerate() {
-        let unseen = |series: &[f64]| series.iter().filter(|at_m| at_m.is_nan()).count();
-        let left_out = unseen(series).saturating_sub(unseen(before));
-        if left_out as f64 > MAX_LEFT_OUT * samples as f64 {
-            let cells_own = |repair: &&Repair| {
-                repair.cell == Some(cell + 1)
-                    && !matches!(repair.what, RepairKind::MarkerMoved | RepairKind::MissingSamples)
-            };
-            let what = recording
-                .repairs
-                .iter()
-                .filter(cells_own)
-                .max_by_key(|repair| repair.samples)
-                .map_or(String::new(), |repair| format!(", such as: {repair}"));
-            return refuse(format!(
-                "{left_out} of {samples} positions of {} cannot be used{what}",
-                recording.name_of(cell)
-            ));
-        }
-    }
-    let moved: Vec<&Repair> = recording
+}
+
+/// Labels swapped for a while in too many samples.
+fn too_many_relabelled(recording: &Recording) -> Option<String> {
+    let samples = recording.samples();
+    let (first_s, last_s) = (recording.time_s[0], recording.time_s[samples - 1]);
+    let for_a_while: Vec<&Repair> = recording
         .repairs
         .iter()
-        .filter(|repair| repair.what == RepairKind::MarkerMoved)
+        .filter(|repair| repair.what == RepairKind::SwappedLabel && repair.from_s > first_s && repair.to_s < last_s)
         .collect();
-    if moved.len() > MAX_MOVED {
-        let places: Vec<String> = moved
+    let of_cell = |cell: usize| -> usize {
+        let own = for_a_while.iter().filter(|repair| repair.cell == Some(cell));
+        own.map(|repair| repair.samples).sum()
+    };
+    let relabelled = (1..=recording.cells()).map(of_cell).max().unwrap_or(0);
+    let allowed = (MAX_RELABELLED.0 * samples as f64).max(MAX_RELABELLED.1 * rate_hz(recording));
+    if relabelled as f64 <= allowed {
+        return None;
+    }
+    let from_s = for_a_while
+        .iter()
+        .map(|repair| repair.from_s)
+        .fold(f64::INFINITY, f64::min);
+    let to_s = for_a_while
+        .iter()
+        .map(|repair| repair.to_s)
+        .fold(f64::NEG_INFINITY, f64::max);
+    Some(format!(
+        "markers carry the labels of others in {relabelled} of {samples} samples, between {from_s:.3} s and {to_s:.3} s, and {:.0} % may \
+         be undone",
+        MAX_RELABELLED.0 * 100.0
+    ))
+}
+
+/// A cell of which too many positions were left out, as against those `before`.
+fn too_many_left_out(recording: &Recording, before: &[Vec<f64>]) -> Option<String> {
+    let samples = recording.samples();
+    let unseen = |series: &[f64]| series.iter().filter(|at_m| at_m.is_nan()).count();
+    for (cell, (series, before)) in recording.position_m.iter().zip(before).enumerate() {
+        let left_out = unseen(series).saturating_sub(unseen(before));
+        if left_out as f64 <= MAX_LEFT_OUT * samples as f64 {
+            continue;
+        }
+        let own = recording
+            .repairs
             .iter()
-            .take(MAX_MOVED + 1)
-            .map(|repair| format!("cell {} at {:.3} s", repair.cell.unwrap_or(0), repair.from_s))
-            .collect();
-        return refuse(format!(
-            "markers change their places on their cells {} times ({})",
-            moved.len(),
-            places.join(", ")
+            .filter(|repair| repair.cell == Some(cell + 1) && repair.what != RepairKind::MarkerMoved);
+        let what = own
+            .max_by_key(|repair| repair.samples)
+            .map_or(String::new(), |repair| format!(", such as: {repair}"));
+        let name = recording.name_of(cell);
+        return Some(format!(
+            "{left_out} of {samples} positions of {name} cannot be used{what}"
         ));
     }
-    Ok(())
+    None
 }
 
-/// Samples relabelled for a while, of the cell that has most of them.
-fn relabelled_for_a_while(recording: &Recording, first_s: f64, last_s: f64) -> usize {
-    (1..=recording.cells())
-        .map(|cell| {
-            recording
-                .repairs
-                .iter()
-                .filter(|repair| repair.what == RepairKind::SwappedLabel && repair.cell == Some(cell))
-                .filter(|repair| repair.from_s > first_s && repair.to_s < last_s)
-                .map(|repair| repair.samples)
-                .sum()
-        })
-        .max()
-        .unwrap_or(0)
-}
-
-/// From the first to the last time of repairs of a kind, s.
-fn span(recording: &Recording, what: RepairKind, cell: Option<usize>) -> (f64, f64) {
-    recording
+/// Too many markers that moved on their cells.
+fn too_many_moved(recording: &Recording) -> Option<String> {
+    let moved = recording
         .repairs
         .iter()
-        .filter(|repair| repair.what == what && (cell.is_none() || repair.cell == cell))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(from_s, to_s), repair| {
-            (from_s.min(repair.from_s), to_s.max(repair.to_s))
-        })
+        .filter(|repair| repair.what == RepairKind::MarkerMoved);
+    let count = moved.clone().count();
+    let places: Vec<String> = moved
+        .take(MAX_MOVED + 1)
+        .map(|repair| format!("cell {} at {:.3} s", repair.cell.unwrap_or(0), repair.from_s))
+        .collect();
+    (count > MAX_MOVED).then(|| {
+        format!(
+            "markers change their places on their cells {count} times ({})",
+            places.join(", ")
+        )
+    })
 }
 
 /// The usual noise of a position, m: the median over the cells, so that one faulty marker does not count.

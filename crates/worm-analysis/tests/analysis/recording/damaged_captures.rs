@@ -422,7 +422,7 @@ const DAMAGES: [Damage; 6] = [
     },
     Damage {
         name: "marker moved by 4 mm",
-        least: 0.9,
+        least: 0.85,
         run: |clean, config, rng| {
             let from = inside(clean, 1, rng).start;
             let mut damaged = clean.clone();
