@@ -42,6 +42,7 @@ impl Folder {
                 "payload_kg": run.payload_kg,
                 "cycle_s": run.cycle_s,
                 "warnings": run.recording.warnings,
+                "repairs": run.recording.repairs,
             })
         };
         let runs: Vec<_> = runs.iter().map(run).collect();

@@ -270,6 +270,7 @@ impl Recorder {
             gait_phase: scene.with_phase.then(|| self.phase.clone()),
             motor: None,
             warnings: Vec::new(),
+            repairs: Vec::new(),
         };
         SimulatedRun {
             recording,

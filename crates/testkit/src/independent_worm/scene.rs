@@ -140,6 +140,7 @@ impl Scene {
             gait_phase: None,
             motor: None,
             warnings: Vec::new(),
+            repairs: Vec::new(),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The result of an analysis. Its names in JSON are a contract.
 
+use crate::recording::Repair;
 use serde::Serialize;
 
 /// Where the gait phase comes from.
@@ -69,6 +70,8 @@ pub struct Analysis {
     pub rigid_energy_j: f64,
     /// Limitations of these figures.
     pub warnings: Vec<String>,
+    /// What was repaired in the recording, and what was noticed but left as it is.
+    pub repairs: Vec<Repair>,
     /// The series behind the figures, sample by sample.
     #[serde(skip)]
     pub series: Series,

@@ -6,8 +6,8 @@ use self::theory::theory;
 use super::analysis::{Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Theory};
 use super::energy_balance;
 use super::error::AnalysisError;
-use crate::identify::{self, IdentifiedGait, Prior, fit, gait, onset, search};
-use crate::recording::Recording;
+use crate::identify::{self, IdentifiedGait, Prior, Steadied, fit, gait, onset, search};
+use crate::recording::{Recording, Repair};
 use worm_estimator::config::Config;
 use worm_physics::effect::Setting;
 use worm_physics::{Physics, Worm, rigid_energy_j};
@@ -53,6 +53,7 @@ struct Prepared<'a> {
     gait: IdentifiedGait,
     first_m: Vec<f64>,
     search: Option<search::Found>,
+    repairs: Vec<Repair>,
 }
 
 /// Analyses recordings of one worm; several are fitted together, with common largest tip deformations and mass.
@@ -149,17 +150,22 @@ impl<'a> Prepared<'a> {
                 configured: base.cells(),
             });
         }
-        let filled_m = recording.filled();
         let prior = Prior {
             step_order: &config.worm.step_order_from_zero(),
             phase: recording.gait_phase.as_deref(),
         };
-        let gait = gait::find(&recording.time_s, &recording.position_m, &filled_m, prior).map_err(|source| {
-            AnalysisError::IdentifiedGait {
-                recording: name(),
-                source,
-            }
+        let find_gait =
+            |measured_m: &[Vec<f64>], filled_m: &[Vec<f64>]| gait::find(&recording.time_s, measured_m, filled_m, prior);
+        let Steadied {
+            recording: steadied,
+            gait,
+            repairs,
+            ..
+        } = identify::steady(recording, find_gait).map_err(|source| AnalysisError::IdentifiedGait {
+            recording: name(),
+            source,
         })?;
+        let filled_m = steadied.filled();
         check_stroke(gait.stroke_m, base.stroke_m(), name)?;
         let first_m: Vec<f64> = onset::find(&gait).iter().map(|onset| onset.max_deformation_m).collect();
         let stiffness_n_per_m: Vec<f64> = base
@@ -174,6 +180,7 @@ impl<'a> Prepared<'a> {
             gait,
             first_m,
             search,
+            repairs,
         })
     }
 
@@ -260,6 +267,7 @@ impl<'a> Prepared<'a> {
                 nominal: theory(&Physics::of(nominal).with(effects), cycle_s),
             },
             warnings: self.warnings(fitted, &balance.cycles, cycle_s, mass_kg, base, effects),
+            repairs: self.repairs.iter().map(|repair| repair.in_run(index)).collect(),
             cycles: balance.cycles,
             mean,
             std,
@@ -277,6 +285,7 @@ impl<'a> Prepared<'a> {
         effects: &[Setting],
     ) -> Vec<String> {
         let mut warnings = self.run.recording.warnings.clone();
+        warnings.extend(self.repairs.iter().map(Repair::to_string));
         if !effects.is_empty() {
             let names: Vec<&str> = effects.iter().map(|effect| effect.effect().name).collect();
             warnings.push(format!(

@@ -264,6 +264,7 @@ pub fn simulate(config: &Config, simulation: &Simulation) -> Result<Recording, S
         gait_phase: (!simulation.positions_only).then_some(phases),
         motor: None,
         warnings: Vec::new(),
+        repairs: Vec::new(),
     })
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Cells count from 1 here. Phases are fractions of a gait cycle, 0 to 1.
 
+use crate::recording::Repair;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -50,6 +51,8 @@ pub struct Answer {
     pub runs: Vec<RunSummary>,
     /// Limitations of this answer.
     pub warnings: Vec<String>,
+    /// What was repaired in the recordings, and what was noticed but left as it is.
+    pub repairs: Vec<Repair>,
     /// Series and maps for figures; not part of the JSON.
     #[serde(skip)]
     pub figures: Figures,

@@ -129,6 +129,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         screening: screening::screening(&parts.screened, selected, speed_droop.is_some()),
         threshold: parts.threshold,
         warnings: words::warnings(problem, final_fit),
+        repairs: words::repairs(problem),
         runs,
         figures: Figures {
             maps_before,

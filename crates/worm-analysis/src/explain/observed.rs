@@ -3,7 +3,8 @@
 use super::error::ExplainError;
 use crate::experiment::RecordedRun;
 use crate::identify::clean::leave_out_outliers;
-use crate::identify::{GaitError, IdentifiedGait, Prior, gait};
+use crate::identify::{self, GaitError, IdentifiedGait, Prior, Steadied, gait};
+use crate::recording::{Recording, Repair};
 use worm_estimator::config::Config;
 
 /// Cycles at the start that do not count unless the worm was just laid down: the state of the tips is unknown there.
@@ -45,6 +46,8 @@ pub(super) struct Observed<'a> {
     /// First sample that counts.
     pub counts_from: usize,
     pub cycle_s: f64,
+    /// Every repair of the recording.
+    pub repairs: Vec<Repair>,
 }
 
 impl<'a> Observed<'a> {
@@ -64,7 +67,15 @@ impl<'a> Observed<'a> {
                 configured: config.worm.cells,
             });
         }
-        let gait = find_gait(run, config).map_err(|source| ExplainError::IdentifiedGait {
+        let Steadied {
+            recording: steadied,
+            gait,
+            repairs,
+            ..
+        } = identify::steady(recording, |position_m, filled_m| {
+            find_gait(recording, position_m, filled_m, config)
+        })
+        .map_err(|source| ExplainError::IdentifiedGait {
             recording: name(),
             source,
         })?;
@@ -76,9 +87,9 @@ impl<'a> Observed<'a> {
                 configured_m: config.worm.stroke_m,
             });
         }
-        let filled_m = recording.filled();
-        let mut position_m = recording.position_m.clone();
-        let noise_m = crate::identify::clean::noise_by_differences(&position_m).max(1e-7);
+        let filled_m = steadied.filled();
+        let mut position_m = steadied.into_owned().position_m;
+        let noise_m = identify::clean::noise_by_differences(&position_m).max(1e-7);
         for (series, filled) in position_m.iter_mut().zip(&filled_m) {
             leave_out_outliers(series, filled, noise_m);
         }
@@ -101,6 +112,7 @@ impl<'a> Observed<'a> {
             may_be_laid_down,
             laid_down: false,
             counts_from: 0,
+            repairs,
         };
         observed.assume_laid_down(false);
         if observed.whole_cycles() < MIN_CYCLES {
@@ -159,8 +171,12 @@ impl<'a> Observed<'a> {
 }
 
 /// The gait, also of a worm with a cell that falls behind the others cycle by cycle.
-fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, GaitError> {
-    let recording = run.recording;
+fn find_gait(
+    recording: &Recording,
+    position_m: &[Vec<f64>],
+    filled_m: &[Vec<f64>],
+    config: &Config,
+) -> Result<IdentifiedGait, GaitError> {
     let step_order = config.worm.step_order_from_zero();
     let find = |position_m: &[Vec<f64>], filled_m: &[Vec<f64>]| {
         let prior = Prior {
@@ -169,8 +185,7 @@ fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, Ga
         };
         gait::find(&recording.time_s, position_m, filled_m, prior)
     };
-    let filled_m = recording.filled();
-    let found = find(&recording.position_m, &filled_m);
+    let found = find(position_m, filled_m);
     // The clock by which cells fall behind: the phase where there is one, else time.
     let clock: Vec<f64> = match (&found, &recording.gait_phase) {
         (Ok(gait), _) => gait.phase.clone(),
@@ -181,7 +196,7 @@ fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, Ga
             .map(|time_s| time_s / config.gait.cycle_s)
             .collect(),
     };
-    let behind_m = falling_behind_m(&filled_m, &clock);
+    let behind_m = falling_behind_m(filled_m, &clock);
     let cycles = clock[clock.len() - 1] - clock[0];
     let farthest_m = behind_m.iter().fold(0.0, |max: f64, rate| max.max(rate.abs())) * cycles;
     if farthest_m < FALLS_BEHIND * config.worm.stroke_m {
@@ -199,7 +214,7 @@ fn find_gait(run: RecordedRun<'_>, config: &Config) -> Result<IdentifiedGait, Ga
             })
             .collect()
     };
-    find(&straighten(&recording.position_m), &straighten(&filled_m)).or(found)
+    find(&straighten(position_m), &straighten(filled_m)).or(found)
 }
 
 /// How far each cell moves ahead of the mean of all in a cycle, m: the median over all pairs of samples a cycle apart.

@@ -243,6 +243,7 @@ fn assemble(
         threshold: model_selection::chance(table.advances.len()),
         runs: runs.collect(),
         warnings: selected.warnings(kept),
+        repairs: Vec::new(),
         figures: Figures::default(),
     }
 }

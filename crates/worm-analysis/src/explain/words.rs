@@ -4,6 +4,7 @@ use super::answer::{NamedEffect, Place, Verdict, answers_in_words};
 use super::fit::{Fit, FitProblem};
 use super::model_selection::Selected;
 use super::parameter::What;
+use crate::recording::Repair;
 use worm_physics::effect::{LIBRARY, Visible};
 
 /// The verdict in a sentence or two. `refused` is the fraction of the held-out gap that the best effect closes, where that is too
@@ -97,6 +98,14 @@ pub(super) fn remainder(selected: &Selected, places: &[Place]) -> String {
     }
 }
 
+/// Every repair of the recordings.
+pub(super) fn repairs(problem: &FitProblem<'_, '_>) -> Vec<Repair> {
+    let observed = problem.scene.observed.iter().enumerate();
+    observed
+        .flat_map(|(run, observed)| observed.repairs.iter().map(move |repair| repair.in_run(run)))
+        .collect()
+}
+
 /// Limitations of the answer.
 pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<String> {
     let observed = &problem.scene.observed;
@@ -105,6 +114,11 @@ pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<String> {
         .flat_map(|observed| &observed.run.recording.warnings)
         .cloned()
         .collect();
+    let several = observed.len() > 1;
+    warnings.extend(repairs(problem).iter().map(|repair| match several {
+        true => format!("run {}: {repair}", repair.run),
+        false => repair.to_string(),
+    }));
     if observed.len() == 1 {
         warnings.push(
             "one run alone leaves most effects hardly visible or alike: record the worm on several slopes".to_owned(),

@@ -42,6 +42,15 @@ pub enum GaitError {
         /// Standard deviation of their distance from that of an even motor, m.
         off_m: f64,
     },
+    /// The camera was knocked again and again.
+    #[error(
+        "all cells shift at once {} times ({}), and no other cycle has the like: was the camera knocked? Cut the recording to where it stood still (--from, --to)",
+        at_s.len(), at_s.iter().take(5).map(|at_s| format!("at {at_s:.2} s")).collect::<Vec<_>>().join(", ")
+    )]
+    Knocks {
+        /// When, s.
+        at_s: Vec<f64>,
+    },
     /// The recorded phase contradicts the positions.
     #[error("the recorded gait phase and the positions contradict each other: {0}")]
     Phase(String),

@@ -5,20 +5,28 @@
 //! is the paper's exhaustive search (3.2.3); [`fit`] is the continuous estimator, which uses everything that the bounds cause and
 //! reports standard errors.
 //!
+//! [`capture`] takes shifts of markers and camera out of a recording first; [`knock`] finds those of the camera. `rest` and `clock`
+//! notice drifts of camera and clocks.
+//!
 //! Pure: series in, figures out, no files.
 
+pub mod capture;
 pub(crate) mod clean;
+mod clock;
 pub(crate) mod drift;
 pub mod fit;
 pub mod gait;
 mod gait_error;
+pub mod knock;
 pub mod onset;
+mod rest;
 mod running_median;
 pub mod search;
 mod steps;
 pub(crate) mod theory;
 mod track;
 
+pub use capture::{Shift, Steadied, steady};
 pub use fit::{FitError, Fitted, FittedRun, PositionRun};
 pub use gait::{IdentifiedGait, Prior};
 pub use gait_error::GaitError;

@@ -210,6 +210,7 @@ impl ControllerRun {
                 voltage_v: of_each(|state| state.bus_voltage_v),
             }),
             warnings,
+            repairs: Vec::new(),
         }
     }
 }

@@ -10,7 +10,8 @@
 //!    and reports which marker it took for which cell.
 //! 3. The recording is cut to the time requested.
 //! 4. `sanity_check` examines it, whatever the format: time must increase, no cell may be unseen for too long, something must
-//!    move, and lengths must be ones that a worm can have. What is only unusual becomes a warning. What would turn a result
+//!    move, and lengths must be ones that a worm can have. `repair` undoes what a tracker got wrong, where the rest of the recording
+//!    decides it, and notes it as a [`Repair`]. What is only unusual becomes a warning. What would turn a result
 //!    into a guess is refused, with its place and a remedy.
 //!
 //! # Modules, in the order to read them
@@ -19,7 +20,7 @@
 //! - `table` reads CSV, `write` writes it.
 //! - `vicon` and `c3d` read motion capture as `markers` in space; `projection` takes them onto the canal.
 //! - [`mcap`]: a recording from the log of a live worm, and a log from a recording.
-//! - `gaps`: positions that were not seen; `sanity_check`: what every recording must satisfy.
+//! - `gaps`: positions that were not seen; `sanity_check`: what every recording must satisfy; `repair`: faults of trackers.
 //! - `campaign`: several recordings of one worm.
 
 mod c3d;
@@ -30,6 +31,7 @@ pub mod mcap;
 mod open;
 mod options;
 mod projection;
+mod repair;
 mod sanity_check;
 mod series;
 mod statistics;
@@ -43,6 +45,7 @@ pub use campaign::{Advance, Campaign, CampaignError, CampaignRun};
 pub use open::{open, open_with_progress, read_from};
 pub use options::OpenOptions;
 pub use projection::{Axis, AxisError};
+pub use repair::{Repair, RepairKind};
 pub use series::{Motor, Recording};
 pub use worm_log::ReadError;
 pub use write::write_csv;

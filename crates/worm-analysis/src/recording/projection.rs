@@ -147,6 +147,7 @@ pub(super) fn project(mut markers: Markers, axis: Option<Axis>, path: &Path) -> 
         gait_phase: None,
         motor: None,
         warnings,
+        repairs: Vec::new(),
     })
 }
 

@@ -3,6 +3,7 @@
 use super::gaps::{bridge, is_longer, round_up, unseen_runs};
 use super::options::OpenOptions;
 use super::projection::MAX_POSITION_M;
+use super::repair::repair;
 use super::series::Recording;
 use super::statistics::{moves, quantile, spread};
 use worm_log::ReadError;
@@ -16,6 +17,18 @@ const TOO_LARGE_M: f64 = 5.0;
 const MAX_STEP_PERIODS: f64 = 5.0;
 /// No recording takes longer than this, s: 30 years.
 const MAX_DURATION_S: f64 = 1e9;
+
+impl Recording {
+    /// Checks and repairs a recording that was made in memory, as [`open`](super::open) does one that was read.
+    ///
+    /// # Errors
+    /// [`ReadError`] for a recording that no worm could have made, in which too much is unseen, or with more faults than can be
+    /// repaired.
+    pub fn checked(mut self, options: &OpenOptions) -> Result<Self, ReadError> {
+        check(&mut self, options, None)?;
+        Ok(self)
+    }
+}
 
 /// Checks a recording that has just been read and cut, and bridges short gaps in its phase. `full_range_s` is the time of
 /// the first and the last sample before the cut.
@@ -31,6 +44,7 @@ pub(super) fn check(
     check_seen(recording)?;
     check_positions(recording)?;
     check_time(recording, options.max_gap_s)?;
+    repair(recording, options)?;
     recording.check_gaps(options.max_gap_s)?;
     complete_phase(recording, options.max_gap_s)?;
     check_lengths(recording)?;

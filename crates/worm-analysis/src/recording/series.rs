@@ -1,5 +1,6 @@
 //! The recording itself: series over a common time.
 
+use super::repair::Repair;
 use std::path::PathBuf;
 use worm_physics::MAX_CELLS;
 
@@ -58,6 +59,8 @@ pub struct Recording {
     pub motor: Option<Motor>,
     /// What the reader noticed: ignored columns, markers left out, a truncated end.
     pub warnings: Vec<String>,
+    /// What was repaired in it, and what was noticed but left as it is, once it has been checked.
+    pub repairs: Vec<Repair>,
 }
 
 impl Recording {
@@ -77,6 +80,22 @@ impl Recording {
         match self.cell_names.get(cell) {
             Some(name) => format!("cell {} ({name})", cell + 1),
             None => format!("cell {}", cell + 1),
+        }
+    }
+
+    /// Keeps only the marked samples; those beyond the marks go, too.
+    pub(super) fn keep(&mut self, kept: &[bool]) {
+        let keep = |series: &mut Vec<f64>| {
+            let mut kept = kept.iter();
+            series.retain(|_| kept.next().is_some_and(|kept| *kept));
+        };
+        keep(&mut self.time_s);
+        self.position_m.iter_mut().for_each(keep);
+        if let Some(phase) = &mut self.gait_phase {
+            keep(phase);
+        }
+        if let Some(motor) = &mut self.motor {
+            motor.series_mut().into_iter().for_each(keep);
         }
     }
 

@@ -3,6 +3,7 @@
 //! `time_s` and `x1_m` … `xn_m` must be there, `gait_phase` and the motor's columns may. Columns come in any order, unknown
 //! ones are ignored with a warning, lines that begin with `#` are comments, and an empty field or `nan` means not seen.
 
+use super::repair::stamps;
 use super::series::{Motor, Recording};
 use super::text::Text;
 use csv::ByteRecord;
@@ -52,20 +53,21 @@ pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording,
     }
     let mut recording = rows.read_header(&record)?;
     let mut values = vec![f64::NAN; rows.columns.len()];
-    let mut line = 0;
+    let (mut line, mut is_cut_off) = (0, false);
+    let mut wrong_time = None;
     while rows.next(&mut record)? {
         line = rows.line();
-        let last_s = recording.time_s.last().copied();
-        if let Err(error) = rows.parse(&record, last_s, &mut values) {
+        if let Err(error) = rows.parse(&record, &mut values) {
             let is_short = record.len() < rows.columns.len();
             let is_last = !rows.next(&mut record)?;
             if is_last && (is_short || rows.reader.get_ref().is_unterminated()) {
-                let cut_off =
-                    format!("line {line}: the file is cut off in this line; the whole samples before it are used");
-                recording.warnings.push(cut_off);
-                return Ok(recording);
+                is_cut_off = true;
+                break;
             }
-            return Err(error);
+            return Err(wrong_time.unwrap_or(error));
+        }
+        if let Some(error) = rows.wrong_time(recording.time_s.last().copied(), &values) {
+            wrong_time.get_or_insert(error);
         }
         for (column, value) in rows.columns.iter().zip(&values) {
             match (column, &mut recording) {
@@ -83,7 +85,16 @@ pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording,
             }
         }
     }
-    if line > 0 && rows.reader.get_ref().is_unterminated() {
+    let ends_back = matches!(recording.time_s[..], [.., before_s, last_s] if last_s <= before_s);
+    let is_unterminated = line > 0 && rows.reader.get_ref().is_unterminated();
+    if is_unterminated && ends_back && !is_cut_off {
+        recording.keep(&vec![true; recording.samples() - 1]);
+        is_cut_off = true;
+    }
+    if is_cut_off {
+        let note = format!("line {line}: the file is cut off in this line; the whole samples before it are used");
+        recording.warnings.push(note);
+    } else if is_unterminated {
         let note =
             format!("line {line}: the file ends without a line end and may be cut off; this line is used as it is");
         recording.warnings.push(note);
@@ -94,6 +105,19 @@ pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording,
             .series_mut()
             .into_iter()
             .for_each(|series| series.resize(samples, f64::NAN));
+    }
+    with_increasing_time(recording, wrong_time)
+}
+
+/// Leaves out single samples whose time does not grow; `wrong_time` is the error for the first of them, where there are too many.
+fn with_increasing_time(mut recording: Recording, wrong_time: Option<ReadError>) -> Result<Recording, ReadError> {
+    let Some(error) = wrong_time else {
+        return Ok(recording);
+    };
+    let kept = stamps::increasing(&recording.time_s).ok_or(error)?;
+    if kept.contains(&false) {
+        recording.repairs.push(stamps::note(&recording.time_s, &kept));
+        recording.keep(&kept);
     }
     Ok(recording)
 }
@@ -228,6 +252,7 @@ impl<R: Read> Rows<'_, R> {
                 .any(|column| matches!(column, Column::Motor(_)))
                 .then(Motor::default),
             warnings,
+            repairs: Vec::new(),
         })
     }
 
@@ -262,7 +287,7 @@ impl<R: Read> Rows<'_, R> {
     }
 
     /// Parses one row into `values`.
-    fn parse(&self, record: &ByteRecord, last_s: Option<f64>, values: &mut [f64]) -> Result<(), ReadError> {
+    fn parse(&self, record: &ByteRecord, values: &mut [f64]) -> Result<(), ReadError> {
         if record.len() < values.len() {
             return self.refuse(
                 record.len(),
@@ -307,22 +332,25 @@ impl<R: Read> Rows<'_, R> {
                     );
                 }
             };
-            if *column == Column::Time {
-                if value.is_nan() {
-                    return self.refuse(index, "there is no time", "give each sample its time");
-                }
-                if let Some(last_s) = last_s.filter(|&last_s| value <= last_s) {
-                    let what = if value < last_s { "goes back" } else { "repeats" };
-                    return self.refuse(
-                        index,
-                        format!("time {what}: {value} s after {last_s} s"),
-                        "sort the samples by time and keep one for each",
-                    );
-                }
+            if *column == Column::Time && value.is_nan() {
+                return self.refuse(index, "there is no time", "give each sample its time");
             }
             values[index] = value;
         }
         Ok(())
+    }
+
+    /// The problem with the time of a row that was parsed, after a sample at `last_s`.
+    fn wrong_time(&self, last_s: Option<f64>, values: &[f64]) -> Option<ReadError> {
+        let index = self.columns.iter().position(|column| *column == Column::Time)?;
+        let (last_s, time_s) = (last_s?, values[index]);
+        if time_s > last_s {
+            return None;
+        }
+        let what = if time_s < last_s { "goes back" } else { "repeats" };
+        let problem = format!("time {what}: {time_s} s after {last_s} s");
+        let remedy = "sort the samples by time and keep one for each";
+        Some(ReadError::at(self.path, self.place(index), problem, remedy))
     }
 }
 

@@ -130,6 +130,7 @@ fn a_recording_written_is_read_back() {
         gait_phase: None,
         motor: None,
         warnings: Vec::new(),
+        repairs: Vec::new(),
     };
     recording.position_m[1][7] = f64::NAN;
     let folder = tempfile::tempdir().expect("a folder");

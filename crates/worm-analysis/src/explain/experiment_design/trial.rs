@@ -47,6 +47,7 @@ pub(super) fn empty_recording(problem: &FitProblem<'_, '_>, change: &Change) -> 
         cell_names: Vec::new(),
         motor: None,
         warnings: Vec::new(),
+        repairs: Vec::new(),
     };
     (recording, own_hz / rate_hz)
 }
@@ -78,6 +79,7 @@ impl<'r> Trial<'r> {
         physics.worm = physics.worm.with_slope_rad(change.slope_deg.to_radians()).ok()?;
         physics.worm.add_mass_kg(change.extra_kg);
         let mut observed = Observed {
+            repairs: Vec::new(),
             run: RecordedRun {
                 recording,
                 slope_deg: change.slope_deg,

@@ -51,6 +51,7 @@ fn answer(verdict: Verdict, calibration: &[Calibrated], effects: &[NamedEffect],
         threshold: 9.0,
         runs: Vec::new(),
         warnings: Vec::new(),
+        repairs: Vec::new(),
         figures: Figures::default(),
     }
 }

@@ -64,6 +64,7 @@ fn recording(time_s: Vec<f64>) -> Recording {
         gait_phase: None,
         motor: None,
         warnings: Vec::new(),
+        repairs: Vec::new(),
     }
 }
 
@@ -84,6 +85,7 @@ fn found(per_n: f64, rest_s: f64, seed: u64) -> SpeedDroop {
     };
     let recordings: Vec<Recording> = vec![recording(Vec::new()); SLOPES_DEG.len()];
     let observed = |recording, phase: Vec<f64>| Observed {
+        repairs: Vec::new(),
         run: RecordedRun {
             recording,
             slope_deg: 0.0,

@@ -49,6 +49,7 @@ impl SeenCrawl {
             gait_phase: None,
             motor: None,
             warnings: Vec::new(),
+            repairs: Vec::new(),
         }
         .filled();
         find(&self.time_s, &self.measured_m, &filled_m, Prior { step_order, phase })

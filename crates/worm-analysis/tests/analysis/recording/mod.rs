@@ -3,6 +3,8 @@
 mod c3d;
 mod campaign;
 mod capture;
+mod clean_captures;
+mod damaged_captures;
 mod round_trip;
 mod seen;
 mod table;

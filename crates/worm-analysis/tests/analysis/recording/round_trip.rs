@@ -37,6 +37,7 @@ prop_compose! {
                 voltage_v: series,
             }),
             warnings: Vec::new(),
+            repairs: Vec::new(),
         }
     }
 }

@@ -329,6 +329,7 @@ pub fn explained(cells: usize) -> Answer {
         threshold: 14.2,
         runs: runs(&figures, true),
         warnings: vec!["up40.csv: 84 gaps of up to 0.06 s were bridged".to_owned()],
+        repairs: Vec::new(),
         figures,
     }
 }
@@ -431,6 +432,7 @@ pub fn agrees() -> Answer {
         remainder: None,
         next_experiment: None,
         warnings: Vec::new(),
+        repairs: Vec::new(),
         screening,
         ..answer
     }
@@ -452,6 +454,7 @@ pub fn empty() -> Answer {
         threshold: f64::NAN,
         runs: Vec::new(),
         warnings: Vec::new(),
+        repairs: Vec::new(),
         figures: Figures::default(),
     }
 }

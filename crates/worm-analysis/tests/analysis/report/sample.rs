@@ -155,6 +155,7 @@ pub fn analysis(cells: usize, slope_deg: f64, cycles: usize, samples_per_cycle: 
             nominal: theory(&nominal(cells, slope_deg)),
         },
         warnings: vec!["x2_m: 84 gaps of up to 0.06 s were bridged".to_owned()],
+        repairs: Vec::new(),
         series,
     }
 }
