@@ -102,8 +102,9 @@ impl Controller {
         } else {
             command.cycles_per_s * TAU
         };
-        // A speed that is no number is beyond the limit, too.
-        if !(velocity_rad_s.abs() <= self.velocity_limit_rad_s) {
+        // A speed that is no number is none within the limit.
+        let is_within_limit = velocity_rad_s.abs() <= self.velocity_limit_rad_s;
+        if !is_within_limit {
             return (CommandOutcome::BadSpeed, 0);
         }
         let limit = match CrawlLimit::of_command(command.limit_s, self.crawl_limit_s, inputs.lease, now_ns) {
