@@ -355,7 +355,7 @@ impl Controller {
             // The loop has logged the reason. The servo may have switched torque on, and only its answer was lost.
             ServiceOutcome::Failed(Service::Arm) => {
                 self.resume.cancel();
-                // The attempt has changed the servo's settings: they tell nothing about the silence before any more.
+                // The attempt has changed the servo's settings, which no longer show why it was silent.
                 self.is_silence_unexplained = false;
                 if self.mode != Mode::Fault {
                     self.enter(Mode::Stopping, now_ns);

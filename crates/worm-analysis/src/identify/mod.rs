@@ -15,6 +15,8 @@ pub(crate) mod clean;
 mod clock;
 pub(crate) mod drift;
 pub mod fit;
+#[cfg(test)]
+mod fixture;
 pub mod gait;
 mod gait_error;
 pub mod knock;

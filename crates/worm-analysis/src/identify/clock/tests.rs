@@ -1,10 +1,10 @@
 //! Lags that grow, and lags that do not.
 
 use super::drift;
-use crate::experiment::{Simulation, simulate};
-use crate::identify::gait::{IdentifiedGait, Prior, find};
+use crate::experiment::Simulation;
+use crate::identify::fixture::crawl;
+use crate::identify::gait::IdentifiedGait;
 use crate::recording::Recording;
-use worm_estimator::config::Config;
 
 fn seen(change: impl Fn(&mut Recording)) -> (Recording, IdentifiedGait) {
     let simulation = Simulation {
@@ -12,14 +12,7 @@ fn seen(change: impl Fn(&mut Recording)) -> (Recording, IdentifiedGait) {
         noise_m: 5e-5,
         ..Simulation::default()
     };
-    let mut recording = simulate(&Config::default(), &simulation).expect("it crawls");
-    change(&mut recording);
-    let prior = Prior {
-        step_order: &[0, 1, 2, 3],
-        phase: recording.gait_phase.as_deref(),
-    };
-    let gait = find(&recording.time_s, &recording.position_m, &recording.filled(), prior).expect("a gait");
-    (recording, gait)
+    crawl(&simulation, change)
 }
 
 fn drift_of(change: impl Fn(&mut Recording)) -> Option<f64> {

@@ -1,10 +1,9 @@
 //! Knocks, and slips that are none.
 
 use super::{Knock, find};
-use crate::experiment::{Simulation, simulate};
-use crate::identify::gait::{self, Prior};
+use crate::experiment::Simulation;
+use crate::identify::fixture::crawl;
 use crate::recording::Recording;
-use worm_estimator::config::Config;
 
 /// Ten cycles of 300 samples with a change; what is found in them.
 fn found(positions_only: bool, change: impl Fn(&mut Recording)) -> Vec<Knock> {
@@ -12,13 +11,7 @@ fn found(positions_only: bool, change: impl Fn(&mut Recording)) -> Vec<Knock> {
         positions_only,
         ..Simulation::default()
     };
-    let mut recording = simulate(&Config::default(), &simulation).expect("it crawls");
-    change(&mut recording);
-    let prior = Prior {
-        step_order: &[0, 1, 2, 3],
-        phase: recording.gait_phase.as_deref(),
-    };
-    let gait = gait::find(&recording.time_s, &recording.position_m, &recording.filled(), prior).expect("a gait");
+    let (recording, gait) = crawl(&simulation, change);
     find(&recording.time_s, &recording.position_m, &gait)
 }
 

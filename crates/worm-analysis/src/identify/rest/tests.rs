@@ -1,9 +1,8 @@
 //! A camera that drifts, seen by a worm that rests.
 
 use super::drift;
-use crate::experiment::{Simulation, simulate};
-use crate::identify::gait::{Prior, find};
-use worm_estimator::config::Config;
+use crate::experiment::Simulation;
+use crate::identify::fixture::crawl;
 
 /// The drift found where all positions drift by a speed, m/s.
 fn found(rest_s: f64, positions_only: bool, shift_m: impl Fn(f64) -> f64) -> Option<f64> {
@@ -14,19 +13,14 @@ fn found(rest_s: f64, positions_only: bool, shift_m: impl Fn(f64) -> f64) -> Opt
         positions_only,
         ..Simulation::default()
     };
-    let mut recording = simulate(&Config::default(), &simulation).expect("it crawls");
-    let times_s = recording.time_s.clone();
-    for series in &mut recording.position_m {
-        for (at_m, &time_s) in series.iter_mut().zip(&times_s) {
-            *at_m += shift_m(time_s);
+    let (recording, gait) = crawl(&simulation, |recording| {
+        for series in &mut recording.position_m {
+            for (at_m, &time_s) in series.iter_mut().zip(&recording.time_s) {
+                *at_m += shift_m(time_s);
+            }
         }
-    }
-    let prior = Prior {
-        step_order: &[0, 1, 2, 3],
-        phase: recording.gait_phase.as_deref(),
-    };
-    let gait = find(&times_s, &recording.position_m, &recording.filled(), prior).expect("a gait");
-    drift(&times_s, &gait).and_then(|found| found.rate)
+    });
+    drift(&recording.time_s, &gait).and_then(|found| found.rate)
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //!
 //! Trackers confuse markers, lose and freeze them, and are knocked. What the rest of the recording decides beyond doubt is put right
 //! here, in this order, because each step relies on those before it:
-//! 1. `labels`: cells cannot pass one another in a canal, so their order tells which marker is which.
+//! 1. `labels`: cells cannot pass one another in a canal, so their order shows which marker is whose.
 //! 2. `frozen`: a marker without noise is no measurement.
 //! 3. `jumps`: a marker that jumps away alone is left out until it comes back; one that stays away has moved on its cell.
 //!
