@@ -4,7 +4,7 @@ mod logout;
 mod trials;
 
 use crate::control::{Drive, DriveError, link_settings};
-use crate::link::{EmergencyStopInput, LinkSettings, Prepared, StartupError};
+use crate::link::{EmergencyStopError, EmergencyStopInput, LinkSettings, Prepared, StartupError};
 use crate::realtime::machine::{self, Setting};
 use crate::realtime::{self, EffectiveSettings};
 use crate::topics::{Hub, Instance};
@@ -12,6 +12,8 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::path::Path;
 use worm_estimator::config::{Config, Realtime};
+
+use trials::TrialWorm;
 
 pub(crate) use trials::Trials;
 
@@ -61,7 +63,7 @@ pub(crate) struct CheckReport {
 
 impl CheckReport {
     /// Runs all checks, and the trials that are asked for. `source` says where the configuration comes from.
-    pub(crate) fn new(config: &Config, source: &str, trials: Trials) -> Self {
+    pub(crate) fn new(config: &Config, source: &str, trials: &Trials) -> Self {
         let mut report = Self {
             worm: config.worm.name.clone(),
             findings: Vec::new(),
@@ -72,8 +74,8 @@ impl CheckReport {
             report.findings.push(setting.into());
         }
         check_topics(config, &mut report);
-        check_emergency_stop(config, &mut report);
-        check_port(config, trials, &mut report);
+        let emergency_stop = check_emergency_stop(config, &mut report);
+        check_port(config, trials, emergency_stop, &mut report);
         report
     }
 
@@ -189,16 +191,26 @@ fn check_topics(config: &Config, report: &mut CheckReport) {
 }
 
 /// Requests a GPIO line, as the loop would. That of a tracker is checked with the port.
-fn check_emergency_stop(config: &Config, report: &mut CheckReport) {
-    match EmergencyStopInput::open(config) {
+fn check_emergency_stop(
+    config: &Config,
+    report: &mut CheckReport,
+) -> Result<Option<EmergencyStopInput>, EmergencyStopError> {
+    let input = EmergencyStopInput::open(config);
+    match &input {
         Ok(None) => {}
         Ok(Some(_)) => report.good("emergency stop", "its input can be read"),
         // The error's text includes the remedy.
         Err(error) => report.note(Level::Error, "emergency stop", "cannot be read", error.to_string()),
     }
+    input
 }
 
-fn check_port(config: &Config, trials: Trials, report: &mut CheckReport) {
+fn check_port(
+    config: &Config,
+    trials: &Trials,
+    emergency_stop: Result<Option<EmergencyStopInput>, EmergencyStopError>,
+    report: &mut CheckReport,
+) {
     let Some(port) = &config.port else {
         report.good("port", "none configured: the virtual worm is used");
         return;
@@ -209,6 +221,7 @@ fn check_port(config: &Config, trials: Trials, report: &mut CheckReport) {
         Err(error) => return report.note(Level::Error, "port", "cannot be used", error.to_string()),
     };
     let mut opened = Drive::open(path, settings.clone());
+    let mut is_accepted = true;
     if let Err(
         error @ DriveError::Startup {
             source: StartupError::UnsafeWatchdog { .. },
@@ -217,6 +230,7 @@ fn check_port(config: &Config, trials: Trials, report: &mut CheckReport) {
     ) = &opened
     {
         report.note(Level::Error, "port", "the worm would not be armed", error.to_string());
+        is_accepted = false;
         // The rest can be checked all the same.
         let accepting = LinkSettings {
             accept_unsafe_watchdog: true,
@@ -243,7 +257,13 @@ fn check_port(config: &Config, trials: Trials, report: &mut CheckReport) {
                 report.note(level, "port", finding.what, finding.remedy);
             }
             report_current(config, &prepared, report);
-            trials.run(config, &mut drive, &prepared, report);
+            let mut worm = TrialWorm {
+                config,
+                drive: &mut drive,
+                prepared: &prepared,
+                is_accepted,
+            };
+            trials.run(&mut worm, emergency_stop, report);
         }
         // The error's text includes the remedy.
         Err(error) => report.note(Level::Error, "port", "cannot be used", error.to_string()),

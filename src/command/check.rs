@@ -1,6 +1,6 @@
 //! `wormd check`: what stands between this computer, this configuration and a crawling worm.
 
-use super::{Failure, WormArgs, print};
+use super::{Failure, WormArgs, end_on_signal, print, suspend_on_signal};
 use crate::preflight::{CheckReport, Level, Trials};
 use clap::Args;
 
@@ -30,16 +30,21 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
         Some(file) => file.display().to_string(),
         None => "the built-in defaults".to_owned(),
     };
-    let trials = Trials {
+    let mut trials = Trials {
         watchdog: args.try_watchdog,
         motion: args.try_motion,
+        signals: Vec::new(),
     };
     if trials.is_any() && config.port.is_none() {
         return Err(Failure::unusable(
             "a trial needs a serial port: name one in the section [port] or with --port",
         ));
     }
-    let report = CheckReport::new(&config, &source, trials);
+    if trials.is_any() {
+        // Nobody leaves, or is suspended, while the motor turns.
+        trials.signals = vec![end_on_signal()?, suspend_on_signal()?];
+    }
+    let report = CheckReport::new(&config, &source, &trials);
     if args.json {
         print::line(serde_json::to_string_pretty(&report).map_err(Failure::failed)?)?;
     } else {

@@ -5,7 +5,8 @@ use super::replaceable_port::ReplaceablePort;
 use crate::link::servo::scale;
 use crate::link::{
     ArmError, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, MotionTrial, OpenError,
-    OperationError, Prepared, ReadMode, ReadPlan, StartupError, TrialError, Tty, WatchdogTrial, WormBus, arm, prepare,
+    OperationError, Prepared, ReadMode, ReadPlan, StartupError, StopInputs, TrialError, Tty, WatchdogTrial, WormBus,
+    arm, prepare,
 };
 use dynamixel_bus::packet::DeviceId;
 use std::f64::consts::TAU;
@@ -170,8 +171,8 @@ impl Drive {
     ///
     /// # Errors
     /// [`DriveError::Trial`]
-    pub fn try_watchdog(&mut self) -> Result<WatchdogTrial, DriveError> {
-        let trial = self.bus.try_watchdog(&self.settings);
+    pub fn try_watchdog(&mut self, stops: &mut StopInputs<'_>) -> Result<WatchdogTrial, DriveError> {
+        let trial = self.bus.try_watchdog(&self.settings, stops);
         trial.map_err(|source| self.trial(source))
     }
 
@@ -179,8 +180,9 @@ impl Drive {
     ///
     /// # Errors
     /// [`DriveError::Trial`]
-    pub fn try_motion(&mut self, positive: bool) -> Result<MotionTrial, DriveError> {
-        let trial = self.bus.try_motion(&self.settings, if positive { 1.0 } else { -1.0 });
+    pub fn try_motion(&mut self, positive: bool, stops: &mut StopInputs<'_>) -> Result<MotionTrial, DriveError> {
+        let sign = if positive { 1.0 } else { -1.0 };
+        let trial = self.bus.try_motion(&self.settings, sign, stops);
         trial.map_err(|source| self.trial(source))
     }
 

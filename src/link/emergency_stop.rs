@@ -87,6 +87,20 @@ impl EmergencyStopInput {
         self.judge(now_ns, reading)
     }
 
+    /// As [`is_pressed`](Self::is_pressed), without an exchange: whether a GPIO line says so. A switch at the tracker is not read.
+    pub(super) fn is_pressed_at_line(&mut self, now_ns: u64) -> bool {
+        let Source::Gpio(line) = &self.source else {
+            return false;
+        };
+        let reading = read_line(line);
+        self.judge(now_ns, reading)
+    }
+
+    /// Forgets when it was last read: it was not asked for a while.
+    pub(super) fn forget(&mut self) {
+        self.read_ns = None;
+    }
+
     fn judge(&mut self, now_ns: u64, reading: Option<bool>) -> bool {
         match reading {
             Some(pressed) => {

@@ -16,7 +16,7 @@
 //! 7. [`WormBus::set_torque`], [`WormBus::stop_motor`], [`WormBus::rearm_watchdog`] and [`WormBus::reboot_servo`] serve between ticks;
 //!    each change is verified by reading back.
 //!    [`arm`] prepares and switches torque on, and off again where that cannot be verified. [`WormBus::try_watchdog`] and
-//!    [`WormBus::try_motion`] are trials that turn the cam.
+//!    [`WormBus::try_motion`] are trials that turn the cam, until [`StopInputs`] end them.
 //! 8. [`EmergencyStopInput`] reads the emergency stop, from the exchange or from a GPIO line.
 //! 9. [`virtual_worm`] is the other end of the line: the same devices, simulated on a pseudo-terminal.
 //!
@@ -51,6 +51,7 @@ mod operations;
 mod owed_answers;
 pub mod servo;
 mod startup;
+mod stop_inputs;
 pub mod tracker;
 mod trial;
 pub mod virtual_worm;
@@ -67,6 +68,7 @@ pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPla
 pub use operations::OperationError;
 pub use servo::ServoReading;
 pub use startup::{LinkSettings, Prepared, StartupError, prepare};
+pub use stop_inputs::StopInputs;
 pub use tracker::{NoTrackerBlock, TrackerReading};
 pub use trial::{MotionTrial, TrialError, WatchdogTrial};
 pub use worm_bus::WormBus;

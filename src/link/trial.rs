@@ -1,11 +1,15 @@
 //! Trials that turn the cam a little: does the servo's watchdog stop the motor, and does the motor do what it is told?
 //!
-//! Both switch torque on, turn the cam slowly, and switch torque off whatever happens.
+//! Both switch torque on, turn the cam slowly, and switch torque off whatever happens: a signal to the process, a pressed emergency
+//! stop and a hardware error end them early.
 
 use super::arm::{ArmError, arm};
 use super::operations::REPLY_TIME;
 use super::servo::{self, ServoReading, register, scale};
-use super::{LinkSettings, OperationError, Port, StartupError, TrackerReading, TransactionError, WormBus};
+use super::{
+    ExchangeOutcome, ExchangePlan, LinkSettings, OperationError, Port, Prepared, StartupError, StopInputs,
+    TrackerReading, TransactionError, WormBus,
+};
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
@@ -43,6 +47,17 @@ pub enum TrialError {
     /// The watchdog acted while the trial was still talking to the servo.
     #[error("the computer paused, and the watchdog acted before the trial began: try again")]
     Paused,
+    /// A signal asked the process to end.
+    #[error("ended by a signal to this process")]
+    Signal,
+    /// The emergency stop is pressed, or was not read for its time.
+    #[error("the emergency stop is pressed, or cannot be read: release it, or look at its cable, and try again")]
+    EmergencyStop,
+    /// The servo's answer has its alert bit.
+    #[error(
+        "the servo reports a hardware error: `wormd check` says which one; remove the cause, then reboot the servo"
+    )]
+    Alert,
     /// A register could not be read or set.
     #[error(transparent)]
     Operation(#[from] OperationError),
@@ -99,8 +114,12 @@ impl<P: Port> WormBus<P> {
     ///
     /// # Errors
     /// [`TrialError`]; torque is off, as far as it can be switched off.
-    pub fn try_watchdog(&mut self, settings: &LinkSettings) -> Result<WatchdogTrial, TrialError> {
-        let outcome = self.watchdog_trial(settings);
+    pub fn try_watchdog(
+        &mut self,
+        settings: &LinkSettings,
+        stops: &mut StopInputs<'_>,
+    ) -> Result<WatchdogTrial, TrialError> {
+        let outcome = self.watchdog_trial(settings, stops);
         self.end_trial(settings, outcome)
     }
 
@@ -108,8 +127,13 @@ impl<P: Port> WormBus<P> {
     ///
     /// # Errors
     /// [`TrialError`]; torque is off, as far as it can be switched off.
-    pub fn try_motion(&mut self, settings: &LinkSettings, sign: f64) -> Result<MotionTrial, TrialError> {
-        let outcome = self.motion_trial(settings, sign);
+    pub fn try_motion(
+        &mut self,
+        settings: &LinkSettings,
+        sign: f64,
+        stops: &mut StopInputs<'_>,
+    ) -> Result<MotionTrial, TrialError> {
+        let outcome = self.motion_trial(settings, sign, stops);
         self.end_trial(settings, outcome)
     }
 
@@ -120,20 +144,32 @@ impl<P: Port> WormBus<P> {
         outcome
     }
 
-    fn watchdog_trial(&mut self, settings: &LinkSettings) -> Result<WatchdogTrial, TrialError> {
-        let plan = arm(self, settings, &mut Vec::new())?.plan;
+    /// Switches torque on, unless something already asks for an end; the cam does not turn yet.
+    fn arm_for_trial(&mut self, settings: &LinkSettings, stops: &mut StopInputs<'_>) -> Result<Prepared, TrialError> {
+        stops.begin()?;
+        let prepared = arm(self, settings, &mut Vec::new())?;
+        self.attended_exchange(&prepared.plan, 0.0, stops)?;
+        Ok(prepared)
+    }
+
+    fn watchdog_trial(
+        &mut self,
+        settings: &LinkSettings,
+        stops: &mut StopInputs<'_>,
+    ) -> Result<WatchdogTrial, TrialError> {
+        let plan = self.arm_for_trial(settings, stops)?.plan;
         let mut turn = Turn::new(SPEED_RAD_S);
-        self.turn_on(&plan, &mut turn, RUN_UP_RAD)?; // until it turns steadily
+        self.turn_on(&plan, &mut turn, RUN_UP_RAD, stops)?; // until it turns steadily
         let begun = turn.last(self, settings)?;
-        self.turn_on(&plan, &mut turn, 2.0 * RUN_UP_RAD)?;
+        self.turn_on(&plan, &mut turn, 2.0 * RUN_UP_RAD, stops)?;
         let last = self.read_servo(settings)?;
         if last.watchdog_latched() {
             return Err(TrialError::Paused);
         }
         let speed_rad_s = (last.position_rad - begun.position_rad) / elapsed_s(&begun, &last);
-        std::thread::sleep(Duration::from_millis(u64::from(settings.watchdog_ms)) + MARGIN);
+        stops.wait(Duration::from_millis(u64::from(settings.watchdog_ms)) + MARGIN)?;
         let after = self.read_servo(settings)?;
-        std::thread::sleep(WATCHED);
+        stops.wait(WATCHED)?;
         let later = self.read_servo(settings)?;
         let stopped = (later.position_rad - after.position_rad).abs() < STANDS_WITHIN_RAD;
         let turned_rad = after.position_rad - last.position_rad;
@@ -149,17 +185,22 @@ impl<P: Port> WormBus<P> {
         })
     }
 
-    fn motion_trial(&mut self, settings: &LinkSettings, sign: f64) -> Result<MotionTrial, TrialError> {
-        let prepared = arm(self, settings, &mut Vec::new())?;
+    fn motion_trial(
+        &mut self,
+        settings: &LinkSettings,
+        sign: f64,
+        stops: &mut StopInputs<'_>,
+    ) -> Result<MotionTrial, TrialError> {
+        let prepared = self.arm_for_trial(settings, stops)?;
         let plan = prepared.plan;
         let duty_counts = (DUTY_SHARE * prepared.duty_limit / scale::DUTY).max(1.0) as u32;
         self.set_register(settings.servo_id, register::GOAL_PWM, duty_counts)?;
         let mut there = Turn::new(SPEED_RAD_S * sign);
-        self.turn_on(&plan, &mut there, ANGLE_RAD)?;
-        let rest = self.rest(&plan)?;
+        self.turn_on(&plan, &mut there, ANGLE_RAD, stops)?;
+        let rest = self.rest(&plan, stops)?;
         let mut back = Turn::new(-SPEED_RAD_S * sign);
-        self.turn_on(&plan, &mut back, ANGLE_RAD)?;
-        let _stands = self.rest(&plan)?;
+        self.turn_on(&plan, &mut back, ANGLE_RAD, stops)?;
+        let _stands = self.rest(&plan, stops)?;
         let cells = prepared.tracker_reading;
         Ok(MotionTrial {
             there_rad: there.moved_rad(),
@@ -171,10 +212,16 @@ impl<P: Port> WormBus<P> {
     }
 
     /// Turns on until the cam has turned by `angle_rad` since the turn began.
-    fn turn_on(&mut self, plan: &super::ExchangePlan, turn: &mut Turn, angle_rad: f64) -> Result<(), TrialError> {
+    fn turn_on(
+        &mut self,
+        plan: &ExchangePlan,
+        turn: &mut Turn,
+        angle_rad: f64,
+        stops: &mut StopInputs<'_>,
+    ) -> Result<(), TrialError> {
         let deadline = Instant::now() + MOTION_TIME;
         while turn.moved_rad() < angle_rad {
-            let outcome = self.exchange(plan, turn.goal_rad_s, Instant::now() + REPLY_TIME);
+            let outcome = self.attended_exchange(plan, turn.goal_rad_s, stops)?;
             if let Ok(servo) = outcome.servo {
                 turn.take(servo);
             }
@@ -188,23 +235,41 @@ impl<P: Port> WormBus<P> {
     }
 
     /// Brings the cam to rest; where the cells are then.
-    fn rest(&mut self, plan: &super::ExchangePlan) -> Result<Option<TrackerReading>, TrialError> {
+    fn rest(&mut self, plan: &ExchangePlan, stops: &mut StopInputs<'_>) -> Result<Option<TrackerReading>, TrialError> {
         let deadline = Instant::now() + WATCHED;
         let mut seen = None;
         while Instant::now() < deadline {
-            let outcome = self.exchange(plan, 0.0, Instant::now() + REPLY_TIME);
+            let outcome = self.attended_exchange(plan, 0.0, stops)?;
             seen = outcome.tracker.ok().or(seen);
             std::thread::sleep(INTERVAL);
         }
         Ok(seen)
     }
 
+    /// An exchange that ends the trial where something asks for it.
+    fn attended_exchange(
+        &mut self,
+        plan: &ExchangePlan,
+        goal_rad_s: f64,
+        stops: &mut StopInputs<'_>,
+    ) -> Result<ExchangeOutcome, TrialError> {
+        let outcome = self.exchange(plan, goal_rad_s, Instant::now() + REPLY_TIME);
+        stops.check(&outcome)?;
+        match outcome.servo {
+            Ok(servo) if servo.alert => Err(TrialError::Alert),
+            _ => Ok(outcome),
+        }
+    }
+
     /// Reads the servo and changes nothing, not even the goal.
-    fn read_servo(&mut self, settings: &LinkSettings) -> Result<ServoReading, TransactionError> {
+    fn read_servo(&mut self, settings: &LinkSettings) -> Result<ServoReading, TrialError> {
         let mut block = [0; servo::BLOCK_LEN];
         let servo_id = settings.servo_id;
         let flags = self.ask_again(|bus, deadline| bus.read(servo_id, servo::BLOCK_ADDRESS, &mut block, deadline))?;
-        Ok(ServoReading::from_block(&block, flags.alert))
+        match ServoReading::from_block(&block, flags.alert) {
+            ServoReading { alert: true, .. } => Err(TrialError::Alert),
+            reading => Ok(reading),
+        }
     }
 }
 
@@ -241,7 +306,7 @@ impl Turn {
     }
 
     /// The newest reading, or one that is taken now.
-    fn last<P: Port>(&self, bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<ServoReading, TransactionError> {
+    fn last<P: Port>(&self, bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<ServoReading, TrialError> {
         self.last.map_or_else(|| bus.read_servo(settings), Ok)
     }
 }

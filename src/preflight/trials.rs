@@ -3,39 +3,82 @@
 use super::{CheckReport, Level};
 use crate::control::Drive;
 use crate::link::servo::scale;
-use crate::link::{MotionTrial, Prepared, WatchdogTrial};
+use crate::link::{EmergencyStopError, EmergencyStopInput, MotionTrial, Prepared, StopInputs, WatchdogTrial};
 use std::f64::consts::TAU;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use worm_estimator::config::Config;
 
 /// Least displacement of a cell that says anything about the direction, m.
 const LEAST_DISPLACEMENT_M: f64 = 3e-4;
 
 /// Which trials to run.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Trials {
     /// Does the servo's watchdog stop the motor?
     pub watchdog: bool,
     /// Does the cam turn as it is told?
     pub motion: bool,
+    /// Any of these flags ends a trial at once.
+    pub signals: Vec<Arc<AtomicBool>>,
+}
+
+/// The worm that is tried.
+pub(super) struct TrialWorm<'a> {
+    pub config: &'a Config,
+    pub drive: &'a mut Drive,
+    pub prepared: &'a Prepared,
+    /// Whether the worm would be armed, too. A servo whose watchdog is not trusted is turned only to try that watchdog.
+    pub is_accepted: bool,
 }
 
 impl Trials {
     /// Whether there is anything to try.
-    pub(crate) const fn is_any(self) -> bool {
+    pub(crate) const fn is_any(&self) -> bool {
         self.watchdog || self.motion
     }
 
-    /// Runs the trials, motion first: a watchdog can be tried only on a cam that turns.
-    pub(super) fn run(self, config: &Config, drive: &mut Drive, prepared: &Prepared, report: &mut CheckReport) {
-        if self.motion {
-            match drive.try_motion(config.servo.positive_is_forward) {
-                Ok(trial) => report_motion(config, &trial, report),
-                Err(error) => report.note(Level::Error, "motion", "could not be tried", error.to_string()),
+    /// Runs the trials, motion first: a watchdog can be tried only on a cam that turns. Without the configured emergency stop nothing
+    /// turns.
+    pub(super) fn run(
+        &self,
+        worm: &mut TrialWorm<'_>,
+        emergency_stop: Result<Option<EmergencyStopInput>, EmergencyStopError>,
+        report: &mut CheckReport,
+    ) {
+        let emergency_stop = match emergency_stop {
+            Ok(input) => input,
+            Err(_) => {
+                for (_, subject) in [(self.motion, "motion"), (self.watchdog, "watchdog")]
+                    .into_iter()
+                    .filter(|(is_asked, _)| *is_asked)
+                {
+                    let remedy = "make the emergency stop readable first: nothing else ends a trial at the worm";
+                    report.note(Level::Error, subject, "was not tried", remedy);
+                }
+                return;
             }
-            report_home(config, prepared, report);
+        };
+        let mut stops = StopInputs::new(&self.signals, emergency_stop);
+        if self.motion {
+            if worm.is_accepted {
+                match worm.drive.try_motion(worm.config.servo.positive_is_forward, &mut stops) {
+                    Ok(trial) => report_motion(worm.config, &trial, report),
+                    Err(error) => report.note(Level::Error, "motion", "could not be tried", error.to_string()),
+                }
+            } else {
+                let remedy = "try the watchdog alone (--try-watchdog), with a hand on the supply's switch";
+                report.note(
+                    Level::Error,
+                    "motion",
+                    "was not tried: the worm would not be armed",
+                    remedy,
+                );
+            }
+            report_home(worm.config, worm.prepared, report);
         }
         if self.watchdog {
-            match drive.try_watchdog() {
+            match worm.drive.try_watchdog(&mut stops) {
                 Ok(trial) => report_watchdog(&trial, report),
                 Err(error) => report.note(Level::Error, "watchdog", "could not be tried", error.to_string()),
             }

@@ -182,17 +182,25 @@ impl FileSeries {
         Ok(series)
     }
 
+    /// Removes what is more than may be kept. A file that cannot be removed is tried again when the next one begins.
     fn remove_oldest(&mut self) {
         let Some(keep) = self.limits.keep else { return };
-        while self.kept.len() > keep.max(1) {
-            let Some(oldest) = self.kept.pop_front() else { return };
+        let surplus = self.kept.len().saturating_sub(keep.max(1));
+        let mut refused = Vec::new();
+        for oldest in self.kept.drain(..surplus) {
             match oldest.remove() {
                 Ok(()) => tracing::info!("removed {}, the oldest file", oldest.path().display()),
-                Err(error) => tracing::warn!(
-                    "{} cannot be removed: {error}: remove it by hand, or the disk gets full",
-                    oldest.path().display()
-                ),
+                Err(error) => {
+                    tracing::warn!(
+                        "{} cannot be removed: {error}: it is tried again with the next file; until then the disk fills",
+                        oldest.path().display()
+                    );
+                    refused.push(oldest);
+                }
             }
+        }
+        for oldest in refused.into_iter().rev() {
+            self.kept.push_front(oldest);
         }
     }
 }

@@ -4,6 +4,7 @@
 //! another user could exchange what lies there.
 
 use super::error::InstanceError;
+use super::role;
 use nix::errno::Errno;
 use nix::fcntl::{OFlag, open, openat};
 use nix::sys::stat::{FileStat, Mode, fchmod, fstat, mkdirat};
@@ -155,21 +156,78 @@ fn create_root(root: &Path) -> io::Result<()> {
 
 /// Where `topics.root = "auto"` puts the topics of a worm: `/dev/shm/wormd` for root. For another user `/run/user/UID/wormd`, which
 /// nobody else can enter; where there is no such folder, or the name is too long for a socket in it, `/dev/shm/wormd-UID`.
+///
+/// `/run/user/UID` comes and goes with the user's sessions, so a worm that runs decides: its processes are found, and joined, in
+/// whichever of the two folders they are.
 pub(super) fn auto_root(worm: &str) -> PathBuf {
+    running_or_first(auto_roots(worm), worm)
+}
+
+/// The folders that `topics.root = "auto"` may mean, the one for a new worm first.
+fn auto_roots(worm: &str) -> Vec<PathBuf> {
     /// Longest root with twice the worm's name; as `topics.root` is checked.
     const LIMIT: usize = 48;
     let user = nix::unistd::geteuid();
     if user.is_root() {
-        return PathBuf::from("/dev/shm/wormd");
+        return vec![PathBuf::from("/dev/shm/wormd")];
     }
     let runtime = PathBuf::from(format!("/run/user/{user}"));
     let is_own = runtime
         .metadata()
         .is_ok_and(|it| it.is_dir() && it.uid() == user.as_raw());
     let root = runtime.join("wormd");
+    let everywhere = PathBuf::from(format!("/dev/shm/wormd-{user}"));
     if is_own && root.as_os_str().len() + 2 * worm.len() <= LIMIT {
-        root
+        vec![root, everywhere]
     } else {
-        PathBuf::from(format!("/dev/shm/wormd-{user}"))
+        vec![everywhere]
+    }
+}
+
+/// The root under which a process of `worm` runs, else the first.
+fn running_or_first(mut roots: Vec<PathBuf>, worm: &str) -> PathBuf {
+    let user = nix::unistd::geteuid().as_raw();
+    let runs_in = |root: &PathBuf| {
+        let folder = root.join(worm);
+        // Nobody else can pretend that this user's worm runs.
+        let is_own = folder
+            .symlink_metadata()
+            .is_ok_and(|it| it.is_dir() && it.uid() == user);
+        is_own && role::is_any_held(&folder)
+    };
+    let chosen = roots.iter().position(runs_in).unwrap_or_default();
+    roots.swap_remove(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::topics::{Controller, Instance, RoleLock, Supervisor};
+
+    #[test]
+    fn a_worm_that_runs_is_found_though_another_root_is_preferred_by_now() {
+        let folder = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
+        let (preferred, other) = (folder.path().join("run"), folder.path().join("shm"));
+        let chosen = || running_or_first(vec![preferred.clone(), other.clone()], "w");
+        assert_eq!(chosen(), preferred, "nothing runs");
+
+        let instance = Instance::new(&other, "w").expect("an instance");
+        assert_eq!(chosen(), preferred, "a folder alone is no worm");
+        let controller = RoleLock::<Controller>::take(&instance).expect("nobody else has it");
+        assert_eq!(chosen(), other);
+        // A second controller of that name is refused, wherever it would have begun.
+        let second = Instance::new(&chosen(), "w").expect("an instance");
+        RoleLock::<Controller>::take(&second).expect_err("one runs already");
+        assert_eq!(
+            running_or_first(vec![preferred.clone(), other.clone()], "another"),
+            preferred
+        );
+
+        drop(controller);
+        assert_eq!(chosen(), preferred, "it has ended");
+        let supervisor = RoleLock::<Supervisor>::take(&instance).expect("nobody else has it");
+        assert_eq!(chosen(), other, "its supervisor is about to start it again");
+        drop(supervisor);
+        assert_eq!(chosen(), preferred);
     }
 }

@@ -87,6 +87,7 @@ mod event;
 mod folder;
 mod hub;
 mod instance;
+mod kernel_locks;
 mod lock;
 mod open;
 mod publisher;

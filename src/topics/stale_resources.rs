@@ -1,6 +1,7 @@
 //! What killed processes leave behind, and who is alive to mind its removal.
 
 use super::instance::Instance;
+use super::kernel_locks;
 use std::fmt;
 use std::fs;
 use std::io;
@@ -39,9 +40,9 @@ pub(super) fn peers(instance: &Instance) -> Vec<Peer> {
     let presence = instance.lock_path("presence");
     let segments = format!("{SHARED_MEMORY}/{}", instance.prefix());
     let scan = || {
-        others(|process| {
+        others(|pid, process| {
             let maps = fs::read_to_string(process.join("maps")).unwrap_or_default();
-            maps.contains(&segments) || opens(process, |file| file == presence)
+            maps.contains(&segments) || has_open(pid, &presence)
         })
     };
     let mut found = scan();
@@ -56,16 +57,19 @@ pub(super) fn peers(instance: &Instance) -> Vec<Peer> {
 
 /// Every other process that has the file open.
 pub(super) fn who_has_open(file: &Path) -> Vec<Peer> {
-    others(|process| opens(process, |open| open == file))
+    others(|pid, _| has_open(pid, file))
 }
 
-/// Whether process `pid` has the file open.
+/// Whether process `pid` has the file open, or, where the system does not show what it has open, has locked it.
 pub(super) fn has_open(pid: u32, file: &Path) -> bool {
-    opens(&Path::new("/proc").join(pid.to_string()), |open| open == file)
+    open_files(pid).map_or_else(
+        |_| kernel_locks::holds(pid, file),
+        |mut open_files| open_files.any(|open| open == file),
+    )
 }
 
-/// The other processes for which `takes_part` holds; it is given the process's folder in `/proc`.
-fn others(takes_part: impl Fn(&Path) -> bool) -> Vec<Peer> {
+/// The other processes for which `takes_part` holds; it is given the process and its folder in `/proc`.
+fn others(takes_part: impl Fn(u32, &Path) -> bool) -> Vec<Peer> {
     let Ok(processes) = fs::read_dir("/proc") else {
         return Vec::new();
     };
@@ -76,7 +80,7 @@ fn others(takes_part: impl Fn(&Path) -> bool) -> Vec<Peer> {
     let mut found: Vec<Peer> = processes
         .flatten()
         .filter_map(|entry| Some((pid_of(&entry)?, entry.path())))
-        .filter(|(pid, path)| *pid != std::process::id() && may_take_part(path) && takes_part(path))
+        .filter(|(pid, path)| *pid != std::process::id() && may_take_part(path) && takes_part(*pid, path))
         .map(|(pid, path)| Peer {
             pid,
             name: fs::read_to_string(path.join("comm"))
@@ -89,14 +93,12 @@ fn others(takes_part: impl Fn(&Path) -> bool) -> Vec<Peer> {
     found
 }
 
-fn opens(process: &Path, is_meant: impl Fn(&Path) -> bool) -> bool {
-    let Ok(descriptors) = fs::read_dir(process.join("fd")) else {
-        return false;
-    };
-    descriptors
+/// What a process has open, as far as it can be said; an error where this user may not know.
+fn open_files(pid: u32) -> io::Result<impl Iterator<Item = PathBuf>> {
+    let descriptors = fs::read_dir(format!("/proc/{pid}/fd"))?;
+    Ok(descriptors
         .flatten()
-        .filter_map(|entry| fs::read_link(entry.path()).ok())
-        .any(|file| is_meant(&file))
+        .filter_map(|entry| fs::read_link(entry.path()).ok()))
 }
 
 /// Files of this worm: shared-memory segments, and what iceoryx2 put into the folder. Locks are not among them, nor files of other

@@ -312,10 +312,39 @@ fn check_tries_motion_and_watchdog() {
                 .find(|finding| finding["subject"] == subject)
                 .map(|finding| &finding["level"])
         };
-        for subject in ["motion", "direction", "home", "motor current"] {
+        for subject in ["home", "motor current"] {
             assert_eq!(level_of(subject), Some(&"good".into()), "{subject}: {text}");
         }
+        // A servo that would not be armed is turned only to try its watchdog.
+        let direction = (level == "good").then(|| serde_json::Value::from(level));
+        assert_eq!(level_of("motion"), Some(&level.into()), "{text}");
+        assert_eq!(level_of("direction").cloned(), direction, "{text}");
         assert_eq!(level_of("watchdog"), Some(&level.into()), "{text}");
+    }
+}
+
+#[test]
+fn check_turns_nothing_while_the_emergency_stop_cannot_be_read() {
+    let worm = Worm::new("no-stop");
+    let _devices = worm.virtual_worm(&[]);
+    let config = format!(
+        "[port]\npath = \"{}\"\n[emergency_stop]\nsource = \"gpio\"\nchip = \"/dev/null\"\nline = 17\n",
+        worm.port()
+    );
+    let config = worm.config(&config);
+    let output = worm
+        .wormd(&["check", "--json", "--try-motion", "--try-watchdog", "--config", &config])
+        .output();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    for subject in ["motion", "watchdog"] {
+        let mut findings = report["findings"].as_array().expect("a list").iter();
+        let finding = findings.find(|finding| finding["subject"] == subject).expect(subject);
+        assert_eq!(
+            (&finding["level"], &finding["found"]),
+            (&"error".into(), &"was not tried".into())
+        );
     }
 }
 

@@ -179,6 +179,44 @@ fn only_the_newest_are_kept_and_only_own_files_are_removed() {
 }
 
 #[test]
+fn a_file_that_cannot_be_removed_is_tried_again_with_the_next() {
+    let mut recording = Recording::begin(RotationLimits {
+        max_age: Some(Duration::from_secs(1)),
+        keep: Some(2),
+        ..RotationLimits::default()
+    });
+    // The oldest file lies in a folder that cannot be entered for a while.
+    let [folder, aside] = ["folder", "aside"].map(|name| recording.folder.path().join(name));
+    std::fs::create_dir(&folder).expect("can be made");
+    let path = folder.join("old.mcap");
+    let file = LogFile::create(&path, false, &recording.progress).expect("an empty folder");
+    let oldest = file.identity(&path).expect("is there");
+    recording.series.as_mut().expect("is open").kept.push_front(oldest);
+    std::fs::rename(&folder, &aside).expect("is there");
+    std::fs::write(&folder, "in the way").expect("can be written");
+    let begun = Instant::now();
+    let mut write_at = |at_s| {
+        recording
+            .write(1, begun + Duration::from_secs(at_s))
+            .expect("there is room");
+        recording.files()
+    };
+    write_at(0);
+    write_at(1);
+    assert_eq!(
+        write_at(2),
+        ["aside", "folder", "run.1.mcap", "run.2.mcap"],
+        "the others are removed all the same"
+    );
+    assert!(aside.join("old.mcap").exists());
+    std::fs::remove_file(&folder).expect("is there");
+    std::fs::rename(&aside, &folder).expect("is there");
+    assert_eq!(write_at(3), ["folder", "run.2.mcap", "run.3.mcap"]);
+    assert!(!path.exists(), "removed as soon as that was possible");
+    recording.finish();
+}
+
+#[test]
 fn a_file_that_cannot_be_begun_leaves_the_one_before_complete() {
     let mut recording = Recording::begin(RotationLimits {
         max_age: Some(Duration::from_secs(1)),
