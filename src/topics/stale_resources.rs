@@ -62,10 +62,7 @@ pub(super) fn who_has_open(file: &Path) -> Vec<Peer> {
 
 /// Whether process `pid` has the file open, or, where the system does not show what it has open, has locked it.
 pub(super) fn has_open(pid: u32, file: &Path) -> bool {
-    open_files(pid).map_or_else(
-        |_| kernel_locks::holds(pid, file),
-        |mut open_files| open_files.any(|open| open == file),
-    )
+    shows_open(pid, file).unwrap_or_else(|_| kernel_locks::holds(pid, file))
 }
 
 /// The other processes for which `takes_part` holds; it is given the process and its folder in `/proc`.
@@ -93,12 +90,18 @@ fn others(takes_part: impl Fn(u32, &Path) -> bool) -> Vec<Peer> {
     found
 }
 
-/// What a process has open, as far as it can be said; an error where this user may not know.
-fn open_files(pid: u32) -> io::Result<impl Iterator<Item = PathBuf>> {
-    let descriptors = fs::read_dir(format!("/proc/{pid}/fd"))?;
-    Ok(descriptors
-        .flatten()
-        .filter_map(|entry| fs::read_link(entry.path()).ok()))
+/// Whether `/proc` shows that a process has the file open; an error where this user may not know.
+fn shows_open(pid: u32, file: &Path) -> io::Result<bool> {
+    let mut refused = None;
+    for entry in fs::read_dir(format!("/proc/{pid}/fd"))?.flatten() {
+        match fs::read_link(entry.path()) {
+            Ok(open) if open == file => return Ok(true),
+            // The list may be readable where the names are not.
+            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => refused = Some(error),
+            _ => {}
+        }
+    }
+    refused.map_or(Ok(false), Err)
 }
 
 /// Files of this worm: shared-memory segments, and what iceoryx2 put into the folder. Locks are not among them, nor files of other
