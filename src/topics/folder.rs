@@ -4,7 +4,7 @@
 //! another user could exchange what lies there.
 
 use super::error::InstanceError;
-use super::role;
+use super::lock_holder;
 use nix::errno::Errno;
 use nix::fcntl::{OFlag, open, openat};
 use nix::sys::stat::{FileStat, Mode, fchmod, fstat, mkdirat};
@@ -193,7 +193,7 @@ fn running_or_first(mut roots: Vec<PathBuf>, worm: &str) -> PathBuf {
         let is_own = folder
             .symlink_metadata()
             .is_ok_and(|it| it.is_dir() && it.uid() == user);
-        is_own && role::is_any_held(&folder)
+        is_own && lock_holder::is_any_held(&folder)
     };
     let chosen = roots.iter().position(runs_in).unwrap_or_default();
     roots.swap_remove(chosen)

@@ -89,6 +89,7 @@ mod hub;
 mod instance;
 mod kernel_locks;
 mod lock;
+mod lock_holder;
 mod open;
 mod publisher;
 mod role;

@@ -2,10 +2,10 @@
 
 use super::instance::Instance;
 use super::lock::{LockError, LockFile, LockKind, LockPlace};
+use super::lock_holder;
 use super::stale_resources;
 use std::io;
 use std::marker::PhantomData;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// How long a holder that has just locked may take to write its pid.
@@ -110,7 +110,7 @@ impl<R: Role> RoleLock<R> {
 
     /// The process that has the role now, if any. Does not disturb one that is about to take it.
     pub fn holder(instance: &Instance) -> Option<u32> {
-        holder_of(&instance.lock_path(R::NAME), stale_resources::has_open)
+        lock_holder::holder(&instance.lock_path(R::NAME))
     }
 
     pub(super) fn instance(&self) -> &Instance {
@@ -145,23 +145,6 @@ pub(super) fn remove_abandoned(instance: &Instance) {
     }
 }
 
-/// Whether a process has a role of the worm whose folder this is. Creates nothing and disturbs nobody.
-pub(super) fn is_any_held(worm_folder: &Path) -> bool {
-    NAMES.iter().any(|name| {
-        let lock = worm_folder.join(format!("{name}.lock"));
-        holder_of(&lock, stale_resources::has_open).is_some()
-    })
-}
-
-/// The process that a lock file names, if it is `in_use` by it.
-fn holder_of(path: &Path, in_use: impl Fn(u32, &Path) -> bool) -> Option<u32> {
-    read_pid(path).filter(|&pid| in_use(pid, path))
-}
-
-fn read_pid(path: &Path) -> Option<u32> {
-    std::fs::read_to_string(path).ok()?.trim().parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,7 +155,7 @@ mod tests {
         let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
         let instance = Instance::new(root.path(), "locks").expect("an instance");
         let path = instance.lock_path(Controller::NAME);
-        let holder = || holder_of(&path, kernel_locks::holds);
+        let holder = || lock_holder::holder_by(&path, kernel_locks::holds);
         assert_eq!(holder(), None);
         let controller = RoleLock::<Controller>::take(&instance).expect("nobody else has it");
         assert_eq!(holder(), Some(std::process::id()));

@@ -1,7 +1,7 @@
 //! What killed processes leave behind, and who is alive to mind its removal.
 
 use super::instance::Instance;
-use super::kernel_locks;
+use super::lock_holder::has_open;
 use std::fmt;
 use std::fs;
 use std::io;
@@ -60,11 +60,6 @@ pub(super) fn who_has_open(file: &Path) -> Vec<Peer> {
     others(|pid, _| has_open(pid, file))
 }
 
-/// Whether process `pid` has the file open, or, where the system does not show what it has open, has locked it.
-pub(super) fn has_open(pid: u32, file: &Path) -> bool {
-    shows_open(pid, file).unwrap_or_else(|_| kernel_locks::holds(pid, file))
-}
-
 /// The other processes for which `takes_part` holds; it is given the process and its folder in `/proc`.
 fn others(takes_part: impl Fn(u32, &Path) -> bool) -> Vec<Peer> {
     let Ok(processes) = fs::read_dir("/proc") else {
@@ -88,20 +83,6 @@ fn others(takes_part: impl Fn(u32, &Path) -> bool) -> Vec<Peer> {
         .collect();
     found.sort_by_key(|peer| peer.pid);
     found
-}
-
-/// Whether `/proc` shows that a process has the file open; an error where this user may not know.
-fn shows_open(pid: u32, file: &Path) -> io::Result<bool> {
-    let mut refused = None;
-    for entry in fs::read_dir(format!("/proc/{pid}/fd"))?.flatten() {
-        match fs::read_link(entry.path()) {
-            Ok(open) if open == file => return Ok(true),
-            // The list may be readable where the names are not.
-            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => refused = Some(error),
-            _ => {}
-        }
-    }
-    refused.map_or(Ok(false), Err)
 }
 
 /// Files of this worm: shared-memory segments, and what iceoryx2 put into the folder. Locks are not among them, nor files of other

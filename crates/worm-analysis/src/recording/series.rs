@@ -1,6 +1,6 @@
 //! The recording itself: series over a common time.
 
-use super::repair::Repair;
+use super::repair_note::Repair;
 use std::path::PathBuf;
 use worm_physics::MAX_CELLS;
 

@@ -4,8 +4,8 @@
 //! the noise, are no measurements. A file may be written in steps as coarse as the noise, so that equal values are chance; how many in a
 //! row are too many follows from how often two are equal.
 
-use super::note::{Repair, RepairKind};
 use super::usual_noise;
+use crate::recording::repair_note::{Repair, RepairKind};
 use crate::recording::series::Recording;
 use std::ops::Range;
 

@@ -3,8 +3,8 @@
 //! A slip shifts all cells at once, because the cam holds them together; a jump of one cell against the others is the marker's. The straight
 //! line through a few samples before is compared with that through a few after, less the median over the cells of the same.
 
-use super::note::{Repair, RepairKind};
 use super::usual_noise;
+use crate::recording::repair_note::{Repair, RepairKind};
 use crate::recording::series::Recording;
 use crate::recording::statistics::quantile;
 use std::ops::Range;

@@ -5,8 +5,8 @@
 //! the least total distance. A cell moves by a small part of a millimetre in a sample and cells are centimetres apart, so the alignment
 //! is not in doubt; where that is not so (cells with origins of their own, samples too far apart), no label is touched.
 
-use super::note::{Repair, RepairKind};
 use super::usual_noise;
+use crate::recording::repair_note::{Repair, RepairKind};
 use crate::recording::series::Recording;
 use crate::recording::statistics::{quantile, quantiles};
 use worm_log::ReadError;

@@ -13,13 +13,11 @@
 mod frozen;
 mod jumps;
 mod labels;
-mod note;
 pub(super) mod stamps;
-
-pub use note::{Repair, RepairKind};
 
 use super::gaps::{is_longer, round_up};
 use super::options::OpenOptions;
+use super::repair_note::{Repair, RepairKind};
 use super::series::Recording;
 use super::statistics::noise;
 use worm_log::ReadError;

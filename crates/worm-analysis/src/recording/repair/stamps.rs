@@ -1,6 +1,6 @@
 //! Times of the samples: those that do not grow, and those that are missing.
 
-use super::note::{Repair, RepairKind};
+use crate::recording::repair_note::{Repair, RepairKind};
 use crate::recording::statistics::quantile;
 
 /// Largest fraction of the samples whose time may be wrong.
