@@ -139,7 +139,11 @@ impl Invariants {
     pub fn look(&mut self, tick: &Tick, truth: &Truth) -> Option<Broken> {
         let state = &tick.state;
         let same_mode = self.last.is_some_and(|last| last.mode == state.mode);
-        self.mode_ticks = if same_mode { self.mode_ticks.saturating_add(1) } else { 0 };
+        self.mode_ticks = if same_mode {
+            self.mode_ticks.saturating_add(1)
+        } else {
+            0
+        };
         let broken = self
             .sequence(state)
             .or_else(|| self.first_reason(state))

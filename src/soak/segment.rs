@@ -260,9 +260,7 @@ impl Segment {
                 Mode::Armed | Mode::Holding => {
                     if self.try_command(CommandKind::Crawl, speed)? == Some(CommandOutcome::AlarmStands) {
                         refused += 1;
-                        if refused > 2
-                            && self.try_command(CommandKind::Reset, 0.0)? == Some(CommandOutcome::Accepted)
-                        {
+                        if refused > 2 && self.try_command(CommandKind::Reset, 0.0)? == Some(CommandOutcome::Accepted) {
                             self.tally.permitted += 1;
                         }
                         self.pass_s(1.5)?;

@@ -62,10 +62,7 @@ impl Segment {
         match noticed_s {
             None => {
                 tally.missed += 1;
-                self.find(
-                    FindingKind::Missed,
-                    format!("{what}: nothing within {age_s:.2} s"),
-                );
+                self.find(FindingKind::Missed, format!("{what}: nothing within {age_s:.2} s"));
             }
             Some(noticed_s) => {
                 tally.slowest_s = tally.slowest_s.max(noticed_s);
