@@ -36,6 +36,8 @@ pub struct Session<M> {
     now_ns: u64,
     /// How long the worm's world has stood still.
     stood_ns: u64,
+    /// How long it stood still during the service behind the last tick; counted with the next tick.
+    stands_in_service_ns: u64,
     /// For how long the controller has not run since its last tick.
     absent_ns: u64,
     worm_stands_until_ns: u64,
@@ -80,6 +82,7 @@ impl<M: Machine> Session<M> {
             period_ns: (1e9 / rate_hz) as u64,
             now_ns: 1_000_000_000, // what start-up took, and more
             stood_ns: 0,
+            stands_in_service_ns: 0,
             absent_ns: 0,
             worm_stands_until_ns: 0,
             estimator_stands_until_ns: 0,
@@ -175,7 +178,7 @@ impl<M: Machine> Session<M> {
         if now_ns < self.worm_stands_until_ns {
             let took_s = f64::from(ATTEMPTS) * SERVICE_TIMEOUT_S;
             let took_ns = (took_s * 1e9) as u64;
-            self.stood_ns += took_ns;
+            self.stands_in_service_ns = took_ns;
             let served = Served {
                 outcome: ServiceOutcome::Failed(service),
                 hardware_error: None,
@@ -190,6 +193,7 @@ impl<M: Machine> Session<M> {
     /// One tick, in the order of `control::run`.
     pub fn tick(&mut self, command: Option<Command>) -> Tick {
         self.now_ns += self.period_ns;
+        self.stood_ns += std::mem::take(&mut self.stands_in_service_ns);
         let exchange = self.exchange();
         let now_ns = self.now_ns;
         let served = self.served.take();
