@@ -11,6 +11,9 @@ use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, State};
 /// A cycle of the ledger is the estimator's when they end within this share of a cycle.
 const SAME_END: f64 = 0.03;
 
+/// A servo that was too hot is still reported until it is this much below the threshold, and a count of its thermometer, K.
+const COOL_C: f64 = 4.0;
+
 type Energy = (fn(&Cycle) -> f64, fn(&PlantLedger) -> f64);
 
 /// In the order of [`QUANTITIES`].
@@ -34,12 +37,12 @@ impl Segment {
         }
     }
 
-    /// Nothing explains any more an alarm that still stands.
+    /// Nothing explains any more an alarm that still stands, but that a servo which was overheated takes minutes to cool down.
     pub(super) fn find_standing_alarms(&mut self) {
-        let standing = self.standing();
-        if standing.is_empty() {
-            return;
-        }
+        let hot_c = self.config.alarms.device_fault.threshold - COOL_C;
+        let is_hot = self.session.machine.plant().motor().case_c() > hot_c;
+        let mut standing = self.standing();
+        standing.retain(|name| !(is_hot && *name == AlarmKind::DeviceFault.name()));
         let cause = self.episode.as_ref().map(|episode| episode.drawn.cause.clone());
         for name in standing {
             self.find(FindingKind::FalseAlarm, format!("{name} still stands after {cause:?}"));
