@@ -134,7 +134,7 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
         (
             changed(&writer, "fixed.csv", &good, third_fixed),
             level,
-            &["cell 3", "does not step"],
+            &["cell 3", "frozen", "cannot be used"],
         ),
         (
             changed(&writer, "back.csv", &good, runs_back),

@@ -65,12 +65,11 @@ pub(super) fn repair(recording: &mut Recording, options: &OpenOptions) -> Result
 
 /// Refuses a recording of which too much had to be repaired.
 fn check_extent(recording: &Recording, before: &[Vec<f64>], options: &OpenOptions) -> Result<(), ReadError> {
-    check_lengths_left_out(recording, options)?;
     let problem = too_many_relabelled(recording)
         .or_else(|| too_many_left_out(recording, before))
         .or_else(|| too_many_moved(recording));
     match problem {
-        None => Ok(()),
+        None => check_lengths_left_out(recording, options),
         Some(problem) => Err(ReadError::whole(
             &recording.source,
             problem,
