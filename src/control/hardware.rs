@@ -6,7 +6,7 @@ use crate::link::servo::scale;
 use crate::link::{
     ArmError, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, MotionTrial, OpenError,
     OperationError, Prepared, ReadMode, ReadPlan, StartupError, StopInputs, TrialError, Tty, WatchdogTrial, WormBus,
-    arm, prepare,
+    arm, disarm, prepare,
 };
 use dynamixel_bus::packet::DeviceId;
 use std::f64::consts::TAU;
@@ -209,11 +209,6 @@ impl Drive {
                 path: self.path.clone(),
             });
         }
-        if self.hardware_errors().is_ok_and(|bits| bits != 0) {
-            // The only way out of a hardware error is a restart (XL330-M288 e-manual, "Hardware Error Status").
-            let servo = self.settings.servo_id;
-            self.bus.reboot_servo(servo).map_err(|source| self.operation(source))?;
-        }
         let mut findings = Vec::new();
         let path = || self.path.clone();
         let prepared = arm(&mut self.bus, &self.settings, &mut findings).map_err(|error| match error {
@@ -231,21 +226,10 @@ impl Drive {
     }
 
     fn disarm(&mut self) -> Result<u8, DriveError> {
-        self.set_torque(false)?;
-        self.hardware_errors()
-    }
-
-    fn set_torque(&mut self, on: bool) -> Result<(), DriveError> {
-        let servo = self.settings.servo_id;
-        self.bus.set_torque(servo, on).map_err(|source| self.operation(source))
-    }
-
-    fn hardware_errors(&mut self) -> Result<u8, DriveError> {
-        let servo = self.settings.servo_id;
-        let errors = self
-            .bus
-            .hardware_errors(servo)
-            .map_err(|source| self.operation(source))?;
+        let errors = disarm(&mut self.bus, self.settings.servo_id).map_err(|source| DriveError::Operation {
+            path: self.path.clone(),
+            source,
+        })?;
         Ok(errors.0)
     }
 
@@ -253,13 +237,6 @@ impl Drive {
         DriveError::Trial {
             path: self.path.clone(),
             source: Box::new(source),
-        }
-    }
-
-    fn operation(&self, source: OperationError) -> DriveError {
-        DriveError::Operation {
-            path: self.path.clone(),
-            source,
         }
     }
 }

@@ -1,5 +1,7 @@
-//! Arming: torque comes on only on a worm that is prepared, and never stays on when arming fails.
+//! Arming and disarming: torque comes on only on a worm that is prepared, and never stays on when arming fails.
 
+use super::packet::DeviceId;
+use super::servo::HardwareErrors;
 use super::{Finding, LinkSettings, OperationError, Port, Prepared, StartupError, WormBus, prepare};
 
 /// Why a worm was not armed.
@@ -18,7 +20,8 @@ pub enum ArmError {
     },
 }
 
-/// Prepares the worm as [`prepare`], and switches torque on. Where that cannot be verified, torque goes off again.
+/// Prepares the worm as [`prepare`], and switches torque on. Where that cannot be verified, torque goes off again. A servo with a
+/// hardware error is restarted before.
 ///
 /// # Errors
 /// [`ArmError`]
@@ -27,13 +30,27 @@ pub fn arm<P: Port>(
     settings: &LinkSettings,
     findings: &mut Vec<Finding>,
 ) -> Result<Prepared, ArmError> {
+    let servo = settings.servo_id;
+    if bus.hardware_errors(servo).is_ok_and(|errors| !errors.is_none()) {
+        // The only way out of a hardware error is a restart (XL330-M288 e-manual, "Hardware Error Status").
+        bus.reboot_servo(servo).map_err(StartupError::from)?;
+    }
     let prepared = prepare(bus, settings, findings)?;
-    if let Err(cause) = bus.set_torque(settings.servo_id, true) {
+    if let Err(cause) = bus.set_torque(servo, true) {
         // The servo may have obeyed though it was not heard.
-        return Err(match bus.set_torque(settings.servo_id, false) {
+        return Err(match bus.set_torque(servo, false) {
             Ok(()) => ArmError::NotArmed(cause.into()),
             Err(off) => ArmError::TorqueUnknown { cause, off },
         });
     }
     Ok(prepared)
+}
+
+/// Switches torque off, and reads why the servo has shut down, if it has.
+///
+/// # Errors
+/// [`OperationError`]
+pub fn disarm<P: Port>(bus: &mut WormBus<P>, servo: DeviceId) -> Result<HardwareErrors, OperationError> {
+    bus.set_torque(servo, false)?;
+    bus.hardware_errors(servo)
 }

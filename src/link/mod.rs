@@ -57,7 +57,7 @@ mod trial;
 pub mod virtual_worm;
 mod worm_bus;
 
-pub use arm::{ArmError, arm};
+pub use arm::{ArmError, arm, disarm};
 pub use counters::{ExchangeCounters, LinkCounters};
 pub use dynamixel_bus::{
     Bus, BusCounters, FaultInjector, Faults, Finding, Identity, OpenError, Port, PortError, RefusalCounters, Register,

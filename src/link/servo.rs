@@ -52,6 +52,10 @@ pub mod register {
     pub const STATUS_RETURN_LEVEL: Register = Register::new(68, 1, "status return level");
     /// See [`HardwareErrors`](super::HardwareErrors). Read-only.
     pub const HARDWARE_ERROR_STATUS: Register = Register::new(70, 1, "hardware error status");
+    /// Integral gain of the velocity loop, in 1/65536 of the servo's own unit.
+    pub const VELOCITY_I_GAIN: Register = Register::new(76, 2, "velocity I gain");
+    /// Proportional gain of the velocity loop, in 1/128 of the servo's own unit.
+    pub const VELOCITY_P_GAIN: Register = Register::new(78, 2, "velocity P gain");
     /// Silence after which the motor stops by itself, in 20 ms; 0 is never, 0xFF says that it has happened.
     pub const BUS_WATCHDOG: Register = Register::new(98, 1, "bus watchdog");
     /// Limit of the duty in all modes but PWM mode, in 0.113 %; the PWM limit after a start and a change of mode.
@@ -124,6 +128,9 @@ pub mod scale {
 
 /// Model number of the XL330-M288-T.
 pub const XL330_M288_MODEL: u16 = 1200;
+
+/// Gains of the velocity loop of an XL330-M288-T as the factory sets them: I, P (e-manual, "Velocity PI Gain(76, 78)").
+pub const XL330_M288_VELOCITY_GAINS: (u16, u16) = (1600, 180);
 
 /// Full duty in counts of 0.113 %.
 pub const FULL_PWM: u16 = 885;

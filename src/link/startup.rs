@@ -3,13 +3,14 @@
 //!
 //! 1. **Who answers?** Servo and tracker are pinged. When the servo is silent, the usual baud rates are tried and the bus is
 //!    scanned, so that the error names the cause.
-//! 2. **Is the motor at rest?** Torque goes off before anything else is checked; it would lock the settings, too. During the checks
-//!    the servo answers writes (status return level 2), so that a refusal has a reason.
+//! 2. **Is the motor at rest?** Torque goes off before anything else is checked or refused; it would lock the settings, too. During the
+//!    checks the servo answers writes (status return level 2), so that a refusal has a reason.
 //! 3. **Are they the right ones, and set up?** Model numbers; no hardware error; a watchdog that works; cells of the tracker; direction
-//!    of counting, modes, limits, profiles, shutdown, return delay. A setting that is right is not written: EEPROM wears.
+//!    of counting, modes, gains, limits, profiles, shutdown, return delay. A setting that is right is not written: EEPROM wears.
 //! 4. **Ready to tick:** status return level 1 (answer reads only, see the exchange), goal zero, watchdog cleared and set.
 //! 5. **How are they read?** The read mode is tried with real requests, and the first reading is kept.
 
+use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
 use super::operations::{OperationError, REPLY_TIME};
@@ -37,6 +38,12 @@ const LAST_FIRMWARE_WITH_WATCHDOG_DEFECT: u8 = 51;
 /// Hardware errors at which the servo has to switch torque off by itself.
 const REQUIRED_SHUTDOWN: HardwareErrors =
     HardwareErrors(HardwareErrors::OVERHEATING.0 | HardwareErrors::ELECTRICAL_SHOCK.0 | HardwareErrors::OVERLOAD.0);
+/// Model numbers of the X series: their register 64 switches torque.
+const X_SERIES: RangeInclusive<u16> = 1000..=1999;
+/// A servo that answers has at least this supply, V: with less its reading is wrong.
+const LEAST_VOLTAGE_V: f64 = 3.0;
+/// How often the voltage is read before it counts as too low.
+const VOLTAGE_ATTEMPTS: usize = 3;
 /// Resistance of copper grows by this share per kelvin.
 const COPPER_PER_K: f64 = 0.00393;
 /// Temperature at which the configured resistance holds, °C.
@@ -164,6 +171,14 @@ pub enum StartupError {
         tracker::register::SWITCHES
     )]
     NoEmergencyStop,
+    /// The supply is not one that a servo can work with, so no duty can be derived from it.
+    #[error(
+        "the servo reads a supply of {voltage_v:.1} V, less than {LEAST_VOLTAGE_V} V: look at the supply and its cable, and try again"
+    )]
+    NoSupply {
+        /// The voltage, V.
+        voltage_v: f64,
+    },
     /// A limit that the register cannot hold.
     #[error("{value} is no {register} that the servo can hold: correct it in the config")]
     Limit {
@@ -201,10 +216,16 @@ pub fn prepare<P: Port>(
     findings: &mut Vec<Finding>,
 ) -> Result<Prepared, StartupError> {
     let (servo_id, tracker_id) = (settings.servo_id, settings.tracker_id);
-    let servo = identify_servo(bus, settings)?;
+    let servo = identify_servo(bus, settings);
     // The motor comes to rest first, whatever else is wrong.
+    let had_torque = match &servo {
+        Ok(_) => bring_to_rest(bus, servo_id),
+        Err(StartupError::WrongModel { found, .. }) if X_SERIES.contains(found) => bring_to_rest(bus, servo_id),
+        Err(_) => false,
+    };
+    let servo = servo?;
     set_status_level(bus, servo_id, ANSWER_ALL)?;
-    unlock(bus, servo_id, findings)?;
+    unlock(bus, servo_id, had_torque, findings)?;
     let errors = bus.hardware_errors(servo_id)?;
     if !errors.is_none() {
         return Err(StartupError::HardwareError(errors));
@@ -366,9 +387,28 @@ fn set_status_level<P: Port>(bus: &mut WormBus<P>, servo: DeviceId, level: u32) 
     .into())
 }
 
-/// Switches torque off and clears the watchdog, which lock settings and goal.
-fn unlock<P: Port>(bus: &mut WormBus<P>, servo: DeviceId, findings: &mut Vec<Finding>) -> Result<(), StartupError> {
-    if bus.register(servo, register::TORQUE_ENABLE)? != 0 {
+/// Switches torque off, whether or not any answer comes; returns whether it was on, as far as the servo said. What fails here is
+/// reported by the steps that follow, which ask again.
+fn bring_to_rest<P: Port>(bus: &mut WormBus<P>, servo: DeviceId) -> bool {
+    let deadline = |time| Instant::now() + time;
+    // Not answered for certain, and nothing waits for the answers: a servo at status return level 0 says nothing to a read either.
+    bus.set_writes_are_answered(false);
+    let _ = bus.write_register(servo, register::STATUS_RETURN_LEVEL, ANSWER_ALL, deadline(REPLY_TIME));
+    let _ = bus.settle(deadline(QUIET_TIME));
+    let found = bus.read_register(servo, register::TORQUE_ENABLE, deadline(REPLY_TIME));
+    let _ = bus.write_register(servo, register::TORQUE_ENABLE, 0, deadline(REPLY_TIME));
+    let _ = bus.settle(deadline(QUIET_TIME));
+    found.is_ok_and(|torque| torque != 0)
+}
+
+/// Switches torque off, verified this time, and clears the watchdog, which lock settings and goal.
+fn unlock<P: Port>(
+    bus: &mut WormBus<P>,
+    servo: DeviceId,
+    had_torque: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<(), StartupError> {
+    if bus.register(servo, register::TORQUE_ENABLE)? != 0 || had_torque {
         findings.push(Finding::corrected(
             "torque was on: an earlier controller ended without an orderly stop",
             "torque off",
@@ -426,7 +466,16 @@ fn set_up<P: Port>(
         (register::PROFILE_ACCELERATION, 0),
         (register::PROFILE_VELOCITY, 0),
     ];
-    for (register, wanted) in wanted {
+    let (velocity_i, velocity_p) = servo::XL330_M288_VELOCITY_GAINS;
+    let gains = [
+        (register::VELOCITY_I_GAIN, u32::from(velocity_i)),
+        (register::VELOCITY_P_GAIN, u32::from(velocity_p)),
+    ];
+    // Other models have other gains from the factory, which are not known here.
+    let gains = gains
+        .into_iter()
+        .filter(|_| settings.servo_model == servo::XL330_M288_MODEL);
+    for (register, wanted) in wanted.into_iter().chain(gains) {
         let found = match bus.register(servo_id, register) {
             Err(OperationError::Transaction {
                 error: TransactionError::Refused { .. },
@@ -456,6 +505,9 @@ fn describe_setting(register: Register, found: u32) -> String {
             "{register} of the servo was {0}: its positions read {0} counts too high, so look at servo.home_position",
             found as i32
         ),
+        register::VELOCITY_I_GAIN | register::VELOCITY_P_GAIN => {
+            format!("{was}: the motor may oscillate or hardly turn with it")
+        }
         register::STARTUP_CONFIGURATION if found & 1 != 0 => format!("{was}: torque would have come on with the power"),
         register::SHUTDOWN => format!("{was}: it would have gone on in spite of overheating, shock or overload"),
         _ => was,
@@ -467,15 +519,29 @@ fn describe_setting(register: Register, found: u32) -> String {
 ///
 /// In velocity mode the servo limits nothing but its duty (e-manual, "Goal PWM(100)"; "Current Limit(38)" is of the current modes). The
 /// goal PWM is in RAM: a limit that follows the supply's voltage wears no EEPROM.
+///
+/// A warm winding has more resistance, but it cools: the resistance is taken to be no more than that at the reference temperature.
 fn limit_duty<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<f64, StartupError> {
     let servo_id = settings.servo_id;
-    let voltage_v = f64::from(bus.register(servo_id, register::PRESENT_INPUT_VOLTAGE)?) * scale::VOLTAGE_V;
-    let temperature_c = f64::from(bus.register(servo_id, register::PRESENT_TEMPERATURE)?);
+    let voltage_v = supply_voltage_v(bus, servo_id)?;
+    let temperature_c = f64::from(bus.register(servo_id, register::PRESENT_TEMPERATURE)?).min(RESISTANCE_AT_C);
     let resistance_ohm = settings.winding_resistance_ohm * (1.0 + COPPER_PER_K * (temperature_c - RESISTANCE_AT_C));
-    let share = settings.current_limit_a * resistance_ohm / voltage_v; // infinite without a voltage
+    let share = settings.current_limit_a * resistance_ohm / voltage_v;
     let counts = (share / scale::DUTY).floor().clamp(1.0, f64::from(servo::FULL_PWM));
     bus.set_register(servo_id, register::GOAL_PWM, counts as u32)?;
     Ok((counts * scale::DUTY).min(1.0))
+}
+
+/// The supply as the servo measures it. A reading that is too low to be true is taken again.
+fn supply_voltage_v<P: Port>(bus: &mut WormBus<P>, servo_id: DeviceId) -> Result<f64, StartupError> {
+    let mut voltage_v = 0.0;
+    for _ in 0..VOLTAGE_ATTEMPTS {
+        voltage_v = f64::from(bus.register(servo_id, register::PRESENT_INPUT_VOLTAGE)?) * scale::VOLTAGE_V;
+        if voltage_v >= LEAST_VOLTAGE_V {
+            return Ok(voltage_v);
+        }
+    }
+    Err(StartupError::NoSupply { voltage_v })
 }
 
 fn choose_read_plan<P: Port>(

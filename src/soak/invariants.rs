@@ -1,7 +1,8 @@
 //! What must hold in every tick, whatever happens to the worm.
 
 use super::machine::Machine;
-use super::session::Session;
+use super::session::{Session, Tick};
+use crate::control::{Service, ServiceOutcome};
 use worm_estimator::config::Config;
 use worm_estimator::message::{Cycle, Fault, Mode, State};
 
@@ -16,6 +17,12 @@ const PHASE_TOLERANCE: f64 = 0.02;
 const MAX_SPEED: f64 = 1.25;
 /// Rounding of the ramp.
 const RAMP_TOLERANCE: f64 = 1e-6;
+/// After an attempt that failed, torque is switched off again after this time, s.
+const RETRY_S: f64 = 0.5;
+/// How long the cam may take to come to rest after the ramp, s.
+const SETTLING_S: f64 = 0.5;
+/// How far a holding worm may be from where it came to rest, cycles.
+const HOLD_TOLERANCE: f64 = 0.02;
 
 /// What is true at the end of a tick, and no controller can know.
 #[derive(Debug, Clone, Copy)]
@@ -26,6 +33,8 @@ pub struct Truth {
     pub phase: f64,
     /// How long the worm's world has stood still, ns.
     pub stood_ns: u64,
+    /// Whether the servo's torque is on.
+    pub torque_is_on: bool,
 }
 
 impl Truth {
@@ -37,6 +46,7 @@ impl Truth {
             velocity_rad_s: plant.motor().velocity_rad_per_s(),
             phase: plant.body().phase(),
             stood_ns,
+            torque_is_on: plant.torque_is_on(),
         }
     }
 }
@@ -64,6 +74,18 @@ pub struct Invariants {
     /// How long it may turn after that, s.
     may_turn_s: f64,
     stood_ns: u64,
+    /// Ticks in a row in which torque was on though a fault is latched.
+    torque_ticks: u32,
+    /// How many of these there may be: more while attempts to switch it off fail.
+    max_torque_ticks: u32,
+    /// Ticks in a row with an answer of the servo.
+    answered_ticks: u32,
+    /// Ticks in the present mode.
+    mode_ticks: u32,
+    /// Gait phase at which a hold came to rest, cycles.
+    hold_phase: Option<f64>,
+    /// The longest ramp, s.
+    ramp_s: f64,
     /// Servo readings in a row without a miss.
     answers: u32,
     /// A reset was accepted since the worm stood in a fault for the last time: a new reason may take the place of the old one.
@@ -73,6 +95,9 @@ pub struct Invariants {
     /// Difference of the published phase from the true one, cycles, as first seen.
     phase_offset: Option<f64>,
 }
+
+/// Torque may be on for so many ticks after a fault is seen.
+const TWO_TICKS: u32 = 2;
 
 /// The latched reason of a fault.
 fn reason(state: &State) -> (u32, u32) {
@@ -92,6 +117,12 @@ impl Invariants {
             resting_since_s: None,
             may_turn_s: 0.0,
             stood_ns: 0,
+            torque_ticks: 0,
+            max_torque_ticks: TWO_TICKS,
+            answered_ticks: 0,
+            mode_ticks: 0,
+            hold_phase: None,
+            ramp_s: MAX_SPEED * config.gait.ramp_s,
             answers: 0,
             was_reset: false,
             clock_offset_s: f64::INFINITY,
@@ -105,12 +136,22 @@ impl Invariants {
     }
 
     /// Holds a tick against the rules; the first one that it breaks.
-    pub fn look(&mut self, state: &State, goal_counts: i32, truth: &Truth) -> Option<Broken> {
+    pub fn look(&mut self, tick: &Tick, truth: &Truth) -> Option<Broken> {
+        let state = &tick.state;
+        let same_mode = self.last.is_some_and(|last| last.mode == state.mode);
+        self.mode_ticks = if same_mode {
+            self.mode_ticks.saturating_add(1)
+        } else {
+            0
+        };
         let broken = self
             .sequence(state)
             .or_else(|| self.first_reason(state))
-            .or_else(|| self.goal(state, goal_counts))
+            .or_else(|| self.goal(state, tick.goal_counts))
             .or_else(|| self.ramp(state))
+            .or_else(|| self.stopping(state))
+            .or_else(|| self.torque(tick, truth))
+            .or_else(|| self.hold(state, truth))
             .or_else(|| self.rest(state, truth))
             .or_else(|| self.phase(state, truth));
         if state.mode != Mode::Fault.code() || self.last.is_some_and(|last| reason(&last) != reason(state)) {
@@ -187,6 +228,83 @@ impl Invariants {
         (jump_rad_s > self.acceleration_rad_s2 * dt_s + RAMP_TOLERANCE).then(|| Broken {
             rule: "the goal follows the ramp",
             text: format!("from {from_rad_s} to {} rad/s in {dt_s} s", state.goal_velocity_rad_s),
+        })
+    }
+
+    /// How many ticks take this long.
+    fn ticks(&self, seconds: f64) -> u32 {
+        (seconds / self.tick_s).ceil() as u32
+    }
+
+    /// A worm that stops becomes slower until it stands, and never faster; then torque goes off.
+    fn stopping(&self, state: &State) -> Option<Broken> {
+        let last = self.last.as_ref()?;
+        if state.mode != Mode::Stopping.code() {
+            return None;
+        }
+        if self.mode_ticks > self.ticks(self.ramp_s + SETTLING_S) + TWO_TICKS {
+            return Some(Broken {
+                rule: "a stop ends with torque off",
+                text: format!("still stopping after {} ticks", self.mode_ticks),
+            });
+        }
+        let (from_rad_s, to_rad_s) = (last.goal_velocity_rad_s.abs(), state.goal_velocity_rad_s.abs());
+        let for_long = self.mode_ticks > self.ticks(self.ramp_s) + TWO_TICKS;
+        (to_rad_s > from_rad_s + RAMP_TOLERANCE || (for_long && to_rad_s > 0.0)).then(|| Broken {
+            rule: "the goal falls while the worm stops",
+            text: format!(
+                "from {from_rad_s} to {to_rad_s} rad/s, {} ticks after the stop",
+                self.mode_ticks
+            ),
+        })
+    }
+
+    /// Torque is off in mode `disarmed`, and in a fault within two ticks; services take place between ticks. An attempt that fails is
+    /// made again after [`RETRY_S`], but only a servo that misses answers is an excuse for failing.
+    fn torque(&mut self, tick: &Tick, truth: &Truth) -> Option<Broken> {
+        let state = &tick.state;
+        let retry_ticks = self.ticks(RETRY_S) + TWO_TICKS;
+        self.answered_ticks = if state.motor_is_new == 1 {
+            self.answered_ticks.saturating_add(1)
+        } else {
+            0
+        };
+        let arms = matches!(
+            tick.service,
+            Some(ServiceOutcome::Done(Service::Arm) | ServiceOutcome::Failed(Service::Arm))
+        );
+        let is_disarmed = state.mode == Mode::Disarmed.code();
+        if arms || !truth.torque_is_on || !(is_disarmed || state.mode == Mode::Fault.code()) {
+            (self.torque_ticks, self.max_torque_ticks) = (0, TWO_TICKS);
+            return None;
+        }
+        self.torque_ticks = self.torque_ticks.saturating_add(1);
+        if tick.service == Some(ServiceOutcome::Failed(Service::Disarm)) {
+            self.max_torque_ticks = self.torque_ticks.saturating_add(retry_ticks);
+        }
+        let answers_all_along = self.answered_ticks.min(self.torque_ticks) > retry_ticks;
+        (is_disarmed || self.torque_ticks > self.max_torque_ticks || answers_all_along).then(|| Broken {
+            rule: "torque is off in a fault and while disarmed",
+            text: format!(
+                "on in mode {} (fault {}) for {} ticks, {} at most",
+                state.mode, state.fault, self.torque_ticks, self.max_torque_ticks
+            ),
+        })
+    }
+
+    /// A worm that holds stays where it came to rest.
+    fn hold(&mut self, state: &State, truth: &Truth) -> Option<Broken> {
+        if state.mode != Mode::Holding.code() {
+            self.hold_phase = None;
+            return None;
+        }
+        if self.mode_ticks < self.ticks(self.ramp_s + SETTLING_S) {
+            return None;
+        }
+        let rest = *self.hold_phase.get_or_insert(truth.phase);
+        ((truth.phase - rest).abs() > HOLD_TOLERANCE).then(|| Broken {
+            rule: "a hold keeps the cam where it rests",
+            text: format!("phase {:.4} instead of {rest:.4}", truth.phase),
         })
     }
 

@@ -1,12 +1,11 @@
 //! The worm's end of the loop in virtual time: the real link code on a port in memory, and the virtual worm's devices at its other end.
 
 use crate::control::{DriveError, Service, ServiceOutcome, link_settings};
-use crate::link::servo::register::HARDWARE_ERROR_STATUS;
 use crate::link::servo::scale;
 use crate::link::virtual_worm::{Devices, DevicesError, Fault, Options, Plant};
 use crate::link::{
     EmergencyStopError, EmergencyStopInput, ExchangePlan, FaultInjector, Faults, LinkSettings, Port, PortError,
-    ServoReading, StartupError, TrackerReading, WormBus, prepare,
+    ServoReading, StartupError, TrackerReading, WormBus, arm, disarm, prepare,
 };
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
@@ -29,7 +28,7 @@ pub struct Exchange {
 pub struct Served {
     /// Whether it was done.
     pub outcome: ServiceOutcome,
-    /// What the servo's hardware error register said.
+    /// What the servo's hardware error register said, where the service was done.
     pub hardware_error: Option<u8>,
     /// When it was over, s.
     pub ended_s: f64,
@@ -63,7 +62,7 @@ pub enum MachineError {
 }
 
 /// How long a service waits for one answer, s.
-const SERVICE_TIMEOUT_S: f64 = 0.06;
+pub(super) const SERVICE_TIMEOUT_S: f64 = 0.06;
 /// The codec's own deadlines are on the real clock, which means nothing here.
 const NEVER: Duration = Duration::from_secs(3600);
 
@@ -186,24 +185,16 @@ impl Wired {
         self.bus.port_mut().set_faults(faults);
     }
 
-    /// As [`Drive`](crate::control::Drive) arms.
-    fn arm(&mut self) -> bool {
-        if self.hardware_errors().is_some_and(|bits| bits != 0)
-            && self.bus.reboot_servo(self.settings.servo_id).is_err()
-        {
-            return false;
+    /// As [`Drive`](crate::control::Drive) serves: the same operations of the link.
+    fn execute(&mut self, service: Service) -> Option<u8> {
+        match service {
+            Service::Arm => {
+                let prepared = arm(&mut self.bus, &self.settings, &mut Vec::new()).ok()?;
+                self.plan = prepared.plan;
+                Some(0)
+            }
+            Service::Disarm => Some(disarm(&mut self.bus, self.settings.servo_id).ok()?.0),
         }
-        prepare(&mut self.bus, &self.settings, &mut Vec::new()).is_ok_and(|prepared| {
-            self.plan = prepared.plan;
-            self.bus.set_torque(self.settings.servo_id, true).is_ok()
-        })
-    }
-
-    fn hardware_errors(&mut self) -> Option<u8> {
-        let servo = self.settings.servo_id;
-        let deadline = Instant::now() + NEVER;
-        let bits = self.bus.read_register(servo, HARDWARE_ERROR_STATUS, deadline);
-        bits.ok().map(|bits| bits as u8)
     }
 }
 
@@ -228,16 +219,11 @@ impl Machine for Wired {
     fn serve(&mut self, service: Service, now_s: f64) -> Served {
         let wire = self.wire();
         (wire.now_s, wire.timeout_s) = (wire.now_s.max(now_s), SERVICE_TIMEOUT_S);
-        let done = match service {
-            Service::Arm => self.arm(),
-            Service::Disarm => self.bus.set_torque(self.settings.servo_id, false).is_ok(),
-        };
-        let hardware_error = self.hardware_errors();
+        let hardware_error = self.execute(service);
         Served {
-            outcome: if done {
-                ServiceOutcome::Done(service)
-            } else {
-                ServiceOutcome::Failed(service)
+            outcome: match hardware_error {
+                Some(_) => ServiceOutcome::Done(service),
+                None => ServiceOutcome::Failed(service),
             },
             hardware_error,
             ended_s: self.wire().now_s,

@@ -118,6 +118,8 @@ pub struct Tally {
     pub cycles: u64,
     /// Alarms that a fault explains.
     pub true_alarms: u64,
+    /// How often the operator had to permit motion despite standing alarms by a reset.
+    pub permitted: u64,
     /// By kind of fault, in the order of the table.
     pub faults: Vec<FaultTally>,
     /// By energy.
@@ -151,6 +153,8 @@ pub struct SoakReport {
     pub alarms_true: u64,
     /// Alarms that no fault explains.
     pub alarms_false: u64,
+    /// How often the operator had to permit motion despite standing alarms by a reset.
+    pub motion_permitted: u64,
     /// Faults that had to be noticed and were not.
     pub missed: u64,
     /// Faults that were noticed after their bound.
@@ -227,6 +231,7 @@ impl SoakReport {
             drawn: faults.iter().map(|fault| fault.drawn).sum(),
             alarms_true: sum(|tally| tally.true_alarms),
             alarms_false: count(FindingKind::FalseAlarm),
+            motion_permitted: sum(|tally| tally.permitted),
             missed: count(FindingKind::Missed),
             late: count(FindingKind::Late),
             broken: count(FindingKind::Invariant),
@@ -261,6 +266,11 @@ impl fmt::Display for SoakReport {
             f,
             "alarms: {} true, {} false; faults: {} missed, {} late; invariants: {} broken",
             self.alarms_true, self.alarms_false, self.missed, self.late, self.broken
+        )?;
+        writeln!(
+            f,
+            "motion permitted by reset despite standing alarms: {}",
+            self.motion_permitted
         )?;
         writeln!(
             f,

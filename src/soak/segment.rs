@@ -31,6 +31,8 @@ struct Episode {
     /// Whether it had to be noticed.
     must_s: Option<f64>,
     noticed_s: Option<f64>,
+    /// Whether it was counted what became of it.
+    is_judged: bool,
     /// Until when it explains alarms, s; none while it lasts.
     explains_until_s: Option<f64>,
 }
@@ -73,6 +75,7 @@ pub fn run(seed: u64, number: u64) -> Tally {
         Ok(mut segment) => {
             // Either way it is over.
             let _over: Result<(), Over> = segment.live();
+            segment.judge_unfinished();
             segment.close()
         }
         Err(error) => Tally {
@@ -183,6 +186,7 @@ impl Segment {
                 _ => false,
             }),
             noticed_s: None,
+            is_judged: false,
             explains_until_s: None,
             drawn: drawn.clone(),
         });
@@ -216,6 +220,7 @@ impl Segment {
             episode.explains_until_s = Some(self.session.now_s() + aftermath_s);
         }
         self.crawl_to_the_end_of_the_episode()?;
+        self.find_standing_alarms();
         self.episode = None;
         self.undisturbed_since_s = self.session.now_s();
         Ok(())
@@ -255,8 +260,8 @@ impl Segment {
                 Mode::Armed | Mode::Holding => {
                     if self.try_command(CommandKind::Crawl, speed)? == Some(CommandOutcome::AlarmStands) {
                         refused += 1;
-                        if refused > 2 {
-                            self.try_command(CommandKind::Reset, 0.0)?;
+                        if refused > 2 && self.try_command(CommandKind::Reset, 0.0)? == Some(CommandOutcome::Accepted) {
+                            self.tally.permitted += 1;
                         }
                         self.pass_s(1.5)?;
                     }
@@ -327,7 +332,7 @@ impl Segment {
         }
         self.take_accounts();
         let truth = Truth::of(&mut self.session);
-        if let Some(broken) = self.invariants.look(&tick.state, tick.goal_counts, &truth) {
+        if let Some(broken) = self.invariants.look(&tick, &truth) {
             return self.end_with(broken);
         }
         while self.alarms_seen < self.session.raised.len() {

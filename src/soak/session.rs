@@ -1,14 +1,16 @@
 //! One worm with its controller and its estimator, tick by tick, wired like the processes: what the estimator publishes in one
 //! tick reaches the controller in the next.
 
-use super::machine::{Exchange, Machine, Served};
-use crate::control::{Controller, EstimateSeen, Inputs, Lease, Outputs};
+use super::machine::{Exchange, Machine, SERVICE_TIMEOUT_S, Served};
+use crate::control::{Controller, EstimateSeen, Inputs, Lease, Outputs, Service, ServiceOutcome};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{EstimatorError, Observer};
 use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, State};
 
 /// The estimator's heartbeat while no sample comes, s.
 const HEARTBEAT_S: f64 = 0.1;
+/// How often a service asks a servo that does not answer.
+const ATTEMPTS: u32 = 3;
 
 /// What a pause keeps from running.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +36,8 @@ pub struct Session<M> {
     now_ns: u64,
     /// How long the worm's world has stood still.
     stood_ns: u64,
+    /// How long it stood still during the service behind the last tick; counted with the next tick.
+    stands_in_service_ns: u64,
     /// For how long the controller has not run since its last tick.
     absent_ns: u64,
     worm_stands_until_ns: u64,
@@ -61,6 +65,8 @@ pub struct Tick {
     pub goal_counts: i32,
     /// What became of the command.
     pub verdict: Option<CommandOutcome>,
+    /// What became of the service at the end of the tick.
+    pub service: Option<ServiceOutcome>,
 }
 
 impl<M: Machine> Session<M> {
@@ -76,6 +82,7 @@ impl<M: Machine> Session<M> {
             period_ns: (1e9 / rate_hz) as u64,
             now_ns: 1_000_000_000, // what start-up took, and more
             stood_ns: 0,
+            stands_in_service_ns: 0,
             absent_ns: 0,
             worm_stands_until_ns: 0,
             estimator_stands_until_ns: 0,
@@ -165,9 +172,28 @@ impl<M: Machine> Session<M> {
         self.machine.exchange(goal_counts, world_s)
     }
 
+    /// A service, and when it was over, ns. A worm that stands still answers nothing.
+    fn serve(&mut self, service: Service) -> (Served, u64) {
+        let (now_ns, world_s) = (self.now_ns, self.world_s());
+        if now_ns < self.worm_stands_until_ns {
+            let took_s = f64::from(ATTEMPTS) * SERVICE_TIMEOUT_S;
+            let took_ns = (took_s * 1e9) as u64;
+            self.stands_in_service_ns = took_ns;
+            let served = Served {
+                outcome: ServiceOutcome::Failed(service),
+                hardware_error: None,
+                ended_s: world_s,
+            };
+            return (served, now_ns + took_ns);
+        }
+        let served = self.machine.serve(service, world_s);
+        (served, now_ns.max((served.ended_s * 1e9) as u64 + self.stood_ns))
+    }
+
     /// One tick, in the order of `control::run`.
     pub fn tick(&mut self, command: Option<Command>) -> Tick {
         self.now_ns += self.period_ns;
+        self.stood_ns += std::mem::take(&mut self.stands_in_service_ns);
         let exchange = self.exchange();
         let now_ns = self.now_ns;
         let served = self.served.take();
@@ -188,11 +214,9 @@ impl<M: Machine> Session<M> {
             hardware_error: served.and_then(|(served, _)| served.hardware_error),
         });
         self.last = Some(outputs);
-        let world_s = self.world_s();
         self.served = outputs.service.map(|service| {
-            let served = self.machine.serve(service, world_s);
             // A service pauses the schedule.
-            let ended_ns = now_ns.max((served.ended_s * 1e9) as u64 + self.stood_ns);
+            let (served, ended_ns) = self.serve(service);
             self.now_ns = ended_ns;
             (served, ended_ns - now_ns)
         });
@@ -209,6 +233,7 @@ impl<M: Machine> Session<M> {
             verdict: outputs
                 .reply
                 .map(|reply| CommandOutcome::try_from(reply.verdict).unwrap_or(CommandOutcome::Unknown)),
+            service: self.served.map(|(served, _)| served.outcome),
         }
     }
 

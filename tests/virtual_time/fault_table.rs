@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use worm_estimator::config::Config;
 use worm_estimator::message::{AlarmKind, CommandKind, CommandOutcome, Fault, Mode};
 use wormd::link::Faults;
-use wormd::link::virtual_worm::Options;
+use wormd::link::virtual_worm::{Fault as WormFault, Options};
 use wormd::soak::invariants::{Invariants, Truth};
 use wormd::soak::{Machine, Paused, Session, Wired};
 
@@ -196,6 +196,12 @@ const CASES: &[Case] = &[
     case(Mild, 1.0, LEVEL, || {
         Pause("computer paused 300 ms", Paused::Computer, 300)
     }),
+    case(Mild, 1.0, LEVEL, || {
+        Pause("virtual worm paused 50 ms", Paused::Worm, 50)
+    }),
+    case(Severe, 1.5, LEVEL, || {
+        Pause("virtual worm paused 500 ms", Paused::Worm, 500)
+    }),
 ];
 
 const MODES: [Mode; 5] = [Mode::Armed, Mode::Crawling, Mode::Holding, Mode::Stopping, Mode::Fault];
@@ -234,7 +240,7 @@ impl Run {
             self.invariants.note_reset();
         }
         let truth = Truth::of(&mut self.session);
-        match self.invariants.look(&tick.state, tick.goal_counts, &truth) {
+        match self.invariants.look(&tick, &truth) {
             None => Ok(tick.verdict),
             Some(broken) => Err(format!(
                 "{}: {} at {} s",
@@ -538,6 +544,14 @@ fn every_fault_in_every_mode_is_survived_or_stops_the_worm_for_the_right_reason(
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert_eq!(table, TABLE, "\n{HEAD}{table}");
+}
+
+#[test]
+fn every_kind_of_fault_has_a_row() {
+    let specs: Vec<&str> = CASES.iter().map(|case| (case.cause)().name()).collect();
+    let has_row = |kind: &str| specs.iter().any(|spec| spec.split(':').next() == Some(kind));
+    let missing: Vec<&str> = WormFault::kinds().filter(|kind| !has_row(kind)).collect();
+    assert!(missing.is_empty(), "no row for {missing:?}");
 }
 
 #[test]

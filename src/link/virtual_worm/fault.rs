@@ -156,6 +156,11 @@ impl Fault {
         self.kind.name
     }
 
+    /// The names of all kinds.
+    pub fn kinds() -> impl Iterator<Item = &'static str> {
+        KINDS.iter().map(|kind| kind.name)
+    }
+
     /// The grammar and every kind, for the help text.
     pub fn help() -> String {
         let mut help = String::from(
@@ -184,7 +189,7 @@ impl FromStr for Fault {
             .find(|kind| kind.name == name)
             .ok_or_else(|| FaultError::UnknownKind {
                 kind: name.to_owned(),
-                known: KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
+                known: Self::kinds().collect::<Vec<_>>().join(", "),
             })?;
         let mut given = vec![None; kind.parameters.len()];
         for piece in pieces.split(',').filter(|piece| !piece.is_empty()) {

@@ -87,6 +87,11 @@ impl Plant {
         self.gains = gains;
     }
 
+    /// Whether the servo's torque is on: its bridge drives or brakes the motor.
+    pub fn torque_is_on(&self) -> bool {
+        !matches!(self.drive, Drive::Off)
+    }
+
     /// Forgets the velocity loop's integral.
     pub fn reset_loop(&mut self) {
         self.motor.reset_loop();

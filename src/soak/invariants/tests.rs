@@ -4,6 +4,11 @@ const REST: Truth = Truth {
     velocity_rad_s: 0.0,
     phase: 0.0,
     stood_ns: 0,
+    torque_is_on: false,
+};
+const POWERED: Truth = Truth {
+    torque_is_on: true,
+    ..REST
 };
 
 /// The state of a tick at 250 Hz, and what is changed in it.
@@ -21,14 +26,38 @@ fn invariants() -> Invariants {
     Invariants::new(&Config::from_toml("control.rate_hz = 250.0", "test".as_ref()).expect("a valid configuration"))
 }
 
+fn tick(state: State, goal_counts: i32, service: Option<ServiceOutcome>) -> Tick {
+    Tick {
+        state,
+        goal_counts,
+        verdict: None,
+        service,
+    }
+}
+
 /// The rule that the last of these ticks breaks; the ones before it break none.
 fn broken(ticks: &[(State, i32, Truth)]) -> Option<&'static str> {
+    let ticks: Vec<_> = ticks
+        .iter()
+        .map(|(state, goal_counts, truth)| (tick(*state, *goal_counts, None), *truth))
+        .collect();
+    broken_by(&ticks)
+}
+
+fn broken_by(ticks: &[(Tick, Truth)]) -> Option<&'static str> {
     let mut invariants = invariants();
     let (last, before) = ticks.split_last()?;
-    for (state, goal_counts, truth) in before {
-        assert_eq!(invariants.look(state, *goal_counts, truth), None);
+    for (tick, truth) in before {
+        assert_eq!(invariants.look(tick, truth), None);
     }
-    invariants.look(&last.0, last.1, &last.2).map(|broken| broken.rule)
+    invariants.look(&last.0, &last.1).map(|broken| broken.rule)
+}
+
+fn in_mode(tick: u64, mode: Mode, change: impl FnOnce(&mut State)) -> State {
+    state(tick, |state| {
+        state.mode = mode.code();
+        change(state);
+    })
 }
 
 #[test]
@@ -82,4 +111,83 @@ fn every_rule_can_be_broken() {
     let mut ticks: Vec<_> = (1..=4).map(rest).collect();
     ticks.push((state(5, |_| {}), 0, elsewhere));
     assert_eq!(broken(&ticks), Some("the phase is continuous"));
+}
+
+const TORQUE: &str = "torque is off in a fault and while disarmed";
+const FAILED: Option<ServiceOutcome> = Some(ServiceOutcome::Failed(Service::Disarm));
+
+/// A fault that is seen in tick 1, with torque on for so many ticks; what became of the service in each.
+fn fault_with_torque(ticks: u64, service: impl Fn(u64) -> Option<ServiceOutcome>, answers: bool) -> Vec<(Tick, Truth)> {
+    let state = |number| {
+        in_mode(number, Mode::Fault, |state| {
+            state.fault = Fault::LinkLost.code();
+            state.motor_is_new = u32::from(answers);
+        })
+    };
+    (1..=ticks)
+        .map(|number| (tick(state(number), 0, service(number)), POWERED))
+        .collect()
+}
+
+#[test]
+fn torque_goes_off_in_a_fault() {
+    let never = |_| None;
+    assert_eq!(broken_by(&fault_with_torque(2, never, true)), None);
+    assert_eq!(broken_by(&fault_with_torque(3, never, true)), Some(TORQUE));
+    // A failed attempt is made again after half a second: 125 ticks.
+    let once = |number| FAILED.filter(|_| number == 1);
+    assert_eq!(broken_by(&fault_with_torque(128, once, false)), None);
+    assert_eq!(broken_by(&fault_with_torque(129, once, false)), Some(TORQUE));
+    // Only a servo that cannot be reached excuses failure after failure.
+    let again = |number| FAILED.filter(|_| number % 126 == 1);
+    assert_eq!(broken_by(&fault_with_torque(1000, again, false)), None);
+    assert_eq!(broken_by(&fault_with_torque(128, again, true)), Some(TORQUE));
+}
+
+#[test]
+fn torque_is_off_while_disarmed() {
+    let disarmed = |number, service| {
+        let state = in_mode(number, Mode::Disarmed, |_| {});
+        (tick(state, 0, service), POWERED)
+    };
+    assert_eq!(broken_by(&[disarmed(1, None)]), Some(TORQUE));
+    let done = Some(ServiceOutcome::Done(Service::Arm));
+    assert_eq!(broken_by(&[disarmed(1, done)]), None, "on its way to armed");
+    assert_eq!(broken_by(&[disarmed(1, done), disarmed(2, None)]), Some(TORQUE));
+}
+
+#[test]
+fn a_hold_stays_where_it_rests() {
+    // The ramp, a quarter more for the fastest crawl, and half a second: 204 ticks.
+    let hold = |ticks: u64, moves_at: u64| -> Vec<_> {
+        (1..=ticks)
+            .map(|number| {
+                let phase = if number < moves_at { 0.0 } else { 0.021 };
+                let state = in_mode(number, Mode::Holding, |state| state.phase = phase);
+                (state, 0, Truth { phase, ..POWERED })
+            })
+            .collect()
+    };
+    assert_eq!(broken(&hold(400, 190)), None, "before it has come to rest");
+    assert_eq!(broken(&hold(400, 400)), Some("a hold keeps the cam where it rests"));
+}
+
+#[test]
+fn a_stop_ends() {
+    let stop = |number, goal_velocity_rad_s| {
+        let state = in_mode(number, Mode::Stopping, |state| {
+            state.goal_velocity_rad_s = goal_velocity_rad_s;
+        });
+        (state, 0, POWERED)
+    };
+    const FALLS: &str = "the goal falls while the worm stops";
+    assert_eq!(broken(&[stop(1, 1.0), stop(2, 0.97)]), None);
+    assert_eq!(broken(&[stop(1, 1.0), stop(2, 1.01)]), Some(FALLS));
+    // 79 ticks for the ramp, and two.
+    let constant: Vec<_> = (1..=83).map(|number| stop(number, 1.0)).collect();
+    assert_eq!(broken(&constant[..82]), None);
+    assert_eq!(broken(&constant), Some(FALLS));
+    let at_rest: Vec<_> = (1..=208).map(|number| stop(number, 0.0)).collect();
+    assert_eq!(broken(&at_rest[..207]), None);
+    assert_eq!(broken(&at_rest), Some("a stop ends with torque off"));
 }

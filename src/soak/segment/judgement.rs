@@ -11,6 +11,9 @@ use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, State};
 /// A cycle of the ledger is the estimator's when they end within this share of a cycle.
 const SAME_END: f64 = 0.03;
 
+/// A servo that was too hot is still reported until it is this much below the threshold, and a count of its thermometer, K.
+const COOL_C: f64 = 4.0;
+
 type Energy = (fn(&Cycle) -> f64, fn(&PlantLedger) -> f64);
 
 /// In the order of [`QUANTITIES`].
@@ -24,9 +27,34 @@ const ENERGIES: [Energy; QUANTITIES.len()] = [
 ];
 
 impl Segment {
+    /// The segment is over: a fault under way is judged as far as it can be.
+    pub(super) fn judge_unfinished(&mut self) {
+        let Some(episode) = &self.episode else { return };
+        let age_s = self.session.now_s() - episode.began_s;
+        let is_due = episode.must_s.is_some_and(|must_s| age_s > must_s);
+        if !episode.is_judged && (is_due || episode.noticed_s.is_some()) {
+            self.judge();
+        }
+    }
+
+    /// Nothing explains any more an alarm that still stands, but that a servo which was overheated takes minutes to cool down.
+    pub(super) fn find_standing_alarms(&mut self) {
+        let hot_c = self.config.alarms.device_fault.threshold - COOL_C;
+        let is_hot = self.session.machine.plant().motor().case_c() > hot_c;
+        let mut standing = self.standing();
+        standing.retain(|name| !(is_hot && *name == AlarmKind::DeviceFault.name()));
+        let cause = self.episode.as_ref().map(|episode| episode.drawn.cause.clone());
+        for name in standing {
+            self.find(FindingKind::FalseAlarm, format!("{name} still stands after {cause:?}"));
+        }
+    }
+
     /// The fault is over: was it noticed, and in time?
     pub(super) fn judge(&mut self) {
-        let Some(episode) = &self.episode else { return };
+        let age_s = self.session.now_s();
+        let Some(episode) = &mut self.episode else { return };
+        episode.is_judged = true;
+        let age_s = age_s - episode.began_s;
         let (row, must_s) = (episode.drawn.row, episode.must_s);
         let noticed_s = episode.noticed_s.map(|noticed_s| noticed_s - episode.began_s);
         let what = format!("{} ({:?})", row.name, episode.drawn.cause);
@@ -37,10 +65,7 @@ impl Segment {
         match noticed_s {
             None => {
                 tally.missed += 1;
-                self.find(
-                    FindingKind::Missed,
-                    format!("{what}: nothing within {:.2} s", drawn.lasts_s),
-                );
+                self.find(FindingKind::Missed, format!("{what}: nothing within {age_s:.2} s"));
             }
             Some(noticed_s) => {
                 tally.slowest_s = tally.slowest_s.max(noticed_s);

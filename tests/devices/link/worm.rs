@@ -25,6 +25,8 @@ pub struct Quirks {
     pub knows_no_bulk: bool,
     pub tracker_silent: bool,
     pub servo_silent: bool,
+    /// The servo obeys, but only its answers to pings arrive.
+    pub answers_pings_only: bool,
     /// Answers come only with the request after the one that they are for.
     pub one_late: bool,
     pub unplugged: bool,
@@ -66,6 +68,8 @@ impl Worm {
         worm.set_servo(servo_register::VELOCITY_LIMIT, 445);
         worm.set_servo(servo_register::PWM_LIMIT, 885);
         worm.set_servo(servo_register::SHUTDOWN, 53);
+        worm.set_servo(servo_register::VELOCITY_I_GAIN, 1600);
+        worm.set_servo(servo_register::VELOCITY_P_GAIN, 180);
         worm.set_servo(servo_register::STATUS_RETURN_LEVEL, 2);
         worm.set_servo(servo_register::PRESENT_INPUT_VOLTAGE, 50);
         worm.set_servo(servo_register::PRESENT_TEMPERATURE, 31);
@@ -133,7 +137,8 @@ impl Worm {
     }
 
     fn answers(&self, id: DeviceId, level: u32) -> bool {
-        id.get() == TRACKER || self.servo(servo_register::STATUS_RETURN_LEVEL) >= level
+        let is_heard = !self.quirks.answers_pings_only && self.servo(servo_register::STATUS_RETURN_LEVEL) >= level;
+        id.get() == TRACKER || is_heard
     }
 
     fn ping(&mut self, id: DeviceId) {
