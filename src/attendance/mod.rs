@@ -19,6 +19,7 @@ pub(crate) use stop_client::{StopError, ask};
 pub(crate) use stop_socket::Request;
 pub use stop_socket::StopSocket;
 
+use std::time::Duration;
 use worm_estimator::message::{Command, Fault, Mode, Reply};
 
 /// Who attends to a controller. Everything here is without locks and without system calls on the side of the loop.
@@ -31,9 +32,10 @@ pub struct Attendance {
 }
 
 impl Attendance {
-    /// What is known of the parent.
-    pub fn parent(&self) -> Parent {
-        self.parent.as_ref().map_or(Parent::None, ParentPipe::state)
+    /// What is known of the parent in this tick of the loop, one every `period`.
+    pub fn parent_in_tick(&self, period: Duration) -> Parent {
+        let parent = self.parent.as_ref();
+        parent.map_or(Parent::None, |parent| parent.state_in_tick(period))
     }
 
     /// The next command from the stop socket, and the number to answer it with.

@@ -9,7 +9,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use std::io;
 use std::os::fd::AsFd;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use std::time::Duration;
 
 /// Silence is counted in steps of this: a pause of the whole computer counts as one step at most.
@@ -45,7 +45,14 @@ impl Parent {
 /// Reads standard input in a thread of its own.
 #[derive(Debug, Clone)]
 pub struct ParentPipe {
-    state: Arc<AtomicU8>,
+    lease: Duration,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    state: AtomicU8,
+    unheard: AtomicU32, // ticks since the thread last listened
 }
 
 impl ParentPipe {
@@ -55,30 +62,55 @@ impl ParentPipe {
     /// # Errors
     /// When there is no thread to be had.
     pub fn watch(lease: Duration, priority: u8) -> io::Result<Self> {
-        let pipe = Self {
-            state: Arc::new(AtomicU8::new(Parent::Here as u8)),
-        };
+        let pipe = Self::of(lease);
         let there = pipe.clone();
         std::thread::Builder::new().name("parent".to_owned()).spawn(move || {
             if priority > 0 {
                 // Where it is refused, so is the loop's own, which is reported.
                 let _ = realtime::set_fifo(priority);
             }
-            there.read(lease);
+            there.read();
         })?;
         Ok(pipe)
     }
 
+    fn of(lease: Duration) -> Self {
+        let shared = Shared {
+            state: AtomicU8::new(Parent::Here as u8),
+            unheard: AtomicU32::new(0),
+        };
+        Self {
+            lease,
+            shared: Arc::new(shared),
+        }
+    }
+
     /// What is known now.
     pub fn state(&self) -> Parent {
-        let code = self.state.load(Ordering::Acquire);
+        let code = self.shared.state.load(Ordering::Acquire);
         Parent::ALL.get(usize::from(code)).copied().unwrap_or(Parent::Gone)
     }
 
+    /// What is known in this tick of the loop, one every `period`. A parent to whom nobody listens is silent: the thread that
+    /// listens might not get a CPU while the loop does. Time is counted in ticks, so a pause of the whole computer does not count.
+    pub fn state_in_tick(&self, period: Duration) -> Parent {
+        let unheard = self.shared.unheard.fetch_add(1, Ordering::Relaxed).saturating_add(1);
+        let is_unheard = period.saturating_mul(unheard) >= self.lease;
+        match self.state() {
+            Parent::Here if is_unheard => Parent::Silent,
+            state => state,
+        }
+    }
+
+    fn listened(&self, state: Parent) {
+        self.shared.state.store(state as u8, Ordering::Release);
+        self.shared.unheard.store(0, Ordering::Relaxed);
+    }
+
     /// Reads until the end of the pipe.
-    fn read(&self, lease: Duration) {
+    fn read(&self) {
         let stdin = io::stdin();
-        let mut silence = Silence::of(lease);
+        let mut silence = Silence::of(self.lease);
         let mut bytes = [0; 256];
         loop {
             let mut readable = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
@@ -93,7 +125,7 @@ impl ParentPipe {
                 },
                 Err(_) => Parent::Gone,
             };
-            self.state.store(state as u8, Ordering::Release);
+            self.listened(state);
             if state == Parent::Gone {
                 return;
             }
@@ -140,5 +172,18 @@ mod tests {
         let (here, silent) = (Parent::Here, Parent::Silent);
         assert_eq!(heard, [here, here, here, here, silent, silent]);
         assert_eq!((silence.broken(), silence.step()), (here, here));
+    }
+
+    #[test]
+    fn a_parent_to_whom_nobody_listens_is_silent() {
+        let pipe = ParentPipe::of(Duration::from_millis(100));
+        let tick = Duration::from_millis(25);
+        let in_ticks = || -> Vec<_> { (0..5).map(|_| pipe.state_in_tick(tick)).collect() };
+        let (here, silent) = (Parent::Here, Parent::Silent);
+        assert_eq!(in_ticks(), [here, here, here, silent, silent]);
+        pipe.listened(Parent::Here);
+        assert_eq!(in_ticks(), [here, here, here, silent, silent]);
+        pipe.listened(Parent::Gone);
+        assert_eq!(in_ticks(), [Parent::Gone; 5]);
     }
 }

@@ -198,7 +198,7 @@ impl Drive {
     pub fn serve(&mut self, service: Service) -> Result<Option<u8>, DriveError> {
         match service {
             Service::Arm => self.arm().map(|()| Some(0)),
-            Service::Disarm => self.disarm().map(Some),
+            Service::Disarm => self.disarm(),
         }
     }
 
@@ -225,12 +225,12 @@ impl Drive {
         Ok(())
     }
 
-    fn disarm(&mut self) -> Result<u8, DriveError> {
+    fn disarm(&mut self) -> Result<Option<u8>, DriveError> {
         let errors = disarm(&mut self.bus, self.settings.servo_id).map_err(|source| DriveError::Operation {
             path: self.path.clone(),
             source,
         })?;
-        Ok(errors.0)
+        Ok(errors.map(|errors| errors.0))
     }
 
     fn trial(&self, source: TrialError) -> DriveError {

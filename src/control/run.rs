@@ -255,7 +255,7 @@ impl Loop {
         let alarm_count = self.ports.take_alarms(&mut self.alarms);
         let estimate = self.ports.estimates.latest().ok().flatten();
         let (command, responder) = take_command(&self.ports.commands, attendance);
-        let lease = lease_of(attendance.parent());
+        let parent = attendance.parent_in_tick(Duration::from_nanos(self.schedule.period_ns()));
         let inputs = Inputs {
             now_ns: exchanged,
             absent_ns,
@@ -265,9 +265,9 @@ impl Loop {
             command,
             alarms: &self.alarms[..alarm_count],
             estimate: estimate.as_deref().map(EstimateSeen::from),
-            lease,
+            lease: lease_of(parent),
             emergency_stop,
-            end: end || (attendance.parent() == Parent::Gone && is_without_torque(self.controller.mode())),
+            end: end || (parent == Parent::Gone && is_without_torque(self.controller.mode())),
             service: self.served.outcome,
             service_ns: self.served.took_ns,
             hardware_error: self.served.hardware_error,

@@ -46,11 +46,12 @@ pub fn arm<P: Port>(
     Ok(prepared)
 }
 
-/// Switches torque off, and reads why the servo has shut down, if it has.
+/// Switches torque off, and reads why the servo has shut down, if it has. Torque that is off is what counts: where the reason
+/// cannot be read, there is none.
 ///
 /// # Errors
-/// [`OperationError`]
-pub fn disarm<P: Port>(bus: &mut WormBus<P>, servo: DeviceId) -> Result<HardwareErrors, OperationError> {
+/// [`OperationError`]: torque may be on.
+pub fn disarm<P: Port>(bus: &mut WormBus<P>, servo: DeviceId) -> Result<Option<HardwareErrors>, OperationError> {
     bus.set_torque(servo, false)?;
-    bus.hardware_errors(servo)
+    Ok(bus.hardware_errors(servo).ok())
 }

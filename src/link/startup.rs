@@ -10,12 +10,18 @@
 //! 4. **Ready to tick:** status return level 1 (answer reads only, see the exchange), goal zero, watchdog cleared and set.
 //! 5. **How are they read?** The read mode is tried with real requests, and the first reading is kept.
 
+mod identify;
+mod set_up;
+
 use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
 use super::operations::{OperationError, REPLY_TIME};
 use super::packet::DeviceId;
-use super::servo::{self, HardwareErrors, WATCHDOG_LATCHED, register, scale};
+use super::servo::{HardwareErrors, WATCHDOG_LATCHED, register};
+use identify::{identify, identify_servo};
+use set_up::{LEAST_VOLTAGE_V, limit_duty, set_up};
+
 use super::{
     ExchangeOutcome, ExchangePlan, Finding, Identity, Port, PortError, ReadMode, ReadPlan, Register, ServoReading,
     TrackerReading, TransactionError, WormBus, tracker,
@@ -35,19 +41,8 @@ const READ_ATTEMPTS: usize = 5;
 /// 4814): XL330-M077 and -M288, XC330-T181, -T288, -M181, -M288.
 const MODELS_OF_SIZE_330: [u16; 6] = [1190, 1200, 1210, 1220, 1230, 1240];
 const LAST_FIRMWARE_WITH_WATCHDOG_DEFECT: u8 = 51;
-/// Hardware errors at which the servo has to switch torque off by itself.
-const REQUIRED_SHUTDOWN: HardwareErrors =
-    HardwareErrors(HardwareErrors::OVERHEATING.0 | HardwareErrors::ELECTRICAL_SHOCK.0 | HardwareErrors::OVERLOAD.0);
 /// Model numbers of the X series: their register 64 switches torque.
 const X_SERIES: RangeInclusive<u16> = 1000..=1999;
-/// A servo that answers has at least this supply, V: with less its reading is wrong.
-const LEAST_VOLTAGE_V: f64 = 3.0;
-/// How often the voltage is read before it counts as too low.
-const VOLTAGE_ATTEMPTS: usize = 3;
-/// Resistance of copper grows by this share per kelvin.
-const COPPER_PER_K: f64 = 0.00393;
-/// Temperature at which the configured resistance holds, °C.
-const RESISTANCE_AT_C: f64 = 25.0;
 
 /// What the link has to know of a worm. The config fills it in.
 #[derive(Debug, Clone, PartialEq)]
@@ -268,74 +263,6 @@ pub fn prepare<P: Port>(
     })
 }
 
-fn identify_servo<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<Identity, StartupError> {
-    let found = identify(bus, settings, "servo", settings.servo_id, settings.servo_model);
-    let Err(StartupError::Silent { .. }) = found else {
-        return found;
-    };
-    // The tracker answers: it is not the baud rate.
-    if bus.ping(settings.tracker_id, Instant::now() + REPLY_TIME).is_ok() {
-        return found;
-    }
-    let mut rate_found = None;
-    for rate in servo::BAUD_RATES.into_iter().filter(|&rate| rate != settings.baud) {
-        // An adapter need not have every rate.
-        if bus.port_mut().set_baud_rate(rate).is_err() {
-            continue;
-        }
-        bus.settle(Instant::now() + QUIET_TIME)?;
-        if bus.ping(settings.servo_id, Instant::now() + REPLY_TIME).is_ok() {
-            rate_found = Some(rate);
-            break;
-        }
-    }
-    bus.port_mut().set_baud_rate(settings.baud)?;
-    match rate_found {
-        Some(rate) => Err(StartupError::OtherBaudRate {
-            found: rate,
-            configured: settings.baud,
-        }),
-        None => found,
-    }
-}
-
-fn identify<P: Port>(
-    bus: &mut WormBus<P>,
-    settings: &LinkSettings,
-    device: &'static str,
-    id: DeviceId,
-    expected: u16,
-) -> Result<Identity, StartupError> {
-    match bus.ask_again(|bus, deadline| bus.ping(id, deadline)) {
-        Ok(identity) if identity.model == expected => Ok(identity),
-        Ok(Identity { model: found, .. }) => Err(StartupError::WrongModel {
-            device,
-            id,
-            found,
-            expected,
-        }),
-        Err(TransactionError::Port(error)) => Err(error.into()),
-        Err(_) => Err(StartupError::Silent {
-            device,
-            id,
-            baud: settings.baud,
-            present: who_is_there(bus),
-        }),
-    }
-}
-
-/// For an error: who answers a broadcast ping.
-fn who_is_there<P: Port>(bus: &mut WormBus<P>) -> String {
-    let mut present = Vec::new();
-    let listened = bus.broadcast_ping(Instant::now() + 4 * REPLY_TIME, |id, who| {
-        present.push(format!("{id} (model {})", who.model))
-    });
-    match (listened, present.as_slice()) {
-        (Ok(_), [_, ..]) => format!("these IDs do: {}", present.join(", ")),
-        _ => "nobody does".into(),
-    }
-}
-
 /// Whether a servo is known to turn on when its bus watchdog has acted.
 fn has_watchdog_defect(servo: Identity) -> bool {
     MODELS_OF_SIZE_330.contains(&servo.model) && servo.firmware <= LAST_FIRMWARE_WITH_WATCHDOG_DEFECT
@@ -423,125 +350,6 @@ fn unlock<P: Port>(
     }
     bus.set_register(servo, register::BUS_WATCHDOG, 0)?;
     Ok(())
-}
-
-fn set_up<P: Port>(
-    bus: &mut WormBus<P>,
-    settings: &LinkSettings,
-    findings: &mut Vec<Finding>,
-) -> Result<(), StartupError> {
-    let counts = |register: Register, value: f64, unit: f64| {
-        let counts = (value / unit).round();
-        let greatest = 256f64.powi(i32::from(register.size)) - 1.0;
-        if (1.0..=greatest).contains(&counts) {
-            Ok(counts as u32)
-        } else {
-            Err(StartupError::Limit { register, value })
-        }
-    };
-    let velocity_limit = counts(
-        register::VELOCITY_LIMIT,
-        settings.velocity_limit_rad_s,
-        scale::VELOCITY_RAD_S,
-    )?;
-    let servo_id = settings.servo_id;
-    let shutdown = bus.register(servo_id, register::SHUTDOWN)? | u32::from(REQUIRED_SHUTDOWN.0);
-    let wanted = [
-        (register::RETURN_DELAY, 0),
-        (register::DRIVE_MODE, 0),
-        (register::OPERATING_MODE, u32::from(servo::VELOCITY_MODE)),
-        (register::HOMING_OFFSET, 0),
-        (
-            register::TEMPERATURE_LIMIT,
-            counts(register::TEMPERATURE_LIMIT, settings.temperature_limit_c, 1.0)?,
-        ),
-        (register::PWM_LIMIT, u32::from(servo::FULL_PWM)),
-        (
-            register::CURRENT_LIMIT,
-            counts(register::CURRENT_LIMIT, settings.current_limit_a, scale::CURRENT_A)?,
-        ),
-        (register::VELOCITY_LIMIT, velocity_limit),
-        (register::STARTUP_CONFIGURATION, 0),
-        (register::SHUTDOWN, shutdown),
-        (register::PROFILE_ACCELERATION, 0),
-        (register::PROFILE_VELOCITY, 0),
-    ];
-    let (velocity_i, velocity_p) = servo::XL330_M288_VELOCITY_GAINS;
-    let gains = [
-        (register::VELOCITY_I_GAIN, u32::from(velocity_i)),
-        (register::VELOCITY_P_GAIN, u32::from(velocity_p)),
-    ];
-    // Other models have other gains from the factory, which are not known here.
-    let gains = gains
-        .into_iter()
-        .filter(|_| settings.servo_model == servo::XL330_M288_MODEL);
-    for (register, wanted) in wanted.into_iter().chain(gains) {
-        let found = match bus.register(servo_id, register) {
-            Err(OperationError::Transaction {
-                error: TransactionError::Refused { .. },
-                ..
-            }) if register == register::STARTUP_CONFIGURATION => continue, // an older firmware without it
-            found => found?,
-        };
-        if found != wanted {
-            bus.set_register(servo_id, register, wanted)?;
-            findings.push(Finding::corrected(
-                describe_setting(register, found),
-                format!("set to {wanted}"),
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// What it means that a register was found with a value that it must not have.
-fn describe_setting(register: Register, found: u32) -> String {
-    let was = format!("{register} of the servo was {found}");
-    match register {
-        register::RETURN_DELAY => format!("the servo waited {} µs before each answer", found * 2),
-        register::DRIVE_MODE if found & 1 != 0 => format!("{was}: it turned in reverse"),
-        register::DRIVE_MODE if found & 8 != 0 => format!("{was}: any goal would have switched torque on"),
-        register::HOMING_OFFSET => format!(
-            "{register} of the servo was {0}: its positions read {0} counts too high, so look at servo.home_position",
-            found as i32
-        ),
-        register::VELOCITY_I_GAIN | register::VELOCITY_P_GAIN => {
-            format!("{was}: the motor may oscillate or hardly turn with it")
-        }
-        register::STARTUP_CONFIGURATION if found & 1 != 0 => format!("{was}: torque would have come on with the power"),
-        register::SHUTDOWN => format!("{was}: it would have gone on in spite of overheating, shock or overload"),
-        _ => was,
-    }
-}
-
-/// Limits the duty so that a blocked motor draws no more than the configured current, as far as resistance and supply now say. Returns
-/// the limit, in (0, 1].
-///
-/// In velocity mode the servo limits nothing but its duty (e-manual, "Goal PWM(100)"; "Current Limit(38)" is of the current modes). The
-/// goal PWM is in RAM: a limit that follows the supply's voltage wears no EEPROM.
-///
-/// A warm winding has more resistance, but it cools: the resistance is taken to be no more than that at the reference temperature.
-fn limit_duty<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<f64, StartupError> {
-    let servo_id = settings.servo_id;
-    let voltage_v = supply_voltage_v(bus, servo_id)?;
-    let temperature_c = f64::from(bus.register(servo_id, register::PRESENT_TEMPERATURE)?).min(RESISTANCE_AT_C);
-    let resistance_ohm = settings.winding_resistance_ohm * (1.0 + COPPER_PER_K * (temperature_c - RESISTANCE_AT_C));
-    let share = settings.current_limit_a * resistance_ohm / voltage_v;
-    let counts = (share / scale::DUTY).floor().clamp(1.0, f64::from(servo::FULL_PWM));
-    bus.set_register(servo_id, register::GOAL_PWM, counts as u32)?;
-    Ok((counts * scale::DUTY).min(1.0))
-}
-
-/// The supply as the servo measures it. A reading that is too low to be true is taken again.
-fn supply_voltage_v<P: Port>(bus: &mut WormBus<P>, servo_id: DeviceId) -> Result<f64, StartupError> {
-    let mut voltage_v = 0.0;
-    for _ in 0..VOLTAGE_ATTEMPTS {
-        voltage_v = f64::from(bus.register(servo_id, register::PRESENT_INPUT_VOLTAGE)?) * scale::VOLTAGE_V;
-        if voltage_v >= LEAST_VOLTAGE_V {
-            return Ok(voltage_v);
-        }
-    }
-    Err(StartupError::NoSupply { voltage_v })
 }
 
 fn choose_read_plan<P: Port>(

@@ -4,8 +4,8 @@ use crate::control::{DriveError, Service, ServiceOutcome, link_settings};
 use crate::link::servo::scale;
 use crate::link::virtual_worm::{Devices, DevicesError, Fault, Options, Plant};
 use crate::link::{
-    EmergencyStopError, EmergencyStopInput, ExchangePlan, FaultInjector, Faults, LinkSettings, Port, PortError,
-    ServoReading, StartupError, TrackerReading, WormBus, arm, disarm, prepare,
+    ArmError, EmergencyStopError, EmergencyStopInput, ExchangePlan, FaultInjector, Faults, LinkSettings, Port,
+    PortError, ServoReading, StartupError, TrackerReading, WormBus, arm, disarm, prepare,
 };
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
@@ -28,7 +28,7 @@ pub struct Exchange {
 pub struct Served {
     /// Whether it was done.
     pub outcome: ServiceOutcome,
-    /// What the servo's hardware error register said, where the service was done.
+    /// What the servo's hardware error register said, where it was read.
     pub hardware_error: Option<u8>,
     /// When it was over, s.
     pub ended_s: f64,
@@ -186,14 +186,16 @@ impl Wired {
     }
 
     /// As [`Drive`](crate::control::Drive) serves: the same operations of the link.
-    fn execute(&mut self, service: Service) -> Option<u8> {
+    fn execute(&mut self, service: Service) -> Result<Option<u8>, ArmError> {
         match service {
             Service::Arm => {
-                let prepared = arm(&mut self.bus, &self.settings, &mut Vec::new()).ok()?;
-                self.plan = prepared.plan;
-                Some(0)
+                self.plan = arm(&mut self.bus, &self.settings, &mut Vec::new())?.plan;
+                Ok(Some(0))
             }
-            Service::Disarm => Some(disarm(&mut self.bus, self.settings.servo_id).ok()?.0),
+            Service::Disarm => {
+                let errors = disarm(&mut self.bus, self.settings.servo_id).map_err(StartupError::from)?;
+                Ok(errors.map(|errors| errors.0))
+            }
         }
     }
 }
@@ -219,13 +221,13 @@ impl Machine for Wired {
     fn serve(&mut self, service: Service, now_s: f64) -> Served {
         let wire = self.wire();
         (wire.now_s, wire.timeout_s) = (wire.now_s.max(now_s), SERVICE_TIMEOUT_S);
-        let hardware_error = self.execute(service);
+        let executed = self.execute(service);
         Served {
-            outcome: match hardware_error {
-                Some(_) => ServiceOutcome::Done(service),
-                None => ServiceOutcome::Failed(service),
+            outcome: match executed {
+                Ok(_) => ServiceOutcome::Done(service),
+                Err(_) => ServiceOutcome::Failed(service),
             },
-            hardware_error,
+            hardware_error: executed.ok().flatten(),
             ended_s: self.wire().now_s,
         }
     }

@@ -260,31 +260,31 @@ fn run(case: &Case) -> (String, String) {
 const STORIES: &str = "\
 slope, fault: alarms and how long after it they came, how it ended
  0° stall                      motor-stall 0.03 s, fault (alarm)
- 0° jam:cell=2                 jammed-cell 2.17 s, fault (alarm)
-30° jam:cell=4,share=0.4       jammed-cell 0.92 s, fault (alarm)
+ 0° jam:cell=2                 jammed-cell 2.16 s, fault (alarm)
+30° jam:cell=4,share=0.4       jammed-cell 0.91 s, fault (alarm)
  0° jam:cell=1,share=0.8       model-mismatch 13.83 s, crawling
-30° slip:friction=0.4          sliding-down 0.33 s, no-progress 0.41 s, holding
-45° slip:friction=0.3          sliding-down 0.13 s, no-progress 0.17 s, holding
- 0° slide:speed=0.003          no-progress 1.65 s, sliding-down 3.19 s, holding
-30° slide:speed=0.01           sliding-down 0.38 s, no-progress 0.51 s, holding
+30° slip:friction=0.4          sliding-down 0.34 s, no-progress 0.41 s, holding
+45° slip:friction=0.3          sliding-down 0.14 s, no-progress 0.16 s, holding
+ 0° slide:speed=0.003          no-progress 1.73 s, sliding-down 3.27 s, holding
+30° slide:speed=0.01           sliding-down 0.38 s, no-progress 0.40 s, holding
 30° slope:deg=70               no-progress 1.02 s, holding
  0° friction-inside:scale=3    energy-over-budget 3.84 s, crawling
- 0° battery:charge=0.08@0      battery-low 11.25 s, crawling
+ 0° battery:charge=0.08@0      battery-low 13.31 s, crawling
  0° sag:volts=1.4              device-fault 0.26 s, fault (under-voltage)
- 0° silence:device=servo       link-fault 0.10 s, tracker-fault 0.49 s, fault (link-lost)
- 0° silence:device=tracker     tracker-fault 0.49 s, fault (tracker-stale)
+ 0° silence:device=servo       link-fault 0.10 s, tracker-fault 0.50 s, fault (link-lost)
+ 0° silence:device=tracker     tracker-fault 0.50 s, fault (tracker-stale)
  0° blind:cell=3               tracker-fault 0.58 s, crawling
- 0° dropout:share=0.6          tracker-fault 0.87 s, crawling
+ 0° dropout:share=0.6          tracker-fault 0.86 s, crawling
  0° dropout:share=0.1          crawling
  0° noise:m=0.0005             crawling
  0° overheat:ambient=90        device-fault 0.98 s, fault (over-temperature)
  0° hardware-error:bits=32     device-fault 0.00 s, fault (servo-hardware)
  0° reboot:off=0.05            link-fault 0.10 s, device-fault 0.16 s, fault (servo-restarted)
- 0° drop:share=0.3             link-fault 0.43 s, crawling
- 0° corrupt:share=0.3          link-fault 0.93 s, crawling
+ 0° drop:share=0.3             link-fault 0.41 s, crawling
+ 0° corrupt:share=0.3          link-fault 0.97 s, crawling
  0° drop:share=0.02            crawling
  0° delay:ms=2                 crawling
- 0° drag:force=0.3             model-mismatch 13.83 s, crawling
+ 0° drag:force=0.3             model-mismatch 11.33 s, crawling
 ";
 
 #[test]

@@ -12,6 +12,8 @@ const RATE_HZ: f64 = 250.0;
 const CYCLE_S: f64 = 2.5;
 /// Cycles within which a mismatch from the start must be reported.
 const SOON_CYCLES: f64 = 8.5;
+/// The same for one that is just above the threshold.
+const SOME_CYCLES: f64 = 16.5;
 /// Cycles for which a sound worm is watched.
 const LONG_CYCLES: f64 = 60.0;
 
@@ -100,8 +102,20 @@ fn told(session: &Session<Wired>) -> Option<Alarm> {
     session.raised.iter().find(is_ours).copied()
 }
 
+fn cycles_from(began_s: f64, alarm: &Alarm) -> f64 {
+    (alarm.time_ns as f64 * 1e-9 - began_s) / CYCLE_S
+}
+
 fn is_raised(session: &Session<Wired>) -> bool {
     session.observer.latest().raised_mask >> AlarmKind::ModelMismatch.code() & 1 == 1
+}
+
+/// How many seeds: as many as the environment variable `WORMD_SEEDS` says, or this.
+fn seeds(otherwise: u64) -> u64 {
+    match std::env::var("WORMD_SEEDS") {
+        Ok(seeds) => seeds.parse().expect("WORMD_SEEDS must be a number of seeds"),
+        Err(_) => otherwise,
+    }
 }
 
 /// Half of the worms; with the environment variable `WORMD_HOURS` all of them.
@@ -133,10 +147,14 @@ fn a_sound_worm_raises_no_mismatch() {
             if !all && (index / SLOPES_DEG.len() + index + number) % 2 == 1 {
                 continue;
             }
-            let mut session = crawling(&file, &world, faults, 1 + index as u64);
-            session.run_s(LONG_CYCLES * CYCLE_S, |_| {});
-            if !session.raised.is_empty() {
-                writeln!(wrongs, "{bounds_mm:?} at {slope_deg}°, {what}: {:?}", session.raised).expect("text has room");
+            for seed in 1..=seeds(1) {
+                let mut session = crawling(&file, &world, faults, index as u64 + seed);
+                session.run_s(LONG_CYCLES * CYCLE_S, |_| {});
+                if !session.raised.is_empty() {
+                    let raised = &session.raised;
+                    writeln!(wrongs, "{bounds_mm:?} at {slope_deg}°, {what}, seed {seed}: {raised:?}")
+                        .expect("text has room");
+                }
             }
         }
     }
@@ -149,12 +167,12 @@ fn a_sound_worm_raises_no_mismatch() {
 fn what_the_model_does_not_know_is_reported() {
     let (mut wrongs, mut misnamed) = (String::new(), Vec::new());
     let mut check = |what: String, file: World, world: World, faults: &[&str], cell: Option<u32>| {
-        for seed in 1..=3 {
+        for seed in 1..=seeds(3) {
             let mut session = crawling(&file, &world, faults, seed);
             let began_s = session.now_s();
             session.run_s(SOON_CYCLES * CYCLE_S + 2.0, |_| {});
             let alarm = told(&session);
-            let cycles = alarm.map(|alarm| (alarm.time_ns as f64 * 1e-9 - began_s) / CYCLE_S);
+            let cycles = alarm.map(|alarm| cycles_from(began_s, &alarm));
             println!(
                 "{what}, seed {seed}: {cycles:.1?} cycles, {:.2?} mm",
                 alarm.map(|alarm| alarm.value * 1e3)
@@ -184,7 +202,6 @@ fn what_the_model_does_not_know_is_reported() {
         check(format!("{slope_deg}°, drag"), file, file, &["drag:force=0.3@0"], None);
     }
     for (bounds_mm, slope_deg, more_deg) in [
-        (EQUAL, 0.0, 3.0),
         (EQUAL, 30.0, 3.0),
         (PAPER, 15.0, 3.0),
         (PAPER, 15.0, -3.0),
@@ -209,8 +226,26 @@ fn what_the_model_does_not_know_is_reported() {
         None,
     );
     assert!(wrongs.is_empty(), "{wrongs}");
-    // One of 48, at the 95 % to which an alarm is certain.
-    assert_eq!(misnamed, ["0°, cell 2 times 1.3, seed 2"]);
+    assert!(misnamed.is_empty(), "{misnamed:?}");
+}
+
+/// A slope of 3° makes 0.23 mm on the level, against a threshold of 0.16 mm and a scatter of 0.03 mm from cycle to cycle.
+#[test]
+fn what_is_just_above_the_threshold_takes_some_cycles_more() {
+    let file = World::of(EQUAL, 0.0);
+    let count = seeds(10);
+    let cycles: Vec<f64> = (1..=count)
+        .filter_map(|seed| {
+            let mut session = crawling(&file, &file.slope(3.0), &[], seed);
+            let began_s = session.now_s();
+            session.run_s(SOME_CYCLES * CYCLE_S, |_| {});
+            told(&session).map(|alarm| cycles_from(began_s, &alarm))
+        })
+        .collect();
+    let soon = cycles.iter().filter(|&&cycles| cycles <= SOON_CYCLES).count();
+    println!("of {count}, {soon} within {SOON_CYCLES} cycles: {cycles:.1?}");
+    assert_eq!(cycles.len() as u64, count);
+    assert!(soon as u64 * 3 >= count * 2, "{soon} of {count}: {cycles:.1?}");
 }
 
 /// A drag that comes and goes is reported and cleared, and the map shows where it cost distance.

@@ -192,19 +192,36 @@ fn read_wish(time: Duration) -> Wish {
     }
 }
 
-/// What this input of a terminal in raw mode means: Ctrl-C or q stops, Ctrl-Z suspends. Keys that send several characters begin
-/// with escape.
+/// What this input of a terminal in raw mode means: Ctrl-C or q stops, Ctrl-Z suspends.
 fn wish_of(keys: &[u8]) -> Wish {
     const CTRL_C: u8 = 3;
     const CTRL_Z: u8 = 26;
-    const ESCAPE: u8 = 27;
-    if keys.contains(&CTRL_C) || (keys.first() != Some(&ESCAPE) && keys.contains(&b'q')) {
+    // Ctrl-C counts wherever it stands: no sequence of any key contains it.
+    if keys.contains(&CTRL_C) || without_sequences(keys).any(|key| key == b'q') {
         Wish::Stop
     } else if keys.contains(&CTRL_Z) {
         Wish::Suspend
     } else {
         Wish::GoOn
     }
+}
+
+/// The keys that send one character. Others, such as the cursor keys, send escape and several more (ECMA-48, 5.4; and SS3).
+fn without_sequences(keys: &[u8]) -> impl Iterator<Item = u8> + '_ {
+    const ESCAPE: u8 = 27;
+    let mut rest = keys.iter().copied();
+    std::iter::from_fn(move || {
+        loop {
+            match rest.next()? {
+                ESCAPE => match rest.next()? {
+                    b'[' => rest.find(|key| (0x40..=0x7e).contains(key)).map(|_| ())?,
+                    b'O' => rest.next().map(|_| ())?,
+                    _ => {} // Alt and a key
+                },
+                key => return Some(key),
+            }
+        }
+    })
 }
 
 #[cfg(test)]
@@ -219,6 +236,10 @@ mod tests {
             (b"xq", Wish::Stop),
             (b"\x1b[A", Wish::GoOn),
             (b"\x1bq", Wish::GoOn),
+            (b"\x1b[Aq", Wish::Stop),
+            (b"\x1bOPq", Wish::Stop),
+            (b"\x1b[1;5Dx", Wish::GoOn),
+            (b"\x1b[", Wish::GoOn),
             (b"\x1a", Wish::Suspend),
         ] {
             assert_eq!(wish_of(keys), wish, "{keys:?}");

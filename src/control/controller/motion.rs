@@ -56,8 +56,7 @@ impl Controller {
             Mode::Stopping => {
                 self.ramp.aim(0.0);
                 let velocity_rad_s = self.ramp.advance(dt_s);
-                let is_timed_out = now_ns.saturating_sub(self.mode_since_ns) > STANDSTILL_TIMEOUT_NS;
-                if self.disarm_due_ns.is_none() && self.ramp.is_at_rest() && (self.cam_stands() || is_timed_out) {
+                if self.disarm_due_ns.is_none() && self.has_come_to_rest(now_ns) {
                     self.request_disarm(now_ns);
                 }
                 velocity_rad_s
@@ -79,6 +78,15 @@ impl Controller {
         }
     }
 
+    /// Whether the ramp is over and the cam stands, or has had its time for that.
+    fn has_come_to_rest(&mut self, now_ns: u64) -> bool {
+        if !self.ramp.is_at_rest() {
+            return false;
+        }
+        let since_ns = *self.at_rest_since_ns.get_or_insert(now_ns);
+        self.cam_stands() || now_ns.saturating_sub(since_ns) > STANDSTILL_TIMEOUT_NS
+    }
+
     fn cam_stands(&self) -> bool {
         self.assembler.state.motor_velocity_rad_s.abs() < STANDSTILL_RAD_S
     }
@@ -89,11 +97,8 @@ impl Controller {
         let Some(hold_rad) = self.hold_angle_rad else {
             self.ramp.aim(0.0);
             let velocity_rad_s = self.ramp.advance(dt_s);
-            if self.ramp.is_at_rest() {
-                let since_ns = *self.at_rest_since_ns.get_or_insert(now_ns);
-                if self.cam_stands() || now_ns.saturating_sub(since_ns) > STANDSTILL_TIMEOUT_NS {
-                    self.hold_angle_rad = Some(angle_rad);
-                }
+            if self.has_come_to_rest(now_ns) {
+                self.hold_angle_rad = Some(angle_rad);
             }
             return velocity_rad_s;
         };

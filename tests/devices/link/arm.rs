@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use wormd::link::servo::register;
-use wormd::link::{ArmError, Port, PortError, WormBus, arm};
+use wormd::link::servo::{HardwareErrors, register};
+use wormd::link::{ArmError, Port, PortError, WormBus, arm, disarm};
 
 use super::startup::settings;
-use super::worm::Worm;
+use super::worm::{SERVO, Worm, id};
 
 /// What goes wrong once torque is on.
 #[derive(Clone, Copy, PartialEq)]
@@ -80,4 +80,15 @@ fn torque_never_stays_on_unreported() {
             }
         }
     }
+}
+
+#[test]
+fn torque_that_is_off_is_off_though_the_hardware_errors_cannot_be_read() {
+    let mut bus = WormBus::new(Worm::new(5));
+    arm(&mut bus, &settings(), &mut Vec::new()).expect("torque comes on");
+    assert_eq!(disarm(&mut bus, id(SERVO)), Ok(Some(HardwareErrors(0))));
+    arm(&mut bus, &settings(), &mut Vec::new()).expect("torque comes on");
+    bus.port_mut().quirks.hardware_errors_get_lost = true;
+    assert_eq!(disarm(&mut bus, id(SERVO)), Ok(None));
+    assert_eq!(bus.port().servo(register::TORQUE_ENABLE), 0);
 }

@@ -27,6 +27,8 @@ pub struct Quirks {
     pub servo_silent: bool,
     /// The servo obeys, but only its answers to pings arrive.
     pub answers_pings_only: bool,
+    /// The answers in which the servo names its hardware errors do not arrive.
+    pub hardware_errors_get_lost: bool,
     /// Answers come only with the request after the one that they are for.
     pub one_late: bool,
     pub unplugged: bool,
@@ -150,7 +152,10 @@ impl Worm {
 
     fn read(&mut self, id: DeviceId, address: u16, length: u16) {
         let Some(&table) = self.table(id) else { return };
-        if self.answers(id, 1) {
+        let is_lost = self.quirks.hardware_errors_get_lost
+            && id.get() == SERVO
+            && address == servo_register::HARDWARE_ERROR_STATUS.address;
+        if self.answers(id, 1) && !is_lost {
             let from = usize::from(address);
             match table.get(from..from + usize::from(length)) {
                 Some(data) => self.say(id, None, data),

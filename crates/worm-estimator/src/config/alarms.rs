@@ -72,7 +72,7 @@ impl Default for Alarms {
             link_fault: alarm(Policy::Warn, 0.2),
             tracker_fault: alarm(Policy::Warn, 0.3),
             device_fault: alarm(Policy::Warn, 60.0),
-            model_mismatch: alarm(Policy::Warn, 1.5e-4),
+            model_mismatch: alarm(Policy::Warn, 1.6e-4),
             recording_stopped: alarm(Policy::Warn, 5.0),
         }
     }

@@ -34,6 +34,8 @@ struct Rig {
     /// The state that the estimator has got stuck at, if it has.
     estimator_stuck_at: Option<u64>,
     services_fail: bool,
+    /// What the motor still turns when its goal is zero, rad/s.
+    coasts_rad_s: f64,
     /// The messages on their way.
     messages: Vec<Alarm>,
     /// The level in the estimates.
@@ -82,6 +84,7 @@ impl Rig {
             estimator_runs: true,
             estimator_stuck_at: None,
             services_fail: false,
+            coasts_rad_s: 0.0,
             messages: Vec::new(),
             raised_mask: 0,
             lease: Lease::Held,
@@ -120,7 +123,7 @@ impl Rig {
     fn tick(&mut self, command: Option<Command>) -> Outputs {
         let service_ns = self.served.map_or(0, |_| self.service_ms * MS);
         self.now_ns += MS + service_ns;
-        self.servo.velocity_rad_s = f64::from(self.goal_counts) * RAD_S_PER_COUNT;
+        self.servo.velocity_rad_s = f64::from(self.goal_counts) * RAD_S_PER_COUNT + self.coasts_rad_s;
         self.servo.position_rad += self.servo.velocity_rad_s * 1e-3;
         if self.tracker_runs && (self.now_ns / MS).is_multiple_of(8) {
             self.tracker.sample += 1;

@@ -75,6 +75,35 @@ fn an_arming_that_fails_ends_disarmed_only_once_torque_is_known_to_be_off() {
     assert_eq!((rig.mode(), rig.disarms), (Mode::Disarmed, 1));
 }
 
+/// Without torque a cam that still turns would be turned on by the worm's weight. The wait for it begins where the ramp ends.
+#[test]
+fn torque_stays_on_until_the_cam_stands_after_a_long_ramp() {
+    // A goal below one count is sent as none, so the ramp ends some ms later than the goal that is sent.
+    for (stands_after_ms, disarmed_ms) in [(0, 0..=30), (300, 300..=310), (900, 500..=530)] {
+        let mut rig = Rig::crawling("gait.ramp_s = 2.0");
+        rig.run(2_000);
+        rig.command(CommandKind::Stop, 0.0);
+        rig.coasts_rad_s = 0.5;
+        while rig.goal_counts != 0 {
+            assert_eq!(rig.mode(), Mode::Stopping);
+            rig.run(1);
+        }
+        let mut took_ms = 0;
+        while rig.mode() == Mode::Stopping && took_ms < 2_000 {
+            if took_ms == stands_after_ms {
+                rig.coasts_rad_s = 0.0;
+            }
+            rig.run(1);
+            took_ms += 1;
+        }
+        assert_eq!(rig.mode(), Mode::Disarmed);
+        assert!(
+            disarmed_ms.contains(&took_ms),
+            "stands after {stands_after_ms} ms, disarmed after {took_ms} ms"
+        );
+    }
+}
+
 #[test]
 fn stop_is_accepted_in_every_mode() {
     let crawling = || Rig::crawling("");

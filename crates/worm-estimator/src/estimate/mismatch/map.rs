@@ -8,6 +8,7 @@
 use super::BINS;
 use super::reference_model::{ALLOWANCES, Part, ReferenceModel};
 use super::weighted_mean::{MeanEstimate, WeightedMean};
+use std::f64::consts::TAU;
 use worm_physics::MAX_CELLS;
 
 /// Probability of a false alarm over the whole family, at one test.
@@ -202,8 +203,7 @@ impl ResidualMap {
     pub fn unexplained(&self, threshold_m: f64) -> Option<Unexplained> {
         let advance = self.advance.known(self.pooled)?;
         let advance_m = advance.mean - self.allowed_advance_m;
-        // Half the tail of the normal distribution beyond z is below exp(−z²/2)/2.
-        let limit = (2.0 * ((self.size() + 1) as f64 / FALSE_FRACTION).ln()).sqrt();
+        let limit = normal_quantile_beyond(FALSE_FRACTION / (self.size() + 1) as f64);
         let mut worst: Option<(f64, usize, Residual)> = None;
         let mut is_within = advance_m.abs() <= threshold_m;
         for index in 0..self.size() {
@@ -272,6 +272,27 @@ impl ResidualMap {
                 Some(own)
             }
             _ => Some(largest),
+        }
+    }
+}
+
+/// The z beyond which at most this probability of the normal distribution lies, for probabilities up to 1 %: from Mills' bound on the
+/// tail, exp(−z²/2)/(z √(2π)). One tail is enough: a mean that exceeds the threshold does so on one side.
+fn normal_quantile_beyond(probability: f64) -> f64 {
+    let log = -2.0 * (probability * TAU.sqrt()).ln();
+    (0..5).fold(log.sqrt(), |z, _| (log - 2.0 * z.ln()).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::normal_quantile_beyond;
+
+    #[test]
+    fn the_limit_is_just_above_the_normal_quantile() {
+        // Abramowitz and Stegun, table 26.6.
+        for (probability, quantile) in [(1e-2, 2.32635), (1e-3, 3.09023), (1e-4, 3.71902), (1e-5, 4.26489)] {
+            let limit = normal_quantile_beyond(probability);
+            assert!((quantile..quantile + 0.08).contains(&limit), "{probability}: {limit}");
         }
     }
 }

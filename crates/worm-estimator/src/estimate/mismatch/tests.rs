@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use worm_physics::Worm;
 
 const CELLS: usize = 4;
-const THRESHOLD_M: f64 = 1.5e-4;
+const THRESHOLD_M: f64 = 1.6e-4;
 const NOISE_M: f64 = 3e-5;
 
 /// A map of the paper's worm over so many cycles of noise, and what `add` adds to step, bin and cell.

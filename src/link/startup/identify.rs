@@ -1,0 +1,76 @@
+//! Who answers: the configured servo and tracker, others, or nobody.
+
+use std::time::Instant;
+
+use super::{LinkSettings, QUIET_TIME, StartupError};
+use crate::link::operations::REPLY_TIME;
+use crate::link::packet::DeviceId;
+use crate::link::{Identity, Port, TransactionError, WormBus, servo};
+
+pub(super) fn identify_servo<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<Identity, StartupError> {
+    let found = identify(bus, settings, "servo", settings.servo_id, settings.servo_model);
+    let Err(StartupError::Silent { .. }) = found else {
+        return found;
+    };
+    // The tracker answers: it is not the baud rate.
+    if bus.ping(settings.tracker_id, Instant::now() + REPLY_TIME).is_ok() {
+        return found;
+    }
+    let mut rate_found = None;
+    for rate in servo::BAUD_RATES.into_iter().filter(|&rate| rate != settings.baud) {
+        // An adapter need not have every rate.
+        if bus.port_mut().set_baud_rate(rate).is_err() {
+            continue;
+        }
+        bus.settle(Instant::now() + QUIET_TIME)?;
+        if bus.ping(settings.servo_id, Instant::now() + REPLY_TIME).is_ok() {
+            rate_found = Some(rate);
+            break;
+        }
+    }
+    bus.port_mut().set_baud_rate(settings.baud)?;
+    match rate_found {
+        Some(rate) => Err(StartupError::OtherBaudRate {
+            found: rate,
+            configured: settings.baud,
+        }),
+        None => found,
+    }
+}
+
+pub(super) fn identify<P: Port>(
+    bus: &mut WormBus<P>,
+    settings: &LinkSettings,
+    device: &'static str,
+    id: DeviceId,
+    expected: u16,
+) -> Result<Identity, StartupError> {
+    match bus.ask_again(|bus, deadline| bus.ping(id, deadline)) {
+        Ok(identity) if identity.model == expected => Ok(identity),
+        Ok(Identity { model: found, .. }) => Err(StartupError::WrongModel {
+            device,
+            id,
+            found,
+            expected,
+        }),
+        Err(TransactionError::Port(error)) => Err(error.into()),
+        Err(_) => Err(StartupError::Silent {
+            device,
+            id,
+            baud: settings.baud,
+            present: who_is_there(bus),
+        }),
+    }
+}
+
+/// For an error: who answers a broadcast ping.
+fn who_is_there<P: Port>(bus: &mut WormBus<P>) -> String {
+    let mut present = Vec::new();
+    let listened = bus.broadcast_ping(Instant::now() + 4 * REPLY_TIME, |id, who| {
+        present.push(format!("{id} (model {})", who.model))
+    });
+    match (listened, present.as_slice()) {
+        (Ok(_), [_, ..]) => format!("these IDs do: {}", present.join(", ")),
+        _ => "nobody does".into(),
+    }
+}
