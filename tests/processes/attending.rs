@@ -89,6 +89,37 @@ fn with_a_terminal_that_nobody_reads_a_run_ends_in_time_and_heeds_signals() {
     drop(pty.master);
 }
 
+/// A terminal that nobody reads and that takes nothing more.
+fn full_terminal() -> OpenptyResult {
+    let pty = stalled_terminal();
+    let flags = |flags| nix::fcntl::fcntl(&pty.slave, nix::fcntl::FcntlArg::F_SETFL(flags)).expect("flags can be set");
+    flags(nix::fcntl::OFlag::O_NONBLOCK);
+    while nix::unistd::write(&pty.slave, &[b'x'; 100]).is_ok() {}
+    flags(nix::fcntl::OFlag::empty());
+    pty
+}
+
+#[test]
+fn a_controller_whose_terminal_is_full_crawls_and_heeds_commands_and_signals() {
+    let mut crawling = Crawling::at_rest(Worm::new("unread"), &[]);
+    crawling.controller.kill();
+    let port = crawling.worm.port();
+    let pty = full_terminal();
+    // Everything it logs goes to that terminal.
+    let control = crawling.worm.wormd(&["control", "--port", &port, "-vv"]);
+    crawling.controller = control.start_in(pty.slave);
+    make_crawl_again(&crawling.worm);
+    for order in [CommandKind::Hold, CommandKind::Crawl, CommandKind::Stop] {
+        assert_eq!(crawling.worm.order(order), CommandOutcome::Accepted, "{order}");
+        std::thread::sleep(Duration::from_millis(300));
+    }
+    wait_for_mode(&crawling.worm, Mode::Disarmed);
+    let Crawling { controller, worm, .. } = crawling;
+    controller.signal(Signal::SIGTERM);
+    controller.ends_within(PATIENCE);
+    drop((pty.master, worm));
+}
+
 #[test]
 fn a_worm_whose_parent_was_killed_holds_and_the_next_parent_takes_over() {
     let worm = Worm::new("orphan");
