@@ -295,6 +295,10 @@ impl Loop {
         // At once, because it may be to switch torque off. A finished loop has done what it could.
         let service = outputs.service.filter(|_| !outputs.finished);
         self.served = service.map_or(Served::NOTHING, |service| {
+            // It takes its time, in which the emergency stop is not read: that is no silence of the switch.
+            if let Some(emergency_stop) = &mut self.emergency_stop {
+                emergency_stop.forget();
+            }
             serve(drive, service, &mut self.failed_services)
         });
         self.finish(

@@ -97,7 +97,7 @@ impl EmergencyStopInput {
     }
 
     /// Forgets when it was last read: it was not asked for a while.
-    pub(super) fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.read_ns = None;
     }
 
