@@ -47,11 +47,11 @@ const X_SERIES: RangeInclusive<u16> = 1000..=1999;
 /// What the link has to know of a worm. The config fills it in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkSettings {
-    /// Baud rate in bit/s, one of [`servo::BAUD_RATES`]; 1,000,000 is usual.
+    /// Baud rate in bit/s, one of [`BAUD_RATES`](crate::link::servo::BAUD_RATES); 1,000,000 is usual.
     pub baud: u32,
     /// The servo's ID.
     pub servo_id: DeviceId,
-    /// The servo's model number, [`servo::XL330_M288_MODEL`] by default.
+    /// The servo's model number, [`XL330_M288_MODEL`](crate::link::servo::XL330_M288_MODEL) by default.
     pub servo_model: u16,
     /// The tracker's ID, [`tracker::DEFAULT_ID`] by default.
     pub tracker_id: DeviceId,
