@@ -100,14 +100,13 @@ fn full_terminal() -> OpenptyResult {
 }
 
 #[test]
-fn a_controller_whose_terminal_is_full_crawls_and_heeds_commands_and_signals() {
+fn a_controller_whose_log_nobody_reads_crawls_and_heeds_commands_and_signals() {
     let mut crawling = Crawling::at_rest(Worm::new("unread"), &[]);
     crawling.controller.kill();
     let port = crawling.worm.port();
     let pty = full_terminal();
-    // Everything it logs goes to that terminal.
     let control = crawling.worm.wormd(&["control", "--port", &port, "-vv"]);
-    crawling.controller = control.start_in(pty.slave);
+    crawling.controller = control.start_logging_to(pty.slave);
     make_crawl_again(&crawling.worm);
     for order in [CommandKind::Hold, CommandKind::Crawl, CommandKind::Stop] {
         assert_eq!(crawling.worm.order(order), CommandOutcome::Accepted, "{order}");
