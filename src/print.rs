@@ -75,9 +75,23 @@ pub(crate) fn line_within(text: impl Display, patience: Duration) -> Result<(), 
     }
 }
 
-/// Writes the line "ready" to standard output. A parent that does not wait for it may have closed the pipe.
+/// Writes the line "ready" to standard output: see [`announce`].
 pub(crate) fn ready() {
-    let _ = line("ready");
+    announce("ready");
+}
+
+/// Writes a line to standard output for a parent that waits for it, in the background where that was asked for. A parent that does not
+/// wait may have closed the pipe, or may not read.
+pub(crate) fn announce(text: impl Display) {
+    let Some(background) = BACKGROUND.get() else {
+        let _ = line(text);
+        return;
+    };
+    background.waiting.fetch_add(1, Ordering::Relaxed);
+    // One that nobody reads is in the way.
+    if background.announced.try_send(text.to_string()).is_err() {
+        background.waiting.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 /// Writes a line to standard error, in the background where that was asked for.
@@ -91,27 +105,39 @@ static BACKGROUND: OnceLock<Background> = OnceLock::new();
 
 struct Background {
     queue: Sender<Vec<u8>>,
+    announced: Sender<String>,
     /// Lines that were queued and are not printed yet.
     waiting: AtomicU64,
     dropped: AtomicU64,
 }
 
-/// From now on whoever logs never waits for standard error.
+/// From now on whoever logs never waits for standard error, and [`announce`] never for standard output. Call it before requesting
+/// real-time priority, so that what prints keeps the ordinary scheduler.
 ///
 /// # Errors
 /// [`Failure::Failed`] when there is no thread to be had.
 pub(crate) fn log_in_background() -> Result<(), Failure> {
     let (queue, lines) = bounded(QUEUE);
+    let (announced, announcements) = bounded(1);
     let background = BACKGROUND.get_or_init(|| Background {
         queue,
+        announced,
         waiting: AtomicU64::new(0),
         dropped: AtomicU64::new(0),
     });
-    std::thread::Builder::new()
-        .name("log".to_owned())
-        .spawn(move || background.print(&lines))
-        .map(drop)
-        .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))
+    let start = |name: &str, print: Box<dyn FnOnce() + Send>| {
+        std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(print)
+            .map(drop)
+            .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))
+    };
+    start("log", Box::new(move || background.print(&lines)))?;
+    // A thread of its own: a reader of standard output is not to wait for one of standard error.
+    start(
+        "output",
+        Box::new(move || background.print_announcements(&announcements)),
+    )
 }
 
 /// Waits until the log is printed, but no longer than `patience`.
@@ -136,6 +162,13 @@ impl Background {
             }
             // When standard error is closed, there is nowhere left to report that.
             let _ = stderr.write_all(&line);
+            self.waiting.fetch_sub(1, Ordering::Release);
+        }
+    }
+
+    fn print_announcements(&self, announcements: &Receiver<String>) {
+        for text in announcements {
+            let _ = line(text);
             self.waiting.fetch_sub(1, Ordering::Release);
         }
     }

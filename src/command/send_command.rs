@@ -98,6 +98,7 @@ fn send(args: &SendCommandArgs, config: &Config) -> Result<Answer, Failure> {
 
 /// Crawls as long as this process runs.
 fn attend(args: &SendCommandArgs, config: &Config) -> Result<(), Failure> {
+    print::log_in_background()?;
     let end = end_on_signal()?;
     let hub = open(config)?;
     let worm = &config.worm.name;

@@ -2,10 +2,15 @@
 
 use super::progress::Progress;
 use super::{Failure, end_on_signal, print};
-use crate::soak::{self, SoakOptions};
+use crate::soak::{self, RunProgress, SoakOptions};
 use clap::Args;
+use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// How often a run says how far it has come, where there is no terminal for a progress bar.
+const SAY_EVERY: Duration = Duration::from_secs(60);
 
 /// Arguments of `wormd soak`.
 #[derive(Debug, Args)]
@@ -19,6 +24,9 @@ pub struct SoakArgs {
     /// Run only this segment of half an hour, as a finding names it
     #[arg(long, value_name = "K", conflicts_with = "hours")]
     segment: Option<u64>,
+    /// Go on with this segment of the run, as a run that was stopped says
+    #[arg(long, value_name = "K", conflicts_with = "segment", default_value_t = 0)]
+    from_segment: u64,
     /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
@@ -43,25 +51,33 @@ pub fn run(args: &SoakArgs) -> Result<(), Failure> {
             first: segment,
             segments: 1,
         },
-        (None, hours) => SoakOptions::hours(args.seed, hours.unwrap_or_default()),
+        (None, hours) => SoakOptions::hours(args.seed, hours.unwrap_or_default()).from_segment(args.from_segment),
     };
+    if options.segments == 0 {
+        return Err(Failure::failed(format!(
+            "there is no segment {} in a run of this length: give a smaller --from-segment or more --hours",
+            args.from_segment
+        )));
+    }
     let end = end_on_signal()?;
-    let progress = Mutex::new(Progress::begin());
-    let report = soak::run(&options, |done| {
-        // A progress bar is not worth waiting for.
-        if let Ok(mut progress) = progress.try_lock() {
-            progress.tell("segments", done as f64 / options.segments as f64);
+    let witness = Mutex::new(Witness::new(&options));
+    let report = soak::run(&options, |progress| {
+        if let Ok(mut witness) = witness.lock() {
+            witness.see(progress);
         }
         !end.load(Ordering::Relaxed)
     });
-    drop(progress);
+    drop(witness);
     if args.json {
         print::line(serde_json::to_string(&report).map_err(Failure::failed)?)?;
     } else {
         print::line(report.to_string().trim_end())?;
     }
     if report.passed() && report.segments < options.segments {
-        Err(Failure::failed("stopped before the end; until then nothing was wrong"))
+        Err(Failure::failed(format!(
+            "stopped before the end; until then nothing was wrong. Go on with --from-segment {}",
+            options.first + report.segments
+        )))
     } else if report.passed() {
         Ok(())
     } else {
@@ -69,5 +85,57 @@ pub fn run(args: &SoakArgs) -> Result<(), Failure> {
             "{} false alarms, {} faults missed, {} late, {} invariants broken",
             report.alarms_false, report.missed, report.late, report.broken
         )))
+    }
+}
+
+/// Says on standard error what is found, when it is found, and how far the run has come: a run of many hours may be killed.
+struct Witness {
+    seed: u64,
+    segments: u64,
+    bar: Progress,
+    has_terminal: bool,
+    began: Instant,
+    said: Instant,
+    hours: f64,
+    findings: usize,
+}
+
+impl Witness {
+    fn new(options: &SoakOptions) -> Self {
+        let now = Instant::now();
+        Self {
+            seed: options.seed,
+            segments: options.segments,
+            bar: Progress::begin(),
+            has_terminal: std::io::stderr().is_terminal(),
+            began: now,
+            said: now,
+            hours: 0.0,
+            findings: 0,
+        }
+    }
+
+    fn see(&mut self, progress: &RunProgress<'_>) {
+        self.hours += progress.newest.time_s / 3600.0;
+        // The report lists what a single segment found.
+        if self.segments > 1 {
+            for finding in progress.newest.findings_of(self.seed) {
+                self.findings += 1;
+                self.bar.say(&finding);
+            }
+        }
+        self.bar.tell("segments", progress.done as f64 / self.segments as f64);
+        if !self.has_terminal && self.said.elapsed() >= SAY_EVERY {
+            self.said = Instant::now();
+            print::log_line(format!(
+                "{} of {} segments, {:.1} h ({:.1} h per minute), {} findings; go on with --from-segment {}",
+                progress.done,
+                self.segments,
+                self.hours,
+                self.hours / (self.began.elapsed().as_secs_f64() / 60.0),
+                self.findings,
+                progress.continue_with
+            ));
+        }
     }
 }

@@ -87,7 +87,7 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
     let link = PortLink::create(&args.link, server.path()).map_err(Failure::unusable)?;
     report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     // A parent that does not wait for this line may have closed the pipe.
-    let _ = print::line(args.link.display());
+    print::announce(args.link.display());
     let devices = server.run(&end).map_err(Failure::failed)?;
     drop(link);
     if args.supervised

@@ -3,6 +3,9 @@
 //! A computer that is busy, or whose host takes its CPUs away, does not run the loop for a while. In that time no device was asked,
 //! and none could have been received. So the silences of servo, tracker and estimator are measured on a clock that stands still
 //! meanwhile. Without pauses it agrees with the computer's clock.
+//!
+//! A tick that was merely late by some periods is excused in the same way. But where every tick is late the devices are asked in every
+//! one of them: of such ticks the clock counts at least half, so that no silence, ramp or time limit takes more than twice its time.
 
 use worm_estimator::config::Config;
 
@@ -110,16 +113,23 @@ pub(super) struct ExchangeTimes {
     pub exchanged: u64,
     /// What the tick before took from the end of its exchange to its own end.
     pub work_before: u64,
+    /// From the end of the exchange before to the end of this one.
+    pub elapsed: u64,
 }
 
 /// How long the loop could not run between the end of the previous exchange and the end of this one, in whole periods: a shorter
-/// absence has cost no tick.
+/// absence has cost no tick. Of one that is no pause, at most half of the time between them.
 pub(super) fn absent_ns(times: &ExchangeTimes, period_ns: u64) -> u64 {
     let woken_late = times.woken.saturating_sub(times.deadline);
     let answered_late = (times.exchanged - times.woken).saturating_sub(times.bus_allowed);
     let whole_periods = |ns: u64| ns / period_ns * period_ns;
     // The previous tick's work may have run past this deadline, which the schedule then moved on.
-    whole_periods(woken_late + answered_late) + whole_periods(times.work_before)
+    let absent = whole_periods(woken_late + answered_late) + whole_periods(times.work_before);
+    if absent < MIN_PAUSE_NS {
+        absent.min(times.elapsed / 2)
+    } else {
+        absent
+    }
 }
 
 #[cfg(test)]
@@ -171,6 +181,7 @@ mod tests {
     #[test]
     fn only_what_the_loop_could_not_help_is_absence() {
         let times = |woken_us: u64, bus_us: u64, work_before_us: u64| ExchangeTimes {
+            elapsed: 10_000_000,
             deadline: 5_000_000,
             woken: 5_000_000 + woken_us * 1_000,
             bus_allowed: 700_000,
@@ -192,6 +203,30 @@ mod tests {
                 absent * MS,
                 "{woken} {bus} {work_before}"
             );
+        }
+    }
+
+    #[test]
+    fn late_ticks_make_no_time_longer_than_twice() {
+        for late_ms in 1..10 {
+            let mut loop_clock = LoopClock::default();
+            let (mut now_ns, elapsed) = (1_000 * MS, (1 + late_ms) * MS);
+            let began_ns = loop_clock.advance(now_ns, 0, 0).present_ns;
+            for _ in 0..100 {
+                let deadline = now_ns + MS;
+                now_ns += elapsed;
+                let late = ExchangeTimes {
+                    deadline,
+                    woken: now_ns,
+                    bus_allowed: MS,
+                    exchanged: now_ns,
+                    work_before: 0,
+                    elapsed,
+                };
+                loop_clock.advance(now_ns, absent_ns(&late, MS), 0);
+            }
+            let present_ns = loop_clock.advance(now_ns, 0, 0).present_ns - began_ns;
+            assert!(2 * present_ns >= 100 * elapsed, "{late_ms} ms late: {present_ns} ns");
         }
     }
 }

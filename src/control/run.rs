@@ -122,6 +122,7 @@ pub fn run(
         silence: Silence::new(config),
         emergency_stop,
         absent_ns: 0,
+        exchanged_ns: 0,
         controller: Controller::new(config),
         schedule: Schedule::new(config.control.rate_hz, monotonic_ns()),
         rate: RateKeeper::new(
@@ -167,6 +168,8 @@ struct Loop {
     emergency_stop: Option<EmergencyStopInput>,
     /// How long the loop could not run although it was due, in all.
     absent_ns: u64,
+    /// When the last exchange ended.
+    exchanged_ns: u64,
     controller: Controller,
     schedule: Schedule,
     rate: RateKeeper,
@@ -243,6 +246,7 @@ impl Loop {
                 bus_allowed,
                 exchanged,
                 work_before: self.work_ns,
+                elapsed: exchanged.saturating_sub(std::mem::replace(&mut self.exchanged_ns, exchanged)),
             },
             self.schedule.period_ns(),
         ) + self.unanswerable_ns(outcome.servo.is_ok(), drive.is_gone());

@@ -96,13 +96,13 @@ impl<P: Port> WormBus<P> {
     /// # Errors
     /// [`OperationError`]
     pub fn reboot_servo(&mut self, servo: DeviceId) -> Result<(), OperationError> {
-        let deadline = Instant::now() + REBOOT_TIME;
+        let deadline = self.port_mut().now() + REBOOT_TIME;
         // It may lose its receipt in the restart; whether it comes back is what counts.
         let _ = self.reboot(servo, Instant::now() + REPLY_TIME);
         self.set_writes_are_answered(true);
         // A servo that has not gone down yet still answers.
-        std::thread::sleep(REPLY_TIME);
-        while Instant::now() < deadline {
+        let waited = self.port_mut().pass_time(REPLY_TIME);
+        while waited.is_ok() && self.port_mut().now() < deadline {
             if self.ping(servo, Instant::now() + REPLY_TIME).is_ok() {
                 return Ok(());
             }

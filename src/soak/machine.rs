@@ -70,6 +70,8 @@ const NEVER: Duration = Duration::from_secs(3600);
 /// `timeout_s`.
 struct Wire {
     devices: Devices,
+    /// Time 0.
+    began: Instant,
     now_s: f64,
     timeout_s: f64,
     give_up_s: f64,
@@ -85,6 +87,15 @@ fn simulated<E>(result: Result<(), E>) -> Result<(), PortError> {
 }
 
 impl Port for Wire {
+    fn now(&self) -> Instant {
+        self.began + Duration::from_secs_f64(self.now_s)
+    }
+
+    fn pass_time(&mut self, time: Duration) -> Result<(), PortError> {
+        self.now_s += time.as_secs_f64();
+        simulated(self.devices.advance_to(self.now_s))
+    }
+
     fn send(&mut self, bytes: &[u8], _: Instant) -> Result<(), PortError> {
         simulated(self.devices.receive(bytes, self.now_s))?;
         self.give_up_s = self.now_s + self.timeout_s;
@@ -139,6 +150,7 @@ impl Wired {
     pub fn new(config: &Config, options: &Options) -> Result<Self, MachineError> {
         let wire = Wire {
             devices: Devices::new(config, options)?,
+            began: Instant::now(),
             now_s: 0.0,
             timeout_s: SERVICE_TIMEOUT_S,
             give_up_s: 0.0,

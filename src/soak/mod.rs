@@ -29,6 +29,7 @@ pub use report::{Finding, SoakReport};
 pub use session::{Paused, Session, Tick};
 
 use report::Tally;
+use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -61,14 +62,58 @@ impl SoakOptions {
             segments: (hours * 3600.0 / SEGMENT_S).ceil().max(1.0) as u64,
         }
     }
+
+    /// The rest of them, from a segment on; none if it is past the end.
+    #[must_use]
+    pub fn from_segment(self, first: u64) -> Self {
+        Self {
+            first: self.first + first,
+            segments: self.segments.saturating_sub(first),
+            ..self
+        }
+    }
 }
 
-/// Runs the segments on all cores. `progress` is called after each with how many are done; it says whether to go on.
-pub fn run(options: &SoakOptions, progress: impl Fn(u64) -> bool + Sync) -> SoakReport {
+/// How far a run has come.
+#[derive(Debug, Clone, Copy)]
+pub struct RunProgress<'a> {
+    /// Segments that are done.
+    pub done: u64,
+    /// Every segment before this one is done: a run that is killed here is continued with it.
+    pub continue_with: u64,
+    /// The segment that was done just now.
+    pub newest: &'a Tally,
+}
+
+/// What the cores share.
+#[derive(Default)]
+struct Done {
+    tallies: Vec<Tally>,
+    /// The first segment that is not done.
+    next: u64,
+    /// Those after it that are.
+    ahead: BTreeSet<u64>,
+}
+
+impl Done {
+    fn take(&mut self, tally: Tally) {
+        self.ahead.insert(tally.segment);
+        self.tallies.push(tally);
+        while self.ahead.remove(&self.next) {
+            self.next += 1;
+        }
+    }
+}
+
+/// Runs the segments on all cores. `progress` is called after each, one call at a time; it says whether to go on.
+pub fn run(options: &SoakOptions, progress: impl Fn(&RunProgress<'_>) -> bool + Sync) -> SoakReport {
     let began = Instant::now();
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let (next, done) = (AtomicU64::new(0), AtomicU64::new(0));
-    let tallies = Mutex::new(Vec::new());
+    let next = AtomicU64::new(0);
+    let done = Mutex::new(Done {
+        next: options.first,
+        ..Done::default()
+    });
     std::thread::scope(|scope| {
         for _ in 0..cores.min(usize::try_from(options.segments).unwrap_or(cores)) {
             scope.spawn(|| {
@@ -79,18 +124,24 @@ pub fn run(options: &SoakOptions, progress: impl Fn(u64) -> bool + Sync) -> Soak
                     }
                     let tally = segment::run(options.seed, options.first + index);
                     // A thread that panicked leaves what it had pushed, and its panic ends the scope.
-                    tallies
-                        .lock()
-                        .unwrap_or_else(std::sync::PoisonError::into_inner)
-                        .push(tally);
-                    if !progress(done.fetch_add(1, Ordering::Relaxed) + 1) {
+                    let mut done = done.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                    done.take(tally);
+                    let goes_on = done.tallies.last().is_none_or(|newest| {
+                        progress(&RunProgress {
+                            done: done.tallies.len() as u64,
+                            continue_with: done.next,
+                            newest,
+                        })
+                    });
+                    if !goes_on {
                         next.store(options.segments, Ordering::Relaxed);
                     }
                 }
             });
         }
     });
-    let mut tallies: Vec<Tally> = tallies.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut tallies = done.tallies;
     tallies.sort_by_key(|tally| tally.segment);
     SoakReport::of(options.seed, &tallies, began.elapsed().as_secs_f64())
 }

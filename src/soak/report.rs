@@ -15,6 +15,8 @@ pub const QUANTITIES: [&str; 6] = [
 
 /// Findings that are listed; more are only counted.
 const LISTED: usize = 20;
+/// Findings of one sort that are listed, so that a frequent sort does not hide the others.
+const LISTED_OF_A_SORT: usize = 3;
 
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -39,10 +41,48 @@ pub struct Finding {
     pub segment: u64,
     /// Time in the segment, s.
     pub time_s: f64,
+    /// Which sort it is of: the rule, or the alarm, and the fault under way.
+    pub sort: String,
     /// What happened.
     pub text: String,
     /// A command line that runs exactly this segment again.
     pub command: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:?} at {:.3} s of segment {}: {}\n  {}",
+            self.kind, self.time_s, self.segment, self.text, self.command
+        )
+    }
+}
+
+/// How many findings are of one sort.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SortCount {
+    /// What is wrong.
+    pub kind: FindingKind,
+    /// The sort: the rule, or the alarm, and the fault under way.
+    pub sort: String,
+    /// How many findings.
+    pub findings: u64,
+    /// In how many segments.
+    pub segments: u64,
+}
+
+/// What is wrong in a segment.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// What.
+    pub kind: FindingKind,
+    /// Time in the segment, s.
+    pub time_s: f64,
+    /// Which sort it is of: the rule, or the alarm, and the fault under way.
+    pub sort: String,
+    /// What happened.
+    pub text: String,
 }
 
 /// One kind of fault.
@@ -124,8 +164,22 @@ pub struct Tally {
     pub faults: Vec<FaultTally>,
     /// By energy.
     pub energies: [ErrorSums; QUANTITIES.len()],
-    /// What is wrong: kind, time in the segment in s, and what happened.
-    pub findings: Vec<(FindingKind, f64, String)>,
+    /// What is wrong.
+    pub findings: Vec<Found>,
+}
+
+impl Tally {
+    /// What is wrong in this segment of a soak with a seed.
+    pub fn findings_of(&self, seed: u64) -> impl Iterator<Item = Finding> + '_ {
+        self.findings.iter().map(move |found| Finding {
+            kind: found.kind,
+            segment: self.segment,
+            time_s: found.time_s,
+            sort: found.sort.clone(),
+            text: found.text.clone(),
+            command: format!("wormd soak --seed {seed} --segment {}", self.segment),
+        })
+    }
 }
 
 /// What a soak found.
@@ -165,7 +219,9 @@ pub struct SoakReport {
     pub faults: Vec<FaultTally>,
     /// Energy per settled cycle without a fault, against the virtual worm's ledger.
     pub energies: Vec<EnergyError>,
-    /// The first things that are wrong, in the order of the segments, broken invariants first.
+    /// How many findings there are of each sort.
+    pub sorts: Vec<SortCount>,
+    /// The first things that are wrong of each sort, in the order of the segments, broken invariants first.
     pub findings: Vec<Finding>,
 }
 
@@ -174,7 +230,7 @@ impl SoakReport {
     pub fn of(seed: u64, tallies: &[Tally], took_s: f64) -> Self {
         let sum = |part: fn(&Tally) -> u64| tallies.iter().map(part).sum::<u64>();
         let count = |kind| {
-            let of_kind = |tally: &Tally| tally.findings.iter().filter(|finding| finding.0 == kind).count() as u64;
+            let of_kind = |tally: &Tally| tally.findings.iter().filter(|finding| finding.kind == kind).count() as u64;
             tallies.iter().map(of_kind).sum::<u64>()
         };
         let hours = tallies.iter().map(|tally| tally.time_s).sum::<f64>() / 3600.0;
@@ -205,20 +261,16 @@ impl SoakReport {
                 worst_percent: sums.worst,
             }
         });
-        let mut findings: Vec<Finding> = tallies
-            .iter()
-            .flat_map(|tally| {
-                tally.findings.iter().map(|(kind, time_s, text)| Finding {
-                    kind: *kind,
-                    segment: tally.segment,
-                    time_s: *time_s,
-                    text: text.clone(),
-                    command: format!("wormd soak --seed {seed} --segment {}", tally.segment),
-                })
-            })
-            .collect();
-        findings.sort_by_key(|finding| (finding.kind, finding.segment));
-        findings.truncate(LISTED);
+        let mut all: Vec<Finding> = tallies.iter().flat_map(|tally| tally.findings_of(seed)).collect();
+        all.sort_by_key(|finding| (finding.kind, finding.segment));
+        let sorts = count_sorts(&all);
+        let mut listed: Vec<Finding> = Vec::new();
+        for finding in all {
+            let is_like = |other: &&Finding| (other.kind, &other.sort) == (finding.kind, &finding.sort);
+            if listed.len() < LISTED && listed.iter().filter(is_like).count() < LISTED_OF_A_SORT {
+                listed.push(finding);
+            }
+        }
         Self {
             seed,
             segments: tallies.len() as u64,
@@ -237,7 +289,8 @@ impl SoakReport {
             broken: count(FindingKind::Invariant),
             faults,
             energies: energies.collect(),
-            findings,
+            sorts,
+            findings: listed,
         }
     }
 
@@ -245,6 +298,31 @@ impl SoakReport {
     pub fn passed(&self) -> bool {
         self.findings.is_empty()
     }
+}
+
+/// Counts the findings of each sort, the most frequent of each kind first.
+fn count_sorts(findings: &[Finding]) -> Vec<SortCount> {
+    let mut sorts: Vec<SortCount> = Vec::new();
+    let mut last_segments: Vec<u64> = Vec::new();
+    for finding in findings {
+        let is_like = |sort: &SortCount| (sort.kind, &sort.sort) == (finding.kind, &finding.sort);
+        let index = sorts.iter().position(is_like).unwrap_or_else(|| {
+            sorts.push(SortCount {
+                kind: finding.kind,
+                sort: finding.sort.clone(),
+                findings: 0,
+                segments: 0,
+            });
+            last_segments.push(u64::MAX);
+            sorts.len() - 1
+        });
+        sorts[index].findings += 1;
+        if std::mem::replace(&mut last_segments[index], finding.segment) != finding.segment {
+            sorts[index].segments += 1;
+        }
+    }
+    sorts.sort_by_key(|sort| (sort.kind, std::cmp::Reverse(sort.findings)));
+    sorts
 }
 
 impl fmt::Display for SoakReport {
@@ -292,13 +370,58 @@ impl fmt::Display for SoakReport {
                 energy.energy, energy.mean_percent, energy.rms_percent, energy.worst_percent, energy.cycles
             )?;
         }
+        if !self.sorts.is_empty() {
+            writeln!(f, "\n{:<12} {:>8} {:>8}  what", "wrong", "findings", "segments")?;
+        }
+        for sort in &self.sorts {
+            let kind = format!("{:?}", sort.kind);
+            writeln!(f, "{kind:<12} {:>8} {:>8}  {}", sort.findings, sort.segments, sort.sort)?;
+        }
         for finding in &self.findings {
-            write!(
-                f,
-                "\n{:?} at {:.3} s of segment {}: {}\n  {}",
-                finding.kind, finding.time_s, finding.segment, finding.text, finding.command
-            )?;
+            write!(f, "\n{finding}")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frequent sort is counted and listed thrice; it hides none of the others.
+    #[test]
+    fn every_sort_of_finding_is_counted_and_listed() {
+        let found = |kind, sort: &str| Found {
+            kind,
+            time_s: 1.0,
+            sort: sort.to_owned(),
+            text: sort.to_owned(),
+        };
+        let mut tallies: Vec<Tally> = (0..40)
+            .map(|segment| Tally {
+                segment,
+                findings: vec![
+                    found(FindingKind::FalseAlarm, "often"),
+                    found(FindingKind::FalseAlarm, "often"),
+                ],
+                ..Tally::default()
+            })
+            .collect();
+        tallies[39].findings.push(found(FindingKind::FalseAlarm, "once"));
+        tallies[38].findings.push(found(FindingKind::Invariant, "rule"));
+        let report = SoakReport::of(1, &tallies, 1.0);
+        assert_eq!((report.alarms_false, report.broken, report.passed()), (81, 1, false));
+        let sorts: Vec<_> = report
+            .sorts
+            .iter()
+            .map(|sort| (sort.sort.as_str(), sort.findings, sort.segments))
+            .collect();
+        assert_eq!(sorts, [("rule", 1, 1), ("often", 80, 40), ("once", 1, 1)]);
+        let listed: Vec<_> = report.findings.iter().map(|finding| finding.sort.as_str()).collect();
+        assert_eq!(listed, ["rule", "often", "often", "often", "once"]);
+        assert!(
+            report.to_string().contains("FalseAlarm         80       40  often"),
+            "{report}"
+        );
     }
 }

@@ -5,7 +5,7 @@ mod judgement;
 use super::draw::{self, Cause, Drawn, ROWS};
 use super::invariants::{Invariants, Truth};
 use super::machine::{Machine, Wired};
-use super::report::{FaultTally, FindingKind, Tally};
+use super::report::{FaultTally, FindingKind, Found, Tally};
 use super::session::{Paused, Session, Tick};
 use super::{RATE_HZ, SEGMENT_S, STEP_S, worm};
 use crate::link::virtual_worm::{Options, PlantLedger};
@@ -47,6 +47,8 @@ struct Segment {
     alarms_seen: usize,
     last_mode: Mode,
     episode: Option<Episode>,
+    /// How warm the servo's case was before it was overheated, °C.
+    cool_c: Option<f64>,
     /// Time from which on cycles are undisturbed, s.
     undisturbed_since_s: f64,
     /// Cycles of the ledger that were looked at, and the newest ones with their ends.
@@ -79,7 +81,12 @@ pub fn run(seed: u64, number: u64) -> Tally {
             segment.close()
         }
         Err(error) => Tally {
-            findings: vec![(FindingKind::Invariant, 0.0, format!("a sound worm starts: {error}"))],
+            findings: vec![Found {
+                kind: FindingKind::Invariant,
+                time_s: 0.0,
+                sort: "a sound worm starts".to_owned(),
+                text: format!("a sound worm starts: {error}"),
+            }],
             ..tally
         },
     }
@@ -103,6 +110,7 @@ impl Segment {
             alarms_seen: 0,
             last_mode: Mode::Disarmed,
             episode: None,
+            cool_c: None,
             undisturbed_since_s: 0.0,
             ledger_seen: 0,
             accounts: VecDeque::new(),
@@ -190,6 +198,11 @@ impl Segment {
             explains_until_s: None,
             drawn: drawn.clone(),
         });
+        if drawn.row.overheats {
+            // Of two in a row, the first found it cool.
+            let case_c = self.session.machine.plant().motor().case_c();
+            self.cool_c = Some(self.cool_c.map_or(case_c, |cool_c| cool_c.min(case_c)));
+        }
         let lasts_s = drawn.lasts_s;
         match &drawn.cause {
             Cause::VirtualWorm(spec) => {
@@ -338,7 +351,7 @@ impl Segment {
         while self.alarms_seen < self.session.raised.len() {
             let alarm = self.session.raised[self.alarms_seen];
             self.alarms_seen += 1;
-            self.take_alarm(&alarm);
+            self.take_alarm(&alarm, &tick.state);
         }
         self.take_mode(&tick.state)?;
         for cycle in self.session.cycles.as_mut().map(std::mem::take).unwrap_or_default() {

@@ -106,7 +106,8 @@ fn a_controller_whose_log_nobody_reads_crawls_and_heeds_commands_and_signals() {
     let port = crawling.worm.port();
     let pty = full_terminal();
     let control = crawling.worm.wormd(&["control", "--port", &port, "-vv"]);
-    crawling.controller = control.start_logging_to(pty.slave);
+    // Neither the log nor the line "ready" finds a reader.
+    crawling.controller = control.start_in(pty.slave);
     make_crawl_again(&crawling.worm);
     for order in [CommandKind::Hold, CommandKind::Crawl, CommandKind::Stop] {
         assert_eq!(crawling.worm.order(order), CommandOutcome::Accepted, "{order}");

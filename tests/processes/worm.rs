@@ -318,12 +318,6 @@ impl Invocation {
         self.spawn()
     }
 
-    /// Starts it with this terminal for its log, and discards its standard output.
-    pub fn start_logging_to(mut self, terminal: OwnedFd) -> Process {
-        self.command.stdout(Stdio::null()).stderr(terminal);
-        self.spawn()
-    }
-
     /// Starts it with a terminal of its own.
     pub fn start_in(mut self, terminal: OwnedFd) -> Process {
         let copy = || terminal.try_clone().expect("a descriptor is free");

@@ -1,8 +1,9 @@
 //! What each fault of the virtual worm brings about: which alarms, which fault of the controller, by when, and nothing else.
 
-use super::harness::{Obeying, config, crawling, wired};
+use super::harness::{self, Obeying, config, crawling, wired};
 use std::fmt::Write;
 use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
+use wormd::control::{Service, ServiceOutcome};
 use wormd::link::virtual_worm::Options;
 use wormd::soak::Machine;
 
@@ -271,17 +272,17 @@ slope, fault: alarms and how long after it they came, how it ended
  0° friction-inside:scale=3    energy-over-budget 3.84 s, crawling
  0° battery:charge=0.08@0      battery-low 13.31 s, crawling
  0° sag:volts=1.4              device-fault 0.26 s, fault (under-voltage)
- 0° silence:device=servo       link-fault 0.10 s, tracker-fault 0.50 s, fault (link-lost)
+ 0° silence:device=servo       link-fault 0.10 s, tracker-fault 0.67 s, fault (link-lost)
  0° silence:device=tracker     tracker-fault 0.50 s, fault (tracker-stale)
- 0° blind:cell=3               tracker-fault 0.58 s, crawling
- 0° dropout:share=0.6          tracker-fault 0.86 s, crawling
+ 0° blind:cell=3               tracker-fault 0.59 s, crawling
+ 0° dropout:share=0.6          tracker-fault 0.84 s, crawling
  0° dropout:share=0.1          crawling
  0° noise:m=0.0005             crawling
  0° overheat:ambient=90        device-fault 0.98 s, fault (over-temperature)
  0° hardware-error:bits=32     device-fault 0.00 s, fault (servo-hardware)
  0° reboot:off=0.05            link-fault 0.10 s, device-fault 0.16 s, fault (servo-restarted)
- 0° drop:share=0.3             link-fault 0.41 s, crawling
- 0° corrupt:share=0.3          link-fault 0.97 s, crawling
+ 0° drop:share=0.3             link-fault 0.44 s, crawling
+ 0° corrupt:share=0.3          link-fault 0.94 s, crawling
  0° drop:share=0.02            crawling
  0° delay:ms=2                 crawling
  0° drag:force=0.3             model-mismatch 11.33 s, crawling
@@ -333,4 +334,46 @@ fn once_the_cause_is_over_a_reset_lets_the_worm_crawl_on() {
         let cycles = session.machine.plant().body().phase() - phase;
         assert!((cycles - 7.95).abs() < 0.02, "{fault}: {cycles} cycles in 20 s");
     }
+}
+
+/// Each attempt takes a third of a second, in which the controller asks for no sample. The tracker is not at fault.
+#[test]
+fn attempts_to_arm_a_servo_that_is_too_hot_are_no_silence_of_the_tracker() {
+    let config = config(LEVEL);
+    let options = Options {
+        faults: vec!["overheat:ambient=75@9".parse().expect("a fault")],
+        ..Options::default()
+    };
+    for rate_hz in [250.0, 1000.0] {
+        let mut session = crawling(&config, wired(&config, &options), rate_hz);
+        session.run_s(5.0, |_| {});
+        session.command(CommandKind::Stop, 0.0);
+        session.run_s(12.0, |_| {});
+        for _ in 0..10 {
+            let began_s = session.now_s();
+            session.command(CommandKind::Arm, 0.0);
+            assert!(session.now_s() > began_s + 0.2, "{rate_hz} Hz: it takes its time");
+            session.run_s(0.5, |_| {});
+            assert_eq!(session.mode(), Mode::Disarmed, "{rate_hz} Hz: it is still too hot");
+        }
+        assert_eq!(session.raised_kinds(), [DeviceFault], "{rate_hz} Hz");
+    }
+}
+
+/// Arming restarts a servo with a hardware error and waits two seconds for it, of the worm's time: however fast this computer is.
+#[test]
+fn a_servo_that_does_not_come_back_is_waited_for_in_the_worms_time() {
+    let config = config(LEVEL);
+    let mut session = harness::session(&config, wired(&config, &Options::default()), 250.0);
+    session.run_s(0.1, |_| {});
+    for fault in ["hardware-error:bits=32", "silence:device=servo@0.03"] {
+        let fault = fault.parse().expect("a fault");
+        session.machine.switch_on(fault).expect("this worm can have it");
+        session.run_s(0.008, |_| {});
+    }
+    let began_s = session.now_s();
+    let tick = session.send(CommandKind::Arm, 0.0);
+    assert_eq!(tick.service, Some(ServiceOutcome::Failed(Service::Arm)));
+    let took_s = session.now_s() - began_s;
+    assert!((1.9..2.5).contains(&took_s), "{took_s} s");
 }

@@ -128,3 +128,28 @@ fn a_sound_worm_stays_far_from_the_threshold_of_a_stall() {
         );
     }
 }
+
+/// When the voltage drops at once, the servo's own loop makes up for it slowly. Until then a fast worm turns too slowly by more than the
+/// alarm allows for: that is reported, and true.
+#[test]
+fn a_sudden_sag_stalls_a_fast_worm_truly() {
+    const CYCLE_S: f64 = 1.1;
+    let config = config(&format!("gait.cycle_s = {CYCLE_S}\n"));
+    for (volts, lags) in [(1.78, true), (0.4, false)] {
+        let wired = wired(&config, &options(&[format!("sag:volts={volts}@8.1..9")]));
+        let mut session = crawling(&config, wired, 1000.0);
+        session.run_s(8.05, |_| {});
+        let mut slowest: f64 = 1.0;
+        session.run_s(0.3, |tick| {
+            if tick.state.mode == Mode::Crawling.code() {
+                slowest = slowest.min(tick.state.motor_velocity_rad_s * CYCLE_S / std::f64::consts::TAU);
+            }
+        });
+        assert_eq!(
+            session.raised_kinds().contains(&AlarmKind::MotorStall),
+            lags,
+            "{volts} V"
+        );
+        assert_eq!(slowest < 0.8, lags, "{volts} V: {slowest} of the command");
+    }
+}

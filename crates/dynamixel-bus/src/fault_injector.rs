@@ -147,6 +147,14 @@ impl<P: Port> FaultInjector<P> {
 }
 
 impl<P: Port> Port for FaultInjector<P> {
+    fn now(&self) -> Instant {
+        self.port.now()
+    }
+
+    fn pass_time(&mut self, time: Duration) -> Result<(), PortError> {
+        self.port.pass_time(time)
+    }
+
     fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), PortError> {
         self.requests += 1;
         self.answer_left = if self.happens(self.faults.truncate) {

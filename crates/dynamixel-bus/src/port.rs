@@ -1,6 +1,6 @@
 //! The interface between a bus and a serial port: sending and receiving with deadlines.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// A serial port with bounded waits.
 ///
@@ -31,9 +31,31 @@ pub trait Port {
     /// # Errors
     /// [`PortError::Os`] when the port does not have it.
     fn set_baud_rate(&mut self, baud: u32) -> Result<(), PortError>;
+
+    /// The time at this port. A simulated port has its own.
+    fn now(&self) -> Instant {
+        Instant::now()
+    }
+
+    /// Waits while nothing is sent or received.
+    ///
+    /// # Errors
+    /// [`PortError`] when a simulated port cannot go on.
+    fn pass_time(&mut self, time: Duration) -> Result<(), PortError> {
+        std::thread::sleep(time);
+        Ok(())
+    }
 }
 
 impl<P: Port + ?Sized> Port for &mut P {
+    fn now(&self) -> Instant {
+        (**self).now()
+    }
+
+    fn pass_time(&mut self, time: Duration) -> Result<(), PortError> {
+        (**self).pass_time(time)
+    }
+
     fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), PortError> {
         (**self).send(bytes, deadline)
     }

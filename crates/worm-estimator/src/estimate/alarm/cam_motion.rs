@@ -26,6 +26,10 @@ const STEADY_UNITS: f64 = 0.3;
 const REGIME_FRACTION: f64 = 0.05;
 /// Longest time step that is integrated, s: beyond it states were lost or the controller paused.
 const LONGEST_STEP_S: f64 = 1.0;
+/// Lowest fraction of the configured rate at which the loop ticks: see `control.adapt_rate`.
+pub(super) const MIN_RATE_FRACTION: f64 = 0.125;
+/// A tick that takes longer than this is none that was merely late, s: it ended with a service, such as arming.
+const SHORTEST_SERVICE_S: f64 = 0.01;
 
 /// One tick, as the detectors need it.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +37,8 @@ pub(super) struct Tick {
     pub now_ns: u64,
     /// Since the previous tick, s; 0 in the first one and after a restart.
     pub step_s: f64,
-    /// The part of it in which the computer did not pause, s: in which the devices could be heard.
+    /// The part of it in which the devices could be heard, s: in which the computer did not pause, and no service of the servo (such as
+    /// arming, 0.3 s) kept the controller from asking.
     pub present_s: f64,
     /// Motor time since the last reading before this tick, s: less than the time that passed where a simulated motor stood still with
     /// its computer.
@@ -65,6 +70,7 @@ pub(super) struct Tick {
 /// Follows the cam from tick to tick.
 #[derive(Debug, Clone)]
 pub(super) struct CamMotion {
+    longest_tick_s: f64,
     last: Option<(u64, u64)>, // sequence and time of the last tick
     motor_time: MotorTime,
     read_ns: Option<u64>, // motor time of the last motor reading
@@ -84,6 +90,7 @@ pub(super) struct CamMotion {
 impl CamMotion {
     pub(super) fn new(config: &Config) -> Self {
         Self {
+            longest_tick_s: SHORTEST_SERVICE_S.max(1.0 / (MIN_RATE_FRACTION * config.control.rate_hz)),
             last: None,
             motor_time: MotorTime::default(),
             read_ns: None,
@@ -110,6 +117,10 @@ impl CamMotion {
             _ => 0.0,
         }
         .min(LONGEST_STEP_S);
+        let ticks = match self.last {
+            Some((sequence, _)) => state.sequence.saturating_sub(sequence).max(1),
+            None => 1,
+        };
         self.last = Some((state.sequence, state.time_ns));
         let motor_ns = self.motor_time.update(state);
         let seconds_since = |then_ns: u64, now_ns: u64| now_ns.saturating_sub(then_ns) as f64 * 1e-9;
@@ -142,7 +153,7 @@ impl CamMotion {
         Tick {
             now_ns: state.time_ns,
             step_s,
-            present_s: (step_s - paused_s).max(0.0),
+            present_s: (step_s - paused_s).clamp(0.0, ticks as f64 * self.longest_tick_s),
             motor_s,
             restarted,
             phase: self.phase,

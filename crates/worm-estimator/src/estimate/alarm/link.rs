@@ -4,7 +4,7 @@
 //! compared, so states that the estimator did not receive are counted, too. A late answer is not a failure: it comes from a busy computer,
 //! and `timing` shows that. The controller's own fault "link lost" raises the alarm at once.
 
-use super::cam_motion::Tick;
+use super::cam_motion::{MIN_RATE_FRACTION, Tick};
 use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Fault, Severity, State};
@@ -13,8 +13,6 @@ use crate::message::{Fault, Severity, State};
 const WINDOW_S: f64 = 0.5;
 /// Parts of the window; the oldest part falls out as a whole.
 const PARTS: usize = 10;
-/// Lowest fraction of the configured rate at which the loop ticks: see `control.adapt_rate`.
-const MIN_RATE_FRACTION: f64 = 0.125;
 
 #[derive(Debug, Clone)]
 pub(super) struct LinkFault {

@@ -2,7 +2,7 @@
 //!
 //! The estimator keeps the residual map (see [`crate::estimate::mismatch`], which also lists what is allowed for); this detector evaluates it
 //! whenever it has changed. The alarm is raised when something in the map exceeds `threshold`, in metres a cycle, with the confidence of
-//! the whole family, and cleared when nothing exceeds it any more. It is armed while the map has enough cycles; new bounds, a reversal or a
+//! the whole family, and cleared when nothing exceeds it any more; to it is added what identified bounds leave uncertain. It is armed while the map has enough cycles; new bounds, a reversal or a
 //! restart leave it unarmed until there are enough again.
 //!
 //! The value is the unexplained displacement, measured less modelled, along the crawl. The cell is the one that shows it best, and the
@@ -63,7 +63,7 @@ impl ModelMismatch {
         self.place = Some(found.at.phase);
         DetectorOutput::Measured(Reading {
             value: found.excess_m,
-            threshold: self.threshold_m,
+            threshold: found.allowed_m,
             verdict,
             since_ns: self.since_ns,
             cell: Some(found.at.cell),

@@ -5,7 +5,8 @@
 //!
 //! - **at rest** (cam still, in any mode, with or without torque): median displacement of the cells since rest began;
 //! - **crawling up or on the level**: how far the worm is below its highest point, less the baseline of the retraction at this gait phase
-//!   (calibrated; before that, half a stroke);
+//!   (calibrated; before that, half a stroke). With a cell out of sight, and for a cycle after, half a stroke again: while that cell steps,
+//!   only those are seen that it pushes back;
 //! - **crawling down**: displacement down in the last cycle (see [`super::stride`]) less the baseline per cycle; before that is calibrated,
 //!   and just after a reversal, a whole stroke, which is the most that a gait can gain.
 //!
@@ -28,6 +29,8 @@ const SMOOTHING: f64 = 0.2;
 const CONFIRMATIONS: u32 = 4;
 /// A displacement within this many standard deviations of the mean position is noise.
 const NOISE_SIGMAS: f64 = 4.0;
+/// The worm is as high as before, whatever was not seen, after this many cycles.
+const REGAINED_CYCLES: f64 = 1.0;
 /// Part of the threshold by which the worm must sink further to count as still sliding.
 const FURTHER_FRACTION: f64 = 0.25;
 /// The slide is over after this long without sinking further, s …
@@ -40,6 +43,8 @@ const OVER_CYCLES: f64 = 1.2;
 struct Retraction {
     sum_m: [f64; BINS],
     count: [u32; BINS],
+    /// The cells that were seen in all of it, as a mask.
+    cells: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,6 +69,7 @@ pub(super) struct SlidingDown {
     highest_m: f64,
     last: Positions,
     retraction: Retraction,
+    blind_phase: f64, // where a cell was last out of sight that the baseline has
     beyond: u32,
     lowest_excess_m: f64, // the largest excess while the alarm's condition holds
     sunk_ns: u64,         // when it last grew
@@ -95,7 +101,9 @@ impl SlidingDown {
             retraction: Retraction {
                 sum_m: [0.0; BINS],
                 count: [0; BINS],
+                cells: u32::MAX,
             },
+            blind_phase: f64::NEG_INFINITY,
             beyond: 0,
             lowest_excess_m: 0.0,
             sunk_ns: 0,
@@ -144,7 +152,7 @@ impl SlidingDown {
         }
         let excess_m = match crawl_state {
             CrawlState::Resting => self.rested(up),
-            CrawlState::Climbing => Some(self.climbed(tick, strides, baseline_m.is_some(), fault_free)),
+            CrawlState::Climbing => Some(self.climbed(tick, positions.mask, strides, baseline_m.is_some(), fault_free)),
             CrawlState::Descending => self.descended(tick, positions, strides, baseline_m),
         };
         match excess_m {
@@ -187,17 +195,22 @@ impl SlidingDown {
         moved_m.map(|metres| -metres * up)
     }
 
-    fn climbed(&mut self, tick: &Tick, strides: &Strides, baseline_is_known: bool, fault_free: bool) -> f64 {
+    fn climbed(&mut self, tick: &Tick, seen: u32, strides: &Strides, baseline_is_known: bool, fault_free: bool) -> f64 {
         let below_m = self.highest_m - self.height_m;
         let phase = tick.phase.unwrap_or(0.0);
         let bin = ((phase.rem_euclid(1.0) * BINS as f64) as usize).min(BINS - 1);
-        let Retraction { sum_m, count } = &mut self.retraction;
+        let Retraction { sum_m, count, cells } = &mut self.retraction;
         let calibrates = !baseline_is_known || count[bin] < self.calibration_cycles;
         if fault_free && calibrates && strides.can_calibrate() && below_m < 0.5 * self.stroke_m {
             sum_m[bin] += below_m;
             count[bin] += 1;
+            *cells &= seen;
         }
-        let baseline_m = if baseline_is_known && count[bin] > 0 {
+        if count[bin] > 0 && seen & *cells != *cells {
+            self.blind_phase = phase;
+        }
+        let is_blind = (phase - self.blind_phase).abs() < REGAINED_CYCLES;
+        let baseline_m = if baseline_is_known && count[bin] > 0 && !is_blind {
             sum_m[bin] / f64::from(count[bin])
         } else {
             0.5 * self.stroke_m

@@ -1,6 +1,6 @@
 //! Tracker fault: no samples, many lost, or a cell that is not seen.
 //!
-//! Over a sliding two seconds in which the computer did not pause: the fraction of samples that did not arrive (missed between two reads, or
+//! Over a sliding two seconds in which the controller asked (it does not while the computer pauses or a service takes its time): the fraction of samples that did not arrive (missed between two reads, or
 //! never sent), and for each cell the fraction of arrived samples in which it was not seen; the largest of them is monitored. A cell is named
 //! when all others are below half the threshold. No sample at all for the controller's tracker timeout raises the alarm at once, and so
 //! does the controller's own fault "tracker stale".

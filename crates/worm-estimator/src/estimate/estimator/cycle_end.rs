@@ -134,7 +134,8 @@ impl Estimator {
                 tip.bound_m = bound_m;
             }
             self.contacts.set_tips(&self.tips);
-            self.mismatch.set_identified(self.predictor.worm());
+            let standard_error = |weights: &[f64; MAX_CELLS]| identification.standard_error(weights);
+            self.mismatch.set_identified(self.predictor.worm(), standard_error);
             // With new bounds the contact points at the window's start have to be found anew.
             self.window_contact_m = [f64::NAN; MAX_CELLS];
             self.show_bounds();

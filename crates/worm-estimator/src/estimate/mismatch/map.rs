@@ -7,12 +7,17 @@
 
 use super::BINS;
 use super::reference_model::{ALLOWANCES, Part, ReferenceModel};
-use super::weighted_mean::{MeanEstimate, WeightedMean};
+use super::weighted_mean::{MIN_VALUES, MeanEstimate, WeightedMean};
 use std::f64::consts::TAU;
 use worm_physics::MAX_CELLS;
 
 /// Probability of a false alarm over the whole family, at one test.
 const FALSE_FRACTION: f64 = 0.05;
+/// Identified bounds are known to so many of their standard errors: what they leave uncertain in the model's motion is no mismatch.
+const MODEL_SIGMAS: f64 = 3.0;
+/// The last cycles count alone when all of them together are within the threshold, and the mean is more than this many thresholds off:
+/// it remembers something that is over.
+const OVER_THRESHOLDS: f64 = 2.0;
 /// Standard errors by which another cell than the stepping one must stand out to be named.
 const STANDS_OUT_SIGMAS: f64 = 4.0;
 
@@ -24,6 +29,12 @@ pub struct ResidualMap {
     stepping: [usize; MAX_CELLS],
     means: Vec<WeightedMean>, // [step][bin][cell]
     advance: WeightedMean,
+    recent_m: [Vec<f64>; MIN_VALUES as usize], // increments of the last cycles, the oldest first
+    spare: Vec<WeightedMean>, // the means of those cycles alone, while it is tried whether they count alone
+    model_sigma_m: Vec<f64>,  // standard error of the model's increments, where its bounds were identified
+    model_advance_sigma_m: f64,
+    by_bound: Vec<[f64; MAX_CELLS]>, // what each metre of a bound adds to each entry, m/m
+    threshold_m: f64,
     effects_m: [Vec<f64>; ALLOWANCES.len()], // for allowed deviations of 100 %
     allowed_m: Vec<f64>,                     // their best fit
     allowed_advance_m: f64,
@@ -68,12 +79,15 @@ pub struct Unexplained {
     pub significance: f64,
     /// Whether it exceeds the threshold with the confidence of the whole family.
     pub is_significant: bool,
+    /// The threshold, and what identified bounds leave uncertain there, m a cycle.
+    pub allowed_m: f64,
     /// Whether nothing in the map exceeds the threshold, significantly or not.
     pub is_within: bool,
 }
 
 impl ResidualMap {
-    pub(super) fn new(cells: usize) -> Self {
+    /// An empty map, to be held against a threshold in m a cycle.
+    pub(super) fn new(cells: usize, threshold_m: f64) -> Self {
         let size = cells * BINS * cells;
         Self {
             cells,
@@ -81,6 +95,12 @@ impl ResidualMap {
             stepping: [0; MAX_CELLS],
             means: vec![WeightedMean::default(); size],
             advance: WeightedMean::default(),
+            recent_m: std::array::from_fn(|_| vec![f64::NAN; size]),
+            spare: vec![WeightedMean::default(); size],
+            model_sigma_m: vec![0.0; size],
+            model_advance_sigma_m: 0.0,
+            by_bound: vec![[0.0; MAX_CELLS]; size],
+            threshold_m,
             effects_m: std::array::from_fn(|_| vec![0.0; size]),
             allowed_m: vec![0.0; size],
             allowed_advance_m: 0.0,
@@ -97,6 +117,7 @@ impl ResidualMap {
         }
         self.means.fill(WeightedMean::default());
         self.advance = WeightedMean::default();
+        self.recent_m.iter_mut().for_each(|cycle_m| cycle_m.fill(f64::NAN));
         for (effect_m, allowance) in self.effects_m.iter_mut().zip(&ALLOWANCES) {
             model.effect_of(allowance, effect_m);
         }
@@ -105,12 +126,65 @@ impl ResidualMap {
         self.revision += 1;
     }
 
+    /// Takes from the model what its identified bounds leave uncertain: `standard_error` is that of Σ wᵢ δmaxᵢ.
+    pub(super) fn set_uncertainty(
+        &mut self,
+        model: &ReferenceModel,
+        standard_error: impl Fn(&[f64; MAX_CELLS]) -> f64,
+    ) {
+        let effect_m = &mut self.model_sigma_m; // until it is overwritten
+        let mut advance = [0.0; MAX_CELLS];
+        for (cell, advance) in advance[..self.cells].iter_mut().enumerate() {
+            model.effect_of_bound(cell, effect_m);
+            *advance = effect_m.iter().sum::<f64>() / self.cells as f64;
+            for (by_bound, &effect_m) in self.by_bound.iter_mut().zip(effect_m.iter()) {
+                by_bound[cell] = effect_m;
+            }
+        }
+        let known = |sigma_m: f64| if sigma_m.is_finite() { sigma_m } else { 0.0 };
+        for (sigma_m, by_bound) in self.model_sigma_m.iter_mut().zip(&self.by_bound) {
+            *sigma_m = known(standard_error(by_bound));
+        }
+        self.model_advance_sigma_m = known(standard_error(&advance));
+    }
+
     /// Adds one cycle: an increment for each entry, `NaN` where it was not seen.
     pub(super) fn add(&mut self, increments_m: &[f64]) {
-        for (mean, &increment_m) in self.means.iter_mut().zip(increments_m) {
-            mean.add(increment_m);
+        self.recent_m.rotate_left(1);
+        if let Some(newest_m) = self.recent_m.last_mut() {
+            newest_m.copy_from_slice(increments_m);
         }
-        self.advance.add(increments_m.iter().sum::<f64>() / self.cells as f64);
+        add_cycle(self.cells, &mut self.means, &mut self.advance, increments_m);
+        self.estimate();
+        self.forget_what_is_over();
+        self.revision += 1;
+    }
+
+    /// A fault that moved the worm by centimetres would stay in the mean for some forty cycles.
+    fn forget_what_is_over(&mut self) {
+        let far_off = |unexplained: Unexplained| unexplained.excess_m.abs() > OVER_THRESHOLDS * unexplained.allowed_m;
+        if !self.unexplained(self.threshold_m).is_some_and(far_off) {
+            return;
+        }
+        let advance = std::mem::take(&mut self.advance);
+        std::mem::swap(&mut self.means, &mut self.spare);
+        self.means.fill(WeightedMean::default());
+        for cycle_m in &self.recent_m {
+            add_cycle(self.cells, &mut self.means, &mut self.advance, cycle_m);
+        }
+        self.estimate();
+        if !self
+            .unexplained(self.threshold_m)
+            .is_some_and(|recent| recent.is_within)
+        {
+            self.advance = advance;
+            std::mem::swap(&mut self.means, &mut self.spare);
+            self.estimate();
+        }
+    }
+
+    /// What follows from the means: their scatter, and the allowed deviations.
+    fn estimate(&mut self) {
         let (mut sum, mut count) = (0.0, 0.0);
         for variance in self.means.iter().filter_map(WeightedMean::variance) {
             sum += variance;
@@ -118,7 +192,6 @@ impl ResidualMap {
         }
         self.pooled = if count > 0.0 { sum / count } else { 0.0 };
         self.allow();
-        self.revision += 1;
     }
 
     /// Fits the allowed deviations by least squares, each to the part of the motion in which it shows, and within its limit.
@@ -205,14 +278,16 @@ impl ResidualMap {
         let advance_m = advance.mean - self.allowed_advance_m;
         let limit = normal_quantile_beyond(FALSE_FRACTION / (self.size() + 1) as f64);
         let mut worst: Option<(f64, usize, Residual)> = None;
-        let mut is_within = advance_m.abs() <= threshold_m;
+        let allowed_advance_m = threshold_m + MODEL_SIGMAS * self.model_advance_sigma_m;
+        let mut is_within = advance_m.abs() <= allowed_advance_m;
         for index in 0..self.size() {
             let Some((residual, known)) = self.entry(index) else {
                 continue;
             };
-            is_within &= residual.unexplained_m.abs() <= threshold_m;
+            let allowed_m = threshold_m + MODEL_SIGMAS * self.model_sigma_m[index];
+            is_within &= residual.unexplained_m.abs() <= allowed_m;
             // Those above the threshold first; below it, the most significant.
-            let rank = known.beyond(residual.unexplained_m, threshold_m);
+            let rank = known.beyond(residual.unexplained_m, allowed_m);
             let larger = |(max, _, than): &(f64, usize, Residual)| {
                 rank > *max || (rank == *max && residual.significance().abs() > than.significance().abs())
             };
@@ -221,7 +296,7 @@ impl ResidualMap {
             }
         }
         let (rank, index, _) = worst?;
-        let advance_rank = advance.beyond(advance_m, threshold_m);
+        let advance_rank = advance.beyond(advance_m, allowed_advance_m);
         if advance_rank > rank {
             let at = self.carrier_of(advance_m)?;
             return Some(Unexplained {
@@ -229,6 +304,7 @@ impl ResidualMap {
                 excess_m: advance_m,
                 significance: advance_m / advance.sigma,
                 is_significant: advance_rank > limit,
+                allowed_m: allowed_advance_m,
                 is_within,
             });
         }
@@ -238,6 +314,7 @@ impl ResidualMap {
             excess_m: at.unexplained_m,
             significance: at.significance(),
             is_significant: rank > limit,
+            allowed_m: threshold_m + MODEL_SIGMAS * self.model_sigma_m[index],
             is_within,
         })
     }
@@ -274,6 +351,15 @@ impl ResidualMap {
             _ => Some(largest),
         }
     }
+}
+
+fn add_cycle(cells: usize, means: &mut [WeightedMean], advance: &mut WeightedMean, increments_m: &[f64]) {
+    let mut sum_m = 0.0;
+    for (mean, &increment_m) in means.iter_mut().zip(increments_m) {
+        mean.add(increment_m);
+        sum_m += increment_m;
+    }
+    advance.add(sum_m / cells as f64);
 }
 
 /// The z beyond which at most this probability of the normal distribution lies, for probabilities up to 1 %: from Mills' bound on the

@@ -28,6 +28,13 @@
 //! of the weight of the next, so a mismatch that was there from the start is reported after five cycles, or some more when it is just
 //! above the threshold: friction that scatters by 1 % from cycle to cycle moves each advance by 0.02 mm. One that appears later must first outweigh what was before: 8 to 13 cycles.
 //!
+//! The alarm clears when nothing in the map exceeds the threshold any more. One that was large would stay in the mean for long: a slide by
+//! 40 mm a cycle for 41 cycles. So when the mean is far off, but the last four cycles by themselves are within the threshold everywhere,
+//! what was before is over and forgotten.
+//!
+//! Bounds that were identified are known to their standard errors only, and so is the motion of a model that has them: 0.1 mm a cycle
+//! with a noisy tracker (0.3 mm). Three standard errors of each entry and of the advance are added to the threshold there.
+//!
 //! # What cannot be detected, and what is allowed for
 //! Recalibration hides effects, so there is little of it.
 //!
@@ -76,9 +83,9 @@ pub(super) struct Mismatch {
 }
 
 impl Mismatch {
-    /// For the configured worm, in forward direction.
-    pub(super) fn new(worm: &Worm) -> Self {
-        let map = ResidualMap::new(worm.cells());
+    /// For the configured worm, in forward direction, against a threshold in m a cycle.
+    pub(super) fn new(worm: &Worm, threshold_m: f64) -> Self {
+        let map = ResidualMap::new(worm.cells(), threshold_m);
         let mut new = Self {
             model: ReferenceModel::new(worm),
             step: vec![f64::NAN; map.size()],
@@ -91,11 +98,12 @@ impl Mismatch {
         new
     }
 
-    /// Starts over with bounds that were identified in the present direction.
-    pub(super) fn set_identified(&mut self, worm: &Worm) {
+    /// Starts over with bounds that were identified in the present direction; `standard_error` is that of Σ wᵢ δmaxᵢ.
+    pub(super) fn set_identified(&mut self, worm: &Worm, standard_error: impl Fn(&[f64; MAX_CELLS]) -> f64) {
         self.model.set_worm(worm);
         self.identified_in = Some(self.map.direction());
         self.clear(self.map.direction());
+        self.map.set_uncertainty(&self.model, standard_error);
     }
 
     /// Starts a cycle that does not continue the last one, or runs in the other direction.

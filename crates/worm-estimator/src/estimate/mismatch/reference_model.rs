@@ -50,6 +50,9 @@ pub(super) struct Allowance {
     deviate: fn(Worm, f64) -> Result<Worm, WormError>,
 }
 
+/// By how much a bound is changed to see what its error does, as a fraction.
+const BOUND_FRACTION: f64 = 0.02;
+
 /// The model's worm, its motion since the last start, and its path over the two cycles of the window.
 ///
 /// Like the window it looks along the crawl: a backward crawl is that of the mirrored worm, which runs forward.
@@ -126,9 +129,24 @@ impl ReferenceModel {
 
     /// What an allowed deviation of 100 % would add to each entry of the map, m; zeros where such a worm cannot hold.
     pub(super) fn effect_of(&self, allowance: &Allowance, effect_m: &mut [f64]) {
+        let deviating = (allowance.deviate)(self.worm().clone(), allowance.max);
+        self.effect(deviating, allowance.max, effect_m);
+    }
+
+    /// What each metre of a cell's bound would add to each entry of the map, m/m; zeros where such a worm cannot hold.
+    pub(super) fn effect_of_bound(&self, cell: usize, effect_m: &mut [f64]) {
+        let mut contact = self.worm().contact(cell);
+        let added_m = BOUND_FRACTION * contact.forward_bound_m;
+        contact.forward_bound_m += added_m;
+        contact.backward_bound_m += added_m;
+        self.effect(self.worm().clone().with_contact(cell, contact), added_m, effect_m);
+    }
+
+    /// What a deviation adds to each entry of the map, for each unit of its `size`.
+    fn effect(&self, deviating: Result<Worm, WormError>, size: f64, effect_m: &mut [f64]) {
         effect_m.fill(0.0);
         let cells = self.worm().cells();
-        let Ok(deviating) = (allowance.deviate)(self.worm().clone(), allowance.max) else {
+        let Ok(deviating) = deviating else {
             return;
         };
         let (mut is, mut would_be) = (at_rest(self.worm()), at_rest(&deviating));
@@ -138,7 +156,7 @@ impl ReferenceModel {
             would_be.advance_to(&deviating, phase)?;
             let mut difference_m = [0.0; MAX_CELLS];
             for (cell, to) in difference_m[..cells].iter_mut().enumerate() {
-                *to = (would_be.positions_m()[cell] - is.positions_m()[cell]) / allowance.max;
+                *to = (would_be.positions_m()[cell] - is.positions_m()[cell]) / size;
             }
             Ok(difference_m)
         };

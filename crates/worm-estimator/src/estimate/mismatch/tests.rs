@@ -12,7 +12,7 @@ const NOISE_M: f64 = 3e-5;
 
 /// A map of the paper's worm over so many cycles of noise, and what `add` adds to step, bin and cell.
 fn map_of(cycles: usize, seed: u64, add: impl Fn(usize, usize, usize) -> f64) -> ResidualMap {
-    let mut map = ResidualMap::new(CELLS);
+    let mut map = ResidualMap::new(CELLS, THRESHOLD_M);
     map.clear(1, &ReferenceModel::new(&Worm::paper()));
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     for _ in 0..cycles {
@@ -131,4 +131,55 @@ fn a_small_deviation_of_the_stroke_is_allowed_for() {
     let long = with_fraction(0.06);
     // 4 % of 11.5 mm, once a cycle for each cell.
     assert!(long.is_significant && (long.excess_m - 4.6e-4).abs() < 3e-5, "{long:?}");
+}
+
+/// 40 mm a cycle are forgotten as soon as four cycles fit the model; what goes on, or comes back, is not.
+#[test]
+fn what_is_over_is_forgotten() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
+    let mut map = map_of(12, 4, |_, bin, _| if bin == 1 { 1e-2 } else { 0.0 });
+    let mut add_cycle = |map: &mut ResidualMap, more_m: f64| {
+        let increments_m: Vec<f64> = (0..map.size())
+            .map(|_| {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                NOISE_M * noise + more_m
+            })
+            .collect();
+        map.add(&increments_m);
+        let found = map.unexplained(THRESHOLD_M).expect("enough cycles");
+        (found.is_significant, found.is_within)
+    };
+    for _ in 0..3 {
+        assert!(!add_cycle(&mut map, 0.0).1, "three cycles are not enough");
+    }
+    assert_eq!(add_cycle(&mut map, 0.0), (false, true));
+    // One cycle in four goes on as before: nothing is over.
+    let mut map = map_of(12, 5, |_, bin, _| if bin == 1 { 1e-2 } else { 0.0 });
+    for cycle in 0..24 {
+        let more_m = if cycle % 4 == 3 { 2.5e-3 } else { 0.0 };
+        assert!(!add_cycle(&mut map, more_m).1, "cycle {cycle}");
+    }
+}
+
+/// What identified bounds leave uncertain is added to the threshold, three standard errors of it.
+#[test]
+fn uncertain_bounds_are_allowed_for() {
+    let model = ReferenceModel::new(&Worm::paper());
+    let found = |sigma_m: f64| {
+        let mut map = map_of(20, 6, |_, bin, _| if bin == 1 { 1e-4 } else { 0.0 });
+        map.set_uncertainty(&model, |weights| {
+            sigma_m * weights.iter().map(|weight| weight * weight).sum::<f64>().sqrt()
+        });
+        map.unexplained(THRESHOLD_M).expect("enough cycles")
+    };
+    // 0.1 mm in each of four steps.
+    let known = found(0.0);
+    assert!(known.is_significant && !known.is_within && (known.excess_m - 4e-4).abs() < 5e-5);
+    assert!((known.allowed_m - THRESHOLD_M).abs() < 1e-12);
+    // With bounds off by 0.05 mm at each tip the advance of a cycle may be off by a fifth of a millimetre.
+    let uncertain = found(5e-5);
+    assert!(
+        uncertain.is_within && !uncertain.is_significant && uncertain.allowed_m < 8e-4,
+        "{uncertain:?}"
+    );
 }
