@@ -27,11 +27,11 @@ const FEW: usize = 4;
 #[derive(Debug, Parser)]
 #[command(about = "Runs the search for the missing effect on campaigns in which one is hidden, and scores it.")]
 struct Arguments {
-    /// Which cases: development, test or search; absent: a few of development.
-    #[arg(long, value_parser = |name: &str| Split::named(name).ok_or("must be development, test or search"))]
+    /// Which cases: development, test, search or sample; absent: a few of development.
+    #[arg(long, value_parser = |name: &str| Split::named(name).ok_or("must be development, test, search or sample"))]
     split: Option<Split>,
-    /// Only these: an effect, clean, outside, pair or twin.
-    #[arg(long, value_parser = |name: &str| Case::words().find(|word| *word == name).ok_or("must be an effect, clean, outside, pair or twin"))]
+    /// Only these: an effect, clean, discrepant, outside, pair, triple, twin or onset.
+    #[arg(long, value_parser = |name: &str| Case::words().find(|word| *word == name).ok_or("must be an effect, clean, discrepant, outside, pair, triple, twin or onset"))]
     only: Option<&'static str>,
     /// At most so many cases, spread evenly over the split.
     #[arg(long)]

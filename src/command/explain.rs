@@ -12,6 +12,7 @@ use super::progress::Progress;
 use super::{Failure, WormArgs, log_line, print};
 use clap::Args;
 use folder::Folder;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use worm_analysis::experiment::Progress as Step;
 use worm_analysis::explain::{Answer, Options, explain, explain_advances, model_update};
@@ -35,6 +36,12 @@ pub struct ExplainArgs {
     /// Seed of the search
     #[arg(long, value_name = "N", default_value_t = Options::default().seed)]
     seed: u64,
+    /// What the model is taken to be wrong by everywhere, as a fraction of the tips' mean largest deformation; 0.0005 to 0.1
+    #[arg(long, value_name = "FRACTION", default_value_t = Options::default().discrepancy, value_parser = |text: &str| fraction(text, 0.0005..=0.1))]
+    discrepancy: f64,
+    /// Relative change of the advance or of the energy of a cycle below which an effect is not named; 0 to 0.5
+    #[arg(long, value_name = "FRACTION", default_value_t = Options::default().matters, value_parser = |text: &str| fraction(text, 0.0..=0.5))]
+    matters: f64,
     /// Record the worm that is crawling now, into DIR/live.mcap, and explain that; at its configured slope unless --slope is
     /// given
     #[arg(long, conflicts_with = "recording", requires = "out")]
@@ -56,7 +63,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let mut progress = Progress::begin();
     let (source, dataset) = args.read(&mut progress)?;
     let folder = args.out.as_deref().map(Folder::prepare).transpose()?;
-    let mut answer = match search(&dataset, args.seed, &mut progress) {
+    let mut answer = match search(&dataset, args.options(), &mut progress) {
         Ok(answer) => answer,
         Err((failure, stage)) => {
             if let Some(folder) = &folder {
@@ -94,7 +101,23 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// A number in a range.
+fn fraction(text: &str, range: RangeInclusive<f64>) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if range.contains(&value) => Ok(value),
+        _ => Err(format!("give a number from {} to {}", range.start(), range.end())),
+    }
+}
+
 impl ExplainArgs {
+    fn options(&self) -> Options {
+        Options {
+            seed: self.seed,
+            discrepancy: self.discrepancy,
+            matters: self.matters,
+        }
+    }
+
     /// The data to explain, and where they come from.
     fn read(&self, progress: &mut Progress) -> Result<(PathBuf, Dataset), Failure> {
         if let Some(recording) = &self.recording {
@@ -117,7 +140,7 @@ impl ExplainArgs {
 }
 
 /// The answer; or why there is none, and the stage that the search had reached.
-fn search(dataset: &Dataset, seed: u64, progress: &mut Progress) -> Result<Answer, (Failure, &'static str)> {
+fn search(dataset: &Dataset, options: Options, progress: &mut Progress) -> Result<Answer, (Failure, &'static str)> {
     let runs = dataset.runs();
     conditions::check(&runs, &dataset.config).map_err(|failure| (failure, "reading"))?;
     let mut stage = "gait";
@@ -126,7 +149,7 @@ fn search(dataset: &Dataset, seed: u64, progress: &mut Progress) -> Result<Answe
         progress.tell(stage, READING + (1.0 - READING) * step.fraction);
     };
     let answer = if dataset.advances.is_empty() {
-        explain(&runs, &dataset.config, &Options { seed }, &mut report_step)
+        explain(&runs, &dataset.config, &options, &mut report_step)
     } else {
         explain_advances(&dataset.advances, &dataset.config, &mut report_step)
     };

@@ -1,7 +1,9 @@
 //! A progress bar for commands that take longer than a second.
 
+use super::print;
 use crossbeam::channel::{Sender, bounded};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::fmt::Display;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -50,6 +52,11 @@ impl Progress {
             self.bar.set_message(stage.to_owned());
         }
         self.bar.set_position((fraction.clamp(0.0, 1.0) * PARTS as f64) as u64);
+    }
+
+    /// Writes a line to standard error, above the bar where there is one.
+    pub fn say(&self, text: impl Display) {
+        self.bar.suspend(|| print::log_line(text));
     }
 }
 

@@ -212,6 +212,10 @@ fn one_recording_is_explained_and_everything_is_kept() {
         "calibration",
         "screening",
         "threshold",
+        "null_probability",
+        "other_probability",
+        "agrees_within_m",
+        "discrepancy_m",
         "runs",
         "warnings",
     ] {

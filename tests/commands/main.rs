@@ -5,6 +5,7 @@ mod analyze;
 mod command_line;
 mod experiment_reproduction;
 mod explain;
+mod explain_mujoco;
 mod latency_page;
 mod latency_sample;
 mod licences;

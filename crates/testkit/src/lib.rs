@@ -2,7 +2,8 @@
 //!
 //! - [`independent_worm`]: worms with inertia and an uneven motor, which share no code with the library's physics; they test the
 //!   identification.
-//! - [`hidden_effects`]: worms with a hidden effect and friction laws of their own; they test the search for the missing effect.
+//! - [`hidden_effects`]: worms with a hidden effect and friction laws of their own, and the score of the search for the missing
+//!   effect. A second test bed, in MuJoCo, lies beside this crate's sources in `mujoco/`.
 //! - [`nominal`], [`random`]: constants and random draws that both share.
 //! - [`crawl`]: the exact model as a poor tracker sees it, as the controller's states; it tests the estimator.
 //! - [`log_sample`]: a log of such a crawl.

@@ -4,12 +4,12 @@
 //! momentum is P = M b' + Σ mᵢ eᵢ' with eᵢ the cells' extensions, and only contacts, weight and drags change it. The momentum
 //! is what is integrated, so a sudden change of eᵢ' needs no infinite force.
 
-use super::CELLS;
+use super::MAX_CELLS;
 use super::cam_profile::CamProfile;
 use super::deviations::Deviations;
 use super::parameters::WormParameters;
 use super::tip::{Limits, Pad, Tip};
-use super::unmodelled::UnmodelledEffect;
+use super::unmodelled::{Situation, UnmodelledEffect};
 use crate::nominal::{GRAVITY_M_S2, LOWERING_S};
 
 /// Time in which a cell held by a compliant drive follows its force, s: far below any step, far above the time step.
@@ -33,12 +33,12 @@ impl Worm {
         }
     }
 
-    fn pads(&self, mass_kg: f64) -> [Pad; CELLS] {
-        let Self {
-            parameters, deviations, ..
-        } = self;
-        let stiffness: f64 = parameters.stiffness_n_per_m.iter().sum();
-        let damping = 2.0 * parameters.damping_ratio * (stiffness * mass_kg).sqrt() / CELLS as f64;
+    fn pads(&self, deviations: &Deviations) -> [Pad; MAX_CELLS] {
+        let Self { parameters, .. } = self;
+        let mass_kg = parameters.mass_kg;
+        let cells = parameters.cells;
+        let stiffness: f64 = parameters.stiffness_n_per_m[..cells].iter().sum();
+        let damping = 2.0 * parameters.damping_ratio * (stiffness * mass_kg).sqrt() / cells as f64;
         std::array::from_fn(|cell| {
             let stiffness_n_per_m = parameters.stiffness_n_per_m[cell] * deviations.stiffness_factor[cell];
             let friction_n = parameters.friction_n[cell] * deviations.friction_factor[cell];
@@ -46,6 +46,8 @@ impl Worm {
                 stiffness_n_per_m,
                 damping_n_s_per_m: damping,
                 hardening: deviations.hardening,
+                laws: deviations.laws,
+                discrepancy_m: deviations.discrepancy_m,
                 creep_share: deviations.creep_share,
                 creep_s: deviations.creep_s,
                 yielding_share: deviations.yielding_share,
@@ -72,6 +74,25 @@ pub struct Placement {
     pub start_m: f64,
 }
 
+/// What mass, slope and clamps come to.
+struct Load {
+    mass_kg: f64,
+    weight_n: f64,
+    grip_on_slope: f64,
+}
+
+impl Load {
+    fn of(worm: &Worm, deviations: &Deviations, placement: Placement) -> Self {
+        let mass_kg = worm.parameters.mass_kg + deviations.mass_kg + placement.payload_kg;
+        let slope_rad = (placement.slope_deg + deviations.angle_deg).to_radians();
+        Self {
+            mass_kg,
+            weight_n: mass_kg * GRAVITY_M_S2 * slope_rad.sin(),
+            grip_on_slope: 1.0 - deviations.slope_sensitivity * (1.0 - slope_rad.cos()),
+        }
+    }
+}
+
 /// Inputs of one time step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepInput<'a> {
@@ -80,7 +101,7 @@ pub struct StepInput<'a> {
     /// Cycles since the run's start.
     pub cycles: f64,
     /// Each tip's friction over its mean in this cycle.
-    pub scatter: &'a [f64; CELLS],
+    pub scatter: &'a [f64; MAX_CELLS],
     /// Whether a jump of the friction is due.
     pub jumped: bool,
 }
@@ -89,8 +110,14 @@ pub struct StepInput<'a> {
 #[derive(Debug, Clone)]
 pub struct Motion<'a> {
     worm: &'a Worm,
+    /// Those of the worm, once what is hidden has begun.
+    deviations: Deviations,
+    cells: usize,
+    placement: Placement,
     cam_profile: CamProfile,
-    pads: [Pad; CELLS],
+    /// What the cam's profile lost or won where it changed in mid-run, m.
+    extension_offset_m: [f64; MAX_CELLS],
+    pads: [Pad; MAX_CELLS],
     mass_kg: f64,
     /// Weight along the canal, N.
     weight_n: f64,
@@ -101,50 +128,90 @@ pub struct Motion<'a> {
     momentum_n_s: f64,
     /// Velocity of the body's translation over the last time step, m/s.
     pub translation_m_s: f64,
-    pub position_m: [f64; CELLS],
-    velocity_m_s: [f64; CELLS],
-    tips: [Tip; CELLS],
-    extension_m: [f64; CELLS],
+    pub position_m: [f64; MAX_CELLS],
+    velocity_m_s: [f64; MAX_CELLS],
+    tips: [Tip; MAX_CELLS],
+    extension_m: [f64; MAX_CELLS],
     /// How far the drive's compliance holds each cell back, m.
-    stand_off_m: [f64; CELLS],
+    stand_off_m: [f64; MAX_CELLS],
     mean_m: f64,
+    /// Positive work of the drive so far (13), J.
+    pub work_j: f64,
     /// Mean position where the run began, m.
     begin_m: f64,
+    effect_begun: bool,
+    /// Displacement to which what trails behind the worm has followed, m.
+    followed_m: f64,
 }
 
 impl<'a> Motion<'a> {
     /// A worm just laid down, undeformed and at rest; `step_s` is the integrator's time step.
-    pub fn laid_down(worm: &'a Worm, placement: Placement, phase: f64, step_s: f64) -> Self {
-        let cam_profile = CamProfile::new(&worm.parameters, &worm.deviations, worm.unmodelled.as_ref());
-        let mass_kg = worm.parameters.mass_kg + worm.deviations.mass_kg + placement.payload_kg;
-        let position_m: [f64; CELLS] =
+    /// With `begun`, what is hidden is there from the start; without, [`begin_effect`](Self::begin_effect) brings it.
+    pub fn laid_down(worm: &'a Worm, placement: Placement, phase: f64, step_s: f64, begun: bool) -> Self {
+        let deviations = if begun {
+            worm.deviations.clone()
+        } else {
+            Deviations::default()
+        };
+        let cam_profile = CamProfile::new(&worm.parameters, &deviations, worm.unmodelled.as_ref());
+        let position_m: [f64; MAX_CELLS] =
             std::array::from_fn(|cell| placement.start_m - worm.parameters.spacing_m * cell as f64);
-        let mean_m = position_m.iter().sum::<f64>() / CELLS as f64;
-        let slope_rad = (placement.slope_deg + worm.deviations.angle_deg).to_radians();
+        let cells = worm.parameters.cells;
+        let mean_m = position_m[..cells].iter().sum::<f64>() / cells as f64;
+        let load = Load::of(worm, &deviations, placement);
         Self {
-            pads: worm.pads(worm.parameters.mass_kg),
-            mass_kg,
-            weight_n: mass_kg * GRAVITY_M_S2 * slope_rad.sin(),
-            grip_on_slope: 1.0 - worm.deviations.slope_sensitivity * (1.0 - slope_rad.cos()),
+            pads: worm.pads(&deviations),
+            deviations,
+            placement,
+            extension_offset_m: [0.0; MAX_CELLS],
+            mass_kg: load.mass_kg,
+            weight_n: load.weight_n,
+            grip_on_slope: load.grip_on_slope,
             step_s,
             time_s: 0.0,
             momentum_n_s: 0.0,
             translation_m_s: 0.0,
             position_m,
-            velocity_m_s: [0.0; CELLS],
+            velocity_m_s: [0.0; MAX_CELLS],
             tips: position_m.map(Tip::laid_down),
             extension_m: cam_profile.extensions_m(phase),
-            stand_off_m: [0.0; CELLS],
+            stand_off_m: [0.0; MAX_CELLS],
             mean_m,
+            work_j: 0.0,
             begin_m: mean_m,
+            effect_begun: begun,
+            followed_m: 0.0,
+            cells,
             cam_profile,
             worm,
         }
     }
 
+    /// What is hidden begins now: positions and momentum stay, all else may change.
+    pub fn begin_effect(&mut self, phase: f64) {
+        self.effect_begun = true;
+        let before_m = self.cam_profile.extensions_m(phase);
+        self.deviations = self.worm.deviations.clone();
+        self.cam_profile = CamProfile::new(&self.worm.parameters, &self.deviations, self.worm.unmodelled.as_ref());
+        let after_m = self.cam_profile.extensions_m(phase);
+        for cell in 0..self.cells {
+            self.extension_offset_m[cell] += before_m[cell] - after_m[cell];
+        }
+        self.pads = self.worm.pads(&self.deviations);
+        let load = Load::of(self.worm, &self.deviations, self.placement);
+        self.momentum_n_s *= load.mass_kg / self.mass_kg;
+        (self.mass_kg, self.weight_n, self.grip_on_slope) = (load.mass_kg, load.weight_n, load.grip_on_slope);
+    }
+
     /// Starts the run: its displacement counts from here.
     pub fn begin(&mut self) {
+        self.followed_m -= self.mean_m - self.begin_m;
         self.begin_m = self.mean_m;
+    }
+
+    /// Whether what is hidden has begun.
+    pub fn has_begun(&self) -> bool {
+        self.effect_begun
     }
 
     pub fn time_s(&self) -> f64 {
@@ -153,29 +220,34 @@ impl<'a> Motion<'a> {
 
     /// Force that the drive gives the stepping cell (13), N.
     pub fn actuator_n(&self, phase: f64) -> f64 {
-        self.tips[self.cam_profile.stepping(phase)].elastic_n + self.weight_n / CELLS as f64
+        self.tips[self.cam_profile.stepping(phase)].elastic_n + self.weight_n / self.cells as f64
     }
 
     /// One time step.
     pub fn step(&mut self, now: StepInput) {
         let step_s = self.step_s;
-        let cell_kg = self.mass_kg / CELLS as f64;
+        let cell_kg = self.mass_kg / self.cells as f64;
         self.momentum_n_s -= self.pull_n() * step_s;
 
         let follow = step_s / (FOLLOW_S + step_s);
         let mut extension_m = self.cam_profile.extensions_m(now.phase);
-        for ((extension_m, stand_off_m), tip) in extension_m.iter_mut().zip(&mut self.stand_off_m).zip(&self.tips) {
-            let held_m = self.worm.deviations.compliance_m_per_n * tip.elastic_n;
-            *stand_off_m += follow * (held_m - *stand_off_m);
-            *extension_m -= *stand_off_m;
+        for (cell, extension_m) in extension_m.iter_mut().enumerate().take(self.cells) {
+            let held_m = self.deviations.compliance_m_per_n * self.tips[cell].elastic_n;
+            self.stand_off_m[cell] += follow * (held_m - self.stand_off_m[cell]);
+            *extension_m += self.extension_offset_m[cell] - self.stand_off_m[cell];
         }
-        let extended_m: f64 = extension_m
-            .iter()
-            .zip(&self.extension_m)
-            .map(|(new, old)| new - old)
+        let extended_m: f64 = (0..self.cells)
+            .map(|cell| extension_m[cell] - self.extension_m[cell])
             .sum();
+        let work_j: f64 = (0..self.cells)
+            .map(|cell| {
+                let force_n = self.tips[cell].elastic_n + self.weight_n / self.cells as f64;
+                force_n * (extension_m[cell] - self.extension_m[cell])
+            })
+            .sum();
+        self.work_j += work_j.max(0.0);
         self.translation_m_s = (self.momentum_n_s - cell_kg * extended_m / step_s) / self.mass_kg;
-        for (cell, extension_m) in extension_m.into_iter().enumerate() {
+        for (cell, extension_m) in extension_m.into_iter().enumerate().take(self.cells) {
             let displacement_m = extension_m - self.extension_m[cell] + self.translation_m_s * step_s;
             let limits = self.limits(cell, now);
             self.position_m[cell] += displacement_m;
@@ -183,27 +255,30 @@ impl<'a> Motion<'a> {
             self.tips[cell].follow(displacement_m, step_s, &self.pads[cell], limits);
         }
         self.extension_m = extension_m;
-        self.mean_m = self.position_m.iter().sum::<f64>() / CELLS as f64;
+        self.mean_m = self.position_m[..self.cells].iter().sum::<f64>() / self.cells as f64;
+        if let Some(follows_s) = self.worm.unmodelled.as_ref().and_then(UnmodelledEffect::follows_s) {
+            self.followed_m += (self.mean_m - self.begin_m - self.followed_m) * step_s / (follows_s + step_s);
+        }
         self.time_s += step_s;
     }
 
     /// Sum of the forces that pull the worm backward, N.
     fn pull_n(&self) -> f64 {
-        let deviations = &self.worm.deviations;
+        let deviations = &self.deviations;
         let lowered = (self.time_s / LOWERING_S).min(1.0);
         let displacement_from_start_m = self.mean_m - self.begin_m;
         let mut pull_n = lowered * (self.weight_n + deviations.force_n);
         pull_n += deviations.tether_n_per_m * displacement_from_start_m.max(0.0);
-        for cell in 0..CELLS {
+        for cell in 0..self.cells {
             pull_n += self.tips[cell].force_n + deviations.drag_n_s_per_m * self.velocity_m_s[cell];
         }
         if let Some(unmodelled) = &self.worm.unmodelled {
-            pull_n += lowered * unmodelled.on_worm_n(displacement_from_start_m);
+            pull_n += lowered * unmodelled.on_worm_n(displacement_from_start_m, self.followed_m, self.time_s);
             pull_n += lowered
-                * self
-                    .position_m
+                * self.position_m[..self.cells]
                     .iter()
-                    .map(|&place_m| unmodelled.on_cell_n(place_m))
+                    .zip(&self.velocity_m_s)
+                    .map(|(&place_m, &velocity_m_s)| unmodelled.on_cell_n(place_m, velocity_m_s))
                     .sum::<f64>();
         }
         pull_n
@@ -211,21 +286,23 @@ impl<'a> Motion<'a> {
 
     fn limits(&self, cell: usize, now: StepInput) -> Limits {
         let Worm {
-            parameters,
-            deviations,
-            unmodelled,
+            parameters, unmodelled, ..
         } = self.worm;
+        let deviations = &self.deviations;
         let mut limit_n = parameters.friction_n[cell] * deviations.friction_factor[cell] * now.scatter[cell];
         limit_n *= self.grip_on_slope;
         if deviations.loss_per_cycle > 0.0 {
-            limit_n *= (1.0 - deviations.loss_per_cycle).powf(now.cycles.max(0.0));
+            limit_n *= deviations.laws.wear.left(deviations.loss_per_cycle, now.cycles);
         }
         if let Some(patch) = deviations.patch {
-            let inside = (patch.from_m..patch.from_m + patch.length_m).contains(&self.tips[cell].place_m);
-            limit_n *= if inside { patch.friction_factor } else { 1.0 };
+            limit_n *= patch.friction_at(self.tips[cell].place_m, deviations.laws.patch_edge_m);
         }
         if let Some(unmodelled) = unmodelled {
-            limit_n *= unmodelled.friction_factor(now.cycles, now.jumped);
+            let situation = Situation {
+                cycles: now.cycles,
+                jumped: now.jumped,
+            };
+            limit_n *= unmodelled.friction_factor(cell, self.tips[cell].place_m, self.velocity_m_s[cell], situation);
         }
         Limits {
             forward_n: limit_n,

@@ -3,33 +3,11 @@
 //! Severities are log-uniform between two ends, from what cannot be seen to what cannot be overlooked; a [`SeverityRange`] narrows
 //! that to a part of the logarithm.
 
-use super::CELLS;
+use super::MAX_CELLS;
 use super::deviations::{Deviations, Patch};
+use super::truth::TrueEffect;
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-/// An effect as it truly is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrueEffect {
-    /// Its name in the library; another name where the library has none for it.
-    pub name: &'static str,
-    /// The cell that it sits in, from 0, where it sits in one.
-    pub cell: Option<usize>,
-    /// Its figures, by the library's names.
-    pub parameters: Vec<(&'static str, f64)>,
-}
-
-impl TrueEffect {
-    /// Its cell, from 1, and its figures.
-    pub fn in_words(&self) -> String {
-        let cell = self.cell.map(|cell| format!("cell {}", cell + 1));
-        let figures = self
-            .parameters
-            .iter()
-            .map(|(name, value)| format!("{name} {value:.3e}"));
-        cell.into_iter().chain(figures).collect::<Vec<_>>().join(", ")
-    }
-}
 
 /// A part of the range of severities, as fractions of its logarithm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,8 +122,14 @@ impl Effect {
     }
 
     /// Draws its strength and its cell, and puts it into the worm.
-    pub fn hide(self, range: SeverityRange, deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
-        let cell = rng.random_range(0..CELLS);
+    pub fn hide(
+        self,
+        range: SeverityRange,
+        cells: usize,
+        deviations: &mut Deviations,
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> TrueEffect {
+        let cell = rng.random_range(0..cells);
         let mut of_cell = None;
         let parameters = match self {
             Self::UnequalClamping => {
@@ -260,11 +244,7 @@ impl Effect {
                 vec![("sensitivity", deviations.slope_sensitivity)]
             }
         };
-        TrueEffect {
-            name: self.name(),
-            cell: of_cell,
-            parameters,
-        }
+        TrueEffect::new(self.name(), of_cell, &parameters)
     }
 }
 
@@ -274,19 +254,15 @@ const LEVEL_DISTANCE_M: f64 = 0.080;
 /// Shortens the stroke of every cell; returns the fraction that is lost.
 pub fn shorten_every_stroke(range: SeverityRange, deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> f64 {
     let fraction = range.severity(0.04, 0.15, rng);
-    deviations.stroke_factor = [1.0 - fraction; CELLS];
+    deviations.stroke_factor = [1.0 - fraction; MAX_CELLS];
     fraction
 }
 
 /// Makes every pad softer and weaker by the same factor, which positions cannot distinguish from a payload.
 pub fn soften(deviations: &mut Deviations, rng: &mut Xoshiro256PlusPlus) -> TrueEffect {
     let factor = rng.random_range(0.68..0.82);
-    deviations.stiffness_factor = [factor; CELLS];
+    deviations.stiffness_factor = [factor; MAX_CELLS];
     // The largest deformation, friction force over stiffness, stays.
-    deviations.friction_factor = [factor; CELLS];
-    TrueEffect {
-        name: "softer-pads",
-        cell: None,
-        parameters: vec![("stiffness_factor", factor)],
-    }
+    deviations.friction_factor = [factor; MAX_CELLS];
+    TrueEffect::new("softer-pads", None, &[("stiffness_factor", factor)])
 }

@@ -1,6 +1,5 @@
 //! What a hidden effect does to the positions: the same worm from the same random draws, with it and without.
 
-use super::CELLS;
 use super::scene::SimulatedRun;
 
 /// Places in a cycle at which two runs are compared.
@@ -32,7 +31,7 @@ impl EffectSize {
             for cycle in whole_cycles(with_effect).filter(|&cycle| whole_cycles(baseline).any(|other| other == cycle)) {
                 let lasts_s = |simulated: &SimulatedRun| simulated.time_at(cycle + 1.0) - simulated.time_at(cycle);
                 time.add(lasts_s(with_effect) - lasts_s(baseline));
-                for cell in 0..CELLS {
+                for cell in 0..with_effect.position_m.len() {
                     let differences_m: Vec<f64> = (0..PLACES)
                         .map(|place| {
                             let phase = cycle + place as f64 / PLACES as f64;
@@ -54,14 +53,15 @@ impl EffectSize {
 
 /// Mean advance of the cells in every whole cycle of a run, m.
 pub fn advances_m(simulated: &SimulatedRun) -> Vec<f64> {
-    let mean_m = |phase: f64| (0..CELLS).map(|cell| simulated.position_at(cell, phase)).sum::<f64>() / CELLS as f64;
+    let cells = simulated.position_m.len();
+    let mean_m = |phase: f64| (0..cells).map(|cell| simulated.position_at(cell, phase)).sum::<f64>() / cells as f64;
     whole_cycles(simulated)
         .map(|cycle| mean_m(cycle + 1.0) - mean_m(cycle))
         .collect()
 }
 
 /// The phases at which the whole cycles of a run begin.
-fn whole_cycles(simulated: &SimulatedRun) -> impl Iterator<Item = f64> {
+pub fn whole_cycles(simulated: &SimulatedRun) -> impl Iterator<Item = f64> {
     let first = simulated.phase.first().map_or(0.0, |phase| phase.ceil());
     // A run that ends at a whole cycle has its last sample a little before.
     let last = simulated.phase.last().map_or(0.0, |phase| (phase + 0.01).floor());
@@ -89,8 +89,28 @@ impl SimulatedRun {
         series_m[row] + fraction * (series_m[row + 1] - series_m[row])
     }
 
+    /// Positive work of the drive up to a phase, J.
+    pub fn work_at(&self, phase: f64) -> f64 {
+        let (row, fraction) = self.place(phase);
+        self.work_j[row] + fraction * (self.work_j[row + 1] - self.work_j[row])
+    }
+
+    /// The phase at which as much of its cycle's time has passed as `phase` has of its turn.
+    pub fn phase_at_time_fraction(&self, phase: f64) -> f64 {
+        let cycle = phase.floor();
+        let (begun_s, ended_s) = (self.time_at(cycle), self.time_at(cycle + 1.0));
+        let at_s = begun_s + (phase - cycle) * (ended_s - begun_s);
+        let time_s = &self.recording.time_s;
+        let row = time_s
+            .partition_point(|&earlier| earlier <= at_s)
+            .clamp(1, time_s.len() - 1)
+            - 1;
+        let fraction = (at_s - time_s[row]) / (time_s[row + 1] - time_s[row]);
+        self.phase[row] + fraction * (self.phase[row + 1] - self.phase[row])
+    }
+
     /// Time at a phase, s.
-    fn time_at(&self, phase: f64) -> f64 {
+    pub fn time_at(&self, phase: f64) -> f64 {
         let (row, fraction) = self.place(phase);
         let time_s = &self.recording.time_s;
         time_s[row] + fraction * (time_s[row + 1] - time_s[row])

@@ -1,8 +1,10 @@
 //! A follow-up run of the same worm under another condition: the experiment that an answer proposes.
 
 use super::body::Placement;
-use super::campaign::{HiddenCampaign, SLOPE_SIGMA_DEG, crawl};
+use super::campaign::HiddenCampaign;
+use super::crawling::crawl;
 use super::scene::{CrawlFailed, Scene};
+use super::setting::SLOPE_SIGMA_DEG;
 use crate::random::truncated_normal;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -50,7 +52,7 @@ impl HiddenCampaign {
     /// # Errors
     /// [`CrawlFailed`] when the worm does not crawl under the condition.
     pub fn follow_up(&self, condition: Condition, seed: u64) -> Result<ExtraRun, CrawlFailed> {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ seed.rotate_left(24));
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.truth.seed ^ seed.rotate_left(24));
         let model = &self.scenes[self.scenes.len() - 1];
         let scene = Scene {
             placement: Placement {

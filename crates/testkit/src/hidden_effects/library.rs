@@ -1,29 +1,34 @@
 //! The library's own search, called as its user would, and the scored part of its answer.
 
-use super::assessment::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict};
+use super::answer::{Answer, Proposal};
+use super::assessment::Explainer;
 use super::campaign::HiddenCampaign;
 use super::follow_up::{Condition, ExtraRun};
 use std::panic::{self, AssertUnwindSafe};
 use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain;
 use worm_analysis::explain::answer::{ExperimentChange, RunChange};
-
-/// Standard errors to either end of a 90 % interval.
-const NINETY_PERCENT: f64 = 1.645;
+use worm_analysis::recording::{OpenOptions, Recording};
 
 /// The library's own search.
 pub struct Library;
 
 impl Explainer for Library {
     fn explain(&self, campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<Answer, String> {
-        Ok(scored(&search(campaign, extra)?, campaign))
+        scored(&search(campaign, extra)?, campaign)
     }
 }
 
 /// Has the library explain the runs of a campaign and those that were proposed. A case on which it panics counts
 /// as one without an answer.
 fn search(campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<explain::Answer, String> {
-    let own = campaign.recordings.iter().zip(&campaign.slopes_deg);
+    // What is wrong with a capture is repaired or refused, as when it is read from a file.
+    let checked = campaign.recordings.iter().cloned();
+    let checked: Vec<Recording> = checked
+        .map(|recording| recording.checked(&OpenOptions::default()))
+        .collect::<Result<_, _>>()
+        .map_err(|problem| problem.to_string())?;
+    let own = checked.iter().zip(&campaign.slopes_deg);
     let own = own.map(|(recording, &slope_deg)| RecordedRun {
         recording,
         slope_deg,
@@ -45,50 +50,13 @@ fn search(campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<explain::Answ
         .map_err(|problem| problem.to_string())
 }
 
-/// The scored part of the library's answer.
-fn scored(answer: &explain::Answer, campaign: &HiddenCampaign) -> Answer {
-    let first = answer.effects.first();
-    Answer {
-        verdict: match answer.verdict {
-            explain::Verdict::Agrees => Verdict::Nothing,
-            explain::Verdict::Explained => Verdict::Named,
-            explain::Verdict::Ambiguous => Verdict::Ambiguous,
-            explain::Verdict::OutsideLibrary => Verdict::Outside,
-        },
-        named: answer.effects.iter().map(named).collect(),
-        rivals: answer.rivals.iter().map(named).collect(),
-        screened: answer.screening.iter().map(screened).collect(),
-        closure: first.map(|effect| effect.closure),
-        margin: first.map(|effect| effect.margin),
+/// The scored part of the library's answer, read from the JSON that it prints.
+fn scored(answer: &explain::Answer, campaign: &HiddenCampaign) -> Result<Answer, String> {
+    let report = serde_json::to_value(answer).map_err(|problem| problem.to_string())?;
+    Ok(Answer {
         proposal: answer.next_experiment.as_ref().map(|next| proposal(next, campaign)),
-    }
-}
-
-fn named(effect: &explain::answer::NamedEffect) -> Named {
-    Named {
-        name: effect.name.clone(),
-        cell: effect.cell.map(|cell| cell - 1),
-        twins: effect.twins.clone(),
-        parameters: effect
-            .parameters
-            .iter()
-            .map(|found| Estimate {
-                name: found.name.clone(),
-                value: found.value,
-                low: found.value - NINETY_PERCENT * found.sigma,
-                high: found.value + NINETY_PERCENT * found.sigma,
-            })
-            .collect(),
-    }
-}
-
-fn screened(effect: &explain::answer::Screened) -> Screened {
-    Screened {
-        name: effect.name.clone(),
-        cell: effect.cell.map(|cell| cell - 1),
-        // Twice the log likelihood rises by the square of the standard deviations.
-        sigma: effect.improvement.unwrap_or(effect.score).max(0.0).sqrt(),
-    }
+        ..Answer::from_json(&report)?
+    })
 }
 
 /// The proposed run as the campaign's experimenter would make it: on the slope that the proposal names, as usual but for one

@@ -16,28 +16,45 @@
 //! ```
 //!
 //! [`effect`] has the library's 22 effects by name, [`unmodelled`] effects that are not in the library. [`campaign`] draws a
-//! worm and makes its runs, [`follow_up`] makes one more run of it under another condition, and [`split`] lists the cases.
-//! [`assessment`] compares an answer with the truth, [`table`] sums up many; [`library`] calls the library's own search.
+//! worm ([`setting`]), hides something in it ([`hidden`]) and makes its runs ([`crawling`]), [`follow_up`] makes one more run of it under another condition, and [`split`] lists the cases.
+//!
+//! What is true of a campaign is a [`truth::Truth`], which every test bed writes as `truth.json`; the worm in MuJoCo
+//! (`crates/testkit/mujoco`) writes the same file. [`assessment`] compares an [`answer`] with it, [`table`] and [`curves`] sum up
+//! many. [`library`] calls the library's own search, [`folders`] any built `wormd` on campaigns in folders.
 
+pub mod answer;
+pub mod artefact;
 pub mod assessment;
 pub mod body;
 pub mod cam_profile;
 pub mod campaign;
+pub mod crawling;
+pub mod curves;
+pub mod detectability;
 pub mod deviations;
+pub mod discrepancy;
 pub mod effect;
 pub mod effect_size;
+pub mod folders;
 pub mod follow_up;
+pub mod hidden;
 pub mod library;
 pub mod motor;
 pub mod parameters;
 pub mod scene;
+pub mod setting;
 pub mod split;
+pub mod statistics;
 pub mod table;
 pub mod tip;
+pub mod true_campaign;
+pub mod truth;
 pub mod unmodelled;
+pub mod variety;
 
 // The identification is tested with the same camera and motor.
 pub use crate::independent_worm::{cam as drive, camera};
 
-/// Cells of every worm here.
-pub const CELLS: usize = 4;
+/// The most cells that a worm here has. What there is one of for each cell lies in arrays of this length, of which a worm with fewer
+/// uses the first.
+pub const MAX_CELLS: usize = 8;

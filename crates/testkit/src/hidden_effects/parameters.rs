@@ -1,6 +1,6 @@
 //! The true parameters of a worm: all near their nominal values, none exactly.
 
-use super::CELLS;
+use super::MAX_CELLS;
 use super::motor::Motor;
 use super::tip::contact::Contact;
 use crate::nominal::{DAMPING_RATIO, MASS_KG, MAX_DEFORMATION_M, SPACING_M, STIFFNESS_N_PER_M, STROKE_M};
@@ -8,15 +8,24 @@ use crate::random::{about_one, log_uniform, shuffle};
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+/// Cells of the paper's worm.
+const NOMINAL_CELLS: usize = 4;
+
+/// A value for each of so many cells; 1 beyond them.
+pub fn each_of(cells: usize, mut value: impl FnMut(usize) -> f64) -> [f64; MAX_CELLS] {
+    std::array::from_fn(|cell| if cell < cells { value(cell) } else { 1.0 })
+}
+
 /// The worm's parameters, before an effect is hidden in it.
 #[derive(Debug, Clone)]
 pub struct WormParameters {
+    pub cells: usize,
     /// Mass of the whole worm in equal shares, kg.
     pub mass_kg: f64,
     /// Friction force of each tip, N.
-    pub friction_n: [f64; CELLS],
+    pub friction_n: [f64; MAX_CELLS],
     /// Stiffness of each pad, N/m.
-    pub stiffness_n_per_m: [f64; CELLS],
+    pub stiffness_n_per_m: [f64; MAX_CELLS],
     pub stroke_m: f64,
     /// Distance between neighbouring cells at rest, m.
     pub spacing_m: f64,
@@ -30,16 +39,17 @@ pub struct WormParameters {
     /// Standard deviation of each tip's friction from cycle to cycle, relative.
     pub scatter: f64,
     /// Cells from 0, in the order in which they step.
-    pub step_order: [usize; CELLS],
+    pub step_order: Vec<usize>,
 }
 
 impl WormParameters {
-    /// The nominal worm, on tips that do not yield before they slide.
+    /// The nominal worm of four cells, on tips that do not yield before they slide.
     pub fn nominal() -> Self {
         Self {
+            cells: NOMINAL_CELLS,
             mass_kg: MASS_KG,
-            friction_n: [STIFFNESS_N_PER_M * MAX_DEFORMATION_M; CELLS],
-            stiffness_n_per_m: [STIFFNESS_N_PER_M; CELLS],
+            friction_n: [STIFFNESS_N_PER_M * MAX_DEFORMATION_M; MAX_CELLS],
+            stiffness_n_per_m: [STIFFNESS_N_PER_M; MAX_CELLS],
             stroke_m: STROKE_M,
             spacing_m: SPACING_M,
             contact: Contact::rigid(),
@@ -47,7 +57,7 @@ impl WormParameters {
             rounding: 0.005,
             motor: Motor::even(),
             scatter: 0.0,
-            step_order: std::array::from_fn(|cell| cell),
+            step_order: (0..NOMINAL_CELLS).collect(),
         }
     }
 
@@ -57,11 +67,14 @@ impl WormParameters {
         let friction = about_one(0.08, rng);
         let stiffness = about_one(0.04, rng);
         Self {
+            cells: nominal.cells,
             mass_kg: nominal.mass_kg * about_one(0.005, rng),
-            friction_n: nominal.friction_n.map(|n| n * friction * about_one(0.02, rng)),
-            stiffness_n_per_m: nominal
-                .stiffness_n_per_m
-                .map(|n_per_m| n_per_m * stiffness * about_one(0.015, rng)),
+            friction_n: each_of(nominal.cells, |cell| {
+                nominal.friction_n[cell] * friction * about_one(0.02, rng)
+            }),
+            stiffness_n_per_m: each_of(nominal.cells, |cell| {
+                nominal.stiffness_n_per_m[cell] * stiffness * about_one(0.015, rng)
+            }),
             stroke_m: nominal.stroke_m * about_one(0.01, rng),
             // Cells are said to sit "about 40 mm apart": their distance must not reveal a wrong sensor scale.
             spacing_m: rng.random_range(0.036..0.044),
@@ -71,7 +84,7 @@ impl WormParameters {
             motor: Motor::draw(rng),
             scatter: rng.random_range(0.005..0.015),
             step_order: {
-                let mut order = nominal.step_order;
+                let mut order = nominal.step_order.clone();
                 if rng.random_range(0..4) == 0 {
                     shuffle(&mut order, rng);
                 }
@@ -83,6 +96,6 @@ impl WormParameters {
     /// Each tip's friction in each cycle over its mean: `[cell][cycle]`.
     pub fn scatter_over(&self, cycles: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<Vec<f64>> {
         let each = |_| (0..cycles).map(|_| about_one(self.scatter, rng)).collect();
-        (0..CELLS).map(each).collect()
+        (0..self.cells).map(each).collect()
     }
 }

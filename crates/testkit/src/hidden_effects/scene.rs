@@ -1,9 +1,10 @@
 //! One run: a worm, its motor, and the camera.
 
-use super::CELLS;
+use super::MAX_CELLS;
 use super::body::{Motion, Placement, StepInput, Worm};
 use super::camera::{Camera, CameraSampler};
 use super::drive::Drive;
+use super::parameters::each_of;
 use crate::nominal::{MAX_BODY_SPEED_M_S, TIMEOUT_CYCLES};
 use crate::random::log_uniform;
 use rand::SeedableRng;
@@ -39,6 +40,15 @@ impl MotionCapture {
         }
     }
 
+    /// A camera of middling noise.
+    pub fn usual() -> Self {
+        Self {
+            camera: Camera::default(),
+            drift_m: 0.02e-3,
+            drift_s: 0.1,
+        }
+    }
+
     /// A camera drawn at random.
     pub fn draw(rng: &mut Xoshiro256PlusPlus) -> Self {
         Self {
@@ -66,6 +76,8 @@ pub struct Scene {
     pub dwell_s: f64,
     /// Cycle of the recording at which the friction jumps; infinite: never.
     pub jump_at_cycle: f64,
+    /// Cycle of the recording at which what is hidden begins: minus infinity: it is there from the start; infinity: never.
+    pub begins_at_cycle: f64,
     /// Whether the cam's phase is recorded.
     pub with_phase: bool,
     pub seed: u64,
@@ -81,6 +93,8 @@ pub struct SimulatedRun {
     pub phase: Vec<f64>,
     /// Positions as a perfect camera of the same scale and latency would give them, m: `[cell][sample]`.
     pub position_m: Vec<Vec<f64>>,
+    /// Positive work of the drive at each sample, J, as old as the positions.
+    pub work_j: Vec<f64>,
 }
 
 impl Scene {
@@ -98,6 +112,7 @@ impl Scene {
             cycles: 12.0,
             dwell_s: 0.0,
             jump_at_cycle: f64::INFINITY,
+            begins_at_cycle: f64::NEG_INFINITY,
             with_phase: true,
             seed: 1,
             step_s: STEP_S,
@@ -113,8 +128,14 @@ impl Scene {
         let to_phase = from_phase + self.cycles;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed);
         let scatter = worm.parameters.scatter_over(to_phase.ceil() as usize + 2, &mut rng);
-        let mut motion = Motion::laid_down(worm, self.placement, self.drive.first_phase, self.step_s);
-        let mut cam = CamRotation::new(self);
+        let mut motion = Motion::laid_down(
+            worm,
+            self.placement,
+            self.drive.first_phase,
+            self.step_s,
+            self.begins_at_cycle == f64::NEG_INFINITY,
+        );
+        let mut cam = CamRotation::new(self, worm.parameters.cells);
         // Without a warm-up the camera runs while the worm rests before its first step.
         while cam.phase < from_phase {
             if self.warm_up_cycles == 0.0 {
@@ -126,7 +147,7 @@ impl Scene {
 
         let rate_hz = self.capture.camera.rate_hz;
         let (origin_s, latency_s) = (motion.time_s(), worm.deviations.latency_s);
-        let mut recorder = Recorder::new(self, worm.deviations.scale);
+        let mut recorder = Recorder::new(self, worm);
         // Positions are those of so long ago, so they are taken from the origin on and the phase so much later.
         while cam.phase < to_phase || recorder.phase.len() < recorder.position_m[0].len() {
             let begun_s = motion.time_s() - origin_s;
@@ -140,6 +161,7 @@ impl Scene {
                 recorder.record(std::array::from_fn(|cell| {
                     before_m[cell] + fraction * (motion.position_m[cell] - before_m[cell])
                 }));
+                recorder.work_j.push(motion.work_j);
             }
             while latency_s + recorder.phase.len() as f64 / rate_hz < ended_s {
                 let fraction = fraction_at(latency_s + recorder.phase.len() as f64 / rate_hz);
@@ -165,8 +187,11 @@ impl Scene {
         };
         cam.turn(motion.time_s(), self.step_s, droop);
         let cycle = (cam.phase - self.drive.first_phase).max(0.0) as usize;
-        let factors = std::array::from_fn(|cell| scatter[cell][cycle.min(scatter[cell].len() - 1)]);
+        let factors = each_of(scatter.len(), |cell| scatter[cell][cycle.min(scatter[cell].len() - 1)]);
         let cycles = cam.phase - from_phase;
+        if !motion.has_begun() && cycles >= self.begins_at_cycle {
+            motion.begin_effect(cam.phase);
+        }
         motion.step(StepInput {
             phase: cam.phase,
             cycles,
@@ -182,6 +207,7 @@ impl Scene {
 
 /// The cam as the motor turns it.
 struct CamRotation<'a> {
+    cells: usize,
     drive: &'a Drive,
     dwell_s: f64,
     phase: f64,
@@ -189,8 +215,9 @@ struct CamRotation<'a> {
 }
 
 impl<'a> CamRotation<'a> {
-    fn new(scene: &'a Scene) -> Self {
+    fn new(scene: &'a Scene, cells: usize) -> Self {
         Self {
+            cells,
             drive: &scene.drive,
             dwell_s: scene.dwell_s,
             phase: scene.drive.first_phase,
@@ -203,8 +230,8 @@ impl<'a> CamRotation<'a> {
             return;
         }
         let half_s = 0.5 * step_s;
-        let midway = self.phase + half_s * droop * self.drive.speed(self.phase, time_s, CELLS);
-        let next = self.phase + step_s * droop * self.drive.speed(midway, time_s + half_s, CELLS);
+        let midway = self.phase + half_s * droop * self.drive.speed(self.phase, time_s, self.cells);
+        let next = self.phase + step_s * droop * self.drive.speed(midway, time_s + half_s, self.cells);
         let whole = self.phase.floor() + 1.0;
         if self.dwell_s > 0.0 && next >= whole {
             self.phase = whole;
@@ -221,34 +248,37 @@ struct Recorder {
     rng: Xoshiro256PlusPlus,
     /// Of the correlated noise: the factor from one sample to the next, and the standard deviation of what is added, m.
     correlated: (f64, f64),
-    error_m: [f64; CELLS],
+    error_m: [f64; MAX_CELLS],
     scale: f64,
     phase: Vec<f64>,
     position_m: Vec<Vec<f64>>,
+    work_j: Vec<f64>,
     seen_m: Vec<Vec<f64>>,
 }
 
 impl Recorder {
-    fn new(scene: &Scene, scale: f64) -> Self {
+    fn new(scene: &Scene, worm: &Worm) -> Self {
+        let cells = worm.parameters.cells;
         let capture = &scene.capture;
         let kept = (-1.0 / (capture.camera.rate_hz * capture.drift_s)).exp();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(!scene.seed);
-        let error_m = std::array::from_fn(|_| capture.drift_m * normal(&mut rng));
+        let error_m = each_of(cells, |_| capture.drift_m * normal(&mut rng));
         Self {
-            sampler: CameraSampler::new(capture.camera.clone(), CELLS, scene.seed.rotate_left(32)),
+            sampler: CameraSampler::new(capture.camera.clone(), cells, scene.seed.rotate_left(32)),
             rng,
             correlated: (kept, capture.drift_m * (1.0 - kept * kept).sqrt()),
             error_m,
-            scale,
+            scale: worm.deviations.scale,
             phase: Vec::new(),
-            position_m: vec![Vec::new(); CELLS],
-            seen_m: vec![Vec::new(); CELLS],
+            work_j: Vec::new(),
+            position_m: vec![Vec::new(); cells],
+            seen_m: vec![Vec::new(); cells],
         }
     }
 
-    fn record(&mut self, position_m: [f64; CELLS]) {
+    fn record(&mut self, position_m: [f64; MAX_CELLS]) {
         let time_s = self.sampler.next_s();
-        for (cell, position_m) in position_m.into_iter().enumerate() {
+        for (cell, position_m) in position_m.into_iter().enumerate().take(self.seen_m.len()) {
             let (kept, added_m) = self.correlated;
             let measured_m = self.scale * position_m;
             self.error_m[cell] = kept * self.error_m[cell] + added_m * normal(&mut self.rng);
@@ -262,7 +292,7 @@ impl Recorder {
         self.phase.truncate(samples);
         let recording = Recording {
             source: PathBuf::from(format!("seed{}at{}deg", scene.seed, scene.placement.slope_deg)),
-            cell_names: (1..=CELLS).map(|cell| format!("x{cell}_m")).collect(),
+            cell_names: (1..=self.seen_m.len()).map(|cell| format!("x{cell}_m")).collect(),
             time_s: (0..samples)
                 .map(|sample| sample as f64 / scene.capture.camera.rate_hz)
                 .collect(),
@@ -276,6 +306,7 @@ impl Recorder {
             recording,
             phase: self.phase,
             position_m: self.position_m,
+            work_j: self.work_j,
         }
     }
 }

@@ -1,8 +1,10 @@
-//! The cases: a development split to tune on and a sealed test split, from disjoint ranges of seeds, and the few that the tests of
-//! the search run at a smaller size.
+//! The cases: a development split to tune on and a sealed test split, from disjoint ranges of seeds and with strangers of disjoint
+//! kinds, and the few that the tests of the search run at a smaller size.
 
-use super::campaign::{Hidden, HiddenCampaign, Twin, draw};
+use super::campaign::{HiddenCampaign, draw, draw_varied, draw_varied_short};
 use super::effect::{Effect, SeverityRange};
+use super::hidden::{Hidden, Twin};
+use super::unmodelled::{DEVELOPMENT_KINDS, TEST_KINDS};
 
 /// One of the sets of cases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,35 +15,80 @@ pub enum Split {
     Test,
     /// What `tests/analysis/search.rs` runs at a smaller size.
     Search,
+    /// One of each kind, as varied as in the splits but recorded for a short time: what `tests/analysis/own_sample.rs` runs.
+    Sample,
 }
 
 /// The seed of every case of [`Split::Search`]: in no range of the others.
 pub const SEARCH_SEED: u64 = 501;
+/// The seed of every case of [`Split::Sample`].
+const SAMPLE_SEED: u64 = 701;
 
 impl Split {
     /// Below the first seed.
     fn base(self) -> u64 {
         match self {
-            Self::Development => 41_300_000,
-            Self::Test => 73_900_000,
+            Self::Development => 52_600_000,
+            Self::Test => 88_400_000,
             Self::Search => SEARCH_SEED,
+            Self::Sample => SAMPLE_SEED,
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Development => "development",
+            Self::Test => "test",
+            Self::Search => "search",
+            Self::Sample => "sample",
+        }
+    }
+
+    fn counts(self) -> Counts {
+        match self {
+            Self::Development => Counts {
+                severities: 4,
+                clean: 40,
+                discrepant: 16,
+                outside: 36,
+                pairs: 16,
+                triples: 8,
+                twins: 6,
+                onsets: 16,
+            },
+            Self::Test | Self::Search | Self::Sample => Counts {
+                severities: 10,
+                clean: 132,
+                discrepant: 48,
+                outside: 126,
+                pairs: 110,
+                triples: 30,
+                twins: 12,
+                onsets: 110,
+            },
+        }
+    }
+
+    /// The kinds of strangers in it.
+    fn stranger_kinds(self) -> [u64; 9] {
+        match self {
+            Self::Development | Self::Sample => DEVELOPMENT_KINDS,
+            Self::Test | Self::Search => TEST_KINDS,
         }
     }
 
     /// The split of a name.
     pub fn named(name: &str) -> Option<Self> {
-        match name {
-            "development" => Some(Self::Development),
-            "test" => Some(Self::Test),
-            "search" => Some(Self::Search),
-            _ => None,
-        }
+        [Self::Development, Self::Test, Self::Search, Self::Sample]
+            .into_iter()
+            .find(|split| split.name() == name)
     }
 }
 
 /// One campaign to be drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
+    pub split: Split,
     pub hidden: Hidden,
     pub seed: u64,
 }
@@ -49,7 +96,7 @@ pub struct Case {
 impl Case {
     /// All values of [`what`](Self::what).
     pub fn words() -> impl Iterator<Item = &'static str> {
-        let others = ["clean", "outside", "pair", "twin"];
+        let others = ["clean", "discrepant", "outside", "pair", "triple", "twin", "onset"];
         Effect::ALL.iter().map(|effect| effect.name()).chain(others)
     }
 
@@ -59,26 +106,67 @@ impl Case {
             Hidden::Clean => "clean",
             Hidden::Single(effect, _) => effect.name(),
             Hidden::Outside(_) => "outside",
+            Hidden::Discrepant(_) => "discrepant",
+            Hidden::Onset(..) => "onset",
+            Hidden::Triple => "triple",
             Hidden::Pair => "pair",
             Hidden::Twin(_) => "twin",
         }
     }
 
-    /// Makes the campaign; it takes about half a second.
+    /// Makes the campaign; it takes a second or a few.
     pub fn draw(self) -> HiddenCampaign {
-        draw(self.hidden, self.seed)
+        let mut campaign = match self.split {
+            Split::Search => draw(self.hidden, self.seed),
+            Split::Sample => draw_varied_short(self.hidden, self.seed),
+            Split::Development | Split::Test => draw_varied(self.hidden, self.seed),
+        };
+        self.split.name().clone_into(&mut campaign.truth.split);
+        campaign
     }
 }
 
-const SEVERITIES: usize = 4;
-const CLEAN: usize = 24;
-const OUTSIDE: usize = 18;
-const PAIRS: usize = 12;
-const TWINS: usize = 6;
+/// How many cases of each kind a split has.
+struct Counts {
+    /// Of each effect.
+    severities: usize,
+    clean: usize,
+    discrepant: usize,
+    outside: usize,
+    pairs: usize,
+    triples: usize,
+    twins: usize,
+    onsets: usize,
+}
+
+/// Sizes of the discrepancies put in, micrometres.
+const DISCREPANCIES: [u32; 4] = [5, 10, 20, 40];
+/// What can begin in mid-run.
+const WITH_ONSET: [Effect; 7] = [
+    Effect::UnequalClamping,
+    Effect::UnequalStiffness,
+    Effect::ConstantDrag,
+    Effect::LostStroke,
+    Effect::Payload,
+    Effect::DirectionalFriction,
+    Effect::ViscousDrag,
+];
 
 /// The cases of a split. `scale` multiplies how many there are of each kind; a case has the same seed at any scale. Those of the
 /// tests are the same few at any scale.
 pub fn split(split: Split, scale: f64) -> Vec<Case> {
+    let case = |hidden, seed| Case { split, hidden, seed };
+    if split == Split::Sample {
+        let hidden = [
+            Hidden::Clean,
+            Hidden::Discrepant(10),
+            Hidden::Single(Effect::UnequalStiffness, SeverityRange::UPPER_HALF),
+            Hidden::Outside(11),
+            Hidden::Pair,
+            Hidden::Onset(Effect::UnequalClamping, SeverityRange::UPPER_HALF),
+        ];
+        return hidden.map(|hidden| case(hidden, split.base())).to_vec();
+    }
     if split == Split::Search {
         let hidden = [
             Hidden::Clean,
@@ -86,28 +174,39 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
             Hidden::Twin(Twin::ConstantDrag),
             Hidden::Outside(5),
         ];
-        let seed = split.base();
-        return hidden.map(|hidden| Case { hidden, seed }).to_vec();
+        return hidden.map(|hidden| case(hidden, split.base())).to_vec();
     }
+    let counts = split.counts();
     let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     let seed = |group: usize, number: usize| split.base() + 1000 * group as u64 + number as u64;
     let mut cases = Vec::new();
-    let mut push = |hidden, seed| cases.push(Case { hidden, seed });
     for (group, &effect) in Effect::ALL.iter().enumerate() {
-        let severities = count(SEVERITIES);
+        let severities = count(counts.severities);
         for number in 0..severities {
             let hidden = Hidden::Single(effect, SeverityRange::part(number, severities));
             // Severities of different scales get different seeds.
-            push(hidden, seed(group, 30 * severities + number));
+            cases.push(case(hidden, seed(group, 10 * severities + number)));
         }
     }
-    let group = Effect::ALL.len();
-    (0..count(CLEAN)).for_each(|number| push(Hidden::Clean, seed(group, number)));
-    (0..count(OUTSIDE)).for_each(|number| push(Hidden::Outside(number as u64), seed(group + 1, number)));
-    (0..count(PAIRS)).for_each(|number| push(Hidden::Pair, seed(group + 2, number)));
-    (0..count(TWINS)).for_each(|number| {
-        let twin = Twin::ALL[number % Twin::ALL.len()];
-        push(Hidden::Twin(twin), seed(group + 3, number));
+    let effects = Effect::ALL.len();
+    let kinds = split.stranger_kinds();
+    let mut several = |group: usize, of: usize, hidden: &dyn Fn(usize) -> Hidden| {
+        cases.extend((0..count(of)).map(|number| case(hidden(number), seed(effects + group, number))));
+    };
+    several(0, counts.clean, &|_| Hidden::Clean);
+    several(1, counts.outside, &|number| {
+        Hidden::Outside(kinds[number % kinds.len()])
+    });
+    several(2, counts.pairs, &|_| Hidden::Pair);
+    several(3, counts.twins, &|number| {
+        Hidden::Twin(Twin::ALL[number % Twin::ALL.len()])
+    });
+    several(4, counts.triples, &|_| Hidden::Triple);
+    several(5, counts.onsets, &|number| {
+        Hidden::Onset(WITH_ONSET[number % WITH_ONSET.len()], SeverityRange::UPPER_HALF)
+    });
+    several(6, counts.discrepant, &|number| {
+        Hidden::Discrepant(DISCREPANCIES[number % DISCREPANCIES.len()])
     });
     cases
 }

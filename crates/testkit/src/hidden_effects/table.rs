@@ -1,186 +1,225 @@
-//! Many assessments in one table: proportions with their Wilson intervals, medians, and the targets.
+//! Many assessments in one table: proportions with their exact 95 % intervals, medians, and the targets.
+//!
+//! Strong or weak is decided by the truth of the campaign and never by the search's own significance.
 
-use super::assessment::{Assessment, Verdict};
-use super::campaign::CampaignKind;
+use super::answer::Verdict;
+use super::assessment::Assessment;
+use super::curves::Curves;
+use super::statistics::{Proportion, median};
+use super::truth::{CampaignKind, STRONG_SIGMA, TrueEffect};
 use std::fmt;
 use std::io;
 
-/// Significance from which an effect counts as detectable, standard deviations.
-const DETECTABLE_SIGMA: f64 = 5.0;
-/// Of the normal distribution, for intervals of 95 %.
-const Z: f64 = 1.96;
+/// Significance of each cycle after an onset from which it must be found, standard deviations.
+const ONSET_SIGMA_PER_CYCLE: f64 = 2.0;
+/// Stated probability that counts as certain.
+const CERTAIN: f64 = 0.99;
 
-/// A proportion: hits among a number of cases.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Proportion {
-    pub hits: usize,
-    pub of: usize,
+/// A row of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    pub what: &'static str,
+    pub proportion: Proportion,
+    pub target: &'static str,
 }
 
-impl Proportion {
-    /// Counts the true ones among those that are not `None`.
-    pub fn count(each: impl Iterator<Item = Option<bool>>) -> Self {
-        each.flatten().fold(Self::default(), |fraction, hit| Self {
-            hits: fraction.hits + usize::from(hit),
-            of: fraction.of + 1,
-        })
-    }
-
-    /// Wilson's 95 % interval; 0 to 1 where there is nothing to count.
-    pub fn wilson(self) -> [f64; 2] {
-        if self.of == 0 {
-            return [0.0, 1.0];
-        }
-        let (n, p) = (self.of as f64, self.hits as f64 / self.of as f64);
-        let centre = p + Z * Z / (2.0 * n);
-        let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
-        let scale = 1.0 + Z * Z / n;
-        [((centre - half) / scale).max(0.0), ((centre + half) / scale).min(1.0)]
-    }
-}
-
-impl fmt::Display for Proportion {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.of == 0 {
-            return write!(out, "{:>22}", "none");
-        }
-        let percent = |fraction: f64| 100.0 * fraction;
-        let [low, high] = self.wilson().map(percent);
-        let fraction = percent(self.hits as f64 / self.of as f64);
-        write!(
-            out,
-            "{:>3}/{:<3} {fraction:5.1} % ({low:.0} to {high:.0})",
-            self.hits, self.of
-        )
-    }
-}
-
-/// All scores.
+/// All scores. Campaigns whose recordings were refused for what is wrong with them count in the rows on artefacts only.
 #[derive(Debug)]
 pub struct ScoreTable<'a>(pub &'a [Assessment]);
 
 impl ScoreTable<'_> {
     fn of(&self, kind: CampaignKind) -> impl Iterator<Item = &Assessment> {
-        self.0.iter().filter(move |assessment| assessment.kind == kind)
+        let answered = self.0.iter().filter(|one| !one.is_refused());
+        answered.filter(move |one| one.truth.kind == kind)
     }
 
-    /// Single effects that the library itself says are detectable.
-    fn detectable(&self) -> impl Iterator<Item = &Assessment> {
-        self.of(CampaignKind::Single)
-            .filter(|assessment| assessment.significance_sigma >= DETECTABLE_SIGMA)
+    /// Campaigns with something wrong in the recordings.
+    fn spoiled(&self) -> impl Iterator<Item = &Assessment> {
+        self.0.iter().filter(|one| !one.truth.artefacts.is_empty())
     }
 
-    /// Every proportion: its name, its value and its target.
-    pub fn fractions(&self) -> Vec<(&'static str, Proportion, &'static str)> {
-        let abstains =
-            |assessment: &Assessment| Some(matches!(assessment.verdict, Verdict::Nothing | Verdict::Outside));
-        let settled = |assessment: &&Assessment| assessment.settled.is_some();
+    /// Single effects that must be found.
+    fn strong(&self) -> impl Iterator<Item = &Assessment> {
+        self.of(CampaignKind::Single).filter(|one| one.truth.is_strong())
+    }
+
+    fn weak(&self) -> impl Iterator<Item = &Assessment> {
+        self.of(CampaignKind::Single).filter(|one| !one.truth.is_strong())
+    }
+
+    /// What the library does not know and must be noticed.
+    fn strangers(&self) -> impl Iterator<Item = &Assessment> {
+        self.of(CampaignKind::Stranger)
+            .filter(|one| one.truth.sigma >= STRONG_SIGMA)
+    }
+
+    /// Campaigns of several effects, each of which must be found.
+    fn several(&self, kind: CampaignKind) -> impl Iterator<Item = &Assessment> {
+        let each_shows = |one: &&Assessment| one.truth.effects.iter().all(|effect| effect.sigma >= STRONG_SIGMA);
+        self.of(kind).filter(each_shows)
+    }
+
+    fn onsets(&self) -> impl Iterator<Item = &Assessment> {
+        self.of(CampaignKind::Onset)
+            .filter(|one| one.truth.sigma_per_cycle >= ONSET_SIGMA_PER_CYCLE)
+    }
+
+    /// Every proportion.
+    pub fn rows(&self) -> Vec<Row> {
+        let row = |what, proportion, target| Row {
+            what,
+            proportion,
+            target,
+        };
+        use CampaignKind::{Clean, Pair, Single, Triple};
         vec![
-            (
+            row(
                 "no answer at all",
-                Proportion::count(self.0.iter().map(|one| Some(one.verdict == Verdict::Failed))),
+                share(self.0.iter().filter(|one| one.truth.artefacts.is_empty()), |one| {
+                    is(one, Verdict::Failed)
+                }),
                 "0 %",
             ),
-            (
-                "singles at least 5 sigma",
-                Proportion::count(
-                    self.of(CampaignKind::Single)
-                        .map(|one| Some(one.significance_sigma >= DETECTABLE_SIGMA)),
-                ),
+            row(
+                "artefact: refused",
+                share(self.spoiled(), |one| Some(one.is_refused())),
                 "",
             ),
-            (
-                "class, top 1, at least 5 sigma",
-                Proportion::count(self.detectable().map(|one| one.right_class)),
-                ">= 90 %",
-            ),
-            (
-                "class, top 1, every severity",
-                Proportion::count(self.of(CampaignKind::Single).map(|one| one.right_class)),
+            row(
+                "artefact: named what is not there",
+                share(self.spoiled().filter(|one| !one.is_refused()), names_what_is_not_there),
                 "",
             ),
-            (
-                "strict, at least 5 sigma",
-                Proportion::count(self.detectable().map(|one| one.strict)),
-                ">= 75 %",
+            row(
+                "clean: an effect named",
+                share(self.of(Clean), names),
+                "<= 3 % (MuJoCo 5 %)",
             ),
-            (
-                "faulty cell",
-                Proportion::count(self.detectable().map(|one| one.right_cell)),
-                ">= 95 %",
+            row(
+                "clean: outside the library",
+                share(self.of(Clean), |one| is(one, Verdict::Outside)),
+                "<= 10 % (15 %)",
             ),
-            (
-                "clean, falsely named",
-                Proportion::count(self.of(CampaignKind::Clean).map(|one| Some(one.verdict.names()))),
-                "<= 5 %",
-            ),
-            (
-                "clean, called outside",
-                Proportion::count(
-                    self.of(CampaignKind::Clean)
-                        .map(|one| Some(one.verdict == Verdict::Outside)),
-                ),
+            row(
+                "single: strong by truth",
+                share(self.of(Single), |one| Some(one.truth.is_strong())),
                 "",
             ),
-            (
-                "outside, abstained",
-                Proportion::count(self.of(CampaignKind::Outside).map(abstains)),
-                ">= 80 %",
+            row(
+                "single: false second effect",
+                share(self.of(Single), |one| one.false_second),
+                "<= 4 % (5 %)",
             ),
-            (
-                "outside, seen to be outside",
-                Proportion::count(
-                    self.of(CampaignKind::Outside)
-                        .map(|one| Some(one.verdict == Verdict::Outside)),
-                ),
+            row(
+                "strong: class right",
+                share(self.strong(), |one| one.right_class),
+                ">= 92 % (90 %)",
+            ),
+            row(
+                "strong: strictly right",
+                share(self.strong(), |one| one.strict),
+                ">= 82 % (80 %)",
+            ),
+            row("strong: cell right", share(self.strong(), |one| one.right_cell), ""),
+            row(
+                "strong: agrees",
+                share(self.strong(), |one| is(one, Verdict::Nothing)),
                 "",
             ),
-            (
-                "90 % interval covers",
-                Proportion::count(self.detectable().map(|one| one.covered)),
-                "85 to 95 %",
-            ),
-            (
-                "ambiguous set holds the truth",
-                Proportion::count(self.0.iter().map(|one| one.in_set)),
+            row(
+                "strong: outside the library",
+                share(self.strong(), |one| is(one, Verdict::Outside)),
                 "",
             ),
-            (
-                "ambiguous, settled by proposal",
-                Proportion::count(self.0.iter().filter(settled).map(|one| one.settled)),
-                ">= 80 %",
+            row(
+                "strong: 90 % interval covers",
+                share(self.strong(), |one| one.covered),
+                "85 to 95 % (80 to 95 %)",
             ),
-            (
-                "pairs, one right",
-                Proportion::count(self.0.iter().map(|one| one.of_pair.map(|met| met >= 1))),
-                ">= 95 %",
+            row(
+                "single: 90 % interval covers",
+                share(self.of(Single), |one| one.covered),
+                "",
             ),
-            (
-                "pairs, both right",
-                Proportion::count(self.0.iter().map(|one| one.of_pair.map(|met| met >= 2))),
+            row("weak: class right", share(self.weak(), |one| one.right_class), ""),
+            row("weak: another class named", share(self.weak(), names_wrongly), ""),
+            row(
+                "weak: outside the library",
+                share(self.weak(), |one| is(one, Verdict::Outside)),
+                "",
+            ),
+            row(
+                "stranger: detected as outside",
+                share(self.strangers(), |one| is(one, Verdict::Outside)),
                 ">= 65 %",
             ),
-            (
+            row(
+                "stranger: under another name",
+                share(self.strangers(), names),
+                "<= 10 %",
+            ),
+            row(
+                "stranger: agrees",
+                share(self.strangers(), |one| is(one, Verdict::Nothing)),
+                "",
+            ),
+            row(
+                "single: an onset where none is",
+                share(self.of(Single), |one| one.false_onset),
+                "",
+            ),
+            row("stated at 0.99: right", share(self.0.iter(), certain), ">= 98 % (97 %)"),
+            row("named at 0.99: right", share(self.0.iter(), certain_name), ""),
+            row("ambiguous: set holds truth", share(self.0.iter(), |one| one.in_set), ""),
+            row(
+                "ambiguous: settled by the run",
+                share(self.0.iter(), |one| one.settled),
+                "",
+            ),
+            row(
                 "twins reported as twins",
-                Proportion::count(self.0.iter().map(|one| one.twins_reported)),
-                "100 %",
+                share(self.0.iter(), |one| one.twins_reported),
+                "",
+            ),
+            row(
+                "pair: one named",
+                share(self.several(Pair), |one| one.of_several.map(|met| met >= 1)),
+                "",
+            ),
+            row(
+                "pair: both named",
+                share(self.several(Pair), |one| one.of_several.map(|met| met >= 2)),
+                ">= 75 %",
+            ),
+            row(
+                "triple: two named",
+                share(self.several(Triple), |one| one.of_several.map(|met| met >= 2)),
+                "",
+            ),
+            row(
+                "onset: class right",
+                share(self.onsets(), |one| one.right_class),
+                ">= 85 %",
+            ),
+            row(
+                "onset: within one cycle",
+                share(self.onsets(), |one| one.onset_right),
+                ">= 85 %",
             ),
         ]
     }
 
-    /// Every median: its name, its value, the number of cases and the target.
-    pub fn medians(&self) -> [(&'static str, Option<f64>, usize, &'static str); 3] {
-        let of = |value: fn(&Assessment) -> Option<f64>| {
-            let mut values: Vec<f64> = self.detectable().filter_map(value).collect();
-            values.sort_by(f64::total_cmp);
-            (median(&values), values.len())
+    /// Every median: its name, its value and the number of cases.
+    pub fn medians(&self) -> [(&'static str, Option<f64>, usize); 3] {
+        let of = |what, value: fn(&Assessment) -> Option<f64>| {
+            let values: Vec<f64> = self.strong().filter_map(value).collect();
+            let count = values.len();
+            (what, median(values), count)
         };
-        let (closure, margin) = (of(|one| one.closure), of(|one| one.margin));
-        let severity = of(|one| one.severity_error);
         [
-            ("median held-out closure", closure.0, closure.1, ">= 90 %"),
-            ("median margin", margin.0, margin.1, ""),
-            ("median severity error", severity.0, severity.1, "<= 10 %"),
+            of("strong: median closure", |one| one.closure),
+            of("strong: median margin", |one| one.margin),
+            of("strong: median severity error", |one| one.severity_error),
         ]
     }
 
@@ -191,56 +230,86 @@ impl ScoreTable<'_> {
     pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
         let mut out = csv::Writer::from_writer(to);
         out.write_record([
+            "bed",
+            "split",
             "case",
             "kind",
             "truth",
             "cell",
             "parameters",
-            "advance_rms_m",
-            "within_cycle_rms_m",
+            "sigma",
+            "sigma_per_cycle",
+            "impact",
+            "discrepancy_m",
+            "noise_m",
+            "cells",
+            "cycle_s",
             "verdict",
             "top",
-            "significance_sigma",
+            "named",
+            "probability",
+            "probability_right",
             "right_class",
             "strict",
             "right_cell",
+            "false_second",
             "closure",
             "margin",
             "severity_error",
             "covered",
             "in_set",
             "twins_reported",
-            "of_pair",
+            "of_several",
+            "onset_right",
+            "false_onset",
+            "artefacts",
             "settled",
         ])?;
         for one in self.0 {
-            let truths = |each: &dyn Fn(&super::effect::TrueEffect) -> String| {
-                one.truth.iter().map(each).collect::<Vec<_>>().join("; ")
-            };
+            let truth = &one.truth;
+            let effects =
+                |each: &dyn Fn(&TrueEffect) -> String| truth.effects.iter().map(each).collect::<Vec<_>>().join("; ");
+            let hidden = truth
+                .stranger
+                .clone()
+                .unwrap_or_else(|| effects(&|effect| effect.name.clone()));
             out.write_record([
-                one.case.clone(),
-                format!("{:?}", one.kind).to_lowercase(),
-                truths(&|truth| truth.name.to_owned()),
-                truths(&|truth| truth.cell.map_or(String::new(), |cell| (cell + 1).to_string())),
-                truths(&|truth| {
-                    let each = truth.parameters.iter().map(|(name, value)| format!("{name}={value}"));
+                truth.bed.clone(),
+                truth.split.clone(),
+                truth.case.clone(),
+                format!("{:?}", truth.kind).to_lowercase(),
+                hidden,
+                effects(&|effect| cell_of(effect.cell.map(|cell| cell + 1))),
+                effects(&|effect| {
+                    let each = effect.parameters.iter().map(|(name, value)| format!("{name}={value}"));
                     each.collect::<Vec<_>>().join(" ")
                 }),
-                one.effect_size_m[0].to_string(),
-                one.effect_size_m[1].to_string(),
+                truth.sigma.to_string(),
+                truth.sigma_per_cycle.to_string(),
+                truth.impact().to_string(),
+                truth.discrepancy_m.to_string(),
+                truth.noise_m.to_string(),
+                truth.cells.to_string(),
+                truth.cycle_s.to_string(),
                 one.verdict.name().to_owned(),
                 one.top.clone().unwrap_or_default(),
-                one.significance_sigma.to_string(),
+                one.named.to_string(),
+                cell_of(one.stated.map(|stated| stated.0)),
+                cell_of(one.stated.map(|stated| stated.1)),
                 cell_of(one.right_class),
                 cell_of(one.strict),
                 cell_of(one.right_cell),
+                cell_of(one.false_second),
                 cell_of(one.closure),
                 cell_of(one.margin),
                 cell_of(one.severity_error),
                 cell_of(one.covered),
                 cell_of(one.in_set),
                 cell_of(one.twins_reported),
-                cell_of(one.of_pair),
+                cell_of(one.of_several),
+                cell_of(one.onset_right),
+                cell_of(one.false_onset),
+                truth.artefacts.join("; "),
                 cell_of(one.settled),
             ])?;
         }
@@ -249,24 +318,55 @@ impl ScoreTable<'_> {
     }
 }
 
-impl fmt::Display for ScoreTable<'_> {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (what, fraction, aim) in self.fractions() {
-            writeln!(out, "{what:<32} {:<28} {aim}", fraction.to_string())?;
-        }
-        for (what, median, of, aim) in self.medians() {
-            let value = median.map_or("none".to_owned(), |median| format!("{:.1} % of {of}", 100.0 * median));
-            writeln!(out, "{what:<32} {value:<28} {aim}")?;
-        }
-        Ok(())
-    }
+/// The proportion among those to which a question applies.
+fn share<'a>(each: impl Iterator<Item = &'a Assessment>, value: fn(&Assessment) -> Option<bool>) -> Proportion {
+    Proportion::count(each.map(value))
 }
 
-/// The middle of sorted values.
-fn median(sorted: &[f64]) -> Option<f64> {
-    let upper = sorted.get(sorted.len() / 2)?;
-    let lower = sorted[(sorted.len() - 1) / 2];
-    Some(0.5 * (lower + upper))
+fn is(one: &Assessment, verdict: Verdict) -> Option<bool> {
+    Some(one.verdict == verdict)
+}
+
+fn names(one: &Assessment) -> Option<bool> {
+    Some(one.verdict.names())
+}
+
+/// Whether an answer that states certainty is right.
+fn certain(one: &Assessment) -> Option<bool> {
+    one.stated.filter(|stated| stated.0 >= CERTAIN).map(|stated| stated.1)
+}
+
+fn certain_name(one: &Assessment) -> Option<bool> {
+    certain(one).filter(|_| one.verdict.names())
+}
+
+/// Whether a clean worm is given an effect, or another class than the true one is named first, or a second effect.
+fn names_what_is_not_there(one: &Assessment) -> Option<bool> {
+    let clean = one.truth.kind == CampaignKind::Clean && one.verdict.names();
+    Some(clean || names_wrongly(one) == Some(true) || one.false_second == Some(true))
+}
+
+/// Whether something is named that is not there.
+fn names_wrongly(one: &Assessment) -> Option<bool> {
+    one.right_class.map(|right| one.verdict.names() && !right)
+}
+
+impl fmt::Display for ScoreTable<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Row {
+            what,
+            proportion,
+            target,
+        } in self.rows()
+        {
+            writeln!(out, "{what:<34} {:<28} {target}", proportion.to_string())?;
+        }
+        for (what, median, of) in self.medians() {
+            let value = median.map_or("none".to_owned(), |median| format!("{:.1} % of {of}", 100.0 * median));
+            writeln!(out, "{what:<34} {value}")?;
+        }
+        write!(out, "{}", Curves(self.0))
+    }
 }
 
 fn cell_of(value: Option<impl ToString>) -> String {

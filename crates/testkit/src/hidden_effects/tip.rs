@@ -1,7 +1,7 @@
 //! One tip: a pad that gives, in series with a contact that grips the canal.
 //!
-//! The pad between cell and tip is a spring with a damper beside it, and with what may be hidden in it: a cubic part, a
-//! Maxwell branch, elements that yield. The tip itself has no mass and holds to the canal by the friction law that was drawn
+//! The pad between cell and tip is a spring with a damper beside it, and with what may be hidden in it: a part that grows
+//! stiffer, Maxwell branches, elements that yield. The tip itself has no mass and holds to the canal by the friction law that was drawn
 //! for the worm ([`contact`]). Without mass the forces of pad and contact are equal at every moment; with the pad taken
 //! linear over a time step, each law solves that for the tip's displacement at the end of the step.
 
@@ -10,17 +10,21 @@ pub mod contact;
 pub mod coulomb;
 pub mod dahl;
 pub mod elasto_plastic;
+pub mod laws;
 pub mod lugre;
 pub mod weakening;
 
 use bristle::TipLoad;
 use contact::Contact;
+use laws::Laws;
 use weakening::FrictionState;
 
 /// Number of elements of the yielding part of a pad.
 const ELEMENTS: usize = 16;
-/// Deformation at which the pad's cubic part equals β times its linear part, m.
-const HARDENING_M: f64 = 1.75e-3;
+
+/// The wave that a discrepancy is: rad for each metre of deformation, and without any.
+const WAVE_PER_M: f64 = 2.7e3;
+const WAVE_START_RAD: f64 = 0.6;
 
 /// Parameters of a pad and its tip.
 #[derive(Debug, Clone)]
@@ -28,6 +32,10 @@ pub struct Pad {
     pub stiffness_n_per_m: f64,
     pub damping_n_s_per_m: f64,
     pub hardening: f64,
+    /// Forms of hardening and creep.
+    pub laws: Laws,
+    /// Size of a smooth wave in the pad's law, m.
+    pub discrepancy_m: f64,
     pub creep_share: f64,
     pub creep_s: f64,
     pub yielding_share: f64,
@@ -42,8 +50,8 @@ pub struct Pad {
 impl Pad {
     /// Slope of the elastic force, N/m, at most.
     fn tangent_n_per_m(&self, deformation_m: f64) -> f64 {
-        let cubic = 3.0 * self.hardening * (deformation_m / HARDENING_M).powi(2);
-        self.stiffness_n_per_m * (1.0 + cubic + self.creep_share)
+        let (growth, slope) = self.laws.hardening.growth(deformation_m);
+        self.stiffness_n_per_m * (1.0 + (1.0 + slope) * self.hardening * growth + self.creep_share)
     }
 }
 
@@ -65,7 +73,7 @@ pub struct Tip {
     pub force_n: f64,
     deformation_m: f64,
     bristle_m: f64,
-    crept_m: f64,
+    crept_m: [f64; 2],
     yielded_m: [f64; ELEMENTS],
     friction_state: FrictionState,
 }
@@ -79,7 +87,7 @@ impl Tip {
             force_n: 0.0,
             deformation_m: 0.0,
             bristle_m: 0.0,
-            crept_m: 0.0,
+            crept_m: [0.0; 2],
             yielded_m: [0.0; ELEMENTS],
             friction_state: FrictionState::default(),
         }
@@ -122,11 +130,24 @@ impl Tip {
     /// The pad's elastic force at its new deformation.
     fn deform(&mut self, step_s: f64, pad: &Pad) {
         let (stiffness, reach_m) = (pad.stiffness_n_per_m, self.deformation_m);
-        let cubic = pad.hardening * (reach_m / HARDENING_M).powi(2);
-        let mut force_n = stiffness * (1.0 - pad.yielding_share + cubic) * reach_m;
+        let growth = pad.hardening * pad.laws.hardening.growth(reach_m).0;
+        let mut force_n = stiffness * (1.0 - pad.yielding_share + growth) * reach_m;
+        if pad.discrepancy_m > 0.0 {
+            force_n += stiffness * pad.discrepancy_m * (WAVE_PER_M * reach_m + WAVE_START_RAD).sin();
+        }
         if pad.creep_share > 0.0 {
-            self.crept_m += (reach_m - self.crept_m) * step_s / (pad.creep_s + step_s);
-            force_n += stiffness * pad.creep_share * (reach_m - self.crept_m);
+            let (branches, ratio) = if pad.laws.creep_ratio > 0.0 {
+                (2, pad.laws.creep_ratio.sqrt())
+            } else {
+                (1, 1.0)
+            };
+            for (crept_m, time_s) in self.crept_m[..branches]
+                .iter_mut()
+                .zip([pad.creep_s * ratio, pad.creep_s / ratio])
+            {
+                *crept_m += (reach_m - *crept_m) * step_s / (time_s + step_s);
+                force_n += stiffness * pad.creep_share / branches as f64 * (reach_m - *crept_m);
+            }
         }
         if pad.yielding_share > 0.0 {
             let element = stiffness * pad.yielding_share / ELEMENTS as f64;

@@ -42,11 +42,17 @@ pub struct Answer {
     pub next_experiment: Option<NextExperiment>,
     /// The recalibrated model: what was free within its prior, and the values found.
     pub calibration: Vec<Calibrated>,
+    /// The same fitted without what no model file can hold, as it is written back; not part of the JSON.
+    #[serde(skip)]
+    pub written_back: Vec<Calibrated>,
     /// The screening of the whole library, most significant first.
     pub screening: Vec<Screened>,
-    /// Improvement that an effect must exceed: what the best of the whole library reaches by chance one time in twenty, with a
-    /// margin. In units of twice the log likelihood.
+    /// Improvement that the best of the whole library stays below in 99 of a hundred worms without an effect, drawn for this campaign.
+    /// In units of twice the log likelihood. For advances alone, the chi-squared that a right model exceeds one time in twenty.
     pub threshold: f64,
+    /// How probable it is that nothing, and that something else, is missing.
+    #[serde(flatten)]
+    pub doubt: Doubt,
     /// The recordings.
     pub runs: Vec<RunSummary>,
     /// Limitations of this answer.
@@ -65,6 +71,32 @@ impl Answer {
     }
 }
 
+/// How probable it is that none of the effects is the answer, and what that rests on; `NaN` where it is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Doubt {
+    /// Posterior probability that no effect is missing that changes what matters.
+    pub null_probability: f64,
+    /// Posterior probability that something else is missing, alone or beside an effect.
+    pub other_probability: f64,
+    /// The measured advance of a cycle and that of the model in the answer differ on no run by more than this, m, with a probability
+    /// of 95 %.
+    pub agrees_within_m: f64,
+    /// Standard deviation that the model is taken to be wrong by everywhere, m.
+    pub discrepancy_m: f64,
+}
+
+impl Default for Doubt {
+    /// Nothing is known.
+    fn default() -> Self {
+        Self {
+            null_probability: f64::NAN,
+            other_probability: f64::NAN,
+            agrees_within_m: f64::NAN,
+            discrepancy_m: f64::NAN,
+        }
+    }
+}
+
 /// An effect with its values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NamedEffect {
@@ -76,19 +108,49 @@ pub struct NamedEffect {
     pub parameters: Vec<FoundParameter>,
     /// The cell it acts on, from 1; none for all.
     pub cell: Option<usize>,
+    /// When it begins; none where it acts throughout.
+    pub onset: Option<FoundOnset>,
     /// The other effects of the same answer, in words: a pair explains the data only together.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub together_with: Vec<String>,
-    /// Fraction of the gap after recalibration that it closes, down to the noise floor, on cycles that it was not fitted to.
+    /// Fraction of the squared gap after recalibration that it closes, down to the noise floor, on cycles that it was not fitted to.
+    /// `NaN` where the gap is within its own error.
     pub closure: f64,
+    /// 90 % interval of that.
+    pub closure_interval: [f64; 2],
     /// Its closure less that of the best effect of another kind.
     pub margin: f64,
-    /// Probability among the effects of the library, from held-out likelihoods.
+    /// Posterior probability of its class, none and something else being counted: of the effect on any cell, and of its exact twins.
     pub probability: f64,
     /// Improvement over the recalibrated model: rise of twice the log likelihood.
     pub improvement: f64,
     /// Which experiment distinguishes it from its neighbours.
     pub separated_by: String,
+}
+
+/// When an effect begins that does not act from the start of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FoundOnset {
+    /// Gait cycles since the first sample of the run.
+    pub cycle: f64,
+    /// Time since the first sample of the run, s; of the first run where it begins in all.
+    pub time_s: f64,
+    /// The recording in which it begins; none for all.
+    pub run: Option<String>,
+}
+
+impl FoundOnset {
+    /// When it begins, as a clause: `from 5.0 cycles (12.5 s) after the start of run2.csv on`.
+    pub fn in_words(&self) -> String {
+        let run = self
+            .run
+            .as_ref()
+            .map_or_else(|| " of every run".to_owned(), |run| format!(" of {run}"));
+        format!(
+            "from {:.1} cycles ({:.1} s) after the start{run} on",
+            self.cycle, self.time_s
+        )
+    }
 }
 
 impl NamedEffect {
@@ -184,8 +246,12 @@ pub struct Stage {
     pub fit_rms_m: f64,
     /// The same on cycles that it was not fitted to, m.
     pub held_out_rms_m: f64,
+    /// 90 % interval of that, by the scatter from cycle to cycle, m.
+    pub held_out_interval_m: [f64; 2],
     /// Mean over the runs of how far the advance per cycle is off, m.
     pub advance_error_m: f64,
+    /// 90 % interval of that, m.
+    pub advance_error_interval_m: [f64; 2],
     /// Mean over the runs of how far the energy per cycle (11) is off, J.
     pub energy_error_j: f64,
 }
@@ -197,6 +263,8 @@ pub struct Remainder {
     pub description: String,
     /// Fraction of the gap that stays open after the best effect.
     pub open_share: f64,
+    /// Where something begins in mid-run, to the nearest cycle.
+    pub onset: Option<FoundOnset>,
     /// Period in cycles, where it repeats in time.
     pub period_cycles: Option<f64>,
     /// Period along the canal, m, where it repeats in space.

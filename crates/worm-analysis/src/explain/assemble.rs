@@ -6,12 +6,15 @@ mod runs;
 mod screening;
 mod stages;
 
-use super::answer::{Answer, Figures, NamedEffect, Remainder, ResidualMap, Verdict};
+use super::answer::{Answer, Doubt, Figures, NamedEffect, Remainder, ResidualMap, RunSummary, Verdict};
 use super::cross_validation::HeldOut;
 use super::experiment_design::propose;
 use super::fit::{Fit, FitProblem};
 use super::gap::cycles;
-use super::model_selection::{Candidate, Selected};
+use super::judge::candidate::Candidate;
+use super::judge::decision::Selected;
+use super::noise::RunNoise;
+use super::parameter::{Free, Onset, What};
 use super::period::period;
 use super::residual_map::{map, places};
 use super::score_test::Screening;
@@ -24,8 +27,10 @@ use worm_estimator::config::Config;
 
 /// Places listed at most.
 const PLACES: usize = 12;
-/// Fraction of the held-out gap that the best effect must close to be named.
-const CLOSES: f64 = 0.15;
+/// Standard errors that a normal quantity stays below with a probability of 95 %.
+const ONE_SIDED: f64 = 1.645;
+/// Standard deviation that holds an effect where it was found, in steps of its derivatives.
+const HELD: f64 = 1e-3;
 /// Improvement from which a motor that droops is named: chance reaches 4 one time in twenty, and there is one such quantity.
 const DROOPS: f64 = 16.0;
 
@@ -37,6 +42,10 @@ pub(super) struct Parts {
     pub screened: Vec<Screening>,
     pub selected: Selected,
     pub speed_droop: Option<SpeedDroop>,
+    /// Fraction of the gap that the best candidate leaves open.
+    pub open_share: f64,
+    /// Standard deviation of the discrepancy, m.
+    pub discrepancy_m: f64,
     pub threshold: f64,
 }
 
@@ -47,23 +56,12 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         .speed_droop
         .as_ref()
         .filter(|speed_droop| speed_droop.improvement > DROOPS);
-    let mut named: &[Candidate] = match selected.verdict {
+    let named: &[Candidate] = match selected.verdict {
         Verdict::Explained | Verdict::Ambiguous => &selected.candidates,
         Verdict::Agrees | Verdict::OutsideLibrary => &[],
     };
-    let mut gap = stages::Gap::measure(problem, parts, named);
-    let mut of_positions = selected.verdict;
-    let refused = gap.closure.first().copied().filter(|closure| *closure < CLOSES);
-    if refused.is_some() {
-        named = &[];
-        gap = stages::Gap::measure(problem, parts, named);
-        of_positions = if selected.gap_is_negligible {
-            Verdict::Agrees
-        } else {
-            Verdict::OutsideLibrary
-        };
-    }
-    let verdict = match (of_positions, speed_droop) {
+    let gap = stages::Gap::measure(problem, parts, named);
+    let verdict = match (selected.verdict, speed_droop) {
         (Verdict::Agrees, Some(_)) => Verdict::Explained,
         (verdict, _) => verdict,
     };
@@ -71,6 +69,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     let mut rivals = Vec::new();
     for (place, candidate) in named.iter().enumerate() {
         let found = named_effects(
+            &problem.scene.observed,
             candidate,
             selected.probability[place],
             gap.closure[place],
@@ -96,12 +95,20 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         Verdict::Agrees => Vec::new(),
         _ => best.map_or_else(Vec::new, |fit| maps(problem, fit)),
     };
+    let change = selected.change.map(|change| {
+        let onset = Onset {
+            cycle: change.cycle as f64,
+            run: change.run,
+        };
+        effects::found_onset(&problem.scene.observed, onset)
+    });
     let remainder = (verdict == Verdict::OutsideLibrary).then(|| {
         let places = places(&maps_after, PLACES);
         let period = period(problem, best.unwrap_or(&parts.recalibrated));
         Remainder {
-            description: words::remainder(selected, &places),
-            open_share: selected.open_share,
+            description: words::remainder(parts.open_share, &places),
+            open_share: parts.open_share,
+            onset: change.clone(),
             period_cycles: period.cycles,
             period_m: period.displacement_m,
             places,
@@ -118,7 +125,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     let runs = runs::runs(problem, parts, named.first());
     Answer {
         verdict,
-        sentence: words::sentence(verdict, &effects, &rivals, selected, refused, parts.threshold),
+        sentence: words::sentence(verdict, &effects, &rivals, selected, parts.open_share, change.as_ref()),
         r#where: places(&maps_before, PLACES),
         effects,
         rivals,
@@ -126,9 +133,16 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         remainder,
         next_experiment,
         calibration: calibration(final_fit, config),
+        written_back: calibration(&as_written(problem, final_fit), config),
         screening: screening::screening(&parts.screened, selected, speed_droop.is_some()),
         threshold: parts.threshold,
-        warnings: words::warnings(problem, final_fit),
+        doubt: Doubt {
+            null_probability: selected.null_probability,
+            other_probability: selected.other_probability,
+            agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
+            discrepancy_m: parts.discrepancy_m,
+        },
+        warnings: words::warnings(problem, final_fit, named.first()),
         repairs: words::repairs(problem),
         runs,
         figures: Figures {
@@ -143,6 +157,46 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
             model_diff: Vec::new(),
         },
     }
+}
+
+/// The fit of a model file: what it cannot hold keeps the values that every simulation has, and the effects stay as they were found.
+fn as_written(problem: &FitProblem<'_, '_>, fit: &Fit) -> Fit {
+    let is_written = |free: &Free| match free.what {
+        What::Effect { .. } => true,
+        What::Nuisance(nuisance) => nuisance.is_of_model_file(),
+    };
+    let mut hypothesis = fit.hypothesis.clone();
+    hypothesis.free.clear();
+    let mut at = Vec::new();
+    for (free, &value) in fit
+        .hypothesis
+        .free
+        .iter()
+        .zip(&fit.at)
+        .filter(|(free, _)| is_written(free))
+    {
+        let mut free = *free;
+        if matches!(free.what, What::Effect { .. }) {
+            (free.quantity.centre, free.quantity.sigma) = (value, HELD * free.quantity.step);
+        }
+        hypothesis.free.push(free);
+        at.push(value);
+    }
+    problem.fit(&hypothesis, at, None)
+}
+
+/// The measured advances and those of the recalibrated or the named model differ on no run by more than this, m, with a probability of
+/// 95 %: the measured mean has the error of the body's random walk, the model's that of its parameters.
+fn agrees_within_m(problem: &FitProblem<'_, '_>, runs: &[RunSummary], fit: &Fit, is_named: bool) -> f64 {
+    let of_run = |((run, noise), of_model_m): ((&RunSummary, &RunNoise), f64)| {
+        let [measured_m, recalibrated_m, named_m] = run.advance_m;
+        let model_m = if is_named { named_m } else { recalibrated_m };
+        let of_mean_m = noise.drift_per_cycle_m() / (run.cycles as f64).sqrt();
+        (measured_m - model_m).abs() + ONE_SIDED * of_mean_m.hypot(of_model_m)
+    };
+    let with_noise = runs.iter().zip(&problem.noise);
+    let all = with_noise.zip(problem.advance_sigmas_m(fit)).map(of_run);
+    all.fold(0.0, f64::max)
 }
 
 fn maps(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<ResidualMap> {

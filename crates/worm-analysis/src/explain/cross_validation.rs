@@ -45,17 +45,6 @@ pub(super) struct HeldOut {
     pub fits: Vec<FitWithout>,
 }
 
-impl HeldOut {
-    /// The refits of each partition: every sample is left out once in each.
-    pub fn partitions(&self) -> Vec<&[FitWithout]> {
-        let (slopes, blocks) = self.fits.split_at(self.fits.len().saturating_sub(BLOCKS));
-        [slopes, blocks]
-            .into_iter()
-            .filter(|partition| !partition.is_empty())
-            .collect()
-    }
-}
-
 /// Which cycle since the first sample a sample is in.
 pub(super) fn cycle_of(observed: &Observed<'_>, sample: usize) -> usize {
     (observed.phase[sample] - observed.phase[0]).max(0.0).floor() as usize
@@ -95,16 +84,11 @@ pub(super) fn folds(problem: &FitProblem<'_, '_>) -> Vec<Fold> {
 impl Fold {
     /// For each residual, whether it stays in.
     fn stays(&self, problem: &FitProblem<'_, '_>) -> Vec<bool> {
-        let mut stays = Vec::new();
-        for (observed, left_out) in problem.scene.observed.iter().zip(&self.left_out) {
-            let of = |sample: usize| !left_out[cycle_of(observed, sample)];
-            let samples = observed.counts_from..observed.samples();
-            stays.extend(samples.clone().map(of));
-            for sample in samples {
-                stays.extend(std::iter::repeat_n(of(sample), observed.cells()));
-            }
-        }
-        stays
+        let of = |(run, bin): (usize, usize)| {
+            let first = problem.bins[run].bins[bin].samples.start;
+            !self.left_out[run][cycle_of(&problem.scene.observed[run], first)]
+        };
+        problem.bin_of_rows().into_iter().map(of).collect()
     }
 }
 

@@ -45,6 +45,15 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
     if candidates.len() < 2 {
         return None;
     }
+    // A new run shows what has begun from its start.
+    let begun: Vec<Fit> = candidates
+        .iter()
+        .map(|fit| Fit {
+            hypothesis: fit.hypothesis.without_onsets(),
+            ..(*fit).clone()
+        })
+        .collect();
+    let candidates: &[&Fit] = &begun.iter().collect::<Vec<_>>();
     let changes = changes(problem.scene, cycle_s);
     let plain_distance_of = |change: &Change| {
         let empty_recording = empty_recording(problem, change);

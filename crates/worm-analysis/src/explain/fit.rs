@@ -1,18 +1,25 @@
 //! A campaign as a problem of least squares, and hypotheses fitted to it.
 //!
+//! The rows are the mean residuals of each bin (see [`super::bins`]), whitened by the noise and by the discrepancy, so that the square
+//! sum of a fit is minus twice its log likelihood with both marginalised.
+//!
 //! Every evaluation simulates the whole campaign, so the derivatives are computed by differences once and then updated; they are
 //! computed again when they no longer lead downhill (see [`crate::least_squares`]).
 
+use super::bins::Bins;
+use super::discrepancy::Discrepancy;
 use super::hypothesis::Hypothesis;
 use super::noise::RunNoise;
-use super::parameter::{Nuisance, What};
-use super::predict::Scene;
+use super::observed::Observed;
+use super::parameter::{Nuisance, Onset, What};
+use super::plant::Plant;
+use super::predict::{Predicted, Scene};
 use super::residual::Residual;
 use crate::least_squares::{
     self, Derivatives, Estimate, LeastSquares, Method, Quantity, damped_step, dot, gradient, normal_matrix,
-    prior_chi_squared, standard_errors,
+    prior_chi_squared, standard_errors, submatrix,
 };
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Fall of chi-squared below which a fit has converged, absolute and as a fraction.
@@ -38,7 +45,12 @@ const IMPOSSIBLE: f64 = 1e3;
 /// The campaign with its noise.
 pub(super) struct FitProblem<'s, 'a> {
     pub scene: &'s Scene<'a>,
+    /// Of each run.
+    pub bins: Vec<Bins>,
+    /// Of each run.
     pub noise: Vec<RunNoise>,
+    /// None before it is known, for the noise comes first.
+    pub discrepancy: Option<Discrepancy>,
     /// By how much chi-squared of the recalibrated model grows where a cycle of a periodic crawl is simulated once and repeated,
     /// instead of simulating every cycle.
     pub repeating_excess: f64,
@@ -88,9 +100,29 @@ impl Fit {
         free.quantity.is_at_limit(self.at[quantity])
     }
 
-    /// Standard errors of all quantities; infinite where nothing is known.
+    /// Standard errors of all quantities; infinite where nothing is known. What lies at a limit adds nothing to the errors of others.
     pub fn sigmas(&self) -> Vec<f64> {
-        standard_errors(self.normal(None))
+        let normal = self.normal(None);
+        let mut sigmas = standard_errors(normal.clone());
+        let open: Vec<usize> = (0..self.at.len())
+            .filter(|&quantity| !self.at_limit(quantity))
+            .collect();
+        for (&quantity, sigma) in open.iter().zip(standard_errors(submatrix(&normal, &open))) {
+            sigmas[quantity] = sigma;
+        }
+        sigmas
+    }
+
+    /// Standard deviation of something linear in all quantities, by its derivatives.
+    pub fn sigma_of(&self, derivatives: &[f64]) -> f64 {
+        let open: Vec<usize> = (0..self.at.len())
+            .filter(|&quantity| !self.at_limit(quantity))
+            .collect();
+        let derivatives = DVector::from_iterator(open.len(), open.iter().map(|&quantity| derivatives[quantity]));
+        let factor = submatrix(&self.normal(None), &open).cholesky();
+        factor.map_or(f64::INFINITY, |factor| {
+            derivatives.dot(&factor.solve(&derivatives)).max(0.0).sqrt()
+        })
     }
 }
 
@@ -110,8 +142,8 @@ impl LeastSquares for UnderHypothesis<'_, '_, '_> {
         self.problem.residuals(self.hypothesis, at)
     }
 
-    fn derivatives(&self, at: &[f64], residual: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
-        self.problem.derivatives(self.hypothesis, at, residual, quantities)
+    fn derivatives(&self, at: &[f64], _residual: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
+        self.problem.derivatives(self.hypothesis, at, quantities)
     }
 }
 
@@ -124,43 +156,135 @@ impl<'s, 'a> FitProblem<'s, 'a> {
         }
     }
 
+    /// The same campaign with the likelihood of noise alone.
+    pub fn without_any_discrepancy(&self) -> Self {
+        Self {
+            scene: self.scene,
+            bins: self.bins.clone(),
+            noise: self.noise.clone(),
+            discrepancy: None,
+            repeating_excess: self.repeating_excess,
+        }
+    }
+
     /// Rows of each run, in the vector of all residuals.
     fn rows(&self, run: usize) -> std::ops::Range<usize> {
-        let length = |run: usize| {
-            let observed = &self.scene.observed[run];
-            (observed.samples() - observed.counts_from) * (1 + observed.cells())
-        };
+        let length = |run: usize| self.bins[run].len() * (1 + self.scene.observed[run].cells());
         let from: usize = (0..run).map(length).sum();
         from..from + length(run)
     }
 
-    /// Residuals of a run under a hypothesis.
+    /// The bin that each row is in, as run and number in the run.
+    pub fn bin_of_rows(&self) -> Vec<(usize, usize)> {
+        let mut rows = Vec::new();
+        for (run, bins) in self.bins.iter().enumerate() {
+            rows.extend((0..bins.len()).map(|bin| (run, bin)));
+            for bin in 0..bins.len() {
+                rows.extend(std::iter::repeat_n((run, bin), self.scene.observed[run].cells()));
+            }
+        }
+        rows
+    }
+
+    /// Residuals of a run under a hypothesis, whitened by the noise alone.
     fn run_residuals(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64> {
-        let observed = &self.scene.observed[run];
+        self.of_prediction(run, self.scene.predict(run, hypothesis, at).as_ref())
+    }
+
+    fn of_prediction(&self, run: usize, predicted: Option<&Predicted>) -> Vec<f64> {
         let rows = self.rows(run).len();
         let mut out = Vec::with_capacity(rows);
-        match self.scene.predict(run, hypothesis, at) {
-            Some(predicted) => self.noise[run].whiten(observed, &Residual::new(observed, &predicted), &mut out),
+        match predicted {
+            Some(predicted) => {
+                let residual = Residual::binned(&self.scene.observed[run], &self.bins[run], predicted);
+                self.noise[run].whiten(&residual, &mut out);
+            }
             None => out.resize(rows, IMPOSSIBLE),
         }
         out
     }
 
-    /// Residuals of all runs.
-    pub fn residuals(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64> {
+    /// Residuals of all runs, whitened by the noise alone, and the advance that a cycle of each is predicted to make, m; `NaN` where the
+    /// worm could not have made it.
+    pub fn residuals_and_advances(&self, hypothesis: &Hypothesis, at: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let of_run = |run: usize| {
+            let predicted = self.scene.predict(run, hypothesis, at);
+            let advance_m = predicted
+                .as_ref()
+                .map_or(f64::NAN, |predicted| predicted.advance_m(&self.scene.observed[run]));
+            (self.of_prediction(run, predicted.as_ref()), advance_m)
+        };
+        let runs = (0..self.scene.observed.len()).into_par_iter();
+        let (rows, advances_m): (Vec<Vec<f64>>, Vec<f64>) = runs.map(of_run).unzip();
+        (rows.concat(), advances_m)
+    }
+
+    /// The advance that a cycle of each run is predicted to make, m.
+    pub fn advances_m(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64> {
+        let advance_m = |run: usize| {
+            let predicted = self.scene.predict(run, hypothesis, at);
+            predicted.map_or(f64::NAN, |predicted| predicted.advance_m(&self.scene.observed[run]))
+        };
+        (0..self.scene.observed.len()).into_par_iter().map(advance_m).collect()
+    }
+
+    /// Standard deviations of the advances that a fit with derivatives predicts, m.
+    pub fn advance_sigmas_m(&self, fit: &Fit) -> Vec<f64> {
+        let here_m = self.advances_m(&fit.hypothesis, &fit.at);
+        let changes: Vec<Vec<f64>> = (0..fit.at.len())
+            .map(|quantity| {
+                let step = fit.hypothesis.free[quantity].quantity.inward_step(fit.at[quantity]);
+                let mut probe = fit.at.clone();
+                probe[quantity] += step;
+                let there_m = self.advances_m(&fit.hypothesis, &probe);
+                here_m
+                    .iter()
+                    .zip(&there_m)
+                    .map(|(here, there)| (there - here) / step)
+                    .collect()
+            })
+            .collect();
+        let of_run = |run: usize| fit.sigma_of(&changes.iter().map(|change| change[run]).collect::<Vec<f64>>());
+        (0..here_m.len()).map(of_run).collect()
+    }
+
+    /// The largest relative change from some advances to others: relative to the advance, or to a quarter of the stroke where the
+    /// worm hardly advances.
+    pub fn impact(&self, from_m: &[f64], to_m: &[f64]) -> f64 {
+        let change = |((run, from_m), to_m): ((usize, &f64), &f64)| {
+            let stroke_m = self.scene.nominal[run].worm.stroke_m();
+            (to_m - from_m).abs() / from_m.abs().max(0.25 * stroke_m)
+        };
+        from_m.iter().enumerate().zip(to_m).map(change).fold(0.0, f64::max)
+    }
+
+    /// Residuals of all runs, whitened by the noise alone.
+    pub fn without_discrepancy(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64> {
         let runs = (0..self.scene.observed.len()).into_par_iter();
         let residuals: Vec<Vec<f64>> = runs.map(|run| self.run_residuals(run, hypothesis, at)).collect();
         residuals.concat()
     }
 
+    /// Whitens rows by the discrepancy, where it is known.
+    pub fn whiten(&self, rows: &mut [f64]) {
+        if let Some(discrepancy) = &self.discrepancy {
+            discrepancy.whiten(rows);
+        }
+    }
+
+    /// Residuals of all runs.
+    pub fn residuals(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64> {
+        let mut residual = self.without_discrepancy(hypothesis, at);
+        self.whiten(&mut residual);
+        residual
+    }
+
     /// How the residuals change with some quantities, by differences towards the inside of their limits.
-    fn derivatives(
-        &self,
-        hypothesis: &Hypothesis,
-        at: &[f64],
-        residual: &[f64],
-        quantities: &[usize],
-    ) -> Vec<Vec<f64>> {
+    fn derivatives(&self, hypothesis: &Hypothesis, at: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
+        if quantities.is_empty() {
+            return Vec::new();
+        }
+        let here = self.without_discrepancy(hypothesis, at);
         let runs = self.scene.observed.len();
         let of_run = |quantity: usize, run: usize| {
             let free = &hypothesis.free[quantity];
@@ -172,16 +296,56 @@ impl<'s, 'a> FitProblem<'s, 'a> {
             let mut probe = at.to_vec();
             probe[quantity] += step;
             let mut column = self.run_residuals(run, hypothesis, &probe);
-            for (value, here) in column.iter_mut().zip(&residual[rows]) {
+            for (value, here) in column.iter_mut().zip(&here[rows]) {
                 *value = (*value - here) / step;
             }
             column
         };
-        let columns = quantities.par_iter().map(|&quantity| {
-            let runs: Vec<Vec<f64>> = (0..runs).into_par_iter().map(|run| of_run(quantity, run)).collect();
-            runs.concat()
-        });
-        columns.collect()
+        let columns: Vec<Vec<f64>> = quantities
+            .par_iter()
+            .map(|&quantity| {
+                let runs: Vec<Vec<f64>> = (0..runs).into_par_iter().map(|run| of_run(quantity, run)).collect();
+                runs.concat()
+            })
+            .collect();
+        self.whiten_all(columns)
+    }
+
+    /// A change of the residuals, whitened by the noise alone, that begins at some time: 0 before, and the relative positions about
+    /// their means again.
+    pub fn after_onset(&self, change: &[f64], onset: &Onset) -> Vec<f64> {
+        let mut begun = vec![0.0; change.len()];
+        for (run, bins) in self.bins.iter().enumerate().filter(|(run, _)| onset.is_in(*run)) {
+            let from = bins.start_phase + onset.cycle;
+            let first = bins.bins.partition_point(|bin| bin.phase < from);
+            let rows = self.rows(run);
+            let (count, cells) = (bins.len(), self.scene.observed[run].cells());
+            begun[rows.start + first..rows.start + count]
+                .copy_from_slice(&change[rows.start + first..rows.start + count]);
+            let relative = rows.start + count..rows.end;
+            begun[relative.start + first * cells..relative.end]
+                .copy_from_slice(&change[relative.start + first * cells..relative.end]);
+            for cell in 0..cells {
+                let mut of_cell: Vec<&mut f64> = begun[relative.clone()].iter_mut().skip(cell).step_by(cells).collect();
+                let mean = of_cell.iter().map(|row| **row).sum::<f64>() / count as f64;
+                of_cell.iter_mut().for_each(|row| **row -= mean);
+            }
+        }
+        begun
+    }
+
+    /// Whitens columns of rows by the discrepancy, where it is known.
+    pub fn whiten_all(&self, columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let Some(discrepancy) = &self.discrepancy else {
+            return columns;
+        };
+        let rows = columns.first().map_or(0, Vec::len);
+        let mut whitened = DMatrix::from_iterator(rows, columns.len(), columns.into_iter().flatten());
+        discrepancy.whiten_columns(&mut whitened);
+        whitened
+            .column_iter()
+            .map(|column| column.as_slice().to_vec())
+            .collect()
     }
 
     /// By how much chi-squared of a fit grows where a cycle of a periodic crawl is simulated once and repeated, compared to the same
@@ -196,7 +360,7 @@ impl<'s, 'a> FitProblem<'s, 'a> {
 
     /// How much of a fall of chi-squared from one fit to another is due to the one repeating a cycle and the other simulating all.
     pub fn excess_of_repeating(&self, from: &Fit, to: &Fit) -> f64 {
-        let repeats = |fit: &Fit| self.scene.physics(0, &fit.hypothesis, &fit.at).0.is_periodic();
+        let repeats = |fit: &Fit| self.scene.repeats(0, &fit.hypothesis, &fit.at);
         match (repeats(from), repeats(to)) {
             (true, false) => self.repeating_excess,
             (false, true) => -self.repeating_excess,
@@ -212,7 +376,7 @@ impl<'s, 'a> FitProblem<'s, 'a> {
     /// Computes the derivatives of all quantities.
     pub fn compute_jacobian(&self, fit: &mut Fit) {
         let all: Vec<usize> = (0..fit.at.len()).collect();
-        fit.jacobian = self.derivatives(&fit.hypothesis, &fit.at, &fit.residual, &all);
+        fit.jacobian = self.derivatives(&fit.hypothesis, &fit.at, &all);
     }
 
     /// A hypothesis at some values, with derivatives.
@@ -262,6 +426,31 @@ impl<'s, 'a> FitProblem<'s, 'a> {
             }
         }
         fit
+    }
+}
+
+impl Plant for FitProblem<'_, '_> {
+    fn runs(&self) -> usize {
+        self.scene.observed.len()
+    }
+
+    fn cells(&self) -> usize {
+        self.scene.observed.first().map_or(0, Observed::cells)
+    }
+
+    fn condition(&self, run: usize) -> f64 {
+        self.scene.observed[run].run.slope_deg.to_radians().sin()
+    }
+
+    fn bins(&self, run: usize) -> &Bins {
+        &self.bins[run]
+    }
+
+    fn rows_of(&self, run: usize, pattern_m: &[f64]) -> Vec<f64> {
+        let mut rows = Vec::with_capacity(self.rows(run).len());
+        let residual = Residual::of_pattern(&self.scene.observed[run], &self.bins[run], pattern_m);
+        self.noise[run].whiten(&residual, &mut rows);
+        rows
     }
 }
 

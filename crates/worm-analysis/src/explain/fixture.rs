@@ -1,10 +1,11 @@
 //! Campaigns for the tests of the search: the model's own crawl under an effect, with noise and a body that goes astray.
 
+use super::bins::Bins;
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
 use super::noise::RunNoise;
 use super::observed::Observed;
-use super::parameter::Hypothesised;
+use super::parameter::{Hypothesised, Onset};
 use super::predict::Scene;
 use super::residual::Residual;
 use crate::experiment::{RecordedRun, Simulation, simulate};
@@ -44,6 +45,15 @@ pub(super) type Truth<'t> = Option<(&'t str, Option<usize>, &'t [f64])>;
 
 /// The recordings of a worm with an effect.
 pub(super) fn record(campaign: &Campaign, truth: Truth<'_>, seed: u64) -> Vec<Recording> {
+    record_under(campaign, &hypothesis(truth), seed)
+}
+
+/// The recordings of a worm under a hypothesis.
+pub(super) fn record_under(
+    campaign: &Campaign,
+    (hypothesis, at): &(Hypothesis, Vec<f64>),
+    seed: u64,
+) -> Vec<Recording> {
     let config = Config::default();
     let simulations = campaign.slopes_deg.iter().map(|&slope_deg| Simulation {
         slope_deg,
@@ -52,11 +62,10 @@ pub(super) fn record(campaign: &Campaign, truth: Truth<'_>, seed: u64) -> Vec<Re
     let mut recordings: Vec<Recording> = simulations
         .map(|simulation| simulate(&config, &simulation).expect("the simulation is a fixed one"))
         .collect();
-    let (hypothesis, at) = hypothesis(truth);
     let scene = scene(&recordings, campaign);
     let runs = 0..recordings.len();
     let predicted: Vec<Vec<f64>> = runs
-        .map(|run| scene.predict(run, &hypothesis, &at).expect("it holds").position_m)
+        .map(|run| scene.predict(run, hypothesis, at).expect("it holds").position_m)
         .collect();
     drop(scene);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -87,7 +96,20 @@ pub(super) fn hypothesis(truth: Truth<'_>) -> (Hypothesis, Vec<f64>) {
         return (Hypothesis::default(), Vec::new());
     };
     let effect = named(name).expect("the name is in the library");
-    (Hypothesis::new(&[], &[Hypothesised { effect, cell }]), values.to_vec())
+    (
+        Hypothesis::new(&[], &[Hypothesised::throughout(effect, cell)]),
+        values.to_vec(),
+    )
+}
+
+/// The same, from some cycles after the start of the runs that it concerns on.
+pub(super) fn begun(truth: Truth<'_>, onset: Onset) -> (Hypothesis, Vec<f64>) {
+    let (mut hypothesis, at) = hypothesis(truth);
+    hypothesis
+        .hypothesised
+        .iter_mut()
+        .for_each(|one| one.onset = Some(onset));
+    (hypothesis, at)
 }
 
 pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Scene<'a> {
@@ -113,16 +135,23 @@ pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Sce
     scene
 }
 
-/// The problem with the noise that some hypothesis leaves.
+/// The problem with the noise that some hypothesis leaves, and no discrepancy: these worms are the model's own.
 pub(super) fn problem<'s, 'a>(scene: &'s Scene<'a>, (hypothesis, at): &(Hypothesis, Vec<f64>)) -> FitProblem<'s, 'a> {
+    let bins: Vec<Bins> = scene.observed.iter().map(Bins::new).collect();
     let noise = |(run, observed): (usize, &Observed<'_>)| {
         let predicted = scene.predict(run, hypothesis, at).expect("it holds");
-        RunNoise::measure(observed, &Residual::new(observed, &predicted))
+        RunNoise::measure(
+            observed,
+            &bins[run],
+            &Residual::binned(observed, &bins[run], &predicted),
+        )
     };
     FitProblem {
         noise: scene.observed.iter().enumerate().map(noise).collect(),
         scene,
+        discrepancy: None,
         repeating_excess: 0.0,
+        bins,
     }
 }
 

@@ -23,12 +23,15 @@ use super::observed::Observed;
 use super::predict::Predicted;
 use super::residual::Residual;
 pub(super) use mean_cycle::cycles;
+use std::f64::consts::SQRT_2;
 use std::ops::Range;
 
 /// Fraction of a cycle that the last one may lack and still count as whole.
 const SHORT: f64 = 0.05;
 /// Fraction of a cycle by which the first settled sample may miss the start of the cycle.
 const LATE: f64 = 0.1;
+/// Standard errors to either end of a 90 % interval.
+const NINETY: f64 = 1.645;
 /// Mean of the absolute value of a normal quantity, in standard deviations.
 const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
 
@@ -75,6 +78,80 @@ struct Cycle {
     samples: Range<usize>,
 }
 
+/// Squares of each cycle of each run: neighbouring samples are not independent, cycles are nearly so.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Clusters(Vec<Vec<Squares>>);
+
+impl Clusters {
+    fn add(&mut self, run: usize, cycle: usize, squares: Squares) {
+        if self.0.len() <= run {
+            self.0.resize(run + 1, Vec::new());
+        }
+        if self.0[run].len() <= cycle {
+            self.0[run].resize(cycle + 1, Squares::default());
+        }
+        self.0[run][cycle].add(squares);
+    }
+
+    fn each(&self) -> impl Iterator<Item = Squares> {
+        self.0.iter().flatten().copied().filter(|squares| squares.count > 0.0)
+    }
+
+    fn total(&self) -> Squares {
+        self.each().fold(Squares::default(), |mut sum, squares| {
+            sum.add(squares);
+            sum
+        })
+    }
+
+    /// 90 % interval of the root mean square.
+    fn interval_m(&self) -> [f64; 2] {
+        let total = self.total();
+        let mean_m2 = total.sum / total.count;
+        let off = self
+            .each()
+            .map(|squares| (squares.sum - mean_m2 * squares.count).powi(2));
+        let half_m2 = NINETY * off.sum::<f64>().sqrt() / total.count;
+        [mean_m2 - half_m2, mean_m2 + half_m2].map(|m2| m2.max(0.0).sqrt())
+    }
+
+    /// The fraction of the squared gap between these residuals and a floor that others close, with its 90 % interval; `NaN` where the
+    /// gap is within its own error, and where the interval is wider than from nothing to all on either side.
+    pub fn closure(&self, closed: &Self, floor_m: f64) -> (f64, [f64; 2]) {
+        let pairs: Vec<(f64, f64)> = self
+            .each()
+            .zip(closed.each())
+            .map(|(open, left)| {
+                let left_m2 = left.sum / left.count * open.count;
+                (open.sum - floor_m * floor_m * open.count, open.sum - left_m2)
+            })
+            .collect();
+        let (gap, gain) = pairs
+            .iter()
+            .fold((0.0, 0.0), |(gap, gain), pair| (gap + pair.0, gain + pair.1));
+        let count = pairs.len() as f64;
+        let spread = pairs
+            .iter()
+            .map(|(one, _)| (one - gap / count).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        // The floor is as uncertain as the gap.
+        if gap.is_nan() || gap - NINETY * SQRT_2 * spread <= 0.0 {
+            return (f64::NAN, [f64::NAN; 2]);
+        }
+        let closure = gain / gap;
+        let off = pairs
+            .iter()
+            .map(|(gap, gain)| (gain - closure * gap).powi(2))
+            .sum::<f64>();
+        let half = NINETY * off.sqrt() / gap;
+        if half > 1.0 {
+            return (f64::NAN, [f64::NAN; 2]);
+        }
+        (closure, [closure - half, closure + half])
+    }
+}
+
 /// A running mean of squares.
 #[derive(Debug, Clone, Copy, Default)]
 struct Squares {
@@ -100,7 +177,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         let runs = 0..problem.scene.observed.len();
         let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(problem, run, best)).collect();
         let energy = |(run, residuals): (usize, &Option<CellResiduals>)| {
-            let drift_m = problem.noise[run].drift.smooth(&residuals.as_ref()?.body_m);
+            let drift_m = problem.noise[run].smooth(&problem.scene.observed[run], &residuals.as_ref()?.body_m);
             let walk = energy::carried(problem, run, best, &drift_m)?;
             Some(walk.energy_j(&problem.scene.observed[run]))
         };
@@ -117,17 +194,15 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
     pub fn stage(&self, stage: StageKind, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
         let residuals = self.residuals(all);
         let fit_rms_m = self.rms(&residuals, |_, _| true);
-        let mut held_out = Squares::default();
-        for (fit, out) in folds {
-            let is_out = |run: usize, cycle: usize| out.get(run).and_then(|run| run.get(cycle)) == Some(&true);
-            held_out.add(self.squares(&self.residuals(fit), is_out));
-        }
+        let held_out = self.clusters(all, folds);
         let energy_j = |run: usize| energy::own(self.problem, run, all).map(|walk| walk.energy_j(self.observed(run)));
         Stage {
             stage,
             effect,
             fit_rms_m,
-            held_out_rms_m: if folds.is_empty() { fit_rms_m } else { held_out.rms() },
+            held_out_rms_m: held_out.total().rms(),
+            held_out_interval_m: held_out.interval_m(),
+            advance_error_interval_m: self.advance_interval_m(&residuals),
             advance_error_m: self
                 .mean_over_runs(|run| Some(advance_m(self.observed(run), residuals[run].as_ref()?).abs())),
             energy_error_j: self.energy_error_j(energy_j),
@@ -157,6 +232,8 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
             effect: None,
             fit_rms_m: rms(&all),
             held_out_rms_m: f64::min(rms(&alone), rms(&trend)),
+            held_out_interval_m: [f64::NAN; 2],
+            advance_error_interval_m: [f64::NAN; 2],
             advance_error_m: self.mean_over_runs(|run| Some(advance_m(self.observed(run), all[run].as_ref()?).abs())),
             energy_error_j: self.energy_error_j(energy_j),
         }
@@ -185,9 +262,55 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
             effect: None,
             fit_rms_m: squares.rms(),
             held_out_rms_m: squares.rms(),
+            held_out_interval_m: [f64::NAN; 2],
+            advance_error_interval_m: [f64::NAN; 2],
             advance_error_m: self.mean_over_runs(|run| Some(chance(self.problem.noise[run].drift_per_cycle_m(), run))),
             energy_error_j: self.mean_over_runs(|run| Some(chance(deviation(self.energy_j[run].as_ref()?), run))),
         }
+    }
+
+    /// Squares of each cycle held out, as [`stage`](Self::stage) counts them.
+    pub fn clusters(&self, all: &Fit, folds: &[FitWithout]) -> Clusters {
+        let mut clusters = Clusters::default();
+        let mut add = |fit: &Fit, is_out: &dyn Fn(usize, usize) -> bool| {
+            for (run, residuals) in self.residuals(fit).iter().enumerate() {
+                for cycle in settled_cycles(self.observed(run))
+                    .iter()
+                    .filter(|cycle| is_out(run, cycle.index))
+                {
+                    let squares = residuals.as_ref().map_or(
+                        Squares {
+                            sum: f64::NAN,
+                            count: 1.0,
+                        },
+                        |residuals| of_cycle(self.observed(run), residuals, cycle),
+                    );
+                    clusters.add(run, cycle.index, squares);
+                }
+            }
+        };
+        for (fit, out) in folds {
+            add(fit, &|run, cycle| {
+                out.get(run).and_then(|run| run.get(cycle)) == Some(&true)
+            });
+        }
+        if folds.is_empty() {
+            add(all, &|_, _| true);
+        }
+        clusters
+    }
+
+    /// 90 % interval of the mean over the runs of how far the advance is off, m: by the scatter of the cycles.
+    fn advance_interval_m(&self, residuals: &[Option<CellResiduals>]) -> [f64; 2] {
+        let of = |run: usize| Some(advance_m(self.observed(run), residuals[run].as_ref()?).abs());
+        let mean_m = self.mean_over_runs(of);
+        let variance_m2: f64 = (0..self.runs())
+            .map(|run| {
+                self.problem.noise[run].drift_per_cycle_m().powi(2) / settled_cycles(self.observed(run)).len() as f64
+            })
+            .sum();
+        let half_m = NINETY * variance_m2.sqrt() / self.runs() as f64;
+        [(mean_m - half_m).max(0.0), mean_m + half_m]
     }
 
     fn runs(&self) -> usize {
@@ -244,6 +367,12 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
     }
 }
 
+/// Mean energy of a settled cycle of a run by a fit's own motion, J; none where it slides down.
+pub(super) fn energy_per_cycle_j(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<f64> {
+    let walk = energy::own(problem, run, fit)?;
+    Some(mean(&walk.energy_j(&problem.scene.observed[run])))
+}
+
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
@@ -293,25 +422,30 @@ fn at_boundaries(observed: &Observed<'_>, cycles: &[Cycle], series: &[f64]) -> V
 
 /// Squares of every cell's residual within the cycles that count, about its mean in each.
 fn within_cycles(observed: &Observed<'_>, residuals: &CellResiduals, counts: impl Fn(usize) -> bool) -> Squares {
-    let cells = observed.cells();
     let mut squares = Squares::default();
     for cycle in settled_cycles(observed).iter().filter(|cycle| counts(cycle.index)) {
-        for cell in 0..cells {
-            let own_m = || {
-                let of_cell = cycle
-                    .samples
-                    .clone()
-                    .map(|sample| residuals.own_m[sample * cells + cell]);
-                of_cell.filter(|own_m| own_m.is_finite())
-            };
-            let seen = own_m().count() as f64;
-            if seen > 1.0 {
-                let mean_m = own_m().sum::<f64>() / seen;
-                squares.add(Squares {
-                    sum: own_m().map(|own_m| (own_m - mean_m).powi(2)).sum(),
-                    count: seen - 1.0,
-                });
-            }
+        squares.add(of_cycle(observed, residuals, cycle));
+    }
+    squares
+}
+
+/// Squares of every cell's residual within a cycle, about its mean in it.
+fn of_cycle(observed: &Observed<'_>, residuals: &CellResiduals, cycle: &Cycle) -> Squares {
+    let cells = observed.cells();
+    let mut squares = Squares::default();
+    for cell in 0..cells {
+        let own_m = || {
+            let samples = cycle.samples.clone();
+            let of_cell = samples.map(|sample| residuals.own_m[sample * cells + cell]);
+            of_cell.filter(|own_m| own_m.is_finite())
+        };
+        let seen = own_m().count() as f64;
+        if seen > 1.0 {
+            let mean_m = own_m().sum::<f64>() / seen;
+            squares.add(Squares {
+                sum: own_m().map(|own_m| (own_m - mean_m).powi(2)).sum(),
+                count: seen - 1.0,
+            });
         }
     }
     squares

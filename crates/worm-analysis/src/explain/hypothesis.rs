@@ -40,6 +40,20 @@ impl Hypothesis {
 
     /// The effects with these values.
     pub fn settings(&self, at: &[f64]) -> Vec<Setting> {
+        self.settings_of(at, |_| true)
+    }
+
+    /// The effects that act from the start of a run.
+    pub fn settings_at_start(&self, at: &[f64]) -> Vec<Setting> {
+        self.settings_of(at, |one| one.onset.is_none())
+    }
+
+    /// The effects that act at the end of a run.
+    pub fn settings_at_end(&self, run: usize, at: &[f64]) -> Vec<Setting> {
+        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.is_in(run)))
+    }
+
+    fn settings_of(&self, at: &[f64], acts: impl Fn(&Hypothesised) -> bool) -> Vec<Setting> {
         let mut values: Vec<Vec<f64>> = self
             .hypothesised
             .iter()
@@ -50,10 +64,24 @@ impl Hypothesis {
                 values[place][parameter] = value;
             }
         }
-        self.hypothesised
-            .iter()
-            .zip(values)
+        let effects = self.hypothesised.iter().zip(values);
+        let acting = effects.filter(|(hypothesised, _)| acts(hypothesised));
+        acting
             .map(|(hypothesised, values)| Setting::within(hypothesised.effect, hypothesised.cell, &values))
             .collect()
+    }
+
+    /// Where an effect of a run begins after its start, cycles since then: the first of several.
+    pub fn begins_at(&self, run: usize) -> Option<f64> {
+        let onsets = self.hypothesised.iter().filter_map(|one| one.onset);
+        let of_run = onsets.filter(|onset| onset.is_in(run)).map(|onset| onset.cycle);
+        of_run.min_by(f64::total_cmp)
+    }
+
+    /// The same with all effects acting throughout.
+    pub fn without_onsets(&self) -> Self {
+        let mut all = self.clone();
+        all.hypothesised.iter_mut().for_each(|one| one.onset = None);
+        all
     }
 }

@@ -4,7 +4,8 @@
 //! appended as an `[[effect]]`, with a comment that lists its twins and the experiment that would separate them. Everything else stays as
 //! it was, order and comments included, so that the difference between the two files is the answer.
 //!
-//! Quantities of a run or of the measurement (`slope of run 1`, `clock`) are no property of the worm and are not written.
+//! Quantities of a run or of the measurement (`slope of run 1`, `clock`) are no property of the worm and are not written, nor are those
+//! that a model file cannot hold (damping, presliding, rounding, viscosity): the recalibration that is written is fitted without them.
 
 mod diff;
 mod entry;
@@ -61,7 +62,7 @@ pub struct ModelText {
 /// [`WriteBackError`] when the text is not that of a configuration, or the answer is not about its worm.
 pub fn model(config_text: &str, config: &Config, answer: &Answer) -> Result<ModelText, WriteBackError> {
     let mut document: DocumentMut = config_text.parse()?;
-    let factors = Factors::of(&answer.calibration, config.worm.cells)?;
+    let factors = Factors::of(&answer.written_back, config.worm.cells)?;
     let worm = document.entry("worm").or_insert_with(|| Item::Table(Table::new()));
     if let Some(worm) = worm.as_table_like_mut() {
         factors.write(worm, config);

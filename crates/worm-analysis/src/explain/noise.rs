@@ -1,183 +1,137 @@
-//! The noise floor: how well the worm repeats its own cycles.
+//! The noise: how well the worm repeats its own cycles.
 //!
-//! What remains of a run once its mean cycle (and a linear trend of it over the cycles) is removed is noise for any model: camera noise,
-//! partly correlated from sample to sample, and a random walk of the body, since every step differs a little from the last. Both are
-//! measured after a *free form* (one value for each phase bin) removed whatever any model could explain, so a missing effect does not
-//! count as noise. The variance of sums over a step accounts for correlation: where sums vary more than those of independent samples
-//! would, all weights are reduced accordingly.
+//! Neighbouring cycles differ by noise alone, whatever the model misses, unless something changes just between them. So the noise is
+//! measured by differences from each cycle to the next, and by medians of their squares: a change in the middle of a run concerns one
+//! difference of many and does not count as noise. There are two kinds. Camera noise and scatter within the cycle concern each cell,
+//! and are correlated from bin to bin. The body makes a random walk, since every step differs a little from the last.
 
+use super::bins::Bins;
 use super::observed::Observed;
 use super::residual::Residual;
 use crate::identify::drift::Drift;
 
-/// Phase bins of a step in the free form.
-pub(super) const BINS_PER_STEP: usize = 12;
-/// Cycles from which the free form has a trend.
-const TREND_CYCLES: usize = 5;
-/// Drifts that are tried, as standard deviations after one cycle, m: from `.0` on, each `.1` times the one before.
-const DRIFTS: (f64, f64, usize) = (1e-6, 1.5, 20);
+/// Median of the square of a normal quantity, in variances.
+const MEDIAN_SQUARE: f64 = 0.454_936;
+/// Variance of the mean of a random walk over an interval less its mean over the one before, in variances gathered in an interval.
+const WALK_OF_MEANS: f64 = 2.0 / 3.0;
+/// Variance of the change of that difference from one interval to the next, in the same unit: neighbouring differences overlap.
+const WALK_OF_SECOND_DIFFERENCES: f64 = 1.0;
+/// Variance of a variance taken by [`variance`], relative to its square, times the number of values.
+const VARIANCE_OF_MEDIAN: f64 = 5.4;
+/// Fraction of its bins that a step or a cycle must show.
+const WHOLE: f64 = 0.9;
+/// Fewest changes of the advance from which their variance is taken: a single change in mid-run shows in three of them.
+const MIN_DIFFERENCES: usize = 8;
+/// Smallest variance of a position, and of the drift in a cycle, m².
+const MIN_M2: f64 = 1e-14;
+const MIN_DRIFT_M2: f64 = 1e-12;
 
 /// The noise of one run.
 #[derive(Debug, Clone)]
 pub(super) struct RunNoise {
-    pub drift: Drift,
-    /// Variance of one position, m².
-    position_m2: f64,
-    /// The same for the settled crawl alone.
-    settled: Drift,
-    /// Factor on the whitened residuals of the body, for their correlation.
-    pub body_scale: f64,
-    /// One over the standard deviation of a cell's relative position, correlation counted, 1/m.
-    pub relative_scale: f64,
-    /// Quantities in the free form.
-    pub free_quantities: f64,
+    drift: Drift,
+    /// Variance of one sample that neighbouring samples do not share, and of what the samples of a bin share, m².
+    white_m2: f64,
+    shared_m2: f64,
+    /// Factor on the variance of a bin's position for its correlation with the bins beside it.
+    along: f64,
+    /// One over the standard deviation of each cell's relative position in each bin, 1/m; 0 where not seen.
+    relative_scale: Vec<f64>,
 }
 
 impl RunNoise {
-    /// The noise of a run, by its residual under some hypothesis.
-    pub fn measure(observed: &Observed<'_>, residual: &Residual) -> Self {
-        let free = free_form(observed, residual);
+    /// The noise of a run, by its residual in bins under some hypothesis.
+    pub fn measure(observed: &Observed<'_>, bins: &Bins, residual: &Residual) -> Self {
         let cells = observed.cells();
-        let from = observed.settled_from();
-        let cycles = observed.whole_cycles() as f64;
-        let terms = if observed.whole_cycles() >= TREND_CYCLES {
-            2.0
-        } else {
-            1.0
-        };
-        let lost = cycles / (cycles - terms).max(1.0); // variance that the free form removed with it
-        let (mut squares, mut equations) = (0.0, 0.0);
-        for sample in from..observed.samples() {
-            let row = &free.relative_m[sample * cells..(sample + 1) * cells];
-            let seen = row.iter().filter(|relative_m| relative_m.is_finite()).count() as f64;
-            if seen > 1.0 {
-                squares += row.iter().filter(|m| m.is_finite()).map(|m| m * m).sum::<f64>();
-                equations += seen - 1.0;
-            }
-        }
-        let position_m2 = (lost * squares / f64::max(equations, 1.0)).max(1e-14);
-        let variance_m2 = |counts_from: usize| -> Vec<f64> {
-            let of = |sample: usize| {
-                let stepping = observed.stepping(sample);
-                let seen = (0..cells)
-                    .filter(|&cell| observed.position_m[cell][sample].is_finite())
-                    .filter(|&cell| observed.phase_recorded || cell != stepping)
-                    .count();
-                if seen == 0 || sample < counts_from {
-                    f64::INFINITY
-                } else {
-                    position_m2 / seen as f64
-                }
-            };
-            (0..observed.samples()).map(of).collect()
-        };
-        let shrunk_m2: Vec<f64> = variance_m2(from).iter().map(|m2| m2 / lost).collect();
-        let likeliest_m = (0..DRIFTS.2)
-            .map(|at| DRIFTS.0 * DRIFTS.1.powi(at as i32))
-            .map(|per_cycle_m| {
-                let drift = Drift::new(&observed.phase, &shrunk_m2, per_cycle_m * per_cycle_m);
-                (drift.chi_squared(free.body_m.iter().copied()), per_cycle_m)
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map_or(DRIFTS.0, |best| best.1);
-        let drift_m2 = lost * likeliest_m * likeliest_m;
-        let settled = Drift::new(&observed.phase, &variance_m2(from), drift_m2);
-        let samples_per_step = (observed.samples() as f64
-            / ((observed.phase[observed.samples() - 1] - observed.phase[0]) * cells as f64))
-            .round()
-            .max(2.0) as usize;
-        let mut whitened_residuals = Vec::with_capacity(observed.samples());
-        settled.whiten(free.body_m.iter().copied(), |whitened_residual| {
-            whitened_residuals.push(whitened_residual)
+        let counted = if observed.phase_recorded { cells } else { cells - 1 } as f64;
+        let changes = CycleChanges::new(observed, bins, residual);
+        // A relative position lacks its share in the body's.
+        let position_m2 = (0.5 * changes.of_bins_m2() * counted / (counted - 1.0)).max(MIN_M2);
+        let per_bin = bins.bins.iter().map(|bin| bin.samples.len() as f64).sum::<f64>() / bins.len() as f64;
+        let white_m2 = observed.noise_m.powi(2).min(position_m2 * per_bin);
+        let shared_m2 = (position_m2 - white_m2 / per_bin).max(0.0);
+        let along = changes.along().clamp(1.0, bins.per_step as f64);
+        let of_step_m2 = position_m2 * along / counted / bins.per_step as f64;
+        let of_steps_m2 = 0.5 * changes.of_steps_m2();
+        let per_step_m2 = (of_steps_m2 - 2.0 * of_step_m2) / WALK_OF_MEANS * cells as f64;
+        // Where the estimate is lost in its own error, the drift may still be as large as that.
+        let of_few = |count: usize| (VARIANCE_OF_MEDIAN / count.max(1) as f64).sqrt();
+        let error_m2 = of_steps_m2 / WALK_OF_MEANS * of_few(changes.steps()) * cells as f64;
+        let of_cycle_m2 = of_step_m2 / cells as f64;
+        let per_cycle_m2 = changes.of_cycles_m2().map_or(0.0, |m2| {
+            (m2 * (1.0 - of_few(changes.cycles())) - 6.0 * of_cycle_m2) / WALK_OF_SECOND_DIFFERENCES
         });
-        let body_scale = 1.0
-            / (lost * sum_variance(&whitened_residuals[from..], samples_per_step))
-                .max(1.0)
-                .sqrt();
-        let along: f64 = (0..cells)
-            .map(|cell| {
-                let series: Vec<f64> = (from..observed.samples())
-                    .map(|sample| free.relative_m[sample * cells + cell])
-                    .filter(|relative_m| relative_m.is_finite())
-                    .map(|relative_m| relative_m / (position_m2 / lost).sqrt())
-                    .collect();
-                sum_variance(&series, samples_per_step)
-            })
-            .sum::<f64>()
-            / cells as f64;
-        Self {
-            drift: Drift::new(&observed.phase, &variance_m2(observed.counts_from), drift_m2),
-            position_m2,
-            settled,
-            body_scale,
-            relative_scale: 1.0 / (position_m2 * along.max(1.0)).sqrt(),
-            // Each counts by its part of chi-squared: the weights are smaller where noise is correlated.
-            free_quantities: terms
-                * (BINS_PER_STEP * cells) as f64
-                * (body_scale.powi(2) + (cells as f64 - 1.0) / along.max(1.0)),
-        }
+        let drift_m2 = per_step_m2.max(error_m2).max(per_cycle_m2).max(MIN_DRIFT_M2);
+        Self::new(observed, bins, [white_m2, shared_m2, along, drift_m2])
     }
 
-    /// The noise of another run of the same worm before the same camera, which keeps one sample in `thinned` and shows every cell.
-    pub fn of_another(&self, observed: &Observed<'_>, thinned: f64) -> Self {
-        let variance_m2: Vec<f64> = (0..observed.samples())
-            .map(|sample| {
-                let seen = observed.cells() as f64 - if observed.phase_recorded { 0.0 } else { 1.0 };
-                if sample < observed.counts_from {
-                    f64::INFINITY
-                } else {
-                    self.position_m2 / thinned / seen
-                }
-            })
-            .collect();
-        let drift = Drift::new(&observed.phase, &variance_m2, self.drift.per_cycle_m2());
-        Self {
-            settled: drift.clone(),
-            drift,
-            position_m2: self.position_m2 / thinned,
-            body_scale: self.body_scale,
-            relative_scale: self.relative_scale * thinned.sqrt(),
-            free_quantities: 0.0,
-        }
-    }
-
-    /// How much of the chi-squared of a residual a free form would remove beyond chance.
-    pub fn explainable(&self, observed: &Observed<'_>, residual: &Residual) -> f64 {
-        let from = observed.settled_from() * observed.cells();
-        let chi_squared = |residual: &Residual| {
-            let mut squares = 0.0;
-            self.settled
-                .whiten(residual.body_m.iter().copied(), |whitened_residual| {
-                    squares += whitened_residual * whitened_residual
-                });
-            let relative = residual.relative_m[from..]
-                .iter()
-                .filter(|relative_m| relative_m.is_finite());
-            let relative_squares: f64 = relative.map(|relative_m| relative_m * relative_m).sum();
-            squares * self.body_scale.powi(2) + relative_squares * self.relative_scale.powi(2)
-        };
-        chi_squared(residual) - chi_squared(&free_form(observed, residual)) - self.free_quantities
-    }
-
-    /// Appends the whitened residuals of a run, each of variance 1 where the hypothesis holds: for every sample that counts the
-    /// body's, then for every sample each cell's.
-    pub fn whiten(&self, observed: &Observed<'_>, residual: &Residual, out: &mut Vec<f64>) {
-        let from = observed.counts_from;
-        let mut at = 0;
-        self.drift.whiten(residual.body_m.iter().copied(), |whitened_residual| {
-            if at >= from {
-                out.push(whitened_residual * self.body_scale);
-            }
-            at += 1;
-        });
+    fn new(observed: &Observed<'_>, bins: &Bins, [white_m2, shared_m2, along, drift_m2]: [f64; 4]) -> Self {
         let cells = observed.cells();
-        out.extend(residual.relative_m[from * cells..].iter().map(|relative_m| {
-            if relative_m.is_nan() {
-                0.0
+        let mut relative_scale = Vec::with_capacity(bins.len() * cells);
+        let mut body_m2 = Vec::with_capacity(bins.len());
+        for bin in &bins.bins {
+            let (mut sum_m2, mut seen) = (0.0, 0.0);
+            for cell in 0..cells {
+                let samples = bin.samples.clone();
+                let count = samples
+                    .filter(|&sample| observed.position_m[cell][sample].is_finite())
+                    .count() as f64;
+                let own_m2 = along * (white_m2 / count + shared_m2);
+                let counts = count > 0.0 && (observed.phase_recorded || cell != bin.stepping);
+                relative_scale.push(if counts { own_m2.sqrt().recip() } else { 0.0 });
+                if counts {
+                    sum_m2 += own_m2;
+                    seen += 1.0;
+                }
+            }
+            body_m2.push(if seen > 0.0 {
+                sum_m2 / (seen * seen)
             } else {
-                relative_m * self.relative_scale
-            }
-        }));
+                f64::INFINITY
+            });
+        }
+        let phase: Vec<f64> = bins.bins.iter().map(|bin| bin.phase).collect();
+        Self {
+            drift: Drift::new(&phase, &body_m2, drift_m2),
+            white_m2,
+            shared_m2,
+            along,
+            relative_scale,
+        }
+    }
+
+    /// The noise of another run of the same worm before the same camera, which keeps one sample in `thinned`.
+    pub fn of_another(&self, observed: &Observed<'_>, bins: &Bins, thinned: f64) -> Self {
+        let white_m2 = self.white_m2 / thinned;
+        Self::new(
+            observed,
+            bins,
+            [white_m2, self.shared_m2, self.along, self.drift.per_cycle_m2()],
+        )
+    }
+
+    /// Appends the whitened residuals of a run, each of variance 1 where the hypothesis holds: for every bin the body's, then for
+    /// every bin each cell's.
+    pub fn whiten(&self, residual: &Residual, out: &mut Vec<f64>) {
+        self.drift
+            .whiten(residual.body_m.iter().copied(), |whitened| out.push(whitened));
+        let with_scale = residual.relative_m.iter().zip(&self.relative_scale);
+        out.extend(with_scale.map(|(relative_m, scale)| if relative_m.is_nan() { 0.0 } else { relative_m * scale }));
+    }
+
+    /// The body's drift at every sample, by its residual there, m.
+    pub fn smooth(&self, observed: &Observed<'_>, body_m: &[f64]) -> Vec<f64> {
+        let sample_m2 = (self.white_m2 + self.along * self.shared_m2) / observed.cells() as f64;
+        let variance_m2 = body_m.iter().enumerate().map(|(sample, body_m)| {
+            let counts = sample >= observed.counts_from && body_m.is_finite();
+            if counts { sample_m2 } else { f64::INFINITY }
+        });
+        Drift::new(
+            &observed.phase,
+            &variance_m2.collect::<Vec<_>>(),
+            self.drift.per_cycle_m2(),
+        )
+        .smooth(body_m)
     }
 
     /// Standard deviation of the body's random walk after one cycle, m.
@@ -186,124 +140,198 @@ impl RunNoise {
     }
 }
 
-/// Variance of sums over `length` values, over that of as many independent values of variance 1.
-fn sum_variance(series: &[f64], length: usize) -> f64 {
-    let sums = series.chunks_exact(length).map(|chunk| chunk.iter().sum::<f64>());
-    let (mut squares, mut count) = (0.0, 0.0);
-    for sum in sums {
-        squares += sum * sum;
-        count += 1.0;
-    }
-    if count > 0.0 {
-        squares / (count * length as f64)
-    } else {
-        1.0
-    }
+/// Changes of a residual from each settled cycle to the next.
+struct CycleChanges {
+    /// Of each cell's relative position: `[cell][place in the cycle][cycle]`, m.
+    relative_m: Vec<Vec<Vec<f64>>>,
+    /// Of the displacement of the body from the mean over one step to the mean over the next: `[step][cycle]`, m.
+    steps_m: Vec<Vec<f64>>,
+    /// Of the body's mean advance in a cycle, m.
+    cycles_m: Vec<f64>,
+    per_step: usize,
 }
 
-/// Which phase bin a sample is in, counted through from phase 0.
-pub(super) fn bin_of(observed: &Observed<'_>, sample: usize, bins_per_step: usize) -> i64 {
-    (observed.phase[sample] * (observed.cells() * bins_per_step) as f64).floor() as i64
-}
-
-/// What remains when each phase bin has a displacement of its own, with a linear trend over the cycles.
-fn free_form(observed: &Observed<'_>, residual: &Residual) -> Residual {
-    let cells = observed.cells();
-    let mut free = Residual {
-        body_m: flatten(observed, residual.body_m.clone(), true),
-        relative_m: residual.relative_m.clone(),
-    };
-    for cell in 0..cells {
-        let series: Vec<f64> = residual.relative_m.iter().skip(cell).step_by(cells).copied().collect();
-        for (sample, value) in flatten(observed, series, false).into_iter().enumerate() {
-            free.relative_m[sample * cells + cell] = value;
-        }
-    }
-    free
-}
-
-/// Removes the mean cycle and its trend from a series: from its increments from bin to bin where it accumulates, else from its values.
-fn flatten(observed: &Observed<'_>, series: Vec<f64>, runs_on: bool) -> Vec<f64> {
-    let per_cycle = (observed.cells() * BINS_PER_STEP) as i64;
-    let from = observed.settled_from();
-    let first_bin = bin_of(observed, from, BINS_PER_STEP);
-    let bins = (bin_of(observed, observed.samples() - 1, BINS_PER_STEP) - first_bin + 1).max(1) as usize;
-    let (mut sum, mut count, mut phase) = (vec![0.0; bins], vec![0.0; bins], vec![0.0; bins]);
-    for (sample, value) in series.iter().enumerate().skip(from) {
-        if value.is_finite() {
-            let bin = (bin_of(observed, sample, BINS_PER_STEP) - first_bin) as usize;
-            sum[bin] += value;
-            phase[bin] += observed.phase[sample];
-            count[bin] += 1.0;
-        }
-    }
-    let mean: Vec<f64> = sum.iter().zip(&count).map(|(sum, count)| sum / count).collect();
-    let value: Vec<f64> = if runs_on {
-        (0..bins)
-            .map(|bin| if bin == 0 { 0.0 } else { mean[bin] - mean[bin - 1] })
-            .collect()
-    } else {
-        mean.clone()
-    };
-    // A straight line over the cycles for each bin of the cycle.
-    let mut shape = vec![0.0; bins];
-    for place in 0..per_cycle {
-        let mine: Vec<usize> = (0..bins)
-            .filter(|&bin| (first_bin + bin as i64).rem_euclid(per_cycle) == place)
-            .filter(|&bin| value[bin].is_finite() && !(runs_on && bin == 0))
-            .collect();
-        if mine.is_empty() {
-            continue;
-        }
-        let n = mine.len() as f64;
-        let middle = mine.iter().map(|&bin| bin as f64).sum::<f64>() / n;
-        let level = mine.iter().map(|&bin| value[bin]).sum::<f64>() / n;
-        let spread: f64 = mine.iter().map(|&bin| (bin as f64 - middle).powi(2)).sum();
-        let slope = if mine.len() >= TREND_CYCLES {
-            mine.iter().map(|&bin| (bin as f64 - middle) * value[bin]).sum::<f64>() / spread
-        } else {
-            0.0
-        };
-        for bin in (0..bins).filter(|&bin| (first_bin + bin as i64).rem_euclid(per_cycle) == place) {
-            shape[bin] = level + slope * (bin as f64 - middle);
-        }
-    }
-    if runs_on {
-        for bin in 1..bins {
-            shape[bin] += shape[bin - 1];
-        }
-    }
-    // Linear between the centres of bins.
-    let middles: Vec<f64> = (0..bins)
-        .map(|bin| {
-            if count[bin] > 0.0 {
-                phase[bin] / count[bin]
-            } else {
-                (first_bin as f64 + bin as f64 + 0.5) / per_cycle as f64
+impl CycleChanges {
+    fn new(observed: &Observed<'_>, bins: &Bins, residual: &Residual) -> Self {
+        let cells = observed.cells();
+        let per_cycle = bins.per_cycle() as usize;
+        let from = bins
+            .bins
+            .partition_point(|bin| bin.samples.start < observed.settled_from());
+        let first = bins
+            .bins
+            .get(from)
+            .map_or(0, |bin| bin.number.div_euclid(per_cycle as i64));
+        let last = bins
+            .bins
+            .last()
+            .map_or(0, |bin| bin.number.div_euclid(per_cycle as i64));
+        let cycles = (last - first + 1).max(1) as usize;
+        // `[cycle][place]`, the body first, then each cell.
+        let mut tables = vec![vec![vec![f64::NAN; per_cycle]; cycles]; 1 + cells];
+        for bin in from..bins.len() {
+            let (cycle, place) = (
+                (bins.bins[bin].number.div_euclid(per_cycle as i64) - first) as usize,
+                bins.place(bin),
+            );
+            tables[0][cycle][place] = residual.body_m[bin];
+            for cell in 0..cells {
+                tables[1 + cell][cycle][place] = residual.relative_m[bin * cells + cell];
             }
-        })
-        .collect();
-    let mut flat = series;
-    for (sample, value) in flat.iter_mut().enumerate().skip(from) {
-        let bin = (bin_of(observed, sample, BINS_PER_STEP) - first_bin) as usize;
-        let here = observed.phase[sample];
-        let other = if here < middles[bin] {
-            bin.saturating_sub(1)
-        } else {
-            (bin + 1).min(bins - 1)
+        }
+        let changes = |table: &[Vec<f64>], place: usize| -> Vec<f64> {
+            table.windows(2).map(|pair| pair[1][place] - pair[0][place]).collect()
         };
-        let fraction = if other == bin || middles[other] == middles[bin] {
-            0.0
-        } else {
-            (here - middles[bin]) / (middles[other] - middles[bin])
+        let relative_m = tables[1..]
+            .iter()
+            .map(|table| (0..per_cycle).map(|place| changes(table, place)).collect())
+            .collect();
+        // The mean over a part of a cycle is another one where the body gets ahead of the model.
+        let mean_of = |values: &[f64]| {
+            let seen: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+            if (seen.len() as f64) < WHOLE * values.len() as f64 {
+                f64::NAN
+            } else {
+                seen.iter().sum::<f64>() / seen.len() as f64
+            }
         };
-        let between = if runs_on {
-            shape[bin] + fraction * (shape[other] - shape[bin])
-        } else {
-            shape[bin]
-        };
-        *value -= between;
+        let step_means: Vec<f64> = tables[0]
+            .iter()
+            .flat_map(|cycle| cycle.chunks_exact(bins.per_step).map(mean_of))
+            .collect();
+        let displacements: Vec<f64> = step_means.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mut steps_m = vec![Vec::new(); cells];
+        for step in cells..displacements.len() {
+            steps_m[step % cells].push(displacements[step] - displacements[step - cells]);
+        }
+        let cycle_means: Vec<f64> = tables[0].iter().map(|cycle| mean_of(cycle)).collect();
+        let cycles_m = cycle_means
+            .windows(3)
+            .map(|three| three[2] - 2.0 * three[1] + three[0])
+            .collect();
+        Self {
+            relative_m,
+            steps_m,
+            cycles_m,
+            per_step: bins.per_step,
+        }
     }
-    flat[..from].fill(0.0);
-    flat
+
+    /// Variance of the change of a relative position, m²: mean over cells and places.
+    fn of_bins_m2(&self) -> f64 {
+        mean(
+            self.relative_m
+                .iter()
+                .flatten()
+                .filter_map(|changes_m| variance(changes_m)),
+        )
+    }
+
+    /// Variance of the mean change over a step, over that of as many independent bins.
+    fn along(&self) -> f64 {
+        let of_steps = self.relative_m.iter().flat_map(|of_cell| {
+            of_cell.chunks_exact(self.per_step).map(|step| {
+                let cycles = step.first().map_or(0, Vec::len);
+                let mean_m =
+                    |cycle: usize| step.iter().map(|changes_m| changes_m[cycle]).sum::<f64>() / step.len() as f64;
+                variance(&(0..cycles).map(mean_m).collect::<Vec<_>>())
+            })
+        });
+        mean(of_steps.flatten()) * self.per_step as f64 / self.of_bins_m2()
+    }
+
+    /// Variance of the change of the body's displacement from step to step, m².
+    fn of_steps_m2(&self) -> f64 {
+        variance(&self.steps_m.concat()).unwrap_or(0.0)
+    }
+
+    /// Number of changes from step to step that were seen.
+    fn steps(&self) -> usize {
+        let all = self.steps_m.iter().flatten();
+        all.filter(|change_m| change_m.is_finite()).count()
+    }
+
+    /// Number of changes from cycle to cycle that were seen.
+    fn cycles(&self) -> usize {
+        self.cycles_m.iter().filter(|change_m| change_m.is_finite()).count()
+    }
+
+    /// Variance of the change of the body's advance from cycle to cycle, m²; none with few cycles.
+    fn of_cycles_m2(&self) -> Option<f64> {
+        (self.cycles() >= MIN_DIFFERENCES)
+            .then(|| variance(&self.cycles_m))
+            .flatten()
+    }
+}
+
+/// Variance of values about 0 by the median of their squares; none where there are none.
+fn variance(values: &[f64]) -> Option<f64> {
+    let mut squares: Vec<f64> = values
+        .iter()
+        .map(|value| value * value)
+        .filter(|square| square.is_finite())
+        .collect();
+    if squares.is_empty() {
+        return None;
+    }
+    squares.sort_by(f64::total_cmp);
+    let middle = 0.5 * (squares[squares.len() / 2] + squares[(squares.len() - 1) / 2]);
+    Some(middle / MEDIAN_SQUARE)
+}
+
+/// Mean; 0 of nothing.
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / f64::max(count, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{Campaign, NOISE_M, WALK_M, hypothesis, record, scene};
+    use super::*;
+    use crate::recording::Recording;
+
+    /// The noise of the first run by the right model.
+    fn measured(recordings: &[Recording]) -> (RunNoise, usize) {
+        let campaign = Campaign::default();
+        let scene = scene(recordings, &campaign);
+        let observed = &scene.observed[0];
+        let bins = Bins::new(observed);
+        let (right, at) = hypothesis(None);
+        let predicted = scene.predict(0, &right, &at).expect("it holds");
+        let residual = Residual::binned(observed, &bins, &predicted);
+        (RunNoise::measure(observed, &bins, &residual), bins.len())
+    }
+
+    #[test]
+    fn it_is_what_the_recording_was_made_with() {
+        let recordings = record(&Campaign::default(), None, 1);
+        let (noise, bins) = measured(&recordings);
+        let per_bin = recordings[0].time_s.len() as f64 / bins as f64;
+        let position_m = (noise.white_m2 / per_bin + noise.shared_m2).sqrt();
+        assert!(
+            (position_m * per_bin.sqrt() / NOISE_M - 1.0).abs() < 0.2,
+            "{position_m}"
+        );
+        assert!(
+            (0.4..2.5).contains(&(noise.drift_per_cycle_m() / WALK_M)),
+            "{}",
+            noise.drift_per_cycle_m()
+        );
+    }
+
+    #[test]
+    fn a_change_in_the_middle_of_a_run_is_none_of_it() {
+        let recordings = record(&Campaign::default(), None, 1);
+        let mut changed = recordings.clone();
+        let middle = changed[0].time_s.len() / 2;
+        changed[0].position_m[1][middle..]
+            .iter_mut()
+            .for_each(|at_m| *at_m += 4e-4);
+        let [(plain, _), (changed, _)] = [&recordings, &changed].map(|recordings| measured(recordings));
+        let position_m2 = |noise: &RunNoise| noise.along * (noise.white_m2 + noise.shared_m2);
+        let ratio = position_m2(&changed) / position_m2(&plain);
+        assert!(ratio < 1.5, "the variance grows by a factor {ratio}");
+        assert!(changed.drift_per_cycle_m() < 2.0 * plain.drift_per_cycle_m().max(WALK_M));
+    }
 }

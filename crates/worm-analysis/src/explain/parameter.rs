@@ -103,6 +103,14 @@ impl Nuisance {
         all
     }
 
+    /// Whether a model file, or the campaign's, can hold it; what it cannot hold is the same in every simulation.
+    pub fn is_of_model_file(self) -> bool {
+        !matches!(
+            self,
+            Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity
+        )
+    }
+
     fn free(self, (sigma, reach, step): (f64, f64, f64)) -> Free {
         self.free_within((0.0, sigma, -reach, reach, step))
     }
@@ -159,15 +167,49 @@ impl Free {
     }
 }
 
+/// When an effect begins that does not act from the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Onset {
+    /// Cycles since the first sample of the run.
+    pub cycle: f64,
+    /// The only run that it acts in; all of them for none.
+    pub run: Option<usize>,
+}
+
+impl Onset {
+    /// Whether it concerns a run.
+    pub fn is_in(&self, run: usize) -> bool {
+        self.run.is_none_or(|of| of == run)
+    }
+}
+
 /// An effect assumed to act, on one cell or on all that it concerns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hypothesised {
     pub effect: &'static Effect,
     pub cell: Option<usize>,
+    /// When it begins; it acts throughout for none.
+    pub onset: Option<Onset>,
+}
+
+impl Hypothesised {
+    /// An effect that acts throughout.
+    pub fn throughout(effect: &'static Effect, cell: Option<usize>) -> Self {
+        Self {
+            effect,
+            cell,
+            onset: None,
+        }
+    }
+
+    /// Whether it is the same effect of the same cell, whenever it begins.
+    pub fn is_same_effect(&self, other: &Self) -> bool {
+        self.effect.name == other.effect.name && self.cell == other.cell
+    }
 }
 
 impl PartialEq for Hypothesised {
     fn eq(&self, other: &Self) -> bool {
-        self.effect.name == other.effect.name && self.cell == other.cell
+        self.is_same_effect(other) && self.onset == other.onset
     }
 }

@@ -28,9 +28,31 @@ pub(super) struct Predicted {
     pub position_m: Vec<f64>,
 }
 
+impl Predicted {
+    /// Mean advance in a cycle, m: over as many whole settled cycles as there are.
+    pub fn advance_m(&self, observed: &Observed<'_>) -> f64 {
+        let cells = observed.cells();
+        let mean_m = |sample: usize| {
+            let at_m = &self.position_m[sample * cells..(sample + 1) * cells];
+            at_m.iter().sum::<f64>() / cells as f64
+        };
+        let phase = &observed.phase;
+        let last = observed.samples() - 1;
+        let cycles = observed.whole_cycles().max(1) as f64;
+        let from = phase.partition_point(|&here| here < phase[last] - cycles).min(last - 1);
+        (mean_m(last) - mean_m(from)) / (phase[last] - phase[from])
+    }
+}
+
 impl Scene<'_> {
-    /// The physics of a run under a hypothesis, and the damping ratio.
+    /// The physics of a run under a hypothesis, at its end where an effect begins in between, and the damping ratio.
     pub fn physics(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> (Physics, f64) {
+        let (physics, damping) = self.recalibrated(run, hypothesis, at);
+        (physics.with(&hypothesis.settings_at_end(run, at)), damping)
+    }
+
+    /// The physics of a run without any effect, and the damping ratio.
+    fn recalibrated(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> (Physics, f64) {
         let mut physics = self.nominal[run].clone();
         let mut damping = 0.4;
         for (free, &value) in hypothesis.free.iter().zip(at) {
@@ -46,14 +68,27 @@ impl Scene<'_> {
                 }
             }
         }
-        (physics.with(&hypothesis.settings(at)), damping)
+        (physics, damping)
+    }
+
+    /// Whether the crawl of a run is simulated for some cycles and then repeated.
+    pub fn repeats(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> bool {
+        let is_steady = !hypothesis.throughout && hypothesis.begins_at(run).is_none();
+        is_steady && self.physics(run, hypothesis, at).0.is_periodic()
     }
 
     /// Positions of a run under a hypothesis; none where the worm could not have made it.
     pub fn predict(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<Predicted> {
-        let (physics, damping) = self.physics(run, hypothesis, at);
-        let repeats = physics.is_periodic() && !hypothesis.throughout;
-        predict(&self.observed[run], &physics, damping, repeats)
+        let observed = &self.observed[run];
+        let (recalibrated, damping) = self.recalibrated(run, hypothesis, at);
+        let physics = recalibrated.clone().with(&hypothesis.settings_at_end(run, at));
+        match hypothesis.begins_at(run) {
+            Some(cycle) => {
+                let before = recalibrated.with(&hypothesis.settings_at_start(at));
+                predict_change(observed, &before, &physics, cycle, damping)
+            }
+            None => predict(observed, &physics, damping, self.repeats(run, hypothesis, at)),
+        }
     }
 }
 
@@ -117,6 +152,44 @@ pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, 
         }
     }
     position_m.iter_mut().for_each(|at_m| *at_m *= physics.view.scale);
+    Some(Predicted { position_m })
+}
+
+/// Positions at every sample of a recording, by some physics and, from so many cycles after its start on, by another that differs in
+/// how the worm moves and not in how it is seen.
+fn predict_change(
+    observed: &Observed<'_>,
+    before: &Physics,
+    after: &Physics,
+    cycle: f64,
+    damping: f64,
+) -> Option<Predicted> {
+    let mechanics = [before, after].map(Mechanics::new);
+    let time_s = &observed.run.recording.time_s;
+    let mut clock = Clock::new(time_s, &observed.phase, before.view.latency_s);
+    let mut crawl = start(observed, &mechanics[0], clock.phase_at(0), damping)?;
+    let change = observed.phase[0] + cycle;
+    let mut has_changed = false;
+    let mut position_m = Vec::with_capacity(observed.cells() * observed.samples());
+    for sample in 0..observed.samples() {
+        let phase = clock.phase_at(sample);
+        let mut left_s = time_s[sample] - time_s[sample.saturating_sub(1)];
+        if !has_changed && phase > change {
+            let from = crawl.phase();
+            let until_change_s = left_s * ((change - from) / (phase - from).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            if change > from {
+                crawl.advance_to(&mechanics[0], change, until_change_s).ok()?;
+            }
+            crawl.take_up(&mechanics[1]);
+            left_s -= until_change_s;
+            has_changed = true;
+        }
+        crawl
+            .advance_to(&mechanics[usize::from(has_changed)], phase, left_s)
+            .ok()?;
+        position_m.extend_from_slice(crawl.positions_m());
+    }
+    position_m.iter_mut().for_each(|at_m| *at_m *= before.view.scale);
     Some(Predicted { position_m })
 }
 
@@ -221,4 +294,49 @@ pub(super) fn nominal(observed: &Observed<'_>, worm: Worm, payload_kg: f64) -> W
         .unwrap_or_else(|_| unreachable!("the gait names every cell once"));
     worm.add_mass_kg(payload_kg);
     worm
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{Campaign, begun, hypothesis, record, scene};
+    use super::super::parameter::Onset;
+    use super::*;
+
+    /// A cell with less friction from the middle of the second run on: as without it before, and as with it throughout after.
+    #[test]
+    fn an_effect_that_begins_in_mid_run_changes_what_comes_after() {
+        let campaign = Campaign::default();
+        let recordings = record(&campaign, None, 1);
+        let scene = scene(&recordings, &campaign);
+        let truth = Some(("unequal-clamping", Some(1), &[0.5][..]));
+        let onset = Onset {
+            cycle: 2.0,
+            run: Some(1),
+        };
+        let predict = |run: usize, (hypothesis, at): &(Hypothesis, Vec<f64>)| {
+            scene.predict(run, hypothesis, at).expect("it holds").position_m
+        };
+        let begun = begun(truth, onset);
+        assert!(scene.repeats(0, &begun.0, &begun.1) && !scene.repeats(1, &begun.0, &begun.1));
+        let without: Vec<Vec<f64>> = (0..2).map(|run| predict(run, &hypothesis(None))).collect();
+        assert_eq!(predict(0, &begun), without[0], "the other run");
+        let (with, throughout) = (predict(1, &begun), predict(1, &hypothesis(truth)));
+        let observed = &scene.observed[1];
+        let cells = observed.cells();
+        let at = |phase: f64| cells * observed.phase.partition_point(|&here| here < observed.phase[0] + phase);
+        let apart = |one: &[f64], other: &[f64], from: usize, to: usize| {
+            let differences = one[from..to].iter().zip(&other[from..to]).map(|(a, b)| (a - b).abs());
+            differences.fold(0.0, f64::max)
+        };
+        let before = apart(&with, &without[1], 0, at(1.9));
+        assert!(before < 2e-6, "{before} m before it begins");
+        let advance_m = |positions: &[f64]| positions[at(3.9)] - positions[at(2.9)];
+        let (begun_m, throughout_m) = (advance_m(&with), advance_m(&throughout));
+        let change_m = throughout_m - advance_m(&without[1]);
+        assert!(change_m.abs() > 1e-4, "{change_m} m");
+        assert!(
+            (begun_m - throughout_m).abs() < 0.05 * change_m.abs(),
+            "{begun_m} and {throughout_m} m a cycle"
+        );
+    }
 }

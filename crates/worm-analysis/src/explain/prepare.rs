@@ -1,5 +1,7 @@
 //! Prepares the runs of a campaign, and recalibrates the model on them.
 
+use super::bins::Bins;
+use super::discrepancy::Discrepancy;
 use super::error::ExplainError;
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
@@ -93,11 +95,14 @@ fn judge_start(observed: &mut Observed<'_>, physics: &Physics) {
     observed.assume_laid_down(is_laid_down);
 }
 
-/// Alternates between measuring the noise and recalibrating the model.
+/// Alternates between measuring the noise and recalibrating the model; the discrepancy is as large as a fraction of the mean largest
+/// deformation of the tips.
 pub(super) fn recalibrate<'s, 'a>(
     scene: &'s Scene<'a>,
     base: &Hypothesis,
-) -> Result<(FitProblem<'s, 'a>, Fit), ExplainError> {
+    fraction: f64,
+) -> Result<(FitProblem<'s, 'a>, Discrepancy, Fit), ExplainError> {
+    let bins: Vec<Bins> = scene.observed.iter().map(Bins::new).collect();
     let mut at = base.neutral();
     let mut round = 0;
     loop {
@@ -107,24 +112,36 @@ pub(super) fn recalibrate<'s, 'a>(
                 recording: observed.run.recording.source.display().to_string(),
                 slope_deg: observed.run.slope_deg,
             })?;
-            noise.push(RunNoise::measure(observed, &Residual::new(observed, &predicted)));
+            let residual = Residual::binned(observed, &bins[run], &predicted);
+            noise.push(RunNoise::measure(observed, &bins[run], &residual));
         }
-        let problem = FitProblem {
+        let mut problem = FitProblem {
             scene,
+            bins: bins.clone(),
             noise,
+            discrepancy: None,
             repeating_excess: 0.0,
         };
-        let mut fit = problem.fit(base, at, None);
         round += 1;
-        if round == NOISE_ROUNDS {
-            problem.compute_jacobian(&mut fit);
-            let repeating_excess = problem.repeating_excess(&fit);
-            let problem = FitProblem {
-                repeating_excess,
-                ..problem
-            };
-            return Ok((problem, fit));
+        if round < NOISE_ROUNDS {
+            at = problem.fit(base, at, None).at;
+            continue;
         }
-        at = fit.at;
+        let discrepancy = Discrepancy::new(&problem, fraction * mean_deformation_m(scene));
+        problem.discrepancy = Some(discrepancy.clone());
+        let mut fit = problem.fit(base, at, None);
+        problem.compute_jacobian(&mut fit);
+        problem.repeating_excess = problem.repeating_excess(&fit);
+        return Ok((problem, discrepancy, fit));
     }
+}
+
+/// Mean of the largest deformations of the tips, m: friction over stiffness.
+fn mean_deformation_m(scene: &Scene<'_>) -> f64 {
+    let worms = scene.nominal.iter().map(|physics| &physics.worm);
+    let all_m: Vec<f64> = worms
+        .flat_map(|worm| worm.contacts())
+        .map(|contact| 0.5 * (contact.forward_bound_m + contact.backward_bound_m))
+        .collect();
+    all_m.iter().sum::<f64>() / all_m.len() as f64
 }

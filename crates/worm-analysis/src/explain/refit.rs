@@ -2,19 +2,31 @@
 
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
+use super::judge::candidate::{Candidate, are_twins};
+use super::judge::chance::Chance;
+use super::judgement::Judge;
 use super::local_restart::restart_locally;
-use super::model_selection::{self, Candidate};
 use super::parameter::{Hypothesised, What};
 use super::score_test::{self, Screening};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Effects that are refitted; cells of one effect that are; and how near the next cell must come to the best, as a fraction of its gain.
 pub(super) const REFITTED: usize = 8;
 const CELLS_REFITTED: usize = 2;
 const NEXT_CELL: f64 = 0.5;
+/// Effects that are fitted roughly: those most probable by the screening.
+const ROUGHLY: usize = 10;
+/// Fraction of the best rough gain, and the gain, from which an effect is fitted to the end; and how many are at least.
+const PROMISING: (f64, f64) = (0.4, 8.0);
+const AT_LEAST: usize = 2;
+/// Strengths of effects about the nominal model, in notable changes; a fit starts from that which fits best as it is.
+const STRONG: [f64; 4] = [4.0, 8.0, 16.0, 32.0];
 /// Effects that are refitted on top of a single one, and how many of those that screened best are tried roughly before.
 const PAIRED: usize = 3;
 const SCREENED_FOR_PAIRS: usize = 8;
+/// Log odds against the first effect alone, by the screening, from which a second is fitted.
+const MIN_LN_ODDS: f64 = -1.0;
 /// Improvement from which it is worth looking for a better minimum.
 const MIN_TO_LEAP: f64 = 10.0;
 
@@ -37,12 +49,17 @@ pub(super) fn refit(
         Hypothesis::new(&base.hypothesis.free[..effects_from], &all)
     };
     let mut rough: Vec<Fit> = Vec::with_capacity(screened.len());
-    for (done, screening) in screened.iter().enumerate() {
-        progress(0.5 * done as f64 / screened.len() as f64);
+    for (done, screening) in screened.iter().take(ROUGHLY).enumerate() {
+        progress(0.5 * done as f64 / ROUGHLY as f64);
         let hypothesis = hypothesis_of(screening.hypothesised);
         let about_base = screening.starts.iter().map(|start| (base, start.clone()));
-        let strong = score_test::strong(screening.hypothesised.effect);
-        let about_nominal = strong.into_iter().map(|start| (nominal, start));
+        let strong = score_test::strong(screening.hypothesised.effect, &STRONG).into_par_iter();
+        let with_fit = strong.map(|start| {
+            let at = [&nominal.at[..], &start].concat();
+            (problem.evaluate(&hypothesis, at).chi_squared, start)
+        });
+        let best = with_fit.min_by(|a, b| a.0.total_cmp(&b.0));
+        let about_nominal = best.map(|(_, start)| (nominal, start));
         let fits = about_base.chain(about_nominal).map(|(from, start)| {
             let mut at = from.at.clone();
             at.extend(start);
@@ -78,6 +95,10 @@ fn choose(rough: Vec<Fit>, base: &Fit, max: usize) -> Vec<Fit> {
         let same: Vec<&Fit> = chosen.iter().filter(|other| name(other) == name(&fit)).collect();
         let names: BTreeSet<&str> = chosen.iter().map(name).collect();
         let gain = |fit: &Fit| base.chi_squared - fit.chi_squared;
+        let best_gain = chosen.first().map_or(0.0, gain);
+        if chosen.len() >= AT_LEAST && gain(&fit) < PROMISING.1.max(PROMISING.0 * best_gain) {
+            break;
+        }
         let is_wanted = match same.first() {
             None => names.len() < max,
             Some(best) => same.len() < CELLS_REFITTED && gain(&fit) > NEXT_CELL * gain(best),
@@ -111,46 +132,47 @@ pub(super) fn alone(
         Some(pair.fit.at[place])
     };
     let at: Option<Vec<f64>> = hypothesis.free.iter().map(|free| from_pair(free.what)).collect();
-    let candidate = Candidate::of(problem, recalibrated, problem.fit(hypothesis, at?, None));
+    let candidate = Candidate {
+        ln_onset: single.ln_onset,
+        ..Candidate::of(problem, recalibrated, problem.fit(hypothesis, at?, None))
+    };
     (candidate.improvement > single.improvement).then_some(candidate)
 }
 
-/// Pairs of effects: each of the best single ones with those that screen best on top of it, and above the threshold.
-pub(super) fn pair_up<'f>(
-    problem: &FitProblem<'_, '_>,
-    recalibrated: &Fit,
-    seeds: impl Iterator<Item = &'f Candidate>,
+/// Pairs of effects: a single one with those that screen best on top of it; with what chance makes of the screening.
+pub(super) fn pair_up(
+    judge: &Judge<'_, '_, '_>,
+    first: &Candidate,
     hypothesised: &[Hypothesised],
-    threshold: f64,
+    screened: &[Screening],
     seed: u64,
-) -> Vec<Candidate> {
-    let mut pairs: Vec<Candidate> = Vec::new();
-    for first in seeds {
-        let others: Vec<Hypothesised> = hypothesised
-            .iter()
-            .filter(|other| {
-                !first.hypothesised.contains(other) && !model_selection::are_twins(other, &first.hypothesised[0])
-            })
-            .copied()
-            .collect();
-        let base = problem.with_derivatives(&first.fit.hypothesis, first.fit.at.clone());
-        let mut at = first.fit.hypothesis.neutral();
-        let effects_from = at.len() - score_test::effect_quantities(&first.fit.hypothesis);
-        at[effects_from..].copy_from_slice(&first.fit.at[effects_from..]);
-        let about = problem.with_derivatives(&first.fit.hypothesis, at);
-        let (mut promising, _) = score_test::screen(problem, &base, &others, seed);
-        promising.retain(|screening| screening.score > threshold);
-        promising.truncate(SCREENED_FOR_PAIRS);
-        for candidate in refit(problem, &base, &about, &promising, PAIRED, &mut |_| ()) {
-            let candidate = Candidate::of(problem, recalibrated, candidate.fit);
-            let is_new = !pairs
-                .iter()
-                .any(|pair| pair.hypothesised.iter().all(|one| candidate.hypothesised.contains(one)));
-            if is_new {
-                pairs.push(candidate);
-            }
-        }
-    }
-    pairs.sort_by(|a, b| b.improvement.total_cmp(&a.improvement));
-    pairs
+) -> (Vec<Candidate>, Chance) {
+    let problem = judge.problem;
+    let others: Vec<Hypothesised> = hypothesised
+        .iter()
+        .filter(|other| !other.is_same_effect(&first.hypothesised[0]) && !are_twins(other, &first.hypothesised[0]))
+        .copied()
+        .collect();
+    let single = judge.ln_prior(&first.hypothesised);
+    let ln_prior = |other: &Hypothesised| judge.ln_prior(&[first.hypothesised[0], *other]) - single;
+    let scales = first.evidence.unwrap_or(judge.none).scales();
+    let base = problem.with_derivatives(&first.fit.hypothesis, first.fit.at.clone());
+    let (mut promising, chance) =
+        score_test::screen(problem, judge.discrepancy, &base, &others, ln_prior, scales, seed);
+    promising.retain(|screening| screening.ln_bayes + ln_prior(&screening.hypothesised) > MIN_LN_ODDS);
+    promising.truncate(SCREENED_FOR_PAIRS);
+    let mut at = first.fit.hypothesis.neutral();
+    let effects_from = at.len() - score_test::effect_quantities(&first.fit.hypothesis);
+    at[effects_from..].copy_from_slice(&first.fit.at[effects_from..]);
+    let about = problem.with_derivatives(&first.fit.hypothesis, at);
+    let refitted = refit(problem, &base, &about, &promising, PAIRED, &mut |_| ());
+    let mut pairs: Vec<Candidate> = refitted
+        .into_iter()
+        .map(|candidate| Candidate {
+            ln_onset: first.ln_onset,
+            ..Candidate::of(problem, judge.recalibrated, candidate.fit)
+        })
+        .collect();
+    judge.weigh(&mut pairs, screened);
+    (pairs, chance)
 }

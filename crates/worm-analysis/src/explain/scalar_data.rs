@@ -19,12 +19,12 @@ mod model_selection;
 mod next_experiment;
 mod table;
 
-use super::answer::{Answer, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
+use super::answer::{Answer, Doubt, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
 use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
 use super::fit::Fit;
 use super::hypothesis::Hypothesis;
-use super::model_selection::Candidate;
+use super::judge::candidate::Candidate;
 use super::parameter::{Free, Hypothesised, Nuisance, What};
 use super::score_test::hypotheses;
 use crate::experiment::Progress;
@@ -129,6 +129,9 @@ fn refit(table: &Table<'_>, nominal: &Fit, recalibrated: &Fit, hypothesised: Hyp
         hypothesised: vec![hypothesised],
         improvement: recalibrated.chi_squared - fit.chi_squared,
         held_out: None,
+        trace: None,
+        ln_onset: 0.0,
+        evidence: None,
         fit,
     })
 }
@@ -182,7 +185,7 @@ fn assemble(
         .iter()
         .zip(&selected.probability)
         .flat_map(|(kind, &probability)| {
-            let mut named = named_effects(&kind.candidate, probability, f64::NAN, f64::NAN);
+            let mut named = named_effects(&[], &kind.candidate, probability, (f64::NAN, [f64::NAN; 2]), f64::NAN);
             // The parameters are still those of one cell, and name it.
             named
                 .iter_mut()
@@ -197,7 +200,9 @@ fn assemble(
         effect: kind.map(AdvanceKind::name),
         fit_rms_m: f64::NAN,
         held_out_rms_m: f64::NAN,
+        held_out_interval_m: [f64::NAN; 2],
         advance_error_m: table.mean_error_m(fit),
+        advance_error_interval_m: [f64::NAN; 2],
         energy_error_j: f64::NAN,
     };
     let mut stages = vec![
@@ -239,8 +244,10 @@ fn assemble(
         remainder: selected.remainder(table, recalibrated),
         next_experiment: next_experiment::propose(table, recalibrated, selected),
         calibration: calibration(kept, config),
+        written_back: calibration(kept, config),
         screening,
         threshold: model_selection::chance(table.advances.len()),
+        doubt: Doubt::default(),
         runs: runs.collect(),
         warnings: selected.warnings(kept),
         repairs: Vec::new(),

@@ -1,21 +1,22 @@
-//! A score for every effect of the library, and the score that the best of them would reach by chance.
+//! A score for every effect of the library, the evidence that it makes, and what chance would make of noise.
 //!
-//! At the recalibrated model, each effect is simulated at a few strengths (and shapes, where it has one). The change in the residuals,
-//! with everything that the nuisances could explain projected out, is the effect's direction. The score is how much of chi-squared lies
-//! along it: the rise of twice the log likelihood if the change were proportional to the strength.
-//!
-//! The best of many effects fits noise, too. So noise is drawn on all directions together, with their correlations, and the threshold
-//! is what the largest score stays below nineteen times in twenty.
+//! At the recalibrated model, each effect is simulated at a few strengths (and shapes, where it has one). The change in the residuals
+//! is the effect's direction; everything that the nuisances could explain is projected out. With I the square of the direction and s
+//! its product with what the residuals lack, a change of α times the trial's raises the log likelihood by α s − ½ α² I. Integrated over
+//! α with the prior of the severity, and summed over trials, this is the Bayes factor of the effect against none, to first order in the
+//! nuisances and along the curve of its severities. What it comes to by chance is drawn ([`super::judge::chance`]).
 
+use super::discrepancy::Discrepancy;
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
+use super::judge::chance::Chance;
+use super::judge::ln_sum::ln_sum;
+use super::judge::prior::SeverityPrior;
 use super::parameter::Hypothesised;
-use crate::least_squares::{dot, submatrix};
+use crate::least_squares::{cross, dot, gradient, submatrix};
 use nalgebra::{DMatrix, DVector};
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 use worm_physics::effect::{Effect, LIBRARY, Scope};
 
 /// Strengths that are tried, in notable changes; a single one where an effect has a place, for there are many places to try.
@@ -23,16 +24,19 @@ const STRENGTHS: [f64; 4] = [1.0, 4.0, 12.0, 36.0];
 const STRENGTHS_AT_A_PLACE: [f64; 1] = [4.0];
 /// Best trials of an effect from which fits start.
 const STARTS: usize = 2;
-/// Strength of an effect from which a fit starts where nothing is known, in notable changes.
-const STRONG: f64 = 8.0;
-/// Draws of noise for the threshold.
-const DRAWS: usize = 4000;
-/// Fraction of the draws that lie below the threshold.
-const CONFIDENCE: f64 = 0.95;
+/// Factors on the change of a trial up to which its direction stands for others, where several strengths are tried and where one is.
+const BETWEEN: (f64, f64) = (0.55, 1.75);
+const AT_A_PLACE: (f64, f64) = (0.1, 4.5);
+/// The same below the weakest and above the strongest.
+const BEYOND: (f64, f64) = (0.3, 3.0);
+
 /// One effect on one cell, or on all that it concerns, screened.
 #[derive(Debug, Clone)]
 pub(super) struct Screening {
     pub hypothesised: Hypothesised,
+    /// Logarithm of the Bayes factor against the fit without it, to first order in everything else that is free.
+    pub ln_bayes: f64,
+    pub prior: SeverityPrior,
     /// Rise of twice the log likelihood, to first order.
     pub score: f64,
     /// Values from which a fit may begin, best first.
@@ -47,13 +51,10 @@ pub(super) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<Hypothesised
             continue;
         }
         if effect.scope != Scope::OneCell {
-            all.push(Hypothesised { effect, cell: None });
+            all.push(Hypothesised::throughout(effect, None));
         }
         if effect.scope != Scope::Worm {
-            all.extend((0..cells).map(|cell| Hypothesised {
-                effect,
-                cell: Some(cell),
-            }));
+            all.extend((0..cells).map(|cell| Hypothesised::throughout(effect, Some(cell))));
         }
     }
     all
@@ -81,151 +82,19 @@ fn trials(effect: &Effect, canal_m: (f64, f64)) -> Vec<Vec<f64>> {
     trials
 }
 
-/// Strong effects from which a fit may begin where nothing is known.
-pub(super) fn strong(effect: &Effect) -> Vec<Vec<f64>> {
+/// Strong effects from which a fit may begin where nothing is known: changes of so many notable ones to either side.
+pub(super) fn strong(effect: &Effect, strengths: &[f64]) -> Vec<Vec<f64>> {
     if effect.has_place() {
         return Vec::new(); // no place is more likely than another
     }
     let severity = effect.severity();
-    let values = [1.0, -1.0].map(|sign| severity.neutral + sign * STRONG * severity.notable);
-    values
-        .into_iter()
+    let both = |strength: f64| [1.0, -1.0].map(|sign| severity.neutral + sign * strength * severity.notable);
+    strengths
+        .iter()
+        .flat_map(|&strength| both(strength))
         .filter(|value| (severity.min..severity.max).contains(value))
         .map(|value| effect.values_with_neutral_shape(value))
         .collect()
-}
-
-/// The directions of the nuisances and of effects that are in the fit already, to be projected out.
-struct Projection<'f> {
-    fit: &'f Fit,
-    open: Vec<usize>,
-    inverse: DMatrix<f64>,
-}
-
-impl<'f> Projection<'f> {
-    fn new(fit: &'f Fit) -> Self {
-        let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
-        let normal = fit.normal(None);
-        let mut matrix = submatrix(&normal, &open);
-        for row in 0..open.len() {
-            matrix[(row, row)] += 1e-9 * (1.0 + matrix[(row, row)]);
-        }
-        let identity = DMatrix::identity(open.len(), open.len());
-        let inverse = matrix.cholesky().map_or(identity, |factor| factor.inverse());
-        Self { fit, open, inverse }
-    }
-
-    /// Products of a direction with those that are projected out.
-    fn products(&self, direction: &[f64]) -> DVector<f64> {
-        let columns = self
-            .open
-            .iter()
-            .map(|&quantity| dot(&self.fit.jacobian[quantity], direction, None));
-        DVector::from_iterator(self.open.len(), columns)
-    }
-
-    /// Scalar product of two directions after the projection.
-    fn product(&self, a: &[f64], a_products: &DVector<f64>, b: &[f64], b_products: &DVector<f64>) -> f64 {
-        dot(a, b, None) - a_products.dot(&(&self.inverse * b_products))
-    }
-}
-
-/// One trial of an effect.
-struct Tried {
-    hypothesised: usize,
-    values: Vec<f64>,
-    score: f64,
-    fraction: f64,
-    /// The direction, its products and its square, for the weakest trial of each shape and sign.
-    direction: Option<(Vec<f64>, DVector<f64>, f64)>,
-}
-
-/// Screens effects on top of a fit with derivatives. Returns them best first, with the threshold of chance.
-pub(super) fn screen(
-    problem: &FitProblem<'_, '_>,
-    fit: &Fit,
-    hypothesised: &[Hypothesised],
-    seed: u64,
-) -> (Vec<Screening>, f64) {
-    let projection = Projection::new(fit);
-    let residual_products = projection.products(&fit.residual);
-    let canal_m = canal(problem);
-    let tasks: Vec<(usize, Vec<f64>, bool)> = hypothesised
-        .iter()
-        .enumerate()
-        .flat_map(|(number, hypothesised)| {
-            let trials = trials(hypothesised.effect, canal_m);
-            let notable = hypothesised.effect.parameters[0].notable;
-            let neutral = hypothesised.effect.parameters[0].neutral;
-            let weakest = trials
-                .iter()
-                .map(|values| (values[0] - neutral).abs())
-                .fold(f64::INFINITY, f64::min);
-            trials.into_iter().map(move |values| {
-                let is_weakest = (values[0] - neutral).abs() <= weakest + 1e-9 * notable;
-                (number, values, is_weakest)
-            })
-        })
-        .collect();
-    let evaluate = |(number, values, is_weakest): &(usize, Vec<f64>, bool)| {
-        let hypothesised = hypothesised[*number];
-        let mut all = fit.hypothesis.hypothesised.clone();
-        all.push(hypothesised);
-        let nuisances: Vec<_> = fit.hypothesis.free[..fit.at.len() - effect_quantities(&fit.hypothesis)].to_vec();
-        let hypothesis = Hypothesis::new(&nuisances, &all);
-        let mut at = fit.at.clone();
-        at.extend(values);
-        let mut direction = problem.residuals(&hypothesis, &at);
-        for (value, here) in direction.iter_mut().zip(&fit.residual) {
-            *value -= here;
-        }
-        let products = projection.products(&direction);
-        let own = projection.product(&direction, &products, &direction, &products);
-        let whole = dot(&direction, &direction, None);
-        // The nuisances explain such an effect completely.
-        if !(own > 1e-6 * whole && own > 1e-9) {
-            return None;
-        }
-        let along = projection.product(&direction, &products, &fit.residual, &residual_products);
-        let fraction = -along / own;
-        Some(Tried {
-            hypothesised: *number,
-            values: values.clone(),
-            score: if fraction > 0.0 { along * along / own } else { 0.0 },
-            fraction,
-            direction: is_weakest.then_some((direction, products, own)),
-        })
-    };
-    let tried: Vec<Tried> = tasks.par_iter().filter_map(evaluate).collect();
-    let threshold = threshold(&projection, &tried, seed);
-    let mut screened: Vec<Screening> = hypothesised
-        .iter()
-        .enumerate()
-        .map(|(number, &hypothesised)| {
-            let mut mine: Vec<&Tried> = tried.iter().filter(|tried| tried.hypothesised == number).collect();
-            mine.sort_by(|a, b| b.score.total_cmp(&a.score));
-            let severity = &hypothesised.effect.parameters[0];
-            let starts = mine
-                .iter()
-                .take(STARTS)
-                .filter(|tried| tried.score > 0.0)
-                .map(|tried| {
-                    let mut values = tried.values.clone();
-                    let fraction = tried.fraction.clamp(0.2, 3.0);
-                    values[0] = (severity.neutral + fraction * (values[0] - severity.neutral))
-                        .clamp(severity.min, severity.max);
-                    values
-                })
-                .collect();
-            Screening {
-                hypothesised,
-                score: mine.first().map_or(0.0, |tried| tried.score),
-                starts,
-            }
-        })
-        .collect();
-    screened.sort_by(|a, b| b.score.total_cmp(&a.score));
-    (screened, threshold)
 }
 
 /// Number of quantities that belong to effects of a hypothesis.
@@ -238,7 +107,7 @@ pub(super) fn effect_quantities(hypothesis: &Hypothesis) -> usize {
 }
 
 /// The stretch of canal where tips have been, m.
-fn canal(problem: &FitProblem<'_, '_>) -> (f64, f64) {
+pub(super) fn canal(problem: &FitProblem<'_, '_>) -> (f64, f64) {
     let seen = problem
         .scene
         .observed
@@ -252,41 +121,243 @@ fn canal(problem: &FitProblem<'_, '_>) -> (f64, f64) {
     (min - 0.02, max)
 }
 
-/// The score that the best stays below by chance nineteen times in twenty.
-fn threshold(projection: &Projection<'_>, tried: &[Tried], seed: u64) -> f64 {
-    let directions: Vec<&(Vec<f64>, DVector<f64>, f64)> =
-        tried.iter().filter_map(|tried| tried.direction.as_ref()).collect();
-    let count = directions.len();
-    if count == 0 {
-        return 0.0;
+/// One trial of an effect.
+struct Trial {
+    hypothesised: usize,
+    values: Vec<f64>,
+    /// Change of the residuals.
+    direction: Vec<f64>,
+    /// Largest relative change of the advance.
+    impact: f64,
+    /// Factors on its change of the severity for which it stands.
+    stands_for: (f64, f64),
+}
+
+/// Trials of all effects against the residuals of a fit.
+struct Trials {
+    all: Vec<Trial>,
+    priors: Vec<SeverityPrior>,
+    /// Logarithm of the prior probability of each hypothesis, and of each of its shapes given it.
+    ln_prior: Vec<f64>,
+    ln_shape: Vec<f64>,
+    /// Square of each direction, everything that is free projected out.
+    squares: Vec<f64>,
+}
+
+impl Trials {
+    /// Logarithm of the Bayes factor that a trial gives by its score: the integral of the likelihood over the severities it stands
+    /// for, by the height and width of its peak.
+    fn ln_bayes(&self, number: usize, score: f64) -> f64 {
+        let trial = &self.all[number];
+        let prior = &self.priors[trial.hypothesised];
+        ln_bayes(prior, trial.values[0], trial.stands_for, score, self.squares[number])
+            + self.ln_shape[trial.hypothesised]
     }
-    let correlations = |row: usize| -> Vec<f64> {
-        let (a, a_products, a_own) = directions[row];
-        let with_others = directions[..=row].iter();
-        with_others
-            .map(|(b, b_products, b_own)| projection.product(a, a_products, b, b_products) / (a_own * b_own).sqrt())
-            .collect()
-    };
-    let rows: Vec<Vec<f64>> = (0..count).into_par_iter().map(correlations).collect();
-    let mut gram = DMatrix::from_fn(count, count, |row, column| rows[row.max(column)][row.min(column)]);
-    for row in 0..count {
-        gram[(row, row)] += 1e-6;
+
+    /// Improvement that a trial promises by its score.
+    fn improvement(&self, number: usize, score: f64) -> f64 {
+        score.max(0.0).powi(2) / self.squares[number]
     }
-    let Some(factor) = gram.cholesky() else {
-        return f64::INFINITY;
+
+    /// Logarithm of the Bayes factor of every hypothesis.
+    fn ln_bayes_of_each(&self, scores: &[f64]) -> Vec<f64> {
+        let mut each: Vec<Vec<f64>> = vec![Vec::new(); self.priors.len()];
+        for (number, trial) in self.all.iter().enumerate() {
+            each[trial.hypothesised].push(self.ln_bayes(number, scores[number]));
+        }
+        each.iter().map(|trials| ln_sum(trials.iter().copied())).collect()
+    }
+
+    /// The largest log odds of a hypothesis, and the largest improvement of a trial.
+    fn largest(&self, scores: &[f64]) -> (f64, f64) {
+        let each = self.ln_bayes_of_each(scores);
+        let odds = each.iter().zip(&self.ln_prior).map(|(bayes, prior)| bayes + prior);
+        let improvements = (0..scores.len()).map(|number| self.improvement(number, scores[number]));
+        (odds.fold(f64::NEG_INFINITY, f64::max), improvements.fold(0.0, f64::max))
+    }
+}
+
+/// Logarithm of the Bayes factor of a change of a severity to `value`, by its score and the square of its direction, integrated over
+/// the factors on it for which its direction stands.
+pub(super) fn ln_bayes(prior: &SeverityPrior, value: f64, (low, high): (f64, f64), score: f64, square: f64) -> f64 {
+    let factor = (score / square).clamp(low, high);
+    let steepness = (score - factor * square).abs();
+    let width = ((high - low).recip() + steepness + (square / TAU).sqrt()).recip();
+    let density = prior.ln_density_of_logarithm(prior.scaled(value, factor));
+    factor * score - 0.5 * factor * factor * square + density - factor.ln() + width.ln()
+}
+
+/// Screens effects on top of a fit with derivatives. Returns them most probable first, with what chance would do. `ln_prior` is the
+/// logarithm of the prior odds of each against the fit without it, `scales` the probabilities of the discrepancy's scales.
+pub(super) fn screen(
+    problem: &FitProblem<'_, '_>,
+    discrepancy: &Discrepancy,
+    fit: &Fit,
+    hypothesised: &[Hypothesised],
+    ln_prior: impl Fn(&Hypothesised) -> f64,
+    scales: [f64; 4],
+    seed: u64,
+) -> (Vec<Screening>, Chance) {
+    let all = simulate(problem, fit, hypothesised);
+    let rows = fit.residual.len();
+    let directions = DMatrix::from_iterator(
+        rows,
+        all.len(),
+        all.iter().flat_map(|trial| trial.direction.iter().copied()),
+    );
+    let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
+    let jacobian = DMatrix::from_iterator(
+        rows,
+        open.len(),
+        open.iter().flat_map(|&quantity| fit.jacobian[quantity].iter().copied()),
+    );
+    let mut normal = submatrix(&fit.normal(None), &open);
+    for row in 0..open.len() {
+        normal[(row, row)] *= 1.0 + 1e-9;
+    }
+    let Some(normal) = normal.cholesky() else {
+        return (Vec::new(), Chance::default());
     };
-    let lower = factor.l();
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut largest: Vec<f64> = (0..DRAWS)
-        .map(|_| {
-            let noise = DVector::from_iterator(count, (0..count).map(|_| StandardNormal.sample(&mut rng)));
-            let scores = &lower * noise;
-            // A direction counts with its own sign only: the opposite sign, where it is possible, is a trial of its own.
-            scores
-                .iter()
-                .fold(0.0, |max: f64, &score: &f64| max.max(score.max(0.0).powi(2)))
+    let shared = cross(&jacobian, &directions);
+    let projected = normal.solve(&shared);
+    let products = cross(&directions, &directions) - cross(&shared, &projected);
+    let along = discrepancy.products_of(&directions) - discrepancy.products_of(&jacobian) * &projected;
+    let quantities = fit.hypothesis.quantities();
+    let whole_gradient = gradient(&quantities, &fit.at, &fit.residual, &fit.jacobian, None);
+    let pull = DVector::from_iterator(open.len(), open.iter().map(|&quantity| whole_gradient[quantity]));
+    let scores: Vec<f64> = all
+        .iter()
+        .enumerate()
+        .map(|(number, trial)| projected.column(number).dot(&pull) - dot(&trial.direction, &fit.residual, None))
+        .collect();
+    drop(directions);
+    // Those that the nuisances explain completely stay, for the evidence against them is that of their prior.
+    let squares = all
+        .iter()
+        .enumerate()
+        .map(|(number, trial)| {
+            let whole = dot(&trial.direction, &trial.direction, None);
+            products[(number, number)].max(1e-9 * (1.0 + whole))
         })
         .collect();
-    largest.sort_by(f64::total_cmp);
-    largest[(CONFIDENCE * (DRAWS - 1) as f64) as usize]
+    let impacts = |number: usize| -> Vec<(f64, f64)> {
+        let neutral = hypothesised[number].effect.severity().neutral;
+        let mine = all.iter().filter(|trial| trial.hypothesised == number);
+        mine.map(|trial| (trial.values[0] - neutral, trial.impact)).collect()
+    };
+    let shapes = |hypothesised: &Hypothesised| hypothesised.effect.starting_shapes(canal(problem)).len() as f64;
+    let trials = Trials {
+        priors: hypothesised
+            .iter()
+            .enumerate()
+            .map(|(number, one)| SeverityPrior::new(one.effect, &impacts(number)))
+            .collect(),
+        ln_prior: hypothesised.iter().map(ln_prior).collect(),
+        ln_shape: hypothesised.iter().map(|one| -shapes(one).ln()).collect(),
+        all,
+        squares,
+    };
+    let chance = Chance::draw(discrepancy, &products, &along, scales, seed, |scores| {
+        trials.largest(scores)
+    });
+    let ln_bayes = trials.ln_bayes_of_each(&scores);
+    let mut screened: Vec<Screening> = hypothesised
+        .iter()
+        .enumerate()
+        .map(|(number, &hypothesised)| {
+            let mut mine: Vec<usize> = (0..trials.all.len())
+                .filter(|&trial| trials.all[trial].hypothesised == number)
+                .collect();
+            let improvement = |trial: usize| trials.improvement(trial, scores[trial]);
+            mine.sort_by(|&a, &b| improvement(b).total_cmp(&improvement(a)));
+            let severity = hypothesised.effect.severity();
+            let starts = mine
+                .iter()
+                .take(STARTS)
+                .filter(|&&trial| scores[trial] > 0.0)
+                .map(|&trial| {
+                    let mut values = trials.all[trial].values.clone();
+                    let fraction = (scores[trial] / trials.squares[trial]).clamp(0.2, 3.0);
+                    values[0] = (severity.neutral + fraction * (values[0] - severity.neutral))
+                        .clamp(severity.min, severity.max);
+                    values
+                });
+            Screening {
+                hypothesised,
+                ln_bayes: ln_bayes[number],
+                prior: trials.priors[number],
+                score: mine.first().map_or(0.0, |&trial| improvement(trial)),
+                starts: starts.collect(),
+            }
+        })
+        .collect();
+    let ln_odds = |screening: &Screening| {
+        let number = hypothesised.iter().position(|one| *one == screening.hypothesised);
+        screening.ln_bayes + number.map_or(0.0, |number| trials.ln_prior[number])
+    };
+    screened.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
+    (screened, chance)
+}
+
+/// Simulates every trial of every effect on top of a fit.
+fn simulate(problem: &FitProblem<'_, '_>, fit: &Fit, hypothesised: &[Hypothesised]) -> Vec<Trial> {
+    let canal_m = canal(problem);
+    let tasks: Vec<(usize, Vec<f64>, (f64, f64))> = hypothesised
+        .iter()
+        .enumerate()
+        .flat_map(|(number, hypothesised)| {
+            let severity = hypothesised.effect.severity();
+            let has_place = hypothesised.effect.has_place();
+            trials(hypothesised.effect, canal_m).into_iter().map(move |values| {
+                let change = values[0] - severity.neutral;
+                let strength = change.abs() / severity.notable;
+                let reach = if change > 0.0 {
+                    severity.max - severity.neutral
+                } else {
+                    severity.neutral - severity.min
+                };
+                let (low, high) = if has_place { AT_A_PLACE } else { BETWEEN };
+                let low = if strength < 2.0 * STRENGTHS[0] { BEYOND.0 } else { low };
+                let high = if 3.0 * strength > STRENGTHS[3] {
+                    BEYOND.1.max(high)
+                } else {
+                    high
+                };
+                (number, values, (low, high.min(reach / change.abs())))
+            })
+        })
+        .collect();
+    let advances_m = problem.advances_m(&fit.hypothesis, &fit.at);
+    let without = problem.without_discrepancy(&fit.hypothesis, &fit.at);
+    let evaluate = |(number, values, stands_for): &(usize, Vec<f64>, (f64, f64))| {
+        let mut all = fit.hypothesis.hypothesised.clone();
+        all.push(hypothesised[*number]);
+        let nuisances = &fit.hypothesis.free[..fit.at.len() - effect_quantities(&fit.hypothesis)];
+        let hypothesis = Hypothesis::new(nuisances, &all);
+        let mut at = fit.at.clone();
+        at.extend(values);
+        let (mut direction, with_effect_m) = problem.residuals_and_advances(&hypothesis, &at);
+        for (value, here) in direction.iter_mut().zip(&without) {
+            *value -= here;
+        }
+        let square = dot(&direction, &direction, None);
+        // An effect that does nothing, and a worm that could not have crawled.
+        let is_possible = square > 1e-9 && with_effect_m.iter().all(|advance_m| advance_m.is_finite());
+        is_possible.then(|| Trial {
+            hypothesised: *number,
+            values: values.clone(),
+            direction,
+            impact: problem.impact(&advances_m, &with_effect_m),
+            stands_for: *stands_for,
+        })
+    };
+    let mut trials: Vec<Trial> = tasks.par_iter().filter_map(evaluate).collect();
+    let directions = trials
+        .iter_mut()
+        .map(|trial| std::mem::take(&mut trial.direction))
+        .collect();
+    for (trial, whitened) in trials.iter_mut().zip(problem.whiten_all(directions)) {
+        trial.direction = whitened;
+    }
+    trials
 }

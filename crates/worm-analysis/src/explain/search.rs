@@ -4,9 +4,16 @@ use super::answer::Answer;
 use super::assemble;
 use super::cross_validation;
 use super::error::ExplainError;
+use super::fit::Fit;
 use super::hypothesis::Hypothesis;
-use super::model_selection::{self, Open};
-use super::parameter::Nuisance;
+use super::judge::candidate::{Candidate, kinds};
+use super::judge::decision::decide;
+use super::judge::evidence::evidence;
+use super::judge::prior;
+use super::judge::structural_change::StructuralChanges;
+use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
+use super::onset::{mean_cycles, with_onsets};
+use super::parameter::{Hypothesised, Nuisance};
 use super::prepare::{prepare, recalibrate};
 use super::refit::{REFITTED, alone, pair_up, refit};
 use super::score_test;
@@ -14,23 +21,27 @@ use super::speed_droop::speed_droop;
 use crate::experiment::{Progress, RecordedRun};
 use worm_estimator::config::Config;
 
-/// Single effects from which pairs are tried where the best leaves a gap; from the best alone where it leaves none.
+/// Single effects from which pairs are tried.
 const PAIR_SEEDS: usize = 2;
-/// Factor on the improvement that chance reaches one time in twenty, and the smallest threshold: real pads, cams and tips are not quite
-/// those of the model. Chosen on the development split.
-const SAFETY: f64 = 2.5;
-const MIN_IMPROVEMENT: f64 = 26.0;
-
 /// Options of the search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Seed of everything drawn: the same input and seed give the same answer.
     pub seed: u64,
+    /// Scale of the discrepancy between the model and any worm, as a fraction of the mean largest deformation of the tips; above 0.
+    /// Too small, and the model's own small errors get names; too large, and a wrong effect hides in it what it leaves.
+    pub discrepancy: f64,
+    /// Relative change of the advance or of the energy of a cycle below which an effect does not matter.
+    pub matters: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { seed: 1 }
+        Self {
+            seed: 1,
+            discrepancy: 0.006,
+            matters: 0.02,
+        }
     }
 }
 
@@ -50,10 +61,36 @@ pub fn explain(
     let phase_recorded = scene.observed.iter().any(|observed| observed.phase_recorded);
     report("recalibration", 0.03);
     let nuisances = Nuisance::all(config.worm.cells, runs.len(), phase_recorded);
-    let (problem, recalibrated) = recalibrate(&scene, &Hypothesis::new(&nuisances, &[]))?;
+    let (problem, discrepancy, recalibrated) =
+        recalibrate(&scene, &Hypothesis::new(&nuisances, &[]), options.discrepancy)?;
     report("screening", 0.15);
+    let changes = StructuralChanges::new(&problem, &discrepancy);
+    let judge = Judge {
+        problem: &problem,
+        discrepancy: &discrepancy,
+        changes: &changes,
+        recalibrated: &recalibrated,
+        none: evidence(&discrepancy, Some(&changes), &recalibrated, &|_| None),
+        campaign: prior::Campaign {
+            cells: config.worm.cells,
+            runs: runs.len(),
+            cycles: mean_cycles(&problem),
+            phase_recorded,
+        },
+        limit: options.matters,
+    };
     let hypothesised = score_test::hypotheses(config.worm.cells, phase_recorded);
-    let (screened, chance) = score_test::screen(&problem, &recalibrated, &hypothesised, options.seed);
+    let ln_prior = |one: &Hypothesised| judge.ln_prior(&[*one]) - prior::NONE.ln();
+    let scales = judge.none.scales();
+    let (screened, chance) = score_test::screen(
+        &problem,
+        &discrepancy,
+        &recalibrated,
+        &hypothesised,
+        ln_prior,
+        scales,
+        options.seed,
+    );
     report("refit", 0.3);
     let nominal = problem.with_derivatives(&recalibrated.hypothesis, recalibrated.hypothesis.neutral());
     let mut candidates = refit(
@@ -64,40 +101,71 @@ pub fn explain(
         REFITTED,
         &mut |fraction| report("refit", 0.3 + 0.35 * fraction),
     );
-    let threshold = (SAFETY * chance).max(MIN_IMPROVEMENT);
-    report("held-out selection", 0.65);
-    let folds = cross_validation::folds(&problem);
-    let recalibrated_held_out = cross_validation::hold_out(&problem, &recalibrated, &folds);
-    model_selection::hold_out(&problem, &recalibrated, &mut candidates, &folds);
-    report("pairs", 0.75);
-    let open = Open::of(&problem, &recalibrated);
-    let mut pairs = Vec::new();
-    if let Some(best) = candidates.first().filter(|best| best.improvement > threshold) {
-        let seeds = if open.is_closed(&problem, &best.fit) {
-            1
-        } else {
-            PAIR_SEEDS
-        };
-        let seeds = model_selection::kinds(&candidates).into_iter().take(seeds);
-        pairs = pair_up(&problem, &recalibrated, seeds, &hypothesised, threshold, options.seed);
-        model_selection::hold_out(&problem, &recalibrated, &mut pairs, &folds);
-        if let Some(alone) = pairs
-            .first()
-            .and_then(|pair| alone(&problem, &recalibrated, &candidates[0], pair))
-        {
-            candidates[0] = alone;
-            model_selection::hold_out(&problem, &recalibrated, &mut candidates[..1], &folds);
-        }
+    judge.weigh(&mut candidates, &screened);
+    let best = candidates.first().filter(|best| judge.ln_odds(best) > 0.0);
+    let best = best.and_then(|best| best.evidence).unwrap_or(judge.none);
+    if judge.may_change(&best) {
+        report("onsets", 0.6);
+        candidates.extend(with_onsets(&judge, &nominal, &screened));
+        candidates.sort_by(|a, b| judge.ln_odds(b).total_cmp(&judge.ln_odds(a)));
     }
+    report("pairs", 0.65);
+    let mut pairs: Vec<(Candidate, f64)> = Vec::new();
+    let mut seeds: Vec<Candidate> = kinds(&candidates).into_iter().take(PAIR_SEEDS).cloned().collect();
+    // What seems to begin in mid-run may be there from the start, with a second effect that hides that.
+    let throughout = seeds.iter().filter_map(|seed| {
+        let is_throughout = |one: &&Candidate| one.hypothesised[0].onset.is_none();
+        let same = candidates
+            .iter()
+            .filter(|one| one.hypothesised[0].is_same_effect(&seed.hypothesised[0]));
+        seed.hypothesised[0]
+            .onset
+            .and_then(|_| same.clone().find(is_throughout).cloned())
+    });
+    let throughout: Vec<Candidate> = throughout.collect();
+    seeds.extend(throughout);
+    for first in &seeds {
+        let beyond = judge.ln_odds_as_screened(first, None) - chance.ln_odds(FALSE_NAMES);
+        let is_near = judge.ln_odds(first) > judge.ln_odds(&seeds[0]) - WORTH_A_LOOK;
+        if beyond < 0.0 || !is_near && judge.is_closed_by(&seeds[0]) {
+            continue;
+        }
+        let (found, chance) = pair_up(&judge, first, &hypothesised, &screened, options.seed);
+        let beyond = found.into_iter().map(|pair| {
+            let beyond = judge.ln_odds_as_screened(&pair, Some(first)) - chance.ln_odds(FALSE_NAMES);
+            (pair, beyond)
+        });
+        pairs.extend(beyond);
+    }
+    pairs.sort_by(|a, b| judge.ln_odds(&b.0).total_cmp(&judge.ln_odds(&a.0)));
+    if let Some((best, _)) = pairs.first()
+        && let Some(single) = candidates.first()
+        && let Some(alone) = alone(&problem, &recalibrated, single, best)
+    {
+        candidates[0] = alone;
+        judge.weigh(&mut candidates[..1], &screened);
+    }
+    report("held-out selection", 0.8);
+    let plain = problem.without_any_discrepancy();
+    let folds = cross_validation::folds(&plain);
+    let recalibrated_held_out = held_out(&plain, &recalibrated, &folds);
     report("judgement", 0.9);
-    let selected = model_selection::select_model(
-        &problem,
-        &open,
+    let judged = judge.judge(
         candidates,
         pairs,
-        threshold,
+        &chance,
+        &plain,
+        &folds,
         recalibrated_held_out.chi_squared,
     );
+    let fitted: Vec<&Hypothesised> = judged.iter().flat_map(|one| &one.candidate.hypothesised).collect();
+    // What the rough fits dismissed counts by its prior at most: first order promises strong effects too much.
+    let unfitted: Vec<f64> = screened
+        .iter()
+        .filter(|screening| !fitted.contains(&&screening.hypothesised))
+        .map(|screening| judge.none.usual + judge.ln_prior(&[screening.hypothesised]) + screening.ln_bayes.min(0.0))
+        .collect();
+    let selected = decide(judge.none, judged, &unfitted);
     let cycles_s: Vec<f64> = runs
         .iter()
         .map(|run| run.cycle_s.unwrap_or(config.gait.cycle_s))
@@ -111,6 +179,16 @@ pub fn explain(
         &cycles_s,
     );
     report("localisation", 0.93);
+    // What repeats and is smooth, beyond noise.
+    let gap = |fit: &Fit| {
+        let residual = plain.residuals(&fit.hypothesis, &fit.at);
+        discrepancy.beyond_noise(&residual)
+    };
+    let open_share = selected
+        .candidates
+        .first()
+        .map_or(1.0, |candidate| gap(&candidate.fit) / gap(&recalibrated).max(1.0));
+    let threshold = chance.improvement(FALSE_NAMES);
     let parts = assemble::Parts {
         nominal,
         recalibrated,
@@ -118,6 +196,8 @@ pub fn explain(
         screened,
         selected,
         speed_droop,
+        open_share,
+        discrepancy_m: discrepancy.scale_m,
         threshold,
     };
     Ok(assemble::assemble(&problem, config, &parts))

@@ -1,39 +1,37 @@
 //! The answer in words.
 
-use super::answer::{NamedEffect, Place, Verdict, answers_in_words};
+use super::answer::{FoundOnset, NamedEffect, Place, Verdict, answers_in_words};
 use super::fit::{Fit, FitProblem};
-use super::model_selection::Selected;
+use super::judge::candidate::Candidate;
+use super::judge::decision::Selected;
 use super::parameter::What;
 use crate::recording::Repair;
+use worm_estimator::number::percent;
 use worm_physics::effect::{LIBRARY, Visible};
 
-/// The verdict in a sentence or two. `refused` is the fraction of the held-out gap that the best effect closes, where that is too
-/// little to name it.
+/// The verdict in a sentence or two.
 pub(super) fn sentence(
     verdict: Verdict,
     effects: &[NamedEffect],
     rivals: &[NamedEffect],
     selected: &Selected,
-    refused: Option<f64>,
-    threshold: f64,
+    open_share: f64,
+    change: Option<&FoundOnset>,
 ) -> String {
     match verdict {
-        Verdict::Agrees => {
-            let best = selected
-                .all
-                .iter()
-                .map(|candidate| candidate.improvement)
-                .fold(0.0, f64::max);
-            let why = if best > threshold {
-                "what improves the fit by more is too weak to matter, is not kept on held-out data, or closes next to nothing of the gap"
-            } else {
-                "no effect of the library does"
-            };
-            format!(
-                "Model and data agree once the model is recalibrated within its priors: an effect must improve the fit by {threshold:.0}, and {why} (best: {best:.0})."
-            )
-        }
+        Verdict::Agrees => format!(
+            "Model and data agree once the model is recalibrated within its priors: that nothing which matters is missing has a probability of {}.",
+            percent(selected.null_probability)
+        ),
         Verdict::Explained => format!("{} explains the data{}.", names(effects), closing(effects)),
+        Verdict::Ambiguous if rivals.is_empty() => format!(
+            "{} explains the data{}, but it is not sure: that nothing which matters is missing has a probability of {}, that something \
+             else is one of {}.",
+            names(effects),
+            closing(effects),
+            percent(selected.null_probability),
+            percent(selected.other_probability)
+        ),
         Verdict::Ambiguous => format!(
             "{} explains the data{}, but so does {}: these data cannot decide between them.",
             names(effects),
@@ -42,33 +40,37 @@ pub(super) fn sentence(
         ),
         Verdict::OutsideLibrary => {
             let nearest = selected.candidates.first().map_or_else(
-                || "none that is strong enough to matter keeps its improvement on held-out data".to_owned(),
+                || "none comes near".to_owned(),
                 |candidate| {
                     let names: Vec<&str> = candidate
-                        .hypothesised
-                        .iter()
-                        .map(|hypothesised| hypothesised.effect.name)
+                        .named()
+                        .map(|(_, hypothesised)| hypothesised.effect.name)
                         .collect();
-                    let how_near = match refused {
-                        Some(closure) => format!(
-                            "closes {:.0} % of the gap on cycles that it was not fitted to",
-                            100.0 * closure.max(0.0)
-                        ),
-                        None => format!("leaves {:.0} % of the gap open", 100.0 * selected.open_share),
-                    };
-                    format!("{} comes nearest and {how_near}", names.join(" with "))
+                    format!(
+                        "{} comes nearest and leaves {:.0} % of the gap open",
+                        names.join(" with "),
+                        100.0 * open_share
+                    )
                 },
             );
+            let changes = change.map_or_else(String::new, |change| {
+                format!(" Something is different {}.", change.in_words())
+            });
             format!(
-                "Model and data disagree, and no effect of the library, alone or in a pair, explains how: {nearest}."
+                "Model and data disagree, and no effect of the library, alone or in a pair, explains how: {nearest}.{changes} That \
+                 something else is missing has a probability of {}.",
+                percent(selected.other_probability)
             )
         }
     }
 }
 
 fn names(effects: &[NamedEffect]) -> String {
-    let names: Vec<String> = effects.iter().map(NamedEffect::in_words).collect();
-    names.join(" together with ")
+    let name = |effect: &NamedEffect| match &effect.onset {
+        Some(onset) => format!("{} ({})", effect.in_words(), onset.in_words()),
+        None => effect.in_words(),
+    };
+    effects.iter().map(name).collect::<Vec<_>>().join(" together with ")
 }
 
 fn closing(effects: &[NamedEffect]) -> String {
@@ -82,8 +84,8 @@ fn closing(effects: &[NamedEffect]) -> String {
 }
 
 /// What no effect explains, in words.
-pub(super) fn remainder(selected: &Selected, places: &[Place]) -> String {
-    let whole = format!("{:.0} % of the gap stays open", 100.0 * selected.open_share);
+pub(super) fn remainder(open_share: f64, places: &[Place]) -> String {
+    let whole = format!("{:.0} % of the gap stays open", 100.0 * open_share);
     match places.first() {
         Some(place) => format!(
             "{whole}; it is largest at cell {} while cell {} steps, phase {:.2}, on the {}° run: {:+.3} mm in each cycle ({:.1} standard errors)",
@@ -107,7 +109,7 @@ pub(super) fn repairs(problem: &FitProblem<'_, '_>) -> Vec<Repair> {
 }
 
 /// Limitations of the answer.
-pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<String> {
+pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit, named: Option<&Candidate>) -> Vec<String> {
     let observed = &problem.scene.observed;
     let mut warnings: Vec<String> = observed
         .iter()
@@ -141,5 +143,12 @@ pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<String> {
             "{at_limit} of the recalibrated values lie at the end of what their priors allow: see the calibration"
         ));
     }
+    let trace = named.and_then(|candidate| Some(&candidate.hypothesised[candidate.trace?]));
+    warnings.extend(trace.map(|trace| {
+        format!(
+            "a trace of {} was fitted beside it, which improves the fit and changes nothing that matters",
+            trace.effect.name
+        )
+    }));
     warnings
 }

@@ -8,6 +8,7 @@ mod hidden_effects;
 mod identify;
 mod independent_worm;
 mod log_samples;
+mod own_sample;
 mod recording;
 mod report;
 mod score;

@@ -1,10 +1,15 @@
 //! The score, on answers that are known to be right or wrong.
 
-use testkit::hidden_effects::assessment::{Answer, Estimate, Explainer, Named, Proposal, Screened, Verdict, assess};
-use testkit::hidden_effects::campaign::{CampaignKind, CampaignSize, Hidden, HiddenCampaign, Twin, draw_sized};
-use testkit::hidden_effects::effect::{Effect, SeverityRange, TrueEffect};
+use testkit::hidden_effects::answer::{Answer, Estimate, Named, Proposal, Verdict};
+use testkit::hidden_effects::assessment::{Explainer, assess};
+use testkit::hidden_effects::campaign::{HiddenCampaign, draw_sized};
+use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::follow_up::ExtraRun;
-use testkit::hidden_effects::table::{Proportion, ScoreTable};
+use testkit::hidden_effects::hidden::{Hidden, Twin};
+use testkit::hidden_effects::setting::CampaignSize;
+use testkit::hidden_effects::statistics::Proportion;
+use testkit::hidden_effects::table::ScoreTable;
+use testkit::hidden_effects::truth::{CampaignKind, TrueEffect};
 
 /// Knows the truth, and reports it, or else always a payload.
 struct Oracle {
@@ -14,14 +19,14 @@ struct Oracle {
 impl Explainer for Oracle {
     fn explain(&self, campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<Answer, String> {
         let named = |truth: &TrueEffect| Named {
-            name: truth.name.to_owned(),
+            name: truth.name.clone(),
             cell: truth.cell,
             twins: vec!["constant-drag".to_owned(), "directional-friction".to_owned()],
             parameters: truth
                 .parameters
                 .iter()
-                .map(|&(name, value)| Estimate {
-                    name: name.to_owned(),
+                .map(|(name, &value)| Estimate {
+                    name: name.clone(),
                     value: 1.01 * value,
                     low: 0.9 * value.min(2.0 * value),
                     high: 1.1 * value.max(-value),
@@ -32,25 +37,19 @@ impl Explainer for Oracle {
             name: "payload".to_owned(),
             ..Named::default()
         };
-        let truth: Vec<Named> = campaign.truth.iter().map(named).collect();
+        let truth: Vec<Named> = campaign.truth.effects.iter().map(named).collect();
         // An effect of a single cell is ambiguous until there is one more run.
-        let is_ambiguous = campaign.truth.iter().any(|truth| truth.cell.is_some()) && extra.is_empty();
+        let is_ambiguous = campaign.truth.effects.iter().any(|truth| truth.cell.is_some()) && extra.is_empty();
         Ok(Answer {
-            verdict: match campaign.kind {
+            verdict: match campaign.truth.kind {
                 _ if !self.reports_truth => Verdict::Named,
                 CampaignKind::Clean => Verdict::Nothing,
-                CampaignKind::Outside => Verdict::Outside,
+                CampaignKind::Stranger => Verdict::Outside,
                 _ if is_ambiguous => Verdict::Ambiguous,
                 _ => Verdict::Named,
             },
-            screened: truth
-                .iter()
-                .map(|truth| Screened {
-                    name: truth.name.clone(),
-                    cell: truth.cell,
-                    sigma: 8.0,
-                })
-                .collect(),
+            probability: Some(if self.reports_truth { 0.995 } else { 0.9999 }),
+            onset: None,
             named: if self.reports_truth {
                 truth
             } else {
@@ -83,13 +82,13 @@ fn the_score_separates_right_from_wrong() {
             .collect();
         let table = ScoreTable(&assessments);
         println!("{table}");
-        let fractions = table.fractions();
+        let rows = table.rows();
         move |what: &str| {
-            let row = fractions
+            let row = rows
                 .iter()
-                .find(|row| row.0 == what)
+                .find(|row| row.what == what)
                 .expect("the table has such a row");
-            let Proportion { hits, of } = row.1;
+            let Proportion { hits, of } = row.proportion;
             (hits, of)
         }
     };
@@ -97,14 +96,17 @@ fn the_score_separates_right_from_wrong() {
     // What is counted, of how many; the hits of who knows all, and of who says payload always.
     let table = [
         ("no answer at all", 6, [0, 0]),
-        ("singles at least 5 sigma", 2, [2, 2]),
-        ("class, top 1, at least 5 sigma", 2, [2, 0]),
-        ("strict, at least 5 sigma", 2, [1, 0]),
-        ("clean, falsely named", 1, [0, 1]),
-        ("outside, abstained", 1, [1, 0]),
-        ("pairs, one right", 1, [1, 0]),
-        ("pairs, both right", 1, [1, 0]),
+        ("single: strong by truth", 2, [2, 2]),
+        ("single: false second effect", 2, [0, 0]),
+        ("strong: class right", 2, [2, 0]),
+        ("strong: strictly right", 2, [1, 0]),
+        ("clean: an effect named", 1, [0, 1]),
+        ("stranger: detected as outside", 1, [1, 0]),
+        ("stranger: under another name", 1, [0, 1]),
+        ("pair: one named", 1, [1, 0]),
+        ("pair: both named", 1, [1, 0]),
         ("twins reported as twins", 1, [1, 0]),
+        ("stated at 0.99: right", 6, [6, 0]),
     ];
     let [right, wrong] = [fractions(true), fractions(false)];
     for (what, of, [by_right, by_wrong]) in table {
@@ -112,25 +114,11 @@ fn the_score_separates_right_from_wrong() {
         assert_eq!(wrong(what), (by_wrong, of), "{what}, by who does not");
     }
     for what in [
-        "faulty cell",
-        "ambiguous set holds the truth",
-        "ambiguous, settled by proposal",
+        "strong: cell right",
+        "ambiguous: set holds truth",
+        "ambiguous: settled by the run",
     ] {
         assert_eq!(right(what), (1, 1), "{what}");
     }
-    assert_eq!(right("90 % interval covers"), (2, 2));
-}
-
-#[test]
-fn wilson_gives_the_intervals_of_the_textbook() {
-    for (hits, of, expected) in [
-        (0, 10, [0.0, 0.278]),
-        (9, 10, [0.596, 0.982]),
-        (81, 263, [0.255, 0.366]),
-    ] {
-        let interval = Proportion { hits, of }.wilson();
-        for (found, expected) in interval.into_iter().zip(expected) {
-            assert!((found - expected).abs() < 1e-3, "{hits} of {of}: {interval:?}");
-        }
-    }
+    assert_eq!(right("strong: 90 % interval covers"), (2, 2));
 }

@@ -2,15 +2,18 @@
 //! the test split. The same ones in full size are `cargo bench --bench explain_benchmark -- --split search`, and the score over
 //! many is that of the splits `development` and `test`.
 
-use testkit::hidden_effects::assessment::{Answer, Assessment, Explainer, Verdict, assess};
-use testkit::hidden_effects::campaign::{CampaignSize, Hidden, HiddenCampaign, Twin, draw_sized};
+use testkit::hidden_effects::answer::{Answer, Verdict};
+use testkit::hidden_effects::assessment::{Assessment, Explainer, assess};
+use testkit::hidden_effects::campaign::{HiddenCampaign, draw_sized};
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::follow_up::ExtraRun;
+use testkit::hidden_effects::hidden::{Hidden, Twin};
 use testkit::hidden_effects::library::Library;
+use testkit::hidden_effects::setting::CampaignSize;
 use testkit::hidden_effects::split::{Case, SEARCH_SEED, Split, split};
 
 /// The library's own search, called once: the bench finds out whether the proposed run settles an ambiguous answer.
-struct Once;
+pub struct Once;
 
 impl Explainer for Once {
     fn explain(&self, campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<Answer, String> {
@@ -24,6 +27,7 @@ impl Explainer for Once {
 
 fn assessed(hidden: Hidden) -> Assessment {
     let case = Case {
+        split: Split::Search,
         hidden,
         seed: SEARCH_SEED,
     };

@@ -1,16 +1,18 @@
 //! The effects of an answer as people read them.
 
-use crate::explain::answer::{FoundParameter, NamedEffect, with_cell};
-use crate::explain::model_selection::Candidate;
-use crate::explain::parameter::{Hypothesised, What};
+use crate::explain::answer::{FoundOnset, FoundParameter, NamedEffect, with_cell};
+use crate::explain::judge::candidate::Candidate;
+use crate::explain::observed::Observed;
+use crate::explain::parameter::{Hypothesised, Onset, What};
 use crate::explain::speed_droop::SpeedDroop;
 use worm_physics::effect::MOTOR_DROOP;
 
 /// The effects of a candidate.
 pub(in crate::explain) fn named_effects(
+    observed: &[Observed<'_>],
     candidate: &Candidate,
     probability: f64,
-    closure: f64,
+    (closure, closure_interval): (f64, [f64; 2]),
     margin: f64,
 ) -> Vec<NamedEffect> {
     let sigmas = candidate.sigmas();
@@ -41,20 +43,36 @@ pub(in crate::explain) fn named_effects(
                 .collect(),
             parameters: parameters.collect(),
             cell: hypothesised.cell.map(|cell| cell + 1),
+            onset: hypothesised.onset.map(|onset| found_onset(observed, onset)),
             together_with: candidate
-                .hypothesised
-                .iter()
-                .filter(|other| *other != hypothesised)
-                .map(name)
+                .named()
+                .filter(|(other, _)| *other != place)
+                .map(|(_, other)| name(other))
                 .collect(),
             closure,
+            closure_interval,
             margin,
             probability,
             improvement: candidate.improvement,
             separated_by: hypothesised.effect.separated_by.to_owned(),
         }
     };
-    candidate.hypothesised.iter().enumerate().map(of).collect()
+    candidate.named().map(of).collect()
+}
+
+/// When something begins, in cycles and seconds.
+pub(super) fn found_onset(observed: &[Observed<'_>], onset: Onset) -> FoundOnset {
+    let seen = &observed[onset.run.unwrap_or(0)];
+    let phase = seen.phase[0] + onset.cycle;
+    let sample = seen.phase.partition_point(|&here| here < phase).min(seen.samples() - 1);
+    let time_s = &seen.run.recording.time_s;
+    FoundOnset {
+        cycle: onset.cycle,
+        time_s: time_s[sample] - time_s[0],
+        run: onset
+            .run
+            .map(|run| observed[run].run.recording.source.display().to_string()),
+    }
 }
 
 /// A motor that slows down under load, found in times alone.
@@ -73,8 +91,10 @@ pub(super) fn droop_effect(speed_droop: &SpeedDroop) -> NamedEffect {
             cell: None,
         }],
         cell: None,
+        onset: None,
         // It shows in time and does not change the gap in positions.
         closure: f64::NAN,
+        closure_interval: [f64::NAN; 2],
         margin: f64::NAN,
         probability: 1.0 / (1.0 + (-0.5 * speed_droop.improvement).exp()),
         improvement: speed_droop.improvement,

@@ -3,7 +3,7 @@
 use super::Parts;
 use crate::explain::answer::RunSummary;
 use crate::explain::fit::{Fit, FitProblem};
-use crate::explain::model_selection::Candidate;
+use crate::explain::judge::candidate::Candidate;
 use crate::explain::observed::Observed;
 
 /// What the recordings are, and how far the worm got in them.

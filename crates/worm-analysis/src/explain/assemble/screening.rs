@@ -1,7 +1,7 @@
 //! What became of every effect of the library.
 
 use crate::explain::answer::{Screened, ScreeningOutcome};
-use crate::explain::model_selection::Selected;
+use crate::explain::judge::decision::Selected;
 use crate::explain::score_test::Screening;
 use worm_physics::effect::{Effect, LIBRARY};
 

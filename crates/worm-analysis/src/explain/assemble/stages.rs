@@ -4,12 +4,13 @@ use super::Parts;
 use crate::explain::answer::{Stage, StageKind};
 use crate::explain::fit::FitProblem;
 use crate::explain::gap::Measured;
-use crate::explain::model_selection::Candidate;
+use crate::explain::judge::candidate::Candidate;
 
 /// The gap, stage by stage, and what fraction of it each candidate closes.
 pub(super) struct Gap {
     pub stages: Vec<Stage>,
-    pub closure: Vec<f64>,
+    /// With its 90 % interval.
+    pub closure: Vec<(f64, [f64; 2])>,
     best_wrong: f64,
 }
 
@@ -31,14 +32,16 @@ impl Gap {
         let stage = |kind: StageKind, candidate: &Candidate| {
             let folds = candidate.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
             let names: Vec<&str> = candidate
-                .hypothesised
-                .iter()
-                .map(|hypothesised| hypothesised.effect.name)
+                .named()
+                .map(|(_, hypothesised)| hypothesised.effect.name)
                 .collect();
             measured.stage(kind, Some(names.join(" + ")), &candidate.fit, folds)
         };
-        let gap_m = recalibrated.held_out_rms_m - floor.held_out_rms_m;
-        let closure = |stage: &Stage| (recalibrated.held_out_rms_m - stage.held_out_rms_m) / gap_m;
+        let open = measured.clusters(&parts.recalibrated, &parts.recalibrated_held_out.fits);
+        let closure = |candidate: &Candidate| {
+            let folds = candidate.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
+            open.closure(&measured.clusters(&candidate.fit, folds), floor.held_out_rms_m)
+        };
         let of_named: Vec<Stage> = named
             .iter()
             .map(|candidate| stage(StageKind::Named, candidate))
@@ -47,8 +50,11 @@ impl Gap {
             .best_wrong
             .as_ref()
             .map(|candidate| stage(StageKind::BestWrong, candidate));
-        let closures = of_named.iter().map(closure).collect();
-        let best_wrong = wrong.as_ref().map_or(0.0, closure);
+        let closures = named.iter().map(closure).collect();
+        let best_wrong = selected
+            .best_wrong
+            .as_ref()
+            .map_or(0.0, |candidate| closure(candidate).0);
         let mut stages = vec![
             measured.stage(StageKind::Baseline, None, &parts.nominal, &[]),
             recalibrated,
@@ -67,6 +73,6 @@ impl Gap {
     /// A candidate's closure less that of the best other one, candidate or not.
     pub fn margin(&self, place: usize) -> f64 {
         let others = self.closure.iter().enumerate().filter(|(other, _)| *other != place);
-        self.closure[place] - others.map(|(_, closure)| *closure).fold(self.best_wrong, f64::max)
+        self.closure[place].0 - others.map(|(_, closure)| closure.0).fold(self.best_wrong, f64::max)
     }
 }

@@ -1,3 +1,4 @@
+use super::super::bins::Bins;
 use super::super::hypothesis::Hypothesis;
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
@@ -61,21 +62,28 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
     let scene = scene(&recordings, &config);
     let nuisances = Nuisance::all(config.worm.cells, SLOPES_DEG.len(), true);
     let base = Hypothesis::new(&nuisances, &[]);
+    let bins: Vec<Bins> = scene.observed.iter().map(Bins::new).collect();
     let noise = scene.observed.iter().enumerate().map(|(run, observed)| {
         let predicted = scene.predict(run, &base, &base.neutral()).expect("the worm holds");
-        RunNoise::measure(observed, &Residual::new(observed, &predicted))
+        RunNoise::measure(
+            observed,
+            &bins[run],
+            &Residual::binned(observed, &bins[run], &predicted),
+        )
     });
     let noise = noise.collect();
     let problem = FitProblem {
         scene: &scene,
         noise,
+        discrepancy: None,
         repeating_excess: 0.0,
+        bins: bins.clone(),
     };
     let fits: Vec<Fit> = rivals
         .iter()
         .map(|&(name, value)| {
             let effect = effect::named(name).expect("an effect of the library");
-            let hypothesis = Hypothesis::new(&nuisances, &[Hypothesised { effect, cell: None }]);
+            let hypothesis = Hypothesis::new(&nuisances, &[Hypothesised::throughout(effect, None)]);
             let mut at = hypothesis.neutral();
             *at.last_mut().expect("the effect's parameter") = value;
             let mut fit = problem.evaluate(&hypothesis, at);

@@ -3,6 +3,7 @@
 //! The distance between two rivals is the chi-squared of the data of the new run against the wrong one, which may adjust everything that
 //! is free in it as far as the campaign allows (its own normal matrix is the prior), and the slope error of the new run.
 
+use super::super::bins::Bins;
 use super::super::fit::{Fit, FitProblem};
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
@@ -55,6 +56,7 @@ pub(super) fn empty_recording(problem: &FitProblem<'_, '_>, change: &Change) -> 
 /// A run that may be made.
 pub(super) struct Trial<'r> {
     scene: Scene<'r>,
+    bins: Bins,
     noise: RunNoise,
 }
 
@@ -98,8 +100,10 @@ impl<'r> Trial<'r> {
             cycle_s: change.cycle_s,
         };
         observed.assume_laid_down(true);
+        let bins = Bins::new(&observed);
         Some(Self {
-            noise: problem.noise[change.base].of_another(&observed, *thinned),
+            noise: problem.noise[change.base].of_another(&observed, &bins, *thinned),
+            bins,
             scene: Scene {
                 observed: vec![observed],
                 nominal: vec![physics],
@@ -128,8 +132,8 @@ impl<'r> Trial<'r> {
         physics.clamped_worm().check_hold().ok()?;
         let predicted = self.scene.predict(0, &rival.hypothesis, at)?;
         let mut whitened = Vec::new();
-        self.noise
-            .whiten(observed, &Residual::new(observed, &predicted), &mut whitened);
+        let residual = Residual::binned(observed, &self.bins, &predicted);
+        self.noise.whiten(&residual, &mut whitened);
         let cells = observed.cells();
         let mean_m = |sample: usize| {
             let cells_m = &predicted.position_m[sample * cells..(sample + 1) * cells];

@@ -1,9 +1,10 @@
 //! The mean cycle of the residual: what a model of any form could add.
 
 use super::{CellResiduals, Cycle, Squares, advance_m, settled_cycles, within_cycles};
-use crate::explain::noise::BINS_PER_STEP;
 use crate::explain::observed::Observed;
 
+/// Most bins of a step.
+const BINS_PER_STEP: usize = 12;
 /// Fewest samples in a bin, on average.
 const SAMPLES_PER_BIN: f64 = 3.0;
 /// Cycles from which the mean cycle has a trend.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::explain::answer::{Figures, FoundParameter, NamedEffect, Verdict};
+use crate::explain::answer::{Doubt, Figures, FoundParameter, NamedEffect, Verdict};
 
 fn calibrated(name: &str, nominal: f64, found: f64, sigma: f64) -> Calibrated {
     Calibrated {
@@ -29,6 +29,8 @@ fn named(name: &str, cell: Option<usize>, parameters: &[(&str, f64, f64, &str)])
         cell,
         together_with: Vec::new(),
         closure: 0.95,
+        closure_interval: [0.9, 1.0],
+        onset: None,
         margin: 0.2,
         probability: 0.99,
         improvement: 120.0,
@@ -47,8 +49,10 @@ fn answer(verdict: Verdict, calibration: &[Calibrated], effects: &[NamedEffect],
         remainder: None,
         next_experiment: None,
         calibration: calibration.to_vec(),
+        written_back: calibration.to_vec(),
         screening: Vec::new(),
         threshold: 9.0,
+        doubt: Doubt::default(),
         runs: Vec::new(),
         warnings: Vec::new(),
         repairs: Vec::new(),

@@ -7,7 +7,7 @@
 
 use super::super::answer::{Remainder, Verdict};
 use super::super::fit::Fit;
-use super::super::model_selection::{Candidate, are_twins};
+use super::super::judge::candidate::{Candidate, are_twins};
 use super::super::parameter::{Hypothesised, What};
 use super::table::Table;
 
@@ -195,6 +195,7 @@ impl Selected {
                 off.collect::<Vec<_>>().join(", ")
             ),
             open_share: best.chi_squared / recalibrated.chi_squared,
+            onset: None,
             period_cycles: None,
             period_m: None,
             places: Vec::new(),

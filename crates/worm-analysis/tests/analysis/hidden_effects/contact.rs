@@ -10,6 +10,7 @@ use testkit::hidden_effects::parameters::WormParameters;
 use testkit::hidden_effects::scene::{STEP_S, Scene};
 use testkit::hidden_effects::tip::contact::{Contact, Law};
 use testkit::hidden_effects::tip::dahl::Dahl;
+use testkit::hidden_effects::tip::laws::Laws;
 use testkit::hidden_effects::tip::weakening::Weakening;
 use testkit::hidden_effects::tip::{Limits, Pad, Tip};
 
@@ -59,6 +60,8 @@ fn pad(contact: Contact, static_over_kinetic: f64) -> Pad {
         stiffness_n_per_m: 980.0,
         damping_n_s_per_m: 5.0,
         hardening: 0.0,
+        laws: Laws::default(),
+        discrepancy_m: 0.0,
         creep_share: 0.0,
         creep_s: 1.0,
         yielding_share: 0.0,

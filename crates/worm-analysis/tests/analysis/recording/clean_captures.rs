@@ -4,8 +4,10 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use testkit::hidden_effects::campaign::{CampaignSize, Hidden, draw_sized};
+use testkit::hidden_effects::campaign::draw_sized;
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
+use testkit::hidden_effects::hidden::Hidden;
+use testkit::hidden_effects::setting::CampaignSize;
 use testkit::random::log_uniform;
 use worm_analysis::experiment::{Simulation, simulate};
 use worm_analysis::identify::{GaitError, Prior, gait, steady};
@@ -165,7 +167,13 @@ fn worms_of_the_independent_simulator_pass_untouched() {
         campaign
             .recordings
             .into_iter()
-            .map(move |recording| (format!("{}, seed {seed}", campaign.name), recording, config.clone()))
+            .map(move |recording| {
+                (
+                    format!("{}, seed {seed}", campaign.truth.case),
+                    recording,
+                    config.clone(),
+                )
+            })
             .collect::<Vec<_>>()
     });
     assert_untouched(campaigns);

@@ -3,8 +3,9 @@
 
 use super::sample::STIFFNESS_N_PER_M;
 use worm_analysis::explain::answer::{
-    Answer, Calibrated, CycleSeries, ExperimentChange, Figures, FoundParameter, NamedEffect, NextExperiment, Place,
-    Prediction, Remainder, ResidualMap, RunChange, RunSummary, Screened, ScreeningOutcome, Stage, StageKind, Verdict,
+    Answer, Calibrated, CycleSeries, Doubt, ExperimentChange, Figures, FoundParameter, NamedEffect, NextExperiment,
+    Place, Prediction, Remainder, ResidualMap, RunChange, RunSummary, Screened, ScreeningOutcome, Stage, StageKind,
+    Verdict,
 };
 use worm_physics::effect::{self, LIBRARY};
 use worm_physics::{Contact, Motion, Worm};
@@ -188,6 +189,8 @@ pub fn found(
         cell,
         together_with: Vec::new(),
         closure,
+        closure_interval: [closure - 0.03, closure + 0.03],
+        onset: None,
         margin,
         probability: 0.5 + 0.5 * margin,
         improvement,
@@ -239,7 +242,9 @@ fn stage(stage: StageKind, effect: Option<&str>, rms_mm: f64, advance_mm: f64) -
         effect: effect.map(str::to_owned),
         fit_rms_m: rms_mm * 0.97e-3,
         held_out_rms_m: rms_mm * 1e-3,
+        held_out_interval_m: [0.95, 1.05].map(|factor| factor * rms_mm * 1e-3),
         advance_error_m: advance_mm * 1e-3,
+        advance_error_interval_m: [0.9, 1.1].map(|factor| factor * advance_mm * 1e-3),
         energy_error_j: advance_mm * 2.1e-3,
     }
 }
@@ -325,8 +330,15 @@ pub fn explained(cells: usize) -> Answer {
             separation_sigma: None,
         }),
         calibration: calibration(),
+        written_back: calibration(),
         screening: screening(),
         threshold: 14.2,
+        doubt: Doubt {
+            null_probability: 1e-4,
+            other_probability: 0.006,
+            agrees_within_m: 4.1e-5,
+            discrepancy_m: 1.05e-5,
+        },
         runs: runs(&figures, true),
         warnings: vec!["up40.csv: 84 gaps of up to 0.06 s were bridged".to_owned()],
         repairs: Vec::new(),
@@ -399,6 +411,7 @@ pub fn outside() -> Answer {
         remainder: Some(Remainder {
             description: "all cells, while cells 2 and 3 step, at 30° and 40°".to_owned(),
             open_share: 0.62,
+            onset: None,
             period_cycles: None,
             period_m: Some(0.011),
             places: places(&answer.figures.maps_before)[..3].to_vec(),
@@ -450,8 +463,10 @@ pub fn empty() -> Answer {
         remainder: None,
         next_experiment: None,
         calibration: Vec::new(),
+        written_back: Vec::new(),
         screening: Vec::new(),
         threshold: f64::NAN,
+        doubt: Doubt::default(),
         runs: Vec::new(),
         warnings: Vec::new(),
         repairs: Vec::new(),

@@ -133,7 +133,7 @@ fn each_verdict_has_its_own_words() {
             [
                 "Nothing is missing from the model that these recordings could show.",
                 "No effect is needed: the best of the library, unequal-clamping of cell 2, improves the fit by 10.4.",
-                "one time in twenty",
+                "one time in a hundred",
                 "No place is listed where",
                 "No effect is listed as a candidate",
                 "nothing is open",
@@ -200,6 +200,7 @@ fn everything_that_was_found_is_in_the_text() {
     let answer = Answer {
         runs: Vec::new(),
         calibration: answer::calibration()[..2].to_vec(),
+        written_back: answer::calibration()[..2].to_vec(),
         threshold: 9.0,
         remainder: answer::outside().remainder,
         ..answer::ambiguous()

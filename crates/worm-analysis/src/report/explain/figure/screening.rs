@@ -45,7 +45,7 @@ fn keys(answer: &Answer) -> Vec<Key> {
         Key::new(Mark::Box, SHADE, "refitted"),
         Key::new(Mark::Box, LIGHT, "as expected to first order; not refitted"),
         Key::new(Mark::Frame, MUTED, "as expected; the refit did not converge"),
-        Key::new(Mark::Dashed, INK, "what chance reaches one time in twenty"),
+        Key::new(Mark::Dashed, INK, "what chance reaches one time in a hundred"),
     ];
     named.into_iter().chain(others).collect()
 }

@@ -38,6 +38,9 @@ fn remainder_blocks(remainder: &Remainder) -> Vec<Block> {
         let open = percent(remainder.open_share);
         text += &format!(" {open} of the gap stays open after the best effect.");
     }
+    if let Some(onset) = &remainder.onset {
+        text += &format!(" Something is different {}.", onset.in_words());
+    }
     if let Some(cycles) = remainder.period_cycles {
         text += &format!(" It comes back every {} cycles.", significant(cycles, 3));
     }
@@ -55,10 +58,15 @@ fn remainder_blocks(remainder: &Remainder) -> Vec<Block> {
 }
 
 fn why(answer: &Answer) -> String {
-    let chance = if answer.threshold.is_finite() {
+    let chance = if answer.threshold.is_finite() && answer.is_by_advances() {
         format!(
-            "By chance alone, the best of the whole library improves the fit by {} one time in twenty: an effect below that proves \
-             nothing.",
+            "A right model leaves a chi-squared above {} one time in twenty.",
+            fixed(answer.threshold, 1)
+        )
+    } else if answer.threshold.is_finite() {
+        format!(
+            "On this campaign with nothing missing, the best of the whole library would improve the fit by more than {} one time in \
+             a hundred: an effect below that proves nothing.",
             fixed(answer.threshold, 1)
         )
     } else {
@@ -73,16 +81,19 @@ fn why(answer: &Answer) -> String {
         ),
         (Verdict::Agrees, _, None) => "No effect is needed.".to_owned(),
         (Verdict::Explained, [effect], _) => format!(
-            "With {} the fit improves by {}, and {} of the gap closes{}.",
+            "With {} the fit improves by {}{}{}.",
             effect.in_words(),
             fixed(effect.improvement, 0),
-            percent(effect.closure),
+            closed(effect),
             against_best_rival(answer)
         ),
         (Verdict::Explained, effects, _) => format!(
-            "No single effect explains the data; {} together close {} of the gap{}.",
+            "No single effect explains the data; {} together {}{}.",
             names(effects),
-            percent(effects.first().map_or(f64::NAN, |effect| effect.closure)),
+            match effects.first().map(|effect| effect.closure) {
+                Some(closure) if closure.is_finite() => format!("close {} of the gap", percent(closure)),
+                _ => "do".to_owned(),
+            },
             against_best_rival(answer)
         ),
         (Verdict::Ambiguous, effects, _) if answer.is_by_advances() => format!(
@@ -91,10 +102,10 @@ fn why(answer: &Answer) -> String {
         ),
         (Verdict::Ambiguous, effects, _) => {
             let candidates = effects.iter().chain(&answer.rivals);
-            let closed = candidates.map(|effect| format!("{} {}", effect.in_words(), percent(effect.closure)));
+            let weighed = candidates.map(|effect| format!("{} {}", effect.in_words(), percent(effect.probability)));
             format!(
-                "Several effects close about as much of the gap: {}. To name one would be a guess.",
-                in_words(&closed.collect::<Vec<_>>())
+                "Several effects are about as probable: {}. To name one would be a guess.",
+                in_words(&weighed.collect::<Vec<_>>())
             )
         }
         (Verdict::OutsideLibrary, _, Some((best, reached))) => format!(
@@ -105,6 +116,15 @@ fn why(answer: &Answer) -> String {
         (Verdict::OutsideLibrary, _, None) => "No effect of the library leaves only noise.".to_owned(),
     };
     format!("{verdict} {chance}")
+}
+
+/// How much of the gap an effect closes, as a clause; empty where the gap is within its error.
+fn closed(effect: &NamedEffect) -> String {
+    if effect.closure.is_finite() {
+        format!(", and {} of the gap closes", percent(effect.closure))
+    } else {
+        String::new()
+    }
 }
 
 /// What the named effect and the best of another kind leave, as a clause; empty where there was none.

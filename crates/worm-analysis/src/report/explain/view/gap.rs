@@ -1,10 +1,11 @@
 //! How the gap shrinks, stage by stage, on cycles that nothing was fitted to.
 
+use super::quantity::mm;
 use super::{Block, FigureKind};
 use crate::explain::answer::{Stage, StageKind};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::Table;
-use worm_estimator::number::fixed;
+use worm_estimator::number::{fixed, percent};
 
 /// A model of the shrinking gap, in words.
 #[derive(Debug, Clone, Copy)]
@@ -78,7 +79,39 @@ pub(super) fn blocks(answer: &Answer) -> Vec<Block> {
     } else {
         Block::Figure(FigureKind::Gap)
     };
-    vec![first, Block::Table(table(answer, &stages))]
+    let doubt = doubt(answer);
+    let doubt = (!doubt.is_empty()).then(|| Block::paragraph(&doubt));
+    [Some(first), Some(Block::Table(table(answer, &stages))), doubt]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// What the judgement allows the model to be wrong by, how probable it is that the answer is none of the library, and how far the
+/// advances agree; empty where none of it is known.
+fn doubt(answer: &Answer) -> String {
+    let doubt = &answer.doubt;
+    let mut parts = Vec::new();
+    if doubt.discrepancy_m.is_finite() {
+        parts.push(format!(
+            "The model is taken to be wrong by {} everywhere, smoothly over the step: an effect must explain more than that.",
+            mm(doubt.discrepancy_m)
+        ));
+    }
+    if doubt.null_probability.is_finite() && doubt.other_probability.is_finite() {
+        parts.push(format!(
+            "Nothing that matters is missing with a probability of {}, something outside the library with one of {}.",
+            percent(doubt.null_probability),
+            percent(doubt.other_probability)
+        ));
+    }
+    if doubt.agrees_within_m.is_finite() {
+        parts.push(format!(
+            "The advance of a cycle is known and predicted to within {} on every run, with a probability of 95 %.",
+            mm(doubt.agrees_within_m)
+        ));
+    }
+    parts.join(" ")
 }
 
 fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
@@ -115,7 +148,8 @@ fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
             ],
             stages.map(row).collect(),
             "Held-out cycles were kept out of every fit, so a model that merely bends to the data gains nothing there. Errors \
-             of advance and energy are per cycle, means over the runs.",
+             of advance and energy are per cycle, means over the runs. Nobody measured the energy: it is compared with what the \
+             contacts of the best model take along the measured path.",
         )
     };
     Table {

@@ -64,7 +64,10 @@ pub(super) fn headline(answer: &Answer) -> String {
     match (answer.verdict, &answer.effects[..]) {
         (Verdict::Agrees, _) => format!("Nothing is missing from the model that these {evidence} could show."),
         (Verdict::Explained, [effect]) => {
-            let missing = format!("Missing from the model: {}.", effect.in_words());
+            let missing = match &effect.onset {
+                Some(onset) => format!("Missing from the model: {}, {}.", effect.in_words(), onset.in_words()),
+                None => format!("Missing from the model: {}.", effect.in_words()),
+            };
             match library_sentence(&effect.name) {
                 "" => missing,
                 sentence => format!("{missing} {sentence}"),
@@ -112,10 +115,16 @@ fn effect_row(answer: &Answer, effect: &NamedEffect) -> TileRow {
     TileRow {
         name: effect.name.clone(),
         dot: effect.cell.and_then(|cell| colours.get(cell.checked_sub(1)?).copied()),
-        note: match effect.cell {
-            Some(cell) => format!("cell {cell}"),
-            None if is_of_one_cell => "one cell, unknown which".to_owned(),
-            None => "the whole worm".to_owned(),
+        note: {
+            let which = match effect.cell {
+                Some(cell) => format!("cell {cell}"),
+                None if is_of_one_cell => "one cell, unknown which".to_owned(),
+                None => "the whole worm".to_owned(),
+            };
+            match &effect.onset {
+                Some(onset) => format!("{which}, {}", onset.in_words()),
+                None => which,
+            }
         },
         tiles: effect_tiles(effect),
         foot: foot(answer, effect),
@@ -139,7 +148,11 @@ fn effect_tiles(effect: &NamedEffect) -> Vec<Tile> {
             effect.margin,
             "points of the gap, before the best of another kind",
         ),
-        ("probability", effect.probability, "among the effects of the library"),
+        (
+            "probability",
+            effect.probability,
+            "nothing and something else missing counted",
+        ),
     ];
     let scores = scores.map(|(name, fraction, how)| {
         let value = percent(fraction);

@@ -1,0 +1,195 @@
+//! The probability of the data under a hypothesis, everything that is free in it integrated over.
+//!
+//! Laplace's method at the fit: with residuals r, derivatives J and prior precision P at the values x,
+//!
+//! ```text
+//! ln Z(κ) = −½ χ² − ½ ln det A + ½ ln det P + Σ ln π(θ) + ½ ln 2π − ½ ln det(1 + κ² Λ),   A = Jᵀ W J + P
+//! ```
+//! where the nuisances have normal priors P and each effect's parameters the density π at their values, W whitens by the discrepancy
+//! at κ a₀, and χ² is that after one Gauss-Newton step with this W. All κ follow from the same products. Z is the mean over κ: near
+//! one for a hypothesis that is meant to be right, and many times a₀ for one beside which something else is wrong.
+
+use super::super::discrepancy::Discrepancy;
+use super::super::fit::Fit;
+use super::ln_sum::ln_sum;
+use super::structural_change::{Change, StructuralChanges};
+use crate::least_squares::{cross, dot, prior_chi_squared, submatrix};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
+
+/// Scales of the discrepancy over a₀ with the widths that they stand for: half-normal of standard deviation 1, cut at 2. None is below
+/// a half: no campaign shows that the model is right where it was not tried.
+pub(in crate::explain) const USUAL: [(f64, f64); 4] = [(0.5, 0.75), (1.0, 0.5), (1.5, 0.5), (2.0, 0.25)];
+/// The place of a₀ itself among them.
+const UNIT: usize = 1;
+/// Scales where something else is wrong.
+const LARGE: [f64; 4] = [3.0, 6.0, 12.0, 25.0];
+
+/// Weights of the usual scales, 1 in all.
+pub(in crate::explain) fn usual_weights() -> [f64; 4] {
+    let weights = USUAL.map(|(kappa, width)| width * (-0.5 * kappa * kappa).exp());
+    let sum: f64 = weights.iter().sum();
+    weights.map(|weight| weight / sum)
+}
+
+/// Logarithms of the probability of the data.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::explain) struct Evidence {
+    /// With a discrepancy of the usual size.
+    pub usual: f64,
+    /// With a large one: something else is wrong.
+    pub large: f64,
+    /// With each of the usual sizes, weighted.
+    pub of_usual: [f64; 4],
+    /// With a discrepancy of a₀ and something that changes in the middle of a run, and where that is most probable; none where it was not asked.
+    pub changing: Option<(f64, Change)>,
+}
+
+impl Evidence {
+    /// With something else wrong: a large discrepancy, or a change in the middle of a run, each as probable before.
+    pub fn other(&self) -> f64 {
+        let changing = self.changing.map_or(f64::NEG_INFINITY, |(ln, _)| ln);
+        ln_sum([self.large, changing]) - 2.0_f64.ln()
+    }
+
+    /// Posterior probabilities of the usual scales.
+    pub fn scales(&self) -> [f64; 4] {
+        self.of_usual.map(|of_scale| (of_scale - self.usual).exp())
+    }
+
+    /// The probability of the data with a discrepancy of a₀.
+    pub fn at_unit_scale(&self) -> f64 {
+        self.of_usual[UNIT]
+    }
+}
+
+/// The prior of an effect's parameter at its value: logarithm of the density, and its width.
+pub(in crate::explain) type AtValue = (f64, f64);
+
+/// The evidence of a fit with derivatives. `of_effect` gives the prior of each quantity that belongs to an effect.
+pub(in crate::explain) fn evidence(
+    discrepancy: &Discrepancy,
+    changes: Option<&StructuralChanges>,
+    fit: &Fit,
+    of_effect: &dyn Fn(usize) -> Option<AtValue>,
+) -> Evidence {
+    let quantities = fit.hypothesis.quantities();
+    let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
+    let count = open.len();
+    let rows = fit.residual.len();
+    let jacobian = DMatrix::from_iterator(
+        rows,
+        count,
+        open.iter().flat_map(|&at| fit.jacobian[at].iter().copied()),
+    );
+    let along = discrepancy.products(&fit.residual);
+    let along_jacobian = discrepancy.products_of(&jacobian);
+    let mut unlimited = quantities.clone();
+    let mut ln_priors = 0.0;
+    for (quantity, here) in unlimited.iter_mut().enumerate() {
+        if let Some((ln_density, width)) = of_effect(quantity) {
+            // Its own value is the centre: only the width counts.
+            (here.centre, here.sigma) = (fit.at[quantity], width);
+            ln_priors += ln_density + if open.contains(&quantity) { 0.5 * TAU.ln() } else { 0.0 };
+        } else if open.contains(&quantity) {
+            ln_priors -= here.sigma.ln();
+        }
+    }
+    let square = dot(&fit.residual, &fit.residual, None) + prior_chi_squared(&unlimited, &fit.at);
+    let whole = crate::least_squares::normal_matrix(&unlimited, &fit.jacobian, None);
+    let normal = submatrix(&whole, &open);
+    let gradient = DVector::from_iterator(
+        count,
+        open.iter().map(|&at| {
+            let quantity = &unlimited[at];
+            dot(&fit.jacobian[at], &fit.residual, None) + (fit.at[at] - quantity.centre) * quantity.sigma.powi(-2)
+        }),
+    );
+    let at_scale = |kappa: f64| {
+        let change = DVector::from_iterator(
+            along.len(),
+            discrepancy.factors(kappa).into_iter().map(|factor| factor - 1.0),
+        );
+        let mut scaled = along_jacobian.clone();
+        for (mut row, change) in scaled.row_iter_mut().zip(change.iter()) {
+            row *= *change;
+        }
+        let normal = &normal + cross(&along_jacobian, &scaled);
+        let gradient = &gradient + scaled.tr_mul(&along);
+        let square = square
+            + along
+                .iter()
+                .zip(change.iter())
+                .map(|(along, change)| along * along * change)
+                .sum::<f64>();
+        let Some(factor) = normal.cholesky() else {
+            return f64::NEG_INFINITY;
+        };
+        let step = gradient.dot(&factor.solve(&gradient));
+        -0.5 * (square - step) - 0.5 * factor.ln_determinant() + ln_priors - 0.5 * discrepancy.ln_det(kappa)
+    };
+    let changing = changes.and_then(|changes| {
+        let normal = normal.clone().cholesky()?;
+        changes.beside(&fit.residual, &jacobian, &normal, &gradient)
+    });
+    let weights = usual_weights();
+    let of_usual: [f64; 4] = std::array::from_fn(|at| at_scale(USUAL[at].0) + weights[at].ln());
+    let usual = ln_sum(of_usual);
+    Evidence {
+        usual,
+        changing: changing.map(|(ln_bayes, change)| (of_usual[UNIT] - weights[UNIT].ln() + ln_bayes, change)),
+        large: ln_sum(LARGE.map(at_scale)) - (LARGE.len() as f64).ln(),
+        of_usual,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::hypothesis::Hypothesis;
+    use super::super::super::parameter::{Free, Nuisance, What};
+    use super::*;
+    use crate::least_squares::{Estimate, Quantity};
+
+    #[test]
+    fn the_usual_scales_have_weights_of_one_in_all() {
+        assert!((usual_weights().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    /// A nuisance x with prior N(0, s²) whose derivative is d, seen as y with noise 1: y is normal with covariance 1 + s² d dᵀ.
+    #[test]
+    fn of_a_linear_model_it_is_exact() {
+        let (y, d, sigma) = ([1.2, -0.4, 0.7], [1.0, 0.5, -2.0], 0.8);
+        let [yy, dd, dy] =
+            [(&y, &y), (&d, &d), (&d, &y)].map(|(a, b)| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>());
+        let variance = sigma * sigma;
+        let expected = -0.5 * (yy - variance * dy * dy / (1.0 + variance * dd)) - 0.5 * (variance * dd).ln_1p();
+        let free = Free {
+            what: What::Nuisance(Nuisance::Friction),
+            quantity: Quantity {
+                sigma,
+                ..Quantity::unlimited(1e-3)
+            },
+        };
+        for x in [0.0, 0.3] {
+            let residual: Vec<f64> = y.iter().zip(&d).map(|(y, d)| d * x - y).collect();
+            let estimate = Estimate {
+                at: vec![x],
+                residual,
+                jacobian: vec![d.to_vec()],
+                chi_squared: 0.0,
+                converged: true,
+            };
+            let fit = Fit::new(&Hypothesis::new(&[free], &[]), estimate);
+            let found = evidence(&Discrepancy::none(3), None, &fit, &|_| None);
+            assert!(
+                (found.usual - expected).abs() < 1e-9,
+                "{} for {expected} from {x}",
+                found.usual
+            );
+            assert!(
+                (found.large - expected).abs() < 1e-9,
+                "no discrepancy, so no scale of it"
+            );
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! What is expected of an effect before the data are seen.
+//!
+//! # Severity
+//! An effect is worth a name for what it does, so the prior is on its impact: the largest relative change of the advance on any run is
+//! log-normal about 6 %, with a standard deviation of 0.9 in the logarithm. It vanishes towards none (a non-local prior: Johnson and
+//! Rossell 2010), so that small effects earn nothing and data without one speak for *none*. Where the advance does not move, the
+//! median is ten notable changes. Senses that are hardly physical (a drag that pushes) have a tenth of the mass, and where physics
+//! or care sets a limit (the slope is set by an inclinometer, the stroke by a cam) the density falls off beyond it.
+//!
+//! # Odds
+//! None 0.5, something else 0.1, a single effect 0.35, a pair 0.05; shared equally by families (exact twins are one), then by cells,
+//! then 0.6 to an effect that acts throughout and 0.4 to one that begins in mid-run: in all runs or in one, at any cycle.
+
+use super::super::parameter::{Hypothesised, Onset};
+use worm_physics::effect::{Effect, LIBRARY, Parameter, Scope};
+
+/// Prior probability of none, of something else, of a single effect and of a pair.
+pub(in crate::explain) const NONE: f64 = 0.5;
+pub(in crate::explain) const OTHER: f64 = 0.1;
+pub(in crate::explain) const SINGLE: f64 = 0.35;
+const PAIR: f64 = 0.05;
+/// Median of the impact, as a fraction of the advance, and the standard deviation of its logarithm.
+const IMPACT: (f64, f64) = (0.06, 0.9);
+/// Impacts from which the median is interpolated, and the severity without any, in notable changes.
+const MEASURABLE: std::ops::RangeInclusive<f64> = 2e-3..=0.8;
+const WITHOUT_IMPACT: f64 = 10.0;
+/// Mass of the sense that is hardly physical.
+const UNPHYSICAL: f64 = 0.1;
+/// Effects whose severity is positive unless something is odd.
+const ONE_SENSE: [&str; 5] = ["constant-drag", "tether-drag", "payload", "wear", "lost-stroke"];
+/// Those that have no other sense: what changes the other way has another cause. A payload may also be mass that is missing.
+const NO_OTHER_SENSE: [&str; 4] = ["constant-drag", "tether-drag", "wear", "lost-stroke"];
+/// Standard deviations set by the care with which a worm is built and laid down: of the slope, degrees, and of lost stroke.
+const CARE: [(&str, f64); 2] = [("slope-error", 1.5), ("lost-stroke", 0.075)];
+/// Probability that an effect which may begin in mid-run does, and effects that do not.
+const BEGINS: f64 = 0.4;
+const NEVER_BEGIN: [&str; 6] = [
+    "wear",
+    "tether-drag",
+    "sensor-scale",
+    "sensor-latency",
+    "step-overlap",
+    "slope-clamping",
+];
+/// Nodes of the integral that normalises the density of one sense.
+const NODES: usize = 60;
+
+/// The prior of an effect's severity.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::explain) struct SeverityPrior {
+    neutral: f64,
+    /// Largest change to either side, below and above neutral.
+    reach: [f64; 2],
+    ln_median: f64,
+    care: Option<f64>,
+    /// Logarithm of the mass over the integral of the density, below and above neutral.
+    ln_mass: [f64; 2],
+}
+
+impl SeverityPrior {
+    /// From changes of the severity that were simulated, each with its impact.
+    pub fn new(effect: &Effect, impacts: &[(f64, f64)]) -> Self {
+        let severity = effect.severity();
+        let reach = [severity.neutral - severity.min, severity.max - severity.neutral];
+        // From the change whose impact is nearest to the median, in proportion.
+        let off = |impact: f64| (impact / IMPACT.0).ln();
+        let nearest = impacts
+            .iter()
+            .filter(|(_, impact)| MEASURABLE.contains(impact))
+            .min_by(|a, b| off(a.1).abs().total_cmp(&off(b.1).abs()));
+        let median = match nearest {
+            Some((change, impact)) => change.abs() * IMPACT.0 / impact,
+            None => WITHOUT_IMPACT * severity.notable,
+        };
+        let ln_median = median.clamp(severity.notable, 0.7 * reach[0].max(reach[1])).ln();
+        let care = CARE
+            .iter()
+            .find(|(name, _)| *name == effect.name)
+            .map(|(_, care)| *care);
+        let mut prior = Self {
+            neutral: severity.neutral,
+            reach,
+            ln_median,
+            care,
+            ln_mass: [0.0; 2],
+        };
+        let below = match (reach[0] > 0.0, reach[1] > 0.0) {
+            (false, _) => 0.0,
+            (true, false) => 1.0,
+            _ if ONE_SENSE.contains(&effect.name) => UNPHYSICAL,
+            _ => 0.5,
+        };
+        prior.ln_mass = [(below, 0), (1.0 - below, 1)].map(|(mass, side): (f64, usize)| {
+            if mass == 0.0 {
+                f64::NEG_INFINITY
+            } else {
+                mass.ln() - prior.integral(side).ln()
+            }
+        });
+        prior
+    }
+
+    /// Logarithm of the density of the logarithm of a change, up to a constant.
+    fn ln_shape(&self, ln_change: f64) -> f64 {
+        let off = (ln_change - self.ln_median) / IMPACT.1;
+        let careless = self.care.map_or(0.0, |care| ln_change.exp() / care);
+        -0.5 * off * off - 0.5 * careless * careless
+    }
+
+    fn integral(&self, side: usize) -> f64 {
+        let from = self.ln_median - 4.0 * IMPACT.1;
+        let to = (self.ln_median + 4.0 * IMPACT.1).min(self.reach[side].ln());
+        let width = (to - from).max(1e-6) / NODES as f64;
+        let nodes = (0..NODES).map(|node| from + (node as f64 + 0.5) * width);
+        nodes.map(|ln_change| self.ln_shape(ln_change).exp() * width).sum()
+    }
+
+    /// Logarithm of the density of the logarithm of the change at some severity, on its side of neutral.
+    pub fn ln_density_of_logarithm(&self, value: f64) -> f64 {
+        let change = value - self.neutral;
+        if change == 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        self.ln_mass[usize::from(change > 0.0)] + self.ln_shape(change.abs().ln())
+    }
+
+    /// Logarithm of the density at some severity, in one over its unit.
+    pub fn ln_density(&self, value: f64) -> f64 {
+        self.ln_density_of_logarithm(value) - (value - self.neutral).abs().ln()
+    }
+
+    /// A severity whose change from neutral is that of another times a factor.
+    pub fn scaled(&self, value: f64, factor: f64) -> f64 {
+        self.neutral + factor * (value - self.neutral)
+    }
+
+    /// Width of the prior about some severity, for the curvature of the evidence.
+    pub fn width(&self, value: f64) -> f64 {
+        IMPACT.1 * (value - self.neutral).abs()
+    }
+}
+
+/// Whether a severity has a sense that its effect can have.
+pub(in crate::explain) fn is_possible(effect: &Effect, value: f64) -> bool {
+    !NO_OTHER_SENSE.contains(&effect.name) || value >= effect.severity().neutral
+}
+
+/// Logarithm of the density of a parameter of shape, and its width: uniform in the logarithm where it is positive, else along the canal.
+pub(in crate::explain) fn shape(parameter: &Parameter, value: f64, canal_m: (f64, f64)) -> (f64, f64) {
+    let twelfth = 12.0_f64.sqrt();
+    if parameter.min > 0.0 {
+        let whole = (parameter.max / parameter.min).ln();
+        (-(value * whole).ln(), value * whole / twelfth)
+    } else {
+        let whole = canal_m.1 - canal_m.0;
+        (-whole.ln(), whole / twelfth)
+    }
+}
+
+/// What the number of hypotheses depends on.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::explain) struct Campaign {
+    pub cells: usize,
+    pub runs: usize,
+    /// Cycles of a run in which an effect may begin.
+    pub cycles: f64,
+    pub phase_recorded: bool,
+}
+
+impl Campaign {
+    /// Families of effects that positions can show: exact twins count once.
+    fn families(&self) -> f64 {
+        let visible = LIBRARY
+            .iter()
+            .filter(|effect| effect.is_visible_in_positions(self.phase_recorded));
+        visible.map(|effect| 1.0 / (1.0 + effect.twins.len() as f64)).sum()
+    }
+
+    /// Logarithm of the share of one hypothesised effect among all single ones; of one that begins in mid-run, per cycle.
+    fn ln_share(&self, one: &Hypothesised) -> f64 {
+        let variants = match one.effect.scope {
+            Scope::Worm => 1.0,
+            Scope::OneCell => self.cells as f64,
+            // All cells as probable as any one.
+            Scope::AnyCells if one.cell.is_none() => 2.0,
+            Scope::AnyCells => 2.0 * self.cells as f64,
+        };
+        let twins = 1.0 + one.effect.twins.len() as f64;
+        let when = match one.onset {
+            _ if !may_begin(one.effect) => 1.0,
+            None => 1.0 - BEGINS,
+            // All runs as probable as any one.
+            Some(_) if self.runs == 1 => BEGINS / self.cycles,
+            Some(Onset { run: None, .. }) => 0.5 * BEGINS / self.cycles,
+            Some(Onset { run: Some(_), .. }) => 0.5 * BEGINS / self.cycles / self.runs as f64,
+        };
+        when.ln() - (self.families() * variants * twins).ln()
+    }
+
+    /// Logarithm of the prior probability of one effect, or of a pair.
+    pub fn ln_prior(&self, all: &[Hypothesised]) -> f64 {
+        let shares: f64 = all.iter().map(|one| self.ln_share(one)).sum();
+        match all.len() {
+            1 => SINGLE.ln() + shares,
+            // Two of n families: n (n − 1) / 2 pairs.
+            _ => (2.0 * PAIR).ln() + shares,
+        }
+    }
+}
+
+/// Whether an effect may begin in mid-run: what changes the worm or its load may, what says where or for how long it acts has that in
+/// its law, and a measurement does not change by itself.
+pub(in crate::explain) fn may_begin(effect: &Effect) -> bool {
+    !effect.has_place() && !NEVER_BEGIN.contains(&effect.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use worm_physics::effect::named;
+
+    /// An effect whose change by one unit changes the advance by so much.
+    fn prior(name: &str, change: f64, impact: f64) -> SeverityPrior {
+        SeverityPrior::new(named(name).expect("an effect"), &[(change, impact)])
+    }
+
+    /// Mass of a density of the logarithm of the change, on one side of neutral.
+    fn mass(prior: &SeverityPrior, neutral: f64, sign: f64, reach: f64) -> f64 {
+        let (from, to, nodes) = ((1e-6_f64).ln(), reach.ln(), 20_000);
+        let width = (to - from) / f64::from(nodes);
+        let at = |node: i32| neutral + sign * (from + (f64::from(node) + 0.5) * width).exp();
+        (0..nodes)
+            .map(|node| prior.ln_density_of_logarithm(at(node)).exp() * width)
+            .sum()
+    }
+
+    #[test]
+    fn both_senses_together_have_a_mass_of_one() {
+        for (name, neutral, reach, below) in [
+            ("constant-drag", 0.0, [4.0, 4.0], 0.1),
+            ("directional-friction", 1.0, [0.7, 1.5], 0.5),
+            ("slope-error", 0.0, [15.0, 15.0], 0.5),
+            ("pad-hardening", 0.0, [0.0, 4.0], 0.0),
+        ] {
+            let prior = prior(name, 0.2, 0.05);
+            let minus = if reach[0] > 0.0 {
+                mass(&prior, neutral, -1.0, reach[0])
+            } else {
+                0.0
+            };
+            let plus = mass(&prior, neutral, 1.0, reach[1]);
+            assert!(
+                (minus - below).abs() < 0.01 && (plus + below - 1.0).abs() < 0.01,
+                "{name}: {minus} and {plus}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_median_changes_the_advance_by_six_per_cent_and_nothing_is_expected_at_zero() {
+        let prior = prior("constant-drag", 0.3, 0.03);
+        let at = |newton: f64| prior.ln_density_of_logarithm(newton);
+        assert!(at(0.6) > at(0.5) && at(0.6) > at(0.7));
+        assert!(at(0.6) - at(0.006) > 12.0, "a hundredth of it is next to impossible");
+    }
+
+    #[test]
+    fn a_tether_does_not_push() {
+        let tether = named("tether-drag").expect("an effect");
+        assert!(is_possible(tether, 0.2) && !is_possible(tether, -0.2));
+        assert!(is_possible(named("payload").expect("an effect"), -0.02));
+    }
+
+    #[test]
+    fn a_slope_error_of_nine_degrees_costs_what_an_inclinometer_makes_of_it() {
+        let prior = prior("slope-error", 1.0, 0.02);
+        let fall = prior.ln_density_of_logarithm(3.0) - prior.ln_density_of_logarithm(9.0);
+        assert!(fall > 15.0, "{fall}");
+    }
+
+    #[test]
+    fn all_single_effects_together_have_the_prior_of_a_single_one() {
+        let mut all = Vec::new();
+        for effect in LIBRARY
+            .into_iter()
+            .filter(|effect| effect.is_visible_in_positions(true))
+        {
+            if effect.scope != Scope::OneCell {
+                all.push(Hypothesised::throughout(effect, None));
+            }
+            if effect.scope != Scope::Worm {
+                all.extend((0..4).map(|cell| Hypothesised::throughout(effect, Some(cell))));
+            }
+        }
+        let campaign = Campaign {
+            cells: 4,
+            runs: 3,
+            cycles: 10.0,
+            phase_recorded: true,
+        };
+        let begun = |run: Option<usize>| Some(Onset { cycle: 3.0, run });
+        let prior = |one: &Hypothesised| {
+            let mut sum = campaign.ln_prior(&[*one]).exp();
+            if may_begin(one.effect) {
+                let runs = [None, Some(0), Some(1), Some(2)];
+                sum += runs
+                    .map(|run| {
+                        let begun = Hypothesised {
+                            onset: begun(run),
+                            ..*one
+                        };
+                        campaign.cycles * campaign.ln_prior(&[begun]).exp()
+                    })
+                    .iter()
+                    .sum::<f64>();
+            }
+            sum
+        };
+        let sum: f64 = all.iter().map(prior).sum();
+        assert!((sum - SINGLE).abs() < 1e-9, "{sum}");
+    }
+}

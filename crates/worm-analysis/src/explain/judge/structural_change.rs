@@ -1,0 +1,203 @@
+//! The evidence that something changes in the middle of a run, whatever it is.
+//!
+//! What is wrong in every cycle alike looks like the discrepancy; what begins at some cycle does not. So beside a fit the residual may
+//! hold, from one cycle on and in one run or in all, another displacement of each cell by how far it is from the stepping one (cosines
+//! in the phase of the step), and another advance. Both are normal with standard deviations of several a₀, and integrated over. With D
+//! the whitened columns of one such change, r the residuals, and everything that is free in the fit projected out,
+//!
+//! ```text
+//! ln B = −½ ln det(1 + κ² G) + ½ vᵀ (κ⁻² + G)⁻¹ v,   G = Dᵀ K D,   v = Dᵀ K r
+//! ```
+//! is the logarithm of the Bayes factor against the fit without it (known as a structural change: Zeileis and Hornik 2007). The mean
+//! over all cycles, runs and κ is the evidence that there is one.
+
+use super::super::discrepancy::Discrepancy;
+use super::super::plant::Plant;
+use super::ln_sum::ln_sum;
+use crate::least_squares::cross;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Cosines in the phase of a step.
+const COSINES: usize = 3;
+/// Scales of the change over a₀.
+const SCALES: [f64; 3] = [2.0, 6.0, 18.0];
+/// Fewest cycles before a change and after it.
+const MIN_CYCLES: usize = 1;
+
+/// One possible change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::explain) struct Change {
+    /// Cycles since the start of the run.
+    pub cycle: usize,
+    /// The run, or all of them.
+    pub run: Option<usize>,
+}
+
+/// Every possible change of a campaign.
+#[derive(Debug, Clone)]
+pub(in crate::explain) struct StructuralChanges {
+    all: Vec<Change>,
+    /// Whitened columns, as many for each change.
+    columns: DMatrix<f64>,
+    /// Products of the columns of each change with each other.
+    gram: Vec<DMatrix<f64>>,
+}
+
+impl StructuralChanges {
+    /// All cycles of a campaign, in single runs and in all at once.
+    pub fn new(plant: &impl Plant, discrepancy: &Discrepancy) -> Self {
+        let runs = plant.runs();
+        let cycles = |run: usize| {
+            let bins = &plant.bins(run).bins;
+            let since_start = |phase: f64| phase - plant.bins(run).start_phase;
+            let first = bins.first().map_or(0.0, |bin| since_start(bin.phase));
+            let last = bins.last().map_or(0.0, |bin| since_start(bin.phase));
+            first.ceil() as usize + MIN_CYCLES..(last.floor() as usize + 1).saturating_sub(MIN_CYCLES)
+        };
+        let single = (0..runs).flat_map(|run| cycles(run).map(move |cycle| Change { cycle, run: Some(run) }));
+        let common = (0..runs)
+            .map(cycles)
+            .reduce(|a, b| a.start.max(b.start)..a.end.min(b.end));
+        let all_at_once = common
+            .filter(|_| runs > 1)
+            .into_iter()
+            .flatten()
+            .map(|cycle| Change { cycle, run: None });
+        let all: Vec<Change> = single.chain(all_at_once).collect();
+        let columns: Vec<Vec<f64>> = all
+            .par_iter()
+            .flat_map_iter(|change| columns(plant, discrepancy.scale_m, *change))
+            .collect();
+        let rows = columns.first().map_or(0, Vec::len);
+        let mut columns = DMatrix::from_iterator(rows, columns.len(), columns.into_iter().flatten());
+        discrepancy.whiten_columns(&mut columns);
+        let each = columns.ncols().checked_div(all.len()).unwrap_or(0);
+        let gram = (0..all.len())
+            .map(|number| {
+                let mine = columns.columns(number * each, each).into_owned();
+                cross(&mine, &mine)
+            })
+            .collect();
+        Self { all, columns, gram }
+    }
+
+    /// The evidence for a change beside a fit with these residuals and derivatives, as the logarithm of the mean Bayes factor, and the
+    /// most probable change. `normal` is the normal matrix of the fit, `gradient` its gradient.
+    pub fn beside(
+        &self,
+        residual: &[f64],
+        jacobian: &DMatrix<f64>,
+        normal: &Cholesky<f64, Dyn>,
+        gradient: &DVector<f64>,
+    ) -> Option<(f64, Change)> {
+        if self.all.is_empty() {
+            return None;
+        }
+        let along = cross(&self.columns, jacobian);
+        let solved = normal.solve(&along.transpose());
+        let residual = DVector::from_column_slice(residual);
+        let product = self.columns.tr_mul(&residual) - solved.tr_mul(gradient);
+        let each = self.columns.ncols() / self.all.len();
+        let ln_bayes: Vec<f64> = self
+            .gram
+            .iter()
+            .enumerate()
+            .map(|(number, gram)| {
+                let from = number * each;
+                let projected = gram - along.rows(from, each) * solved.columns(from, each);
+                let product = product.rows(from, each);
+                let at_scale = |kappa: f64| {
+                    let scaled = &projected * (kappa * kappa) + DMatrix::identity(each, each);
+                    let Some(factor) = scaled.cholesky() else {
+                        return f64::NEG_INFINITY;
+                    };
+                    let gain = kappa * kappa * product.dot(&factor.solve(&product.into_owned()));
+                    0.5 * gain - 0.5 * factor.ln_determinant()
+                };
+                ln_sum(SCALES.map(at_scale)) - (SCALES.len() as f64).ln()
+            })
+            .collect();
+        let best = (0..self.all.len()).max_by(|&a, &b| ln_bayes[a].total_cmp(&ln_bayes[b]))?;
+        let mean = ln_sum(ln_bayes.iter().copied()) - (self.all.len() as f64).ln();
+        Some((mean, self.all[best]))
+    }
+}
+
+/// The columns of one change, whitened by the noise.
+fn columns(plant: &impl Plant, scale_m: f64, change: Change) -> Vec<Vec<f64>> {
+    let cells = plant.cells();
+    let of_role = (0..cells).flat_map(|role| (0..COSINES).map(move |cosine| Some((role, cosine))));
+    let column = |what: Option<(usize, usize)>| {
+        let of_run = |run: usize| {
+            let bins = plant.bins(run);
+            let mut pattern_m = vec![0.0; bins.len() * cells];
+            if change.run.is_none_or(|of| of == run) {
+                for (bin, pattern_m) in bins.bins.iter().zip(pattern_m.chunks_exact_mut(cells)) {
+                    let since = bin.phase - bins.start_phase - change.cycle as f64;
+                    if since < 0.0 {
+                        continue;
+                    }
+                    match what {
+                        Some((role, cosine)) => {
+                            pattern_m[(bin.stepping + role) % cells] =
+                                scale_m * (PI * cosine as f64 * bin.of_step).cos() / (1.0 + 0.5 * cosine as f64);
+                        }
+                        None => pattern_m.fill(scale_m * since),
+                    }
+                }
+            }
+            plant.rows_of(run, &pattern_m)
+        };
+        (0..plant.runs()).flat_map(of_run).collect()
+    };
+    of_role.chain([None]).map(column).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::fit::FitProblem;
+    use super::super::super::fixture::{Campaign, begun, hypothesis, problem, record_under, scene};
+    use super::super::super::hypothesis::Hypothesis;
+    use super::super::super::parameter::Onset;
+    use super::*;
+
+    /// The evidence for a change beside the worm as it is at the start.
+    fn found(truth: &(Hypothesis, Vec<f64>)) -> (f64, Change) {
+        let campaign = Campaign {
+            slopes_deg: vec![0.0, 30.0],
+            ..Campaign::default()
+        };
+        let recordings = record_under(&campaign, truth, 3);
+        let scene = scene(&recordings, &campaign);
+        let plain = problem(&scene, &hypothesis(None));
+        let discrepancy = Discrepancy::new(&plain, 1e-5);
+        let problem = FitProblem {
+            discrepancy: Some(discrepancy.clone()),
+            ..plain
+        };
+        let changes = StructuralChanges::new(&problem, &discrepancy);
+        let residual = problem.residuals(&Hypothesis::default(), &[]);
+        let nothing_free = DMatrix::zeros(residual.len(), 0);
+        let normal = DMatrix::zeros(0, 0).cholesky().expect("nothing is free");
+        changes
+            .beside(&residual, &nothing_free, &normal, &DVector::zeros(0))
+            .expect("there are cycles enough")
+    }
+
+    #[test]
+    fn what_begins_in_mid_run_is_found_where_it_begins_and_nothing_elsewhere() {
+        let truth = Some(("unequal-clamping", Some(1), &[0.8][..]));
+        let onset = Onset {
+            cycle: 2.0,
+            run: Some(1),
+        };
+        let (ln_bayes, change) = found(&begun(truth, onset));
+        assert!(ln_bayes > 20.0, "{ln_bayes}");
+        assert_eq!(change.run, Some(1));
+        assert!(change.cycle.abs_diff(2) <= 1, "{change:?}");
+        let (ln_bayes, _) = found(&hypothesis(None));
+        assert!(ln_bayes < 0.0, "{ln_bayes}");
+    }
+}

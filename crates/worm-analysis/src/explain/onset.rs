@@ -1,0 +1,207 @@
+//! Effects that begin in mid-run: screened at every cycle, in single runs and in all, and fitted with the time at which they begin.
+//!
+//! The worm of an effect that begins at t₁ moves as without it before and about as with it throughout after, so the change of the
+//! residuals is that of the constant effect from t₁ on: its innovations are the same, and the places of the cells are means again. That
+//! gives a score for every cycle from one simulation of each effect. The best are fitted with the crawl simulated as it is, and t₁ by
+//! values on a grid.
+
+use super::fit::{Fit, FitProblem};
+use super::hypothesis::Hypothesis;
+use super::judge::candidate::Candidate;
+use super::judge::ln_sum::ln_sum;
+use super::judge::prior;
+use super::judgement::Judge;
+use super::parameter::{Hypothesised, Onset};
+use super::refit::refit;
+use super::score_test::{Screening, ln_bayes, strong};
+use crate::least_squares::{cross, dot, submatrix};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Strength at which effects are tried for an onset, in notable changes.
+const STRENGTH: f64 = 8.0;
+/// Effects that are fitted with an onset.
+const FITTED: usize = 4;
+/// Factors on the change of a trial for which its direction stands.
+const STANDS_FOR: (f64, f64) = (0.1, 3.0);
+/// Values of the onset that are tried about the best so far: their distance, cycles, and how many to either side.
+const GRIDS: [(f64, i32); 2] = [(0.25, 5), (0.0625, 4)];
+
+/// Cycles since the start of each run at which an effect may begin: those that leave a whole one before and after.
+fn cycles(problem: &FitProblem<'_, '_>, run: usize) -> std::ops::Range<usize> {
+    let bins = &problem.bins[run];
+    let at = |bin: Option<&super::bins::Bin>| bin.map_or(0.0, |bin| bin.phase - bins.start_phase);
+    at(bins.bins.first()).ceil() as usize + 1..at(bins.bins.last()).floor() as usize
+}
+
+/// Number of cycles at which an effect may begin, on average over the runs; 1 or more.
+pub(super) fn mean_cycles(problem: &FitProblem<'_, '_>) -> f64 {
+    let runs = problem.bins.len();
+    let sum: usize = (0..runs).map(|run| cycles(problem, run).len()).sum();
+    (sum as f64 / runs as f64).max(1.0)
+}
+
+/// Every onset that is tried.
+fn onsets(problem: &FitProblem<'_, '_>) -> Vec<Onset> {
+    let runs = problem.bins.len();
+    let single = (0..runs).flat_map(|run| cycles(problem, run).map(move |cycle| (cycle, Some(run))));
+    let common = (0..runs)
+        .map(|run| cycles(problem, run))
+        .reduce(|a, b| a.start.max(b.start)..a.end.min(b.end));
+    let of_all = common
+        .filter(|_| runs > 1)
+        .into_iter()
+        .flatten()
+        .map(|cycle| (cycle, None));
+    single
+        .chain(of_all)
+        .map(|(cycle, run)| Onset {
+            cycle: cycle as f64,
+            run,
+        })
+        .collect()
+}
+
+/// The effects that most probably begin in mid-run, fitted with their onsets. `screened` are those that act throughout.
+pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[Screening]) -> Vec<Candidate> {
+    let mut promising = screen(judge, screened);
+    promising.truncate(FITTED);
+    let fitted = refit(
+        judge.problem,
+        judge.recalibrated,
+        nominal,
+        &promising,
+        FITTED,
+        &mut |_| (),
+    );
+    let mut candidates: Vec<Candidate> = fitted
+        .into_iter()
+        .map(|candidate| {
+            let (fit, ln_onset) = refine(judge.problem, candidate.fit);
+            Candidate {
+                ln_onset,
+                ..Candidate::of(judge.problem, judge.recalibrated, fit)
+            }
+        })
+        .collect();
+    judge.weigh(&mut candidates, screened);
+    candidates
+}
+
+/// Scores of every effect for every onset; the most probable onset of each, best first.
+fn screen(judge: &Judge<'_, '_, '_>, screened: &[Screening]) -> Vec<Screening> {
+    let (problem, fit) = (judge.problem, judge.recalibrated);
+    let onsets = onsets(problem);
+    let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
+    let jacobian = DMatrix::from_iterator(
+        fit.residual.len(),
+        open.len(),
+        open.iter().flat_map(|&quantity| fit.jacobian[quantity].iter().copied()),
+    );
+    let Some(normal) = submatrix(&fit.normal(None), &open).cholesky() else {
+        return Vec::new();
+    };
+    let residual = DVector::from_column_slice(&fit.residual);
+    let without = problem.without_discrepancy(&fit.hypothesis, &fit.at);
+    let of_effect = |screening: &Screening| {
+        let hypothesised = screening.hypothesised;
+        let mut starts = strong(hypothesised.effect, &[STRENGTH]);
+        starts.extend(screening.starts.first().cloned());
+        let mut best: Option<(f64, Onset, Vec<f64>)> = None;
+        let mut all = Vec::new();
+        for values in starts {
+            let mut at = fit.at.clone();
+            at.extend(&values);
+            let with = problem.without_discrepancy(&Hypothesis::new(&fit.hypothesis.free, &[hypothesised]), &at);
+            let change: Vec<f64> = with
+                .iter()
+                .zip(&without)
+                .map(|(with, without)| with - without)
+                .collect();
+            let directions = onsets.iter().map(|onset| problem.after_onset(&change, onset)).collect();
+            let directions = problem.whiten_all(directions);
+            let directions = DMatrix::from_iterator(residual.len(), onsets.len(), directions.into_iter().flatten());
+            let shared = cross(&jacobian, &directions);
+            let projected = normal.solve(&shared);
+            let scores = -(directions.tr_mul(&residual));
+            for (number, onset) in onsets.iter().enumerate() {
+                let column = directions.column(number);
+                let square = dot(column.as_slice(), column.as_slice(), None)
+                    - shared.column(number).dot(&projected.column(number));
+                let found = ln_bayes(
+                    &screening.prior,
+                    values[0],
+                    STANDS_FOR,
+                    scores[number],
+                    square.max(1e-9),
+                );
+                all.push(found);
+                if best.as_ref().is_none_or(|(best, ..)| found > *best) {
+                    best = Some((found, *onset, values.clone()));
+                }
+            }
+        }
+        let (_, onset, start) = best?;
+        Some(Screening {
+            hypothesised: Hypothesised {
+                onset: Some(onset),
+                ..hypothesised
+            },
+            ln_bayes: ln_sum(all.iter().copied()) - (all.len() as f64).ln(),
+            prior: screening.prior,
+            score: 0.0,
+            starts: vec![start],
+        })
+    };
+    let may_begin = screened
+        .par_iter()
+        .filter(|screening| prior::may_begin(screening.hypothesised.effect));
+    let mut promising: Vec<Screening> = may_begin.filter_map(of_effect).collect();
+    let ln_odds = |screening: &Screening| screening.ln_bayes + judge.ln_prior(&[screening.hypothesised]);
+    promising.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
+    promising
+}
+
+/// Fits the onset of the last effect of a fit. Returns the fit with derivatives, and the logarithm of the cycles that the onset may be
+/// at by the data.
+fn refine(problem: &FitProblem<'_, '_>, mut fit: Fit) -> (Fit, f64) {
+    let with_onset = |fit: &Fit, cycle: f64| {
+        let mut hypothesis = fit.hypothesis.clone();
+        if let Some(onset) = hypothesis.hypothesised.last_mut().and_then(|last| last.onset.as_mut()) {
+            onset.cycle = cycle;
+        }
+        hypothesis
+    };
+    let mut ln_width = 0.0;
+    for (distance, count) in GRIDS {
+        let Some(onset) = fit.hypothesis.hypothesised.last().and_then(|last| last.onset) else {
+            return (fit, 0.0);
+        };
+        let last = problem
+            .bins
+            .iter()
+            .filter_map(|bins| bins.bins.last().map(|bin| bin.phase - bins.start_phase))
+            .fold(0.0, f64::max);
+        let cycles: Vec<f64> = (-count..=count)
+            .map(|number| onset.cycle + distance * f64::from(number))
+            .filter(|cycle| (0.0..last).contains(cycle))
+            .collect();
+        let tried: Vec<f64> = cycles
+            .par_iter()
+            .map(|&cycle| problem.evaluate(&with_onset(&fit, cycle), fit.at.clone()).chi_squared)
+            .collect();
+        let Some(best) = (0..tried.len()).min_by(|&a, &b| tried[a].total_cmp(&tried[b])) else {
+            return (fit, 0.0);
+        };
+        ln_width = ln_sum(tried.iter().map(|chi_squared| -0.5 * (chi_squared - tried[best]))) + distance.ln();
+        let hypothesis = with_onset(&fit, cycles[best]);
+        let next = problem.fit(&hypothesis, fit.at.clone(), Some(&fit));
+        if next.chi_squared <= fit.chi_squared {
+            fit = next;
+        }
+    }
+    if fit.jacobian.is_empty() {
+        problem.compute_jacobian(&mut fit);
+    }
+    (fit, ln_width)
+}
