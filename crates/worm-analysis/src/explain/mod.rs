@@ -15,7 +15,8 @@
 //! - `search`: the steps, one after the other; `prepare`: the runs, and the recalibration; `refit`: effects fitted to the end.
 //! - `observed`: the recordings as the search sees them; `bins`: by cycle, step and phase; `predict`: the positions that a
 //!   `hypothesis` predicts; `residual`: what that leaves of the data; `noise`: how well the worm repeats itself.
-//! - `plant`: what the judgement needs to know of a machine; `discrepancy`: by how much the model is wrong everywhere.
+//! - `plant`: what the judgement needs to know of a machine; `discrepancy`: by how much the model is wrong everywhere; `inertia`: how
+//!   that grows with speed.
 //! - `parameter`: which quantities are free, with priors; `phase_correction`: for phases found from overlapping steps;
 //!   `fit`: the campaign as a problem of least squares (`least_squares`); `local_restart`: from one local minimum to another.
 //! - `score_test`: screens the whole library; `onset`: effects that begin in mid-run; `speed_droop`: the one effect that shows in time alone.
@@ -38,6 +39,7 @@ mod fit;
 mod fixture;
 mod gap;
 mod hypothesis;
+mod inertia;
 mod judge;
 mod judgement;
 mod local_restart;

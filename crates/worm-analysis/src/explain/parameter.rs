@@ -27,6 +27,8 @@ pub(super) enum Nuisance {
     SlopeOf(usize),
     /// Delay of the positions against the recorded phase, s.
     Clock,
+    /// Growth of that delay: positions and phase have two clocks, s/s.
+    ClockDrift,
     /// Logarithm of the damping ratio of the body on its tips.
     Damping,
     /// Stiffness of the pads over that of the bristles that their tips hold on by.
@@ -65,6 +67,7 @@ const STIFFNESS_OF: (f64, f64, f64) = (0.02, 0.08, 4e-3);
 const STROKE_OF: (f64, f64, f64) = (5e-4, 2e-3, 2e-4);
 const SLOPE_OF_DEG: (f64, f64, f64) = (0.15, 0.6, 0.05);
 const CLOCK_S: (f64, f64, f64) = (1e-3, 3e-3, 5e-4);
+const CLOCK_DRIFT: (f64, f64, f64) = (2e-4, 1e-3, 2e-5);
 /// Of the presliding: centre, standard deviation, least, most, step.
 const PRESLIDING: (f64, f64, f64, f64, f64) = (0.02, 0.015, 1e-3, 0.08, 2e-3);
 /// Of the cam's rounding, as of the presliding: no cam has sharp corners.
@@ -94,6 +97,7 @@ impl Nuisance {
         all.extend((0..runs).map(|run| Self::SlopeOf(run).free(SLOPE_OF_DEG)));
         if phase_recorded {
             all.push(Self::Clock.free(CLOCK_S));
+            all.push(Self::ClockDrift.free(CLOCK_DRIFT));
             all.push(Self::Rounding.free_within(ROUNDING));
         }
         let (centre, sigma, reach, step) = DAMPING;
@@ -107,7 +111,7 @@ impl Nuisance {
     pub fn is_of_model_file(self) -> bool {
         !matches!(
             self,
-            Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity
+            Self::ClockDrift | Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity
         )
     }
 
@@ -138,7 +142,13 @@ impl Nuisance {
             Self::StiffnessOf(cell) => worm.scale_stiffness(Some(cell), value.exp()),
             Self::StrokeOf(cell) => worm.scale_stroke(Some(cell), value.exp()),
             Self::SlopeOf(of) if of == run => worm.tilt_rad(value.to_radians()),
-            Self::SlopeOf(_) | Self::Clock | Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity => {}
+            Self::SlopeOf(_)
+            | Self::Clock
+            | Self::ClockDrift
+            | Self::Damping
+            | Self::Presliding
+            | Self::Rounding
+            | Self::Viscosity => {}
         }
     }
 }

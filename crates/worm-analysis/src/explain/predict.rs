@@ -44,23 +44,35 @@ impl Predicted {
     }
 }
 
+/// A run without any effect.
+struct Recalibrated {
+    physics: Physics,
+    damping_ratio: f64,
+    /// Growth of the delay of the positions, s/s.
+    clock_drift: f64,
+}
+
 impl Scene<'_> {
     /// The physics of a run under a hypothesis, at its end where an effect begins in between, and the damping ratio.
     pub fn physics(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> (Physics, f64) {
-        let (physics, damping) = self.recalibrated(run, hypothesis, at);
-        (physics.with(&hypothesis.settings_at_end(run, at)), damping)
+        let recalibrated = self.recalibrated(run, hypothesis, at);
+        (
+            recalibrated.physics.with(&hypothesis.settings_at_end(run, at)),
+            recalibrated.damping_ratio,
+        )
     }
 
-    /// The physics of a run without any effect, and the damping ratio.
-    fn recalibrated(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> (Physics, f64) {
+    /// A run without any effect.
+    fn recalibrated(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Recalibrated {
         let mut physics = self.nominal[run].clone();
-        let mut damping = 0.4;
+        let (mut damping_ratio, mut clock_drift) = (0.4, 0.0);
         for (free, &value) in hypothesis.free.iter().zip(at) {
             if let What::Nuisance(nuisance) = free.what {
                 nuisance.apply(value, run, &mut physics.worm);
                 match nuisance {
                     Nuisance::Clock => physics.view.latency_s += value,
-                    Nuisance::Damping => damping = value.exp(),
+                    Nuisance::ClockDrift => clock_drift = value,
+                    Nuisance::Damping => damping_ratio = value.exp(),
                     Nuisance::Presliding => physics.laws.presliding = value,
                     Nuisance::Rounding => physics.laws.rounding = value,
                     Nuisance::Viscosity => physics.laws.drag_n_s_per_m += value,
@@ -68,7 +80,11 @@ impl Scene<'_> {
                 }
             }
         }
-        (physics, damping)
+        Recalibrated {
+            physics,
+            damping_ratio,
+            clock_drift,
+        }
     }
 
     /// Whether the crawl of a run is simulated for some cycles and then repeated.
@@ -80,14 +96,19 @@ impl Scene<'_> {
     /// Positions of a run under a hypothesis; none where the worm could not have made it.
     pub fn predict(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<Predicted> {
         let observed = &self.observed[run];
-        let (recalibrated, damping) = self.recalibrated(run, hypothesis, at);
-        let physics = recalibrated.clone().with(&hypothesis.settings_at_end(run, at));
+        let recalibrated = self.recalibrated(run, hypothesis, at);
+        let physics = recalibrated.physics.clone().with(&hypothesis.settings_at_end(run, at));
+        let damping_ratio = recalibrated.damping_ratio;
+        let clock = |physics: &Physics| Clock::new(observed, physics.view.latency_s, recalibrated.clock_drift);
         match hypothesis.begins_at(run) {
             Some(cycle) => {
-                let before = recalibrated.with(&hypothesis.settings_at_start(at));
-                predict_change(observed, &before, &physics, cycle, damping)
+                let before = recalibrated.physics.clone().with(&hypothesis.settings_at_start(at));
+                predict_change(observed, clock(&before), &before, &physics, cycle, damping_ratio)
             }
-            None => predict(observed, &physics, damping, self.repeats(run, hypothesis, at)),
+            None => {
+                let repeats = self.repeats(run, hypothesis, at);
+                predict_with(observed, clock(&physics), &physics, damping_ratio, repeats)
+            }
         }
     }
 }
@@ -113,11 +134,20 @@ pub(super) fn start(observed: &Observed<'_>, mechanics: &Mechanics, phase: f64, 
 /// Positions at every sample of a recording, by some physics; where it `repeats`, a crawl is run until it is periodic, and then
 /// repeated.
 pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, repeats: bool) -> Option<Predicted> {
+    let clock = Clock::new(observed, physics.view.latency_s, 0.0);
+    predict_with(observed, clock, physics, damping, repeats)
+}
+
+fn predict_with(
+    observed: &Observed<'_>,
+    mut clock: Clock<'_>,
+    physics: &Physics,
+    damping: f64,
+    repeats: bool,
+) -> Option<Predicted> {
     let mechanics = Mechanics::new(physics);
     let cells = observed.cells();
     let time_s = &observed.run.recording.time_s;
-    // A position shows the worm as it was one latency ago.
-    let mut clock = Clock::new(time_s, &observed.phase, physics.view.latency_s);
     if !observed.phase_recorded && physics.laws.overlap > 0.0 {
         clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, cells));
     }
@@ -159,6 +189,7 @@ pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, 
 /// how the worm moves and not in how it is seen.
 fn predict_change(
     observed: &Observed<'_>,
+    mut clock: Clock<'_>,
     before: &Physics,
     after: &Physics,
     cycle: f64,
@@ -166,7 +197,6 @@ fn predict_change(
 ) -> Option<Predicted> {
     let mechanics = [before, after].map(Mechanics::new);
     let time_s = &observed.run.recording.time_s;
-    let mut clock = Clock::new(time_s, &observed.phase, before.view.latency_s);
     let mut crawl = start(observed, &mechanics[0], clock.phase_at(0), damping)?;
     let change = observed.phase[0] + cycle;
     let mut has_changed = false;
@@ -240,21 +270,24 @@ impl CycleSeen {
     }
 }
 
-/// The gait phase one latency before each sample.
+/// The gait phase one latency before each sample: a position shows the worm as it was then.
 struct Clock<'a> {
     time_s: &'a [f64],
     phase: &'a [f64],
+    /// At the start of the recording, where clocks are set, and its growth, s/s.
     latency_s: f64,
+    drift: f64,
     phase_correction: Option<PhaseCorrection>,
     after: usize,
 }
 
 impl<'a> Clock<'a> {
-    fn new(time_s: &'a [f64], phase: &'a [f64], latency_s: f64) -> Self {
+    fn new(observed: &'a Observed<'_>, latency_s: f64, drift: f64) -> Self {
         Self {
-            time_s,
-            phase,
+            time_s: &observed.run.recording.time_s,
+            phase: &observed.phase,
             latency_s,
+            drift,
             phase_correction: None,
             after: 1,
         }
@@ -269,11 +302,11 @@ impl<'a> Clock<'a> {
     }
 
     fn recorded_at(&mut self, sample: usize) -> f64 {
-        if self.latency_s == 0.0 {
+        if self.latency_s == 0.0 && self.drift == 0.0 {
             return self.phase[sample];
         }
-        let at_s = self.time_s[sample] - self.latency_s;
         let last = self.time_s.len() - 1;
+        let at_s = self.time_s[sample] - self.latency_s - self.drift * (self.time_s[sample] - self.time_s[0]);
         while self.after < last && self.time_s[self.after] < at_s {
             self.after += 1;
         }

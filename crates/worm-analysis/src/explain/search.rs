@@ -57,12 +57,12 @@ pub fn explain(
 ) -> Result<Answer, ExplainError> {
     let mut report = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
     report("gait", 0.0);
-    let scene = prepare(runs, config)?;
+    let mut scene = prepare(runs, config)?;
     let phase_recorded = scene.observed.iter().any(|observed| observed.phase_recorded);
     report("recalibration", 0.03);
     let nuisances = Nuisance::all(config.worm.cells, runs.len(), phase_recorded);
     let (problem, discrepancy, recalibrated) =
-        recalibrate(&scene, &Hypothesis::new(&nuisances, &[]), options.discrepancy)?;
+        recalibrate(&mut scene, &Hypothesis::new(&nuisances, &[]), options.discrepancy)?;
     report("screening", 0.15);
     let changes = StructuralChanges::new(&problem, &discrepancy);
     let judge = Judge {
@@ -171,7 +171,7 @@ pub fn explain(
         .map(|run| run.cycle_s.unwrap_or(config.gait.cycle_s))
         .collect();
     let speed_droop = speed_droop(
-        &scene,
+        problem.scene,
         selected
             .candidates
             .first()

@@ -29,6 +29,7 @@ pub(in crate::explain) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibra
                 Nuisance::StrokeOf(cell) => factor(format!("stroke of cell {}", cell + 1)),
                 Nuisance::SlopeOf(run) => (format!("slope of run {}", run + 1), 0.0, value, sigma, "deg"),
                 Nuisance::Clock => ("clock".to_owned(), 0.0, value, sigma, "s"),
+                Nuisance::ClockDrift => ("clock drift".to_owned(), 0.0, value, sigma, "s/s"),
                 Nuisance::Damping => {
                     let (name, _, found, sigma, unit) = factor("damping".to_owned());
                     (name, free.quantity.centre.exp(), found, sigma, unit)
