@@ -110,7 +110,6 @@ impl Judge<'_, '_, '_> {
         candidates: Vec<Candidate>,
         pairs: Vec<(Candidate, f64)>,
         chance: &Chance,
-        plain: &FitProblem<'_, '_>,
         folds: &[Fold],
         held_out_without: f64,
     ) -> Vec<Judged> {
@@ -151,9 +150,9 @@ impl Judge<'_, '_, '_> {
                         .find(|single| {
                             candidate.trace == Some(0) && single.hypothesised[0] == candidate.hypothesised[0]
                         })
-                        .map(|trace| held_out(plain, &trace.fit, folds).chi_squared);
+                        .map(|trace| held_out(self.problem, &trace.fit, folds).chi_squared);
                     let without = of_trace.unwrap_or(held_out_without);
-                    let held_out = held_out(plain, &candidate.fit, folds);
+                    let held_out = held_out(self.problem, &candidate.fit, folds);
                     holds = without - held_out.chi_squared > 0.0;
                     candidate.held_out = Some(held_out);
                 }
@@ -196,8 +195,9 @@ fn trace(of_each: &[f64]) -> Option<usize> {
     }
 }
 
-/// How a fit does on data that it was not fitted to, by the likelihood without a discrepancy.
-pub(super) fn held_out(plain: &FitProblem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
-    let fit = plain.with_derivatives(&fit.hypothesis, fit.at.clone());
-    cross_validation::hold_out(plain, &fit, folds)
+/// How a fit does on data that it was not fitted to, by the likelihood that it was fitted by: without the discrepancy, refits would
+/// go where the model is wrong anyway.
+pub(super) fn held_out(problem: &FitProblem<'_, '_>, fit: &Fit, folds: &[Fold]) -> HeldOut {
+    let fit = problem.with_derivatives(&fit.hypothesis, fit.at.clone());
+    cross_validation::hold_out(problem, &fit, folds)
 }

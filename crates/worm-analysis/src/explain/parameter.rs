@@ -37,6 +37,8 @@ pub(super) enum Nuisance {
     Rounding,
     /// Resistance of the contacts to each cell's velocity, N s/m.
     Viscosity,
+    /// Friction at rest over that of a sliding tip, less 1.
+    Breakaway,
 }
 
 /// A quantity that is free in a fit.
@@ -58,6 +60,17 @@ pub(super) enum What {
     },
 }
 
+impl Nuisance {
+    /// The severity of an effect with what this nuisance, at some value, has of the same law; none where their laws are others.
+    pub fn added_to(self, effect: &Effect, severity: f64, value: f64) -> Option<f64> {
+        match (self, effect.name) {
+            (Self::Viscosity, "viscous-drag") => Some(severity + value),
+            (Self::Breakaway, "breakaway-friction") => Some(severity * (1.0 + value)),
+            _ => None,
+        }
+    }
+}
+
 /// Prior of a nuisance: standard deviation, distance of the limits from the centre, step of derivatives.
 const FRICTION: (f64, f64, f64) = (0.15, 0.5, 2e-3);
 const STIFFNESS: (f64, f64, f64) = (0.05, 0.1, 4e-3);
@@ -74,6 +87,9 @@ const PRESLIDING: (f64, f64, f64, f64, f64) = (0.02, 0.015, 1e-3, 0.08, 2e-3);
 const ROUNDING: (f64, f64, f64, f64, f64) = (0.05, 0.05, 0.0, 0.3, 5e-3);
 /// Of the viscosity, as of the presliding: no contact is quite dry. At the paper's speed 1 N s/m is 18 mN, of some 2 N of friction.
 const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 0.5, 0.0, 4.0, 0.1);
+/// Of the excess of static friction, as of the presliding: no contact is without. In MuJoCo clean worms look as if they had up to
+/// 0.18, and dry rubber has as much.
+const BREAKAWAY: (f64, f64, f64, f64, f64) = (0.0, 0.1, 0.0, 0.25, 0.01);
 /// Logarithm of the damping ratio: centre, standard deviation, limits' distance, step.
 const DAMPING: (f64, f64, f64, f64) = (-0.9, 1.0, 2.2, 0.1);
 
@@ -104,6 +120,7 @@ impl Nuisance {
         all.push(Self::Damping.free_within((centre, sigma, centre - reach, centre + reach, step)));
         all.push(Self::Presliding.free_within(PRESLIDING));
         all.push(Self::Viscosity.free_within(VISCOSITY));
+        all.push(Self::Breakaway.free_within(BREAKAWAY));
         all
     }
 
@@ -111,7 +128,7 @@ impl Nuisance {
     pub fn is_of_model_file(self) -> bool {
         !matches!(
             self,
-            Self::ClockDrift | Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity
+            Self::ClockDrift | Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity | Self::Breakaway
         )
     }
 
@@ -148,7 +165,8 @@ impl Nuisance {
             | Self::Damping
             | Self::Presliding
             | Self::Rounding
-            | Self::Viscosity => {}
+            | Self::Viscosity
+            | Self::Breakaway => {}
         }
     }
 }

@@ -76,6 +76,7 @@ impl Scene<'_> {
                     Nuisance::Presliding => physics.laws.presliding = value,
                     Nuisance::Rounding => physics.laws.rounding = value,
                     Nuisance::Viscosity => physics.laws.drag_n_s_per_m += value,
+                    Nuisance::Breakaway => physics.laws.static_over_kinetic *= 1.0 + value,
                     _ => {}
                 }
             }

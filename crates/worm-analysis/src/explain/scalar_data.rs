@@ -88,8 +88,12 @@ pub fn explain_advances(
 
 /// The nuisances that change an advance: neither the clock nor those of the first moment of a slide.
 fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
-    let within_a_cycle =
-        |nuisance: Nuisance| matches!(nuisance, Nuisance::Damping | Nuisance::Presliding | Nuisance::Viscosity);
+    let within_a_cycle = |nuisance: Nuisance| {
+        matches!(
+            nuisance,
+            Nuisance::Damping | Nuisance::Presliding | Nuisance::Viscosity | Nuisance::Breakaway
+        )
+    };
     let mut all = Nuisance::all(cells, runs, false);
     all.retain(|free| !matches!(free.what, What::Nuisance(nuisance) if within_a_cycle(nuisance)));
     all

@@ -146,18 +146,10 @@ pub fn explain(
         judge.weigh(&mut candidates[..1], &screened);
     }
     report("held-out selection", 0.8);
-    let plain = problem.without_any_discrepancy();
-    let folds = cross_validation::folds(&plain);
-    let recalibrated_held_out = held_out(&plain, &recalibrated, &folds);
+    let folds = cross_validation::folds(&problem);
+    let recalibrated_held_out = held_out(&problem, &recalibrated, &folds);
     report("judgement", 0.9);
-    let judged = judge.judge(
-        candidates,
-        pairs,
-        &chance,
-        &plain,
-        &folds,
-        recalibrated_held_out.chi_squared,
-    );
+    let judged = judge.judge(candidates, pairs, &chance, &folds, recalibrated_held_out.chi_squared);
     let fitted: Vec<&Hypothesised> = judged.iter().flat_map(|one| &one.candidate.hypothesised).collect();
     // What the rough fits dismissed counts by its prior at most: first order promises strong effects too much.
     let unfitted: Vec<f64> = screened
@@ -165,7 +157,10 @@ pub fn explain(
         .filter(|screening| !fitted.contains(&&screening.hypothesised))
         .map(|screening| judge.none.usual + judge.ln_prior(&[screening.hypothesised]) + screening.ln_bayes.min(0.0))
         .collect();
-    let selected = decide(judge.none, judged, &unfitted);
+    let mut selected = decide(judge.none, judged, &unfitted);
+    for candidate in &mut selected.candidates {
+        candidate.fit = candidate.fit.clone().with_whole_effects();
+    }
     let cycles_s: Vec<f64> = runs
         .iter()
         .map(|run| run.cycle_s.unwrap_or(config.gait.cycle_s))
@@ -181,7 +176,7 @@ pub fn explain(
     report("localisation", 0.93);
     // What repeats and is smooth, beyond noise.
     let gap = |fit: &Fit| {
-        let residual = plain.residuals(&fit.hypothesis, &fit.at);
+        let residual = problem.without_discrepancy(&fit.hypothesis, &fit.at);
         discrepancy.beyond_noise(&residual)
     };
     let open_share = selected

@@ -37,6 +37,7 @@ pub(in crate::explain) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibra
                 Nuisance::Presliding => ("presliding".to_owned(), free.quantity.centre, value, sigma, ""),
                 Nuisance::Rounding => ("rounding".to_owned(), free.quantity.centre, value, sigma, ""),
                 Nuisance::Viscosity => ("viscosity".to_owned(), free.quantity.centre, value, sigma, "N s/m"),
+                Nuisance::Breakaway => ("breakaway".to_owned(), free.quantity.centre, value, sigma, ""),
             };
             Some(Calibrated {
                 name,
@@ -44,7 +45,8 @@ pub(in crate::explain) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibra
                 found,
                 sigma,
                 unit,
-                at_limit: fit.at_limit(at),
+                // What is 0 and cannot be less is nothing special.
+                at_limit: fit.at_limit(at) && value != free.quantity.centre,
             })
         })
         .collect()

@@ -6,8 +6,9 @@
 //! ln Z(κ) = −½ χ² − ½ ln det A + ½ ln det P + Σ ln π(θ) + ½ ln 2π − ½ ln det(1 + κ² Λ),   A = Jᵀ W J + P
 //! ```
 //! where the nuisances have normal priors P and each effect's parameters the density π at their values, W whitens by the discrepancy
-//! at κ a₀, and χ² is that after one Gauss-Newton step with this W. All κ follow from the same products. Z is the mean over κ: near
-//! one for a hypothesis that is meant to be right, and many times a₀ for one beside which something else is wrong.
+//! at κ a₀, and χ² is that after one Gauss-Newton step with this W. All κ follow from the same products. At κ = 1 there is no step, for
+//! that is where the fit ended: what a step still promises there is a bend of the model, and is taken off at every κ. Z is the mean
+//! over κ: near one for a hypothesis that is meant to be right, and many times a₀ for one beside which something else is wrong.
 
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
@@ -15,7 +16,7 @@ use super::ln_sum::ln_sum;
 use super::structural_change::{Change, StructuralChanges};
 use crate::least_squares::{cross, dot, prior_chi_squared, submatrix};
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Scales of the discrepancy over a₀ with the widths that they stand for: half-normal of standard deviation 1, cut at 2. None is below
 /// a half: no campaign shows that the model is right where it was not tried.
@@ -87,25 +88,29 @@ pub(in crate::explain) fn evidence(
     let mut unlimited = quantities.clone();
     let mut ln_priors = 0.0;
     for (quantity, here) in unlimited.iter_mut().enumerate() {
-        if let Some((ln_density, width)) = of_effect(quantity) {
-            // Its own value is the centre: only the width counts.
-            (here.centre, here.sigma) = (fit.at[quantity], width);
-            ln_priors += ln_density + if open.contains(&quantity) { 0.5 * TAU.ln() } else { 0.0 };
-        } else if open.contains(&quantity) {
-            ln_priors -= here.sigma.ln();
+        match of_effect(quantity) {
+            Some((ln_density, width)) => {
+                // Its own value is the centre: only the width counts.
+                (here.centre, here.sigma) = (fit.at[quantity], width);
+                ln_priors += ln_density + 0.5 * TAU.ln();
+            }
+            None => ln_priors -= here.sigma.ln(),
         }
     }
     let square = dot(&fit.residual, &fit.residual, None) + prior_chi_squared(&unlimited, &fit.at);
     let whole = crate::least_squares::normal_matrix(&unlimited, &fit.jacobian, None);
     let normal = submatrix(&whole, &open);
-    let gradient = DVector::from_iterator(
-        count,
-        open.iter().map(|&at| {
-            let quantity = &unlimited[at];
-            dot(&fit.jacobian[at], &fit.residual, None) + (fit.at[at] - quantity.centre) * quantity.sigma.powi(-2)
-        }),
-    );
-    let at_scale = |kappa: f64| {
+    let slope = |at: usize| {
+        let quantity = &unlimited[at];
+        dot(&fit.jacobian[at], &fit.residual, None) + (fit.at[at] - quantity.centre) * quantity.sigma.powi(-2)
+    };
+    // A quantity on its limit falls from there as an exponential and half a bell, and not as a whole bell.
+    for at in (0..fit.at.len()).filter(|at| !open.contains(at)) {
+        let width = (slope(at).abs() + (whole[(at, at)] / FRAC_PI_2).sqrt()).recip();
+        ln_priors += width.ln() - 0.5 * TAU.ln();
+    }
+    let gradient = DVector::from_iterator(count, open.iter().map(|&at| slope(at)));
+    let step_and_rest = |kappa: f64| {
         let change = DVector::from_iterator(
             along.len(),
             discrepancy.factors(kappa).into_iter().map(|factor| factor - 1.0),
@@ -122,12 +127,14 @@ pub(in crate::explain) fn evidence(
                 .zip(change.iter())
                 .map(|(along, change)| along * along * change)
                 .sum::<f64>();
-        let Some(factor) = normal.cholesky() else {
-            return f64::NEG_INFINITY;
-        };
+        let factor = normal.cholesky()?;
         let step = gradient.dot(&factor.solve(&gradient));
-        -0.5 * (square - step) - 0.5 * factor.ln_determinant() + ln_priors - 0.5 * discrepancy.ln_det(kappa)
+        let rest = -0.5 * square - 0.5 * factor.ln_determinant() + ln_priors - 0.5 * discrepancy.ln_det(kappa);
+        Some((step, rest))
     };
+    let bend = step_and_rest(1.0).map_or(0.0, |(step, _)| step);
+    let at_scale =
+        |kappa: f64| step_and_rest(kappa).map_or(f64::NEG_INFINITY, |(step, rest)| rest + 0.5 * (step - bend).max(0.0));
     let changing = changes.and_then(|changes| {
         let normal = normal.clone().cholesky()?;
         changes.beside(&fit.residual, &jacobian, &normal, &gradient)
@@ -170,26 +177,21 @@ mod tests {
                 ..Quantity::unlimited(1e-3)
             },
         };
-        for x in [0.0, 0.3] {
-            let residual: Vec<f64> = y.iter().zip(&d).map(|(y, d)| d * x - y).collect();
-            let estimate = Estimate {
-                at: vec![x],
-                residual,
-                jacobian: vec![d.to_vec()],
-                chi_squared: 0.0,
-                converged: true,
-            };
-            let fit = Fit::new(&Hypothesis::new(&[free], &[]), estimate);
-            let found = evidence(&Discrepancy::none(3), None, &fit, &|_| None);
-            assert!(
-                (found.usual - expected).abs() < 1e-9,
-                "{} for {expected} from {x}",
-                found.usual
-            );
-            assert!(
-                (found.large - expected).abs() < 1e-9,
-                "no discrepancy, so no scale of it"
-            );
-        }
+        let x = dy / (dd + 1.0 / variance);
+        let residual: Vec<f64> = y.iter().zip(&d).map(|(y, d)| d * x - y).collect();
+        let estimate = Estimate {
+            at: vec![x],
+            residual,
+            jacobian: vec![d.to_vec()],
+            chi_squared: 0.0,
+            converged: true,
+        };
+        let fit = Fit::new(&Hypothesis::new(&[free], &[]), estimate);
+        let found = evidence(&Discrepancy::none(3), None, &fit, &|_| None);
+        assert!((found.usual - expected).abs() < 1e-9, "{} for {expected}", found.usual);
+        assert!(
+            (found.large - expected).abs() < 1e-9,
+            "no discrepancy, so no scale of it"
+        );
     }
 }
