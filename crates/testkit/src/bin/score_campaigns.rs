@@ -9,6 +9,7 @@
 
 use std::collections::VecDeque;
 use std::fs::File;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -100,13 +101,18 @@ fn score(arguments: &Arguments) -> Result<(), String> {
     all.sort_by_key(|(number, _)| *number);
     let assessments: Vec<Assessment> = all.into_iter().map(|(_, assessment)| assessment).collect();
     let table = ScoreTable(&assessments);
-    println!("\n{table}");
+    say(format_args!("\n{table}"));
     let Some(path) = &arguments.csv else {
         return Ok(());
     };
     let problem = |error: String| format!("{}: {error}: name a file in an existing folder", path.display());
     let file = File::create(path).map_err(|error| problem(error.to_string()))?;
     table.write_csv(file).map_err(|error| problem(error.to_string()))
+}
+
+/// Prints a line. A reader that has left, such as `head`, ends nothing: answers are still kept.
+fn say(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stdout(), "{line}");
 }
 
 fn explain(campaign: &CampaignFolder, arguments: &Arguments, number: usize, count: usize) -> Assessment {
@@ -116,6 +122,6 @@ fn explain(campaign: &CampaignFolder, arguments: &Arguments, number: usize, coun
         Answers::Files(name) => campaign.assess_file(name),
     };
     let seconds = begun.elapsed().as_secs_f64();
-    println!("{number:>3}/{count} {} {seconds:.1} s", assessment.line());
+    say(format_args!("{number:>3}/{count} {} {seconds:.1} s", assessment.line()));
     assessment
 }

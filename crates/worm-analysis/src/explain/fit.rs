@@ -95,30 +95,6 @@ impl Fit {
         normal_matrix(&self.hypothesis.quantities(), &self.jacobian, counts)
     }
 
-    /// The same with what nuisances have of an effect's law moved into the effect: it predicts the same, and the effect is all there is
-    /// of its law.
-    pub fn with_whole_effects(mut self) -> Self {
-        let free = self.hypothesis.free.clone();
-        for (of_effect, one) in free.iter().enumerate() {
-            let What::Effect { place, parameter: 0 } = one.what else {
-                continue;
-            };
-            let hypothesised = self.hypothesis.hypothesised[place];
-            for (of_nuisance, other) in free.iter().enumerate() {
-                let What::Nuisance(nuisance) = other.what else {
-                    continue;
-                };
-                let (severity, value) = (self.at[of_effect], self.at[of_nuisance]);
-                let whole = nuisance.added_to(hypothesised.effect, severity, value);
-                if let Some(whole) = whole.filter(|_| hypothesised.onset.is_none()) {
-                    self.at[of_effect] = whole.clamp(one.quantity.min, one.quantity.max);
-                    self.at[of_nuisance] = other.quantity.centre;
-                }
-            }
-        }
-        self
-    }
-
     /// Whether a quantity lies on one of its limits.
     pub fn at_limit(&self, quantity: usize) -> bool {
         let free = &self.hypothesis.free[quantity];

@@ -3,7 +3,7 @@
 //! The model has no mass but that of the body as a whole. At each start and stop of a step the body is pushed by stroke / T, T the time
 //! of a cycle, and swings on its tips by that over their natural frequency ω = √(Σ k / m); what becomes of it at the tips is of second
 //! order, as (ω T)⁻². The discrepancy of clean worms in MuJoCo, which have all their masses, follows this law from 0.9 to 9 s a cycle:
-//! the evidence of 40 of them prefers it to a discrepancy that is the same at every speed by a factor of e¹¹³⁰.
+//! the evidence of 40 of them prefers it to a discrepancy that is the same at every speed by a factor of e¹¹²⁰.
 
 use worm_physics::Worm;
 

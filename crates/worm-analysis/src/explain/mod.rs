@@ -22,6 +22,7 @@
 //! - `score_test`: screens the whole library; `onset`: effects that begin in mid-run; `speed_droop`: the one effect that shows in time alone.
 //! - `judge`: priors, evidence, chance and the verdict, for any plant; `judgement`: weighs the candidates of a worm; `matters`: whether
 //!   an effect changes what anybody asks; `cross_validation`: held-out data, which may veto.
+//! - `whole_effects`: what nuisances have of an effect's law, given to the effect.
 //! - `residual_map`: where the gap is; `period`: whether it repeats; `gap`: how it shrinks; `experiment_design`: the next experiment;
 //!   `words`: the answer in words.
 //! - `scalar_data`: the same where only advances per cycle are known.
@@ -62,6 +63,7 @@ mod scalar_data;
 mod score_test;
 mod search;
 mod speed_droop;
+mod whole_effects;
 mod words;
 
 pub use crate::experiment::RecordedRun;

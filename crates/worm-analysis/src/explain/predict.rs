@@ -373,4 +373,34 @@ mod tests {
             "{begun_m} and {throughout_m} m a cycle"
         );
     }
+
+    /// A clock that has fallen behind by some time shows what a latency of that time shows.
+    #[test]
+    fn two_clocks_that_run_apart_are_a_latency_that_grows() {
+        let campaign = Campaign::default();
+        let recordings = record(&campaign, None, 1);
+        let scene = scene(&recordings, &campaign);
+        let last = scene.observed[0].samples() - 1;
+        let duration_s = recordings[0].time_s[last] - recordings[0].time_s[0];
+        let free = Nuisance::all(4, 2, true);
+        let nuisances = Hypothesis::new(&free, &[]);
+        let at_sample = |set: Nuisance, value: f64, sample: usize| {
+            let mut at = nuisances.neutral();
+            let place = free.iter().position(|free| free.what == What::Nuisance(set));
+            at[place.expect("it is free")] = value;
+            let position_m = scene.predict(0, &nuisances, &at).expect("it holds").position_m;
+            position_m[4 * sample..4 * (sample + 1)].to_vec()
+        };
+        let drift = 1e-3;
+        for (sample, behind_s) in [(0, 0.0), (last, drift * duration_s)] {
+            let drifted = at_sample(Nuisance::ClockDrift, drift, sample);
+            let late = at_sample(Nuisance::Clock, behind_s, sample);
+            for (drifted, late) in drifted.iter().zip(&late) {
+                assert!(
+                    (drifted - late).abs() < 2e-6,
+                    "{drifted} and {late} m at sample {sample}"
+                );
+            }
+        }
+    }
 }

@@ -18,6 +18,7 @@ use super::prepare::{prepare, recalibrate};
 use super::refit::{REFITTED, alone, pair_up, refit};
 use super::score_test;
 use super::speed_droop::speed_droop;
+use super::whole_effects::with_whole_effects;
 use crate::experiment::{Progress, RecordedRun};
 use worm_estimator::config::Config;
 
@@ -28,7 +29,8 @@ const PAIR_SEEDS: usize = 2;
 pub struct Options {
     /// Seed of everything drawn: the same input and seed give the same answer.
     pub seed: u64,
-    /// Scale of the discrepancy between the model and any worm, as a fraction of the mean largest deformation of the tips; above 0.
+    /// Scale of the discrepancy between the model and any worm, as a fraction of the mean largest deformation of the tips; above 0. It
+    /// is that of the paper's worm at 2.3 s a cycle, and larger for a faster one.
     /// Too small, and the model's own small errors get names; too large, and a wrong effect hides in it what it leaves.
     pub discrepancy: f64,
     /// Relative change of the advance or of the energy of a cycle below which an effect does not matter.
@@ -159,7 +161,7 @@ pub fn explain(
         .collect();
     let mut selected = decide(judge.none, judged, &unfitted);
     for candidate in &mut selected.candidates {
-        candidate.fit = candidate.fit.clone().with_whole_effects();
+        candidate.fit = with_whole_effects(candidate.fit.clone());
     }
     let cycles_s: Vec<f64> = runs
         .iter()

@@ -194,4 +194,38 @@ mod tests {
             "no discrepancy, so no scale of it"
         );
     }
+
+    /// A nuisance that cannot be negative, and that the data push below 0.
+    #[test]
+    fn on_a_limit_it_is_the_integral_over_what_is_left() {
+        let (y, d, sigma) = ([-1.0, -1.0], [4.0, 3.0], 0.5);
+        let free = Free {
+            what: What::Nuisance(Nuisance::Viscosity),
+            quantity: Quantity {
+                sigma,
+                min: 0.0,
+                max: 10.0,
+                ..Quantity::unlimited(1e-3)
+            },
+        };
+        let residual: Vec<f64> = y.iter().map(|y| -y).collect();
+        let estimate = Estimate {
+            at: vec![0.0],
+            residual,
+            jacobian: vec![d.to_vec()],
+            chi_squared: 0.0,
+            converged: true,
+        };
+        let fit = Fit::new(&Hypothesis::new(&[free], &[]), estimate);
+        let found = evidence(&Discrepancy::none(2), None, &fit, &|_| None);
+        let (nodes, to) = (100_000, 2.0);
+        let width = to / f64::from(nodes);
+        let density = |node: i32| {
+            let x = (f64::from(node) + 0.5) * width;
+            let square: f64 = y.iter().zip(&d).map(|(y, d)| (d * x - y).powi(2)).sum();
+            (-0.5 * square - 0.5 * (x / sigma).powi(2)).exp() / (sigma * TAU.sqrt())
+        };
+        let expected = (0..nodes).map(|node| density(node) * width).sum::<f64>().ln();
+        assert!((found.usual - expected).abs() < 0.2, "{} for {expected}", found.usual);
+    }
 }
