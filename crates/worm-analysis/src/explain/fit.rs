@@ -101,6 +101,13 @@ impl Fit {
         free.quantity.is_at_limit(self.at[quantity])
     }
 
+    /// Whether a quantity would go beyond its prior: it lies on a limit, and that is not where its prior is largest.
+    pub fn would_go_beyond(&self, quantity: usize) -> bool {
+        let prior = &self.hypothesis.free[quantity].quantity;
+        self.at_limit(quantity)
+            && !(prior.is_at_limit(prior.centre) && (self.at[quantity] - prior.centre).abs() < prior.step)
+    }
+
     /// Standard errors of all quantities; infinite where nothing is known. What lies at a limit adds nothing to the errors of others.
     pub fn sigmas(&self) -> Vec<f64> {
         let normal = self.normal(None);

@@ -170,9 +170,9 @@ fn from_heavy_damping(problem: &FitProblem<'_, '_>, fit: Fit) -> Fit {
             _ => {}
         }
     }
-    let other = problem.fit_roughly(&fit.hypothesis, at, &fit);
+    let other = problem.fit(&fit.hypothesis, at, None);
     if other.chi_squared < fit.chi_squared {
-        problem.fit(&fit.hypothesis, other.at.clone(), None)
+        other
     } else {
         fit
     }

@@ -136,7 +136,7 @@ pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit, named: Option<&C
     }
     let limits = fit.hypothesis.free.iter().enumerate();
     let at_limit = limits
-        .filter(|(at, free)| matches!(free.what, What::Nuisance(_)) && fit.at_limit(*at))
+        .filter(|(at, free)| matches!(free.what, What::Nuisance(_)) && fit.would_go_beyond(*at))
         .count();
     if at_limit > 0 {
         warnings.push(format!(

@@ -45,8 +45,7 @@ pub(in crate::explain) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibra
                 found,
                 sigma,
                 unit,
-                // What is 0 and cannot be less is nothing special.
-                at_limit: fit.at_limit(at) && value != free.quantity.centre,
+                at_limit: fit.would_go_beyond(at),
             })
         })
         .collect()

@@ -217,7 +217,7 @@ impl Selected {
             )
         }));
         let at_limit = (0..fit.hypothesis.free.len())
-            .filter(|&at| matches!(fit.hypothesis.free[at].what, What::Nuisance(_)) && fit.at_limit(at))
+            .filter(|&at| matches!(fit.hypothesis.free[at].what, What::Nuisance(_)) && fit.would_go_beyond(at))
             .count();
         if at_limit > 0 {
             warnings.push(format!(

@@ -12,6 +12,7 @@ pub(super) fn readable(unit: &str) -> (f64, &str) {
         "s" => (1e3, "ms"),
         "kg" => (1e3, "g"),
         "J" => (1e3, "mJ"),
+        "s/s" => (1e6, "ppm"),
         "deg" => (1.0, "°"),
         "m/N" => (1e3, "mm/N"),
         "1/N" => (100.0, "% per N"),
