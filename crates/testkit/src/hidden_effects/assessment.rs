@@ -332,14 +332,8 @@ mod tests {
         let right = compare(&truth("single", Value::Null, &[]), &Answer::failed());
         assert!(spoiled.is_refused() && !right.is_refused());
         let all = [spoiled, right];
-        let rows = ScoreTable(&all).rows();
-        let count = |what: &str| {
-            let row = rows
-                .iter()
-                .find(|row| row.what == what)
-                .expect("the table has such a row");
-            (row.proportion.hits, row.proportion.of)
-        };
+        let table = ScoreTable(&all);
+        let count = |what: &str| table.count(what).expect("the table has such a row");
         assert_eq!(count("no answer at all"), (1, 1));
         assert_eq!(count("artefact: refused"), (1, 1));
         assert_eq!(count("artefact: named what is not there"), (0, 0));

@@ -1,4 +1,4 @@
-//! A discrepancy in the law of all pads, as large as is asked for once everything is taken out of it that recalibration explains.
+//! A discrepancy in the law of all pads, scaled until what recalibration leaves of it has the requested size.
 //!
 //! How much of a wave in the pads' law recalibration takes up differs from worm to worm, so the wave is scaled by what is left of it,
 //! and what is left after that is measured.
@@ -12,7 +12,7 @@ use super::true_campaign::RunPairs;
 const MAX_WAVE_M: f64 = 0.2e-3;
 /// Scalings: what is left is not quite proportional to the wave.
 const SCALINGS: usize = 2;
-/// Least share of what is asked for that must be left.
+/// Smallest fraction of the requested size that must be left.
 const LEAST_LEFT: f64 = 0.9;
 
 /// The runs of a worm whose discrepancy has been scaled.

@@ -64,6 +64,13 @@ impl ScoreTable<'_> {
             .filter(|one| one.truth.sigma_per_cycle >= ONSET_SIGMA_PER_CYCLE)
     }
 
+    /// Hits of a row, and of how many; none where no row has this name.
+    pub fn count(&self, what: &str) -> Option<(usize, usize)> {
+        let rows = self.rows();
+        let row = rows.iter().find(|row| row.what == what)?;
+        Some((row.proportion.hits, row.proportion.of))
+    }
+
     /// Every proportion.
     pub fn rows(&self) -> Vec<Row> {
         let row = |what, proportion, target| Row {

@@ -18,16 +18,8 @@ fn the_sample_is_explained_and_scored() {
     }
     let table = ScoreTable(&assessments);
     println!("{table}");
-    let rows = table.rows();
-    let count = |what: &str| {
-        let row = rows
-            .iter()
-            .find(|row| row.what == what)
-            .expect("the table has such a row");
-        (row.proportion.hits, row.proportion.of)
-    };
     // What is counted, and of how many.
-    let table = [
+    let expected = [
         ("no answer at all", (0, 6)),
         ("clean: an effect named", (0, 2)),
         ("single: false second effect", (0, 1)),
@@ -39,9 +31,10 @@ fn the_sample_is_explained_and_scored() {
         // Of the pair only one is named so far.
         ("pair: one named", (1, 1)),
     ];
-    for (what, expected) in table {
-        assert_eq!(count(what), expected, "{what}");
+    for (what, expected) in expected {
+        assert_eq!(table.count(what), Some(expected), "{what}");
     }
     // It shows clearly enough to be scored.
-    assert_eq!(count("stranger: detected as outside").1, 1);
+    let detected = table.count("stranger: detected as outside");
+    assert_eq!(detected.map(|(_, of)| of), Some(1));
 }

@@ -7,7 +7,6 @@ use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::follow_up::ExtraRun;
 use testkit::hidden_effects::hidden::{Hidden, Twin};
 use testkit::hidden_effects::setting::CampaignSize;
-use testkit::hidden_effects::statistics::Proportion;
 use testkit::hidden_effects::table::ScoreTable;
 use testkit::hidden_effects::truth::{CampaignKind, TrueEffect};
 
@@ -80,16 +79,10 @@ fn the_score_separates_right_from_wrong() {
             .iter()
             .map(|campaign| assess(campaign, &Oracle { reports_truth }))
             .collect();
-        let table = ScoreTable(&assessments);
-        println!("{table}");
-        let rows = table.rows();
+        println!("{}", ScoreTable(&assessments));
         move |what: &str| {
-            let row = rows
-                .iter()
-                .find(|row| row.what == what)
-                .expect("the table has such a row");
-            let Proportion { hits, of } = row.proportion;
-            (hits, of)
+            let count = ScoreTable(&assessments).count(what);
+            count.expect("the table has such a row")
         }
     };
     #[rustfmt::skip]
