@@ -19,7 +19,7 @@ mod tests;
 
 use super::ledger::Ledger;
 use super::mechanics::Mechanics;
-use super::pad::{Hold, Loaded, Pad};
+use super::pad::{Hold, Loaded, Pad, Rate};
 use super::worm::SlidesDown;
 use crate::MAX_CELLS;
 
@@ -56,8 +56,7 @@ pub struct Crawl {
 struct Cell {
     pad: Pad,
     drive_m: f64,
-    damping_n: f64, // of the pad, in the last increment
-    drag_n: f64,    // on the cell, in the last increment
+    drag_n: f64, // on the cell, in the last increment
     trial: Trial,
 }
 
@@ -74,8 +73,7 @@ struct Trial {
 /// The constants of one increment's equation.
 struct Increment {
     step_s: f64,
-    relaxing: f64,
-    damping_n_per_m: f64,
+    rate: Rate,
     drag_n_per_m: f64,
     inertia_n_per_m: f64, // 0 without mass
 }
@@ -119,7 +117,7 @@ impl Crawl {
         untethered.laws.tether_n_per_m = 0.0;
         crawl.increment(&untethered, phase, SETTLING_S)?;
         for cell in &mut crawl.cell {
-            (cell.damping_n, cell.drag_n) = (0.0, 0.0);
+            cell.drag_n = 0.0;
         }
         Ok(Self {
             position_m,
@@ -197,6 +195,13 @@ impl Crawl {
         self.ledger = Ledger::default();
     }
 
+    /// As [`begin_at`](Self::begin_at), at a phase some whole cycles from the present one: the crawl is where it is in the gait.
+    pub fn begin_at_phase(&mut self, mechanics: &Mechanics, phase: f64, positions_m: &[f64]) {
+        self.phase = phase;
+        self.take_up(mechanics);
+        self.begin_at(positions_m);
+    }
+
     /// Positions Xᵢ along the canal, m.
     pub fn positions_m(&self) -> &[f64] {
         &self.position_m[..self.cells]
@@ -269,8 +274,7 @@ impl Crawl {
 
     /// Force on a cell besides its contact, its weight and its part of the constant force, N.
     fn passing_force_n(&self, mechanics: &Mechanics, cell: usize) -> f64 {
-        let Cell { damping_n, drag_n, .. } = self.cell[cell];
-        damping_n + drag_n + self.shared_force_n(mechanics) / self.cells as f64
+        self.cell[cell].drag_n + self.shared_force_n(mechanics) / self.cells as f64
     }
 
     /// Force of tether and inertia on the whole worm, N.
@@ -309,12 +313,14 @@ impl Crawl {
         };
         Increment {
             step_s,
-            relaxing: if laws.creep_share > 0.0 {
-                1.0 - (-step_s / laws.creep_time_s).exp()
-            } else {
-                0.0
+            rate: Rate {
+                relaxing: if laws.creep_share > 0.0 {
+                    1.0 - (-step_s / laws.creep_time_s).exp()
+                } else {
+                    0.0
+                },
+                damping_n_per_m: damping_n_s_per_m / step_s,
             },
-            damping_n_per_m: damping_n_s_per_m / step_s,
             drag_n_per_m: laws.drag_n_s_per_m / step_s,
             inertia_n_per_m: 4.0 * mass_kg / (step_s * step_s),
         }
@@ -349,10 +355,8 @@ impl Crawl {
             } = cell.trial;
             let (law, standing_n) = (&mechanics.pad[index], mechanics.standing_n[index]);
             let (before_m, before_n) = (cell.pad.deformation_m, cell.pad.force_n);
-            let lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.relaxing);
-            let strain_m = loaded.deformation_m - before_m;
-            let (damping_n, drag_n) = (increment.damping_n_per_m * strain_m, increment.drag_n_per_m * shift_m);
-            let damped_j = 0.5 * (cell.damping_n + damping_n) * shift_m;
+            let lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.rate);
+            let drag_n = increment.drag_n_per_m * shift_m;
             let dragged_j = 0.5 * (cell.drag_n + drag_n) * shift_m;
             let ledger = &mut self.ledger;
             if loaded.slide_m != 0.0 {
@@ -360,9 +364,9 @@ impl Crawl {
             }
             ledger.weight_work_j += mechanics.worm.cell_weight_n(index) * shift_m;
             ledger.resisting_work_j += resisting_n * shift_m + dragged_j;
-            ledger.settling_loss_j += lost_j + damped_j;
-            let passing_before_n = cell.damping_n + cell.drag_n + shared_before_n;
-            let passing_after_n = damping_n + drag_n + shared_after_n;
+            ledger.settling_loss_j += lost_j;
+            let passing_before_n = cell.drag_n + shared_before_n;
+            let passing_after_n = drag_n + shared_after_n;
             if driven_m != 0.0 {
                 ledger.add_actuator_work(
                     before_n + standing_n + passing_before_n,
@@ -375,7 +379,7 @@ impl Crawl {
             ledger.actuator_net_j += 0.5 * (passing_before_n + passing_after_n) * (shift_m - translation_m - driven_m);
             deformation_m += 0.5 * (before_m + loaded.deformation_m);
             self.position_m[index] += shift_m;
-            (cell.damping_n, cell.drag_n) = (damping_n, drag_n);
+            cell.drag_n = drag_n;
         }
         self.ledger.deformation_integral_m += deformation_m * (phase - self.phase).abs();
         self.rate_m_s = translation_m / increment.step_s;

@@ -3,6 +3,8 @@
 //! The force on a pad never falls as its cell moves on, because what a tip can hold is fixed before its increment: where it breaks away, the
 //! force falls in the next increments. So the balance of the body stays one monotone scalar equation.
 //!
+//! Beside the springs of a pad there may be a damper. The tip holds the sum of their forces, so a pad that is deformed fast slides early.
+//!
 //! Slip reduces what a tip holds beyond its kinetic friction, and rest restores it: θ′ = (1 − θ)/t − θ |v|/d, the ageing law of rate and
 //! state friction (Dieterich 1979, Ruina 1983). In a steady slide it gives the Stribeck curve.
 
@@ -32,6 +34,15 @@ pub(super) struct PadLaw {
     pub creep_n_per_m: f64,
     pub element_n_per_m: f64,
     pub element_yield_m: [f64; ELEMENTS],
+}
+
+/// What the time of an increment does in every pad.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Rate {
+    /// Fraction of its force that the creeping branch loses.
+    pub relaxing: f64,
+    /// Of the damper: force per deformation in the increment.
+    pub damping_n_per_m: f64,
 }
 
 /// The state of one tip.
@@ -90,23 +101,19 @@ impl PadLaw {
         }
     }
 
-    /// A tip whose cell moves by `shift_m`, while the creeping branch loses a fraction `relaxing` of its force.
+    /// A tip whose cell moves by `shift_m`.
     #[inline]
-    pub fn load(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, relaxing: f64) -> Loaded {
-        if self.presliding > 0.0 && shift_m != 0.0 {
-            return self.load_bristles(pad, shift_m, hold, relaxing);
+    pub fn load(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, rate: Rate) -> Loaded {
+        if self.presliding > 0.0 {
+            return self.load_bristles(pad, shift_m, hold, rate);
         }
         let reach_m = pad.deformation_m + shift_m;
-        let (reach_n, tangent_n_per_m) = if self.is_linear() {
-            (self.stiffness_n_per_m * reach_m, self.stiffness_n_per_m)
-        } else {
-            self.force(pad, reach_m, relaxing)
-        };
+        let (reach_n, tangent_n_per_m) = self.force(pad, reach_m, rate);
         let (force_n, deformation_m) = if reach_n > hold.max_n {
-            let at_m = hold.max_m.get_or_insert_with(|| self.invert(pad, hold.max_n, relaxing));
+            let at_m = hold.max_m.get_or_insert_with(|| self.invert(pad, hold.max_n, rate));
             (hold.max_n, at_m.min(reach_m))
         } else if reach_n < hold.min_n {
-            let at_m = hold.min_m.get_or_insert_with(|| self.invert(pad, hold.min_n, relaxing));
+            let at_m = hold.min_m.get_or_insert_with(|| self.invert(pad, hold.min_n, rate));
             (hold.min_n, at_m.max(reach_m))
         } else {
             return Loaded {
@@ -130,22 +137,21 @@ impl PadLaw {
     /// A tip on bristles: its force tends to the friction as its cell moves on (Dahl's law), by implicit Euler; the limit has the sign of
     /// the shift.
     ///
-    /// With u = 1 − F/limit, the remaining friction, and c the compliance of the bristles relative to the pad's, the pad takes u/(u + c) of
-    /// the shift and the tip slides the rest. For a linear pad that is a quadratic in u at the increment's end.
-    fn load_bristles(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, relaxing: f64) -> Loaded {
-        let (still_m, still_n) = *hold
-            .still
-            .get_or_insert_with(|| self.still(pad, hold.min_n, hold.max_n, relaxing));
-        let limit_n = if shift_m > 0.0 { hold.max_n } else { hold.min_n };
-        let is_linear = self.is_linear();
-        let slope = if is_linear {
-            self.stiffness_n_per_m
-        } else {
-            self.force(pad, still_m, relaxing).1
-        };
+    /// The bristles hold what they held at the increment's start, so the pad first deforms to where it bears that, and only the shift
+    /// beyond changes the force. With u = 1 − F/limit, the remaining friction, and c the compliance of the bristles relative to the pad's,
+    /// the pad takes u/(u + c) of it and the tip slides the rest. For a linear pad that is a quadratic in u at the increment's end.
+    fn load_bristles(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, rate: Rate) -> Loaded {
+        let (still_m, still_n) = *hold.still.get_or_insert_with(|| {
+            let held_n = pad.force_n.clamp(hold.min_n, hold.max_n);
+            (self.invert(pad, held_n, rate), held_n)
+        });
+        let reach_m = pad.deformation_m + shift_m;
+        let beyond_m = reach_m - still_m;
+        let limit_n = if beyond_m > 0.0 { hold.max_n } else { hold.min_n };
+        let slope = self.force(pad, still_m, rate).1;
         let fraction = self.presliding * slope / self.stiffness_n_per_m;
         let left = (1.0 - still_n / limit_n).max(0.0);
-        let linear = fraction - left + shift_m * slope / limit_n;
+        let linear = fraction - left + beyond_m * slope / limit_n;
         let root = (linear * linear + 4.0 * left * fraction).sqrt();
         // The form of the root without cancellation.
         let after = if linear > 0.0 {
@@ -153,48 +159,26 @@ impl PadLaw {
         } else {
             0.5 * (root - linear)
         };
-        let (deformation_m, force_n, tangent_n_per_m) = if is_linear {
+        let (deformation_m, force_n, tangent_n_per_m) = if self.is_linear() {
             let force_n = limit_n * (1.0 - after);
-            (force_n / slope, force_n, slope * after / root)
+            (still_m + (force_n - still_n) / slope, force_n, slope * after / root)
         } else if left == 0.0 {
             (still_m, limit_n, 0.0)
         } else {
-            let (strain_m, force_n, tangent) = self.strain_bristles(
-                pad,
-                still_m,
-                shift_m,
-                limit_n,
-                relaxing,
-                limit_n * (left - after) / slope,
-            );
+            let guess_m = limit_n * (left - after) / slope;
+            let (strain_m, force_n, tangent) = self.strain_bristles(pad, still_m, beyond_m, limit_n, rate, guess_m);
             (still_m + strain_m, force_n, tangent)
         };
         Loaded {
             deformation_m,
             force_n,
-            slide_m: pad.deformation_m + shift_m - deformation_m,
+            slide_m: reach_m - deformation_m,
             tangent_n_per_m,
             sliding: if force_n / limit_n > SLIDES_FROM {
-                sign_of(shift_m)
+                sign_of(beyond_m)
             } else {
                 0
             },
-        }
-    }
-
-    /// Deformation and force of a tip before its cell moves: the creeping branch relaxes even where nothing moves, and force beyond the
-    /// friction, as after breaking away, is released.
-    fn still(&self, pad: &Pad, min_n: f64, max_n: f64, relaxing: f64) -> (f64, f64) {
-        let still_n = if self.is_linear() {
-            pad.force_n
-        } else {
-            self.force(pad, pad.deformation_m, relaxing).0
-        };
-        let held_n = still_n.clamp(min_n, max_n);
-        if held_n == still_n {
-            (pad.deformation_m, still_n)
-        } else {
-            (self.invert(pad, held_n, relaxing), held_n)
         }
     }
 
@@ -207,7 +191,7 @@ impl PadLaw {
         still_m: f64,
         shift_m: f64,
         limit_n: f64,
-        relaxing: f64,
+        rate: Rate,
         guess_m: f64,
     ) -> (f64, f64, f64) {
         let mut strain_m = guess_m;
@@ -217,7 +201,7 @@ impl PadLaw {
         };
         let mut tries = 0;
         loop {
-            let (force_n, slope) = self.force(pad, still_m + strain_m, relaxing);
+            let (force_n, slope) = self.force(pad, still_m + strain_m, rate);
             let left = 1.0 - force_n / limit_n;
             let fraction = self.presliding * slope / self.stiffness_n_per_m;
             let excess_m = strain_m * (left + fraction) - shift_m * left;
@@ -237,7 +221,7 @@ impl PadLaw {
     }
 
     /// Accepts a load. Returns the energy that is lost in the pad or released when a tip breaks away, J.
-    pub fn take(&self, pad: &mut Pad, loaded: &Loaded, step_s: f64, relaxing: f64) -> f64 {
+    pub fn take(&self, pad: &mut Pad, loaded: &Loaded, step_s: f64, rate: Rate) -> f64 {
         let deformation_m = loaded.deformation_m;
         let before_n = pad.force_n;
         if self.static_over_kinetic != 1.0 {
@@ -249,7 +233,7 @@ impl PadLaw {
         pad.force_n = loaded.force_n;
         // What a tip holds at rest beyond its kinetic friction is lost in the slide, half of it on average.
         let freed_j = 0.5 * (before_n - loaded.force_n) * loaded.slide_m;
-        if self.is_linear() {
+        if self.is_linear() && rate.damping_n_per_m == 0.0 {
             pad.deformation_m = deformation_m;
             return freed_j;
         }
@@ -258,7 +242,7 @@ impl PadLaw {
         for at in 0..ELEMENTS {
             pad.yielding_m[at] = self.element(pad, at, deformation_m);
         }
-        pad.relaxed_m += relaxing * (deformation_m - pad.relaxed_m);
+        pad.relaxed_m += rate.relaxing * (deformation_m - pad.relaxed_m);
         pad.deformation_m = deformation_m;
         freed_j + strain_j - (self.elastic_j(pad) - elastic_before_j)
     }
@@ -278,12 +262,19 @@ impl PadLaw {
     }
 
     /// Force and its derivative at a deformation.
-    fn force(&self, pad: &Pad, deformation_m: f64, relaxing: f64) -> (f64, f64) {
+    #[inline]
+    fn force(&self, pad: &Pad, deformation_m: f64, rate: Rate) -> (f64, f64) {
+        let damping = rate.damping_n_per_m;
+        let damped_n = damping * (deformation_m - pad.deformation_m);
+        if self.is_linear() {
+            let stiffness = self.stiffness_n_per_m;
+            return (stiffness * deformation_m + damped_n, stiffness + damping);
+        }
         let bend = self.hardening_per_m2 * deformation_m * deformation_m;
-        let creep = self.creep_n_per_m * (1.0 - relaxing);
+        let creep = self.creep_n_per_m * (1.0 - rate.relaxing);
         let mut force_n =
-            self.stiffness_n_per_m * deformation_m * (1.0 + bend) + creep * (deformation_m - pad.relaxed_m);
-        let mut slope = self.stiffness_n_per_m * (1.0 + 3.0 * bend) + creep;
+            self.stiffness_n_per_m * deformation_m * (1.0 + bend) + creep * (deformation_m - pad.relaxed_m) + damped_n;
+        let mut slope = self.stiffness_n_per_m * (1.0 + 3.0 * bend) + creep + damping;
         if self.element_n_per_m > 0.0 {
             for at in 0..ELEMENTS {
                 let element_m = self.element(pad, at, deformation_m);
@@ -297,20 +288,21 @@ impl PadLaw {
     }
 
     /// The deformation at which the force is `target_n`: Newton's method within a bracket, from where the tip is.
-    fn invert(&self, pad: &Pad, target_n: f64, relaxing: f64) -> f64 {
+    fn invert(&self, pad: &Pad, target_n: f64, rate: Rate) -> f64 {
         if self.is_linear() {
-            return target_n / self.stiffness_n_per_m;
+            let damping = rate.damping_n_per_m;
+            return (target_n + damping * pad.deformation_m) / (self.stiffness_n_per_m + damping);
         }
         let scale_n = self.forward_n.max(self.backward_n);
         let mut at_m = pad.deformation_m;
         // Relaxation and yielding never make the force fall, so the spring alone reaches the target within this.
-        let far_m = (target_n.abs() + self.force(pad, at_m, relaxing).0.abs()) / self.stiffness_n_per_m;
+        let far_m = (target_n.abs() + self.force(pad, at_m, rate).0.abs()) / self.stiffness_n_per_m;
         let mut bracket = Bracket {
             low_m: at_m - 2.0 * far_m,
             high_m: at_m + 2.0 * far_m,
         };
         for _ in 0..MAX_ITERATIONS {
-            let (force_n, slope) = self.force(pad, at_m, relaxing);
+            let (force_n, slope) = self.force(pad, at_m, rate);
             let excess_n = force_n - target_n;
             if excess_n.abs() <= INVERSION_FRACTION * scale_n {
                 break;

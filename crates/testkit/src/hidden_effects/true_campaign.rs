@@ -26,12 +26,14 @@ impl RunPairs<'_> {
         Detector::new(self.parameters, capture, &runs)
     }
 
-    /// What is different in the runs of `simulated`, at the middle of each bin: of each run `[bin][cell]`, m.
+    /// What is different in the runs of `simulated`, at the middle of each bin of the campaign's own runs: of each run `[bin][cell]`, m.
+    /// A run that makes fewer cycles in its time keeps its last difference.
     pub fn differences_m(&self, simulated: &[SimulatedRun]) -> Vec<Vec<Vec<f64>>> {
-        let of_run = |((scene, with), without): ((&Scene, &SimulatedRun), &SimulatedRun)| {
+        let of_run = |(((scene, own), with), without): (((&Scene, &SimulatedRun), &SimulatedRun), &SimulatedRun)| {
             let first = first_whole(with);
-            let run = compared((scene, with));
-            let bins = run.phases(self.parameters.cells).map(|bin| first + bin);
+            let [own, here] = [own, with].map(|run| compared((scene, run)));
+            let last = here.phases(self.parameters.cells).last().unwrap_or(0.0);
+            let bins = own.phases(self.parameters.cells).map(|bin| first + bin.min(last));
             bins.map(|phase| {
                 let [one, other] = [with, without].map(|run| {
                     if self.by_time {
@@ -46,12 +48,8 @@ impl RunPairs<'_> {
             })
             .collect()
         };
-        self.scenes
-            .iter()
-            .zip(simulated)
-            .zip(self.baseline)
-            .map(of_run)
-            .collect()
+        let own = self.scenes.iter().zip(self.simulated);
+        own.zip(simulated).zip(self.baseline).map(of_run).collect()
     }
 
     /// What is true of each run.

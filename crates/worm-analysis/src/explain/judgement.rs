@@ -6,11 +6,11 @@ use super::fit::{Fit, FitProblem};
 use super::judge::candidate::Candidate;
 use super::judge::chance::Chance;
 use super::judge::decision::{Judged, MATTERS};
-use super::judge::evidence::{Evidence, evidence};
+use super::judge::evidence::{Evidence, InTime, evidence};
 use super::judge::prior;
-use super::judge::structural_change::StructuralChanges;
 use super::matters::impact;
 use super::parameter::{Hypothesised, What};
+use super::period;
 use super::score_test::{self, Screening};
 
 /// Fraction of worms without an effect, and without a second one, for which the best of the library may pass.
@@ -25,7 +25,7 @@ const MAY_CHANGE: f64 = 3.0;
 pub(super) struct Judge<'j, 's, 'a> {
     pub problem: &'j FitProblem<'s, 'a>,
     pub discrepancy: &'j Discrepancy,
-    pub changes: &'j StructuralChanges,
+    pub in_time: &'j InTime,
     pub recalibrated: &'j Fit,
     /// Evidence without any effect.
     pub none: Evidence,
@@ -80,13 +80,13 @@ impl Judge<'_, '_, '_> {
                     .find(|screening| screening.hypothesised.is_same_effect(&hypothesised))?;
                 Some((mine.prior.ln_density(value), mine.prior.width(value)))
             };
-            let mut found = evidence(self.discrepancy, Some(self.changes), &candidate.fit, &of_effect);
+            let found = evidence(self.discrepancy, Some(self.in_time), &candidate.fit, &of_effect);
             let excess = 0.5 * self.problem.excess_of_repeating(self.recalibrated, &candidate.fit) - candidate.ln_onset;
-            found.usual -= excess;
-            found.large -= excess;
-            found.changing = found.changing.map(|(ln, change)| (ln - excess, change));
-            found.of_usual = found.of_usual.map(|of_scale| of_scale - excess);
-            candidate.evidence = Some(found);
+            candidate.evidence = Some(
+                found
+                    .with_rhythm(period::ln_bayes(self.problem, &candidate.fit))
+                    .less(excess),
+            );
         }
         candidates.sort_by(|a, b| self.ln_odds(b).total_cmp(&self.ln_odds(a)));
     }

@@ -63,6 +63,7 @@ mod scalar_data;
 mod score_test;
 mod search;
 mod speed_droop;
+mod walk;
 mod whole_effects;
 mod words;
 

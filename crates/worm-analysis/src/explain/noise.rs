@@ -2,7 +2,8 @@
 //!
 //! Neighbouring cycles differ by noise alone, whatever the model misses, unless something changes just between them. So the noise is
 //! measured by differences from each cycle to the next, and by medians of their squares: a change in the middle of a run concerns one
-//! difference of many and does not count as noise. There are two kinds. Camera noise and scatter within the cycle concern each cell,
+//! difference of many and does not count as noise. What repeats every second or third cycle does not either: where cycles that are so
+//! far apart differ by much less than neighbours, they are compared instead. There are two kinds. Camera noise and scatter within the cycle concern each cell,
 //! and are correlated from bin to bin. The body makes a random walk, since every step differs a little from the last.
 
 use super::bins::Bins;
@@ -14,12 +15,13 @@ use crate::identify::drift::Drift;
 const MEDIAN_SQUARE: f64 = 0.454_936;
 /// Variance of the mean of a random walk over an interval less its mean over the one before, in variances gathered in an interval.
 const WALK_OF_MEANS: f64 = 2.0 / 3.0;
-/// Variance of the change of that difference from one interval to the next, in the same unit: neighbouring differences overlap.
-const WALK_OF_SECOND_DIFFERENCES: f64 = 1.0;
 /// Variance of a variance taken by [`variance`], relative to its square, times the number of values.
 const VARIANCE_OF_MEDIAN: f64 = 5.4;
 /// Fraction of its bins that a step or a cycle must show.
 const WHOLE: f64 = 0.9;
+/// Cycles that are compared are so far apart, and by what fraction of the variance those farther apart must differ less.
+const APART: [usize; 3] = [1, 2, 3];
+const MUCH_LESS: f64 = 0.5;
 /// Fewest changes of the advance from which their variance is taken: a single change in mid-run shows in three of them.
 const MIN_DIFFERENCES: usize = 8;
 /// Smallest variance of a position, and of the drift in a cycle, m².
@@ -44,7 +46,10 @@ impl RunNoise {
     pub fn measure(observed: &Observed<'_>, bins: &Bins, residual: &Residual) -> Self {
         let cells = observed.cells();
         let counted = if observed.phase_recorded { cells } else { cells - 1 } as f64;
-        let changes = CycleChanges::new(observed, bins, residual);
+        let all = APART.map(|apart| CycleChanges::new(observed, bins, residual, apart));
+        // Relative positions, and the body's.
+        let changes = quietest(&all, |changes| Some(changes.of_bins_m2()));
+        let of_body = quietest(&all, CycleChanges::of_steps_m2);
         // A relative position lacks its share in the body's.
         let position_m2 = (0.5 * changes.of_bins_m2() * counted / (counted - 1.0)).max(MIN_M2);
         let per_bin = bins.bins.iter().map(|bin| bin.samples.len() as f64).sum::<f64>() / bins.len() as f64;
@@ -52,14 +57,17 @@ impl RunNoise {
         let shared_m2 = (position_m2 - white_m2 / per_bin).max(0.0);
         let along = changes.along().clamp(1.0, bins.per_step as f64);
         let of_step_m2 = position_m2 * along / counted / bins.per_step as f64;
-        let of_steps_m2 = 0.5 * changes.of_steps_m2();
+        let of_steps_m2 = 0.5 * of_body.of_steps_m2().unwrap_or(0.0);
         let per_step_m2 = (of_steps_m2 - 2.0 * of_step_m2) / WALK_OF_MEANS * cells as f64;
         // Where the estimate is lost in its own error, the drift may still be as large as that.
         let of_few = |count: usize| (VARIANCE_OF_MEDIAN / count.max(1) as f64).sqrt();
-        let error_m2 = of_steps_m2 / WALK_OF_MEANS * of_few(changes.steps()) * cells as f64;
+        let error_m2 = of_steps_m2 / WALK_OF_MEANS * of_few(of_body.steps()) * cells as f64;
         let of_cycle_m2 = of_step_m2 / cells as f64;
-        let per_cycle_m2 = changes.of_cycles_m2().map_or(0.0, |m2| {
-            (m2 * (1.0 - of_few(changes.cycles())) - 6.0 * of_cycle_m2) / WALK_OF_SECOND_DIFFERENCES
+        let of_cycles = quietest(&all, |changes| {
+            Some(changes.of_cycles_m2()? / changes.walk_of_second_differences())
+        });
+        let per_cycle_m2 = of_cycles.of_cycles_m2().map_or(0.0, |m2| {
+            (m2 * (1.0 - of_few(of_cycles.cycles())) - 6.0 * of_cycle_m2) / of_cycles.walk_of_second_differences()
         });
         let drift_m2 = per_step_m2.max(error_m2).max(per_cycle_m2).max(MIN_DRIFT_M2);
         Self::new(observed, bins, [white_m2, shared_m2, along, drift_m2])
@@ -140,8 +148,20 @@ impl RunNoise {
     }
 }
 
-/// Changes of a residual from each settled cycle to the next.
+/// The changes between neighbouring cycles, or between those farther apart that differ much less; what cannot be measured is no less.
+fn quietest(all: &[CycleChanges; APART.len()], m2: impl Fn(&CycleChanges) -> Option<f64>) -> &CycleChanges {
+    let limit_m2 = m2(&all[0]).map_or(0.0, |m2| MUCH_LESS * m2);
+    let values = all.iter().map(|changes| (changes, m2(changes)));
+    let quiet = values.filter_map(|(changes, m2)| Some((changes, m2.filter(|m2| *m2 < limit_m2)?)));
+    quiet
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or(&all[0], |(changes, _)| changes)
+}
+
+/// Changes of a residual from each settled cycle to one after it.
 struct CycleChanges {
+    /// How many cycles after it.
+    apart: usize,
     /// Of each cell's relative position: `[cell][place in the cycle][cycle]`, m.
     relative_m: Vec<Vec<Vec<f64>>>,
     /// Of the displacement of the body from the mean over one step to the mean over the next: `[step][cycle]`, m.
@@ -152,7 +172,7 @@ struct CycleChanges {
 }
 
 impl CycleChanges {
-    fn new(observed: &Observed<'_>, bins: &Bins, residual: &Residual) -> Self {
+    fn new(observed: &Observed<'_>, bins: &Bins, residual: &Residual, apart: usize) -> Self {
         let cells = observed.cells();
         let per_cycle = bins.per_cycle() as usize;
         let from = bins
@@ -180,7 +200,8 @@ impl CycleChanges {
             }
         }
         let changes = |table: &[Vec<f64>], place: usize| -> Vec<f64> {
-            table.windows(2).map(|pair| pair[1][place] - pair[0][place]).collect()
+            let pairs = table.iter().zip(table.iter().skip(apart));
+            pairs.map(|(one, other)| other[place] - one[place]).collect()
         };
         let relative_m = tables[1..]
             .iter()
@@ -201,15 +222,16 @@ impl CycleChanges {
             .collect();
         let displacements: Vec<f64> = step_means.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let mut steps_m = vec![Vec::new(); cells];
-        for step in cells..displacements.len() {
-            steps_m[step % cells].push(displacements[step] - displacements[step - cells]);
+        for step in apart * cells..displacements.len() {
+            steps_m[step % cells].push(displacements[step] - displacements[step - apart * cells]);
         }
         let cycle_means: Vec<f64> = tables[0].iter().map(|cycle| mean_of(cycle)).collect();
         let cycles_m = cycle_means
-            .windows(3)
-            .map(|three| three[2] - 2.0 * three[1] + three[0])
+            .windows(2 * apart + 1)
+            .map(|window| window[2 * apart] - 2.0 * window[apart] + window[0])
             .collect();
         Self {
+            apart,
             relative_m,
             steps_m,
             cycles_m,
@@ -241,14 +263,20 @@ impl CycleChanges {
     }
 
     /// Variance of the change of the body's displacement from step to step, m².
-    fn of_steps_m2(&self) -> f64 {
-        variance(&self.steps_m.concat()).unwrap_or(0.0)
+    fn of_steps_m2(&self) -> Option<f64> {
+        variance(&self.steps_m.concat())
     }
 
     /// Number of changes from step to step that were seen.
     fn steps(&self) -> usize {
         let all = self.steps_m.iter().flatten();
         all.filter(|change_m| change_m.is_finite()).count()
+    }
+
+    /// Variance of [`of_cycles_m2`](Self::of_cycles_m2) where the body makes a random walk, in variances that it gathers in a cycle: each
+    /// of the two differences of means has n − 1/3, and they overlap by 1/6.
+    fn walk_of_second_differences(&self) -> f64 {
+        2.0 * self.apart as f64 - 1.0
     }
 
     /// Number of changes from cycle to cycle that were seen.
@@ -289,6 +317,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::super::fixture::{Campaign, NOISE_M, WALK_M, hypothesis, record, scene};
     use super::*;
+    use crate::experiment::Simulation;
     use crate::recording::Recording;
 
     /// The noise of the first run by the right model.
@@ -318,6 +347,31 @@ mod tests {
             "{}",
             noise.drift_per_cycle_m()
         );
+    }
+
+    #[test]
+    fn what_every_other_cycle_does_is_none_of_it() {
+        let usual = Campaign::default();
+        let cycles = 9.0;
+        let campaign = Campaign {
+            simulation: Simulation {
+                cycles,
+                ..usual.simulation
+            },
+            ..usual
+        };
+        let recordings = record(&campaign, None, 1);
+        let mut alternating = recordings.clone();
+        let samples = alternating[0].time_s.len() as f64;
+        for (sample, at_m) in alternating[0].position_m[1].iter_mut().enumerate() {
+            let cycle = (sample as f64 / samples * cycles) as usize;
+            *at_m += if cycle % 2 == 0 { 2e-4 } else { -2e-4 };
+        }
+        let [(plain, _), (alternating, _)] = [&recordings, &alternating].map(|recordings| measured(recordings));
+        let position_m2 = |noise: &RunNoise| noise.along * (noise.white_m2 + noise.shared_m2);
+        let ratio = position_m2(&alternating) / position_m2(&plain);
+        assert!(ratio < 1.5, "the variance grows by a factor {ratio}");
+        assert!(alternating.drift_per_cycle_m() < 2.0 * plain.drift_per_cycle_m().max(WALK_M));
     }
 
     #[test]

@@ -18,7 +18,7 @@ const AT_BEGIN: f64 = 0.02;
 const FALLS_BEHIND: f64 = 0.05;
 /// How far the stroke seen may be from the configured one, as a factor.
 const STROKE_FACTOR: f64 = 2.0;
-/// Time at rest before the first step that counts, s, and the time for which a worm just laid down settles on its tips, s.
+/// Time at rest before the first step that counts, or that is a pause, s, and the time for which a worm just laid down settles on its tips, s.
 const REST_S: f64 = 0.1;
 const SINKING_S: f64 = 0.05;
 /// Phase after which the worm counts as moving, cycles.
@@ -160,6 +160,34 @@ impl<'a> Observed<'a> {
     pub fn whole_cycles(&self) -> usize {
         let from = self.phase.get(self.settled_from()).copied().unwrap_or(f64::INFINITY);
         (self.phase[self.samples() - 1] - from).max(0.0).floor() as usize
+    }
+
+    /// Whether the drive stands still for a while on the way: what happens then does not repeat with the phase.
+    pub fn pauses(&self) -> bool {
+        let time_s = &self.run.recording.time_s;
+        let (first, last) = (self.phase[0] + MOVES, self.phase[self.samples() - 1] - MOVES);
+        let mut since = 0;
+        (0..self.samples()).any(|sample| {
+            let phase = self.phase[sample];
+            if phase != self.phase[since] {
+                since = sample;
+            }
+            phase > first && phase < last && time_s[sample] - time_s[since] > REST_S
+        })
+    }
+
+    /// Time of a phase, s, by linear interpolation; beyond the recording it is extrapolated at the mean pace.
+    pub fn time_at_s(&self, phase: f64) -> f64 {
+        let time_s = &self.run.recording.time_s;
+        let last = self.samples() - 1;
+        let after = self.phase.partition_point(|&here| here < phase);
+        if after == 0 || after > last {
+            let end = after.min(last);
+            return time_s[end] + (phase - self.phase[end]) * self.cycle_s;
+        }
+        let width = self.phase[after] - self.phase[after - 1];
+        let fraction = (phase - self.phase[after - 1]) / width;
+        time_s[after - 1] + fraction * (time_s[after] - time_s[after - 1])
     }
 
     /// The cell whose step a sample is in.

@@ -77,7 +77,7 @@ const STIFFNESS: (f64, f64, f64) = (0.05, 0.1, 4e-3);
 const STROKE: (f64, f64, f64) = (0.01, 0.03, 5e-4);
 const FRICTION_OF: (f64, f64, f64) = (0.025, 0.1, 4e-3);
 const STIFFNESS_OF: (f64, f64, f64) = (0.02, 0.08, 4e-3);
-const STROKE_OF: (f64, f64, f64) = (5e-4, 2e-3, 2e-4);
+const STROKE_OF: (f64, f64, f64) = (1e-3, 4e-3, 2e-4);
 const SLOPE_OF_DEG: (f64, f64, f64) = (0.15, 0.6, 0.05);
 const CLOCK_S: (f64, f64, f64) = (1e-3, 3e-3, 5e-4);
 const CLOCK_DRIFT: (f64, f64, f64) = (2e-4, 1e-3, 2e-5);
@@ -86,7 +86,7 @@ const PRESLIDING: (f64, f64, f64, f64, f64) = (0.02, 0.015, 1e-3, 0.08, 2e-3);
 /// Of the cam's rounding, as of the presliding: no cam has sharp corners.
 const ROUNDING: (f64, f64, f64, f64, f64) = (0.05, 0.05, 0.0, 0.3, 5e-3);
 /// Of the viscosity, as of the presliding: no contact is quite dry. At the paper's speed 1 N s/m is 18 mN, of some 2 N of friction.
-const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 0.5, 0.0, 4.0, 0.1);
+const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 1.0, 0.0, 6.0, 0.1);
 /// Of the excess of static friction, as of the presliding: no contact is without. In MuJoCo clean worms look as if they had up to
 /// 0.18, and dry rubber has as much.
 const BREAKAWAY: (f64, f64, f64, f64, f64) = (0.0, 0.1, 0.0, 0.25, 0.01);

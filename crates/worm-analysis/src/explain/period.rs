@@ -4,8 +4,13 @@
 //! the worm, with its own amplitude, phase and mean in every run (generalised Lomb-Scargle, Zechmeister and Kürster 2009: cycles are few
 //! and unevenly spaced, and the mean of few periods is not that of the wave). The largest fraction of the variance that a sine
 //! explains is compared with what it explains after shuffling the cycles of each run.
+//!
+//! How probable the wave is beside scatter of unknown size follows from the same fractions R²: with ν displacements beyond their means, k
+//! coefficients of the waves, and a prior on these worth one cycle of each run (Zellner's g-prior, g the cycles of a run), the Bayes
+//! factor is (1 + g)^((ν − k)/2) (1 + g (1 − R²))^(−ν/2) (Liang et al. 2008). Its mean over frequencies and both kinds of waves is the evidence.
 
 use super::fit::{Fit, FitProblem};
+use super::judge::ln_sum::ln_sum;
 use super::residual::Residual;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
@@ -19,6 +24,8 @@ const MIN_CYCLES: usize = 6;
 const SHORTEST: (f64, f64) = (2.0, 0.5);
 /// Oversampling of the frequencies that a run can resolve.
 const OVERSAMPLED: f64 = 12.0;
+/// The same for the evidence: frequencies that a run tells apart.
+const APART: f64 = 2.0;
 /// How often the cycles are shuffled, and in how many of these a sine may do as well.
 const SHUFFLES: usize = 200;
 const AS_GOOD: usize = 2;
@@ -41,22 +48,45 @@ struct Series {
     displacement_m: Vec<f64>, // mean taken out
 }
 
+/// Logarithm of the Bayes factor of a wave in the residual of a fit against scatter; none where no run is long enough.
+pub(super) fn ln_bayes(problem: &FitProblem<'_, '_>, fit: &Fit) -> Option<f64> {
+    ln_bayes_of(&displacements_of_all(problem, fit))
+}
+
+fn ln_bayes_of(series: &[Series]) -> Option<f64> {
+    let displacements: Vec<Vec<f64>> = series.iter().map(|one| one.displacement_m.clone()).collect();
+    let runs = series.len() as f64;
+    let count: f64 = displacements.iter().map(|one| one.len() as f64).sum();
+    let (free, waves) = (count - runs, 2.0 * runs);
+    let worth = count / runs;
+    let of_fraction = |fraction: f64| {
+        let left = worth * (1.0 - fraction).max(0.0);
+        0.5 * (free - waves) * worth.ln_1p() - 0.5 * free * left.ln_1p()
+    };
+    let of_all = |at: fn(&Series) -> &[f64], frequencies: Vec<f64>| {
+        let each = frequencies
+            .iter()
+            .map(|&frequency| of_fraction(fraction(series, &at, &displacements, frequency)));
+        (!frequencies.is_empty()).then(|| ln_sum(each) - (frequencies.len() as f64).ln())
+    };
+    let (by_cycle, by_place) = spans(series);
+    let both = [
+        of_all(|one| &one.cycle, frequencies(by_cycle, APART)),
+        of_all(|one| &one.place_m, frequencies(by_place, APART)),
+    ];
+    let found: Vec<f64> = both.into_iter().flatten().collect();
+    (!found.is_empty()).then(|| ln_sum(found.iter().copied()) - (found.len() as f64).ln())
+}
+
 /// The period of the residual of a fit; the clearer one where both in time and along the canal are beyond chance.
 pub(super) fn period(problem: &FitProblem<'_, '_>, fit: &Fit) -> Period {
-    let runs = 0..problem.scene.observed.len();
-    let series: Vec<Series> = runs.filter_map(|run| displacements(problem, run, fit)).collect();
-    period_of(&series)
+    period_of(&displacements_of_all(problem, fit))
 }
 
 fn period_of(series: &[Series]) -> Period {
-    let longest = |at: fn(&Series) -> &[f64]| {
-        let spans = series.iter().map(|one| at(one)[at(one).len() - 1] - at(one)[0]);
-        spans.fold(0.0, f64::max)
-    };
-    let by_cycle = strongest(series, |one| &one.cycle, longest(|one| &one.cycle), SHORTEST.0);
-    let span_m = longest(|one| &one.place_m);
-    let cycles: usize = series.iter().map(|one| one.cycle.len()).max().unwrap_or(1);
-    let by_place = strongest(series, |one| &one.place_m, span_m, SHORTEST.1 * span_m / cycles as f64);
+    let (cycles, places) = spans(series);
+    let by_cycle = strongest(series, |one| &one.cycle, &frequencies(cycles, OVERSAMPLED));
+    let by_place = strongest(series, |one| &one.place_m, &frequencies(places, OVERSAMPLED));
     match (by_cycle, by_place) {
         (Some(by_cycle), Some(by_place)) if by_cycle.1 >= by_place.1 => Period {
             cycles: Some(by_cycle.0),
@@ -72,6 +102,11 @@ fn period_of(series: &[Series]) -> Period {
         },
         (None, None) => Period::default(),
     }
+}
+
+fn displacements_of_all(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<Series> {
+    let runs = 0..problem.scene.observed.len();
+    runs.filter_map(|run| displacements(problem, run, fit)).collect()
 }
 
 /// Displacement of the body in each settled cycle of a run beyond the model's.
@@ -111,16 +146,37 @@ fn displacements(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<
     (series.displacement_m.len() >= MIN_CYCLES).then_some(series)
 }
 
+/// The longest run and the shortest period that it shows: in cycles, and along the canal in metres.
+fn spans(series: &[Series]) -> ((f64, f64), (f64, f64)) {
+    let longest = |at: fn(&Series) -> &[f64]| {
+        let spans = series.iter().map(|one| at(one)[at(one).len() - 1] - at(one)[0]);
+        spans.fold(0.0, f64::max)
+    };
+    let span_m = longest(|one| &one.place_m);
+    let cycles: usize = series.iter().map(|one| one.cycle.len()).max().unwrap_or(1);
+    (
+        (longest(|one| &one.cycle), SHORTEST.0),
+        (span_m, SHORTEST.1 * span_m / cycles as f64),
+    )
+}
+
+/// Frequencies from one wave in the longest run to the shortest period.
+fn frequencies((longest, shortest): (f64, f64), oversampled: f64) -> Vec<f64> {
+    if !(longest > shortest && shortest > 0.0) {
+        return Vec::new();
+    }
+    let step = 1.0 / (oversampled * longest);
+    let count = ((1.0 / shortest) / step) as usize;
+    (oversampled as usize..=count)
+        .map(|number| number as f64 * step)
+        .collect()
+}
+
 /// Period of the sine that explains most of the variance, and the fraction; none where chance does as well.
-fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], longest: f64, shortest: f64) -> Option<(f64, f64)> {
-    if series.is_empty() || !(longest > shortest && shortest > 0.0) {
+fn strongest(series: &[Series], at: impl Fn(&Series) -> &[f64], frequencies: &[f64]) -> Option<(f64, f64)> {
+    if frequencies.is_empty() {
         return None;
     }
-    let step = 1.0 / (OVERSAMPLED * longest);
-    let count = ((1.0 / shortest) / step) as usize;
-    let frequencies: Vec<f64> = (OVERSAMPLED as usize..=count)
-        .map(|number| number as f64 * step)
-        .collect();
     let best = |displacements: &[Vec<f64>]| {
         let fraction = |&frequency: &f64| (frequency, fraction(series, &at, displacements, frequency));
         let fractions = frequencies.iter().map(fraction);
@@ -211,6 +267,20 @@ mod tests {
                 "seed {seed}: {ribs:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_wave_is_evidence_and_scatter_is_none() {
+        let of =
+            |wave: &dyn Fn(f64, f64) -> f64, seed: u64| ln_bayes_of(&runs(wave, seed)).expect("they are long enough");
+        for seed in 0..5 {
+            let swings = of(&|cycle, _| 1e-4 * (TAU * cycle / 4.3 + 1.0).sin(), seed);
+            let ribs = of(&|_, m| 1e-4 * (TAU * m / 11e-3 + 1.0).sin(), seed);
+            assert!(swings > 5.0 && ribs > 5.0, "seed {seed}: {swings} and {ribs}");
+        }
+        // The mean of a Bayes factor over data without a wave is 1, most of it from few of them.
+        let mean = (0..200).map(|seed| of(&|_, _| 0.0, seed).exp()).sum::<f64>() / 200.0;
+        assert!((0.02..4.0).contains(&mean), "{mean}");
     }
 
     #[test]

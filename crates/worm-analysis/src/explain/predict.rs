@@ -4,15 +4,12 @@ use super::hypothesis::Hypothesis;
 use super::observed::Observed;
 use super::parameter::{Nuisance, What};
 use super::phase_correction::PhaseCorrection;
+use super::walk::{Gait, Settling, Walk};
 use worm_physics::{Crawl, Mechanics, Physics, Worm};
 
-/// Cycles that are run before a recording that begins in the middle of a crawl.
-const LEAD_CYCLES: f64 = 5.0;
-/// Cycles after which a worm that was laid down crawls periodically to within far less than the noise.
-const SETTLING_CYCLES: f64 = 5.0;
-/// Cycles of the crawl that are kept before it is repeated, and parts of a sample in which they are kept.
-const SEEN_CYCLES: f64 = 1.1;
-const PARTS_SEEN: usize = 4;
+/// Most cycles that are run before a recording that begins in the middle of a crawl, and the parts of each.
+const LEAD_CYCLES: usize = 5;
+const LEAD_PARTS: usize = 40;
 
 /// The runs, and the nominal worm in each.
 pub(super) struct Scene<'a> {
@@ -91,7 +88,7 @@ impl Scene<'_> {
     /// Whether the crawl of a run is simulated for some cycles and then repeated.
     pub fn repeats(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> bool {
         let is_steady = !hypothesis.throughout && hypothesis.begins_at(run).is_none();
-        is_steady && self.physics(run, hypothesis, at).0.is_periodic()
+        is_steady && !self.observed[run].pauses() && self.physics(run, hypothesis, at).0.is_periodic()
     }
 
     /// Positions of a run under a hypothesis; none where the worm could not have made it.
@@ -114,21 +111,30 @@ impl Scene<'_> {
     }
 }
 
-/// The crawl at the first sample of a recording.
-pub(super) fn start(observed: &Observed<'_>, mechanics: &Mechanics, phase: f64, damping: f64) -> Option<Crawl> {
+/// The crawl at the first sample of a recording. A periodic crawl under way has gone on until it repeats, any other for a few cycles.
+pub(super) fn start(
+    observed: &Observed<'_>,
+    mechanics: &Mechanics,
+    phase: f64,
+    damping: f64,
+    repeats: bool,
+) -> Option<Crawl> {
     let first_m = &observed.first_m;
     if observed.laid_down {
         return Crawl::at_rest(mechanics, phase, first_m, Some(damping)).ok();
     }
-    let lead = LEAD_CYCLES;
-    let samples = 200.0;
-    let mut crawl = Crawl::at_rest(mechanics, phase - lead, first_m, Some(damping)).ok()?;
-    let step_s = lead * observed.cycle_s / samples;
-    for sample in 1..=samples as usize {
-        let here = phase - lead * (1.0 - sample as f64 / samples);
+    let begin = phase - LEAD_CYCLES as f64;
+    let step_s = observed.cycle_s / LEAD_PARTS as f64;
+    let mut crawl = Crawl::at_rest(mechanics, begin, first_m, Some(damping)).ok()?;
+    let mut settling = Settling::default();
+    for part in 1..=LEAD_CYCLES * LEAD_PARTS {
+        let here = begin + part as f64 / LEAD_PARTS as f64;
         crawl.advance_to(mechanics, here, step_s).ok()?;
+        if repeats && part % LEAD_PARTS == 0 && settling.has_settled(&crawl) {
+            break;
+        }
     }
-    crawl.begin_at(first_m);
+    crawl.begin_at_phase(mechanics, phase, first_m);
     Some(crawl)
 }
 
@@ -147,43 +153,13 @@ fn predict_with(
     repeats: bool,
 ) -> Option<Predicted> {
     let mechanics = Mechanics::new(physics);
-    let cells = observed.cells();
-    let time_s = &observed.run.recording.time_s;
     if !observed.phase_recorded && physics.laws.overlap > 0.0 {
-        clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, cells));
+        clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, observed.cells()));
     }
-    let first_phase = clock.phase_at(0);
-    let mut crawl = start(observed, &mechanics, first_phase, damping)?;
-    let crawled = if observed.laid_down { SETTLING_CYCLES } else { 0.0 };
-    let repeats_from = if repeats {
-        first_phase + crawled + SEEN_CYCLES
-    } else {
-        f64::INFINITY
-    };
-    let mut position_m = Vec::with_capacity(cells * observed.samples());
-    let mut cycle = CycleSeen::default();
-    for sample in 0..observed.samples() {
-        let phase = clock.phase_at(sample);
-        if phase > repeats_from {
-            cycle.repeat(phase, cells, &mut position_m);
-        } else {
-            let step_s = time_s[sample] - time_s[sample.saturating_sub(1)];
-            let from = crawl.phase();
-            // From a little more than a cycle before it is repeated.
-            if phase > repeats_from - SEEN_CYCLES && repeats_from.is_finite() {
-                for part in 1..=PARTS_SEEN {
-                    let here = from + (phase - from) * part as f64 / PARTS_SEEN as f64;
-                    crawl.advance_to(&mechanics, here, step_s / PARTS_SEEN as f64).ok()?;
-                    cycle.see(here, crawl.positions_m());
-                }
-            } else {
-                crawl.advance_to(&mechanics, phase, step_s).ok()?;
-            }
-            position_m.extend_from_slice(crawl.positions_m());
-        }
-    }
-    position_m.iter_mut().for_each(|at_m| *at_m *= physics.view.scale);
-    Some(Predicted { position_m })
+    let crawl = start(observed, &mechanics, clock.phase_at(0), damping, repeats)?;
+    let mut walk = Walk::new(observed, clock, crawl);
+    walk.go_to(&mechanics, f64::INFINITY, Gait::new(repeats, !observed.laid_down))?;
+    Some(walk.seen_at(physics.view.scale))
 }
 
 /// Positions at every sample of a recording, by some physics and, from so many cycles after its start on, by another that differs in
@@ -196,83 +172,24 @@ fn predict_change(
     cycle: f64,
     damping: f64,
 ) -> Option<Predicted> {
-    let mechanics = [before, after].map(Mechanics::new);
-    let time_s = &observed.run.recording.time_s;
-    let mut crawl = start(observed, &mechanics[0], clock.phase_at(0), damping)?;
+    let [before_it, after_it] = [before, after].map(Mechanics::new);
+    let pauses = observed.pauses();
+    let repeats = !pauses && before.is_periodic();
+    let crawl = start(observed, &before_it, clock.phase_at(0), damping, repeats)?;
+    let mut walk = Walk::new(observed, clock, crawl);
     let change = observed.phase[0] + cycle;
-    let mut has_changed = false;
-    let mut position_m = Vec::with_capacity(observed.cells() * observed.samples());
-    for sample in 0..observed.samples() {
-        let phase = clock.phase_at(sample);
-        let mut left_s = time_s[sample] - time_s[sample.saturating_sub(1)];
-        if !has_changed && phase > change {
-            let from = crawl.phase();
-            let until_change_s = left_s * ((change - from) / (phase - from).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            if change > from {
-                crawl.advance_to(&mechanics[0], change, until_change_s).ok()?;
-            }
-            crawl.take_up(&mechanics[1]);
-            left_s -= until_change_s;
-            has_changed = true;
-        }
-        crawl
-            .advance_to(&mechanics[usize::from(has_changed)], phase, left_s)
-            .ok()?;
-        position_m.extend_from_slice(crawl.positions_m());
-    }
-    position_m.iter_mut().for_each(|at_m| *at_m *= before.view.scale);
-    Some(Predicted { position_m })
-}
-
-/// A cycle of a periodic crawl, kept in fine steps and then repeated.
-#[derive(Default)]
-struct CycleSeen {
-    phase: Vec<f64>,
-    position_m: Vec<f64>, // `[seen][cell]`, flat
-    advance_m: Vec<f64>,  // of each cell in a cycle; empty until something is repeated
-}
-
-impl CycleSeen {
-    fn see(&mut self, phase: f64, positions_m: &[f64]) {
-        self.phase.push(phase);
-        self.position_m.extend_from_slice(positions_m);
-    }
-
-    /// Position of a cell at a phase within the cycle kept, m, by linear interpolation.
-    fn at_m(&self, phase: f64, cell: usize, cells: usize) -> f64 {
-        let high = self
-            .phase
-            .partition_point(|&seen| seen < phase)
-            .clamp(1, self.phase.len() - 1);
-        let low = high - 1;
-        let width = self.phase[high] - self.phase[low];
-        let fraction = if width > 0.0 {
-            (phase - self.phase[low]) / width
-        } else {
-            0.0
-        };
-        let at_m = |seen: usize| self.position_m[seen * cells + cell];
-        at_m(low) + fraction * (at_m(high) - at_m(low))
-    }
-
-    /// Appends the positions at a later phase, as in the cycle kept.
-    fn repeat(&mut self, phase: f64, cells: usize, out: &mut Vec<f64>) {
-        let end = self.phase[self.phase.len() - 1];
-        if self.advance_m.is_empty() {
-            let last_m = &self.position_m[self.position_m.len() - cells..];
-            self.advance_m = (0..cells)
-                .map(|cell| last_m[cell] - self.at_m(end - 1.0, cell, cells))
-                .collect();
-        }
-        let cycles = (phase - end).ceil();
-        for cell in 0..cells {
-            out.push(self.at_m(phase - cycles, cell, cells) + cycles * self.advance_m[cell]);
-        }
-    }
+    walk.go_to(&before_it, change, Gait::new(repeats, !observed.laid_down))?;
+    walk.take_up(&after_it);
+    walk.go_to(
+        &after_it,
+        f64::INFINITY,
+        Gait::new(!pauses && after.is_periodic(), false),
+    )?;
+    Some(walk.seen_at(before.view.scale))
 }
 
 /// The gait phase one latency before each sample: a position shows the worm as it was then.
-struct Clock<'a> {
+pub(super) struct Clock<'a> {
     time_s: &'a [f64],
     phase: &'a [f64],
     /// At the start of the recording, where clocks are set, and its growth, s/s.
@@ -295,7 +212,7 @@ impl<'a> Clock<'a> {
     }
 
     /// For samples asked in order.
-    fn phase_at(&mut self, sample: usize) -> f64 {
+    pub fn phase_at(&mut self, sample: usize) -> f64 {
         let phase = self.recorded_at(sample);
         self.phase_correction
             .as_ref()

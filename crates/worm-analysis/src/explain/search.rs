@@ -8,12 +8,12 @@ use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::judge::candidate::{Candidate, kinds};
 use super::judge::decision::decide;
-use super::judge::evidence::evidence;
+use super::judge::evidence::{InTime, evidence};
 use super::judge::prior;
-use super::judge::structural_change::StructuralChanges;
 use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
 use super::onset::{mean_cycles, with_onsets};
 use super::parameter::{Hypothesised, Nuisance};
+use super::period;
 use super::prepare::{prepare, recalibrate};
 use super::refit::{REFITTED, alone, pair_up, refit};
 use super::score_test;
@@ -66,13 +66,14 @@ pub fn explain(
     let (problem, discrepancy, recalibrated) =
         recalibrate(&mut scene, &Hypothesis::new(&nuisances, &[]), options.discrepancy)?;
     report("screening", 0.15);
-    let changes = StructuralChanges::new(&problem, &discrepancy);
+    let in_time = InTime::new(&problem, &discrepancy);
     let judge = Judge {
         problem: &problem,
         discrepancy: &discrepancy,
-        changes: &changes,
+        in_time: &in_time,
         recalibrated: &recalibrated,
-        none: evidence(&discrepancy, Some(&changes), &recalibrated, &|_| None),
+        none: evidence(&discrepancy, Some(&in_time), &recalibrated, &|_| None)
+            .with_rhythm(period::ln_bayes(&problem, &recalibrated)),
         campaign: prior::Campaign {
             cells: config.worm.cells,
             runs: runs.len(),

@@ -2,17 +2,17 @@
 
 use super::{Crawl, Increment};
 use crate::mechanics::Mechanics;
-use crate::pad::{Hold, Loaded, Pad, PadLaw};
+use crate::pad::{Hold, Loaded, Pad, PadLaw, Rate};
 use crate::worm::SlidesDown;
 
 /// Tolerance of the balance, as a fraction of what the tips can hold.
-const BALANCE_FRACTION: f64 = 1e-9;
+const BALANCE_FRACTION: f64 = 1e-7;
 /// Most iterations of an increment: bisection alone would have converged by then.
 const MAX_ITERATIONS: usize = 120;
 /// Displacement of the body in one increment beyond which it counts as sliding down, m.
 const LOST_M: f64 = 0.5;
 /// Tolerance of a cell's displacement against its drive, m.
-const OWN_WAY_M: f64 = 1e-15;
+const OWN_WAY_M: f64 = 1e-12;
 /// Width at which a bracket is no longer halved, m.
 const NARROW_M: f64 = 1e-16;
 
@@ -80,7 +80,7 @@ impl Crawl {
     /// Evaluates a translation; afterwards every cell's trial is the one at it.
     pub(super) fn try_out(&mut self, mechanics: &Mechanics, increment: &Increment, translation_m: f64) -> Balance {
         let laws = &mechanics.laws;
-        let (damping, drag) = (increment.damping_n_per_m, increment.drag_n_per_m);
+        let drag = increment.drag_n_per_m;
         let (mut excess_n, mut slope_n_per_m) = (mechanics.pull_n, 0.0);
         // The displacement of the cells' mean, and its derivative by the translation of the body.
         let (mut mean_shift_m, mut yields) = (0.0, 0.0);
@@ -89,16 +89,13 @@ impl Crawl {
             let way = Way {
                 law,
                 pad: &cell.pad,
-                relaxing: increment.relaxing,
+                rate: increment.rate,
                 compliance_m_per_n: laws.compliance_m_per_n,
             };
             let (shift_m, loaded, gives) = way.load(trial.driven_m + translation_m, &mut trial.hold);
             (trial.shift_m, trial.loaded) = (shift_m, loaded);
-            let strain_m = loaded.deformation_m - cell.pad.deformation_m;
-            excess_n += loaded.force_n + damping * strain_m + drag * shift_m;
-            // The fraction of a shift that strains the pad.
-            let damped = damping * (loaded.tangent_n_per_m / law.stiffness_n_per_m).min(1.0);
-            slope_n_per_m += (loaded.tangent_n_per_m + damped + drag) * gives;
+            excess_n += loaded.force_n + drag * shift_m;
+            slope_n_per_m += (loaded.tangent_n_per_m + drag) * gives;
             mean_shift_m += shift_m;
             yields += gives;
         }
@@ -128,7 +125,7 @@ impl Crawl {
 struct Way<'a> {
     law: &'a PadLaw,
     pad: &'a Pad,
-    relaxing: f64,
+    rate: Rate,
     compliance_m_per_n: f64,
 }
 
@@ -137,7 +134,7 @@ impl Way<'_> {
     #[inline]
     fn load(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
         if self.compliance_m_per_n == 0.0 {
-            let loaded = self.law.load(self.pad, driven_m, hold, self.relaxing);
+            let loaded = self.law.load(self.pad, driven_m, hold, self.rate);
             return (driven_m, loaded, 1.0);
         }
         self.load_yielding(driven_m, hold)
@@ -148,7 +145,7 @@ impl Way<'_> {
         let compliance = self.compliance_m_per_n;
         let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut shift_m = driven_m / (1.0 + compliance * self.law.stiffness_n_per_m);
-        let mut loaded = self.law.load(self.pad, shift_m, hold, self.relaxing);
+        let mut loaded = self.law.load(self.pad, shift_m, hold, self.rate);
         for _ in 0..MAX_ITERATIONS {
             let excess_m = shift_m + compliance * (loaded.force_n - self.pad.force_n) - driven_m;
             if excess_m.abs() <= OWN_WAY_M || high_m - low_m < NARROW_M {
@@ -166,7 +163,7 @@ impl Way<'_> {
             } else {
                 0.5 * (low_m + high_m)
             };
-            loaded = self.law.load(self.pad, shift_m, hold, self.relaxing);
+            loaded = self.law.load(self.pad, shift_m, hold, self.rate);
         }
         (shift_m, loaded, 1.0 / (1.0 + compliance * loaded.tangent_n_per_m))
     }

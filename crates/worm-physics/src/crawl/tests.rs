@@ -2,6 +2,7 @@
 
 mod agreement;
 mod convergence;
+mod damper;
 mod energy_balance;
 
 use crate::Worm;

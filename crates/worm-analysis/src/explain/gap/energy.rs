@@ -47,7 +47,7 @@ fn walk(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit, path_m: Option<&[f6
     let observed = &problem.scene.observed[run];
     let (physics, damping) = problem.scene.physics(run, &fit.hypothesis, &fit.at);
     let mechanics = Mechanics::new(&physics);
-    let mut crawl = start(observed, &mechanics, observed.phase[0], damping)?;
+    let mut crawl = start(observed, &mechanics, observed.phase[0], damping, physics.is_periodic())?;
     let first_m = crawl.mean_position_m();
     let time_s = &observed.run.recording.time_s;
     let mut walk = Walk {

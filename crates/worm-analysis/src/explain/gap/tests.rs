@@ -103,13 +103,12 @@ fn only_cycles_that_were_held_out_count_as_such() {
     let wrong_m = measured.stage(StageKind::Named, None, &wrong, &[]).fit_rms_m;
     let right_m = rms_m(&[]);
     assert_eq!(rms_m(&[(right.clone(), fold(&scene, true))]), right_m);
-    assert_eq!(
-        rms_m(&[
-            (wrong.clone(), fold(&scene, true)),
-            (right.clone(), fold(&scene, false))
-        ]),
-        wrong_m
-    );
+    let of_wrong_m = rms_m(&[
+        (wrong.clone(), fold(&scene, true)),
+        (right.clone(), fold(&scene, false)),
+    ]);
+    // The sums run in another order.
+    assert!((of_wrong_m / wrong_m - 1.0).abs() < 1e-12, "{of_wrong_m} for {wrong_m}");
     assert!(rms_m(&[(wrong, fold(&scene, false))]).is_nan());
 }
 

@@ -58,6 +58,7 @@ impl Judged {
             large: f64::NEG_INFINITY,
             of_usual: [f64::NEG_INFINITY; 4],
             changing: None,
+            repeating: None,
         })
     }
 
@@ -215,7 +216,7 @@ fn change(none: Evidence, judged: &[Judged]) -> Option<Change> {
     let all = judged.iter().map(|one| (one.ln_share + one.ln_other(), one.evidence()));
     let (_, evidence) = all.chain([(none.other(), none)]).max_by(|a, b| a.0.total_cmp(&b.0))?;
     let (ln_changing, change) = evidence.changing?;
-    (ln_changing > evidence.large).then_some(change)
+    (ln_changing > evidence.large.max(evidence.repeating.unwrap_or(f64::NEG_INFINITY))).then_some(change)
 }
 
 #[cfg(test)]
@@ -235,6 +236,7 @@ mod tests {
             large,
             of_usual: [usual - 4.0_f64.ln(); 4],
             changing: None,
+            repeating: None,
         }
     }
 

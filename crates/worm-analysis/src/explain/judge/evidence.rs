@@ -12,7 +12,10 @@
 
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
+use super::super::plant::Plant;
+use super::beside::Fitted;
 use super::ln_sum::ln_sum;
+use super::repetition::Repetitions;
 use super::structural_change::{Change, StructuralChanges};
 use crate::least_squares::{cross, dot, prior_chi_squared, submatrix};
 use nalgebra::{DMatrix, DVector};
@@ -44,13 +47,53 @@ pub(in crate::explain) struct Evidence {
     pub of_usual: [f64; 4],
     /// With a discrepancy of a₀ and something that changes in the middle of a run, and where that is most probable; none where it was not asked.
     pub changing: Option<(f64, Change)>,
+    /// With a discrepancy of a₀ and something that repeats after some cycles; none where it was not asked.
+    pub repeating: Option<f64>,
+}
+
+/// What may be in the data beside any hypothesis, and shows in time.
+pub(in crate::explain) struct InTime {
+    pub changes: StructuralChanges,
+    pub repetitions: Repetitions,
+}
+
+impl InTime {
+    /// Of a campaign.
+    pub fn new(plant: &impl Plant, discrepancy: &Discrepancy) -> Self {
+        Self {
+            changes: StructuralChanges::new(plant, discrepancy),
+            repetitions: Repetitions::new(plant, discrepancy),
+        }
+    }
 }
 
 impl Evidence {
-    /// With something else wrong: a large discrepancy, or a change in the middle of a run, each as probable before.
+    /// With something else wrong: a large discrepancy, a change in the middle of a run, or a rhythm, each as probable before.
     pub fn other(&self) -> f64 {
         let changing = self.changing.map_or(f64::NEG_INFINITY, |(ln, _)| ln);
-        ln_sum([self.large, changing]) - 2.0_f64.ln()
+        let repeating = self.repeating.unwrap_or(f64::NEG_INFINITY);
+        ln_sum([self.large, changing, repeating]) - 3.0_f64.ln()
+    }
+
+    /// The same with the Bayes factor of a rhythm of the body, of which as much is expected.
+    pub fn with_rhythm(self, ln_bayes: Option<f64>) -> Self {
+        let of_body = ln_bayes.map(|ln_bayes| unweighted(&self.of_usual) + ln_bayes);
+        let all: Vec<f64> = self.repeating.into_iter().chain(of_body).collect();
+        Self {
+            repeating: (!all.is_empty()).then(|| ln_sum(all.iter().copied()) - (all.len() as f64).ln()),
+            ..self
+        }
+    }
+
+    /// The same where all data have become less probable by a factor e^`excess`.
+    pub fn less(self, excess: f64) -> Self {
+        Self {
+            usual: self.usual - excess,
+            large: self.large - excess,
+            of_usual: self.of_usual.map(|of_scale| of_scale - excess),
+            changing: self.changing.map(|(ln, change)| (ln - excess, change)),
+            repeating: self.repeating.map(|ln| ln - excess),
+        }
     }
 
     /// Posterior probabilities of the usual scales.
@@ -64,13 +107,18 @@ impl Evidence {
     }
 }
 
+/// The probability of the data with a discrepancy of a₀, of those with each usual size.
+fn unweighted(of_usual: &[f64; 4]) -> f64 {
+    of_usual[UNIT] - usual_weights()[UNIT].ln()
+}
+
 /// The prior of an effect's parameter at its value: logarithm of the density, and its width.
 pub(in crate::explain) type AtValue = (f64, f64);
 
 /// The evidence of a fit with derivatives. `of_effect` gives the prior of each quantity that belongs to an effect.
 pub(in crate::explain) fn evidence(
     discrepancy: &Discrepancy,
-    changes: Option<&StructuralChanges>,
+    in_time: Option<&InTime>,
     fit: &Fit,
     of_effect: &dyn Fn(usize) -> Option<AtValue>,
 ) -> Evidence {
@@ -135,16 +183,24 @@ pub(in crate::explain) fn evidence(
     let bend = step_and_rest(1.0).map_or(0.0, |(step, _)| step);
     let at_scale =
         |kappa: f64| step_and_rest(kappa).map_or(f64::NEG_INFINITY, |(step, rest)| rest + 0.5 * (step - bend).max(0.0));
-    let changing = changes.and_then(|changes| {
-        let normal = normal.clone().cholesky()?;
-        changes.beside(&fit.residual, &jacobian, &normal, &gradient)
+    let factor = in_time.and_then(|in_time| Some((in_time, normal.clone().cholesky()?)));
+    let (changing, repeating) = factor.map_or((None, None), |(in_time, normal)| {
+        let fitted = Fitted {
+            residual: &fit.residual,
+            jacobian: &jacobian,
+            normal: &normal,
+            gradient: &gradient,
+        };
+        (in_time.changes.beside(&fitted), in_time.repetitions.beside(&fitted))
     });
     let weights = usual_weights();
     let of_usual: [f64; 4] = std::array::from_fn(|at| at_scale(USUAL[at].0) + weights[at].ln());
     let usual = ln_sum(of_usual);
+    let at_unit = unweighted(&of_usual);
     Evidence {
         usual,
-        changing: changing.map(|(ln_bayes, change)| (of_usual[UNIT] - weights[UNIT].ln() + ln_bayes, change)),
+        changing: changing.map(|(ln_bayes, change)| (at_unit + ln_bayes, change)),
+        repeating: repeating.map(|ln_bayes| at_unit + ln_bayes),
         large: ln_sum(LARGE.map(at_scale)) - (LARGE.len() as f64).ln(),
         of_usual,
     }

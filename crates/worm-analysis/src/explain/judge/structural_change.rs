@@ -2,27 +2,18 @@
 //!
 //! What is wrong in every cycle alike looks like the discrepancy; what begins at some cycle does not. So beside a fit the residual may
 //! hold, from one cycle on and in one run or in all, another displacement of each cell by how far it is from the stepping one (cosines
-//! in the phase of the step), and another advance. Both are normal with standard deviations of several a₀, and integrated over. With D
-//! the whitened columns of one such change, r the residuals, and everything that is free in the fit projected out,
-//!
-//! ```text
-//! ln B = −½ ln det(1 + κ² G) + ½ vᵀ (κ⁻² + G)⁻¹ v,   G = Dᵀ K D,   v = Dᵀ K r
-//! ```
-//! is the logarithm of the Bayes factor against the fit without it (known as a structural change: Zeileis and Hornik 2007). The mean
-//! over all cycles, runs and κ is the evidence that there is one.
+//! in the phase of the step), and another advance. The mean over all cycles and runs is the evidence that there is one (known as a
+//! structural change: Zeileis and Hornik 2007).
 
 use super::super::discrepancy::Discrepancy;
 use super::super::plant::Plant;
+use super::beside::{Blocks, Fitted};
 use super::ln_sum::ln_sum;
-use crate::least_squares::cross;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Cosines in the phase of a step.
 const COSINES: usize = 3;
-/// Scales of the change over a₀.
-const SCALES: [f64; 3] = [2.0, 6.0, 18.0];
 /// Fewest cycles before a change and after it.
 const MIN_CYCLES: usize = 1;
 
@@ -39,10 +30,7 @@ pub(in crate::explain) struct Change {
 #[derive(Debug, Clone)]
 pub(in crate::explain) struct StructuralChanges {
     all: Vec<Change>,
-    /// Whitened columns, as many for each change.
-    columns: DMatrix<f64>,
-    /// Products of the columns of each change with each other.
-    gram: Vec<DMatrix<f64>>,
+    columns: Blocks,
 }
 
 impl StructuralChanges {
@@ -70,55 +58,15 @@ impl StructuralChanges {
             .par_iter()
             .flat_map_iter(|change| columns(plant, discrepancy.scale_m, *change))
             .collect();
-        let rows = columns.first().map_or(0, Vec::len);
-        let mut columns = DMatrix::from_iterator(rows, columns.len(), columns.into_iter().flatten());
-        discrepancy.whiten_columns(&mut columns);
-        let each = columns.ncols().checked_div(all.len()).unwrap_or(0);
-        let gram = (0..all.len())
-            .map(|number| {
-                let mine = columns.columns(number * each, each).into_owned();
-                cross(&mine, &mine)
-            })
-            .collect();
-        Self { all, columns, gram }
+        Self {
+            columns: Blocks::new(columns, all.len(), discrepancy),
+            all,
+        }
     }
 
-    /// The evidence for a change beside a fit with these residuals and derivatives, as the logarithm of the mean Bayes factor, and the
-    /// most probable change. `normal` is the normal matrix of the fit, `gradient` its gradient.
-    pub fn beside(
-        &self,
-        residual: &[f64],
-        jacobian: &DMatrix<f64>,
-        normal: &Cholesky<f64, Dyn>,
-        gradient: &DVector<f64>,
-    ) -> Option<(f64, Change)> {
-        if self.all.is_empty() {
-            return None;
-        }
-        let along = cross(&self.columns, jacobian);
-        let solved = normal.solve(&along.transpose());
-        let residual = DVector::from_column_slice(residual);
-        let product = self.columns.tr_mul(&residual) - solved.tr_mul(gradient);
-        let each = self.columns.ncols() / self.all.len();
-        let ln_bayes: Vec<f64> = self
-            .gram
-            .iter()
-            .enumerate()
-            .map(|(number, gram)| {
-                let from = number * each;
-                let projected = gram - along.rows(from, each) * solved.columns(from, each);
-                let product = product.rows(from, each);
-                let at_scale = |kappa: f64| {
-                    let scaled = &projected * (kappa * kappa) + DMatrix::identity(each, each);
-                    let Some(factor) = scaled.cholesky() else {
-                        return f64::NEG_INFINITY;
-                    };
-                    let gain = kappa * kappa * product.dot(&factor.solve(&product.into_owned()));
-                    0.5 * gain - 0.5 * factor.ln_determinant()
-                };
-                ln_sum(SCALES.map(at_scale)) - (SCALES.len() as f64).ln()
-            })
-            .collect();
+    /// The evidence for a change beside a fit, as the logarithm of the mean Bayes factor, and the most probable change.
+    pub(super) fn beside(&self, fitted: &Fitted<'_>) -> Option<(f64, Change)> {
+        let ln_bayes = self.columns.ln_bayes(fitted);
         let best = (0..self.all.len()).max_by(|&a, &b| ln_bayes[a].total_cmp(&ln_bayes[b]))?;
         let mean = ln_sum(ln_bayes.iter().copied()) - (self.all.len() as f64).ln();
         Some((mean, self.all[best]))
@@ -161,6 +109,7 @@ mod tests {
     use super::super::super::fixture::{Campaign, begun, hypothesis, problem, record_under, scene};
     use super::super::super::hypothesis::Hypothesis;
     use super::super::super::parameter::Onset;
+    use super::super::beside::with_nothing_free;
     use super::*;
 
     /// The evidence for a change beside the worm as it is at the start.
@@ -179,11 +128,8 @@ mod tests {
         };
         let changes = StructuralChanges::new(&problem, &discrepancy);
         let residual = problem.residuals(&Hypothesis::default(), &[]);
-        let nothing_free = DMatrix::zeros(residual.len(), 0);
-        let normal = DMatrix::zeros(0, 0).cholesky().expect("nothing is free");
-        changes
-            .beside(&residual, &nothing_free, &normal, &DVector::zeros(0))
-            .expect("there are cycles enough")
+        let found = with_nothing_free(&residual, |fitted| changes.beside(fitted));
+        found.expect("there are cycles enough")
     }
 
     #[test]
