@@ -79,7 +79,8 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         }
         let mine = possible.iter().filter(|(_, change)| change.what == what);
         for &(_, change) in mine.take(CLOSE_LOOKS) {
-            let Some(separation) = separation(problem, candidates, &change) else {
+            let separation = separation(problem, candidates, &change);
+            let Some(separation) = separation.filter(|separation| *separation >= WORTH_IT) else {
                 continue;
             };
             let scored = ScoredChange { change, separation };
@@ -92,7 +93,7 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
             }
         }
     }
-    match best.filter(|best| best.separation >= WORTH_IT) {
+    match best {
         Some(best) => proposal(problem, candidates, &best),
         None => on_the_bench(candidates),
     }

@@ -10,6 +10,7 @@ use super::hypothesis::Hypothesis;
 use super::judge::candidate::Candidate;
 use super::judge::ln_sum::ln_sum;
 use super::judge::prior;
+use super::judge::structural_change::Change;
 use super::judgement::Judge;
 use super::parameter::{Hypothesised, Onset};
 use super::refit::refit;
@@ -24,6 +25,8 @@ const STRENGTH: f64 = 8.0;
 const FITTED: usize = 4;
 /// Factors on the change of a trial for which its direction stands.
 const STANDS_FOR: (f64, f64) = (0.1, 3.0);
+/// Gauss-Newton steps of a recalibration on what was seen before a change.
+const STEPS_BEFORE: usize = 3;
 /// Values of the onset that are tried about the best so far: their distance, cycles, and how many to either side.
 const GRIDS: [(f64, i32); 2] = [(0.25, 5), (0.0625, 4)];
 
@@ -64,16 +67,13 @@ fn onsets(problem: &FitProblem<'_, '_>) -> Vec<Onset> {
 
 /// The effects that most probably begin in mid-run, fitted with their onsets. `screened` are those that act throughout.
 pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[Screening]) -> Vec<Candidate> {
-    let mut promising = screen(judge, screened);
+    let base = match judge.none.changing {
+        Some((ln_changing, change)) if ln_changing > judge.none.usual => before_change(judge.problem, nominal, change),
+        _ => judge.recalibrated.clone(),
+    };
+    let mut promising = screen(judge, &base, screened);
     promising.truncate(FITTED);
-    let fitted = refit(
-        judge.problem,
-        judge.recalibrated,
-        nominal,
-        &promising,
-        FITTED,
-        &mut |_| (),
-    );
+    let fitted = refit(judge.problem, &base, nominal, &promising, FITTED, &mut |_| ());
     let mut candidates: Vec<Candidate> = fitted
         .into_iter()
         .map(|candidate| {
@@ -88,9 +88,26 @@ pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[
     candidates
 }
 
-/// Scores of every effect for every onset; the most probable onset of each, best first.
-fn screen(judge: &Judge<'_, '_, '_>, screened: &[Screening]) -> Vec<Screening> {
-    let (problem, fit) = (judge.problem, judge.recalibrated);
+/// The model recalibrated on what was seen before a change: what comes after it would drive the recalibration astray.
+fn before_change(problem: &FitProblem<'_, '_>, nominal: &Fit, change: Change) -> Fit {
+    let rows = problem.bin_of_rows().into_iter();
+    let is_before = |(run, bin): (usize, usize)| {
+        let bins = &problem.bins[run];
+        let since = bins.bins[bin].phase - bins.start_phase;
+        change.run.is_some_and(|of| of != run) || since < change.cycle as f64
+    };
+    let stays: Vec<bool> = rows.map(is_before).collect();
+    let mut fit = nominal.clone();
+    for _ in 0..STEPS_BEFORE {
+        fit = problem.step_without(fit, &stays);
+        problem.compute_jacobian(&mut fit);
+    }
+    fit
+}
+
+/// Scores of every effect about a fit for every onset; the most probable onset of each, best first.
+fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening]) -> Vec<Screening> {
+    let problem = judge.problem;
     let onsets = onsets(problem);
     let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
     let jacobian = DMatrix::from_iterator(

@@ -96,8 +96,8 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
 
 #[test]
 fn a_payload_tells_a_wrong_slope_from_a_constant_drag() {
-    // The same pull at 30°: m g (sin 33.5° − sin 30°).
-    let next = proposed(&[("slope-error", 3.5), ("constant-drag", 0.170)]).expect("two rivals");
+    // The same pull at 30°: m g (sin 32.95° − sin 30°).
+    let next = proposed(&[("slope-error", 2.95), ("constant-drag", 0.1434)]).expect("two rivals");
     assert_eq!(
         (next.change, &*next.unit),
         (ExperimentChange::Run(RunChange::Payload), "kg"),
