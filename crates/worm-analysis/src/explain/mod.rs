@@ -47,6 +47,7 @@ mod local_restart;
 mod matters;
 pub mod model_update;
 mod noise;
+mod normal_probability;
 mod observed;
 mod onset;
 mod parameter;

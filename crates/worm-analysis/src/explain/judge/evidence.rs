@@ -9,9 +9,13 @@
 //! at κ a₀, and χ² is that after one Gauss-Newton step with this W. All κ follow from the same products. At κ = 1 there is no step, for
 //! that is where the fit ended: what a step still promises there is a bend of the model, and is taken off at every κ. Z is the mean
 //! over κ: near one for a hypothesis that is meant to be right, and many times a₀ for one beside which something else is wrong.
+//!
+//! A nuisance with a limit is integrated up to it: near the limit part of its bell is missing, and on the limit what is left falls from
+//! there. Both with everything else free, so that nothing is gained or lost where a nuisance comes off its limit.
 
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
+use super::super::normal_probability::normal_probability;
 use super::super::plant::Plant;
 use super::beside::Fitted;
 use super::ln_sum::ln_sum;
@@ -152,10 +156,19 @@ pub(in crate::explain) fn evidence(
         let quantity = &unlimited[at];
         dot(&fit.jacobian[at], &fit.residual, None) + (fit.at[at] - quantity.centre) * quantity.sigma.powi(-2)
     };
-    // A quantity on its limit falls from there as an exponential and half a bell, and not as a whole bell.
-    for at in (0..fit.at.len()).filter(|at| !open.contains(at)) {
-        let width = (slope(at).abs() + (whole[(at, at)] / FRAC_PI_2).sqrt()).recip();
-        ln_priors += width.ln() - 0.5 * TAU.ln();
+    if let Some(factor) = normal.clone().cholesky() {
+        for at in (0..fit.at.len()).filter(|at| !open.contains(at)) {
+            let shared = DVector::from_iterator(count, open.iter().map(|&other| whole[(other, at)]));
+            let curvature = (whole[(at, at)] - shared.dot(&factor.solve(&shared))).max(1e-9 * whole[(at, at)]);
+            ln_priors += ln_beyond_limit(slope(at).abs(), curvature) - 0.5 * TAU.ln();
+        }
+        let variance = factor.inverse();
+        for (place, &at) in open.iter().enumerate().filter(|(_, at)| of_effect(**at).is_none()) {
+            let (quantity, sigma) = (&unlimited[at], variance[(place, place)].sqrt());
+            let above = normal_probability((quantity.max - fit.at[at]) / sigma);
+            let below = normal_probability((fit.at[at] - quantity.min) / sigma);
+            ln_priors += (above + below - 1.0).ln();
+        }
     }
     let gradient = DVector::from_iterator(count, open.iter().map(|&at| slope(at)));
     let step_and_rest = |kappa: f64| {
@@ -206,6 +219,11 @@ pub(in crate::explain) fn evidence(
     }
 }
 
+/// Logarithm of the integral of e^(−slope x − ½ curvature x²) over x > 0, within 6 %: Mills' ratio after Sampford.
+fn ln_beyond_limit(slope: f64, curvature: f64) -> f64 {
+    (2.0 / (slope + (slope * slope + 4.0 * curvature / FRAC_PI_2).sqrt())).ln()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::super::hypothesis::Hypothesis;
@@ -251,37 +269,72 @@ mod tests {
         );
     }
 
-    /// A nuisance that cannot be negative, and that the data push below 0.
+    /// A nuisance that cannot be negative, and another that does nearly the same: on the limit and near it the evidence is the integral
+    /// over what is left of both.
     #[test]
-    fn on_a_limit_it_is_the_integral_over_what_is_left() {
-        let (y, d, sigma) = ([-1.0, -1.0], [4.0, 3.0], 0.5);
-        let free = Free {
-            what: What::Nuisance(Nuisance::Viscosity),
+    fn at_a_limit_it_is_the_integral_over_what_is_left() {
+        let (along, limited, sigma) = ([4.0, 3.0, 1.0], [3.0, 4.0, -0.5], 0.5);
+        let free = |what: Nuisance, (min, max): (f64, f64)| Free {
+            what: What::Nuisance(what),
             quantity: Quantity {
                 sigma,
-                min: 0.0,
-                max: 10.0,
+                min,
+                max,
                 ..Quantity::unlimited(1e-3)
             },
         };
-        let residual: Vec<f64> = y.iter().map(|y| -y).collect();
-        let estimate = Estimate {
-            at: vec![0.0],
-            residual,
-            jacobian: vec![d.to_vec()],
-            chi_squared: 0.0,
-            converged: true,
-        };
-        let fit = Fit::new(&Hypothesis::new(&[free], &[]), estimate);
-        let found = evidence(&Discrepancy::none(2), None, &fit, &|_| None);
-        let (nodes, to) = (100_000, 2.0);
-        let width = to / f64::from(nodes);
-        let density = |node: i32| {
-            let x = (f64::from(node) + 0.5) * width;
-            let square: f64 = y.iter().zip(&d).map(|(y, d)| (d * x - y).powi(2)).sum();
-            (-0.5 * square - 0.5 * (x / sigma).powi(2)).exp() / (sigma * TAU.sqrt())
-        };
-        let expected = (0..nodes).map(|node| density(node) * width).sum::<f64>().ln();
-        assert!((found.usual - expected).abs() < 0.2, "{} for {expected}", found.usual);
+        let hypothesis = Hypothesis::new(
+            &[
+                free(Nuisance::Friction, (-10.0, 10.0)),
+                free(Nuisance::Viscosity, (0.0, 10.0)),
+            ],
+            &[],
+        );
+        for push in [-2.0, -0.5, 0.0, 0.3, 1.0, 3.0] {
+            let y: Vec<f64> = along
+                .iter()
+                .zip(limited)
+                .map(|(along, limited)| 0.3 * along + push * limited)
+                .collect();
+            let chi_squared = |at: [f64; 2]| {
+                let rows = y.iter().zip(along.iter().zip(limited));
+                let of_data: f64 = rows
+                    .map(|(y, (along, limited))| (along * at[0] + limited * at[1] - y).powi(2))
+                    .sum();
+                of_data + (at[0] / sigma).powi(2) + (at[1] / sigma).powi(2)
+            };
+            // The best of the first for each of the second, and the best of those.
+            let [aa, ay, al] = [&along[..], &y[..], &limited[..]].map(|other| dot(&along, other, None));
+            let first = |second: f64| (ay - al * second) / (aa + sigma.powi(-2));
+            let (nodes, to) = (20_000, 4.0);
+            let width = to / f64::from(nodes);
+            let seconds = || (0..=nodes).map(|node| f64::from(node) * width);
+            let second = seconds()
+                .min_by(|a, b| chi_squared([first(*a), *a]).total_cmp(&chi_squared([first(*b), *b])))
+                .expect("some");
+            // Over the first exactly, over the second by the trapezoidal rule.
+            let of_first = (TAU / (aa + sigma.powi(-2))).sqrt();
+            let density = |second: f64| (-0.5 * chi_squared([first(second), second])).exp() * of_first;
+            let sum: f64 = seconds().map(density).sum::<f64>() - 0.5 * (density(0.0) + density(to));
+            let expected = (sum * width / (TAU * sigma * sigma)).ln();
+            let at = [first(second), second];
+            let residual = y
+                .iter()
+                .zip(along.iter().zip(limited))
+                .map(|(y, (along, limited))| along * at[0] + limited * at[1] - y);
+            let estimate = Estimate {
+                at: at.to_vec(),
+                residual: residual.collect(),
+                jacobian: vec![along.to_vec(), limited.to_vec()],
+                chi_squared: 0.0,
+                converged: true,
+            };
+            let found = evidence(&Discrepancy::none(3), None, &Fit::new(&hypothesis, estimate), &|_| None);
+            assert!(
+                (found.usual - expected).abs() < 0.06,
+                "{push}: {} for {expected}",
+                found.usual
+            );
+        }
     }
 }
