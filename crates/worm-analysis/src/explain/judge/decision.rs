@@ -128,6 +128,8 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     };
     let mut order: Vec<usize> = (0..judged.len()).filter(|&at| needs_both(&judged[at])).collect();
     order.sort_by(|&a, &b| judged[b].ln_weight().total_cmp(&judged[a].ln_weight()));
+    // A pair that earns no place by itself earns none with something else beside it, either.
+    let standing: Vec<&Judged> = order.iter().map(|&at| &judged[at]).collect();
     let mut classes: Vec<Class> = Vec::new();
     for at in order {
         let one = &judged[at];
@@ -146,7 +148,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     }
     classes.sort_by(|a, b| b.ln_weight.total_cmp(&a.ln_weight));
     let half = 0.5 * prior::OTHER;
-    let beside = judged.iter().map(|one| half.ln() + one.ln_share + one.ln_other());
+    let beside = standing.iter().map(|one| half.ln() + one.ln_share + one.ln_other());
     let other: Vec<f64> = beside.chain([half.ln() + none.other()]).collect();
     let ln_none = prior::NONE.ln() + none.usual;
     let ln_other = ln_sum(other.iter().copied());
@@ -205,15 +207,17 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         probability,
         null_probability,
         other_probability,
-        change: change(none, &judged),
+        change: change(none, &standing),
         best_wrong,
         all: judged.into_iter().map(|one| one.candidate).collect(),
     }
 }
 
 /// The change in mid-run of the hypothesis that makes something else most probable, where it is that change and no large discrepancy.
-fn change(none: Evidence, judged: &[Judged]) -> Option<Change> {
-    let all = judged.iter().map(|one| (one.ln_share + one.ln_other(), one.evidence()));
+fn change(none: Evidence, standing: &[&Judged]) -> Option<Change> {
+    let all = standing
+        .iter()
+        .map(|one| (one.ln_share + one.ln_other(), one.evidence()));
     let (_, evidence) = all.chain([(none.other(), none)]).max_by(|a, b| a.0.total_cmp(&b.0))?;
     let (ln_changing, change) = evidence.changing?;
     (ln_changing > evidence.large.max(evidence.repeating.unwrap_or(f64::NEG_INFINITY))).then_some(change)
@@ -407,6 +411,15 @@ mod tests {
     }
 
     /// After an effect of 60 standard deviations, one of 6 may be what its law is wrong by.
+    #[test]
+    fn a_pair_that_earns_no_place_says_nothing_about_something_else() {
+        let mut pair = judged(&["pad-creep", "backlash"], 440.0, 435.0);
+        pair.holds = false;
+        let selected = verdict(0.0, vec![judged(&["pad-creep"], 400.0, 380.0), pair]);
+        assert_eq!(selected.verdict, Verdict::Explained);
+        assert_eq!(selected.candidates[0].hypothesised.len(), 1);
+    }
+
     #[test]
     fn what_may_be_the_error_of_the_first_law_is_no_second_effect() {
         let second = |first: f64, gain: f64| {
