@@ -46,7 +46,6 @@ pub struct Crawl {
     travelled_m: f64, // by the mean of the cells
     velocity_m_s: f64,
     acceleration_m_s2: f64,
-    rate_m_s: f64, // of the body's translation in the last increment
     damping_ratio: Option<f64>,
     ledger: Ledger,
 }
@@ -106,7 +105,6 @@ impl Crawl {
             travelled_m: 0.0,
             velocity_m_s: 0.0,
             acceleration_m_s2: 0.0,
-            rate_m_s: 0.0,
             damping_ratio: None,
             ledger: Ledger::default(),
         };
@@ -122,7 +120,6 @@ impl Crawl {
         Ok(Self {
             position_m,
             travelled_m: 0.0,
-            rate_m_s: 0.0,
             damping_ratio,
             ledger: Ledger::default(),
             ..crawl
@@ -382,7 +379,6 @@ impl Crawl {
             cell.drag_n = drag_n;
         }
         self.ledger.deformation_integral_m += deformation_m * (phase - self.phase).abs();
-        self.rate_m_s = translation_m / increment.step_s;
         self.phase = phase;
     }
 }

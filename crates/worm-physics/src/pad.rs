@@ -61,11 +61,33 @@ pub(super) struct Pad {
 pub(super) struct Hold {
     min_n: f64,
     max_n: f64,
-    // Deformation and force before the cell moves, and deformations at the limits, on first use: all depend on the tip's state alone,
-    // not on the shift.
-    still: Option<(f64, f64)>,
-    min_m: Option<f64>,
+    // Found on first use: all depend on the tip's state alone, not on the shift.
+    bristles: Option<Bristles>,
+    min_m: Option<f64>, // deformations at the limits
     max_m: Option<f64>,
+}
+
+/// A tip on bristles before its cell moves in an increment.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bristles {
+    still_m: f64, // deformation at which the pad bears what the bristles hold
+    from_m: f64,  // the same, by the drive
+    slope_n_per_m: f64,
+    softness: f64, // compliance of the bristles, relative to the pad's
+    yields: f64,   // deformation of pad and drive together, relative to the pad's
+    per_yields: f64,
+    backward: Side,
+    forward: Side,
+}
+
+/// One limit of a tip on bristles.
+#[derive(Debug, Clone, Copy, Default)]
+struct Side {
+    limit_n: f64,
+    left: f64,          // remaining friction, a fraction of it
+    whole_m: f64,       // deformation of the pad by the whole limit
+    per_m: f64,         // its inverse
+    twice_product: f64, // of remaining friction and softness
 }
 
 /// A tip after a shift of its cell.
@@ -80,7 +102,7 @@ pub(super) struct Loaded {
 }
 
 impl PadLaw {
-    fn is_linear(&self) -> bool {
+    pub fn is_linear(&self) -> bool {
         self.hardening_per_m2 == 0.0 && self.creep_n_per_m == 0.0 && self.element_n_per_m == 0.0
     }
 
@@ -95,7 +117,7 @@ impl PadLaw {
         Hold {
             min_n: -self.backward_n * limit,
             max_n: self.forward_n * limit,
-            still: None,
+            bristles: None,
             min_m: None,
             max_m: None,
         }
@@ -105,7 +127,7 @@ impl PadLaw {
     #[inline]
     pub fn load(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, rate: Rate) -> Loaded {
         if self.presliding > 0.0 {
-            return self.load_bristles(pad, shift_m, hold, rate);
+            return self.load_bristles(pad, shift_m, hold, rate, 0.0);
         }
         let reach_m = pad.deformation_m + shift_m;
         let (reach_n, tangent_n_per_m) = self.force(pad, reach_m, rate);
@@ -139,46 +161,92 @@ impl PadLaw {
     ///
     /// The bristles hold what they held at the increment's start, so the pad first deforms to where it bears that, and only the shift
     /// beyond changes the force. With u = 1 − F/limit, the remaining friction, and c the compliance of the bristles relative to the pad's,
-    /// the pad takes u/(u + c) of it and the tip slides the rest. For a linear pad that is a quadratic in u at the increment's end.
-    fn load_bristles(&self, pad: &Pad, shift_m: f64, hold: &mut Hold, rate: Rate) -> Loaded {
-        let (still_m, still_n) = *hold.still.get_or_insert_with(|| {
-            let held_n = pad.force_n.clamp(hold.min_n, hold.max_n);
-            (self.invert(pad, held_n, rate), held_n)
-        });
-        let reach_m = pad.deformation_m + shift_m;
-        let beyond_m = reach_m - still_m;
-        let limit_n = if beyond_m > 0.0 { hold.max_n } else { hold.min_n };
-        let slope = self.force(pad, still_m, rate).1;
-        let fraction = self.presliding * slope / self.stiffness_n_per_m;
-        let left = (1.0 - still_n / limit_n).max(0.0);
-        let linear = fraction - left + beyond_m * slope / limit_n;
-        let root = (linear * linear + 4.0 * left * fraction).sqrt();
+    /// the pad takes u/(u + c) of it and the tip slides the rest. For a linear pad that is a quadratic in u at the increment's end, also
+    /// where the cell is driven by something with a compliance of its own.
+    ///
+    /// The cell's shift is the drive's, less what the compliance takes. Of a curved pad the compliance must be 0.
+    pub fn load_bristles(
+        &self,
+        pad: &Pad,
+        driven_m: f64,
+        hold: &mut Hold,
+        rate: Rate,
+        compliance_m_per_n: f64,
+    ) -> Loaded {
+        let (min_n, max_n) = (hold.min_n, hold.max_n);
+        let bristles = &*hold
+            .bristles
+            .get_or_insert_with(|| self.bristles(pad, (min_n, max_n), rate, compliance_m_per_n));
+        let (still_m, slope, yields) = (bristles.still_m, bristles.slope_n_per_m, bristles.yields);
+        // If the force stayed what the bristles hold.
+        let beyond_m = pad.deformation_m + driven_m - bristles.from_m;
+        let side = if beyond_m > 0.0 {
+            &bristles.forward
+        } else {
+            &bristles.backward
+        };
+        let linear = bristles.softness - yields * side.left + beyond_m * side.per_m;
+        let root = (linear * linear + 2.0 * yields * side.twice_product).sqrt();
         // The form of the root without cancellation.
         let after = if linear > 0.0 {
-            2.0 * left * fraction / (linear + root)
+            side.twice_product / (linear + root)
         } else {
-            0.5 * (root - linear)
+            0.5 * (root - linear) * bristles.per_yields
         };
+        let limit_n = side.limit_n;
+        let mut shift_m = driven_m;
         let (deformation_m, force_n, tangent_n_per_m) = if self.is_linear() {
             let force_n = limit_n * (1.0 - after);
-            (still_m + (force_n - still_n) / slope, force_n, slope * after / root)
-        } else if left == 0.0 {
+            shift_m -= compliance_m_per_n * (force_n - pad.force_n);
+            // By the shift, which is less than the drive's.
+            let tangent_n_per_m = slope * after / (root - (yields - 1.0) * after);
+            (still_m + (side.left - after) * side.whole_m, force_n, tangent_n_per_m)
+        } else if side.left == 0.0 {
             (still_m, limit_n, 0.0)
         } else {
-            let guess_m = limit_n * (left - after) / slope;
+            let guess_m = (side.left - after) * side.whole_m;
             let (strain_m, force_n, tangent) = self.strain_bristles(pad, still_m, beyond_m, limit_n, rate, guess_m);
             (still_m + strain_m, force_n, tangent)
         };
         Loaded {
             deformation_m,
             force_n,
-            slide_m: reach_m - deformation_m,
+            slide_m: pad.deformation_m + shift_m - deformation_m,
             tangent_n_per_m,
-            sliding: if force_n / limit_n > SLIDES_FROM {
+            sliding: if force_n.abs() > SLIDES_FROM * limit_n.abs() {
                 sign_of(beyond_m)
             } else {
                 0
             },
+        }
+    }
+
+    /// A tip on bristles before its cell moves, with what it can hold to either side.
+    fn bristles(&self, pad: &Pad, (min_n, max_n): (f64, f64), rate: Rate, compliance_m_per_n: f64) -> Bristles {
+        let still_n = pad.force_n.clamp(min_n, max_n);
+        let still_m = self.invert(pad, still_n, rate);
+        let slope_n_per_m = self.force(pad, still_m, rate).1;
+        let softness = self.presliding * slope_n_per_m / self.stiffness_n_per_m;
+        let yields = 1.0 + compliance_m_per_n * slope_n_per_m;
+        let side = |limit_n: f64| {
+            let left = (1.0 - still_n / limit_n).max(0.0);
+            Side {
+                limit_n,
+                left,
+                whole_m: limit_n / slope_n_per_m,
+                per_m: slope_n_per_m / limit_n,
+                twice_product: 2.0 * left * softness,
+            }
+        };
+        Bristles {
+            still_m,
+            from_m: still_m + compliance_m_per_n * (still_n - pad.force_n),
+            slope_n_per_m,
+            softness,
+            yields,
+            per_yields: yields.recip(),
+            backward: side(min_n),
+            forward: side(max_n),
         }
     }
 
@@ -233,9 +301,12 @@ impl PadLaw {
         pad.force_n = loaded.force_n;
         // What a tip holds at rest beyond its kinetic friction is lost in the slide, half of it on average.
         let freed_j = 0.5 * (before_n - loaded.force_n) * loaded.slide_m;
-        if self.is_linear() && rate.damping_n_per_m == 0.0 {
+        if self.is_linear() {
+            // Of a linear pad only the damper takes energy.
+            let strain_m = deformation_m - pad.deformation_m;
+            let spring_n = 0.5 * self.stiffness_n_per_m * (deformation_m + pad.deformation_m);
             pad.deformation_m = deformation_m;
-            return freed_j;
+            return freed_j + (0.5 * (before_n + loaded.force_n) - spring_n) * strain_m;
         }
         let elastic_before_j = self.elastic_j(pad);
         let strain_j = 0.5 * (before_n + loaded.force_n) * (deformation_m - pad.deformation_m);

@@ -4,8 +4,8 @@ use super::observed::Observed;
 use super::predict::{Clock, Predicted};
 use worm_physics::{Crawl, MAX_CELLS, Mechanics};
 
-/// Change of every pad's deformation from cycle to cycle below which a crawl has settled, m: far less than any noise.
-const SETTLED_M: f64 = 1e-8;
+/// Change of every pad's deformation from cycle to cycle below which a crawl has settled, m: the next is a twentieth or less.
+const SETTLED_M: f64 = 3e-7;
 /// Fewest knots of a step, of a cycle that is repeated, and the longest time between two, s: a small part of an oscillation.
 const KNOTS_OF_STEP: f64 = 104.0;
 const LONGEST_S: f64 = 4.1e-3;

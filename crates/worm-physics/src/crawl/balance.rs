@@ -28,9 +28,12 @@ impl Crawl {
     pub(super) fn solve(&mut self, mechanics: &Mechanics, increment: &Increment) -> Result<f64, SlidesDown> {
         let tolerance_n = BALANCE_FRACTION * mechanics.full_force_n.max(1e-6);
         let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
-        // Without mass several translations may balance: the one nearest to rest is the solution.
+        // Without mass several translations may balance: the one nearest to rest is the solution. With mass the body goes on as it moves.
         let mut at_m = if increment.inertia_n_per_m > 0.0 {
-            self.rate_m_s * increment.step_s
+            let cells = &self.cell[..self.cells];
+            let driven_m: f64 = cells.iter().map(|cell| cell.trial.driven_m).sum();
+            let velocity_m_s = self.velocity_m_s + 0.5 * self.acceleration_m_s2 * increment.step_s;
+            velocity_m_s * increment.step_s - driven_m / self.cells as f64
         } else {
             0.0
         };
@@ -136,6 +139,12 @@ impl Way<'_> {
         if self.compliance_m_per_n == 0.0 {
             let loaded = self.law.load(self.pad, driven_m, hold, self.rate);
             return (driven_m, loaded, 1.0);
+        }
+        if self.law.presliding > 0.0 && self.law.is_linear() {
+            let compliance = self.compliance_m_per_n;
+            let loaded = self.law.load_bristles(self.pad, driven_m, hold, self.rate, compliance);
+            let shift_m = driven_m - compliance * (loaded.force_n - self.pad.force_n);
+            return (shift_m, loaded, 1.0 / (1.0 + compliance * loaded.tangent_n_per_m));
         }
         self.load_yielding(driven_m, hold)
     }

@@ -1,6 +1,7 @@
 //! The incremental motion against the exact one, its energy balance, and its limits.
 
 mod agreement;
+mod compliance;
 mod convergence;
 mod damper;
 mod energy_balance;
