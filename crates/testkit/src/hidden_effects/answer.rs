@@ -78,6 +78,8 @@ pub struct FoundOnset {
     pub time_s: Option<f64>,
     /// The run in which it begins, from 0; none where it begins in every run.
     pub run: Option<usize>,
+    /// The effect ends there, instead.
+    pub ends: bool,
 }
 
 /// The scored part of an explanation.
@@ -205,6 +207,7 @@ fn onset(value: &Value, runs: &Value) -> Result<Option<FoundOnset>, String> {
         cycle: value["cycle"].as_f64(),
         time_s: value["time_s"].as_f64(),
         run,
+        ends: value["ends"].as_bool().unwrap_or(false),
     };
     Ok((found.cycle.is_some() || found.time_s.is_some()).then_some(found))
 }
@@ -234,6 +237,7 @@ mod tests {
             cycle: Some(6.0),
             time_s: Some(15.0),
             run: Some(1),
+            ends: false,
         };
         assert_eq!(answer.onset, Some(onset));
         let mut elsewhere = report.clone();

@@ -199,7 +199,8 @@ fn is_right(truth: &Truth, answer: &Answer, top_is_true: bool) -> bool {
 }
 
 fn has_onset(truth: &Truth, answer: &Answer) -> bool {
-    let Some(found) = answer.onset else {
+    // Everything hidden begins, and ends with its run.
+    let Some(found) = answer.onset.filter(|found| !found.ends) else {
         return false;
     };
     let begins_in = |run: usize| truth.runs[run].onset.is_some();

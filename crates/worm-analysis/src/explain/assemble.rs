@@ -99,6 +99,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         let onset = Onset {
             cycle: change.cycle as f64,
             run: change.run,
+            ends: false,
         };
         effects::found_onset(&problem.scene.observed, onset)
     });

@@ -308,27 +308,29 @@ impl<'s, 'a> FitProblem<'s, 'a> {
         self.whiten_all(columns)
     }
 
-    /// A change of the residuals, whitened by the noise alone, that begins at some time: 0 before, and the relative positions about
-    /// their means again.
-    pub fn after_onset(&self, change: &[f64], onset: &Onset) -> Vec<f64> {
-        let mut begun = vec![0.0; change.len()];
+    /// A change of the residuals, whitened by the noise alone, that begins or ends at some time: 0 where it does not act, and the
+    /// relative positions about their means again.
+    pub fn within_onset(&self, change: &[f64], onset: &Onset) -> Vec<f64> {
+        let mut acting = vec![0.0; change.len()];
         for (run, bins) in self.bins.iter().enumerate().filter(|(run, _)| onset.is_in(*run)) {
             let from = bins.start_phase + onset.cycle;
             let first = bins.bins.partition_point(|bin| bin.phase < from);
             let rows = self.rows(run);
             let (count, cells) = (bins.len(), self.scene.observed[run].cells());
-            begun[rows.start + first..rows.start + count]
-                .copy_from_slice(&change[rows.start + first..rows.start + count]);
+            let acts = if onset.ends { 0..first } else { first..count };
+            let of_body = rows.start + acts.start..rows.start + acts.end;
+            acting[of_body.clone()].copy_from_slice(&change[of_body]);
             let relative = rows.start + count..rows.end;
-            begun[relative.start + first * cells..relative.end]
-                .copy_from_slice(&change[relative.start + first * cells..relative.end]);
+            let of_cells = relative.start + acts.start * cells..relative.start + acts.end * cells;
+            acting[of_cells.clone()].copy_from_slice(&change[of_cells]);
             for cell in 0..cells {
-                let mut of_cell: Vec<&mut f64> = begun[relative.clone()].iter_mut().skip(cell).step_by(cells).collect();
+                let mut of_cell: Vec<&mut f64> =
+                    acting[relative.clone()].iter_mut().skip(cell).step_by(cells).collect();
                 let mean = of_cell.iter().map(|row| **row).sum::<f64>() / count as f64;
                 of_cell.iter_mut().for_each(|row| **row -= mean);
             }
         }
-        begun
+        acting
     }
 
     /// Whitens columns of rows by the discrepancy, where it is known.

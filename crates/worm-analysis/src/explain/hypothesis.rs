@@ -43,14 +43,14 @@ impl Hypothesis {
         self.settings_of(at, |_| true)
     }
 
-    /// The effects that act from the start of a run.
-    pub fn settings_at_start(&self, at: &[f64]) -> Vec<Setting> {
-        self.settings_of(at, |one| one.onset.is_none())
+    /// The effects that act at the start of a run.
+    pub fn settings_at_start(&self, run: usize, at: &[f64]) -> Vec<Setting> {
+        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.acts_at_start(run)))
     }
 
     /// The effects that act at the end of a run.
     pub fn settings_at_end(&self, run: usize, at: &[f64]) -> Vec<Setting> {
-        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.is_in(run)))
+        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.acts_at_end(run)))
     }
 
     fn settings_of(&self, at: &[f64], acts: impl Fn(&Hypothesised) -> bool) -> Vec<Setting> {
@@ -71,8 +71,8 @@ impl Hypothesis {
             .collect()
     }
 
-    /// Where an effect of a run begins after its start, cycles since then: the first of several.
-    pub fn begins_at(&self, run: usize) -> Option<f64> {
+    /// Where an effect of a run begins or ends after its start, cycles since then: the first of several.
+    pub fn changes_at(&self, run: usize) -> Option<f64> {
         let onsets = self.hypothesised.iter().filter_map(|one| one.onset);
         let of_run = onsets.filter(|onset| onset.is_in(run)).map(|onset| onset.cycle);
         of_run.min_by(f64::total_cmp)

@@ -93,15 +93,20 @@ impl Judge<'_, '_, '_> {
 
     /// Whether something else, beside the effect of a candidate, is less probable than the effect alone.
     pub fn is_closed_by(&self, candidate: &Candidate) -> bool {
-        candidate
-            .evidence
-            .is_some_and(|evidence| evidence.usual > evidence.other())
+        candidate.evidence.is_some_and(|evidence| !evidence.is_open())
     }
 
-    /// Whether the data of a fit with this evidence may hold something that begins in mid-run.
-    pub fn may_change(&self, evidence: &Evidence) -> bool {
-        let changing = evidence.changing.map_or(f64::NEG_INFINITY, |(ln, _)| ln);
-        changing > evidence.usual - MAY_CHANGE
+    /// Whether the data may hold something that begins or ends in mid-run, by the evidence of the most probable fit and by that without
+    /// effects: an effect of some place may pass for one of some time.
+    ///
+    /// Where something is wrong anyway a larger discrepancy hides the change, so there it is held against that of a₀ alone.
+    pub fn may_change(&self, best: &Evidence) -> bool {
+        let is_open = best.is_open();
+        [best, &self.none].into_iter().any(|evidence| {
+            let changing = evidence.changing.map_or(f64::NEG_INFINITY, |(ln, _)| ln);
+            let ln_bayes = evidence.ln_bayes_of_change().unwrap_or(f64::NEG_INFINITY);
+            changing > evidence.usual - MAY_CHANGE || is_open && ln_bayes > -MAY_CHANGE
+        })
     }
 
     /// Everything that the decision asks of each candidate. Pairs come with the log odds by which they exceed chance.

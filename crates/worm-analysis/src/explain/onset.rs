@@ -1,9 +1,9 @@
-//! Effects that begin in mid-run: screened at every cycle, in single runs and in all, and fitted with the time at which they begin.
+//! Effects that begin or end in mid-run: screened at every cycle, in single runs and in all, and fitted with the time at which they do.
 //!
 //! The worm of an effect that begins at t₁ moves as without it before and about as with it throughout after, so the change of the
 //! residuals is that of the constant effect from t₁ on: its innovations are the same, and the places of the cells are means again. That
 //! gives a score for every cycle from one simulation of each effect. The best are fitted with the crawl simulated as it is, and t₁ by
-//! values on a grid.
+//! values on a grid. Those that end are the same the other way round: up to t₁ instead of from it on.
 
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
@@ -21,12 +21,13 @@ use rayon::prelude::*;
 
 /// Strength at which effects are tried for an onset, in notable changes.
 const STRENGTH: f64 = 8.0;
-/// Effects that are fitted with an onset.
+/// Effects that are fitted with an onset, and with an end.
 const FITTED: usize = 4;
+const FITTED_WITH_END: usize = 2;
 /// Factors on the change of a trial for which its direction stands.
 const STANDS_FOR: (f64, f64) = (0.1, 3.0);
-/// Gauss-Newton steps of a recalibration on what was seen before a change.
-const STEPS_BEFORE: usize = 3;
+/// Gauss-Newton steps of a recalibration on what was seen to one side of a change.
+const STEPS_BESIDE: usize = 3;
 /// Values of the onset that are tried about the best so far: their distance, cycles, and how many to either side.
 const GRIDS: [(f64, i32); 2] = [(0.25, 5), (0.0625, 4)];
 
@@ -44,8 +45,8 @@ pub(super) fn mean_cycles(problem: &FitProblem<'_, '_>) -> f64 {
     (sum as f64 / runs as f64).max(1.0)
 }
 
-/// Every onset that is tried.
-fn onsets(problem: &FitProblem<'_, '_>) -> Vec<Onset> {
+/// Every onset, or every end, that is tried.
+fn onsets(problem: &FitProblem<'_, '_>, ends: bool) -> Vec<Onset> {
     let runs = problem.bins.len();
     let single = (0..runs).flat_map(|run| cycles(problem, run).map(move |cycle| (cycle, Some(run))));
     let common = (0..runs)
@@ -61,21 +62,26 @@ fn onsets(problem: &FitProblem<'_, '_>) -> Vec<Onset> {
         .map(|(cycle, run)| Onset {
             cycle: cycle as f64,
             run,
+            ends,
         })
         .collect()
 }
 
-/// The effects that most probably begin in mid-run, fitted with their onsets. `screened` are those that act throughout.
+/// The effects that most probably begin or end in mid-run, fitted with the time. `screened` are those that act throughout.
 pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[Screening]) -> Vec<Candidate> {
-    let base = match judge.none.changing {
-        Some((ln_changing, change)) if ln_changing > judge.none.usual => before_change(judge.problem, nominal, change),
-        _ => judge.recalibrated.clone(),
-    };
-    let mut promising = screen(judge, &base, screened);
-    promising.truncate(FITTED);
-    let fitted = refit(judge.problem, &base, nominal, &promising, FITTED, &mut |_| ());
+    let fitted = [(false, FITTED), (true, FITTED_WITH_END)].map(|(ends, count)| {
+        let is_likely = judge.none.ln_bayes_of_change().is_some_and(|ln_bayes| ln_bayes > 0.0);
+        let base = match judge.none.changing {
+            Some((_, change)) if is_likely => beside_change(judge.problem, nominal, change, ends),
+            _ => judge.recalibrated.clone(),
+        };
+        let mut promising = screen(judge, &base, screened, ends);
+        promising.truncate(count);
+        refit(judge.problem, &base, nominal, &promising, count, &mut |_| ())
+    });
     let mut candidates: Vec<Candidate> = fitted
         .into_iter()
+        .flatten()
         .map(|candidate| {
             let (fit, ln_onset) = refine(judge.problem, candidate.fit);
             Candidate {
@@ -88,27 +94,28 @@ pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[
     candidates
 }
 
-/// The model recalibrated on what was seen before a change: what comes after it would drive the recalibration astray.
-fn before_change(problem: &FitProblem<'_, '_>, nominal: &Fit, change: Change) -> Fit {
+/// The model recalibrated on what was seen before a change, or after it where something ends there: the rest would drive the
+/// recalibration astray.
+fn beside_change(problem: &FitProblem<'_, '_>, nominal: &Fit, change: Change, ends: bool) -> Fit {
     let rows = problem.bin_of_rows().into_iter();
-    let is_before = |(run, bin): (usize, usize)| {
+    let is_beside = |(run, bin): (usize, usize)| {
         let bins = &problem.bins[run];
         let since = bins.bins[bin].phase - bins.start_phase;
-        change.run.is_some_and(|of| of != run) || since < change.cycle as f64
+        change.run.is_some_and(|of| of != run) || (since < change.cycle as f64) != ends
     };
-    let stays: Vec<bool> = rows.map(is_before).collect();
+    let stays: Vec<bool> = rows.map(is_beside).collect();
     let mut fit = nominal.clone();
-    for _ in 0..STEPS_BEFORE {
+    for _ in 0..STEPS_BESIDE {
         fit = problem.step_without(fit, &stays);
         problem.compute_jacobian(&mut fit);
     }
     fit
 }
 
-/// Scores of every effect about a fit for every onset; the most probable onset of each, best first.
-fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening]) -> Vec<Screening> {
+/// Scores of every effect about a fit for every onset, or every end; the most probable one of each, best first.
+fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], ends: bool) -> Vec<Screening> {
     let problem = judge.problem;
-    let onsets = onsets(problem);
+    let onsets = onsets(problem, ends);
     let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
     let jacobian = DMatrix::from_iterator(
         fit.residual.len(),
@@ -135,7 +142,10 @@ fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening]) -> Vec<S
                 .zip(&without)
                 .map(|(with, without)| with - without)
                 .collect();
-            let directions = onsets.iter().map(|onset| problem.after_onset(&change, onset)).collect();
+            let directions = onsets
+                .iter()
+                .map(|onset| problem.within_onset(&change, onset))
+                .collect();
             let directions = problem.whiten_all(directions);
             let directions = DMatrix::from_iterator(residual.len(), onsets.len(), directions.into_iter().flatten());
             let shared = cross(&jacobian, &directions);
@@ -221,4 +231,50 @@ fn refine(problem: &FitProblem<'_, '_>, mut fit: Fit) -> (Fit, f64) {
         problem.compute_jacobian(&mut fit);
     }
     (fit, ln_width)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{Campaign, begun, record_under};
+    use super::super::{Options, Verdict, explain};
+    use super::*;
+    use crate::experiment::{RecordedRun, Simulation};
+    use worm_estimator::config::Config;
+
+    /// Half the clamping of a cell, in the second run up to the middle or from there on.
+    #[test]
+    fn what_begins_and_what_ends_are_told_apart() {
+        for ends in [false, true] {
+            let campaign = Campaign {
+                simulation: Simulation {
+                    cycles: 8.0,
+                    ..Campaign::default().simulation
+                },
+                ..Campaign::default()
+            };
+            let onset = Onset {
+                cycle: 4.0,
+                run: Some(1),
+                ends,
+            };
+            let truth = Some(("unequal-clamping", Some(1), &[0.5][..]));
+            let recordings = record_under(&campaign, &begun(truth, onset), 5);
+            let runs: Vec<RecordedRun<'_>> = recordings
+                .iter()
+                .zip(&campaign.slopes_deg)
+                .map(|(recording, &slope_deg)| RecordedRun {
+                    recording,
+                    slope_deg,
+                    payload_kg: 0.0,
+                    cycle_s: None,
+                })
+                .collect();
+            let answer = explain(&runs, &Config::default(), &Options::default(), &mut |_| ()).expect("an answer");
+            assert_eq!(answer.verdict, Verdict::Explained, "{}", answer.sentence);
+            let effect = &answer.effects[0];
+            assert_eq!((effect.name.as_str(), effect.cell), ("unequal-clamping", Some(2)));
+            let found = effect.onset.as_ref().expect("it does not act throughout");
+            assert!(found.ends == ends && (found.cycle - 4.0).abs() < 0.5, "{found:?}");
+        }
+    }
 }

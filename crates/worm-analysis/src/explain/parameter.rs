@@ -195,19 +195,31 @@ impl Free {
     }
 }
 
-/// When an effect begins that does not act from the start.
+/// When an effect begins or ends that does not act throughout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Onset {
     /// Cycles since the first sample of the run.
     pub cycle: f64,
     /// The only run that it acts in; all of them for none.
     pub run: Option<usize>,
+    /// It acts from the start of the run up to then, instead of from then on.
+    pub ends: bool,
 }
 
 impl Onset {
     /// Whether it concerns a run.
     pub fn is_in(&self, run: usize) -> bool {
         self.run.is_none_or(|of| of == run)
+    }
+
+    /// Whether an effect acts at the start of a run.
+    pub fn acts_at_start(&self, run: usize) -> bool {
+        self.ends && self.is_in(run)
+    }
+
+    /// Whether an effect acts at the end of a run.
+    pub fn acts_at_end(&self, run: usize) -> bool {
+        !self.ends && self.is_in(run)
     }
 }
 
@@ -216,7 +228,7 @@ impl Onset {
 pub(super) struct Hypothesised {
     pub effect: &'static Effect,
     pub cell: Option<usize>,
-    /// When it begins; it acts throughout for none.
+    /// When it begins or ends; it acts throughout for none.
     pub onset: Option<Onset>,
 }
 

@@ -50,7 +50,7 @@ struct Recalibrated {
 }
 
 impl Scene<'_> {
-    /// The physics of a run under a hypothesis, at its end where an effect begins in between, and the damping ratio.
+    /// The physics of a run under a hypothesis, at its end where an effect begins or ends in between, and the damping ratio.
     pub fn physics(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> (Physics, f64) {
         let recalibrated = self.recalibrated(run, hypothesis, at);
         (
@@ -87,7 +87,7 @@ impl Scene<'_> {
 
     /// Whether the crawl of a run is simulated for some cycles and then repeated.
     pub fn repeats(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> bool {
-        let is_steady = !hypothesis.throughout && hypothesis.begins_at(run).is_none();
+        let is_steady = !hypothesis.throughout && hypothesis.changes_at(run).is_none();
         is_steady && !self.observed[run].pauses() && self.physics(run, hypothesis, at).0.is_periodic()
     }
 
@@ -98,9 +98,12 @@ impl Scene<'_> {
         let physics = recalibrated.physics.clone().with(&hypothesis.settings_at_end(run, at));
         let damping_ratio = recalibrated.damping_ratio;
         let clock = |physics: &Physics| Clock::new(observed, physics.view.latency_s, recalibrated.clock_drift);
-        match hypothesis.begins_at(run) {
+        match hypothesis.changes_at(run) {
             Some(cycle) => {
-                let before = recalibrated.physics.clone().with(&hypothesis.settings_at_start(at));
+                let before = recalibrated
+                    .physics
+                    .clone()
+                    .with(&hypothesis.settings_at_start(run, at));
                 predict_change(observed, clock(&before), &before, &physics, cycle, damping_ratio)
             }
             None => {
@@ -263,6 +266,7 @@ mod tests {
         let onset = Onset {
             cycle: 2.0,
             run: Some(1),
+            ends: false,
         };
         let predict = |run: usize, (hypothesis, at): &(Hypothesis, Vec<f64>)| {
             scene.predict(run, hypothesis, at).expect("it holds").position_m

@@ -107,8 +107,7 @@ pub fn explain(
     judge.weigh(&mut candidates, &screened);
     let best = candidates.first().filter(|best| judge.ln_odds(best) > 0.0);
     let best = best.and_then(|best| best.evidence).unwrap_or(judge.none);
-    // An effect of some place may pass for one of some time.
-    if judge.may_change(&best) || judge.may_change(&judge.none) {
+    if judge.may_change(&best) {
         report("onsets", 0.6);
         candidates.extend(with_onsets(&judge, &nominal, &screened));
         candidates.sort_by(|a, b| judge.ln_odds(b).total_cmp(&judge.ln_odds(a)));

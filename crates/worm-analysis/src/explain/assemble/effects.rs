@@ -60,7 +60,7 @@ pub(in crate::explain) fn named_effects(
     candidate.named().map(of).collect()
 }
 
-/// When something begins, in cycles and seconds.
+/// When something begins or ends, in cycles and seconds.
 pub(super) fn found_onset(observed: &[Observed<'_>], onset: Onset) -> FoundOnset {
     let seen = &observed[onset.run.unwrap_or(0)];
     let phase = seen.phase[0] + onset.cycle;
@@ -72,6 +72,7 @@ pub(super) fn found_onset(observed: &[Observed<'_>], onset: Onset) -> FoundOnset
         run: onset
             .run
             .map(|run| observed[run].run.recording.source.display().to_string()),
+        ends: onset.ends,
     }
 }
 

@@ -109,6 +109,16 @@ impl Evidence {
     pub fn at_unit_scale(&self) -> f64 {
         self.of_usual[UNIT]
     }
+
+    /// Logarithm of the Bayes factor of a change in the middle of a run, with a discrepancy of a₀; none where it was not asked.
+    pub fn ln_bayes_of_change(&self) -> Option<f64> {
+        self.changing.map(|(changing, _)| changing - unweighted(&self.of_usual))
+    }
+
+    /// Whether something else wrong is more probable than a discrepancy of the usual size.
+    pub fn is_open(&self) -> bool {
+        self.other() >= self.usual
+    }
 }
 
 /// The probability of the data with a discrepancy of a₀, of those with each usual size.

@@ -9,7 +9,8 @@
 //!
 //! # Odds
 //! None 0.5, something else 0.1, a single effect 0.35, a pair 0.05; shared equally by families (exact twins are one), then by cells,
-//! then 0.6 to an effect that acts throughout and 0.4 to one that begins in mid-run: in all runs or in one, at any cycle.
+//! then 0.6 to an effect that acts throughout, 0.3 to one that begins in mid-run and 0.1 to one that ends there: in all runs or in one,
+//! at any cycle.
 
 use super::super::parameter::{Hypothesised, Onset};
 use worm_physics::effect::{Effect, LIBRARY, Parameter, Scope};
@@ -32,8 +33,9 @@ const ONE_SENSE: [&str; 5] = ["constant-drag", "tether-drag", "payload", "wear",
 const NO_OTHER_SENSE: [&str; 4] = ["constant-drag", "tether-drag", "wear", "lost-stroke"];
 /// Standard deviations set by the care with which a worm is built and laid down: of the slope, degrees, and of lost stroke.
 const CARE: [(&str, f64); 2] = [("slope-error", 1.5), ("lost-stroke", 0.075)];
-/// Probability that an effect which may begin in mid-run does, and effects that do not.
-const BEGINS: f64 = 0.4;
+/// Probabilities that an effect which may begin in mid-run does, and that it ends there; and effects that do not.
+const BEGINS: f64 = 0.3;
+const ENDS: f64 = 0.1;
 const NEVER_BEGIN: [&str; 6] = [
     "wear",
     "tether-drag",
@@ -186,13 +188,14 @@ impl Campaign {
             Scope::AnyCells => 2.0 * self.cells as f64,
         };
         let twins = 1.0 + one.effect.twins.len() as f64;
+        let at_some_cycle = |onset: Onset| if onset.ends { ENDS } else { BEGINS } / self.cycles;
         let when = match one.onset {
             _ if !may_begin(one.effect) => 1.0,
-            None => 1.0 - BEGINS,
+            None => 1.0 - BEGINS - ENDS,
             // All runs as probable as any one.
-            Some(_) if self.runs == 1 => BEGINS / self.cycles,
-            Some(Onset { run: None, .. }) => 0.5 * BEGINS / self.cycles,
-            Some(Onset { run: Some(_), .. }) => 0.5 * BEGINS / self.cycles / self.runs as f64,
+            Some(onset) if self.runs == 1 => at_some_cycle(onset),
+            Some(onset) if onset.run.is_none() => 0.5 * at_some_cycle(onset),
+            Some(onset) => 0.5 * at_some_cycle(onset) / self.runs as f64,
         };
         when.ln() - (self.families() * variants * twins).ln()
     }
@@ -208,7 +211,7 @@ impl Campaign {
     }
 }
 
-/// Whether an effect may begin in mid-run: what changes the worm or its load may, what says where or for how long it acts has that in
+/// Whether an effect may begin or end in mid-run: what changes the worm or its load may, what says where or for how long it acts has that in
 /// its law, and a measurement does not change by itself.
 pub(in crate::explain) fn may_begin(effect: &Effect) -> bool {
     !effect.has_place() && !NEVER_BEGIN.contains(&effect.name)
@@ -298,20 +301,17 @@ mod tests {
             cycles: 10.0,
             phase_recorded: true,
         };
-        let begun = |run: Option<usize>| Some(Onset { cycle: 3.0, run });
+        let at_cycle_3 = |run: Option<usize>| [true, false].map(|ends| Onset { cycle: 3.0, run, ends });
         let prior = |one: &Hypothesised| {
             let mut sum = campaign.ln_prior(&[*one]).exp();
             if may_begin(one.effect) {
-                let runs = [None, Some(0), Some(1), Some(2)];
-                sum += runs
-                    .map(|run| {
-                        let begun = Hypothesised {
-                            onset: begun(run),
-                            ..*one
-                        };
-                        campaign.cycles * campaign.ln_prior(&[begun]).exp()
-                    })
-                    .iter()
+                let onsets = [None, Some(0), Some(1), Some(2)].into_iter().flat_map(at_cycle_3);
+                let with_onset = onsets.map(|onset| Hypothesised {
+                    onset: Some(onset),
+                    ..*one
+                });
+                sum += with_onset
+                    .map(|one| campaign.cycles * campaign.ln_prior(&[one]).exp())
                     .sum::<f64>();
             }
             sum

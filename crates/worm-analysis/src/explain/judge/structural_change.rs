@@ -138,6 +138,7 @@ mod tests {
         let onset = Onset {
             cycle: 2.0,
             run: Some(1),
+            ends: false,
         };
         let (ln_bayes, change) = found(&begun(truth, onset));
         assert!(ln_bayes > 20.0, "{ln_bayes}");
