@@ -43,6 +43,9 @@ pub struct ExplainArgs {
     /// Relative change of the advance or of the energy of a cycle below which an effect is not named; 0 to 0.5
     #[arg(long, value_name = "FRACTION", default_value_t = Options::default().matters, value_parser = |text: &str| fraction(text, 0.0..=0.5))]
     matters: f64,
+    /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; 0.01 to 0.5
+    #[arg(long, value_name = "FRACTION", default_value_t = Options::default().expected_impact, value_parser = |text: &str| fraction(text, 0.01..=0.5))]
+    expected_impact: f64,
     /// Record the worm that is crawling now, into DIR/live.mcap, and explain that; at its configured slope unless --slope is
     /// given
     #[arg(long, conflicts_with = "recording", requires = "out")]
@@ -116,6 +119,7 @@ impl ExplainArgs {
             seed: self.seed,
             discrepancy: self.discrepancy,
             matters: self.matters,
+            expected_impact: self.expected_impact,
         }
     }
 

@@ -32,6 +32,8 @@ pub(super) struct Judge<'j, 's, 'a> {
     pub campaign: prior::Campaign,
     /// Relative change of advance or energy that matters.
     pub limit: f64,
+    /// Relative change of the advance that an effect is expected to make.
+    pub expected_impact: f64,
 }
 
 impl Judge<'_, '_, '_> {

@@ -7,7 +7,7 @@ use super::judge::chance::Chance;
 use super::judgement::Judge;
 use super::local_restart::restart_locally;
 use super::parameter::{Hypothesised, What};
-use super::score_test::{self, Screening};
+use super::score_test::{self, Expected, Screening};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -155,10 +155,13 @@ pub(super) fn pair_up(
         .collect();
     let single = judge.ln_prior(&first.hypothesised);
     let ln_prior = |other: &Hypothesised| judge.ln_prior(&[first.hypothesised[0], *other]) - single;
-    let scales = first.evidence.unwrap_or(judge.none).scales();
+    let expected = Expected {
+        ln_prior: &ln_prior,
+        impact: judge.expected_impact,
+        scales: first.evidence.unwrap_or(judge.none).scales(),
+    };
     let base = problem.with_derivatives(&first.fit.hypothesis, first.fit.at.clone());
-    let (mut promising, chance) =
-        score_test::screen(problem, judge.discrepancy, &base, &others, ln_prior, scales, seed);
+    let (mut promising, chance) = score_test::screen(problem, judge.discrepancy, &base, &others, &expected, seed);
     promising.retain(|screening| screening.ln_bayes + ln_prior(&screening.hypothesised) > MIN_LN_ODDS);
     promising.truncate(SCREENED_FOR_PAIRS);
     let mut at = first.fit.hypothesis.neutral();

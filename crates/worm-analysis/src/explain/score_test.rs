@@ -187,15 +187,23 @@ pub(super) fn ln_bayes(prior: &SeverityPrior, value: f64, (low, high): (f64, f64
     factor * score - 0.5 * factor * factor * square + density - factor.ln() + width.ln()
 }
 
-/// Screens effects on top of a fit with derivatives. Returns them most probable first, with what chance would do. `ln_prior` is the
-/// logarithm of the prior odds of each against the fit without it, `scales` the probabilities of the discrepancy's scales.
+/// What is expected of effects before they are screened.
+pub(super) struct Expected<'e> {
+    /// Logarithm of the prior odds of each against the fit without it.
+    pub ln_prior: &'e dyn Fn(&Hypothesised) -> f64,
+    /// Median of the impact.
+    pub impact: f64,
+    /// Probabilities of the discrepancy's scales.
+    pub scales: [f64; 4],
+}
+
+/// Screens effects on top of a fit with derivatives. Returns them most probable first, with what chance would do.
 pub(super) fn screen(
     problem: &FitProblem<'_, '_>,
     discrepancy: &Discrepancy,
     fit: &Fit,
     hypothesised: &[Hypothesised],
-    ln_prior: impl Fn(&Hypothesised) -> f64,
-    scales: [f64; 4],
+    expected: &Expected<'_>,
     seed: u64,
 ) -> (Vec<Screening>, Chance) {
     let all = simulate(problem, fit, hypothesised);
@@ -250,14 +258,14 @@ pub(super) fn screen(
         priors: hypothesised
             .iter()
             .enumerate()
-            .map(|(number, one)| SeverityPrior::new(one.effect, &impacts(number)))
+            .map(|(number, one)| SeverityPrior::new(one.effect, expected.impact, &impacts(number)))
             .collect(),
-        ln_prior: hypothesised.iter().map(ln_prior).collect(),
+        ln_prior: hypothesised.iter().map(expected.ln_prior).collect(),
         ln_shape: hypothesised.iter().map(|one| -shapes(one).ln()).collect(),
         all,
         squares,
     };
-    let chance = Chance::draw(discrepancy, &products, &along, scales, seed, |scores| {
+    let chance = Chance::draw(discrepancy, &products, &along, expected.scales, seed, |scores| {
         trials.largest(scores)
     });
     let ln_bayes = trials.ln_bayes_of_each(&scores);

@@ -16,7 +16,7 @@ use super::parameter::{Hypothesised, Nuisance};
 use super::period;
 use super::prepare::{prepare, recalibrate};
 use super::refit::{REFITTED, alone, pair_up, refit};
-use super::score_test;
+use super::score_test::{self, Expected};
 use super::speed_droop::speed_droop;
 use super::whole_effects::with_whole_effects;
 use crate::experiment::{Progress, RecordedRun};
@@ -35,6 +35,8 @@ pub struct Options {
     pub discrepancy: f64,
     /// Relative change of the advance or of the energy of a cycle below which an effect does not matter.
     pub matters: f64,
+    /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; above 0.
+    pub expected_impact: f64,
 }
 
 impl Default for Options {
@@ -43,6 +45,7 @@ impl Default for Options {
             seed: 1,
             discrepancy: 0.006,
             matters: 0.02,
+            expected_impact: 0.06,
         }
     }
 }
@@ -81,17 +84,21 @@ pub fn explain(
             phase_recorded,
         },
         limit: options.matters,
+        expected_impact: options.expected_impact,
     };
     let hypothesised = score_test::hypotheses(config.worm.cells, phase_recorded);
     let ln_prior = |one: &Hypothesised| judge.ln_prior(&[*one]) - prior::NONE.ln();
-    let scales = judge.none.scales();
+    let expected = Expected {
+        ln_prior: &ln_prior,
+        impact: options.expected_impact,
+        scales: judge.none.scales(),
+    };
     let (screened, chance) = score_test::screen(
         &problem,
         &discrepancy,
         &recalibrated,
         &hypothesised,
-        ln_prior,
-        scales,
+        &expected,
         options.seed,
     );
     report("refit", 0.3);

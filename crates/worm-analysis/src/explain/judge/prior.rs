@@ -2,7 +2,7 @@
 //!
 //! # Severity
 //! An effect is worth a name for what it does, so the prior is on its impact: the largest relative change of the advance on any run is
-//! log-normal about 6 %, with a standard deviation of 0.9 in the logarithm. It vanishes towards none (a non-local prior: Johnson and
+//! log-normal about some median (6 % unless the user says otherwise), with a standard deviation of 0.9 in the logarithm. It vanishes towards none (a non-local prior: Johnson and
 //! Rossell 2010), so that small effects earn nothing and data without one speak for *none*. Where the advance does not move, the
 //! median is ten notable changes. Senses that are hardly physical (a drag that pushes) have a tenth of the mass, and where physics
 //! or care sets a limit (the slope is set by an inclinometer, the stroke by a cam) the density falls off beyond it.
@@ -20,8 +20,8 @@ pub(in crate::explain) const NONE: f64 = 0.5;
 pub(in crate::explain) const OTHER: f64 = 0.1;
 pub(in crate::explain) const SINGLE: f64 = 0.35;
 const PAIR: f64 = 0.05;
-/// Median of the impact, as a fraction of the advance, and the standard deviation of its logarithm.
-const IMPACT: (f64, f64) = (0.06, 0.9);
+/// Standard deviation of the logarithm of the impact.
+const LN_IMPACT: f64 = 0.9;
 /// Impacts from which the median is interpolated, and the severity without any, in notable changes.
 const MEASURABLE: std::ops::RangeInclusive<f64> = 2e-3..=0.8;
 const WITHOUT_IMPACT: f64 = 10.0;
@@ -60,18 +60,19 @@ pub(in crate::explain) struct SeverityPrior {
 }
 
 impl SeverityPrior {
-    /// From changes of the severity that were simulated, each with its impact.
-    pub fn new(effect: &Effect, impacts: &[(f64, f64)]) -> Self {
+    /// From the median of the impact, as a fraction of the advance, and changes of the severity that were simulated, each with its
+    /// impact.
+    pub fn new(effect: &Effect, expected_impact: f64, impacts: &[(f64, f64)]) -> Self {
         let severity = effect.severity();
         let reach = [severity.neutral - severity.min, severity.max - severity.neutral];
         // From the change whose impact is nearest to the median, in proportion.
-        let off = |impact: f64| (impact / IMPACT.0).ln();
+        let off = |impact: f64| (impact / expected_impact).ln();
         let nearest = impacts
             .iter()
             .filter(|(_, impact)| MEASURABLE.contains(impact))
             .min_by(|a, b| off(a.1).abs().total_cmp(&off(b.1).abs()));
         let median = match nearest {
-            Some((change, impact)) => change.abs() * IMPACT.0 / impact,
+            Some((change, impact)) => change.abs() * expected_impact / impact,
             None => WITHOUT_IMPACT * severity.notable,
         };
         let ln_median = median.clamp(severity.notable, 0.7 * reach[0].max(reach[1])).ln();
@@ -104,14 +105,14 @@ impl SeverityPrior {
 
     /// Logarithm of the density of the logarithm of a change, up to a constant.
     fn ln_shape(&self, ln_change: f64) -> f64 {
-        let off = (ln_change - self.ln_median) / IMPACT.1;
+        let off = (ln_change - self.ln_median) / LN_IMPACT;
         let careless = self.care.map_or(0.0, |care| ln_change.exp() / care);
         -0.5 * off * off - 0.5 * careless * careless
     }
 
     fn integral(&self, side: usize) -> f64 {
-        let from = self.ln_median - 4.0 * IMPACT.1;
-        let to = (self.ln_median + 4.0 * IMPACT.1).min(self.reach[side].ln());
+        let from = self.ln_median - 4.0 * LN_IMPACT;
+        let to = (self.ln_median + 4.0 * LN_IMPACT).min(self.reach[side].ln());
         let width = (to - from).max(1e-6) / NODES as f64;
         let nodes = (0..NODES).map(|node| from + (node as f64 + 0.5) * width);
         nodes.map(|ln_change| self.ln_shape(ln_change).exp() * width).sum()
@@ -138,7 +139,7 @@ impl SeverityPrior {
 
     /// Width of the prior about some severity, for the curvature of the evidence.
     pub fn width(&self, value: f64) -> f64 {
-        IMPACT.1 * (value - self.neutral).abs()
+        LN_IMPACT * (value - self.neutral).abs()
     }
 }
 
@@ -224,7 +225,7 @@ mod tests {
 
     /// An effect whose change by one unit changes the advance by so much.
     fn prior(name: &str, change: f64, impact: f64) -> SeverityPrior {
-        SeverityPrior::new(named(name).expect("an effect"), &[(change, impact)])
+        SeverityPrior::new(named(name).expect("an effect"), 0.06, &[(change, impact)])
     }
 
     /// Mass of a density of the logarithm of the change, on one side of neutral.
