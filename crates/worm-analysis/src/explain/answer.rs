@@ -194,7 +194,7 @@ pub struct FoundParameter {
     pub name: String,
     /// Value.
     pub value: f64,
-    /// Its standard error.
+    /// Its standard error; a severity's counts what its law may be wrong by.
     pub sigma: f64,
     /// Its unit; empty for none.
     pub unit: String,
@@ -363,7 +363,7 @@ pub struct Calibrated {
     pub nominal: f64,
     /// The value found.
     pub found: f64,
-    /// Its standard error.
+    /// Its standard error; a severity's counts what its law may be wrong by.
     pub sigma: f64,
     /// Its unit; empty for none.
     pub unit: &'static str,

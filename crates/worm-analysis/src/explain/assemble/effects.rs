@@ -7,6 +7,10 @@ use crate::explain::parameter::{Hypothesised, Onset, What};
 use crate::explain::speed_droop::SpeedDroop;
 use worm_physics::effect::MOTOR_DROOP;
 
+/// How far a severity is off because no law is quite the worm's, as a fraction of its change: worms in MuJoCo have the library's effects
+/// by laws of another form.
+const LAW_ERROR: f64 = 0.1;
+
 /// The effects of a candidate.
 pub(in crate::explain) fn named_effects(
     observed: &[Observed<'_>],
@@ -22,11 +26,17 @@ pub(in crate::explain) fn named_effects(
         let quantities = candidate.fit.hypothesis.free.iter().enumerate();
         let parameters = quantities.filter_map(|(at, free)| match free.what {
             What::Effect { place: mine, parameter } if mine == place => {
-                let parameter = &hypothesised.effect.parameters[parameter];
+                let (is_severity, parameter) = (parameter == 0, &hypothesised.effect.parameters[parameter]);
+                let value = candidate.fit.at[at];
+                let of_law = if is_severity {
+                    LAW_ERROR * (value - parameter.neutral)
+                } else {
+                    0.0
+                };
                 Some(FoundParameter {
                     name: parameter.name.to_owned(),
-                    value: candidate.fit.at[at],
-                    sigma: sigmas[at],
+                    value,
+                    sigma: sigmas[at].hypot(of_law),
                     unit: parameter.unit.to_owned(),
                     cell: hypothesised.cell.map(|cell| cell + 1),
                 })
