@@ -4,7 +4,8 @@
 //! of a cycle, and swings on its tips by that over their natural frequency ω = √(Σ k / m); what becomes of it at the tips is of second
 //! order, as (ω T)⁻². The discrepancy of clean worms in MuJoCo, which have all their masses, follows this law from 0.9 to 9 s a cycle:
 //! the evidence of 52 of them prefers it to the best discrepancy that is the same at every speed by a factor of e¹⁰⁰⁹. Three of them, at
-//! 0.9 to 1.3 s a cycle, make most of it; worms with mass of the project's own need none of it.
+//! 0.9 to 1.3 s a cycle, make most of it; worms with mass of the project's own need none of it. Much of it is the time step with which
+//! those worms in MuJoCo were made (docs/results.md), so for fast worms this errs on the safe side.
 
 use worm_physics::Worm;
 
