@@ -41,12 +41,7 @@ fn identify(criterion: &mut Criterion) {
         ..Simulation::default()
     });
     let uphill_m = uphill.filled();
-    let run = RecordedRun {
-        recording: &uphill,
-        slope_deg: 30.0,
-        payload_kg: 0.0,
-        cycle_s: None,
-    };
+    let run = RecordedRun::at_slope(&uphill, 30.0);
     let mut group = criterion.benchmark_group("identify");
     group.sample_size(10);
     group.bench_function("search 2401 candidates over 10 cycles", |bencher| {

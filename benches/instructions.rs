@@ -81,12 +81,7 @@ const HOT_PATHS: [HotPath; 5] = [
         run: |times| {
             let config = Config::default();
             let recording = simulate(&config, &Simulation::default()).expect("the paper's worm crawls");
-            let run = RecordedRun {
-                recording: &recording,
-                slope_deg: 0.0,
-                payload_kg: 0.0,
-                cycle_s: None,
-            };
+            let run = RecordedRun::at_slope(&recording, 0.0);
             let prediction = Prediction::new(&[run], &config).expect("a recording to predict");
             repeat(times, || {
                 std::hint::black_box(prediction.positions_m(0).expect("the paper's worm crawls"));

@@ -38,6 +38,18 @@ pub struct RecordedRun<'a> {
     pub cycle_s: Option<f64>,
 }
 
+impl<'a> RecordedRun<'a> {
+    /// A recording of the worm as it is on a slope, degrees, at a pace that nobody noted.
+    pub fn at_slope(recording: &'a Recording, slope_deg: f64) -> Self {
+        Self {
+            recording,
+            slope_deg,
+            payload_kg: 0.0,
+            cycle_s: None,
+        }
+    }
+}
+
 /// Progress of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {

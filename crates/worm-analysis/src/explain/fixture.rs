@@ -1,6 +1,7 @@
 //! Campaigns for the tests of the search: the model's own crawl under an effect, with noise and a body that goes astray.
 
 use super::bins::Bins;
+use super::discrepancy::Discrepancy;
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
 use super::noise::RunNoise;
@@ -119,12 +120,7 @@ pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Sce
         nominal: Vec::new(),
     };
     for (recording, &slope_deg) in recordings.iter().zip(&campaign.slopes_deg) {
-        let run = RecordedRun {
-            recording,
-            slope_deg,
-            payload_kg: 0.0,
-            cycle_s: None,
-        };
+        let run = RecordedRun::at_slope(recording, slope_deg);
         let mut observed = Observed::new(run, &config).expect("a recording of this worm");
         observed.assume_laid_down(true);
         let worm = Worm::try_from(&config).expect("the default worm is one");
@@ -153,6 +149,16 @@ pub(super) fn problem<'s, 'a>(scene: &'s Scene<'a>, (hypothesis, at): &(Hypothes
         repeating_excess: 0.0,
         bins,
     }
+}
+
+/// The same problem with a discrepancy of 10 µm.
+pub(super) fn with_discrepancy<'s, 'a>(plain: FitProblem<'s, 'a>) -> (FitProblem<'s, 'a>, Discrepancy) {
+    let discrepancy = Discrepancy::new(&plain, 1e-5);
+    let problem = FitProblem {
+        discrepancy: Some(discrepancy.clone()),
+        ..plain
+    };
+    (problem, discrepancy)
 }
 
 /// A hypothesis taken as it is.

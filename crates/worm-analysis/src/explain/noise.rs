@@ -51,8 +51,6 @@ impl RunNoise {
         let counted = if observed.phase_recorded { cells } else { cells - 1 } as f64;
         let all = APART.map(|apart| CycleChanges::new(observed, bins, residual, apart));
         let changes = quietest(&all);
-        // A body that sways in a rhythm of its own passes for a walk: taken for less, it would look like one effect or another.
-        let of_body = &all[0];
         // A relative position lacks its share in the body's.
         let position_m2 = (0.5 * changes.of_bins_m2() * counted / (counted - 1.0)).max(MIN_M2);
         let per_bin = bins.bins.iter().map(|bin| bin.samples.len() as f64).sum::<f64>() / bins.len() as f64;
@@ -60,14 +58,14 @@ impl RunNoise {
         let shared_m2 = (position_m2 - white_m2 / per_bin).max(0.0);
         let along = changes.along().clamp(1.0, bins.per_step as f64);
         let of_step_m2 = position_m2 * along / counted / bins.per_step as f64;
-        let of_steps_m2 = 0.5 * of_body.of_steps_m2().unwrap_or(0.0);
+        let of_steps_m2 = 0.5 * changes.of_steps_m2();
         let per_step_m2 = (of_steps_m2 - 2.0 * of_step_m2) / WALK_OF_MEANS * cells as f64;
         // Where the estimate is lost in its own error, the drift may still be as large as that.
         let of_few = |count: usize| (VARIANCE_OF_MEDIAN / count.max(1) as f64).sqrt();
-        let error_m2 = of_steps_m2 / WALK_OF_MEANS * of_few(of_body.steps()) * cells as f64;
+        let error_m2 = of_steps_m2 / WALK_OF_MEANS * of_few(changes.steps()) * cells as f64;
         let of_cycle_m2 = of_step_m2 / cells as f64;
-        let per_cycle_m2 = of_body.of_cycles_m2().map_or(0.0, |m2| {
-            (m2 * (1.0 - of_few(of_body.cycles())) - 6.0 * of_cycle_m2) / WALK_OF_SECOND_DIFFERENCES
+        let per_cycle_m2 = changes.of_cycles_m2().map_or(0.0, |m2| {
+            (m2 * (1.0 - of_few(changes.cycles())) - 6.0 * of_cycle_m2) / WALK_OF_SECOND_DIFFERENCES
         });
         let drift_m2 = per_step_m2.max(error_m2).max(per_cycle_m2).max(MIN_DRIFT_M2);
         Self::new(observed, bins, [white_m2, shared_m2, along, drift_m2])
@@ -159,7 +157,8 @@ fn quietest(all: &[CycleChanges; APART.len()]) -> &CycleChanges {
     least.unwrap_or(&all[0])
 }
 
-/// Changes of a residual from each settled cycle to one after it.
+/// Changes of a residual from each settled cycle to one after it, and of the body from each to the next: a body that sways in a rhythm
+/// of its own has to pass for a walk, or it would look like one effect or another.
 struct CycleChanges {
     /// Of each cell's relative position: `[cell][place in the cycle][cycle]`, m.
     relative_m: Vec<Vec<Vec<f64>>>,
@@ -221,13 +220,13 @@ impl CycleChanges {
             .collect();
         let displacements: Vec<f64> = step_means.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let mut steps_m = vec![Vec::new(); cells];
-        for step in apart * cells..displacements.len() {
-            steps_m[step % cells].push(displacements[step] - displacements[step - apart * cells]);
+        for step in cells..displacements.len() {
+            steps_m[step % cells].push(displacements[step] - displacements[step - cells]);
         }
         let cycle_means: Vec<f64> = tables[0].iter().map(|cycle| mean_of(cycle)).collect();
         let cycles_m = cycle_means
-            .windows(2 * apart + 1)
-            .map(|window| window[2 * apart] - 2.0 * window[apart] + window[0])
+            .windows(3)
+            .map(|three| three[2] - 2.0 * three[1] + three[0])
             .collect();
         Self {
             relative_m,
@@ -261,8 +260,8 @@ impl CycleChanges {
     }
 
     /// Variance of the change of the body's displacement from step to step, m².
-    fn of_steps_m2(&self) -> Option<f64> {
-        variance(&self.steps_m.concat())
+    fn of_steps_m2(&self) -> f64 {
+        variance(&self.steps_m.concat()).unwrap_or(0.0)
     }
 
     /// Number of changes from step to step that were seen.

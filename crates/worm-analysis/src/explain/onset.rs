@@ -262,12 +262,7 @@ mod tests {
             let runs: Vec<RecordedRun<'_>> = recordings
                 .iter()
                 .zip(&campaign.slopes_deg)
-                .map(|(recording, &slope_deg)| RecordedRun {
-                    recording,
-                    slope_deg,
-                    payload_kg: 0.0,
-                    cycle_s: None,
-                })
+                .map(|(recording, &slope_deg)| RecordedRun::at_slope(recording, slope_deg))
                 .collect();
             let answer = explain(&runs, &Config::default(), &Options::default(), &mut |_| ()).expect("an answer");
             assert_eq!(answer.verdict, Verdict::Explained, "{}", answer.sentence);

@@ -6,12 +6,7 @@ use crate::recording::Recording;
 use worm_estimator::config::Config;
 
 fn run(recording: &Recording) -> RecordedRun<'_> {
-    RecordedRun {
-        recording,
-        slope_deg: 0.0,
-        payload_kg: 0.0,
-        cycle_s: None,
-    }
+    RecordedRun::at_slope(recording, 0.0)
 }
 
 #[test]

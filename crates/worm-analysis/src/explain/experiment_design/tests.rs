@@ -33,12 +33,7 @@ fn scene<'r>(recordings: &'r [Recording], config: &Config) -> Scene<'r> {
         .iter()
         .zip(SLOPES_DEG)
         .map(|(recording, slope_deg)| {
-            let run = RecordedRun {
-                recording,
-                slope_deg,
-                payload_kg: 0.0,
-                cycle_s: None,
-            };
+            let run = RecordedRun::at_slope(recording, slope_deg);
             Observed::new(run, config).expect("six clean cycles")
         })
         .collect();

@@ -80,11 +80,15 @@ impl Blocks {
     }
 }
 
-/// Beside residuals with nothing free.
+/// What is asked beside the nominal worm, with nothing free.
 #[cfg(test)]
-pub(super) fn with_nothing_free<T>(residual: &[f64], ask: impl Fn(&Fitted<'_>) -> T) -> T {
+pub(super) fn beside_the_nominal_worm<T>(
+    problem: &super::super::fit::FitProblem<'_, '_>,
+    ask: impl Fn(&Fitted<'_>) -> T,
+) -> T {
+    let residual = problem.residuals(&super::super::hypothesis::Hypothesis::default(), &[]);
     ask(&Fitted {
-        residual,
+        residual: &residual,
         jacobian: &DMatrix::zeros(residual.len(), 0),
         normal: &DMatrix::zeros(0, 0).cholesky().expect("nothing is free"),
         gradient: &DVector::zeros(0),

@@ -410,7 +410,6 @@ mod tests {
         assert_eq!((pair(4.0), pair(20.0)), (1, 2));
     }
 
-    /// After an effect of 60 standard deviations, one of 6 may be what its law is wrong by.
     #[test]
     fn a_pair_that_earns_no_place_says_nothing_about_something_else() {
         let mut pair = judged(&["pad-creep", "backlash"], 440.0, 435.0);
@@ -420,6 +419,7 @@ mod tests {
         assert_eq!(selected.candidates[0].hypothesised.len(), 1);
     }
 
+    /// After an effect of 60 standard deviations, one of 6 may be what its law is wrong by.
     #[test]
     fn what_may_be_the_error_of_the_first_law_is_no_second_effect() {
         let second = |first: f64, gain: f64| {

@@ -166,7 +166,8 @@ pub(in crate::explain) fn evidence(
         let quantity = &unlimited[at];
         dot(&fit.jacobian[at], &fit.residual, None) + (fit.at[at] - quantity.centre) * quantity.sigma.powi(-2)
     };
-    if let Some(factor) = normal.clone().cholesky() {
+    let factor = normal.clone().cholesky();
+    if let Some(factor) = &factor {
         for at in (0..fit.at.len()).filter(|at| !open.contains(at)) {
             let shared = DVector::from_iterator(count, open.iter().map(|&other| whole[(other, at)]));
             let curvature = (whole[(at, at)] - shared.dot(&factor.solve(&shared))).max(1e-9 * whole[(at, at)]);
@@ -206,8 +207,7 @@ pub(in crate::explain) fn evidence(
     let bend = step_and_rest(1.0).map_or(0.0, |(step, _)| step);
     let at_scale =
         |kappa: f64| step_and_rest(kappa).map_or(f64::NEG_INFINITY, |(step, rest)| rest + 0.5 * (step - bend).max(0.0));
-    let factor = in_time.and_then(|in_time| Some((in_time, normal.clone().cholesky()?)));
-    let (changing, repeating) = factor.map_or((None, None), |(in_time, normal)| {
+    let (changing, repeating) = in_time.zip(factor).map_or((None, None), |(in_time, normal)| {
         let fitted = Fitted {
             residual: &fit.residual,
             jacobian: &jacobian,

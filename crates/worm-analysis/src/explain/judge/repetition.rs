@@ -99,10 +99,8 @@ fn columns(plant: &impl Plant, scale_m: f64, frequency: f64, of: usize) -> Vec<V
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::fit::FitProblem;
-    use super::super::super::fixture::{Campaign, hypothesis, problem, record, scene};
-    use super::super::super::hypothesis::Hypothesis;
-    use super::super::beside::with_nothing_free;
+    use super::super::super::fixture::{Campaign, hypothesis, problem, record, scene, with_discrepancy};
+    use super::super::beside::beside_the_nominal_worm;
     use super::*;
     use crate::experiment::Simulation;
     use worm_estimator::config::Config;
@@ -126,15 +124,10 @@ mod tests {
             }
         }
         let scene = scene(&recordings, &campaign);
-        let plain = problem(&scene, &hypothesis(None));
-        let discrepancy = Discrepancy::new(&plain, 1e-5);
-        let problem = FitProblem {
-            discrepancy: Some(discrepancy.clone()),
-            ..plain
-        };
+        let (problem, discrepancy) = with_discrepancy(problem(&scene, &hypothesis(None)));
         let repetitions = Repetitions::new(&problem, &discrepancy);
-        let residual = problem.residuals(&Hypothesis::default(), &[]);
-        with_nothing_free(&residual, |fitted| repetitions.beside(fitted)).expect("there are cycles enough")
+        let found = beside_the_nominal_worm(&problem, |fitted| repetitions.beside(fitted));
+        found.expect("there are cycles enough")
     }
 
     #[test]

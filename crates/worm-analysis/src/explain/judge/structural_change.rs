@@ -105,11 +105,10 @@ fn columns(plant: &impl Plant, scale_m: f64, change: Change) -> Vec<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::fit::FitProblem;
-    use super::super::super::fixture::{Campaign, begun, hypothesis, problem, record_under, scene};
+    use super::super::super::fixture::{Campaign, begun, hypothesis, problem, record_under, scene, with_discrepancy};
     use super::super::super::hypothesis::Hypothesis;
     use super::super::super::parameter::Onset;
-    use super::super::beside::with_nothing_free;
+    use super::super::beside::beside_the_nominal_worm;
     use super::*;
 
     /// The evidence for a change beside the worm as it is at the start.
@@ -120,15 +119,9 @@ mod tests {
         };
         let recordings = record_under(&campaign, truth, 3);
         let scene = scene(&recordings, &campaign);
-        let plain = problem(&scene, &hypothesis(None));
-        let discrepancy = Discrepancy::new(&plain, 1e-5);
-        let problem = FitProblem {
-            discrepancy: Some(discrepancy.clone()),
-            ..plain
-        };
+        let (problem, discrepancy) = with_discrepancy(problem(&scene, &hypothesis(None)));
         let changes = StructuralChanges::new(&problem, &discrepancy);
-        let residual = problem.residuals(&Hypothesis::default(), &[]);
-        let found = with_nothing_free(&residual, |fitted| changes.beside(fitted));
+        let found = beside_the_nominal_worm(&problem, |fitted| changes.beside(fitted));
         found.expect("there are cycles enough")
     }
 

@@ -86,12 +86,7 @@ fn found(per_n: f64, rest_s: f64, seed: u64) -> SpeedDroop {
     let recordings: Vec<Recording> = vec![recording(Vec::new()); SLOPES_DEG.len()];
     let observed = |recording, phase: Vec<f64>| Observed {
         repairs: Vec::new(),
-        run: RecordedRun {
-            recording,
-            slope_deg: 0.0,
-            payload_kg: 0.0,
-            cycle_s: None,
-        },
+        run: RecordedRun::at_slope(recording, 0.0),
         position_m: vec![vec![0.0; phase.len()]; cells],
         phase,
         phase_recorded: true,

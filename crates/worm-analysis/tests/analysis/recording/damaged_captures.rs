@@ -53,12 +53,7 @@ fn checked(recording: &Recording) -> Result<Recording, ReadError> {
 
 fn analysis(recording: &Recording) -> Analysis {
     let checked = checked(recording).expect("it can be repaired");
-    let run = RecordedRun {
-        recording: &checked,
-        slope_deg: 0.0,
-        payload_kg: 0.0,
-        cycle_s: None,
-    };
+    let run = RecordedRun::at_slope(&checked, 0.0);
     let mut analyses = analyze(&[run], &Config::default(), &mut |_| ()).expect("a crawl");
     analyses.remove(0)
 }
@@ -200,12 +195,7 @@ fn explain_reads_damaged_captures_and_reports_the_repairs() {
     let runs: Vec<RecordedRun<'_>> = recordings
         .iter()
         .zip(slopes_deg)
-        .map(|(recording, slope_deg)| RecordedRun {
-            recording,
-            slope_deg,
-            payload_kg: 0.0,
-            cycle_s: None,
-        })
+        .map(|(recording, slope_deg)| RecordedRun::at_slope(recording, slope_deg))
         .collect();
     let answer = explain(&runs, &Config::default(), &Options::default(), &mut |_| ()).expect("an answer");
     let found: Vec<_> = answer
@@ -306,13 +296,13 @@ fn too_much_damage_is_refused_with_its_name_and_place() {
     for sample in [700, 1340, 1950, 2480] {
         knock(&mut knocked, sample, 2e-3);
     }
-    let run = RecordedRun {
-        recording: &checked(&knocked).expect("knocks are found later"),
-        slope_deg: 0.0,
-        payload_kg: 0.0,
-        cycle_s: None,
-    };
-    let error = analyze(&[run], &Config::default(), &mut |_| ()).expect_err("four knocks");
+    let recording = checked(&knocked).expect("knocks are found later");
+    let error = analyze(
+        &[RecordedRun::at_slope(&recording, 0.0)],
+        &Config::default(),
+        &mut |_| (),
+    )
+    .expect_err("four knocks");
     assert_says(
         &error,
         &["all cells shift at once 4 times", "at 5.83 s", "knocked"],
