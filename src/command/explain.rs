@@ -36,8 +36,7 @@ pub struct ExplainArgs {
     /// Seed of the search
     #[arg(long, value_name = "N", default_value_t = Options::default().seed)]
     seed: u64,
-    /// What the model is taken to be wrong by everywhere, for the paper's worm at 2.3 s a cycle, as a fraction of the tips' mean largest
-    /// deformation; 0.0005 to 0.1
+    /// What the model is taken to be wrong by everywhere, as a fraction of the tips' mean largest deformation; 0.0005 to 0.1
     #[arg(long, value_name = "FRACTION", default_value_t = Options::default().discrepancy, value_parser = |text: &str| fraction(text, 0.0005..=0.1))]
     discrepancy: f64,
     /// Relative change of the advance or of the energy of a cycle below which an effect is not named; 0 to 0.5

@@ -24,6 +24,21 @@ SMALL = 0.05
 STEPS, WORTH_A_STEP, STEP_HALVINGS = 8, 1e-3, 6
 
 
+def balancing_shift(k: np.ndarray, bound: np.ndarray, trial: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The body's shift [variant] at which the tips, deformed by `trial` [variant, cell] without it, hold the weight.
+
+    Their force rises with the shift in straight lines, which bend where a tip begins or ends to slide: so between two bends.
+    """
+    bends = np.sort(np.concatenate([-bound - trial, bound - trial], axis=1), axis=1)
+    deformation = np.clip(trial[:, None] + bends[:, :, None], -bound[:, None], bound[:, None])
+    force = (k[:, None] * deformation).sum(axis=2) + weight[:, None]
+    after = np.clip((force < 0.0).sum(axis=1), 1, bends.shape[1] - 1)
+    variant = np.arange(len(bends))
+    low, high = force[variant, after - 1], force[variant, after]
+    fraction = np.clip(-low / np.maximum(high - low, 1e-300), 0.0, 1.0)
+    return bends[variant, after - 1] + fraction * (bends[variant, after] - bends[variant, after - 1])
+
+
 def quasi_static(worm: Worm, slope_deg: np.ndarray, phase: np.ndarray, factors: dict) -> np.ndarray:
     """Positions [variant, phase, cell] of several variants at once, laid down at the first phase.
 
@@ -45,20 +60,11 @@ def quasi_static(worm: Worm, slope_deg: np.ndarray, phase: np.ndarray, factors: 
     deformation = np.broadcast_to(-(weight / k.sum(axis=1))[:, None], bound.shape).copy()
     position = np.zeros_like(bound)
     out = np.empty((len(bound), len(phase), n))
-    shift = np.zeros(len(bound))
     for row in range(len(phase)):
         if row:
             step = stroke * (unit[row] - unit[row - 1])
             trial = deformation + step
-            # The body's shift that balances the forces: they rise with it, so it is found between bounds.
-            low, high = np.full(len(bound), -0.02), np.full(len(bound), 0.02)
-            for _ in range(40):
-                middle = 0.5 * (low + high)
-                force = (k * np.clip(trial + middle[:, None], -bound, bound)).sum(axis=1) + weight
-                above = force > 0.0
-                high = np.where(above, middle, high)
-                low = np.where(above, low, middle)
-            shift = 0.5 * (low + high)
+            shift = balancing_shift(k, bound, trial, weight)
             deformation = np.clip(trial + shift[:, None], -bound, bound)
             position = position + step + shift[:, None]
         out[:, row] = position

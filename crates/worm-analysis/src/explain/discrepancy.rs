@@ -9,8 +9,7 @@
 //! for cell i while cell s steps, at phase u of the step, c whole cycles after the start, at slope λ. The part g depends on how far a
 //! cell is from the one that steps, so that a law which is wrong in every pad alike lies in it; h is every cell's own. Both are sums of
 //! cos πmu, m = 0, 1, …, of standard deviation (1 + m/2)⁻², with a covariance over the slopes of 0.7 + 0.3 x x′, x the standardised
-//! sine. A slow part of 0.3 a varies over the run. The ramp ψ lets the advance be wrong. In each run a is as many times as large as the
-//! model is wrong there ([`Plant::inexactness`]).
+//! sine. A slow part of 0.3 a varies over the run. The ramp ψ lets the advance be wrong.
 //!
 //! # How it enters the likelihood
 //! It is linear in normal coefficients, so it is marginalised exactly: with Φ the whitened columns at the scale a₀, and ΦΦᵀ = Q Λ Qᵀ,
@@ -44,15 +43,14 @@ pub(super) struct Discrepancy {
     directions: DMatrix<f64>,
     /// Λ: the variance along each at a₀, in variances of the noise.
     strengths: Vec<f64>,
-    /// Root mean square of a₀ over the runs, m.
+    /// a₀, m.
     pub scale_m: f64,
 }
 
 impl Discrepancy {
-    /// The discrepancy whose standard deviation a₀ is `scale_m` where the plant is as fast as the scale is stated for.
+    /// The discrepancy whose standard deviation a₀ is `scale_m`.
     pub fn new(plant: &impl Plant, scale_m: f64) -> Self {
-        let scales_m: Vec<f64> = (0..plant.runs()).map(|run| scale_m * plant.inexactness(run)).collect();
-        let columns = columns(plant, &scales_m);
+        let columns = columns(plant, scale_m);
         let gram = cross(&columns, &columns);
         let eigen = gram.symmetric_eigen();
         let kept: Vec<usize> = (0..eigen.eigenvalues.len())
@@ -64,7 +62,7 @@ impl Discrepancy {
         Self {
             directions: columns * turned,
             strengths: kept.iter().map(|&at| eigen.eigenvalues[at]).collect(),
-            scale_m: (scales_m.iter().map(|m| m * m).sum::<f64>() / scales_m.len() as f64).sqrt(),
+            scale_m,
         }
     }
 
@@ -147,7 +145,7 @@ enum Column {
     Ramp(usize),
 }
 
-fn columns(plant: &impl Plant, scales_m: &[f64]) -> DMatrix<f64> {
+fn columns(plant: &impl Plant, scale_m: f64) -> DMatrix<f64> {
     let cells = plant.cells();
     let over_slopes = over_slopes(plant);
     let functions = over_slopes.first().map_or(0, Vec::len);
@@ -200,7 +198,7 @@ fn columns(plant: &impl Plant, scales_m: &[f64]) -> DMatrix<f64> {
                         Column::Ramp(function) => pattern_m.fill((bin.phase - first) * over_slopes[run][function]),
                     }
                 }
-                pattern_m.iter_mut().for_each(|m| *m *= scales_m[run]);
+                pattern_m.iter_mut().for_each(|m| *m *= scale_m);
                 plant.rows_of(run, &pattern_m)
             })
             .collect()

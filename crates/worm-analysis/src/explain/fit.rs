@@ -9,7 +9,6 @@
 use super::bins::Bins;
 use super::discrepancy::Discrepancy;
 use super::hypothesis::Hypothesis;
-use super::inertia;
 use super::noise::RunNoise;
 use super::observed::Observed;
 use super::parameter::{Nuisance, Onset, What};
@@ -439,10 +438,6 @@ impl Plant for FitProblem<'_, '_> {
 
     fn condition(&self, run: usize) -> f64 {
         self.scene.observed[run].run.slope_deg.to_radians().sin()
-    }
-
-    fn inexactness(&self, run: usize) -> f64 {
-        inertia::inexactness(&self.scene.nominal[run].worm, self.scene.observed[run].cycle_s)
     }
 
     fn bins(&self, run: usize) -> &Bins {

@@ -40,7 +40,6 @@ mod fit;
 mod fixture;
 mod gap;
 mod hypothesis;
-mod inertia;
 mod judge;
 mod judgement;
 mod local_restart;

@@ -86,10 +86,10 @@ const PRESLIDING: (f64, f64, f64, f64, f64) = (0.02, 0.015, 1e-3, 0.08, 2e-3);
 /// Of the cam's rounding, as of the presliding: no cam has sharp corners.
 const ROUNDING: (f64, f64, f64, f64, f64) = (0.05, 0.05, 0.0, 0.3, 5e-3);
 /// Of the viscosity, as of the presliding: no contact is quite dry. At the paper's speed 1 N s/m is 18 mN, of some 2 N of friction.
-const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 1.0, 0.0, 6.0, 0.1);
-/// Of the excess of static friction, as of the presliding: no contact is without. In MuJoCo clean worms look as if they had up to
-/// 0.18, and dry rubber has as much.
-const BREAKAWAY: (f64, f64, f64, f64, f64) = (0.0, 0.1, 0.0, 0.25, 0.01);
+const VISCOSITY: (f64, f64, f64, f64, f64) = (0.0, 0.7, 0.0, 3.0, 0.1);
+/// Of the excess of static friction, as of the presliding: no contact is without. Clean worms of both test beds look as if they had up
+/// to 0.06.
+const BREAKAWAY: (f64, f64, f64, f64, f64) = (0.0, 0.05, 0.0, 0.15, 0.01);
 /// Logarithm of the damping ratio: centre, standard deviation, limits' distance, step.
 const DAMPING: (f64, f64, f64, f64) = (-0.9, 1.0, 2.2, 0.1);
 

@@ -13,8 +13,6 @@ pub(super) trait Plant: Sync {
     fn cells(&self) -> usize;
     /// The condition that differs from run to run: for a worm, the sine of the slope.
     fn condition(&self, run: usize) -> f64;
-    /// By how much more the model is wrong in a run than at the speed for which the discrepancy's scale is stated.
-    fn inexactness(&self, run: usize) -> f64;
     /// The bins of the gap in a run.
     fn bins(&self, run: usize) -> &Bins;
     /// The whitened rows of displacements of every body in every bin of a run, m: `[bin][body]`, flat.

@@ -29,8 +29,7 @@ const PAIR_SEEDS: usize = 2;
 pub struct Options {
     /// Seed of everything drawn: the same input and seed give the same answer.
     pub seed: u64,
-    /// Scale of the discrepancy between the model and any worm, as a fraction of the mean largest deformation of the tips; above 0. It
-    /// is that of the paper's worm at 2.3 s a cycle, and larger for a faster one.
+    /// Scale of the discrepancy between the model and any worm, as a fraction of the mean largest deformation of the tips; above 0.
     /// Too small, and the model's own small errors get names; too large, and a wrong effect hides in it what it leaves.
     pub discrepancy: f64,
     /// Relative change of the advance or of the energy of a cycle below which an effect does not matter.
@@ -43,7 +42,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             seed: 1,
-            discrepancy: 0.006,
+            discrepancy: 0.004,
             matters: 0.02,
             expected_impact: 0.06,
         }
