@@ -28,7 +28,7 @@ const LOST_M_S: f64 = 1.0;
 /// Fewest increments per step.
 const PARTS_OF_STEP: f64 = 100.0;
 /// Longest increment of a body with mass, s: a small part of an oscillation.
-const LONGEST_S: f64 = 4.2e-3;
+const LONGEST_S: f64 = 8.4e-3;
 /// Shortest increment, s: rate-dependent laws need a time.
 const SHORTEST_S: f64 = 1e-9;
 /// Time in which a worm that was laid down comes to rest, s: until nothing creeps any more.

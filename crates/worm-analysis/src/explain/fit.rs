@@ -311,12 +311,17 @@ impl<'s, 'a> FitProblem<'s, 'a> {
     /// relative positions about their means again.
     pub fn within_onset(&self, change: &[f64], onset: &Onset) -> Vec<f64> {
         let mut acting = vec![0.0; change.len()];
-        for (run, bins) in self.bins.iter().enumerate().filter(|(run, _)| onset.is_in(*run)) {
+        for (run, bins) in self.bins.iter().enumerate() {
             let from = bins.start_phase + onset.cycle;
             let first = bins.bins.partition_point(|bin| bin.phase < from);
             let rows = self.rows(run);
             let (count, cells) = (bins.len(), self.scene.observed[run].cells());
-            let acts = if onset.ends { 0..first } else { first..count };
+            let acts = match (onset.acts_at_start(run), onset.acts_at_end(run)) {
+                (false, false) => continue,
+                (true, true) => 0..count,
+                (true, false) => 0..first,
+                (false, true) => first..count,
+            };
             let of_body = rows.start + acts.start..rows.start + acts.end;
             acting[of_body.clone()].copy_from_slice(&change[of_body]);
             let relative = rows.start + count..rows.end;

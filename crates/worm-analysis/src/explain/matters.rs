@@ -37,7 +37,8 @@ pub(super) fn impact(problem: &FitProblem<'_, '_>, fit: &Fit, place: usize, limi
         problem.evaluate(&hypothesis, without_at),
     );
     let mut impact = Impact::default();
-    for (run, observed) in runs.filter(|(run, _)| onset.is_none_or(|onset| onset.is_in(*run))) {
+    let acts_in = |run: usize| onset.is_none_or(|onset| onset.acts_at_start(run) || onset.acts_at_end(run));
+    for (run, observed) in runs.filter(|(run, _)| acts_in(*run)) {
         let predict = |fit: &Fit| problem.scene.predict(run, &fit.hypothesis, &fit.at);
         let (Some(on), Some(off)) = (predict(fit), predict(&without)) else {
             continue;

@@ -1,4 +1,5 @@
-//! Effects that begin or end in mid-run: screened at every cycle, in single runs and in all, and fitted with the time at which they do.
+//! Effects that begin or end in mid-run: screened at every cycle, of one run to stay so and of every run, and fitted with the time at
+//! which they do.
 //!
 //! The worm of an effect that begins at t₁ moves as without it before and about as with it throughout after, so the change of the
 //! residuals is that of the constant effect from t₁ on: its innovations are the same, and the places of the cells are means again. That
@@ -101,7 +102,11 @@ fn beside_change(problem: &FitProblem<'_, '_>, nominal: &Fit, change: Change, en
     let is_beside = |(run, bin): (usize, usize)| {
         let bins = &problem.bins[run];
         let since = bins.bins[bin].phase - bins.start_phase;
-        change.run.is_some_and(|of| of != run) || (since < change.cycle as f64) != ends
+        let is_before = match change.run {
+            Some(of) if of != run => run < of,
+            _ => since < change.cycle as f64,
+        };
+        is_before != ends
     };
     let stays: Vec<bool> = rows.map(is_beside).collect();
     let mut fit = nominal.clone();

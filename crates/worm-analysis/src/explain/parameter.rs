@@ -200,26 +200,26 @@ impl Free {
 pub(super) struct Onset {
     /// Cycles since the first sample of the run.
     pub cycle: f64,
-    /// The only run that it acts in; all of them for none.
+    /// The run in which it happens, once: the runs before and after are as at its start and its end. In every run for none.
     pub run: Option<usize>,
-    /// It acts from the start of the run up to then, instead of from then on.
+    /// It acts up to then, instead of from then on.
     pub ends: bool,
 }
 
 impl Onset {
-    /// Whether it concerns a run.
+    /// Whether the effect begins or ends in a run.
     pub fn is_in(&self, run: usize) -> bool {
         self.run.is_none_or(|of| of == run)
     }
 
-    /// Whether an effect acts at the start of a run.
+    /// Whether the effect acts at the start of a run.
     pub fn acts_at_start(&self, run: usize) -> bool {
-        self.ends && self.is_in(run)
+        self.run.is_some_and(|of| of < run) != self.ends
     }
 
-    /// Whether an effect acts at the end of a run.
+    /// Whether the effect acts at the end of a run.
     pub fn acts_at_end(&self, run: usize) -> bool {
-        !self.ends && self.is_in(run)
+        self.run.is_none_or(|of| of <= run) != self.ends
     }
 }
 

@@ -8,7 +8,7 @@ use worm_physics::{Crawl, MAX_CELLS, Mechanics};
 const SETTLED_M: f64 = 3e-7;
 /// Fewest knots of a step, of a cycle that is repeated, and the longest time between two, s: a small part of an oscillation.
 const KNOTS_OF_STEP: f64 = 104.0;
-const LONGEST_S: f64 = 4.1e-3;
+const LONGEST_S: f64 = 8.2e-3;
 /// Difference of two phases below which the drive rests, cycles.
 const RESTS: f64 = 1e-12;
 

@@ -7,11 +7,11 @@ use serde::Serialize;
 pub struct FoundOnset {
     /// Gait cycles since the first sample of the run.
     pub cycle: f64,
-    /// Time since the first sample of the run, s; of the first run where it acts in all.
+    /// Time since the first sample of the run, s; of the first run where it happens in each.
     pub time_s: f64,
-    /// The recording that it acts in; none for all.
+    /// The recording in which it happens, once: it lasts in those after it, or acts in those before it. None where it happens in each.
     pub run: Option<String>,
-    /// It acts from the start of the run up to then, instead of from then on.
+    /// It acts up to then, instead of from then on.
     pub ends: bool,
 }
 

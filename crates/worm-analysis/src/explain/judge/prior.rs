@@ -9,7 +9,7 @@
 //!
 //! # Odds
 //! None 0.5, something else 0.1, a single effect 0.35, a pair 0.05; shared equally by families (exact twins are one), then by cells,
-//! then 0.6 to an effect that acts throughout, 0.3 to one that begins in mid-run and 0.1 to one that ends there: in all runs or in one,
+//! then 0.6 to an effect that acts throughout, 0.3 to one that begins in mid-run and 0.1 to one that ends there: in every run, or once in one of them,
 //! at any cycle.
 
 use super::super::parameter::{Hypothesised, Onset};

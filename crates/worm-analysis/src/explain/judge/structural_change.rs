@@ -1,7 +1,7 @@
 //! The evidence that something changes in the middle of a run, whatever it is.
 //!
 //! What is wrong in every cycle alike looks like the discrepancy; what begins at some cycle does not. So beside a fit the residual may
-//! hold, from one cycle on and in one run or in all, another displacement of each cell by how far it is from the stepping one (cosines
+//! hold, from one cycle of a run on and in all later runs, or from one cycle of every run on, another displacement of each cell by how far it is from the stepping one (cosines
 //! in the phase of the step), and another advance. The mean over all cycles and runs is the evidence that there is one (known as a
 //! structural change: Zeileis and Hornik 2007).
 
@@ -22,7 +22,7 @@ const MIN_CYCLES: usize = 1;
 pub(in crate::explain) struct Change {
     /// Cycles since the start of the run.
     pub cycle: usize,
-    /// The run, or all of them.
+    /// The run in which it happens, to stay; every run for none.
     pub run: Option<usize>,
 }
 
@@ -34,7 +34,7 @@ pub(in crate::explain) struct StructuralChanges {
 }
 
 impl StructuralChanges {
-    /// All cycles of a campaign, in single runs and in all at once.
+    /// All cycles of a campaign, of each run to stay so and of all at once.
     pub fn new(plant: &impl Plant, discrepancy: &Discrepancy) -> Self {
         let runs = plant.runs();
         let cycles = |run: usize| {
@@ -81,9 +81,13 @@ fn columns(plant: &impl Plant, scale_m: f64, change: Change) -> Vec<Vec<f64>> {
         let of_run = |run: usize| {
             let bins = plant.bins(run);
             let mut pattern_m = vec![0.0; bins.len() * cells];
-            if change.run.is_none_or(|of| of == run) {
+            if change.run.is_none_or(|of| of <= run) {
+                let from = match change.run {
+                    Some(of) if of < run => 0.0,
+                    _ => change.cycle as f64,
+                };
                 for (bin, pattern_m) in bins.bins.iter().zip(pattern_m.chunks_exact_mut(cells)) {
-                    let since = bin.phase - bins.start_phase - change.cycle as f64;
+                    let since = bin.phase - bins.start_phase - from;
                     if since < 0.0 {
                         continue;
                     }
