@@ -405,6 +405,22 @@ impl<'s, 'a> FitProblem<'s, 'a> {
         Fit::new(hypothesis, estimate)
     }
 
+    /// One Gauss-Newton step of the first quantities, of which derivatives and their normal matrix are known from nearby, where it leads
+    /// downhill.
+    pub fn step_of_first(&self, fit: Fit, jacobian: &[Vec<f64>], normal: &DMatrix<f64>) -> Fit {
+        let (first, rest) = fit.at.split_at(jacobian.len());
+        let quantities = &fit.hypothesis.quantities()[..first.len()];
+        let gradient = gradient(quantities, first, &fit.residual, jacobian, None);
+        let mut at = damped_step(quantities, first, normal, &gradient, SLIGHT_DAMPING);
+        at.extend_from_slice(rest);
+        let stepped = self.evaluate(&fit.hypothesis, at);
+        if stepped.chi_squared < fit.chi_squared {
+            stepped
+        } else {
+            fit
+        }
+    }
+
     /// One Gauss-Newton step on the residuals that stay, with the derivatives that are there; halved until it leads downhill, and none
     /// if it never does.
     pub fn step_without(&self, fit: Fit, stays: &[bool]) -> Fit {

@@ -25,6 +25,9 @@ const STRENGTH: f64 = 8.0;
 /// Effects that are fitted with an onset, and with an end.
 const FITTED: usize = 4;
 const FITTED_WITH_END: usize = 2;
+/// Logarithm of the Bayes factor of a change from which effects are tried only where it is, and about it, cycles.
+const WELL_SEEN: f64 = 20.0;
+const ABOUT: f64 = 2.0;
 /// Factors on the change of a trial for which its direction stands.
 const STANDS_FOR: (f64, f64) = (0.1, 3.0);
 /// Gauss-Newton steps of a recalibration on what was seen to one side of a change.
@@ -71,12 +74,17 @@ fn onsets(problem: &FitProblem<'_, '_>, ends: bool) -> Vec<Onset> {
 /// The effects that most probably begin or end in mid-run, fitted with the time. `screened` are those that act throughout.
 pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[Screening]) -> Vec<Candidate> {
     let fitted = [(false, FITTED), (true, FITTED_WITH_END)].map(|(ends, count)| {
-        let is_likely = judge.none.ln_bayes_of_change().is_some_and(|ln_bayes| ln_bayes > 0.0);
-        let base = match judge.none.changing {
-            Some((_, change)) if is_likely => beside_change(judge.problem, nominal, change, ends),
+        let ln_bayes = judge.none.ln_bayes_of_change().unwrap_or(f64::NEG_INFINITY);
+        let change = judge.none.changing.map(|(_, change)| change);
+        let base = match change {
+            Some(change) if ln_bayes > 0.0 => beside_change(judge.problem, nominal, change, ends),
             _ => judge.recalibrated.clone(),
         };
-        let mut promising = screen(judge, &base, screened, ends);
+        let mut tried = onsets(judge.problem, ends);
+        if let Some(change) = change.filter(|_| ln_bayes > WELL_SEEN) {
+            tried.retain(|onset| onset.run == change.run && (onset.cycle - change.cycle as f64).abs() <= ABOUT);
+        }
+        let mut promising = screen(judge, &base, screened, &tried);
         promising.truncate(count);
         refit(judge.problem, &base, nominal, &promising, count, &mut |_| ())
     });
@@ -117,10 +125,9 @@ fn beside_change(problem: &FitProblem<'_, '_>, nominal: &Fit, change: Change, en
     fit
 }
 
-/// Scores of every effect about a fit for every onset, or every end; the most probable one of each, best first.
-fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], ends: bool) -> Vec<Screening> {
+/// Scores of every effect about a fit for each of some onsets; the most probable one of each, best first.
+fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], onsets: &[Onset]) -> Vec<Screening> {
     let problem = judge.problem;
-    let onsets = onsets(problem, ends);
     let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
     let jacobian = DMatrix::from_iterator(
         fit.residual.len(),

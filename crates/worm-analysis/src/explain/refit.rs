@@ -20,7 +20,8 @@ const ROUGHLY: usize = 10;
 /// Fraction of the best rough gain, and the gain, from which an effect is fitted to the end; and how many are at least.
 const PROMISING: (f64, f64) = (0.4, 8.0);
 const AT_LEAST: usize = 2;
-/// Strengths of effects about the nominal model, in notable changes; a fit starts from that which fits best as it is.
+/// Strengths of effects about the nominal model, in notable changes; a fit starts from that which fits best once a step has recalibrated
+/// the rest.
 const STRONG: [f64; 4] = [4.0, 8.0, 16.0, 32.0];
 /// Effects that are refitted on top of a single one, and how many of those that screened best are tried roughly before.
 const PAIRED: usize = 3;
@@ -48,23 +49,31 @@ pub(super) fn refit(
         all.push(hypothesised);
         Hypothesis::new(&base.hypothesis.free[..effects_from], &all)
     };
+    let nominal_normal = nominal.normal(None);
     let mut rough: Vec<Fit> = Vec::with_capacity(screened.len());
     for (done, screening) in screened.iter().take(ROUGHLY).enumerate() {
         progress(0.5 * done as f64 / ROUGHLY as f64);
         let hypothesis = hypothesis_of(screening.hypothesised);
         let about_base = screening.starts.iter().map(|start| (base, start.clone()));
         let strong = score_test::strong(screening.hypothesised.effect, &STRONG).into_par_iter();
-        let with_fit = strong.map(|start| {
+        let recalibrated = strong.map(|start| {
             let at = [&nominal.at[..], &start].concat();
-            (problem.evaluate(&hypothesis, at).chi_squared, start)
+            problem.step_of_first(problem.evaluate(&hypothesis, at), &nominal.jacobian, &nominal_normal)
         });
-        let best = with_fit.min_by(|a, b| a.0.total_cmp(&b.0));
-        let about_nominal = best.map(|(_, start)| (nominal, start));
-        let fits = about_base.chain(about_nominal).map(|(from, start)| {
-            let mut at = from.at.clone();
-            at.extend(start);
-            problem.fit_roughly(&hypothesis, at, from)
-        });
+        let about_nominal = recalibrated.min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
+        let about_nominal = about_nominal.map(|strong| (nominal, strong.at));
+        let fits = about_base
+            .map(|(from, start)| (from, [&from.at[..], &start].concat()))
+            .chain(about_nominal)
+            .map(|(from, at)| {
+                let fit = problem.fit_roughly(&hypothesis, at.clone(), from);
+                // Derivatives from elsewhere may lead nowhere from a start that is better than anything without the effect.
+                if fit.at == at && fit.chi_squared < base.chi_squared {
+                    let here = problem.with_derivatives(&hypothesis, at.clone());
+                    return problem.fit_roughly(&hypothesis, at, &here);
+                }
+                fit
+            });
         rough.extend(fits.min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared)));
     }
     rough.sort_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
