@@ -69,8 +69,7 @@ pub(super) fn refit(
                 let fit = problem.fit_roughly(&hypothesis, at.clone(), from);
                 // Derivatives from elsewhere may lead nowhere from a start that is better than anything without the effect.
                 if fit.at == at && fit.chi_squared < base.chi_squared {
-                    let here = problem.with_derivatives(&hypothesis, at.clone());
-                    return problem.fit_roughly(&hypothesis, at, &here);
+                    return problem.fit(&hypothesis, at, None);
                 }
                 fit
             });
