@@ -27,12 +27,19 @@ use crate::MAX_CELLS;
 const LOST_M_S: f64 = 1.0;
 /// Fewest increments per step.
 const PARTS_OF_STEP: f64 = 100.0;
-/// Longest increment of a body with mass, s: a small part of an oscillation.
-const LONGEST_S: f64 = 8.4e-3;
+/// Limits of the longest increment of a body with mass, s, a small part of an oscillation; between them it is a fraction of a step.
+const LONGEST_S: [f64; 2] = [4.2e-3, 8.4e-3];
+const LONGEST_OF_STEP: f64 = 1.0 / 150.0;
 /// Shortest increment, s: rate-dependent laws need a time.
 const SHORTEST_S: f64 = 1e-9;
 /// Time in which a worm that was laid down comes to rest, s: until nothing creeps any more.
 const SETTLING_S: f64 = 1e6;
+
+/// Longest increment of a body with mass, s, where a step takes so long, s: a slow drive excites it less.
+pub fn longest_increment_s(step_s: f64) -> f64 {
+    let [shortest, longest] = LONGEST_S;
+    (LONGEST_OF_STEP * step_s).clamp(shortest, longest)
+}
 
 /// A worm in motion under any of the laws. Fixed size, no heap. Every method takes the [`Mechanics`], so that they may change while it
 /// moves.
@@ -150,7 +157,8 @@ impl Crawl {
     fn parts(&self, phase: f64, duration_s: f64) -> f64 {
         let by_phase = (phase - self.phase).abs() * self.cells as f64 * PARTS_OF_STEP;
         let by_time = if self.damping_ratio.is_some() {
-            duration_s / LONGEST_S
+            let steps = (phase - self.phase).abs() * self.cells as f64;
+            duration_s / longest_increment_s(duration_s / steps)
         } else {
             0.0
         };

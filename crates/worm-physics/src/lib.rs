@@ -45,7 +45,7 @@ mod physics;
 pub mod study;
 pub mod worm;
 
-pub use crawl::Crawl;
+pub use crawl::{Crawl, longest_increment_s};
 pub use cycle::{Cycle, LevelCycle, Outcome, level_closed_form, rigid_energy_j, steady_cycle, steady_cycle_of};
 pub use ledger::Ledger;
 pub use locomotion::Locomotion;

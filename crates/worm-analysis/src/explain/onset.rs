@@ -25,15 +25,14 @@ const STRENGTH: f64 = 8.0;
 /// Effects that are fitted with an onset, and with an end.
 const FITTED: usize = 4;
 const FITTED_WITH_END: usize = 2;
-/// Logarithm of the Bayes factor of a change from which effects are tried only where it is, and about it, cycles.
-const WELL_SEEN: f64 = 20.0;
-const ABOUT: f64 = 2.0;
+/// Effects of which every probable onset is tried.
+const TRIED: usize = 12;
 /// Factors on the change of a trial for which its direction stands.
 const STANDS_FOR: (f64, f64) = (0.1, 3.0);
 /// Gauss-Newton steps of a recalibration on what was seen to one side of a change.
 const STEPS_BESIDE: usize = 3;
 /// Values of the onset that are tried about the best so far: their distance, cycles, and how many to either side.
-const GRIDS: [(f64, i32); 2] = [(0.25, 5), (0.0625, 4)];
+const GRIDS: [(f64, i32); 3] = [(1.0, 6), (0.25, 5), (0.0625, 4)];
 
 /// Cycles since the start of each run at which an effect may begin: those that leave a whole one before and after.
 fn cycles(problem: &FitProblem<'_, '_>, run: usize) -> std::ops::Range<usize> {
@@ -75,24 +74,19 @@ fn onsets(problem: &FitProblem<'_, '_>, ends: bool) -> Vec<Onset> {
 pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[Screening]) -> Vec<Candidate> {
     let fitted = [(false, FITTED), (true, FITTED_WITH_END)].map(|(ends, count)| {
         let ln_bayes = judge.none.ln_bayes_of_change().unwrap_or(f64::NEG_INFINITY);
-        let change = judge.none.changing.map(|(_, change)| change);
-        let base = match change {
-            Some(change) if ln_bayes > 0.0 => beside_change(judge.problem, nominal, change, ends),
+        let base = match judge.none.changing {
+            Some((_, change)) if ln_bayes > 0.0 => beside_change(judge.problem, nominal, change, ends),
             _ => judge.recalibrated.clone(),
         };
-        let mut tried = onsets(judge.problem, ends);
-        if let Some(change) = change.filter(|_| ln_bayes > WELL_SEEN) {
-            tried.retain(|onset| onset.run == change.run && (onset.cycle - change.cycle as f64).abs() <= ABOUT);
-        }
-        let mut promising = screen(judge, &base, screened, &tried);
-        promising.truncate(count);
+        let promising = screen(judge, &base, screened, ends);
+        let promising = try_out(judge, &base, promising, count);
         refit(judge.problem, &base, nominal, &promising, count, &mut |_| ())
     });
     let mut candidates: Vec<Candidate> = fitted
         .into_iter()
         .flatten()
         .map(|candidate| {
-            let (fit, ln_onset) = refine(judge.problem, candidate.fit);
+            let (fit, ln_onset) = refine(judge.problem, in_best_run(judge.problem, candidate.fit));
             Candidate {
                 ln_onset,
                 ..Candidate::of(judge.problem, judge.recalibrated, fit)
@@ -125,9 +119,17 @@ fn beside_change(problem: &FitProblem<'_, '_>, nominal: &Fit, change: Change, en
     fit
 }
 
-/// Scores of every effect about a fit for each of some onsets; the most probable one of each, best first.
-fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], onsets: &[Onset]) -> Vec<Screening> {
+/// An effect that may begin or end, with when and how strongly it most probably does so in every run, or in one of them.
+struct Promising {
+    screening: Screening,
+    /// Logarithm of the Bayes factor, onset, and parameters.
+    each: Vec<(f64, Onset, Vec<f64>)>,
+}
+
+/// Scores of every effect about a fit for every onset, or every end; most probable first.
+fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], ends: bool) -> Vec<Promising> {
     let problem = judge.problem;
+    let onsets = onsets(problem, ends);
     let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
     let jacobian = DMatrix::from_iterator(
         fit.residual.len(),
@@ -143,7 +145,7 @@ fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], onsets: 
         let hypothesised = screening.hypothesised;
         let mut starts = strong(hypothesised.effect, &[STRENGTH]);
         starts.extend(screening.starts.first().cloned());
-        let mut best: Option<(f64, Onset, Vec<f64>)> = None;
+        let mut each: Vec<(f64, Onset, Vec<f64>)> = Vec::new();
         let mut all = Vec::new();
         for values in starts {
             let mut at = fit.at.clone();
@@ -175,30 +177,79 @@ fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], onsets: 
                     square.max(1e-9),
                 );
                 all.push(found);
-                if best.as_ref().is_none_or(|(best, ..)| found > *best) {
-                    best = Some((found, *onset, values.clone()));
+                let (least, most) = STANDS_FOR;
+                let strength = (scores[number] / square.max(1e-9)).clamp(least, most);
+                let neutral = hypothesised.effect.severity().neutral;
+                let mut found_at = values.clone();
+                found_at[0] = neutral + strength * (values[0] - neutral);
+                match each.iter_mut().find(|(_, other, _)| other.run == onset.run) {
+                    Some(best) if best.0 < found => *best = (found, *onset, found_at),
+                    Some(_) => {}
+                    None => each.push((found, *onset, found_at)),
                 }
             }
         }
-        let (_, onset, start) = best?;
-        Some(Screening {
-            hypothesised: Hypothesised {
-                onset: Some(onset),
-                ..hypothesised
-            },
+        let screening = Screening {
             ln_bayes: ln_sum(all.iter().copied()) - (all.len() as f64).ln(),
-            prior: screening.prior,
             score: 0.0,
-            starts: vec![start],
-        })
+            starts: Vec::new(),
+            ..screening.clone()
+        };
+        Promising { screening, each }
     };
     let may_begin = screened
         .par_iter()
         .filter(|screening| prior::may_begin(screening.hypothesised.effect));
-    let mut promising: Vec<Screening> = may_begin.filter_map(of_effect).collect();
-    let ln_odds = |screening: &Screening| screening.ln_bayes + judge.ln_prior(&[screening.hypothesised]);
+    let mut promising: Vec<Promising> = may_begin.map(of_effect).collect();
+    let ln_odds =
+        |one: &Promising| one.screening.ln_bayes + judge.ln_prior(&[one.screening.hypothesised]);
     promising.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
     promising
+}
+
+/// The best effects, each with the onset and the strength that fit best as they are: first order promises strong effects too much.
+fn try_out(judge: &Judge<'_, '_, '_>, fit: &Fit, mut promising: Vec<Promising>, count: usize) -> Vec<Screening> {
+    promising.truncate(TRIED);
+    let tried = promising.into_par_iter().filter_map(|one| {
+        let with = |(_, onset, values): (f64, Onset, Vec<f64>)| {
+            let hypothesised = Hypothesised {
+                onset: Some(onset),
+                ..one.screening.hypothesised
+            };
+            let hypothesis = Hypothesis::new(&fit.hypothesis.free, &[hypothesised]);
+            let at = [&fit.at[..], &values].concat();
+            (judge.problem.evaluate(&hypothesis, at).chi_squared, hypothesised, values)
+        };
+        let best = one.each.into_iter().map(with).min_by(|a, b| a.0.total_cmp(&b.0));
+        let (chi_squared, hypothesised, start) = best?;
+        let screening = Screening {
+            hypothesised,
+            starts: vec![start],
+            ..one.screening
+        };
+        Some((chi_squared, screening))
+    });
+    let mut tried: Vec<(f64, Screening)> = tried.collect();
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    tried.into_iter().map(|(_, screening)| screening).take(count).collect()
+}
+
+/// The last effect of a fit at the same cycle of another run, or of every run, where that fits better as it is.
+fn in_best_run(problem: &FitProblem<'_, '_>, fit: Fit) -> Fit {
+    let runs = problem.bins.len();
+    let with_run = |run: Option<usize>| {
+        let mut hypothesis = fit.hypothesis.clone();
+        hypothesis.hypothesised.last_mut()?.onset.as_mut()?.run = run;
+        Some(problem.evaluate(&hypothesis, fit.at.clone()))
+    };
+    let others = (0..runs).map(Some).chain((runs > 1).then_some(None));
+    let best = others
+        .filter_map(with_run)
+        .min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
+    match best {
+        Some(best) if best.chi_squared < fit.chi_squared => problem.fit(&best.hypothesis, best.at, Some(&fit)),
+        _ => fit,
+    }
 }
 
 /// Fits the onset of the last effect of a fit. Returns the fit with derivatives, and the logarithm of the cycles that the onset may be

@@ -2,13 +2,13 @@
 
 use super::observed::Observed;
 use super::predict::{Clock, Predicted};
-use worm_physics::{Crawl, MAX_CELLS, Mechanics};
+use worm_physics::{Crawl, MAX_CELLS, Mechanics, longest_increment_s};
 
 /// Change of every pad's deformation from cycle to cycle below which a crawl has settled, m: the next is a twentieth or less.
 const SETTLED_M: f64 = 3e-7;
-/// Fewest knots of a step, of a cycle that is repeated, and the longest time between two, s: a small part of an oscillation.
+/// Fewest knots of a step, of a cycle that is repeated; and the time between two over the longest increment of a crawl.
 const KNOTS_OF_STEP: f64 = 104.0;
-const LONGEST_S: f64 = 8.2e-3;
+const OF_INCREMENT: f64 = 0.98;
 /// Difference of two phases below which the drive rests, cycles.
 const RESTS: f64 = 1e-12;
 
@@ -182,7 +182,8 @@ impl SteadyCycle {
     fn record(crawl: &mut Crawl, mechanics: &Mechanics, observed: &Observed<'_>) -> Option<Self> {
         let cells = observed.cells();
         let step_s = observed.cycle_s / cells as f64;
-        let knots = cells as f64 * KNOTS_OF_STEP.max((step_s / LONGEST_S).ceil());
+        let between_s = OF_INCREMENT * longest_increment_s(step_s);
+        let knots = cells as f64 * KNOTS_OF_STEP.max((step_s / between_s).ceil());
         let first = (crawl.phase() * knots).ceil();
         let first_phase = first / knots;
         let mut reached_s = observed.time_at_s(crawl.phase());

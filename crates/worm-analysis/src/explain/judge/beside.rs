@@ -14,7 +14,7 @@ use crate::least_squares::cross;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Scales over a₀.
-const SCALES: [f64; 3] = [2.0, 6.0, 18.0];
+const SCALES: [f64; 5] = [2.0, 6.0, 18.0, 60.0, 200.0];
 
 /// A fit beside which something may be.
 pub(super) struct Fitted<'f> {

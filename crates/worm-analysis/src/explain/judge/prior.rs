@@ -36,7 +36,8 @@ const CARE: [(&str, f64); 2] = [("slope-error", 1.5), ("lost-stroke", 0.075)];
 /// Probabilities that an effect which may begin in mid-run does, and that it ends there; and effects that do not.
 const BEGINS: f64 = 0.3;
 const ENDS: f64 = 0.1;
-const NEVER_BEGIN: [&str; 6] = [
+const NEVER_BEGIN: [&str; 7] = [
+    "slope-error",
     "wear",
     "tether-drag",
     "sensor-scale",
