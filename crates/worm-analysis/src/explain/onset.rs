@@ -201,8 +201,7 @@ fn screen(judge: &Judge<'_, '_, '_>, fit: &Fit, screened: &[Screening], ends: bo
         .par_iter()
         .filter(|screening| prior::may_begin(screening.hypothesised.effect));
     let mut promising: Vec<Promising> = may_begin.map(of_effect).collect();
-    let ln_odds =
-        |one: &Promising| one.screening.ln_bayes + judge.ln_prior(&[one.screening.hypothesised]);
+    let ln_odds = |one: &Promising| one.screening.ln_bayes + judge.ln_prior(&[one.screening.hypothesised]);
     promising.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
     promising
 }
@@ -218,7 +217,11 @@ fn try_out(judge: &Judge<'_, '_, '_>, fit: &Fit, mut promising: Vec<Promising>, 
             };
             let hypothesis = Hypothesis::new(&fit.hypothesis.free, &[hypothesised]);
             let at = [&fit.at[..], &values].concat();
-            (judge.problem.evaluate(&hypothesis, at).chi_squared, hypothesised, values)
+            (
+                judge.problem.evaluate(&hypothesis, at).chi_squared,
+                hypothesised,
+                values,
+            )
         };
         let best = one.each.into_iter().map(with).min_by(|a, b| a.0.total_cmp(&b.0));
         let (chi_squared, hypothesised, start) = best?;
