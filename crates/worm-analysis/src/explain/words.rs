@@ -9,6 +9,9 @@ use crate::recording::Repair;
 use worm_estimator::number::percent;
 use worm_physics::effect::{LIBRARY, Visible};
 
+/// Probability from which an effect that is not named is mentioned.
+const WORTH_A_WORD: f64 = 0.1;
+
 /// The verdict in a sentence or two.
 pub(super) fn sentence(
     verdict: Verdict,
@@ -20,8 +23,9 @@ pub(super) fn sentence(
 ) -> String {
     match verdict {
         Verdict::Agrees => format!(
-            "Model and data agree once the model is recalibrated within its priors: that nothing which matters is missing has a probability of {}.",
-            percent(selected.null_probability)
+            "Model and data agree once the model is recalibrated within its priors: that nothing which matters is missing has a probability of {}.{}",
+            percent(selected.null_probability),
+            not_sure_enough(selected)
         ),
         Verdict::Explained => format!("{} explains the data{}.", names(effects), closing(effects)),
         Verdict::Ambiguous if rivals.is_empty() => format!(
@@ -42,13 +46,9 @@ pub(super) fn sentence(
             let nearest = selected.candidates.first().map_or_else(
                 || "none comes near".to_owned(),
                 |candidate| {
-                    let names: Vec<&str> = candidate
-                        .named()
-                        .map(|(_, hypothesised)| hypothesised.effect.name)
-                        .collect();
                     format!(
                         "{} comes nearest and leaves {:.0} % of the gap open",
-                        names.join(" with "),
+                        of_library(candidate),
                         100.0 * open_share
                     )
                 },
@@ -63,6 +63,27 @@ pub(super) fn sentence(
             )
         }
     }
+}
+
+/// What was not named though it may well be there, as a further sentence.
+fn not_sure_enough(selected: &Selected) -> String {
+    let beyond_none = 1.0 - selected.null_probability;
+    match (selected.candidates.first(), selected.probability.first()) {
+        (Some(candidate), Some(&probability)) if (WORTH_A_WORD..=beyond_none).contains(&probability) => format!(
+            " {} may be there, with a probability of {}: not enough for a name.",
+            of_library(candidate),
+            percent(probability)
+        ),
+        _ => String::new(),
+    }
+}
+
+fn of_library(candidate: &Candidate) -> String {
+    let names: Vec<&str> = candidate
+        .named()
+        .map(|(_, hypothesised)| hypothesised.effect.name)
+        .collect();
+    names.join(" with ")
 }
 
 fn names(effects: &[NamedEffect]) -> String {

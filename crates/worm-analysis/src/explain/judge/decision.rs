@@ -12,8 +12,7 @@
 //!    Something else beside an effect must be more than the effect's own law may be wrong by, for no law is known exactly.
 //! 4. A pair needs odds of twenty against the best single effect, and its second effect must pass 2 and 3 by itself, and improve
 //!    the fit by more than the first one's law may be wrong by.
-//! 5. With nine tenths on one class the data are **explained**; where it takes several, or one has between seven and nine tenths,
-//!    **ambiguous**. Otherwise model and data **agree**, or the cause is **outside the library**, whichever is more probable.
+//! 5. With nine tenths on one class the data are **explained**; where it takes several, **ambiguous**. Otherwise model and data **agree**, or the cause is **outside the library**, whichever is more probable.
 
 use super::super::answer::Verdict;
 use super::candidate::{Candidate, are_alike};
@@ -24,10 +23,8 @@ use super::structural_change::Change;
 
 /// Probability from which an effect counts as one that changes what matters.
 pub(in crate::explain) const MATTERS: f64 = 0.95;
-/// Probability that an answer must reach.
+/// Probability that an answer must reach, and several together.
 const SURE: f64 = 0.9;
-/// Probability that several answers, or one that is not sure, must reach together.
-const LIKELY: f64 = 0.7;
 /// Probability below which a class is no rival.
 const RIVAL: f64 = 0.02;
 /// Odds of a pair against the best single effect.
@@ -178,7 +175,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     }
     let verdict = match count {
         1 if sum >= SURE => Verdict::Explained,
-        1.. if sum >= LIKELY => Verdict::Ambiguous,
+        2.. if sum >= SURE => Verdict::Ambiguous,
         _ if other_probability > null_probability => Verdict::OutsideLibrary,
         _ => Verdict::Agrees,
     };
@@ -351,12 +348,13 @@ mod tests {
     }
 
     #[test]
-    fn one_that_is_likely_and_not_sure_is_ambiguous() {
+    fn one_that_is_likely_and_not_sure_is_not_named() {
         // Its prior odds against none are 0.35 / 0.5 over some twenty families: 3.4 nats.
-        let selected = verdict(-10.0, vec![judged(&["pad-creep"], 5.2, -5.0)]);
-        let probability = selected.probability[0];
-        assert!((0.7..0.9).contains(&probability), "{probability}");
-        assert_eq!((selected.verdict, selected.candidates.len()), (Verdict::Ambiguous, 1));
+        let with = |ln_bayes: f64| verdict(-10.0, vec![judged(&["pad-creep"], ln_bayes, -5.0)]);
+        let likely = with(5.2);
+        assert!((0.7..0.9).contains(&likely.probability[0]), "{}", likely.probability[0]);
+        assert_eq!(likely.verdict, Verdict::Agrees);
+        assert_eq!(with(6.2).verdict, Verdict::Explained);
     }
 
     #[test]

@@ -131,7 +131,7 @@ fn each_verdict_has_its_own_words() {
         (
             answer::agrees(),
             [
-                "Nothing is missing from the model that these recordings could show.",
+                "Nothing is missing from the model that these recordings show for sure.",
                 "No effect is needed: the best of the library, unequal-clamping of cell 2, improves the fit by 10.4.",
                 "one time in a hundred",
                 "No place is listed where",

@@ -62,7 +62,7 @@ fn evidence(answer: &Answer) -> &'static str {
 pub(super) fn headline(answer: &Answer) -> String {
     let evidence = evidence(answer);
     match (answer.verdict, &answer.effects[..]) {
-        (Verdict::Agrees, _) => format!("Nothing is missing from the model that these {evidence} could show."),
+        (Verdict::Agrees, _) => format!("Nothing is missing from the model that these {evidence} show for sure."),
         (Verdict::Explained, [effect]) => {
             let missing = match &effect.onset {
                 Some(onset) => format!("Missing from the model: {}, {}.", effect.in_words(), onset.in_words()),
