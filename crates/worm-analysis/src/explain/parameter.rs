@@ -253,3 +253,24 @@ impl PartialEq for Hypothesised {
         self.is_same_effect(other) && self.onset == other.onset
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_happens_in_one_run_lasts_and_what_happens_in_each_does_not() {
+        let (yes, no) = (true, false);
+        for (run, ends, at_start, at_end) in [
+            (Some(1), no, [no, no, yes], [no, yes, yes]),
+            (Some(1), yes, [yes, yes, no], [yes, no, no]),
+            (None, no, [no, no, no], [yes, yes, yes]),
+            (None, yes, [yes, yes, yes], [no, no, no]),
+        ] {
+            let onset = Onset { cycle: 4.0, run, ends };
+            let found = [0, 1, 2].map(|run| (onset.acts_at_start(run), onset.acts_at_end(run)));
+            assert_eq!(found.map(|(start, _)| start), at_start, "{onset:?}");
+            assert_eq!(found.map(|(_, end)| end), at_end, "{onset:?}");
+        }
+    }
+}
