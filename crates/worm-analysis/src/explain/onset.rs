@@ -73,9 +73,9 @@ fn onsets(problem: &FitProblem<'_, '_>, ends: bool) -> Vec<Onset> {
 /// The effects that most probably begin or end in mid-run, fitted with the time. `screened` are those that act throughout.
 pub(super) fn with_onsets(judge: &Judge<'_, '_, '_>, nominal: &Fit, screened: &[Screening]) -> Vec<Candidate> {
     let fitted = [(false, FITTED), (true, FITTED_WITH_END)].map(|(ends, count)| {
-        let ln_bayes = judge.none.ln_bayes_of_change().unwrap_or(f64::NEG_INFINITY);
+        let is_likely = judge.none.ln_bayes_of_change().is_some_and(|ln_bayes| ln_bayes > 0.0);
         let base = match judge.none.changing {
-            Some((_, change)) if ln_bayes > 0.0 => beside_change(judge.problem, nominal, change, ends),
+            Some((_, change)) if is_likely => beside_change(judge.problem, nominal, change, ends),
             _ => judge.recalibrated.clone(),
         };
         let promising = screen(judge, &base, screened, ends);
@@ -103,12 +103,7 @@ fn beside_change(problem: &FitProblem<'_, '_>, nominal: &Fit, change: Change, en
     let rows = problem.bin_of_rows().into_iter();
     let is_beside = |(run, bin): (usize, usize)| {
         let bins = &problem.bins[run];
-        let since = bins.bins[bin].phase - bins.start_phase;
-        let is_before = match change.run {
-            Some(of) if of != run => run < of,
-            _ => since < change.cycle as f64,
-        };
-        is_before != ends
+        change.since(run, bins.bins[bin].phase - bins.start_phase).is_none() != ends
     };
     let stays: Vec<bool> = rows.map(is_beside).collect();
     let mut fit = nominal.clone();

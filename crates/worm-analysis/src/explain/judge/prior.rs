@@ -1,16 +1,17 @@
 //! What is expected of an effect before the data are seen.
 //!
 //! # Severity
-//! An effect is worth a name for what it does, so the prior is on its impact: the largest relative change of the advance on any run is
-//! log-normal about some median (6 % unless the user says otherwise), with a standard deviation of 0.9 in the logarithm. It vanishes towards none (a non-local prior: Johnson and
-//! Rossell 2010), so that small effects earn nothing and data without one speak for *none*. Where the advance does not move, the
-//! median is ten notable changes. Senses that are hardly physical (a drag that pushes) have a tenth of the mass, and where physics
-//! or care sets a limit (the slope is set by an inclinometer, the stroke by a cam) the density falls off beyond it.
+//! An effect is worth a name for what it does, so the prior is on its impact: the largest relative change of the advance on any run
+//! is log-normal about some median (6 % unless the user says otherwise), with a standard deviation of 0.9 in the logarithm. It
+//! vanishes towards none (a non-local prior: Johnson and Rossell 2010), so that small effects earn nothing and data without one
+//! speak for *none*. Where the advance does not move, the median is ten notable changes. Senses that are hardly physical (a drag
+//! that pushes) have a tenth of the mass, and where physics or care sets a limit (the slope is set by an inclinometer, the stroke
+//! by a cam) the density falls off beyond it.
 //!
 //! # Odds
 //! None 0.5, something else 0.1, a single effect 0.35, a pair 0.05; shared equally by families (exact twins are one), then by cells,
-//! then 0.6 to an effect that acts throughout, 0.3 to one that begins in mid-run and 0.1 to one that ends there: in every run, or once in one of them,
-//! at any cycle.
+//! then 0.6 to an effect that acts throughout, 0.3 to one that begins in mid-run and 0.1 to one that ends there: in every run, or once
+//! in one of them, at any cycle.
 
 use super::super::parameter::{Hypothesised, Onset};
 use worm_physics::effect::{Effect, LIBRARY, Parameter, Scope};

@@ -1,9 +1,9 @@
 //! The evidence that something changes in the middle of a run, whatever it is.
 //!
 //! What is wrong in every cycle alike looks like the discrepancy; what begins at some cycle does not. So beside a fit the residual may
-//! hold, from one cycle of a run on and in all later runs, or from one cycle of every run on, another displacement of each cell by how far it is from the stepping one (cosines
-//! in the phase of the step), and another advance. The mean over all cycles and runs is the evidence that there is one (known as a
-//! structural change: Zeileis and Hornik 2007).
+//! hold, from one cycle of a run on and in all later runs, or from one cycle of every run on, another displacement of each cell by how
+//! far it is from the stepping one (cosines in the phase of the step), and another advance. The mean over all cycles and runs is the
+//! evidence that there is one (known as a structural change: Zeileis and Hornik 2007).
 
 use super::super::discrepancy::Discrepancy;
 use super::super::plant::Plant;
@@ -24,6 +24,18 @@ pub(in crate::explain) struct Change {
     pub cycle: usize,
     /// The run in which it happens, to stay; every run for none.
     pub run: Option<usize>,
+}
+
+impl Change {
+    /// Cycles since it happened or, in the runs after that, since their start; none before. Asked for so many cycles after a run's start.
+    pub fn since(&self, run: usize, cycles: f64) -> Option<f64> {
+        let from = match self.run {
+            Some(of) if run < of => return None,
+            Some(of) if run > of => 0.0,
+            _ => self.cycle as f64,
+        };
+        (cycles >= from).then_some(cycles - from)
+    }
 }
 
 /// Every possible change of a campaign.
@@ -81,23 +93,16 @@ fn columns(plant: &impl Plant, scale_m: f64, change: Change) -> Vec<Vec<f64>> {
         let of_run = |run: usize| {
             let bins = plant.bins(run);
             let mut pattern_m = vec![0.0; bins.len() * cells];
-            if change.run.is_none_or(|of| of <= run) {
-                let from = match change.run {
-                    Some(of) if of < run => 0.0,
-                    _ => change.cycle as f64,
+            for (bin, pattern_m) in bins.bins.iter().zip(pattern_m.chunks_exact_mut(cells)) {
+                let Some(since) = change.since(run, bin.phase - bins.start_phase) else {
+                    continue;
                 };
-                for (bin, pattern_m) in bins.bins.iter().zip(pattern_m.chunks_exact_mut(cells)) {
-                    let since = bin.phase - bins.start_phase - from;
-                    if since < 0.0 {
-                        continue;
+                match what {
+                    Some((role, cosine)) => {
+                        pattern_m[(bin.stepping + role) % cells] =
+                            scale_m * (PI * cosine as f64 * bin.of_step).cos() / (1.0 + 0.5 * cosine as f64);
                     }
-                    match what {
-                        Some((role, cosine)) => {
-                            pattern_m[(bin.stepping + role) % cells] =
-                                scale_m * (PI * cosine as f64 * bin.of_step).cos() / (1.0 + 0.5 * cosine as f64);
-                        }
-                        None => pattern_m.fill(scale_m * since),
-                    }
+                    None => pattern_m.fill(scale_m * since),
                 }
             }
             plant.rows_of(run, &pattern_m)
