@@ -15,15 +15,14 @@
 //! - `search`: the steps, one after the other; `prepare`: the runs, and the recalibration; `refit`: effects fitted to the end.
 //! - `observed`: the recordings as the search sees them; `bins`: by cycle, step and phase; `predict`: the positions that a
 //!   `hypothesis` predicts; `residual`: what that leaves of the data; `noise`: how well the worm repeats itself.
-//! - `plant`: what the judgement needs to know of a machine; `discrepancy`: by how much the model is wrong everywhere; `inertia`: how
-//!   that grows with speed.
+//! - `plant`: what the judgement needs to know of a machine; `discrepancy`: by how much the model is wrong everywhere.
 //! - `parameter`: which quantities are free, with priors; `phase_correction`: for phases found from overlapping steps;
 //!   `fit`: the campaign as a problem of least squares (`least_squares`); `local_restart`: from one local minimum to another.
 //! - `score_test`: screens the whole library; `onset`: effects that begin in mid-run; `speed_droop`: the one effect that shows in time alone.
 //! - `judge`: priors, evidence, chance and the verdict, for any plant; `judgement`: weighs the candidates of a worm; `matters`: whether
 //!   an effect changes what anybody asks; `cross_validation`: held-out data, which may veto.
 //! - `whole_effects`: what nuisances have of an effect's law, given to the effect.
-//! - `residual_map`: where the gap is; `period`: whether it repeats; `gap`: how it shrinks; `experiment_design`: the next experiment;
+//! - `residual_map`: where the gap is; `period`: whether it repeats from cycle to cycle, `sway`: within the cycles; `gap`: how it shrinks; `experiment_design`: the next experiment;
 //!   `words`: the answer in words.
 //! - `scalar_data`: the same where only advances per cycle are known.
 //! - `assemble`: puts the answer together; [`model_update`]: the model's file with the answer in it.
@@ -63,6 +62,7 @@ mod scalar_data;
 mod score_test;
 mod search;
 mod speed_droop;
+mod sway;
 mod walk;
 mod whole_effects;
 mod words;

@@ -12,6 +12,7 @@
 use super::fit::{Fit, FitProblem};
 use super::judge::ln_sum::ln_sum;
 use super::residual::Residual;
+use super::sway;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -48,9 +49,27 @@ struct Series {
     displacement_m: Vec<f64>, // mean taken out
 }
 
-/// Logarithm of the Bayes factor of a wave in the residual of a fit against scatter; none where no run is long enough.
+/// Logarithm of the Bayes factor of a wave in the residual of a fit against scatter, from cycle to cycle or within the cycles; none where
+/// no run is long enough.
 pub(super) fn ln_bayes(problem: &FitProblem<'_, '_>, fit: &Fit) -> Option<f64> {
-    ln_bayes_of(&displacements_of_all(problem, fit))
+    let both = [
+        ln_bayes_of(&displacements_of_all(problem, fit)),
+        sway::ln_bayes(problem, fit),
+    ];
+    mean_of(both.into_iter().flatten().collect())
+}
+
+/// Logarithm of the mean of Bayes factors by their logarithms; none of none.
+fn mean_of(ln_bayes: Vec<f64>) -> Option<f64> {
+    let count = ln_bayes.len() as f64;
+    (count > 0.0).then(|| ln_sum(ln_bayes.into_iter()) - count.ln())
+}
+
+/// Logarithm of the Bayes factor of `waves` coefficients of waves that take a fraction of the square sum of values with `free` degrees of
+/// freedom, with a prior that is worth as many of them as `worth` says.
+pub(super) fn ln_bayes_of_fraction(fraction: f64, free: f64, waves: f64, worth: f64) -> f64 {
+    let left = worth * (1.0 - fraction).max(0.0);
+    0.5 * (free - waves) * worth.ln_1p() - 0.5 * free * left.ln_1p()
 }
 
 fn ln_bayes_of(series: &[Series]) -> Option<f64> {
@@ -59,23 +78,19 @@ fn ln_bayes_of(series: &[Series]) -> Option<f64> {
     let count: f64 = displacements.iter().map(|one| one.len() as f64).sum();
     let (free, waves) = (count - runs, 2.0 * runs);
     let worth = count / runs;
-    let of_fraction = |fraction: f64| {
-        let left = worth * (1.0 - fraction).max(0.0);
-        0.5 * (free - waves) * worth.ln_1p() - 0.5 * free * left.ln_1p()
-    };
+    let of_fraction = |fraction: f64| ln_bayes_of_fraction(fraction, free, waves, worth);
     let of_all = |at: fn(&Series) -> &[f64], frequencies: Vec<f64>| {
         let each = frequencies
             .iter()
             .map(|&frequency| of_fraction(fraction(series, &at, &displacements, frequency)));
-        (!frequencies.is_empty()).then(|| ln_sum(each) - (frequencies.len() as f64).ln())
+        mean_of(each.collect())
     };
     let (by_cycle, by_place) = spans(series);
     let both = [
         of_all(|one| &one.cycle, frequencies(by_cycle, APART)),
         of_all(|one| &one.place_m, frequencies(by_place, APART)),
     ];
-    let found: Vec<f64> = both.into_iter().flatten().collect();
-    (!found.is_empty()).then(|| ln_sum(found.iter().copied()) - (found.len() as f64).ln())
+    mean_of(both.into_iter().flatten().collect())
 }
 
 /// The period of the residual of a fit; the clearer one where both in time and along the canal are beyond chance.

@@ -23,6 +23,9 @@ const AT_LEAST: usize = 2;
 /// Strengths of effects about the nominal model, in notable changes; a fit starts from that which fits best once a step has recalibrated
 /// the rest.
 const STRONG: [f64; 4] = [4.0, 8.0, 16.0, 32.0];
+/// Chi-squared of a start, as a multiple of that without the effect, up to which it is fitted with derivatives of its own where those
+/// that are known lead nowhere.
+const STUCK: f64 = 1.5;
 /// Effects that are refitted on top of a single one, and how many of those that screened best are tried roughly before.
 const PAIRED: usize = 3;
 const SCREENED_FOR_PAIRS: usize = 8;
@@ -67,8 +70,8 @@ pub(super) fn refit(
             .chain(about_nominal)
             .map(|(from, at)| {
                 let fit = problem.fit_roughly(&hypothesis, at.clone(), from);
-                // Derivatives from elsewhere may lead nowhere from a start that is better than anything without the effect.
-                if fit.at == at && fit.chi_squared < base.chi_squared {
+                // Derivatives from elsewhere may lead nowhere from a start that is nearly as good as anything without the effect.
+                if fit.at == at && fit.chi_squared < STUCK * base.chi_squared {
                     return problem.fit(&hypothesis, at, None);
                 }
                 fit
