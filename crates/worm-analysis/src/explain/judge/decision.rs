@@ -2,8 +2,8 @@
 //!
 //! # The rules, in their order
 //! 1. Every hypothesis gets its posterior probability: none, each effect, each pair, and something else, which is a large discrepancy
-//!    alone or beside an effect or a pair. Effects that were not fitted to the end count by their screening. What the best effects have in
-//!    common (the same effect of another cell, exact twins) is one class.
+//!    alone or beside an effect or a pair, or looks exactly like one. Effects that were not fitted to the end count by their screening.
+//!    What the best effects have in common (the same effect of another cell, exact twins) is one class.
 //! 2. An effect that changes neither advance nor energy nor positions by what matters counts as none. Beside one that does it is a
 //!    trace: it stays in the fit, without a name, and the other is judged as a single effect. No contact is quite as the model says, and
 //!    a small effect that is certain hides a large one that only differs from recalibration by little.
@@ -29,8 +29,10 @@ const SURE: f64 = 0.9;
 const RIVAL: f64 = 0.02;
 /// Odds of a pair against the best single effect.
 const SECOND: f64 = 20.0;
-/// How well the law of an effect is known, as a fraction of the positions that it moves.
-const LAW_KNOWN: f64 = 0.15;
+/// How well the law of an effect is known, as a fraction of the positions that it moves: what is left beside it may be that without
+/// anything else being wrong, and a second effect must do more, for that has a law which may fit what is left by chance.
+const LAW_KNOWN: f64 = 0.1;
+const FIRST_LAW_KNOWN: f64 = 0.15;
 /// Largest part of the sum that may be left out.
 const NOTHING: f64 = 1e-300;
 
@@ -119,7 +121,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         (best.ln_weight(), best.candidate.improvement)
     });
     // The law of the first effect is no better known than to a fraction of what it does.
-    let is_beyond_first = |pair: &Judged| pair.candidate.improvement - gain > LAW_KNOWN * LAW_KNOWN * gain;
+    let is_beyond_first = |pair: &Judged| pair.candidate.improvement - gain > FIRST_LAW_KNOWN * FIRST_LAW_KNOWN * gain;
     let needs_both = |one: &Judged| {
         !one.is_pair() || (one.ln_weight() - ln_single > SECOND.ln() && one.may_be_named() && is_beyond_first(one))
     };
@@ -145,7 +147,14 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     }
     classes.sort_by(|a, b| b.ln_weight.total_cmp(&a.ln_weight));
     let half = 0.5 * prior::OTHER;
-    let beside = standing.iter().map(|one| half.ln() + one.ln_share + one.ln_other());
+    let beside = standing.iter().map(|one| {
+        let imitated = if one.may_be_named() {
+            one.evidence().usual + prior::IMITATED.ln()
+        } else {
+            f64::NEG_INFINITY
+        };
+        half.ln() + one.ln_share + ln_sum([one.ln_other(), imitated])
+    });
     let other: Vec<f64> = beside.chain([half.ln() + none.other()]).collect();
     let ln_none = prior::NONE.ln() + none.usual;
     let ln_other = ln_sum(other.iter().copied());
@@ -308,7 +317,12 @@ mod tests {
         );
         assert_eq!(selected.verdict, Verdict::Explained);
         assert_eq!(selected.candidates[0].hypothesised[0].effect.name, "pad-creep");
-        assert!(selected.probability[0] > 0.999);
+        // Something else may look just like it.
+        assert!(
+            (0.95..0.98).contains(&selected.probability[0]),
+            "{}",
+            selected.probability[0]
+        );
     }
 
     /// A small effect that is certain and moves nothing by what matters hides a second one from a fit of that alone.
@@ -331,7 +345,7 @@ mod tests {
         beside.candidate.trace = Some(1);
         let selected = verdict(0.0, vec![judged(&["pad-hardening"], 139.0, 60.0), beside]);
         assert_eq!((selected.verdict, selected.candidates.len()), (Verdict::Explained, 1));
-        assert!(selected.probability[0] > 0.99);
+        assert!(selected.probability[0] > 0.95);
     }
 
     #[test]
@@ -354,7 +368,7 @@ mod tests {
         let likely = with(5.2);
         assert!((0.7..0.9).contains(&likely.probability[0]), "{}", likely.probability[0]);
         assert_eq!(likely.verdict, Verdict::Agrees);
-        assert_eq!(with(6.2).verdict, Verdict::Explained);
+        assert_eq!(with(7.2).verdict, Verdict::Explained);
     }
 
     #[test]
