@@ -93,9 +93,19 @@ fn ln_bayes_of(series: &[Series]) -> Option<f64> {
     mean_of(both.into_iter().flatten().collect())
 }
 
-/// The period of the residual of a fit; the clearer one where both in time and along the canal are beyond chance.
+/// The period of the residual of a fit: from cycle to cycle in time or along the canal, the clearer one where both are beyond chance,
+/// or else within the cycles.
 pub(super) fn period(problem: &FitProblem<'_, '_>, fit: &Fit) -> Period {
-    period_of(&displacements_of_all(problem, fit))
+    match period_of(&displacements_of_all(problem, fit)) {
+        Period {
+            cycles: None,
+            displacement_m: None,
+        } => Period {
+            cycles: sway::period(problem, fit),
+            displacement_m: None,
+        },
+        found => found,
+    }
 }
 
 fn period_of(series: &[Series]) -> Period {

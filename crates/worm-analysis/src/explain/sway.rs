@@ -21,21 +21,36 @@ const MIN_CYCLES: usize = 6;
 const LONGEST: f64 = 0.5;
 /// Mean and trend.
 const DRIFTS: usize = 2;
+/// Logarithm of the Bayes factor from which a period is stated.
+const CLEAR: f64 = 3.0;
+/// Oversampling of the frequencies that a run can resolve, and fewest bins of a wave.
+const OVERSAMPLED: f64 = 4.0;
+const BINS_OF_WAVE: f64 = 4.0;
+/// Part of a wave below which it is none beside mean, trend and other waves.
+const VANISHING: f64 = 1e-6;
 
 /// Logarithm of the Bayes factor of a wave in what the body does within the cycles beyond a fit, against scatter; none where no run is
 /// long enough.
 pub(super) fn ln_bayes(problem: &FitProblem<'_, '_>, fit: &Fit) -> Option<f64> {
+    ln_bayes_of(&tables(problem, fit))
+}
+
+/// Period of the wave, cycles, where there clearly is one.
+pub(super) fn period(problem: &FitProblem<'_, '_>, fit: &Fit) -> Option<f64> {
+    period_of(&tables(problem, fit))
+}
+
+/// The table of each run that is long enough, beyond mean and trend over its rows.
+fn tables(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<DMatrix<f64>> {
     let runs = 0..problem.scene.observed.len();
-    let patterns: Vec<DVector<f64>> = runs
-        .filter_map(|run| {
-            let observed = &problem.scene.observed[run];
-            let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
-            let bins = &problem.bins[run];
-            let left = Residual::binned(observed, bins, &predicted);
-            strongest(&increments_m(bins, &left.body_m, observed.settled_from()))
-        })
-        .collect();
-    ln_bayes_of(&patterns)
+    let table = |run: usize| {
+        let observed = &problem.scene.observed[run];
+        let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
+        let bins = &problem.bins[run];
+        let left = Residual::binned(observed, bins, &predicted);
+        beyond_drifts(&increments_m(bins, &left.body_m, observed.settled_from()))
+    };
+    runs.filter_map(table).collect()
 }
 
 /// The body's increments from each bin to the next, a row for each whole cycle from some sample on; 0 where they were not seen.
@@ -59,16 +74,18 @@ fn increments_m(bins: &Bins, body_m: &[f64], settled_from: usize) -> DMatrix<f64
     table
 }
 
-/// How strong the strongest pattern of a table is in each of its rows, beyond mean and trend over them.
-fn strongest(table: &DMatrix<f64>) -> Option<DVector<f64>> {
-    let rows = table.nrows();
-    if rows < MIN_CYCLES {
-        return None;
-    }
-    let drifts = drifts(rows);
-    let beyond = table - &drifts * drifts.tr_mul(table);
-    let eigen = (&beyond * beyond.transpose()).symmetric_eigen();
-    Some(eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned())
+/// A table beyond mean and trend over its rows; none with few of them.
+fn beyond_drifts(table: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    (table.nrows() >= MIN_CYCLES).then(|| {
+        let drifts = drifts(table.nrows());
+        table - &drifts * drifts.tr_mul(table)
+    })
+}
+
+/// How strong the strongest pattern of a table is in each of its rows.
+fn strongest(table: &DMatrix<f64>) -> DVector<f64> {
+    let eigen = (table * table.transpose()).symmetric_eigen();
+    eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned()
 }
 
 /// Mean and trend over rows, as orthonormal columns.
@@ -78,11 +95,12 @@ fn drifts(rows: usize) -> DMatrix<f64> {
     columns.qr().q()
 }
 
-fn ln_bayes_of(patterns: &[DVector<f64>]) -> Option<f64> {
+fn ln_bayes_of(tables: &[DMatrix<f64>]) -> Option<f64> {
+    let patterns: Vec<DVector<f64>> = tables.iter().map(strongest).collect();
     let longest = patterns.iter().map(DVector::len).max()? as f64;
     let of_frequency = |frequency: f64| {
         let (mut taken, mut free, mut waves) = (0.0, 0.0, 0.0);
-        for pattern in patterns {
+        for pattern in &patterns {
             let (of_waves, count) = in_waves(pattern, frequency);
             taken += of_waves;
             free += (pattern.len() - DRIFTS) as f64;
@@ -96,6 +114,36 @@ fn ln_bayes_of(patterns: &[DVector<f64>]) -> Option<f64> {
     let count = ((0.5 - slowest) * 2.0 * longest).ceil().max(1.0);
     let all = (0..=count as usize).map(|number| of_frequency(slowest + (0.5 - slowest) * number as f64 / count));
     Some(ln_sum(all) - (count + 1.0).ln())
+}
+
+fn period_of(tables: &[DMatrix<f64>]) -> Option<f64> {
+    if ln_bayes_of(tables)? < CLEAR {
+        return None;
+    }
+    let longest = tables.iter().map(DMatrix::nrows).max()? as f64;
+    let fastest = tables.iter().map(DMatrix::ncols).min()? as f64 / BINS_OF_WAVE;
+    let step = 1.0 / (OVERSAMPLED * longest);
+    let frequencies = (1..).map(|number| step * f64::from(number));
+    let resolved = frequencies
+        .skip_while(|&frequency| frequency < 1.0 / (LONGEST * longest))
+        .take_while(|&frequency| frequency < fastest);
+    let power = |frequency: f64| tables.iter().map(|table| power(table, frequency)).sum::<f64>();
+    let strongest = resolved.max_by(|&a, &b| power(a).total_cmp(&power(b)))?;
+    Some(1.0 / strongest)
+}
+
+/// Square sum of what a wave of some frequency, one over cycles, has of a table.
+fn power(table: &DMatrix<f64>, frequency: f64) -> f64 {
+    let (mut in_phase, mut a_quarter_off) = (0.0, 0.0);
+    for (column, increments) in table.column_iter().enumerate() {
+        let of_cycle = column as f64 / table.ncols() as f64;
+        for (row, increment) in increments.iter().enumerate() {
+            let (sin, cos) = (TAU * frequency * (row as f64 + of_cycle)).sin_cos();
+            in_phase += increment * cos;
+            a_quarter_off += increment * sin;
+        }
+    }
+    (in_phase * in_phase + a_quarter_off * a_quarter_off) / table.len() as f64
 }
 
 /// The square sum of a pattern's part in waves of a frequency beside mean and trend, and how many waves there are: one where the rows
@@ -120,9 +168,6 @@ fn in_waves(pattern: &DVector<f64>, frequency: f64) -> (f64, usize) {
     (sum, found.len())
 }
 
-/// Part of a wave below which it is none beside the others.
-const VANISHING: f64 = 1e-6;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,25 +177,37 @@ mod tests {
 
     const PLACES: usize = 24;
 
-    /// The evidence of three runs of some cycles with scatter of 1 in every increment, and something more at each time, cycles.
-    fn found(cycles: usize, more: &dyn Fn(f64) -> f64, seed: u64) -> Option<f64> {
+    /// Three runs of some cycles with scatter of 1 in every increment, and something more at each time, cycles.
+    fn runs(cycles: usize, more: &dyn Fn(f64) -> f64, seed: u64) -> Vec<DMatrix<f64>> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let patterns = (0..3).filter_map(|_| {
+        let tables = (0..3).filter_map(|_| {
             let table = DMatrix::from_fn(cycles, PLACES, |cycle, place| {
                 let noise: f64 = StandardNormal.sample(&mut rng);
                 noise + more(cycle as f64 + place as f64 / PLACES as f64)
             });
-            strongest(&table)
+            beyond_drifts(&table)
         });
-        ln_bayes_of(&patterns.collect::<Vec<_>>())
+        tables.collect()
+    }
+
+    /// The evidence in such runs.
+    fn found(cycles: usize, more: &dyn Fn(f64) -> f64, seed: u64) -> Option<f64> {
+        ln_bayes_of(&runs(cycles, more, seed))
     }
 
     #[test]
     fn a_rhythm_within_the_cycles_is_evidence() {
         for seed in 0..5 {
             for per_cycle in [4.3, 1.7, 0.31] {
-                let ln_bayes = found(11, &|cycles| 2.0 * (TAU * per_cycle * cycles + 1.0).sin(), seed);
+                let runs = runs(11, &|cycles| 2.0 * (TAU * per_cycle * cycles + 1.0).sin(), seed);
+                let ln_bayes = ln_bayes_of(&runs);
                 assert!(ln_bayes > Some(5.0), "seed {seed}, {per_cycle} a cycle: {ln_bayes:?}");
+                let period = period_of(&runs).expect("it is clear");
+                // Half of what a run tells apart.
+                assert!(
+                    (1.0 / period - per_cycle).abs() < 0.5 / 11.0,
+                    "{per_cycle} a cycle: every {period}"
+                );
             }
         }
     }

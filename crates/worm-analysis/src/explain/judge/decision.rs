@@ -12,7 +12,9 @@
 //!    Something else beside an effect must be more than the effect's own law may be wrong by, for no law is known exactly.
 //! 4. A pair needs odds of twenty against the best single effect, and its second effect must pass 2 and 3 by itself, and improve
 //!    the fit by more than the first one's law may be wrong by.
-//! 5. With nine tenths on one class the data are **explained**; where it takes several, **ambiguous**. Otherwise model and data **agree**, or the cause is **outside the library**, whichever is more probable.
+//! 5. With nine tenths on one class the data are **explained**; where it takes several, or one is more probable than something else and
+//!    nothing has a tenth at most, **ambiguous**. Otherwise model and data **agree**, or the cause is **outside the library**, whichever
+//!    is more probable.
 
 use super::super::answer::Verdict;
 use super::candidate::{Candidate, are_alike};
@@ -185,6 +187,8 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     let verdict = match count {
         1 if sum >= SURE => Verdict::Explained,
         2.. if sum >= SURE => Verdict::Ambiguous,
+        // Something is missing, and more probably this than what the library does not know.
+        1.. if null_probability <= 1.0 - SURE && sum > other_probability => Verdict::Ambiguous,
         _ if other_probability > null_probability => Verdict::OutsideLibrary,
         _ => Verdict::Agrees,
     };
@@ -384,6 +388,13 @@ mod tests {
             beside.verdict,
             Verdict::OutsideLibrary,
             "a pair may leave something open, too"
+        );
+        let either = verdict(0.0, vec![judged(&["pad-creep"], 40.0, 42.0)]);
+        assert_eq!((either.verdict, either.candidates.len()), (Verdict::Ambiguous, 1));
+        assert!(
+            (0.1..0.4).contains(&either.other_probability),
+            "{}",
+            either.other_probability
         );
         let strong = verdict(0.0, vec![judged(&["pad-creep"], 4000.0, 4020.0)]);
         assert_eq!(strong.verdict, Verdict::Explained, "its law may be wrong by that");

@@ -91,7 +91,7 @@ fn alternatives(effects: &[NamedEffect], rivals: &[NamedEffect]) -> String {
     let candidates: Vec<String> = first.into_iter().chain(answers_in_words(rivals)).collect();
     match &candidates[..] {
         [] => "one effect or another".to_owned(),
-        [only] => format!("{only} or another effect"),
+        [only] => format!("{only} or something else"),
         [first @ .., last] => format!("{} or {last}", first.join(", ")),
     }
 }
