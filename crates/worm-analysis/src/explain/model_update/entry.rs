@@ -13,6 +13,10 @@ pub(super) fn entries(answer: &Answer) -> String {
         Verdict::Agrees | Verdict::OutsideLibrary => return String::new(),
         Verdict::Explained if answer.effects.len() > 1 => ("Found by `wormd explain`; these act together.", &[][..]),
         Verdict::Explained => ("Found by `wormd explain`.", &[][..]),
+        Verdict::Ambiguous if answer.rivals.is_empty() => (
+            "Found by `wormd explain`, which is not sure: something else may be missing.",
+            &[][..],
+        ),
         Verdict::Ambiguous => (
             "Found by `wormd explain`, the likeliest of several that explain the data about as well.",
             answer.rivals.as_slice(),
