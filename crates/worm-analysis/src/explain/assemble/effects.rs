@@ -9,7 +9,7 @@ use worm_physics::effect::MOTOR_DROOP;
 
 /// How far a severity is off because no law is quite the worm's, as a fraction of its change: worms in MuJoCo have the library's effects
 /// by laws of another form.
-const LAW_ERROR: f64 = 0.05;
+const LAW_ERROR: f64 = 0.07;
 
 /// The effects of a candidate.
 pub(in crate::explain) fn named_effects(

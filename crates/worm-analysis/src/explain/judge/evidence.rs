@@ -49,10 +49,10 @@ pub(in crate::explain) struct Evidence {
     pub large: f64,
     /// With each of the usual sizes, weighted.
     pub of_usual: [f64; 4],
-    /// With a discrepancy of a₀ at most and something that changes in the middle of a run, and where that is most probable; none where it
-    /// was not asked.
+    /// With a discrepancy of a₀ and something that changes in the middle of a run, and where that is most probable; none where it was not asked.
     pub changing: Option<(f64, Change)>,
-    /// With a discrepancy of a₀ at most and something that repeats after some cycles; none where it was not asked.
+    /// With a discrepancy of a₀ and something that repeats after some cycles, or of a₀ at most and a rhythm of the body; none where it was not
+    /// asked.
     pub repeating: Option<f64>,
 }
 
@@ -113,8 +113,7 @@ impl Evidence {
 
     /// Logarithm of the Bayes factor of a change in the middle of a run, with a discrepancy of a₀; none where it was not asked.
     pub fn ln_bayes_of_change(&self) -> Option<f64> {
-        self.changing
-            .map(|(changing, _)| changing - at_most_unit(&self.of_usual))
+        self.changing.map(|(changing, _)| changing - at_unit(&self.of_usual))
     }
 
     /// Whether something else wrong is more probable than a discrepancy of the usual size.
@@ -123,8 +122,13 @@ impl Evidence {
     }
 }
 
-/// The probability of the data with a discrepancy of a₀ at most, of those with each usual size. What shows in time is held against a
-/// discrepancy of a₀: a larger one takes the place of what it misses, beside a smaller one it would show no less.
+/// The probability of the data with a discrepancy of a₀, of those with each usual size.
+fn at_unit(of_usual: &[f64; 4]) -> f64 {
+    of_usual[UNIT] - usual_weights()[UNIT].ln()
+}
+
+/// The same with one of a₀ at most. What the body does is held against its own scatter, which no discrepancy is part of; only a larger one
+/// might take its place.
 fn at_most_unit(of_usual: &[f64; 4]) -> f64 {
     let weights = usual_weights();
     ln_sum(of_usual[..=UNIT].iter().copied()) - weights[..=UNIT].iter().sum::<f64>().ln()
@@ -223,11 +227,11 @@ pub(in crate::explain) fn evidence(
     let weights = usual_weights();
     let of_usual: [f64; 4] = std::array::from_fn(|at| at_scale(USUAL[at].0) + weights[at].ln());
     let usual = ln_sum(of_usual);
-    let at_most_unit = at_most_unit(&of_usual);
+    let at_unit = at_unit(&of_usual);
     Evidence {
         usual,
-        changing: changing.map(|(ln_bayes, change)| (at_most_unit + ln_bayes, change)),
-        repeating: repeating.map(|ln_bayes| at_most_unit + ln_bayes),
+        changing: changing.map(|(ln_bayes, change)| (at_unit + ln_bayes, change)),
+        repeating: repeating.map(|ln_bayes| at_unit + ln_bayes),
         large: ln_sum(LARGE.map(at_scale)) - (LARGE.len() as f64).ln(),
         of_usual,
     }
