@@ -62,7 +62,7 @@ pub(super) fn ln_bayes(problem: &FitProblem<'_, '_>, fit: &Fit) -> Option<f64> {
 /// Logarithm of the mean of Bayes factors by their logarithms; none of none.
 fn mean_of(ln_bayes: Vec<f64>) -> Option<f64> {
     let count = ln_bayes.len() as f64;
-    (count > 0.0).then(|| ln_sum(ln_bayes.into_iter()) - count.ln())
+    (count > 0.0).then(|| ln_sum(ln_bayes) - count.ln())
 }
 
 /// Logarithm of the Bayes factor of `waves` coefficients of waves that take a fraction of the square sum of values with `free` degrees of
