@@ -12,6 +12,7 @@ use super::matters::impact;
 use super::parameter::{Hypothesised, What};
 use super::period;
 use super::score_test::{self, Screening};
+use super::sway;
 
 /// Fraction of worms without an effect, and without a second one, for which the best of the library may pass.
 pub(super) const FALSE_NAMES: f64 = 0.01;
@@ -86,7 +87,10 @@ impl Judge<'_, '_, '_> {
             let excess = 0.5 * self.problem.excess_of_repeating(self.recalibrated, &candidate.fit) - candidate.ln_onset;
             candidate.evidence = Some(
                 found
-                    .with_rhythm(period::ln_bayes(self.problem, &candidate.fit))
+                    .with_rhythm(
+                        period::ln_bayes(self.problem, &candidate.fit),
+                        sway::ln_bayes(self.problem, &candidate.fit),
+                    )
                     .less(excess),
             );
         }

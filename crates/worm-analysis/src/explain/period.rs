@@ -10,7 +10,7 @@
 //! factor is (1 + g)^((ν − k)/2) (1 + g (1 − R²))^(−ν/2) (Liang et al. 2008). Its mean over frequencies and both kinds of waves is the evidence.
 
 use super::fit::{Fit, FitProblem};
-use super::judge::ln_sum::ln_sum;
+use super::judge::ln_sum::ln_mean;
 use super::residual::Residual;
 use super::sway;
 use nalgebra::{Matrix3, Vector3};
@@ -49,20 +49,9 @@ struct Series {
     displacement_m: Vec<f64>, // mean taken out
 }
 
-/// Logarithm of the Bayes factor of a wave in the residual of a fit against scatter, from cycle to cycle or within the cycles; none where
-/// no run is long enough.
+/// Logarithm of the Bayes factor of a wave in the residual of a fit against scatter; none where no run is long enough.
 pub(super) fn ln_bayes(problem: &FitProblem<'_, '_>, fit: &Fit) -> Option<f64> {
-    let both = [
-        ln_bayes_of(&displacements_of_all(problem, fit)),
-        sway::ln_bayes(problem, fit),
-    ];
-    mean_of(both.into_iter().flatten().collect())
-}
-
-/// Logarithm of the mean of Bayes factors by their logarithms; none of none.
-fn mean_of(ln_bayes: Vec<f64>) -> Option<f64> {
-    let count = ln_bayes.len() as f64;
-    (count > 0.0).then(|| ln_sum(ln_bayes) - count.ln())
+    ln_bayes_of(&displacements_of_all(problem, fit))
 }
 
 /// Logarithm of the Bayes factor of `waves` coefficients of waves that take a fraction of the square sum of values with `free` degrees of
@@ -83,14 +72,14 @@ fn ln_bayes_of(series: &[Series]) -> Option<f64> {
         let each = frequencies
             .iter()
             .map(|&frequency| of_fraction(fraction(series, &at, &displacements, frequency)));
-        mean_of(each.collect())
+        ln_mean(&each.collect::<Vec<_>>())
     };
     let (by_cycle, by_place) = spans(series);
     let both = [
         of_all(|one| &one.cycle, frequencies(by_cycle, APART)),
         of_all(|one| &one.place_m, frequencies(by_place, APART)),
     ];
-    mean_of(both.into_iter().flatten().collect())
+    ln_mean(&both.into_iter().flatten().collect::<Vec<_>>())
 }
 
 /// The period of the residual of a fit: from cycle to cycle in time or along the canal, the clearer one where both are beyond chance,

@@ -18,6 +18,7 @@ use super::prepare::{prepare, recalibrate};
 use super::refit::{REFITTED, alone, pair_up, refit};
 use super::score_test::{self, Expected};
 use super::speed_droop::speed_droop;
+use super::sway;
 use super::whole_effects::with_whole_effects;
 use crate::experiment::{Progress, RecordedRun};
 use worm_estimator::config::Config;
@@ -74,8 +75,10 @@ pub fn explain(
         discrepancy: &discrepancy,
         in_time: &in_time,
         recalibrated: &recalibrated,
-        none: evidence(&discrepancy, Some(&in_time), &recalibrated, &|_| None)
-            .with_rhythm(period::ln_bayes(&problem, &recalibrated)),
+        none: evidence(&discrepancy, Some(&in_time), &recalibrated, &|_| None).with_rhythm(
+            period::ln_bayes(&problem, &recalibrated),
+            sway::ln_bayes(&problem, &recalibrated),
+        ),
         campaign: prior::Campaign {
             cells: config.worm.cells,
             runs: runs.len(),

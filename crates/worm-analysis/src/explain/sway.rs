@@ -9,7 +9,7 @@
 
 use super::bins::Bins;
 use super::fit::{Fit, FitProblem};
-use super::judge::ln_sum::ln_sum;
+use super::judge::ln_sum::ln_mean;
 use super::period::ln_bayes_of_fraction;
 use super::residual::Residual;
 use nalgebra::{DMatrix, DVector};
@@ -113,7 +113,7 @@ fn ln_bayes_of(tables: &[DMatrix<f64>]) -> Option<f64> {
     let slowest = 1.0 / (LONGEST * longest);
     let count = ((0.5 - slowest) * 2.0 * longest).ceil().max(1.0);
     let all = (0..=count as usize).map(|number| of_frequency(slowest + (0.5 - slowest) * number as f64 / count));
-    Some(ln_sum(all) - (count + 1.0).ln())
+    ln_mean(&all.collect::<Vec<_>>())
 }
 
 fn period_of(tables: &[DMatrix<f64>]) -> Option<f64> {

@@ -18,7 +18,7 @@ use super::super::fit::Fit;
 use super::super::normal_probability::normal_probability;
 use super::super::plant::Plant;
 use super::beside::Fitted;
-use super::ln_sum::ln_sum;
+use super::ln_sum::{ln_mean, ln_sum};
 use super::repetition::Repetitions;
 use super::structural_change::{Change, StructuralChanges};
 use crate::least_squares::{cross, dot, prior_chi_squared, submatrix};
@@ -80,12 +80,21 @@ impl Evidence {
         ln_sum([self.large, changing, repeating]) - 3.0_f64.ln()
     }
 
-    /// The same with the Bayes factor of a rhythm of the body, of which as much is expected.
-    pub fn with_rhythm(self, ln_bayes: Option<f64>) -> Self {
-        let of_body = ln_bayes.map(|ln_bayes| at_most_unit(&self.of_usual) + ln_bayes);
-        let all: Vec<f64> = self.repeating.into_iter().chain(of_body).collect();
+    /// The same with the Bayes factors of a rhythm of the body, from cycle to cycle and within the cycles, of which as much is expected.
+    ///
+    /// From cycle to cycle a canal that is not quite even makes small waves, which a discrepancy of a₀ has to be too small for. What the
+    /// body does within the cycles is held against its own scatter alone, so only a discrepancy above a₀ might take its place.
+    pub fn with_rhythm(self, from_cycle_to_cycle: Option<f64>, within: Option<f64>) -> Self {
+        let of_body: Vec<f64> = [
+            from_cycle_to_cycle.map(|ln_bayes| at_unit(&self.of_usual) + ln_bayes),
+            within.map(|ln_bayes| at_most_unit(&self.of_usual) + ln_bayes),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        let both: Vec<f64> = [self.repeating, ln_mean(&of_body)].into_iter().flatten().collect();
         Self {
-            repeating: (!all.is_empty()).then(|| ln_sum(all.iter().copied()) - (all.len() as f64).ln()),
+            repeating: ln_mean(&both),
             ..self
         }
     }
@@ -127,8 +136,7 @@ fn at_unit(of_usual: &[f64; 4]) -> f64 {
     of_usual[UNIT] - usual_weights()[UNIT].ln()
 }
 
-/// The same with one of a₀ at most. What the body does is held against its own scatter, which no discrepancy is part of; only a larger one
-/// might take its place.
+/// The same with one of a₀ at most.
 fn at_most_unit(of_usual: &[f64; 4]) -> f64 {
     let weights = usual_weights();
     ln_sum(of_usual[..=UNIT].iter().copied()) - weights[..=UNIT].iter().sum::<f64>().ln()
