@@ -22,7 +22,7 @@ pub(in crate::explain) const OTHER: f64 = 0.1;
 pub(in crate::explain) const SINGLE: f64 = 0.35;
 const PAIR: f64 = 0.05;
 /// Part of what is something else that leaves nothing beside an effect of the library, or a pair: no data of the same kind could tell. Of
-/// 26 strangers of both test beds' development splits 6 did.
+/// 25 strangers of both test beds' development splits 6 did.
 pub(in crate::explain) const IMITATED: f64 = 0.25;
 /// Standard deviation of the logarithm of the impact.
 const LN_IMPACT: f64 = 0.9;
