@@ -22,8 +22,8 @@
 //! - `judge`: priors, evidence, chance and the verdict, for any plant; `judgement`: weighs the candidates of a worm; `matters`: whether
 //!   an effect changes what anybody asks; `cross_validation`: held-out data, which may veto.
 //! - `whole_effects`: what nuisances have of an effect's law, given to the effect.
-//! - `residual_map`: where the gap is; `period`: whether it repeats from cycle to cycle, `sway`: within the cycles; `gap`: how it shrinks; `experiment_design`: the next experiment;
-//!   `words`: the answer in words.
+//! - `residual_map`: where the gap is; `period`: whether it repeats from cycle to cycle, `sway`: within the cycles, `wave`: how
+//!   probable that is; `gap`: how it shrinks; `experiment_design`: the next experiment; `words`: the answer in words.
 //! - `scalar_data`: the same where only advances per cycle are known.
 //! - `assemble`: puts the answer together; [`model_update`]: the model's file with the answer in it.
 
@@ -64,6 +64,7 @@ mod search;
 mod speed_droop;
 mod sway;
 mod walk;
+mod wave;
 mod whole_effects;
 mod words;
 

@@ -5,14 +5,14 @@
 //! and unevenly spaced, and the mean of few periods is not that of the wave). The largest fraction of the variance that a sine
 //! explains is compared with what it explains after shuffling the cycles of each run.
 //!
-//! How probable the wave is beside scatter of unknown size follows from the same fractions R²: with ν displacements beyond their means, k
-//! coefficients of the waves, and a prior on these worth one cycle of each run (Zellner's g-prior, g the cycles of a run), the Bayes
-//! factor is (1 + g)^((ν − k)/2) (1 + g (1 − R²))^(−ν/2) (Liang et al. 2008). Its mean over frequencies and both kinds of waves is the evidence.
+//! How probable the wave is beside scatter of unknown size follows from the same fractions ([`super::wave`]), with a prior worth one cycle
+//! of each run. The mean over frequencies and both kinds of waves is the evidence.
 
 use super::fit::{Fit, FitProblem};
 use super::judge::ln_sum::ln_mean;
 use super::residual::Residual;
 use super::sway;
+use super::wave::ln_bayes_of_fraction;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -52,13 +52,6 @@ struct Series {
 /// Logarithm of the Bayes factor of a wave in the residual of a fit against scatter; none where no run is long enough.
 pub(super) fn ln_bayes(problem: &FitProblem<'_, '_>, fit: &Fit) -> Option<f64> {
     ln_bayes_of(&displacements_of_all(problem, fit))
-}
-
-/// Logarithm of the Bayes factor of `waves` coefficients of waves that take a fraction of the square sum of values with `free` degrees of
-/// freedom, with a prior that is worth as many of them as `worth` says.
-pub(super) fn ln_bayes_of_fraction(fraction: f64, free: f64, waves: f64, worth: f64) -> f64 {
-    let left = worth * (1.0 - fraction).max(0.0);
-    0.5 * (free - waves) * worth.ln_1p() - 0.5 * free * left.ln_1p()
 }
 
 fn ln_bayes_of(series: &[Series]) -> Option<f64> {

@@ -4,14 +4,14 @@
 //! goes lets it slip farther in some cycles than in others. The body's displacement in a cycle shows neither. So the increments of its
 //! residual from bin to bin make a table of a row for each cycle. Of that table, less its mean and its trend over the cycles, the
 //! strongest pattern is taken (principal components), and how strong it is in each cycle is a series in which any rhythm but the gait's
-//! shows as a wave. A wave is held against scatter of unknown size as in [`super::period`]; of pure scatter, every direction of the
+//! shows as a wave. A wave is held against scatter of unknown size by [`super::wave`]; of pure scatter, every direction of the
 //! series is as probable as any other.
 
 use super::bins::Bins;
 use super::fit::{Fit, FitProblem};
 use super::judge::ln_sum::ln_mean;
-use super::period::ln_bayes_of_fraction;
 use super::residual::Residual;
+use super::wave::ln_bayes_of_fraction;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 

@@ -8,7 +8,7 @@
 use super::super::discrepancy::Discrepancy;
 use super::super::plant::Plant;
 use super::beside::{Blocks, Fitted};
-use super::ln_sum::ln_sum;
+use super::ln_sum::ln_mean;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -53,8 +53,7 @@ impl Repetitions {
     pub(super) fn beside(&self, fitted: &Fitted<'_>) -> Option<f64> {
         let ln_bayes = self.columns.ln_bayes(fitted);
         let of_frequency = ln_bayes.chunks_exact(self.runs).map(|runs| runs.iter().sum::<f64>());
-        let count = ln_bayes.len() / self.runs;
-        (count > 0).then(|| ln_sum(of_frequency) - (count as f64).ln())
+        ln_mean(&of_frequency.collect::<Vec<_>>())
     }
 }
 
