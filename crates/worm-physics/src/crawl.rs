@@ -207,6 +207,11 @@ impl Crawl {
         self.begin_at(positions_m);
     }
 
+    /// Changes the damping ratio: none makes the motion quasi-static from here on.
+    pub fn set_damping_ratio(&mut self, damping_ratio: Option<f64>) {
+        self.damping_ratio = damping_ratio;
+    }
+
     /// Positions Xᵢ along the canal, m.
     pub fn positions_m(&self) -> &[f64] {
         &self.position_m[..self.cells]

@@ -13,7 +13,8 @@ use super::noise::RunNoise;
 use super::observed::Observed;
 use super::parameter::{Nuisance, Onset, What};
 use super::plant::Plant;
-use super::predict::{Predicted, Scene};
+use super::predict::Scene;
+use super::predicted::Predicted;
 use super::residual::Residual;
 use crate::least_squares::{
     self, Derivatives, Estimate, LeastSquares, Method, Quantity, damped_step, dot, gradient, normal_matrix,

@@ -20,7 +20,7 @@ use super::answer::{Stage, StageKind};
 use super::cross_validation::FitWithout;
 use super::fit::{Fit, FitProblem};
 use super::observed::Observed;
-use super::predict::Predicted;
+use super::predicted::Predicted;
 use super::residual::Residual;
 pub(super) use mean_cycle::cycles;
 use std::f64::consts::SQRT_2;

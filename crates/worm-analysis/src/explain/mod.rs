@@ -14,11 +14,11 @@
 //! - [`answer`]: the result and its JSON contract.
 //! - `search`: the steps, one after the other; `prepare`: the runs, and the recalibration; `refit`: effects fitted to the end.
 //! - `observed`: the recordings as the search sees them; `bins`: by cycle, step and phase; `predict`: the positions that a
-//!   `hypothesis` predicts; `residual`: what that leaves of the data; `noise`: how well the worm repeats itself.
+//!   `hypothesis` predicts, by a `walk` from `start` along a `track`, at samples by their `clock`; `residual`: what that leaves of the data; `noise`: how well the worm repeats itself.
 //! - `plant`: what the judgement needs to know of a machine; `discrepancy`: by how much the model is wrong everywhere.
 //! - `parameter`: which quantities are free, with priors; `phase_correction`: for phases found from overlapping steps;
 //!   `fit`: the campaign as a problem of least squares (`least_squares`); `local_restart`: from one local minimum to another.
-//! - `score_test`: screens the whole library; `onset`: effects that begin in mid-run; `speed_droop`: the one effect that shows in time alone.
+//! - `score_test`: screens the whole library, by its `directions`; `onset`: effects that begin in mid-run; `speed_droop`: the one effect that shows in time alone.
 //! - `judge`: priors, evidence, chance and the verdict, for any plant; `judgement`: weighs the candidates of a worm; `matters`: whether
 //!   an effect changes what anybody asks; `cross_validation`: held-out data, which may veto.
 //! - `whole_effects`: what nuisances have of an effect's law, given to the effect.
@@ -30,7 +30,9 @@
 pub mod answer;
 mod assemble;
 mod bins;
+mod clock;
 mod cross_validation;
+mod directions;
 mod discrepancy;
 mod error;
 mod experiment_design;
@@ -48,11 +50,13 @@ mod noise;
 mod normal_probability;
 mod observed;
 mod onset;
+mod pace;
 mod parameter;
 mod period;
 mod phase_correction;
 mod plant;
 mod predict;
+mod predicted;
 mod prediction;
 mod prepare;
 mod refit;
@@ -62,7 +66,9 @@ mod scalar_data;
 mod score_test;
 mod search;
 mod speed_droop;
+mod start;
 mod sway;
+mod track;
 mod walk;
 mod wave;
 mod whole_effects;

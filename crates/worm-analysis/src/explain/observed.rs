@@ -1,11 +1,13 @@
 //! The recordings as the search sees them: the phase of each sample, which samples count, and their noise.
 
 use super::error::ExplainError;
+use super::pace::{Pace, time_at_s};
 use crate::experiment::RecordedRun;
 use crate::identify::clean::leave_out_outliers;
 use crate::identify::{self, GaitError, IdentifiedGait, Prior, Steadied, gait};
 use crate::recording::{Recording, Repair};
 use worm_estimator::config::Config;
+use worm_physics::Crawl;
 
 /// Cycles at the start that do not count unless the worm was just laid down: the state of the tips is unknown there.
 const FORGOTTEN_CYCLES: f64 = 2.0;
@@ -46,6 +48,12 @@ pub(super) struct Observed<'a> {
     /// First sample that counts.
     pub counts_from: usize,
     pub cycle_s: f64,
+    /// Whether the drive stands still for a while on the way: what happens then does not repeat with the phase.
+    pub pauses: bool,
+    /// The pace of the settled crawl.
+    pub pace: Pace,
+    /// How a worm much like it crawled here, once settled, at a knot: other crawls that were under way settle sooner from there.
+    pub settled: Option<Crawl>,
     /// Every repair of the recording.
     pub repairs: Vec<Repair>,
 }
@@ -102,6 +110,7 @@ impl<'a> Observed<'a> {
         let last = gait.phase.len() - 1;
         let mut observed = Self {
             cycle_s: (recording.time_s[last] - recording.time_s[0]) / (gait.phase[last] - gait.phase[0]),
+            pauses: pauses(&recording.time_s, &gait.phase),
             run,
             phase_recorded: recording.gait_phase.is_some(),
             step_order: gait.step_order,
@@ -112,6 +121,8 @@ impl<'a> Observed<'a> {
             may_be_laid_down,
             laid_down: false,
             counts_from: 0,
+            pace: Pace::default(),
+            settled: None,
             repairs,
         };
         observed.assume_laid_down(false);
@@ -145,6 +156,9 @@ impl<'a> Observed<'a> {
         } else {
             self.phase.partition_point(|&phase| phase < first + FORGOTTEN_CYCLES)
         };
+        let from = self.settled_from();
+        let time_s = &self.run.recording.time_s;
+        self.pace = Pace::mean(&time_s[from..], &self.phase[from..], self.cells(), self.cycle_s);
     }
 
     /// First sample of the settled crawl.
@@ -162,32 +176,18 @@ impl<'a> Observed<'a> {
         (self.phase[self.samples() - 1] - from).max(0.0).floor() as usize
     }
 
-    /// Whether the drive stands still for a while on the way: what happens then does not repeat with the phase.
-    pub fn pauses(&self) -> bool {
-        let time_s = &self.run.recording.time_s;
-        let (first, last) = (self.phase[0] + MOVES, self.phase[self.samples() - 1] - MOVES);
-        let mut since = 0;
-        (0..self.samples()).any(|sample| {
-            let phase = self.phase[sample];
-            if phase != self.phase[since] {
-                since = sample;
-            }
-            phase > first && phase < last && time_s[sample] - time_s[since] > REST_S
-        })
+    /// Time at which the drive leaves a phase, s: after any rest there.
+    pub fn time_left_s(&self, phase: f64) -> f64 {
+        let left = self.phase.partition_point(|&here| here <= phase);
+        let rested_s = left
+            .checked_sub(1)
+            .map_or(f64::NEG_INFINITY, |last| self.run.recording.time_s[last]);
+        self.time_at_s(phase).max(rested_s)
     }
 
-    /// Time of a phase, s, by linear interpolation; beyond the recording it is extrapolated at the mean pace.
+    /// Time of a phase, s; beyond the recording it is extrapolated at the mean pace.
     pub fn time_at_s(&self, phase: f64) -> f64 {
-        let time_s = &self.run.recording.time_s;
-        let last = self.samples() - 1;
-        let after = self.phase.partition_point(|&here| here < phase);
-        if after == 0 || after > last {
-            let end = after.min(last);
-            return time_s[end] + (phase - self.phase[end]) * self.cycle_s;
-        }
-        let width = self.phase[after] - self.phase[after - 1];
-        let fraction = (phase - self.phase[after - 1]) / width;
-        time_s[after - 1] + fraction * (time_s[after] - time_s[after - 1])
+        time_at_s(&self.run.recording.time_s, &self.phase, phase, self.cycle_s)
     }
 
     /// The cell whose step a sample is in.
@@ -196,6 +196,19 @@ impl<'a> Observed<'a> {
         let step = (self.phase[sample] * cells).floor().rem_euclid(cells);
         self.step_order[step as usize]
     }
+}
+
+/// Whether the drive stands still for a while on the way.
+fn pauses(time_s: &[f64], phase: &[f64]) -> bool {
+    let last = phase.len() - 1;
+    let on_the_way = phase[0] + MOVES..phase[last] - MOVES;
+    let mut since = 0;
+    (0..phase.len()).any(|sample| {
+        if phase[sample] != phase[since] {
+            since = sample;
+        }
+        on_the_way.contains(&phase[sample]) && time_s[sample] - time_s[since] > REST_S
+    })
 }
 
 /// The gait, also of a worm with a cell that falls behind the others cycle by cycle.

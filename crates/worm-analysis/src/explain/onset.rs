@@ -283,7 +283,11 @@ fn refine(problem: &FitProblem<'_, '_>, mut fit: Fit) -> (Fit, f64) {
         };
         ln_width = ln_sum(tried.iter().map(|chi_squared| -0.5 * (chi_squared - tried[best]))) + distance.ln();
         let hypothesis = with_onset(&fit, cycles[best]);
-        let next = problem.fit(&hypothesis, fit.at.clone(), Some(&fit));
+        let next = if distance > GRIDS[GRIDS.len() - 1].0 {
+            problem.fit_roughly(&hypothesis, fit.at.clone(), &fit)
+        } else {
+            problem.fit(&hypothesis, fit.at.clone(), Some(&fit))
+        };
         if next.chi_squared <= fit.chi_squared {
             fit = next;
         }

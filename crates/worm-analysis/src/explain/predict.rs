@@ -1,44 +1,19 @@
 //! The positions that a hypothesis predicts for every sample.
 
+use super::clock::Clock;
 use super::hypothesis::Hypothesis;
 use super::observed::Observed;
 use super::parameter::{Nuisance, What};
 use super::phase_correction::PhaseCorrection;
-use super::walk::{Gait, Settling, Walk};
-use worm_physics::{Crawl, Mechanics, Physics, Worm};
-
-/// Most cycles that are run before a recording that begins in the middle of a crawl, and the parts of each.
-const LEAD_CYCLES: usize = 5;
-const LEAD_PARTS: usize = 40;
+use super::predicted::Predicted;
+use super::walk::Walk;
+use worm_physics::{Mechanics, Physics, Worm};
 
 /// The runs, and the nominal worm in each.
 pub(super) struct Scene<'a> {
     pub observed: Vec<Observed<'a>>,
     /// Nominal physics of each run.
     pub nominal: Vec<Physics>,
-}
-
-/// The prediction for one run.
-#[derive(Debug, Clone)]
-pub(super) struct Predicted {
-    /// `[sample][cell]`, flat, m.
-    pub position_m: Vec<f64>,
-}
-
-impl Predicted {
-    /// Mean advance in a cycle, m: over as many whole settled cycles as there are.
-    pub fn advance_m(&self, observed: &Observed<'_>) -> f64 {
-        let cells = observed.cells();
-        let mean_m = |sample: usize| {
-            let at_m = &self.position_m[sample * cells..(sample + 1) * cells];
-            at_m.iter().sum::<f64>() / cells as f64
-        };
-        let phase = &observed.phase;
-        let last = observed.samples() - 1;
-        let cycles = observed.whole_cycles().max(1) as f64;
-        let from = phase.partition_point(|&here| here < phase[last] - cycles).min(last - 1);
-        (mean_m(last) - mean_m(from)) / (phase[last] - phase[from])
-    }
 }
 
 /// A run without any effect.
@@ -88,7 +63,24 @@ impl Scene<'_> {
     /// Whether the crawl of a run is simulated for some cycles and then repeated.
     pub fn repeats(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> bool {
         let is_steady = !hypothesis.throughout && hypothesis.changes_at(run).is_none();
-        is_steady && !self.observed[run].pauses() && self.physics(run, hypothesis, at).0.is_periodic()
+        is_steady && !self.observed[run].pauses && self.physics(run, hypothesis, at).0.is_periodic()
+    }
+
+    /// Settles the crawls that were under way when their recordings began, under a hypothesis near all that will be predicted.
+    pub fn settle(&mut self, hypothesis: &Hypothesis, at: &[f64]) {
+        for run in 0..self.observed.len() {
+            let (physics, damping) = self.physics(run, hypothesis, at);
+            let observed = &self.observed[run];
+            let clock = Clock::new(observed, physics.view.latency_s, 0.0);
+            let walk = Walk::begin(
+                observed,
+                clock,
+                &Mechanics::new(&physics),
+                damping,
+                physics.is_periodic(),
+            );
+            self.observed[run].settled = walk.and_then(Walk::into_settled);
+        }
     }
 
     /// Positions of a run under a hypothesis; none where the worm could not have made it.
@@ -114,33 +106,6 @@ impl Scene<'_> {
     }
 }
 
-/// The crawl at the first sample of a recording. A periodic crawl under way has gone on until it repeats, any other for a few cycles.
-pub(super) fn start(
-    observed: &Observed<'_>,
-    mechanics: &Mechanics,
-    phase: f64,
-    damping: f64,
-    repeats: bool,
-) -> Option<Crawl> {
-    let first_m = &observed.first_m;
-    if observed.laid_down {
-        return Crawl::at_rest(mechanics, phase, first_m, Some(damping)).ok();
-    }
-    let begin = phase - LEAD_CYCLES as f64;
-    let step_s = observed.cycle_s / LEAD_PARTS as f64;
-    let mut crawl = Crawl::at_rest(mechanics, begin, first_m, Some(damping)).ok()?;
-    let mut settling = Settling::default();
-    for part in 1..=LEAD_CYCLES * LEAD_PARTS {
-        let here = begin + part as f64 / LEAD_PARTS as f64;
-        crawl.advance_to(mechanics, here, step_s).ok()?;
-        if repeats && part % LEAD_PARTS == 0 && settling.has_settled(&crawl) {
-            break;
-        }
-    }
-    crawl.begin_at_phase(mechanics, phase, first_m);
-    Some(crawl)
-}
-
 /// Positions at every sample of a recording, by some physics; where it `repeats`, a crawl is run until it is periodic, and then
 /// repeated.
 pub(super) fn predict(observed: &Observed<'_>, physics: &Physics, damping: f64, repeats: bool) -> Option<Predicted> {
@@ -159,9 +124,8 @@ fn predict_with(
     if !observed.phase_recorded && physics.laws.overlap > 0.0 {
         clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, observed.cells()));
     }
-    let crawl = start(observed, &mechanics, clock.phase_at(0), damping, repeats)?;
-    let mut walk = Walk::new(observed, clock, crawl);
-    walk.go_to(&mechanics, f64::INFINITY, Gait::new(repeats, !observed.laid_down))?;
+    let mut walk = Walk::begin(observed, clock, &mechanics, damping, repeats)?;
+    walk.go_to(&mechanics, f64::INFINITY, repeats)?;
     Some(walk.seen_at(physics.view.scale))
 }
 
@@ -169,76 +133,18 @@ fn predict_with(
 /// how the worm moves and not in how it is seen.
 fn predict_change(
     observed: &Observed<'_>,
-    mut clock: Clock<'_>,
+    clock: Clock<'_>,
     before: &Physics,
     after: &Physics,
     cycle: f64,
     damping: f64,
 ) -> Option<Predicted> {
     let [before_it, after_it] = [before, after].map(Mechanics::new);
-    let pauses = observed.pauses();
-    let repeats = !pauses && before.is_periodic();
-    let crawl = start(observed, &before_it, clock.phase_at(0), damping, repeats)?;
-    let mut walk = Walk::new(observed, clock, crawl);
-    let change = observed.phase[0] + cycle;
-    walk.go_to(&before_it, change, Gait::new(repeats, !observed.laid_down))?;
+    let mut walk = Walk::begin(observed, clock, &before_it, damping, before.is_periodic())?;
+    walk.go_to(&before_it, observed.phase[0] + cycle, before.is_periodic())?;
     walk.take_up(&after_it);
-    walk.go_to(
-        &after_it,
-        f64::INFINITY,
-        Gait::new(!pauses && after.is_periodic(), false),
-    )?;
+    walk.go_to(&after_it, f64::INFINITY, after.is_periodic())?;
     Some(walk.seen_at(before.view.scale))
-}
-
-/// The gait phase one latency before each sample: a position shows the worm as it was then.
-pub(super) struct Clock<'a> {
-    time_s: &'a [f64],
-    phase: &'a [f64],
-    /// At the start of the recording, where clocks are set, and its growth, s/s.
-    latency_s: f64,
-    drift: f64,
-    phase_correction: Option<PhaseCorrection>,
-    after: usize,
-}
-
-impl<'a> Clock<'a> {
-    fn new(observed: &'a Observed<'_>, latency_s: f64, drift: f64) -> Self {
-        Self {
-            time_s: &observed.run.recording.time_s,
-            phase: &observed.phase,
-            latency_s,
-            drift,
-            phase_correction: None,
-            after: 1,
-        }
-    }
-
-    /// For samples asked in order.
-    pub fn phase_at(&mut self, sample: usize) -> f64 {
-        let phase = self.recorded_at(sample);
-        self.phase_correction
-            .as_ref()
-            .map_or(phase, |phase_correction| phase_correction.corrected(phase))
-    }
-
-    fn recorded_at(&mut self, sample: usize) -> f64 {
-        if self.latency_s == 0.0 && self.drift == 0.0 {
-            return self.phase[sample];
-        }
-        let last = self.time_s.len() - 1;
-        let at_s = self.time_s[sample] - self.latency_s - self.drift * (self.time_s[sample] - self.time_s[0]);
-        while self.after < last && self.time_s[self.after] < at_s {
-            self.after += 1;
-        }
-        while self.after > 1 && self.time_s[self.after - 1] > at_s {
-            self.after -= 1;
-        }
-        let (low, high) = (self.after - 1, self.after);
-        let fraction = (at_s - self.time_s[low]) / (self.time_s[high] - self.time_s[low]);
-        // Before the first sample and after the last, the phase is extrapolated.
-        self.phase[low] + fraction.clamp(-10.0, 11.0) * (self.phase[high] - self.phase[low])
-    }
 }
 
 /// The nominal worm of a run.
@@ -293,36 +199,5 @@ mod tests {
             (begun_m - throughout_m).abs() < 0.05 * change_m.abs(),
             "{begun_m} and {throughout_m} m a cycle"
         );
-    }
-
-    /// A clock that has fallen behind by some time shows what a latency of that time shows.
-    #[test]
-    fn two_clocks_that_run_apart_are_a_latency_that_grows() {
-        let campaign = Campaign::default();
-        let recordings = record(&campaign, None, 1);
-        let scene = scene(&recordings, &campaign);
-        let observed = &scene.observed[0];
-        let (time_s, drift) = (&recordings[0].time_s, 1e-3);
-        let mut drifting = Clock::new(observed, 2e-3, drift);
-        for sample in 0..observed.samples() {
-            let latency_s = 2e-3 + drift * (time_s[sample] - time_s[0]);
-            let late = Clock::new(observed, latency_s, 0.0).phase_at(sample);
-            assert!((drifting.phase_at(sample) - late).abs() < 1e-12, "sample {sample}");
-        }
-        let free = Nuisance::all(4, 2, true);
-        let nuisances = Hypothesis::new(&free, &[]);
-        let mut at = nuisances.neutral();
-        let predict = |at: &[f64]| scene.predict(0, &nuisances, at).expect("it holds").position_m;
-        let without = predict(&at);
-        let place = free
-            .iter()
-            .position(|free| free.what == What::Nuisance(Nuisance::ClockDrift));
-        at[place.expect("it is free")] = drift;
-        let apart = predict(&at)
-            .iter()
-            .zip(&without)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        assert!(apart > 1e-4, "{apart} m");
     }
 }

@@ -115,6 +115,7 @@ pub(super) fn recalibrate<'s, 'a>(
             break;
         }
     }
+    scene.settle(base, &at);
     let scene: &'s Scene<'a> = scene;
     let mut problem = problem_at(scene, base, &at)?;
     let discrepancy = Discrepancy::new(&problem, fraction * mean_deformation_m(scene));

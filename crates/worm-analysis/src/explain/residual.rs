@@ -8,7 +8,7 @@
 
 use super::bins::Bins;
 use super::observed::Observed;
-use super::predict::Predicted;
+use super::predicted::Predicted;
 
 /// The residual of one run, sample by sample or bin by bin.
 #[derive(Debug, Clone, Default)]

@@ -6,6 +6,7 @@
 //! α with the prior of the severity, and summed over trials, this is the Bayes factor of the effect against none, to first order in the
 //! nuisances and along the curve of its severities. What it comes to by chance is drawn ([`super::judge::chance`]).
 
+use super::directions::{Directions, Projector};
 use super::discrepancy::Discrepancy;
 use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
@@ -13,8 +14,7 @@ use super::judge::chance::Chance;
 use super::judge::ln_sum::ln_sum;
 use super::judge::prior::SeverityPrior;
 use super::parameter::Hypothesised;
-use crate::least_squares::{cross, dot, gradient, submatrix};
-use nalgebra::{DMatrix, DVector};
+use crate::least_squares::dot;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use worm_physics::effect::{Effect, LIBRARY, Scope};
@@ -29,6 +29,9 @@ const BETWEEN: (f64, f64) = (0.55, 1.75);
 const AT_A_PLACE: (f64, f64) = (0.1, 4.5);
 /// The same below the weakest and above the strongest.
 const BEYOND: (f64, f64) = (0.3, 3.0);
+
+/// Trials that are simulated before they are projected.
+const AT_ONCE: usize = 256;
 
 /// One effect on one cell, or on all that it concerns, screened.
 #[derive(Debug, Clone)]
@@ -125,8 +128,6 @@ pub(super) fn canal(problem: &FitProblem<'_, '_>) -> (f64, f64) {
 struct Trial {
     hypothesised: usize,
     values: Vec<f64>,
-    /// Change of the residuals.
-    direction: Vec<f64>,
     /// Largest relative change of the advance.
     impact: f64,
     /// Factors on its change of the severity for which it stands.
@@ -206,48 +207,14 @@ pub(super) fn screen(
     expected: &Expected<'_>,
     seed: u64,
 ) -> (Vec<Screening>, Chance) {
-    let all = simulate(problem, fit, hypothesised);
-    let rows = fit.residual.len();
-    let directions = DMatrix::from_iterator(
-        rows,
-        all.len(),
-        all.iter().flat_map(|trial| trial.direction.iter().copied()),
-    );
-    let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
-    let jacobian = DMatrix::from_iterator(
-        rows,
-        open.len(),
-        open.iter().flat_map(|&quantity| fit.jacobian[quantity].iter().copied()),
-    );
-    let mut normal = submatrix(&fit.normal(None), &open);
-    for row in 0..open.len() {
-        normal[(row, row)] *= 1.0 + 1e-9;
-    }
-    let Some(normal) = normal.cholesky() else {
+    let Some(projector) = Projector::new(discrepancy, fit) else {
         return (Vec::new(), Chance::default());
     };
-    let shared = cross(&jacobian, &directions);
-    let projected = normal.solve(&shared);
-    let products = cross(&directions, &directions) - cross(&shared, &projected);
-    let along = discrepancy.products_of(&directions) - discrepancy.products_of(&jacobian) * &projected;
-    let quantities = fit.hypothesis.quantities();
-    let whole_gradient = gradient(&quantities, &fit.at, &fit.residual, &fit.jacobian, None);
-    let pull = DVector::from_iterator(open.len(), open.iter().map(|&quantity| whole_gradient[quantity]));
-    let scores: Vec<f64> = all
-        .iter()
-        .enumerate()
-        .map(|(number, trial)| projected.column(number).dot(&pull) - dot(&trial.direction, &fit.residual, None))
-        .collect();
-    drop(directions);
+    let (all, directions) = simulate(problem, fit, hypothesised, &projector);
     // Those that the nuisances explain completely stay, for the evidence against them is that of their prior.
-    let squares = all
-        .iter()
-        .enumerate()
-        .map(|(number, trial)| {
-            let whole = dot(&trial.direction, &trial.direction, None);
-            products[(number, number)].max(1e-9 * (1.0 + whole))
-        })
-        .collect();
+    let (scores, squares) = (directions.scores.clone(), directions.squares.clone());
+    let (products, along) = (directions.products(), directions.along());
+    drop(directions);
     let impacts = |number: usize| -> Vec<(f64, f64)> {
         let neutral = hypothesised[number].effect.severity().neutral;
         let mine = all.iter().filter(|trial| trial.hypothesised == number);
@@ -307,8 +274,13 @@ pub(super) fn screen(
     (screened, chance)
 }
 
-/// Simulates every trial of every effect on top of a fit.
-fn simulate(problem: &FitProblem<'_, '_>, fit: &Fit, hypothesised: &[Hypothesised]) -> Vec<Trial> {
+/// Simulates every trial of every effect on top of a fit. Returns those that do something, and the directions of each.
+fn simulate(
+    problem: &FitProblem<'_, '_>,
+    fit: &Fit,
+    hypothesised: &[Hypothesised],
+    projector: &Projector<'_>,
+) -> (Vec<Trial>, Directions) {
     let canal_m = canal(problem);
     let tasks: Vec<(usize, Vec<f64>, (f64, f64))> = hypothesised
         .iter()
@@ -344,28 +316,29 @@ fn simulate(problem: &FitProblem<'_, '_>, fit: &Fit, hypothesised: &[Hypothesise
         let hypothesis = Hypothesis::new(nuisances, &all);
         let mut at = fit.at.clone();
         at.extend(values);
-        let (mut direction, with_effect_m) = problem.residuals_and_advances(&hypothesis, &at);
-        for (value, here) in direction.iter_mut().zip(&without) {
+        let (mut change, with_effect_m) = problem.residuals_and_advances(&hypothesis, &at);
+        for (value, here) in change.iter_mut().zip(&without) {
             *value -= here;
         }
-        let square = dot(&direction, &direction, None);
+        let square = dot(&change, &change, None);
         // An effect that does nothing, and a worm that could not have crawled.
         let is_possible = square > 1e-9 && with_effect_m.iter().all(|advance_m| advance_m.is_finite());
-        is_possible.then(|| Trial {
-            hypothesised: *number,
-            values: values.clone(),
-            direction,
-            impact: problem.impact(&advances_m, &with_effect_m),
-            stands_for: *stands_for,
+        is_possible.then(|| {
+            let trial = Trial {
+                hypothesised: *number,
+                values: values.clone(),
+                impact: problem.impact(&advances_m, &with_effect_m),
+                stands_for: *stands_for,
+            };
+            (trial, change)
         })
     };
-    let mut trials: Vec<Trial> = tasks.par_iter().filter_map(evaluate).collect();
-    let directions = trials
-        .iter_mut()
-        .map(|trial| std::mem::take(&mut trial.direction))
-        .collect();
-    for (trial, whitened) in trials.iter_mut().zip(problem.whiten_all(directions)) {
-        trial.direction = whitened;
+    let (mut trials, mut directions) = (Vec::with_capacity(tasks.len()), projector.none());
+    for some in tasks.chunks(AT_ONCE) {
+        let evaluated: Vec<(Trial, Vec<f64>)> = some.par_iter().filter_map(evaluate).collect();
+        let (of_some, changes): (Vec<Trial>, Vec<Vec<f64>>) = evaluated.into_iter().unzip();
+        trials.extend(of_some);
+        projector.append(problem.whiten_all(changes), &mut directions);
     }
-    trials
+    (trials, directions)
 }

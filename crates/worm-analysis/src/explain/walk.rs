@@ -1,91 +1,99 @@
-//! A crawl through the samples of a recording: simulated until it repeats, and then repeated.
+//! A crawl through the samples of a recording: simulated from knot to knot until it repeats, and then repeated.
 
+use super::clock::Clock;
 use super::observed::Observed;
-use super::predict::{Clock, Predicted};
-use worm_physics::{Crawl, MAX_CELLS, Mechanics, longest_increment_s};
+use super::predicted::Predicted;
+use super::start::{LEAD_CYCLES, start};
+use super::track::Track;
+use worm_physics::{Crawl, Mechanics};
 
-/// Change of every pad's deformation from cycle to cycle below which a crawl has settled, m: the next is a twentieth or less.
-const SETTLED_M: f64 = 3e-7;
-/// Fewest knots of a step, of a cycle that is repeated; and the time between two over the longest increment of a crawl.
-const KNOTS_OF_STEP: f64 = 104.0;
-const OF_INCREMENT: f64 = 0.98;
 /// Difference of two phases below which the drive rests, cycles.
 const RESTS: f64 = 1e-12;
-
-/// What is known of a crawl before it is simulated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Gait {
-    /// It never repeats.
-    Changing,
-    /// It repeats after some cycles.
-    Settling,
-    /// It repeats from the start.
-    Settled,
-}
-
-impl Gait {
-    pub fn new(repeats: bool, has_settled: bool) -> Self {
-        match (repeats, has_settled) {
-            (false, _) => Self::Changing,
-            (true, false) => Self::Settling,
-            (true, true) => Self::Settled,
-        }
-    }
-}
-
-/// Whether a crawl has settled: its tips are as they were a cycle ago.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Settling {
-    deformation_m: Option<[f64; MAX_CELLS]>, // a cycle ago
-}
-
-impl Settling {
-    /// To be asked once a cycle.
-    pub fn has_settled(&mut self, crawl: &Crawl) -> bool {
-        let cells = crawl.positions_m().len();
-        let mut now_m = [0.0; MAX_CELLS];
-        for (cell, now_m) in now_m[..cells].iter_mut().enumerate() {
-            *now_m = crawl.deformation_m(cell);
-        }
-        let before_m = self.deformation_m.replace(now_m);
-        before_m.is_some_and(|before_m| {
-            let mut pairs = now_m.iter().zip(&before_m);
-            pairs.all(|(now_m, before_m)| (now_m - before_m).abs() < SETTLED_M)
-        })
-    }
-}
 
 /// A crawl through the samples of a recording.
 pub(super) struct Walk<'a> {
     observed: &'a Observed<'a>,
     clock: Clock<'a>,
     crawl: Crawl,
+    /// The cycle that it repeats, where that is known from the start.
+    settled: Option<Track<'a>>,
     /// Phase of the last sample that was reached.
     before: f64,
     position_m: Vec<f64>, // `[sample][cell]`, flat, of the samples so far
 }
 
 impl<'a> Walk<'a> {
-    /// From a crawl at the first sample.
-    pub fn new(observed: &'a Observed<'a>, clock: Clock<'a>, crawl: Crawl) -> Self {
-        Self {
-            before: crawl.phase(),
-            position_m: Vec::with_capacity(observed.cells() * observed.samples()),
+    /// From the first sample on; none where the worm slides down. The crawl of a worm that was under way has settled where it comes to
+    /// repeat.
+    pub fn begin(
+        observed: &'a Observed<'a>,
+        mut clock: Clock<'a>,
+        mechanics: &Mechanics,
+        damping: f64,
+        may_repeat: bool,
+    ) -> Option<Self> {
+        let first = clock.phase_at(0);
+        let settles = may_repeat && !observed.laid_down && !observed.pauses;
+        let crawl = match &observed.settled {
+            Some(settled) if settles => {
+                let mut crawl = settled.clone();
+                crawl.set_damping_ratio(Some(damping));
+                crawl
+            }
+            _ => start(
+                observed,
+                mechanics,
+                first,
+                damping,
+                if settles { 0 } else { LEAD_CYCLES },
+            )?,
+        };
+        let mut walk = Self {
             observed,
             clock,
             crawl,
+            settled: None,
+            before: first,
+            position_m: Vec::with_capacity(observed.cells() * observed.samples()),
+        };
+        if settles {
+            let first_knot = walk.knot_from(first);
+            walk.crawl.begin_at_phase(mechanics, first_knot, &observed.first_m);
+            let passes = (first, &observed.first_m[..]);
+            walk.settled = Some(Track::settled(&mut walk.crawl, mechanics, observed, passes)?);
         }
+        Some(walk)
+    }
+
+    /// The crawl after a cycle that repeats from the start; none for one that does not.
+    pub fn into_settled(self) -> Option<Crawl> {
+        self.settled.is_some().then_some(self.crawl)
     }
 
     /// Goes on through the samples up to a phase, which may be infinite; none where the worm slides down.
-    pub fn go_to(&mut self, mechanics: &Mechanics, until: f64, gait: Gait) -> Option<()> {
-        if gait != Gait::Settled {
-            self.simulate(mechanics, until, gait == Gait::Settling)?;
+    pub fn go_to(&mut self, mechanics: &Mechanics, until: f64, may_repeat: bool) -> Option<()> {
+        if self.observed.pauses {
+            // What happens then is not a matter of the phase.
+            return self.simulate(mechanics, until);
         }
-        if gait != Gait::Changing && self.next_sample() < self.observed.samples() && self.crawl.phase() < until {
-            self.repeat(mechanics, until)?;
+        let mut track = match self.settled.take() {
+            Some(track) => track,
+            None => {
+                self.simulate(mechanics, self.knot_from(self.crawl.phase()).min(until))?;
+                Track::begin(&self.crawl, self.observed, may_repeat)
+            }
+        };
+        self.follow(&mut track, mechanics, until)?;
+        if self.next_sample() < self.observed.samples() && track.repeats() {
+            self.begin_anew(&track, mechanics, until)?;
         }
-        Some(())
+        self.simulate(mechanics, until)
+    }
+
+    /// Phase of the first knot from a phase on.
+    fn knot_from(&self, phase: f64) -> f64 {
+        let per_cycle = self.observed.pace.knots() as f64;
+        (phase * per_cycle).ceil() / per_cycle
     }
 
     /// Changes the mechanics: nothing moves.
@@ -105,23 +113,10 @@ impl<'a> Walk<'a> {
         self.position_m.len() / self.observed.cells()
     }
 
-    /// Simulates up to a phase, or until the crawl repeats.
-    fn simulate(&mut self, mechanics: &Mechanics, until: f64, may_repeat: bool) -> Option<()> {
-        let mut settling = Settling::default();
-        let mut cycle_ends = if may_repeat {
-            self.crawl.phase() + 1.0
-        } else {
-            f64::INFINITY
-        };
+    /// Simulates from sample to sample up to a phase.
+    fn simulate(&mut self, mechanics: &Mechanics, until: f64) -> Option<()> {
         for sample in self.next_sample()..self.observed.samples() {
             let phase = self.clock.phase_at(sample);
-            while cycle_ends < phase.min(until) {
-                self.advance(mechanics, cycle_ends, sample, phase)?;
-                if settling.has_settled(&self.crawl) {
-                    return Some(());
-                }
-                cycle_ends += 1.0;
-            }
             if phase > until {
                 return self.advance(mechanics, until, sample, phase);
             }
@@ -145,81 +140,35 @@ impl<'a> Walk<'a> {
         self.crawl.advance_to(mechanics, phase, duration_s.max(0.0)).ok()
     }
 
-    /// Simulates a cycle and repeats it up to a phase.
-    fn repeat(&mut self, mechanics: &Mechanics, until: f64) -> Option<()> {
-        let cycle = SteadyCycle::record(&mut self.crawl, mechanics, self.observed)?;
+    /// Takes the samples up to a phase from a track, or up to the last knot before that phase.
+    fn follow(&mut self, track: &mut Track<'_>, mechanics: &Mechanics, until: f64) -> Option<()> {
         for sample in self.next_sample()..self.observed.samples() {
             let phase = self.clock.phase_at(sample);
             if phase > until {
-                // Here the crawl is simulated again.
-                let ended = self.crawl.phase();
-                let further = (until - ended).rem_euclid(1.0);
-                let duration_s = further * self.observed.cycle_s;
-                self.crawl.advance_to(mechanics, ended + further, duration_s).ok()?;
-                let mut at_m = Vec::with_capacity(self.observed.cells());
-                cycle.extend(until, &mut at_m);
-                self.crawl.begin_at_phase(mechanics, until, &at_m);
                 break;
             }
-            cycle.extend(phase, &mut self.position_m);
+            while !track.reaches(phase) {
+                if track.next_phase() > until {
+                    return Some(());
+                }
+                track.advance(&mut self.crawl, mechanics)?;
+            }
+            track.extend(phase, &mut self.position_m);
             self.before = phase;
         }
         Some(())
     }
-}
 
-/// A cycle of a crawl that repeats: its positions at knots, which lie evenly and on the boundaries of the steps.
-struct SteadyCycle {
-    cells: usize,
-    knots: f64,
-    first_phase: f64,
-    position_m: Vec<f64>, // `[knot][cell]`, flat; the last knot is a cycle after the first
-    advance_m: Vec<f64>,  // of each cell in a cycle
-}
-
-impl SteadyCycle {
-    /// Simulates the next cycle of a crawl, at the pace of the recording there.
-    fn record(crawl: &mut Crawl, mechanics: &Mechanics, observed: &Observed<'_>) -> Option<Self> {
-        let cells = observed.cells();
-        let step_s = observed.cycle_s / cells as f64;
-        let between_s = OF_INCREMENT * longest_increment_s(step_s);
-        let knots = cells as f64 * KNOTS_OF_STEP.max((step_s / between_s).ceil());
-        let first = (crawl.phase() * knots).ceil();
-        let first_phase = first / knots;
-        let mut reached_s = observed.time_at_s(crawl.phase());
-        let mut position_m = Vec::with_capacity(cells * (knots as usize + 1));
-        for knot in 0..=knots as usize {
-            let phase = (first + knot as f64) / knots;
-            let time_s = observed.time_at_s(phase);
-            crawl.advance_to(mechanics, phase, time_s - reached_s).ok()?;
-            position_m.extend_from_slice(crawl.positions_m());
-            reached_s = time_s;
-        }
-        let last_m = &position_m[position_m.len() - cells..];
-        let advance_m = last_m
-            .iter()
-            .zip(&position_m)
-            .map(|(last, first)| last - first)
-            .collect();
-        Some(Self {
-            cells,
-            knots,
-            first_phase,
-            position_m,
-            advance_m,
-        })
-    }
-
-    /// Appends the positions of all cells at a phase.
-    fn extend(&self, phase: f64, out: &mut Vec<f64>) {
-        let cycles = (phase - self.first_phase).floor();
-        let knots = (phase - self.first_phase - cycles) * self.knots;
-        let knot = (knots as usize).min(self.knots as usize - 1);
-        let fraction = knots - knot as f64;
-        let from = knot * self.cells;
-        let (low_m, high_m) = self.position_m[from..from + 2 * self.cells].split_at(self.cells);
-        let ends = low_m.iter().zip(high_m).zip(&self.advance_m);
-        out.extend(ends.map(|((low_m, high_m), advance_m)| low_m + fraction * (high_m - low_m) + cycles * advance_m));
+    /// Brings the crawl to a phase of a track that repeats.
+    fn begin_anew(&mut self, track: &Track<'_>, mechanics: &Mechanics, until: f64) -> Option<()> {
+        let ended = self.crawl.phase();
+        let further = (until - ended).rem_euclid(1.0);
+        let duration_s = further * self.observed.cycle_s;
+        self.crawl.advance_to(mechanics, ended + further, duration_s).ok()?;
+        let mut at_m = Vec::with_capacity(self.observed.cells());
+        track.extend(until, &mut at_m);
+        self.crawl.begin_at_phase(mechanics, until, &at_m);
+        Some(())
     }
 }
 

@@ -65,11 +65,16 @@ pub(super) fn sentence(
     }
 }
 
-/// What was not named though it may well be there, as a further sentence.
+/// What was not named though it may well be there, or is there and does not matter, as a further sentence.
 fn not_sure_enough(selected: &Selected) -> String {
     let beyond_none = 1.0 - selected.null_probability;
     match (selected.candidates.first(), selected.probability.first()) {
-        (Some(candidate), Some(&probability)) if (WORTH_A_WORD..=beyond_none).contains(&probability) => format!(
+        (Some(candidate), Some(&probability)) if probability > beyond_none.max(WORTH_A_WORD) => format!(
+            " What is left looks like {} (probability {}), which changes nothing that matters.",
+            of_library(candidate),
+            percent(probability)
+        ),
+        (Some(candidate), Some(&probability)) if probability >= WORTH_A_WORD => format!(
             " {} may be there, with a probability of {}: not enough for a name.",
             of_library(candidate),
             percent(probability)

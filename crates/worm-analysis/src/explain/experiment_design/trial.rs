@@ -7,8 +7,10 @@ use super::super::bins::Bins;
 use super::super::fit::{Fit, FitProblem};
 use super::super::noise::RunNoise;
 use super::super::observed::Observed;
+use super::super::pace::Pace;
 use super::super::parameter::{Nuisance, What};
-use super::super::predict::{Predicted, Scene};
+use super::super::predict::Scene;
+use super::super::predicted::Predicted;
 use super::super::residual::Residual;
 use super::change::Change;
 use crate::experiment::RecordedRun;
@@ -98,6 +100,9 @@ impl<'r> Trial<'r> {
             laid_down: true,
             counts_from: 0,
             cycle_s: change.cycle_s,
+            pauses: false,
+            pace: Pace::default(),
+            settled: None,
         };
         observed.assume_laid_down(true);
         let bins = Bins::new(&observed);

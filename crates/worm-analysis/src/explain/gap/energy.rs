@@ -3,7 +3,7 @@
 use super::{at_boundaries, settled_cycles};
 use crate::explain::fit::{Fit, FitProblem};
 use crate::explain::observed::Observed;
-use crate::explain::predict::start;
+use crate::explain::start::{LEAD_CYCLES, start};
 use worm_physics::Mechanics;
 
 /// A run under a fit.
@@ -47,7 +47,7 @@ fn walk(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit, path_m: Option<&[f6
     let observed = &problem.scene.observed[run];
     let (physics, damping) = problem.scene.physics(run, &fit.hypothesis, &fit.at);
     let mechanics = Mechanics::new(&physics);
-    let mut crawl = start(observed, &mechanics, observed.phase[0], damping, physics.is_periodic())?;
+    let mut crawl = start(observed, &mechanics, observed.phase[0], damping, LEAD_CYCLES)?;
     let first_m = crawl.mean_position_m();
     let time_s = &observed.run.recording.time_s;
     let mut walk = Walk {

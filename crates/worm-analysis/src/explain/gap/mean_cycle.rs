@@ -3,7 +3,7 @@
 use crate::explain::answer::CycleSeries;
 use crate::explain::fit::{Fit, FitProblem};
 use crate::explain::observed::Observed;
-use crate::explain::predict::Predicted;
+use crate::explain::predicted::Predicted;
 use crate::explain::residual::Residual;
 
 /// Bins of a cycle, about.

@@ -9,9 +9,10 @@
 //! large as the discrepancy at a₀, and B is the mean over some κ above 1.
 
 use super::super::discrepancy::Discrepancy;
-use super::ln_sum::ln_sum;
+use super::ln_sum::ln_mean;
 use crate::least_squares::cross;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 
 /// Scales over a₀.
 const SCALES: [f64; 5] = [2.0, 6.0, 18.0, 60.0, 200.0];
@@ -26,61 +27,68 @@ pub(super) struct Fitted<'f> {
     pub gradient: &'f DVector<f64>,
 }
 
-/// Blocks of columns, each of as many, of which one may be there.
+/// Blocks of columns, of which one may be there.
 #[derive(Debug, Clone)]
 pub(super) struct Blocks {
-    count: usize,
-    /// Whitened.
-    columns: DMatrix<f64>,
-    /// Products of the columns of each block with each other.
-    gram: Vec<DMatrix<f64>>,
+    each: Vec<Block>,
+}
+
+/// Some columns.
+#[derive(Debug, Clone)]
+struct Block {
+    /// Whitened. In single precision, for those of a long recording fill gigabytes.
+    columns: DMatrix<f32>,
+    /// Products of the columns with each other.
+    gram: DMatrix<f64>,
 }
 
 impl Blocks {
-    /// So many blocks of columns that are whitened by the noise.
-    pub fn new(columns: Vec<Vec<f64>>, count: usize, discrepancy: &Discrepancy) -> Self {
-        let rows = columns.first().map_or(0, Vec::len);
-        let mut columns = DMatrix::from_iterator(rows, columns.len(), columns.into_iter().flatten());
-        discrepancy.whiten_columns(&mut columns);
-        let each = columns.ncols().checked_div(count).unwrap_or(0);
-        let gram = (0..count)
-            .map(|number| {
-                let mine = columns.columns(number * each, each).into_owned();
-                cross(&mine, &mine)
-            })
-            .collect();
-        Self { count, columns, gram }
+    /// So many blocks, of each the columns, whitened by the noise.
+    pub fn new(count: usize, columns: impl Fn(usize) -> Vec<Vec<f64>> + Sync, discrepancy: &Discrepancy) -> Self {
+        let block = |number: usize| Block::new(columns(number), discrepancy);
+        Self {
+            each: (0..count).into_par_iter().map(block).collect(),
+        }
     }
 
-    /// The logarithm of the Bayes factor of each block beside a fit.
+    /// Logarithm of the Bayes factor of each block.
     pub fn ln_bayes(&self, fitted: &Fitted<'_>) -> Vec<f64> {
-        if self.count == 0 {
-            return Vec::new();
-        }
-        let along = cross(&self.columns, fitted.jacobian);
-        let solved = fitted.normal.solve(&along.transpose());
-        let residual = DVector::from_column_slice(fitted.residual);
-        let product = self.columns.tr_mul(&residual) - solved.tr_mul(fitted.gradient);
-        let each = self.columns.ncols() / self.count;
-        let of_block = |(number, gram): (usize, &DMatrix<f64>)| {
-            let from = number * each;
-            let projected = gram - along.rows(from, each) * solved.columns(from, each);
-            let product = product.rows(from, each);
-            let at_scale = |kappa: f64| {
-                let scaled = &projected * (kappa * kappa) + DMatrix::identity(each, each);
-                let Some(factor) = scaled.cholesky() else {
-                    return f64::NEG_INFINITY;
-                };
-                let gain = kappa * kappa * product.dot(&factor.solve(&product.into_owned()));
-                0.5 * gain - 0.5 * factor.ln_determinant()
-            };
-            ln_sum(SCALES.map(at_scale)) - (SCALES.len() as f64).ln()
-        };
-        self.gram.iter().enumerate().map(of_block).collect()
+        self.each.par_iter().map(|block| block.ln_bayes(fitted)).collect()
     }
 }
 
-/// What is asked beside the nominal worm, with nothing free.
+impl Block {
+    fn new(columns: Vec<Vec<f64>>, discrepancy: &Discrepancy) -> Self {
+        let (rows, count) = (columns.first().map_or(0, Vec::len), columns.len());
+        let mut columns = DMatrix::from_iterator(rows, count, columns.into_iter().flatten());
+        discrepancy.whiten_columns(&mut columns);
+        let columns = columns.map(|value| value as f32);
+        let exact = columns.map(f64::from);
+        Self {
+            gram: cross(&exact, &exact),
+            columns,
+        }
+    }
+
+    fn ln_bayes(&self, fitted: &Fitted<'_>) -> f64 {
+        let columns = self.columns.map(f64::from);
+        let along = cross(&columns, fitted.jacobian);
+        let solved = fitted.normal.solve(&along.transpose());
+        let residual = DVector::from_column_slice(fitted.residual);
+        let product = columns.tr_mul(&residual) - solved.tr_mul(fitted.gradient);
+        let projected = &self.gram - along * solved;
+        let at_scale = |kappa: f64| {
+            let scaled = &projected * (kappa * kappa) + DMatrix::identity(product.len(), product.len());
+            let Some(factor) = scaled.cholesky() else {
+                return f64::NEG_INFINITY;
+            };
+            let gain = kappa * kappa * product.dot(&factor.solve(&product));
+            0.5 * gain - 0.5 * factor.ln_determinant()
+        };
+        ln_mean(&SCALES.map(at_scale)).unwrap_or(f64::NEG_INFINITY)
+    }
+}
+
 #[cfg(test)]
 pub(super) fn beside_the_nominal_worm<T>(
     problem: &super::super::fit::FitProblem<'_, '_>,

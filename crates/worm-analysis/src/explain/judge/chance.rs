@@ -15,6 +15,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Draws of the data.
 const DRAWS: usize = 4000;
+/// Error of a product of directions, as a fraction of their squares.
+const ROUNDING: f64 = 1e-5;
 /// Draws that are multiplied at once.
 const AT_ONCE: usize = 250;
 
@@ -55,12 +57,12 @@ impl Chance {
             }
             let mut covariance = products + cross(along, &scaled);
             for entry in 0..count {
-                covariance[(entry, entry)] += 1e-9 + 1e-9 * products[(entry, entry)];
+                covariance[(entry, entry)] += 1e-9 + ROUNDING * products[(entry, entry)];
             }
             let Some(factor) = covariance.cholesky() else {
                 continue;
             };
-            let lower = factor.l();
+            let lower = factor.unpack();
             for from in (0..draws).step_by(AT_ONCE) {
                 let some = AT_ONCE.min(draws - from);
                 let normal = DMatrix::from_fn(count, some, |_, _| StandardNormal.sample(&mut rng));

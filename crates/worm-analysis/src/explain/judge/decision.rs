@@ -4,8 +4,8 @@
 //! 1. Every hypothesis gets its posterior probability: none, each effect, each pair, and something else, which is a large discrepancy
 //!    alone or beside an effect or a pair, or looks exactly like one. Effects that were not fitted to the end count by their screening.
 //!    What the best effects have in common (the same effect of another cell, exact twins) is one class.
-//! 2. An effect that changes neither advance nor energy nor positions by what matters counts as none. Beside one that does it is a
-//!    trace: it stays in the fit, without a name, and the other is judged as a single effect. No contact is quite as the model says, and
+//! 2. An effect that changes neither advance nor energy nor positions by what matters counts as none, in part where that is not sure.
+//!    Beside one that does it is a trace: it stays in the fit, without a name, and the other is judged as a single effect. No contact is quite as the model says, and
 //!    a small effect that is certain hides a large one that only differs from recalibration by little.
 //! 3. An effect must also be more probable than the best of the library becomes by chance in one of a hundred worms without one, and
 //!    improve the prediction of data that it was not fitted to.
@@ -23,7 +23,7 @@ use super::ln_sum::ln_sum;
 use super::prior;
 use super::structural_change::Change;
 
-/// Probability from which an effect counts as one that changes what matters.
+/// Probability from which one of two effects counts as one that changes what matters.
 pub(in crate::explain) const MATTERS: f64 = 0.95;
 /// Probability that an answer must reach, and several together.
 const SURE: f64 = 0.9;
@@ -76,14 +76,18 @@ impl Judged {
         self.candidate.named().count() > 1
     }
 
-    /// Whether it counts as none: chance does as much, or nothing that matters changes.
-    fn is_as_good_as_none(&self) -> bool {
-        self.matters < MATTERS || self.beyond_chance <= 0.0
+    /// Probability that it does not count as none: chance does less, and something that matters changes. Two effects must be sure to.
+    fn counts(&self) -> f64 {
+        if self.beyond_chance <= 0.0 || self.is_pair() && self.matters < MATTERS {
+            0.0
+        } else {
+            self.matters
+        }
     }
 
     /// Whether it may be named: it also holds on other data, is no trace, and its shape is within its range.
     fn may_be_named(&self) -> bool {
-        !self.is_as_good_as_none() && self.holds && self.candidate.is_notable()
+        self.counts() > 0.0 && self.holds && self.candidate.is_notable()
     }
 }
 
@@ -111,7 +115,8 @@ struct Class {
     best: usize,
     ln_weight: f64,
     may_be_named: bool,
-    is_as_good_as_none: bool,
+    /// Probability that its best does not count as none.
+    counts: f64,
 }
 
 /// Reaches the verdict. `none` is the evidence without effects, `unfitted` the logarithm of the weights of effects that were only
@@ -143,7 +148,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
                 best: at,
                 ln_weight: one.ln_weight(),
                 may_be_named: one.may_be_named(),
-                is_as_good_as_none: one.is_as_good_as_none(),
+                counts: one.counts(),
             }),
         }
     }
@@ -151,7 +156,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     let half = 0.5 * prior::OTHER;
     let beside = standing.iter().map(|one| {
         let imitated = if one.may_be_named() {
-            one.evidence().usual + prior::IMITATED.ln()
+            one.evidence().usual + (prior::IMITATED * one.counts()).ln()
         } else {
             f64::NEG_INFINITY
         };
@@ -168,27 +173,28 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         .collect();
     let whole = ln_sum(all.iter().copied());
     let probability = |ln_weight: f64| (ln_weight - whole).exp().max(NOTHING);
-    let sum_of = |counts: &dyn Fn(&Class) -> bool| -> f64 {
-        let counted = classes.iter().filter(|class| counts(class));
-        counted.map(|class| probability(class.ln_weight)).sum()
-    };
-    let null_probability = probability(ln_none)
-        + sum_of(&|class| class.is_as_good_as_none)
-        + unfitted.iter().map(|&ln_weight| probability(ln_weight)).sum::<f64>();
+    let that_counts = |class: &Class| class.counts * probability(class.ln_weight);
+    let nothing = probability(ln_none) + unfitted.iter().map(|&ln_weight| probability(ln_weight)).sum::<f64>();
+    let unimportant: f64 = classes
+        .iter()
+        .map(|class| (1.0 - class.counts) * probability(class.ln_weight))
+        .sum();
+    let null_probability = nothing + unimportant;
     // Something is there, and looks like an effect that it cannot be.
-    let other_probability = probability(ln_other) + sum_of(&|class| !class.is_as_good_as_none && !class.may_be_named);
+    let unnamed = classes.iter().filter(|class| !class.may_be_named);
+    let other_probability = probability(ln_other) + unnamed.map(that_counts).sum::<f64>();
     let named: Vec<&Class> = classes.iter().filter(|class| class.may_be_named).collect();
     let mut count = 0;
     let mut sum = 0.0;
-    while sum < SURE && count < named.len() && probability(named[count].ln_weight) > RIVAL {
-        sum += probability(named[count].ln_weight);
+    while sum < SURE && count < named.len() && that_counts(named[count]) > RIVAL {
+        sum += that_counts(named[count]);
         count += 1;
     }
     let verdict = match count {
         1 if sum >= SURE => Verdict::Explained,
         2.. if sum >= SURE => Verdict::Ambiguous,
-        // Something is missing, and more probably this than what the library does not know.
-        1.. if null_probability <= 1.0 - SURE && sum > other_probability => Verdict::Ambiguous,
+        // Something is there, and more probably this than what the library does not know, or what does not matter.
+        1.. if nothing <= 1.0 - SURE && sum > other_probability.max(unimportant) => Verdict::Ambiguous,
         _ if other_probability > null_probability => Verdict::OutsideLibrary,
         _ => Verdict::Agrees,
     };
@@ -198,15 +204,14 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     } else {
         classes.iter().take(1).map(|class| class.best).collect()
     };
-    let probability = chosen
-        .iter()
-        .map(|best| {
-            classes
-                .iter()
-                .find(|class| class.best == *best)
-                .map_or(0.0, |class| probability(class.ln_weight))
+    let of_class = |best: &usize| {
+        let class = classes.iter().find(|class| class.best == *best);
+        class.map_or(0.0, |class| match is_named {
+            true => that_counts(class),
+            false => probability(class.ln_weight),
         })
-        .collect();
+    };
+    let probability = chosen.iter().map(of_class).collect();
     let best_wrong = classes
         .iter()
         .find(|class| !chosen.contains(&class.best))
@@ -403,7 +408,7 @@ mod tests {
     #[test]
     fn what_does_not_matter_or_is_within_chance_is_as_good_as_none() {
         for spoil in [
-            |one: &mut Judged| one.matters = 0.4,
+            |one: &mut Judged| one.matters = 0.0,
             |one: &mut Judged| one.beyond_chance = -0.1,
         ] {
             let mut small = judged(&["pad-creep"], 40.0, 20.0);
@@ -412,6 +417,29 @@ mod tests {
             assert_eq!(selected.verdict, Verdict::Agrees);
             assert!(selected.null_probability > 0.99);
         }
+    }
+
+    #[test]
+    fn what_is_there_and_may_matter_is_named_with_the_doubt() {
+        let with = |matters: f64| {
+            let mut one = judged(&["pad-creep"], 400.0, 20.0);
+            one.matters = matters;
+            verdict(0.0, vec![one])
+        };
+        let likely = with(0.8);
+        assert_eq!(likely.verdict, Verdict::Ambiguous);
+        assert!(
+            (likely.null_probability - 0.2).abs() < 0.02,
+            "{}",
+            likely.null_probability
+        );
+        let hardly = with(0.3);
+        assert_eq!(hardly.verdict, Verdict::Agrees);
+        assert!(
+            (hardly.null_probability - 0.7).abs() < 0.02,
+            "{}",
+            hardly.null_probability
+        );
     }
 
     #[test]

@@ -9,7 +9,6 @@ use super::super::discrepancy::Discrepancy;
 use super::super::plant::Plant;
 use super::beside::{Blocks, Fitted};
 use super::ln_sum::ln_mean;
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Most frequencies.
@@ -39,13 +38,13 @@ impl Repetitions {
             .iter()
             .flat_map(|&frequency| (0..runs).map(move |run| (frequency, run)))
             .collect();
-        let columns: Vec<Vec<f64>> = blocks
-            .par_iter()
-            .flat_map_iter(|&(frequency, run)| columns(plant, discrepancy.scale_m, frequency, run))
-            .collect();
+        let of_block = |number: usize| {
+            let (frequency, run) = blocks[number];
+            columns(plant, discrepancy.scale_m, frequency, run)
+        };
         Self {
             runs,
-            columns: Blocks::new(columns, blocks.len(), discrepancy),
+            columns: Blocks::new(blocks.len(), of_block, discrepancy),
         }
     }
 

@@ -9,11 +9,13 @@ use super::super::discrepancy::Discrepancy;
 use super::super::plant::Plant;
 use super::beside::{Blocks, Fitted};
 use super::ln_sum::ln_sum;
-use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Cosines in the phase of a step.
 const COSINES: usize = 3;
+/// Most cycles of a run at which a change is looked for: in a long run they lie some cycles apart.
+const MOST: usize = 24;
 /// Fewest cycles before a change and after it.
 const MIN_CYCLES: usize = 1;
 
@@ -56,22 +58,26 @@ impl StructuralChanges {
             let last = bins.last().map_or(0.0, |bin| since_start(bin.phase));
             first.ceil() as usize + MIN_CYCLES..(last.floor() as usize + 1).saturating_sub(MIN_CYCLES)
         };
-        let single = (0..runs).flat_map(|run| cycles(run).map(move |cycle| Change { cycle, run: Some(run) }));
+        let places = |cycles: Range<usize>| {
+            let apart = cycles.len().div_ceil(MOST).max(1);
+            cycles.step_by(apart)
+        };
+        let single = (0..runs).flat_map(|run| places(cycles(run)).map(move |cycle| Change { cycle, run: Some(run) }));
         let common = (0..runs)
             .map(cycles)
             .reduce(|a, b| a.start.max(b.start)..a.end.min(b.end));
         let all_at_once = common
             .filter(|_| runs > 1)
             .into_iter()
-            .flatten()
+            .flat_map(places)
             .map(|cycle| Change { cycle, run: None });
         let all: Vec<Change> = single.chain(all_at_once).collect();
-        let columns: Vec<Vec<f64>> = all
-            .par_iter()
-            .flat_map_iter(|change| columns(plant, discrepancy.scale_m, *change))
-            .collect();
         Self {
-            columns: Blocks::new(columns, all.len(), discrepancy),
+            columns: Blocks::new(
+                all.len(),
+                |number| columns(plant, discrepancy.scale_m, all[number]),
+                discrepancy,
+            ),
             all,
         }
     }

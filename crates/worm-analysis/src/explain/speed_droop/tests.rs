@@ -1,6 +1,7 @@
 use super::*;
 use crate::experiment::RecordedRun;
 use crate::explain::hypothesis::Hypothesis;
+use crate::explain::pace::Pace;
 use crate::explain::parameter::Nuisance;
 use crate::recording::Recording;
 use rand::{RngExt, SeedableRng};
@@ -97,6 +98,9 @@ fn found(per_n: f64, rest_s: f64, seed: u64) -> SpeedDroop {
         laid_down: true,
         counts_from: 0,
         cycle_s: CYCLE_S,
+        pauses: false,
+        pace: Pace::default(),
+        settled: None,
     };
     let still = Scene {
         observed: recordings
