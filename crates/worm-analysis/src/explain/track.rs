@@ -16,15 +16,19 @@ const MAX_SETTLING_CYCLES: usize = 5;
 /// A crawl at knots, which lie evenly and on the boundaries of the steps.
 pub(super) struct Track<'a> {
     observed: &'a Observed<'a>,
-    /// The first knot, in knots since phase 0.
+    cells: usize,
+    per_cycle: usize,
+    /// The first knot, in knots since phase 0, and the number of knots after it.
     first: i64,
+    knots: usize,
     position_m: Vec<f64>, // `[knot][cell]`, flat
     may_repeat: bool,
     /// Of every pad after the last whole cycle, and the largest change in it.
     deformation_m: [f64; MAX_CELLS],
     change_m: f64,
-    /// Whether the last cycle goes on for ever.
+    /// Whether the last cycle goes on for ever, and the advance of each cell in it, m.
     repeats: bool,
+    advance_m: Vec<f64>,
 }
 
 impl<'a> Track<'a> {
@@ -32,12 +36,16 @@ impl<'a> Track<'a> {
     pub fn begin(crawl: &Crawl, observed: &'a Observed<'a>, may_repeat: bool) -> Self {
         Self {
             observed,
+            cells: observed.cells(),
+            per_cycle: observed.pace.knots(),
+            knots: 0,
             first: (crawl.phase() * observed.pace.knots() as f64).round() as i64,
             position_m: crawl.positions_m().to_vec(),
             may_repeat,
             deformation_m: deformations_m(crawl),
             change_m: f64::INFINITY,
             repeats: false,
+            advance_m: vec![0.0; observed.cells()],
         }
     }
 
@@ -49,35 +57,22 @@ impl<'a> Track<'a> {
         (phase, at_m): (f64, &[f64]),
     ) -> Option<Self> {
         let mut track = Self::begin(crawl, observed, true);
-        while !track.repeats && track.knots() < MAX_SETTLING_CYCLES * track.per_cycle() {
+        while !track.repeats && track.knots < MAX_SETTLING_CYCLES * track.per_cycle {
             track.advance(crawl, mechanics)?;
         }
-        track.repeats = true;
-        let forgotten = track.knots() - track.per_cycle();
-        track.position_m.drain(..forgotten * track.cells());
+        track.repeat();
+        let forgotten = track.knots - track.per_cycle;
+        track.position_m.drain(..forgotten * track.cells);
         track.first += forgotten as i64;
-        let mut here_m = Vec::with_capacity(track.cells());
+        track.knots -= forgotten;
+        let mut here_m = Vec::with_capacity(track.cells);
         track.extend(phase, &mut here_m);
-        let cells = track.cells();
-        for knot_m in track.position_m.chunks_exact_mut(cells) {
+        for knot_m in track.position_m.chunks_exact_mut(track.cells) {
             for ((knot_m, here_m), at_m) in knot_m.iter_mut().zip(&here_m).zip(at_m) {
                 *knot_m += at_m - here_m;
             }
         }
         Some(track)
-    }
-
-    fn cells(&self) -> usize {
-        self.observed.cells()
-    }
-
-    fn per_cycle(&self) -> usize {
-        self.observed.pace.knots()
-    }
-
-    /// Knots after the first.
-    fn knots(&self) -> usize {
-        self.position_m.len() / self.cells() - 1
     }
 
     /// Whether it goes on for ever.
@@ -87,34 +82,42 @@ impl<'a> Track<'a> {
 
     /// Phase of the knot that comes next.
     pub fn next_phase(&self) -> f64 {
-        (self.first + self.knots() as i64 + 1) as f64 / self.per_cycle() as f64
+        (self.first + self.knots as i64 + 1) as f64 / self.per_cycle as f64
     }
 
-    /// Whether the positions at a phase are known.
+    /// Whether the positions at a phase lie before the last knot.
     pub fn reaches(&self, phase: f64) -> bool {
-        self.repeats || self.place(phase) <= self.knots() as f64
+        self.repeats || self.place(phase) < self.knots as f64
     }
 
     /// Place of a phase, in knots after the first.
     fn place(&self, phase: f64) -> f64 {
-        phase * self.per_cycle() as f64 - self.first as f64
+        phase * self.per_cycle as f64 - self.first as f64
     }
 
     /// Simulates up to the next knot.
     pub fn advance(&mut self, crawl: &mut Crawl, mechanics: &Mechanics) -> Option<()> {
         let phase = self.next_phase();
-        let last = self.first + self.knots() as i64;
         let duration_s = if self.may_repeat {
-            self.observed.pace.after_s(last)
+            self.observed.pace.after_s(self.first + self.knots as i64)
         } else {
             self.observed.time_at_s(phase) - self.observed.time_left_s(crawl.phase())
         };
         crawl.advance_to(mechanics, phase, duration_s).ok()?;
         self.position_m.extend_from_slice(crawl.positions_m());
-        if self.may_repeat && self.knots().is_multiple_of(self.per_cycle()) {
-            self.repeats = self.has_settled(crawl);
+        self.knots += 1;
+        if self.may_repeat && self.knots.is_multiple_of(self.per_cycle) && self.has_settled(crawl) {
+            self.repeat();
         }
         Some(())
+    }
+
+    /// From here on the last cycle goes on for ever.
+    fn repeat(&mut self) {
+        let at_m = |knot: usize| &self.position_m[knot * self.cells..];
+        let ends_m = at_m(self.knots).iter().zip(at_m(self.knots - self.per_cycle));
+        self.advance_m = ends_m.map(|(last_m, first_m)| last_m - first_m).collect();
+        self.repeats = true;
     }
 
     /// Whether the cycle that has just ended repeats: the tips are as they were a cycle ago.
@@ -130,35 +133,24 @@ impl<'a> Track<'a> {
         change_m < SETTLED_M || change_before_m < NEARLY_SETTLED_M
     }
 
-    /// Appends the positions of all cells at a phase.
+    /// Appends the positions of all cells at a phase that it reaches.
     pub fn extend(&self, phase: f64, out: &mut Vec<f64>) {
-        let (last, per_cycle) = (self.knots() as f64, self.per_cycle() as f64);
+        let (last, per_cycle) = (self.knots as f64, self.per_cycle as f64);
         let place = self.place(phase);
-        let cycles = if self.repeats && !(0.0..=last).contains(&place) {
+        let is_beyond = self.repeats && !(0.0..=last).contains(&place);
+        let cycles = if is_beyond {
             1.0 + ((place - last) / per_cycle).floor()
         } else {
             0.0
         };
         let place = place - cycles * per_cycle;
         // A phase may run backwards a little where the drive rests.
-        let knot = (place.max(0.0) as usize).min(self.knots().max(1) - 1);
+        let knot = (place.max(0.0) as usize).min(self.knots - 1);
         let fraction = place - knot as f64;
-        let at = |knot: usize| self.position_m[knot * self.cells()..].iter().take(self.cells());
-        let next = (knot + 1).min(self.knots());
-        for (cell, (low_m, high_m)) in at(knot).zip(at(next)).enumerate() {
-            let repeated_m = if cycles == 0.0 {
-                0.0
-            } else {
-                cycles * self.advance_m(cell)
-            };
-            out.push(low_m + fraction * (high_m - low_m) + repeated_m);
-        }
-    }
-
-    /// Advance of a cell in the last cycle, m.
-    fn advance_m(&self, cell: usize) -> f64 {
-        let at_m = |knot: usize| self.position_m[knot * self.cells() + cell];
-        at_m(self.knots()) - at_m(self.knots() - self.per_cycle())
+        let from = knot * self.cells;
+        let (low_m, high_m) = self.position_m[from..from + 2 * self.cells].split_at(self.cells);
+        let ends = low_m.iter().zip(high_m).zip(&self.advance_m);
+        out.extend(ends.map(|((low_m, high_m), advance_m)| low_m + fraction * (high_m - low_m) + cycles * advance_m));
     }
 }
 
