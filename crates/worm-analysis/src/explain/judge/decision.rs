@@ -4,9 +4,10 @@
 //! 1. Every hypothesis gets its posterior probability: none, each effect, each pair, and something else, which is a large discrepancy
 //!    alone or beside an effect or a pair, or looks exactly like one. Effects that were not fitted to the end count by their screening.
 //!    What the best effects have in common (the same effect of another cell, exact twins) is one class.
-//! 2. An effect that changes neither advance nor energy nor positions by what matters counts as none, in part where that is not sure.
-//!    Beside one that does it is a trace: it stays in the fit, without a name, and the other is judged as a single effect. No contact is quite as the model says, and
-//!    a small effect that is certain hides a large one that only differs from recalibration by little.
+//! 2. An effect that changes neither advance nor energy nor positions by what matters counts as none; where no other comes into
+//!    question, by as much as that is probable. Beside one that does it is a trace: it stays in the fit, without a name, and the other is
+//!    judged as a single effect. No contact is quite as the model says, and a small effect that is certain hides a large one that only
+//!    differs from recalibration by little.
 //! 3. An effect must also be more probable than the best of the library becomes by chance in one of a hundred worms without one, and
 //!    improve the prediction of data that it was not fitted to.
 //!    Something else beside an effect must be more than the effect's own law may be wrong by, for no law is known exactly.
@@ -23,7 +24,7 @@ use super::ln_sum::ln_sum;
 use super::prior;
 use super::structural_change::Change;
 
-/// Probability from which one of two effects counts as one that changes what matters.
+/// Probability from which an effect beside which there are others counts as one that changes what matters.
 pub(in crate::explain) const MATTERS: f64 = 0.95;
 /// Probability that an answer must reach, and several together.
 const SURE: f64 = 0.9;
@@ -76,18 +77,19 @@ impl Judged {
         self.candidate.named().count() > 1
     }
 
-    /// Probability that it does not count as none: chance does less, and something that matters changes. Two effects must be sure to.
-    fn counts(&self) -> f64 {
-        if self.beyond_chance <= 0.0 || self.is_pair() && self.matters < MATTERS {
+    /// Probability that it does not count as none: chance does less, and something that matters changes. It must be sure to, unless no
+    /// other effect comes into question: of two doubts, which it is and whether it matters, an answer may leave one.
+    fn counts(&self, is_alone: bool) -> f64 {
+        if self.beyond_chance <= 0.0 || !is_alone && self.matters < MATTERS {
             0.0
         } else {
             self.matters
         }
     }
 
-    /// Whether it may be named: it also holds on other data, is no trace, and its shape is within its range.
-    fn may_be_named(&self) -> bool {
-        self.counts() > 0.0 && self.holds && self.candidate.is_notable()
+    /// Whether it may be named where it counts: it also holds on other data, is no trace, and its shape is within its range.
+    fn may_be_named(&self, is_alone: bool) -> bool {
+        self.counts(is_alone) > 0.0 && self.holds && self.candidate.is_notable()
     }
 }
 
@@ -114,9 +116,6 @@ pub(in crate::explain) struct Selected {
 struct Class {
     best: usize,
     ln_weight: f64,
-    may_be_named: bool,
-    /// Probability that its best does not count as none.
-    counts: f64,
 }
 
 /// Reaches the verdict. `none` is the evidence without effects, `unfitted` the logarithm of the weights of effects that were only
@@ -130,7 +129,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     // The law of the first effect is no better known than to a fraction of what it does.
     let is_beyond_first = |pair: &Judged| pair.candidate.improvement - gain > FIRST_LAW_KNOWN * FIRST_LAW_KNOWN * gain;
     let needs_both = |one: &Judged| {
-        !one.is_pair() || (one.ln_weight() - ln_single > SECOND.ln() && one.may_be_named() && is_beyond_first(one))
+        !one.is_pair() || (one.ln_weight() - ln_single > SECOND.ln() && one.may_be_named(false) && is_beyond_first(one))
     };
     let mut order: Vec<usize> = (0..judged.len()).filter(|&at| needs_both(&judged[at])).collect();
     order.sort_by(|&a, &b| judged[b].ln_weight().total_cmp(&judged[a].ln_weight()));
@@ -147,16 +146,21 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
             None => classes.push(Class {
                 best: at,
                 ln_weight: one.ln_weight(),
-                may_be_named: one.may_be_named(),
-                counts: one.counts(),
             }),
         }
     }
     classes.sort_by(|a, b| b.ln_weight.total_cmp(&a.ln_weight));
+    // The one that comes into question, where there is one.
+    let of_all = ln_sum(classes.iter().map(|class| class.ln_weight));
+    let alone = classes.first().filter(|first| first.ln_weight - of_all > SURE.ln());
+    let alone = alone.map(|first| &judged[first.best]).filter(|one| !one.is_pair());
+    let is_alone = |one: &Judged| alone.is_some_and(|alone| are_alike(&alone.candidate, &one.candidate));
+    let counts = |one: &Judged| one.counts(is_alone(one));
+    let may_be_named = |one: &Judged| one.may_be_named(is_alone(one));
     let half = 0.5 * prior::OTHER;
     let beside = standing.iter().map(|one| {
-        let imitated = if one.may_be_named() {
-            one.evidence().usual + (prior::IMITATED * one.counts()).ln()
+        let imitated = if may_be_named(one) {
+            one.evidence().usual + (prior::IMITATED * counts(one)).ln()
         } else {
             f64::NEG_INFINITY
         };
@@ -173,17 +177,17 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         .collect();
     let whole = ln_sum(all.iter().copied());
     let probability = |ln_weight: f64| (ln_weight - whole).exp().max(NOTHING);
-    let that_counts = |class: &Class| class.counts * probability(class.ln_weight);
+    let that_counts = |class: &Class| counts(&judged[class.best]) * probability(class.ln_weight);
     let nothing = probability(ln_none) + unfitted.iter().map(|&ln_weight| probability(ln_weight)).sum::<f64>();
     let unimportant: f64 = classes
         .iter()
-        .map(|class| (1.0 - class.counts) * probability(class.ln_weight))
+        .map(|class| probability(class.ln_weight) - that_counts(class))
         .sum();
     let null_probability = nothing + unimportant;
     // Something is there, and looks like an effect that it cannot be.
-    let unnamed = classes.iter().filter(|class| !class.may_be_named);
-    let other_probability = probability(ln_other) + unnamed.map(that_counts).sum::<f64>();
-    let named: Vec<&Class> = classes.iter().filter(|class| class.may_be_named).collect();
+    let (named, unnamed): (Vec<&Class>, Vec<&Class>) =
+        classes.iter().partition(|class| may_be_named(&judged[class.best]));
+    let other_probability = probability(ln_other) + unnamed.into_iter().map(that_counts).sum::<f64>();
     let mut count = 0;
     let mut sum = 0.0;
     while sum < SURE && count < named.len() && that_counts(named[count]) > RIVAL {
@@ -194,7 +198,8 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         1 if sum >= SURE => Verdict::Explained,
         2.. if sum >= SURE => Verdict::Ambiguous,
         // Something is there, and more probably this than what the library does not know, or what does not matter.
-        1.. if nothing <= 1.0 - SURE && sum > other_probability.max(unimportant) => Verdict::Ambiguous,
+        1 if nothing <= 1.0 - SURE && sum > other_probability.max(unimportant) => Verdict::Ambiguous,
+        2.. if null_probability <= 1.0 - SURE && sum > other_probability => Verdict::Ambiguous,
         _ if other_probability > null_probability => Verdict::OutsideLibrary,
         _ => Verdict::Agrees,
     };
@@ -440,6 +445,12 @@ mod tests {
             "{}",
             hardly.null_probability
         );
+        // Neither which it is nor whether it matters is sure.
+        let both = ["pad-creep", "backlash"].map(|name| Judged {
+            matters: 0.9,
+            ..judged(&[name], 400.0, 20.0)
+        });
+        assert_eq!(verdict(0.0, both.into()).verdict, Verdict::Agrees);
     }
 
     #[test]
