@@ -7,19 +7,19 @@ mod screening;
 mod stages;
 
 use super::answer::{Answer, Doubt, Figures, NamedEffect, Remainder, ResidualMap, RunSummary, Verdict};
-use super::cross_validation::HeldOut;
 use super::experiment_design::propose;
-use super::fit::{Fit, FitProblem};
 use super::gap::cycles;
-use super::judge::candidate::Candidate;
-use super::judge::decision::Selected;
-use super::noise::RunNoise;
-use super::parameter::{Free, Onset, What};
-use super::period::period;
 use super::residual_map::{map, places};
-use super::score_test::Screening;
-use super::speed_droop::SpeedDroop;
 use super::words;
+use crate::explain::search::find::Found;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::search::parameter::{Free, Onset, What};
+use crate::explain::worm::noise::RunNoise;
+use crate::explain::worm::nuisance::Nuisance;
+use crate::explain::worm::period::period;
+use crate::explain::worm::recorded_worm::{RecordedWorm, WormProblem};
+use crate::explain::worm::speed_droop::SpeedDroop;
 pub(super) use calibration::calibration;
 pub(super) use effects::named_effects;
 pub(super) use screening::add_unscreened;
@@ -36,22 +36,18 @@ const DROOPS: f64 = 16.0;
 
 /// Everything that the answer is made of.
 pub(super) struct Parts {
-    pub nominal: Fit,
     pub recalibrated: Fit,
-    pub recalibrated_held_out: HeldOut,
-    pub screened: Vec<Screening>,
-    pub selected: Selected,
+    pub found: Found,
     pub speed_droop: Option<SpeedDroop>,
-    /// Fraction of the gap that the best candidate leaves open.
-    pub open_share: f64,
     /// Standard deviation of the discrepancy, m.
     pub discrepancy_m: f64,
-    pub threshold: f64,
 }
 
 /// Puts the answer together.
-pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Parts) -> Answer {
-    let selected = &parts.selected;
+pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &Parts) -> Answer {
+    let worm = problem.plant;
+    let found = &parts.found;
+    let selected = &found.selected;
     let speed_droop = parts
         .speed_droop
         .as_ref()
@@ -60,7 +56,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         Verdict::Explained | Verdict::Ambiguous => &selected.candidates,
         Verdict::Agrees | Verdict::OutsideLibrary => &[],
     };
-    let gap = stages::Gap::measure(problem, parts, named);
+    let gap = stages::Gap::measure(worm, parts, named);
     let verdict = match (selected.verdict, speed_droop) {
         (Verdict::Agrees, Some(_)) => Verdict::Explained,
         (verdict, _) => verdict,
@@ -69,7 +65,7 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     let mut rivals = Vec::new();
     for (place, candidate) in named.iter().enumerate() {
         let found = named_effects(
-            &problem.scene.observed,
+            &worm.scene.observed,
             candidate,
             selected.probability[place],
             gap.closure[place],
@@ -89,11 +85,11 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     }
     effects.extend(speed_droop.map(effects::droop_effect));
     let final_fit = named.first().map_or(&parts.recalibrated, |candidate| &candidate.fit);
-    let maps_before = maps(problem, &parts.recalibrated);
+    let maps_before = maps(worm, &parts.recalibrated);
     let best = selected.candidates.first().map(|candidate| &candidate.fit);
     let maps_after = match verdict {
         Verdict::Agrees => Vec::new(),
-        _ => best.map_or_else(Vec::new, |fit| maps(problem, fit)),
+        _ => best.map_or_else(Vec::new, |fit| maps(worm, fit)),
     };
     let change = selected.change.map(|change| {
         let onset = Onset {
@@ -101,14 +97,14 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
             run: change.run,
             ends: false,
         };
-        effects::found_onset(&problem.scene.observed, onset)
+        effects::found_onset(&worm.scene.observed, onset)
     });
     let remainder = (verdict == Verdict::OutsideLibrary).then(|| {
         let places = places(&maps_after, PLACES);
-        let period = period(problem, best.unwrap_or(&parts.recalibrated));
+        let period = period(worm, best.unwrap_or(&parts.recalibrated));
         Remainder {
-            description: words::remainder(parts.open_share, &places),
-            open_share: parts.open_share,
+            description: words::remainder(found.open_share, &places),
+            open_share: found.open_share,
             onset: change.clone(),
             period_cycles: period.cycles,
             period_m: period.displacement_m,
@@ -119,14 +115,14 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
     let next_experiment = match verdict {
         Verdict::Ambiguous => {
             let fits: Vec<&Fit> = named.iter().map(|candidate| &candidate.fit).collect();
-            propose(problem, &fits, cycle_s)
+            propose(worm, &fits, cycle_s)
         }
         _ => None,
     };
-    let runs = runs::runs(problem, parts, named.first());
+    let runs = runs::runs(worm, parts, named.first());
     Answer {
         verdict,
-        sentence: words::sentence(verdict, &effects, &rivals, selected, parts.open_share, change.as_ref()),
+        sentence: words::sentence(verdict, &effects, &rivals, selected, found.open_share, change.as_ref()),
         r#where: places(&maps_before, PLACES),
         effects,
         rivals,
@@ -135,23 +131,23 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
         next_experiment,
         calibration: calibration(final_fit, config),
         written_back: calibration(&as_written(problem, final_fit), config),
-        screening: screening::screening(&parts.screened, selected, speed_droop.is_some()),
-        threshold: parts.threshold,
+        screening: screening::screening(&found.screened, selected, speed_droop.is_some()),
+        threshold: found.threshold,
         doubt: Doubt {
             null_probability: selected.null_probability,
             other_probability: selected.other_probability,
             agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
             discrepancy_m: parts.discrepancy_m,
         },
-        warnings: words::warnings(problem, final_fit, named.first()),
-        repairs: words::repairs(problem),
+        warnings: words::warnings(worm, final_fit, named.first()),
+        repairs: words::repairs(worm),
         runs,
         figures: Figures {
             maps_before,
             maps_after,
             cycles: cycles(
-                problem,
-                &parts.nominal,
+                worm,
+                &found.nominal,
                 &parts.recalibrated,
                 named.first().map(|candidate| &candidate.fit),
             ),
@@ -161,11 +157,8 @@ pub(super) fn assemble(problem: &FitProblem<'_, '_>, config: &Config, parts: &Pa
 }
 
 /// The fit of a model file: what it cannot hold keeps the values that every simulation has, and the effects stay as they were found.
-fn as_written(problem: &FitProblem<'_, '_>, fit: &Fit) -> Fit {
-    let is_written = |free: &Free| match free.what {
-        What::Effect { .. } => true,
-        What::Nuisance(nuisance) => nuisance.is_of_model_file(),
-    };
+fn as_written(problem: &WormProblem<'_, '_>, fit: &Fit) -> Fit {
+    let is_written = |free: &Free| Nuisance::of(free.what).is_none_or(Nuisance::is_of_model_file);
     let mut hypothesis = fit.hypothesis.clone();
     hypothesis.free.clear();
     let mut at = Vec::new();
@@ -188,20 +181,18 @@ fn as_written(problem: &FitProblem<'_, '_>, fit: &Fit) -> Fit {
 
 /// The measured advances and those of the recalibrated or the named model differ on no run by more than this, m, with a probability of
 /// 95 %: the measured mean has the error of the body's random walk, the model's that of its parameters.
-fn agrees_within_m(problem: &FitProblem<'_, '_>, runs: &[RunSummary], fit: &Fit, is_named: bool) -> f64 {
+fn agrees_within_m(problem: &WormProblem<'_, '_>, runs: &[RunSummary], fit: &Fit, is_named: bool) -> f64 {
     let of_run = |((run, noise), of_model_m): ((&RunSummary, &RunNoise), f64)| {
         let [measured_m, recalibrated_m, named_m] = run.advance_m;
         let model_m = if is_named { named_m } else { recalibrated_m };
         let of_mean_m = noise.drift_per_cycle_m() / (run.cycles as f64).sqrt();
         (measured_m - model_m).abs() + ONE_SIDED * of_mean_m.hypot(of_model_m)
     };
-    let with_noise = runs.iter().zip(&problem.noise);
-    let all = with_noise.zip(problem.advance_sigmas_m(fit)).map(of_run);
+    let with_noise = runs.iter().zip(&problem.plant.noise);
+    let all = with_noise.zip(problem.outcome_sigmas(fit)).map(of_run);
     all.fold(0.0, f64::max)
 }
 
-fn maps(problem: &FitProblem<'_, '_>, fit: &Fit) -> Vec<ResidualMap> {
-    (0..problem.scene.observed.len())
-        .map(|run| map(problem, run, fit))
-        .collect()
+fn maps(worm: &RecordedWorm<'_>, fit: &Fit) -> Vec<ResidualMap> {
+    (0..worm.scene.observed.len()).map(|run| map(worm, run, fit)).collect()
 }

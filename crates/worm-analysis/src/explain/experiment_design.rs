@@ -9,8 +9,9 @@ mod change;
 mod trial;
 
 use super::answer::{ExperimentChange, NextExperiment, Prediction};
-use super::fit::{Fit, FitProblem};
-use super::parameter::{Hypothesised, What};
+use crate::explain::search::fit::Fit;
+use crate::explain::search::parameter::{Hypothesised, What};
+use crate::explain::worm::recorded_worm::RecordedWorm;
 pub(super) use change::SLOPES_DEG;
 use change::{BY_COST, Change, changes, cost};
 use rayon::prelude::*;
@@ -41,7 +42,7 @@ impl ScoredChange {
 /// The run that best separates rivals, fitted with derivatives; none with fewer than two.
 ///
 /// `cycle_s` is the usual time of a gait cycle.
-pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
+pub(super) fn propose(worm: &RecordedWorm<'_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
     if candidates.len() < 2 {
         return None;
     }
@@ -54,11 +55,11 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         })
         .collect();
     let candidates: &[&Fit] = &begun.iter().collect::<Vec<_>>();
-    let changes = changes(problem.scene, cycle_s);
+    let changes = changes(&worm.scene, cycle_s);
     let plain_distance_of = |change: &Change| {
-        let empty_recording = empty_recording(problem, change);
-        let outcomes = predict_all(&Trial::new(problem, change, &empty_recording)?, candidates)?;
-        let crawls = |outcome: &RunOutcome| outcome.advance_m > MIN_ADVANCE * problem.scene.nominal[0].worm.stroke_m();
+        let empty_recording = empty_recording(worm, change);
+        let outcomes = predict_all(&Trial::new(worm, change, &empty_recording)?, candidates)?;
+        let crawls = |outcome: &RunOutcome| outcome.advance_m > MIN_ADVANCE * worm.scene.nominal[0].worm.stroke_m();
         outcomes
             .iter()
             .all(crawls)
@@ -79,7 +80,7 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         }
         let mine = possible.iter().filter(|(_, change)| change.what == what);
         for &(_, change) in mine.take(CLOSE_LOOKS) {
-            let separation = separation(problem, candidates, &change);
+            let separation = separation(worm, candidates, &change);
             let Some(separation) = separation.filter(|separation| *separation >= WORTH_IT) else {
                 continue;
             };
@@ -94,7 +95,7 @@ pub(super) fn propose(problem: &FitProblem<'_, '_>, candidates: &[&Fit], cycle_s
         }
     }
     match best {
-        Some(best) => proposal(problem, candidates, &best),
+        Some(best) => proposal(worm, candidates, &best),
         None => on_the_bench(candidates),
     }
 }
@@ -111,9 +112,9 @@ fn nearest(outcomes: &[RunOutcome], distance: impl Fn(usize, usize) -> f64) -> f
 }
 
 /// Distance between the two nearest predictions of a run, standard deviations, whichever of the two is true.
-fn separation(problem: &FitProblem<'_, '_>, candidates: &[&Fit], change: &Change) -> Option<f64> {
-    let empty_recording = empty_recording(problem, change);
-    let trial = Trial::new(problem, change, &empty_recording)?;
+fn separation(worm: &RecordedWorm<'_>, candidates: &[&Fit], change: &Change) -> Option<f64> {
+    let empty_recording = empty_recording(worm, change);
+    let trial = Trial::new(worm, change, &empty_recording)?;
     let outcomes = predict_all(&trial, candidates)?;
     // Derivatives of nuisances hardly depend on the effect beside them, so those of one rival serve all: the quickest to simulate.
     let quick = candidates
@@ -161,9 +162,9 @@ fn same(candidates: &[&Fit], (rival, quantity): (usize, usize), other: usize) ->
 }
 
 /// The proposal of a run.
-fn proposal(problem: &FitProblem<'_, '_>, candidates: &[&Fit], best: &ScoredChange) -> Option<NextExperiment> {
-    let empty_recording = empty_recording(problem, &best.change);
-    let trial = Trial::new(problem, &best.change, &empty_recording)?;
+fn proposal(worm: &RecordedWorm<'_>, candidates: &[&Fit], best: &ScoredChange) -> Option<NextExperiment> {
+    let empty_recording = empty_recording(worm, &best.change);
+    let trial = Trial::new(worm, &best.change, &empty_recording)?;
     let outcomes = predict_all(&trial, candidates)?;
     let slope = format!("{}°", best.change.slope_deg).replace('-', "−");
     let predictions = candidates

@@ -1,15 +1,14 @@
 //! Campaigns for the tests of the search: the model's own crawl under an effect, with noise and a body that goes astray.
 
-use super::bins::Bins;
-use super::discrepancy::Discrepancy;
-use super::fit::{Fit, FitProblem};
-use super::hypothesis::Hypothesis;
-use super::noise::RunNoise;
-use super::observed::Observed;
-use super::parameter::{Hypothesised, Onset};
-use super::predict::Scene;
-use super::residual::Residual;
 use crate::experiment::{RecordedRun, Simulation, simulate};
+use crate::explain::search::discrepancy::Discrepancy;
+use crate::explain::search::fit::{Fit, FitProblem};
+use crate::explain::search::hypothesis::Hypothesis;
+use crate::explain::search::parameter::{Hypothesised, Onset};
+use crate::explain::search::plant::Plant;
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::predict::Scene;
+use crate::explain::worm::recorded_worm::{RecordedWorm, WormProblem};
 use crate::recording::Recording;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -131,37 +130,28 @@ pub(super) fn scene<'a>(recordings: &'a [Recording], campaign: &Campaign) -> Sce
     scene
 }
 
-/// The problem with the noise that some hypothesis leaves, and no discrepancy: these worms are the model's own.
-pub(super) fn problem<'s, 'a>(scene: &'s Scene<'a>, (hypothesis, at): &(Hypothesis, Vec<f64>)) -> FitProblem<'s, 'a> {
-    let bins: Vec<Bins> = scene.observed.iter().map(Bins::new).collect();
-    let noise = |(run, observed): (usize, &Observed<'_>)| {
-        let predicted = scene.predict(run, hypothesis, at).expect("it holds");
-        RunNoise::measure(
-            observed,
-            &bins[run],
-            &Residual::binned(observed, &bins[run], &predicted),
-        )
-    };
-    FitProblem {
-        noise: scene.observed.iter().enumerate().map(noise).collect(),
-        scene,
-        discrepancy: None,
-        repeating_excess: 0.0,
-        bins,
-    }
+/// The worm of some recordings with the noise that a hypothesis leaves.
+pub(super) fn worm<'a>(
+    recordings: &'a [Recording],
+    campaign: &Campaign,
+    (hypothesis, at): &(Hypothesis, Vec<f64>),
+) -> RecordedWorm<'a> {
+    let mut worm = RecordedWorm::new(scene(recordings, campaign));
+    worm.measure_noise(hypothesis, at).expect("it holds");
+    worm
 }
 
-/// The same problem with a discrepancy of 10 µm.
-pub(super) fn with_discrepancy<'s, 'a>(plain: FitProblem<'s, 'a>) -> (FitProblem<'s, 'a>, Discrepancy) {
-    let discrepancy = Discrepancy::new(&plain, 1e-5);
+/// Its problem with a discrepancy of 10 µm.
+pub(super) fn with_discrepancy<'p, 'a>(worm: &'p RecordedWorm<'a>) -> (WormProblem<'p, 'a>, Discrepancy) {
+    let discrepancy = Discrepancy::new(worm, 1e-5);
     let problem = FitProblem {
         discrepancy: Some(discrepancy.clone()),
-        ..plain
+        ..FitProblem::with_noise_alone(worm)
     };
     (problem, discrepancy)
 }
 
-/// A hypothesis taken as it is.
-pub(super) fn taken(problem: &FitProblem<'_, '_>, (hypothesis, at): (Hypothesis, Vec<f64>)) -> Fit {
-    problem.evaluate(&hypothesis, at)
+/// A hypothesis taken as it is, without a discrepancy: these worms are the model's own.
+pub(super) fn taken(worm: &RecordedWorm<'_>, (hypothesis, at): (Hypothesis, Vec<f64>)) -> Fit {
+    FitProblem::with_noise_alone(worm).evaluate(&hypothesis, at)
 }

@@ -12,32 +12,29 @@
 //! The *free form* adds the mean cycle of its residual to the recalibrated model: about as much as any periodic law could explain.
 //! The *floor* is the scatter of single cycles about that: no periodic model falls below it.
 
-mod energy;
 mod free_form;
 mod mean_cycle;
 
 use super::answer::{Stage, StageKind};
-use super::cross_validation::FitWithout;
-use super::fit::{Fit, FitProblem};
-use super::observed::Observed;
-use super::predicted::Predicted;
-use super::residual::Residual;
+use crate::explain::search::cross_validation::FitWithout;
+use crate::explain::search::fit::Fit;
+use crate::explain::worm::energy;
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::predicted::Predicted;
+use crate::explain::worm::recorded_worm::RecordedWorm;
+use crate::explain::worm::residual::Residual;
+use crate::explain::worm::settled_cycles::{Cycle, settled_cycles};
 pub(super) use mean_cycle::cycles;
 use std::f64::consts::SQRT_2;
-use std::ops::Range;
 
-/// Fraction of a cycle that the last one may lack and still count as whole.
-const SHORT: f64 = 0.05;
-/// Fraction of a cycle by which the first settled sample may miss the start of the cycle.
-const LATE: f64 = 0.1;
 /// Standard errors to either end of a 90 % interval.
 const NINETY: f64 = 1.645;
 /// Mean of the absolute value of a normal quantity, in standard deviations.
 const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
 
 /// A campaign with the energy that its motion took by the contacts of the best model: the reference for all stages.
-pub(super) struct Measured<'p, 's, 'a> {
-    problem: &'p FitProblem<'s, 'a>,
+pub(super) struct Measured<'p, 'a> {
+    worm: &'p RecordedWorm<'a>,
     /// Of each run's settled cycles, J; none where the best model cannot make the run.
     energy_j: Vec<Option<Vec<f64>>>,
     /// Residuals of the best model in each run; none where it cannot make the run.
@@ -64,18 +61,10 @@ impl CellResiduals {
         }
     }
 
-    fn of(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<Self> {
-        let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at)?;
-        Some(Self::new(&problem.scene.observed[run], &predicted))
+    fn of(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<Self> {
+        let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at)?;
+        Some(Self::new(&worm.scene.observed[run], &predicted))
     }
-}
-
-/// A whole gait cycle that counts.
-#[derive(Debug, Clone)]
-struct Cycle {
-    /// Number of the cycle since the first sample, from 0.
-    index: usize,
-    samples: Range<usize>,
 }
 
 /// Squares of each cycle of each run: neighbouring samples are not independent, cycles are nearly so.
@@ -171,18 +160,18 @@ impl Squares {
     }
 }
 
-impl<'p, 's, 'a> Measured<'p, 's, 'a> {
+impl<'p, 'a> Measured<'p, 'a> {
     /// The reference by the best fit.
-    pub fn new(problem: &'p FitProblem<'s, 'a>, best: &Fit) -> Self {
-        let runs = 0..problem.scene.observed.len();
-        let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(problem, run, best)).collect();
+    pub fn new(worm: &'p RecordedWorm<'a>, best: &Fit) -> Self {
+        let runs = 0..worm.scene.observed.len();
+        let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(worm, run, best)).collect();
         let energy = |(run, residuals): (usize, &Option<CellResiduals>)| {
-            let drift_m = problem.noise[run].smooth(&problem.scene.observed[run], &residuals.as_ref()?.body_m);
-            let walk = energy::carried(problem, run, best, &drift_m)?;
-            Some(walk.energy_j(&problem.scene.observed[run]))
+            let drift_m = worm.noise[run].smooth(&worm.scene.observed[run], &residuals.as_ref()?.body_m);
+            let walk = energy::carried(&worm.scene, run, best, &drift_m)?;
+            Some(walk.energy_j(&worm.scene.observed[run]))
         };
         Self {
-            problem,
+            worm,
             energy_j: residuals.iter().enumerate().map(energy).collect(),
             residuals,
         }
@@ -195,7 +184,9 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         let residuals = self.residuals(all);
         let fit_rms_m = self.rms(&residuals, |_, _| true);
         let held_out = self.clusters(all, folds);
-        let energy_j = |run: usize| energy::own(self.problem, run, all).map(|walk| walk.energy_j(self.observed(run)));
+        let energy_j = |run: usize| {
+            energy::own(&self.worm.scene, run, (&all.hypothesis, &all.at)).map(|walk| walk.energy_j(self.observed(run)))
+        };
         Stage {
             stage,
             effect,
@@ -225,7 +216,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         let energy_j = |run: usize| {
             let observed = self.observed(run);
             let beyond_m = free_form::mean_displacement_m(observed, residuals[run].as_ref()?);
-            Some(energy::carried(self.problem, run, recalibrated, &beyond_m)?.energy_j(observed))
+            Some(energy::carried(&self.worm.scene, run, recalibrated, &beyond_m)?.energy_j(observed))
         };
         Stage {
             stage: StageKind::FreeForm,
@@ -264,7 +255,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
             held_out_rms_m: squares.rms(),
             held_out_interval_m: [f64::NAN; 2],
             advance_error_interval_m: [f64::NAN; 2],
-            advance_error_m: self.mean_over_runs(|run| Some(chance(self.problem.noise[run].drift_per_cycle_m(), run))),
+            advance_error_m: self.mean_over_runs(|run| Some(chance(self.worm.noise[run].drift_per_cycle_m(), run))),
             energy_error_j: self.mean_over_runs(|run| Some(chance(deviation(self.energy_j[run].as_ref()?), run))),
         }
     }
@@ -306,7 +297,7 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
         let mean_m = self.mean_over_runs(of);
         let variance_m2: f64 = (0..self.runs())
             .map(|run| {
-                self.problem.noise[run].drift_per_cycle_m().powi(2) / settled_cycles(self.observed(run)).len() as f64
+                self.worm.noise[run].drift_per_cycle_m().powi(2) / settled_cycles(self.observed(run)).len() as f64
             })
             .sum();
         let half_m = NINETY * variance_m2.sqrt() / self.runs() as f64;
@@ -314,16 +305,16 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
     }
 
     fn runs(&self) -> usize {
-        self.problem.scene.observed.len()
+        self.worm.scene.observed.len()
     }
 
     fn observed(&self, run: usize) -> &Observed<'a> {
-        &self.problem.scene.observed[run]
+        &self.worm.scene.observed[run]
     }
 
     fn residuals(&self, fit: &Fit) -> Vec<Option<CellResiduals>> {
         (0..self.runs())
-            .map(|run| CellResiduals::of(self.problem, run, fit))
+            .map(|run| CellResiduals::of(self.worm, run, fit))
             .collect()
     }
 
@@ -367,12 +358,6 @@ impl<'p, 's, 'a> Measured<'p, 's, 'a> {
     }
 }
 
-/// Mean energy of a settled cycle of a run by a fit's own motion, J; none where it slides down.
-pub(super) fn energy_per_cycle_j(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Option<f64> {
-    let walk = energy::own(problem, run, fit)?;
-    Some(mean(&walk.energy_j(&problem.scene.observed[run])))
-}
-
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
@@ -382,42 +367,6 @@ fn deviation(values: &[f64]) -> f64 {
     let mean = mean(values);
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (squares / (values.len() as f64 - 1.0)).sqrt()
-}
-
-/// The whole cycles of the settled crawl, counted from the first sample.
-fn settled_cycles(observed: &Observed<'_>) -> Vec<Cycle> {
-    let phase = &observed.phase;
-    let since_first = |sample: usize| phase[sample] - phase[0];
-    let last = observed.samples() - 1;
-    let from = (since_first(observed.settled_from().min(last)) - LATE).ceil().max(0.0) as usize;
-    let until = (since_first(last) + SHORT).floor().max(0.0) as usize;
-    let begin = |index: usize| phase.partition_point(|&here| here - phase[0] < index as f64);
-    (from..until)
-        .map(|index| Cycle {
-            index,
-            samples: begin(index)..begin(index + 1),
-        })
-        .collect()
-}
-
-/// A series at the starts of these cycles and at the end of the last, linear between samples.
-fn at_boundaries(observed: &Observed<'_>, cycles: &[Cycle], series: &[f64]) -> Vec<f64> {
-    let phase = &observed.phase;
-    let indices = cycles.iter().map(|cycle| cycle.index);
-    let boundaries = indices.chain(cycles.last().map(|cycle| cycle.index + 1));
-    boundaries
-        .map(|index| {
-            let boundary = phase[0] + index as f64;
-            let high = phase.partition_point(|&here| here < boundary).clamp(1, phase.len() - 1);
-            let width = phase[high] - phase[high - 1];
-            let fraction = if width > 0.0 {
-                (boundary - phase[high - 1]) / width
-            } else {
-                1.0
-            };
-            series[high - 1] + fraction * (series[high] - series[high - 1])
-        })
-        .collect()
 }
 
 /// Squares of every cell's residual within the cycles that count, about its mean in each.

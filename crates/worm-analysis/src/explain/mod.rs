@@ -12,71 +12,34 @@
 //!
 //! # Modules, in reading order
 //! - [`answer`]: the result and its JSON contract.
-//! - `search`: the steps, one after the other; `prepare`: the runs, and the recalibration; `refit`: effects fitted to the end.
-//! - `observed`: the recordings as the search sees them; `bins`: by cycle, step and phase; `predict`: the positions that a
-//!   `hypothesis` predicts, by a `walk` from `start` along a `track`, at samples by their `clock`; `residual`: what that leaves of the data; `noise`: how well the worm repeats itself.
-//! - `plant`: what the judgement needs to know of a machine; `discrepancy`: by how much the model is wrong everywhere.
-//! - `parameter`: which quantities are free, with priors; `phase_correction`: for phases found from overlapping steps;
-//!   `fit`: the campaign as a problem of least squares (`least_squares`); `local_restart`: from one local minimum to another.
-//! - `score_test`: screens the whole library, by its `directions`; `onset`: effects that begin in mid-run; `speed_droop`: the one effect that shows in time alone.
-//! - `judge`: priors, evidence, chance and the verdict, for any plant; `judgement`: weighs the candidates of a worm; `matters`: whether
-//!   an effect changes what anybody asks; `cross_validation`: held-out data, which may veto.
-//! - `whole_effects`: what nuisances have of an effect's law, given to the effect.
-//! - `residual_map`: where the gap is; `period`: whether it repeats from cycle to cycle, `sway`: within the cycles, `wave`: how
-//!   probable that is; `gap`: how it shrinks; `experiment_design`: the next experiment; `words`: the answer in words.
+//! - `recorded`: the search on recordings of a worm, from beginning to end.
+//! - `search`: the search for the missing effect of any machine, a plant.
+//! - `worm`: the worm as such a plant.
+//! - `assemble`: puts the answer together, from `residual_map`: where the gap is, `gap`: how it shrinks, `experiment_design`: the next
+//!   experiment, and `words`: the answer in words.
 //! - `scalar_data`: the same where only advances per cycle are known.
-//! - `assemble`: puts the answer together; [`model_update`]: the model's file with the answer in it.
+//! - [`model_update`]: the model's file with the answer in it; `prediction`: what a model predicts, without any search.
 
 pub mod answer;
 mod assemble;
-mod bins;
-mod clock;
-mod cross_validation;
-mod directions;
-mod discrepancy;
 mod error;
 mod experiment_design;
-mod fit;
 #[cfg(test)]
 mod fixture;
 mod gap;
-mod hypothesis;
-mod judge;
-mod judgement;
-mod local_restart;
-mod matters;
 pub mod model_update;
-mod noise;
-mod normal_probability;
-mod observed;
-mod onset;
-mod pace;
-mod parameter;
-mod period;
-mod phase_correction;
-mod plant;
-mod predict;
-mod predicted;
 mod prediction;
-mod prepare;
-mod refit;
-mod residual;
+mod recorded;
 mod residual_map;
 mod scalar_data;
-mod score_test;
 mod search;
-mod speed_droop;
-mod start;
-mod sway;
-mod track;
-mod walk;
-mod wave;
-mod whole_effects;
 mod words;
+mod worm;
 
 pub use crate::experiment::RecordedRun;
 pub use answer::{Answer, Verdict};
 pub use error::ExplainError;
 pub use prediction::Prediction;
+pub use recorded::explain;
 pub use scalar_data::explain_advances;
-pub use search::{Options, explain};
+pub use search::find::Options;

@@ -1,10 +1,10 @@
 //! What a model predicts for recordings, without any search.
 
 use super::error::ExplainError;
-use super::hypothesis::Hypothesis;
-use super::predict::Scene;
-use super::prepare::prepare;
 use crate::experiment::RecordedRun;
+use crate::explain::search::hypothesis::Hypothesis;
+use crate::explain::worm::predict::Scene;
+use crate::explain::worm::prepare::prepare;
 use worm_estimator::config::Config;
 
 /// The configured worm, ready to predict the positions in recordings of it.

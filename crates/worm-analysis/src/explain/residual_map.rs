@@ -12,9 +12,10 @@
 //! uncertain; so the variance of each bin is shrunk towards that of the whole map, and the limit is that of Student's distribution.
 
 use super::answer::{Place, ResidualMap};
-use super::fit::{Fit, FitProblem};
-use super::observed::Observed;
-use super::residual::Residual;
+use crate::explain::search::fit::Fit;
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::recorded_worm::RecordedWorm;
+use crate::explain::worm::residual::Residual;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -38,8 +39,8 @@ const OF_BODY: f64 = 0.5;
 const SLACK: f64 = 0.1;
 
 /// The map of one run under a fit; `NaN` all over where the fit cannot make the run.
-pub(super) fn map(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> ResidualMap {
-    let observed = &problem.scene.observed[run];
+pub(super) fn map(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> ResidualMap {
+    let observed = &worm.scene.observed[run];
     let cells = observed.cells();
     let bins = cells * BINS_PER_STEP;
     let mut map = ResidualMap {
@@ -52,7 +53,7 @@ pub(super) fn map(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Residu
         significance: vec![vec![f64::NAN; bins]; cells],
         limit: f64::INFINITY,
     };
-    let Some(predicted) = problem.scene.predict(run, &fit.hypothesis, &fit.at) else {
+    let Some(predicted) = worm.scene.predict(run, &fit.hypothesis, &fit.at) else {
         return map;
     };
     let displacements = BinDisplacements::new(observed, &Residual::new(observed, &predicted));
@@ -66,7 +67,7 @@ pub(super) fn map(problem: &FitProblem<'_, '_>, run: usize, fit: &Fit) -> Residu
         map.significance[cell][bin] = mean_m / sigma_m;
     }
     let freedom = own_freedom(displacements.cycles.len() as f64) + SHARED_FREEDOM;
-    map.limit = limit(&draws, &sigma_m, freedom, problem.scene.observed.len());
+    map.limit = limit(&draws, &sigma_m, freedom, worm.scene.observed.len());
     map
 }
 

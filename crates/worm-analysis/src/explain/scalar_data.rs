@@ -22,12 +22,13 @@ mod table;
 use super::answer::{Answer, Doubt, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
 use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
-use super::fit::Fit;
-use super::hypothesis::Hypothesis;
-use super::judge::candidate::Candidate;
-use super::parameter::{Free, Hypothesised, Nuisance, What};
-use super::score_test::hypotheses;
 use crate::experiment::Progress;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::hypothesis::Hypothesis;
+use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::search::parameter::{Free, Hypothesised};
+use crate::explain::worm::nuisance::Nuisance;
+use crate::explain::worm::recorded_worm::hypotheses;
 use crate::recording::Advance;
 use model_selection::{AdvanceKind, Selected};
 use rayon::prelude::*;
@@ -95,7 +96,7 @@ fn nuisances(cells: usize, runs: usize) -> Vec<Free> {
         )
     };
     let mut all = Nuisance::all(cells, runs, false);
-    all.retain(|free| !matches!(free.what, What::Nuisance(nuisance) if within_a_cycle(nuisance)));
+    all.retain(|free| !Nuisance::of(free.what).is_some_and(within_a_cycle));
     all
 }
 

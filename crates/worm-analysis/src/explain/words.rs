@@ -1,10 +1,11 @@
 //! The answer in words.
 
 use super::answer::{FoundOnset, NamedEffect, Place, Verdict, answers_in_words};
-use super::fit::{Fit, FitProblem};
-use super::judge::candidate::Candidate;
-use super::judge::decision::Selected;
-use super::parameter::What;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::search::judge::decision::Selected;
+use crate::explain::search::parameter::What;
+use crate::explain::worm::recorded_worm::RecordedWorm;
 use crate::recording::Repair;
 use worm_estimator::number::percent;
 use worm_physics::effect::{LIBRARY, Visible};
@@ -127,23 +128,23 @@ pub(super) fn remainder(open_share: f64, places: &[Place]) -> String {
 }
 
 /// Every repair of the recordings.
-pub(super) fn repairs(problem: &FitProblem<'_, '_>) -> Vec<Repair> {
-    let observed = problem.scene.observed.iter().enumerate();
+pub(super) fn repairs(worm: &RecordedWorm<'_>) -> Vec<Repair> {
+    let observed = worm.scene.observed.iter().enumerate();
     observed
         .flat_map(|(run, observed)| observed.repairs.iter().map(move |repair| repair.in_run(run)))
         .collect()
 }
 
 /// Limitations of the answer.
-pub(super) fn warnings(problem: &FitProblem<'_, '_>, fit: &Fit, named: Option<&Candidate>) -> Vec<String> {
-    let observed = &problem.scene.observed;
+pub(super) fn warnings(worm: &RecordedWorm<'_>, fit: &Fit, named: Option<&Candidate>) -> Vec<String> {
+    let observed = &worm.scene.observed;
     let mut warnings: Vec<String> = observed
         .iter()
         .flat_map(|observed| &observed.run.recording.warnings)
         .cloned()
         .collect();
     let several = observed.len() > 1;
-    warnings.extend(repairs(problem).iter().map(|repair| match several {
+    warnings.extend(repairs(worm).iter().map(|repair| match several {
         true => format!("run {}: {repair}", repair.run),
         false => repair.to_string(),
     }));

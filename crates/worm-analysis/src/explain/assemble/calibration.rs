@@ -1,8 +1,8 @@
 //! The recalibrated model as people read it.
 
 use crate::explain::answer::Calibrated;
-use crate::explain::fit::Fit;
-use crate::explain::parameter::{Nuisance, What};
+use crate::explain::search::fit::Fit;
+use crate::explain::worm::nuisance::Nuisance;
 use worm_estimator::config::Config;
 
 /// What was recalibrated, as people read it.
@@ -11,9 +11,7 @@ pub(in crate::explain) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibra
     let quantities = fit.hypothesis.free.iter().enumerate();
     quantities
         .filter_map(|(at, free)| {
-            let What::Nuisance(nuisance) = free.what else {
-                return None;
-            };
+            let nuisance = Nuisance::of(free.what)?;
             let (value, sigma) = (fit.at[at], sigmas[at]);
             let factor = |name: String| (name, 1.0, value.exp(), value.exp() * sigma, "");
             let (name, nominal, found, sigma, unit) = match nuisance {

@@ -1,10 +1,10 @@
 //! The effects of an answer as people read them.
 
 use crate::explain::answer::{FoundOnset, FoundParameter, NamedEffect, with_cell};
-use crate::explain::judge::candidate::Candidate;
-use crate::explain::observed::Observed;
-use crate::explain::parameter::{Hypothesised, Onset, What};
-use crate::explain::speed_droop::SpeedDroop;
+use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::search::parameter::{Hypothesised, Onset, What};
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::speed_droop::SpeedDroop;
 use worm_physics::effect::MOTOR_DROOP;
 
 /// How far a severity is off because no law is quite the worm's, as a fraction of its change: worms in MuJoCo have the library's effects

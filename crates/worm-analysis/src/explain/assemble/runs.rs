@@ -2,15 +2,16 @@
 
 use super::Parts;
 use crate::explain::answer::RunSummary;
-use crate::explain::fit::{Fit, FitProblem};
-use crate::explain::judge::candidate::Candidate;
-use crate::explain::observed::Observed;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::recorded_worm::RecordedWorm;
 
 /// What the recordings are, and how far the worm got in them.
-pub(super) fn runs(problem: &FitProblem<'_, '_>, parts: &Parts, named: Option<&Candidate>) -> Vec<RunSummary> {
+pub(super) fn runs(worm: &RecordedWorm<'_>, parts: &Parts, named: Option<&Candidate>) -> Vec<RunSummary> {
     let of = |(run, observed): (usize, &Observed<'_>)| {
         let predicted_m = |fit: &Fit| {
-            let predicted = problem.scene.predict(run, &fit.hypothesis, &fit.at);
+            let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at);
             predicted.map_or(f64::NAN, |predicted| {
                 let cells = observed.cells();
                 advance_m(observed, |sample, cell| predicted.position_m[sample * cells + cell])
@@ -25,7 +26,7 @@ pub(super) fn runs(problem: &FitProblem<'_, '_>, parts: &Parts, named: Option<&C
             phase_recorded: observed.phase_recorded,
             laid_down: observed.laid_down,
             noise_m: observed.noise_m,
-            drift_per_cycle_m: problem.noise[run].drift_per_cycle_m(),
+            drift_per_cycle_m: worm.noise[run].drift_per_cycle_m(),
             advance_m: [
                 advance_m(observed, |sample, cell| observed.position_m[cell][sample]),
                 predicted_m(&parts.recalibrated),
@@ -34,7 +35,7 @@ pub(super) fn runs(problem: &FitProblem<'_, '_>, parts: &Parts, named: Option<&C
             advance_sigma_m: None,
         }
     };
-    problem.scene.observed.iter().enumerate().map(of).collect()
+    worm.scene.observed.iter().enumerate().map(of).collect()
 }
 
 /// Advance per cycle, m: mean over the settled samples, each against the one a cycle later in which every cell was seen too.

@@ -1,8 +1,8 @@
 //! What became of every effect of the library.
 
 use crate::explain::answer::{Screened, ScreeningOutcome};
-use crate::explain::judge::decision::Selected;
-use crate::explain::score_test::Screening;
+use crate::explain::search::judge::decision::Selected;
+use crate::explain::search::score_test::Screening;
 use worm_physics::effect::{Effect, LIBRARY};
 
 /// The library's scores, and what became of each effect.

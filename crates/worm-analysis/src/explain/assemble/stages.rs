@@ -2,9 +2,9 @@
 
 use super::Parts;
 use crate::explain::answer::{Stage, StageKind};
-use crate::explain::fit::FitProblem;
 use crate::explain::gap::Measured;
-use crate::explain::judge::candidate::Candidate;
+use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::worm::recorded_worm::RecordedWorm;
 
 /// The gap, stage by stage, and what fraction of it each candidate closes.
 pub(super) struct Gap {
@@ -15,18 +15,18 @@ pub(super) struct Gap {
 }
 
 impl Gap {
-    pub fn measure(problem: &FitProblem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Self {
-        let selected = &parts.selected;
+    pub fn measure(worm: &RecordedWorm<'_>, parts: &Parts, named: &[Candidate]) -> Self {
+        let selected = &parts.found.selected;
         let best = selected
             .candidates
             .first()
             .map_or(&parts.recalibrated, |candidate| &candidate.fit);
-        let measured = Measured::new(problem, best);
+        let measured = Measured::new(worm, best);
         let recalibrated = measured.stage(
             StageKind::Recalibrated,
             None,
             &parts.recalibrated,
-            &parts.recalibrated_held_out.fits,
+            &parts.found.recalibrated_held_out.fits,
         );
         let floor = measured.floor_stage();
         let stage = |kind: StageKind, candidate: &Candidate| {
@@ -37,7 +37,7 @@ impl Gap {
                 .collect();
             measured.stage(kind, Some(names.join(" + ")), &candidate.fit, folds)
         };
-        let open = measured.clusters(&parts.recalibrated, &parts.recalibrated_held_out.fits);
+        let open = measured.clusters(&parts.recalibrated, &parts.found.recalibrated_held_out.fits);
         let closure = |candidate: &Candidate| {
             let folds = candidate.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
             open.closure(&measured.clusters(&candidate.fit, folds), floor.held_out_rms_m)
@@ -56,7 +56,7 @@ impl Gap {
             .as_ref()
             .map_or(0.0, |candidate| closure(candidate).0);
         let mut stages = vec![
-            measured.stage(StageKind::Baseline, None, &parts.nominal, &[]),
+            measured.stage(StageKind::Baseline, None, &parts.found.nominal, &[]),
             recalibrated,
         ];
         stages.extend(wrong);

@@ -1,7 +1,7 @@
 //! What may be changed from one run to the next, with instructions.
 
 use super::super::answer::RunChange;
-use super::super::predict::Scene;
+use crate::explain::worm::predict::Scene;
 
 /// Slopes, degrees; factors on the cycle time, and the cycle times in s that motors do; extra masses, kg; ways that the start is
 /// shifted by, m; factors on the number of cycles; rests after each cycle, s.

@@ -1,13 +1,13 @@
-use super::super::bins::Bins;
-use super::super::hypothesis::Hypothesis;
-use super::super::noise::RunNoise;
-use super::super::observed::Observed;
-use super::super::parameter::Nuisance;
-use super::super::predict::{Scene, nominal};
-use super::super::residual::Residual;
 use super::*;
 use crate::experiment::{RecordedRun, Simulation, simulate};
 use crate::explain::answer::RunChange;
+use crate::explain::search::fit::FitProblem;
+use crate::explain::search::hypothesis::Hypothesis;
+use crate::explain::search::plant::Plant;
+use crate::explain::worm::nuisance::Nuisance;
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::predict::{Scene, nominal};
+use crate::explain::worm::recorded_worm::RecordedWorm;
 use crate::recording::Recording;
 use worm_estimator::config::Config;
 use worm_physics::{Physics, Worm, effect};
@@ -54,26 +54,11 @@ fn scene<'r>(recordings: &'r [Recording], config: &Config) -> Scene<'r> {
 fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
     let config = Config::default();
     let recordings = recordings(&config);
-    let scene = scene(&recordings, &config);
+    let mut worm = RecordedWorm::new(scene(&recordings, &config));
     let nuisances = Nuisance::all(config.worm.cells, SLOPES_DEG.len(), true);
     let base = Hypothesis::new(&nuisances, &[]);
-    let bins: Vec<Bins> = scene.observed.iter().map(Bins::new).collect();
-    let noise = scene.observed.iter().enumerate().map(|(run, observed)| {
-        let predicted = scene.predict(run, &base, &base.neutral()).expect("the worm holds");
-        RunNoise::measure(
-            observed,
-            &bins[run],
-            &Residual::binned(observed, &bins[run], &predicted),
-        )
-    });
-    let noise = noise.collect();
-    let problem = FitProblem {
-        scene: &scene,
-        noise,
-        discrepancy: None,
-        repeating_excess: 0.0,
-        bins: bins.clone(),
-    };
+    worm.measure_noise(&base, &base.neutral()).expect("the worm holds");
+    let problem = FitProblem::with_noise_alone(&worm);
     let fits: Vec<Fit> = rivals
         .iter()
         .map(|&(name, value)| {
@@ -86,7 +71,7 @@ fn proposed(rivals: &[(&str, f64)]) -> Option<NextExperiment> {
             fit
         })
         .collect();
-    propose(&problem, &fits.iter().collect::<Vec<_>>(), config.gait.cycle_s)
+    propose(&worm, &fits.iter().collect::<Vec<_>>(), config.gait.cycle_s)
 }
 
 #[test]

@@ -3,17 +3,20 @@
 //! The distance between two rivals is the chi-squared of the data of the new run against the wrong one, which may adjust everything that
 //! is free in it as far as the campaign allows (its own normal matrix is the prior), and the slope error of the new run.
 
-use super::super::bins::Bins;
-use super::super::fit::{Fit, FitProblem};
-use super::super::noise::RunNoise;
-use super::super::observed::Observed;
-use super::super::pace::Pace;
-use super::super::parameter::{Nuisance, What};
-use super::super::predict::Scene;
-use super::super::predicted::Predicted;
-use super::super::residual::Residual;
 use super::change::Change;
 use crate::experiment::RecordedRun;
+use crate::explain::search::bins::Bins;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::parameter::What;
+use crate::explain::worm::binning::bins;
+use crate::explain::worm::noise::RunNoise;
+use crate::explain::worm::nuisance::Nuisance;
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::pace::Pace;
+use crate::explain::worm::predict::Scene;
+use crate::explain::worm::predicted::Predicted;
+use crate::explain::worm::recorded_worm::RecordedWorm;
+use crate::explain::worm::residual::Residual;
 use crate::least_squares::dot;
 use crate::recording::Recording;
 use nalgebra::{DMatrix, DVector};
@@ -26,11 +29,11 @@ const REST_S: f64 = 0.3;
 /// Cycles after which the advance counts.
 const SETTLING_CYCLES: f64 = 2.0;
 /// The slope error of the new run takes the place of the first run's.
-const FRESH_SLOPE: What = What::Nuisance(Nuisance::SlopeOf(0));
+const FRESH_SLOPE: Nuisance = Nuisance::SlopeOf(0);
 
 /// The recording that a change would give, without positions, and how many samples of the camera there are for each of its own.
-pub(super) fn empty_recording(problem: &FitProblem<'_, '_>, change: &Change) -> (Recording, f64) {
-    let base = &problem.scene.observed[change.base];
+pub(super) fn empty_recording(worm: &RecordedWorm<'_>, change: &Change) -> (Recording, f64) {
+    let base = &worm.scene.observed[change.base];
     let time_s = &base.run.recording.time_s;
     let own_hz = (time_s.len() - 1) as f64 / (time_s[time_s.len() - 1] - time_s[0]);
     let rate_hz = own_hz.min(RATE_HZ).min(SAMPLES_PER_CYCLE / change.cycle_s);
@@ -73,13 +76,9 @@ pub(super) struct RunOutcome {
 
 impl<'r> Trial<'r> {
     /// The run with a change; none where the slope is out of range.
-    pub fn new(
-        problem: &FitProblem<'_, '_>,
-        change: &Change,
-        (recording, thinned): &'r (Recording, f64),
-    ) -> Option<Self> {
-        let base = &problem.scene.observed[change.base];
-        let mut physics = problem.scene.nominal[change.base].clone();
+    pub fn new(worm: &RecordedWorm<'_>, change: &Change, (recording, thinned): &'r (Recording, f64)) -> Option<Self> {
+        let base = &worm.scene.observed[change.base];
+        let mut physics = worm.scene.nominal[change.base].clone();
         physics.worm = physics.worm.with_slope_rad(change.slope_deg.to_radians()).ok()?;
         physics.worm.add_mass_kg(change.extra_kg);
         let mut observed = Observed {
@@ -105,9 +104,9 @@ impl<'r> Trial<'r> {
             settled: None,
         };
         observed.assume_laid_down(true);
-        let bins = Bins::new(&observed);
+        let bins = bins(&observed);
         Some(Self {
-            noise: problem.noise[change.base].of_another(&observed, &bins, *thinned),
+            noise: worm.noise[change.base].of_another(&observed, &bins, *thinned),
             bins,
             scene: Scene {
                 observed: vec![observed],
@@ -158,7 +157,7 @@ impl<'r> Trial<'r> {
 
     /// Which quantities of a rival matter in the new run.
     pub fn relevant_quantities(rival: &Fit) -> Vec<usize> {
-        let of_old_run = |what: What| matches!(what, What::Nuisance(Nuisance::SlopeOf(run)) if run != 0);
+        let of_old_run = |what: What| matches!(Nuisance::of(what), Some(Nuisance::SlopeOf(run)) if run != 0);
         let free = rival.hypothesis.free.iter().enumerate();
         free.filter(|(_, free)| !of_old_run(free.what))
             .map(|(quantity, _)| quantity)
@@ -186,7 +185,7 @@ impl<'r> Trial<'r> {
 fn on_new_run(rival: &Fit) -> Vec<f64> {
     let free = rival.hypothesis.free.iter().zip(&rival.at);
     free.map(|(free, &at)| {
-        if free.what == FRESH_SLOPE {
+        if Nuisance::of(free.what) == Some(FRESH_SLOPE) {
             free.quantity.centre
         } else {
             at
@@ -218,7 +217,7 @@ impl Adjustment {
         let normal = rival.normal(None);
         // The first run's slope error keeps its place, and the new run's is one more quantity at the end.
         let place = |quantity: usize| {
-            if rival.hypothesis.free[quantity].what == FRESH_SLOPE {
+            if Nuisance::of(rival.hypothesis.free[quantity].what) == Some(FRESH_SLOPE) {
                 count
             } else {
                 quantity

@@ -1,7 +1,8 @@
 //! The mean cycle of the residual: what a model of any form could add.
 
-use super::{CellResiduals, Cycle, Squares, advance_m, settled_cycles, within_cycles};
-use crate::explain::observed::Observed;
+use super::{CellResiduals, Squares, advance_m, within_cycles};
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::settled_cycles::{Cycle, settled_cycles};
 
 /// Most bins of a step.
 const BINS_PER_STEP: usize = 12;

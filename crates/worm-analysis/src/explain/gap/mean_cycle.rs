@@ -1,10 +1,11 @@
 //! The mean cycle of each run for the page: measured, and by the models at the same samples.
 
 use crate::explain::answer::CycleSeries;
-use crate::explain::fit::{Fit, FitProblem};
-use crate::explain::observed::Observed;
-use crate::explain::predicted::Predicted;
-use crate::explain::residual::Residual;
+use crate::explain::search::fit::Fit;
+use crate::explain::worm::observed::Observed;
+use crate::explain::worm::predicted::Predicted;
+use crate::explain::worm::recorded_worm::RecordedWorm;
+use crate::explain::worm::residual::Residual;
 
 /// Bins of a cycle, about.
 const BINS: usize = 72;
@@ -12,15 +13,15 @@ const BINS: usize = 72;
 /// Each run's displacement of the body within a cycle: measured, and by the nominal, the recalibrated and the named model. A model that
 /// cannot make a run has no series there; phases that no cycle shows are left out.
 pub(in crate::explain) fn cycles(
-    problem: &FitProblem<'_, '_>,
+    worm: &RecordedWorm<'_>,
     baseline: &Fit,
     recalibrated: &Fit,
     named: Option<&Fit>,
 ) -> Vec<CycleSeries> {
     let of_run = |run: usize| {
-        let observed = &problem.scene.observed[run];
-        let stroke_m = problem.scene.nominal[run].worm.stroke_m();
-        let predict = |fit: &Fit| problem.scene.predict(run, &fit.hypothesis, &fit.at);
+        let observed = &worm.scene.observed[run];
+        let stroke_m = worm.scene.nominal[run].worm.stroke_m();
+        let predict = |fit: &Fit| worm.scene.predict(run, &fit.hypothesis, &fit.at);
         let bins = bins(observed);
         let mut series = CycleSeries {
             slope_deg: observed.run.slope_deg,
@@ -50,7 +51,7 @@ pub(in crate::explain) fn cycles(
         series.named_m = model(fold_model(named));
         series
     };
-    (0..problem.scene.observed.len()).map(of_run).collect()
+    (0..worm.scene.observed.len()).map(of_run).collect()
 }
 
 /// Number of bins: as many for each step as there are samples for.

@@ -1,7 +1,7 @@
-use super::super::fixture::{Campaign, NOISE_M, Truth, WALK_M, hypothesis, problem, record, scene, taken};
+use super::super::fixture::{Campaign, NOISE_M, Truth, WALK_M, hypothesis, record, scene, taken, worm};
 use super::{Measured, cycles};
 use crate::explain::answer::{Stage, StageKind};
-use crate::explain::predict::Scene;
+use crate::explain::worm::predict::Scene;
 use crate::recording::Recording;
 
 const EFFECTS: [Truth<'static>; 3] = [
@@ -23,11 +23,10 @@ struct Stages {
 }
 
 fn stages(recordings: &[Recording], truth: Truth<'_>) -> Stages {
-    let scene = scene(recordings, &Campaign::default());
-    let problem = problem(&scene, &hypothesis(truth));
-    let (baseline, named) = (taken(&problem, hypothesis(None)), taken(&problem, hypothesis(truth)));
-    let measured = Measured::new(&problem, &named);
-    let folds = [(named.clone(), fold(&scene, true))];
+    let worm = worm(recordings, &Campaign::default(), &hypothesis(truth));
+    let (baseline, named) = (taken(&worm, hypothesis(None)), taken(&worm, hypothesis(truth)));
+    let measured = Measured::new(&worm, &named);
+    let folds = [(named.clone(), fold(&worm.scene, true))];
     Stages {
         baseline: measured.stage(StageKind::Baseline, None, &baseline, &[]),
         named: measured.stage(StageKind::Named, Some("it".to_owned()), &named, &folds),
@@ -92,24 +91,20 @@ fn the_advance_that_a_model_misses_is_told() {
 fn only_cycles_that_were_held_out_count_as_such() {
     let campaign = Campaign::default();
     let recordings = record(&campaign, None, 3);
-    let scene = scene(&recordings, &campaign);
-    let problem = problem(&scene, &hypothesis(None));
-    let (right, wrong) = (
-        taken(&problem, hypothesis(None)),
-        taken(&problem, hypothesis(EFFECTS[0])),
-    );
-    let measured = Measured::new(&problem, &right);
+    let worm = worm(&recordings, &campaign, &hypothesis(None));
+    let (right, wrong) = (taken(&worm, hypothesis(None)), taken(&worm, hypothesis(EFFECTS[0])));
+    let measured = Measured::new(&worm, &right);
     let rms_m = |folds: &[_]| measured.stage(StageKind::Named, None, &right, folds).held_out_rms_m;
     let wrong_m = measured.stage(StageKind::Named, None, &wrong, &[]).fit_rms_m;
     let right_m = rms_m(&[]);
-    assert_eq!(rms_m(&[(right.clone(), fold(&scene, true))]), right_m);
+    assert_eq!(rms_m(&[(right.clone(), fold(&worm.scene, true))]), right_m);
     let of_wrong_m = rms_m(&[
-        (wrong.clone(), fold(&scene, true)),
-        (right.clone(), fold(&scene, false)),
+        (wrong.clone(), fold(&worm.scene, true)),
+        (right.clone(), fold(&worm.scene, false)),
     ]);
     // The sums run in another order.
     assert!((of_wrong_m / wrong_m - 1.0).abs() < 1e-12, "{of_wrong_m} for {wrong_m}");
-    assert!(rms_m(&[(wrong, fold(&scene, false))]).is_nan());
+    assert!(rms_m(&[(wrong, fold(&worm.scene, false))]).is_nan());
 }
 
 #[test]
@@ -117,10 +112,9 @@ fn the_mean_cycle_follows_the_model_that_made_it() {
     let campaign = Campaign::default();
     let truth = EFFECTS[1];
     let recordings = record(&campaign, truth, 4);
-    let scene = scene(&recordings, &campaign);
-    let problem = problem(&scene, &hypothesis(truth));
-    let (baseline, named) = (taken(&problem, hypothesis(None)), taken(&problem, hypothesis(truth)));
-    for series in cycles(&problem, &baseline, &baseline, Some(&named)) {
+    let worm = worm(&recordings, &campaign, &hypothesis(truth));
+    let (baseline, named) = (taken(&worm, hypothesis(None)), taken(&worm, hypothesis(truth)));
+    for series in cycles(&worm, &baseline, &baseline, Some(&named)) {
         let off_m = |model_m: &[f64]| {
             let pairs = model_m.iter().zip(&series.measured_m);
             pairs.map(|(model_m, m)| (model_m - m).abs()).fold(0.0, f64::max)

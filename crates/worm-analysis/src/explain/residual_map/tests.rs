@@ -1,15 +1,14 @@
-use super::super::fixture::{Campaign, Truth, hypothesis, problem, record, scene, taken};
+use super::super::fixture::{Campaign, Truth, hypothesis, record, taken, worm};
 use super::{BINS_PER_STEP, MIN_CYCLES, map, places, standard_errors};
 use crate::experiment::Simulation;
 use crate::explain::answer::{Place, ResidualMap};
 
 fn maps(campaign: &Campaign, truth: Truth<'_>, seed: u64) -> Vec<ResidualMap> {
     let recordings = record(campaign, truth, seed);
-    let scene = scene(&recordings, campaign);
-    let problem = problem(&scene, &hypothesis(None));
-    let nominal = taken(&problem, hypothesis(None));
-    (0..scene.observed.len())
-        .map(|run| map(&problem, run, &nominal))
+    let worm = worm(&recordings, campaign, &hypothesis(None));
+    let nominal = taken(&worm, hypothesis(None));
+    (0..worm.scene.observed.len())
+        .map(|run| map(&worm, run, &nominal))
         .collect()
 }
 

@@ -6,10 +6,10 @@
 //! worse to miss a cause than to keep a doubtful one.
 
 use super::super::answer::{Remainder, Verdict};
-use super::super::fit::Fit;
-use super::super::judge::candidate::{Candidate, are_twins};
-use super::super::parameter::{Hypothesised, What};
 use super::table::Table;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::judge::candidate::{Candidate, are_twins};
+use crate::explain::search::parameter::{Hypothesised, What};
 
 /// A quantile of chi-square: its first values from 1 degree of freedom on, and the same quantile of the normal distribution.
 type Quantile = ([f64; 8], f64);

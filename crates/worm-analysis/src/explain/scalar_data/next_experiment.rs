@@ -5,9 +5,9 @@
 
 use super::super::answer::{ExperimentChange, NextExperiment, Prediction, RunChange, Verdict};
 use super::super::experiment_design::{MIN_ADVANCE, SLOPES_DEG};
-use super::super::fit::Fit;
 use super::model_selection::Selected;
 use super::table::Table;
+use crate::explain::search::fit::Fit;
 use worm_physics::Cycle;
 
 /// Most candidates whose predictions are listed.

@@ -1,10 +1,10 @@
 //! The advances, what a hypothesis predicts of them, and its fit.
 
 use super::super::error::ExplainError;
-use super::super::fit::Fit;
-use super::super::hypothesis::Hypothesis;
-use super::super::parameter::{Nuisance, What};
 use super::name;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::hypothesis::Hypothesis;
+use crate::explain::worm::nuisance::Nuisance;
 use crate::least_squares::{self, Derivatives, LeastSquares, Method, Quantity};
 use crate::recording::Advance;
 use nalgebra::{DMatrix, DVector};
@@ -64,7 +64,7 @@ impl<'a> Table<'a> {
         worm.tilt_rad(slope_deg.to_radians() - worm.slope_rad());
         worm.add_mass_kg(payload_kg);
         for (free, &value) in hypothesis.free.iter().zip(at) {
-            if let What::Nuisance(nuisance) = free.what {
+            if let Some(nuisance) = Nuisance::of(free.what) {
                 nuisance.apply(value, run, &mut worm);
             }
         }
@@ -213,8 +213,8 @@ impl LeastSquares for UnderHypothesis<'_> {
             let step = self.quantities[number].inward_step(at[number]);
             let mut probe = at.to_vec();
             probe[number] += step;
-            let of_run = |(run, here): (usize, &f64)| match self.hypothesis.free[number].what {
-                What::Nuisance(Nuisance::SlopeOf(of)) if of != run => 0.0,
+            let of_run = |(run, here): (usize, &f64)| match Nuisance::of(self.hypothesis.free[number].what) {
+                Some(nuisance) if !nuisance.concerns(run) => 0.0,
                 _ => (self.table.residual(run, self.hypothesis, &probe) - here) / step,
             };
             residual.iter().enumerate().map(of_run).collect()

@@ -1,0 +1,49 @@
+//! The search on recordings of a worm.
+
+use super::answer::Answer;
+use super::assemble::{Parts, assemble};
+use super::error::ExplainError;
+use super::search::find::{Options, find};
+use super::search::hypothesis::Hypothesis;
+use super::search::plant::Plant;
+use super::search::recalibrate::{measure_noise, recalibrate};
+use super::worm::prepare::prepare;
+use super::worm::recorded_worm::RecordedWorm;
+use super::worm::speed_droop::speed_droop;
+use crate::experiment::{Progress, RecordedRun};
+use worm_estimator::config::Config;
+
+/// Searches for the effect that the model lacks.
+///
+/// # Errors
+/// [`ExplainError`] names the recording and the remedy.
+pub fn explain(
+    runs: &[RecordedRun<'_>],
+    config: &Config,
+    options: &Options,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Answer, ExplainError> {
+    let mut report = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
+    report("gait", 0.0);
+    let mut worm = RecordedWorm::new(prepare(runs, config)?);
+    report("recalibration", 0.03);
+    let base = Hypothesis::new(&worm.nuisances(), &[]);
+    let at = measure_noise(&mut worm, &base)?;
+    let (problem, discrepancy, recalibrated) = recalibrate(&worm, &base, at, options.discrepancy);
+    let found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
+    let cycles_s: Vec<f64> = runs
+        .iter()
+        .map(|run| run.cycle_s.unwrap_or(config.gait.cycle_s))
+        .collect();
+    let best = found.selected.candidates.first();
+    let best = best.map_or(&recalibrated, |candidate| &candidate.fit);
+    let speed_droop = speed_droop(&worm.scene, best, &cycles_s);
+    report("localisation", 0.93);
+    let parts = Parts {
+        recalibrated,
+        found,
+        speed_droop,
+        discrepancy_m: discrepancy.scale_m,
+    };
+    Ok(assemble(&problem, config, &parts))
+}

@@ -1,0 +1,132 @@
+//! How well a hypothesis predicts data that it was not fitted to.
+//!
+//! The data are partitioned in two ways: by runs, and by blocks of neighbouring cycles of all runs. Each part is left out in turn;
+//! the hypothesis is refitted to the rest by Gauss-Newton steps, and its residuals on the part left out are simulated exactly. The
+//! score is the mean over both partitions.
+//!
+//! # The score
+//! Data left out have conditions of their own that the rest does not determine, such as the error of their slope. So the score is
+//! twice the negative logarithm of the probability density that the fit predicts for them, its uncertainty included. With residuals
+//! r there, derivatives J, and C the covariance that the rest leaves,
+//!
+//! ```text
+//! rᵀ (1 + J C Jᵀ)⁻¹ r + log det (1 + J C Jᵀ) = |r|² − gᵀ N⁻¹ g + log (det N / det C⁻¹),   N = C⁻¹ + Jᵀ J,   g = Jᵀ r
+//! ```
+//! A vague effect predicts everything with a low density and so pays for its freedom. The priors' part of chi-squared of the whole
+//! fit is added: of two hypotheses that predict the same, the one with less extreme values is more likely.
+
+use super::fit::{Fit, FitProblem};
+use super::plant::{Plant, Recorded};
+use crate::least_squares::{dot, prior_chi_squared, submatrix};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Blocks of neighbouring cycles.
+const BLOCKS: usize = 3;
+/// Steps of each refit.
+const STEPS: usize = 2;
+
+/// What is left out at once.
+#[derive(Debug, Clone)]
+pub(in crate::explain) struct Fold {
+    /// For each run and whole cycle since its first sample, whether it is left out.
+    pub left_out: Vec<Vec<bool>>,
+}
+
+/// A fit, and what was left out for it, as [`Fold::left_out`] says.
+pub(in crate::explain) type FitWithout = (Fit, Vec<Vec<bool>>);
+
+/// How a hypothesis does on data that it was not fitted to.
+#[derive(Debug, Clone)]
+pub(in crate::explain) struct HeldOut {
+    /// The score, as a chi-squared: mean over the partitions.
+    pub chi_squared: f64,
+    /// The refit without each fold.
+    pub fits: Vec<FitWithout>,
+}
+
+/// All folds of a campaign: first the runs, where there are several, then the blocks of cycles.
+pub(in crate::explain) fn folds(plant: &impl Recorded) -> Vec<Fold> {
+    let runs = plant.runs();
+    let cycles = |run: usize| plant.bins(run).cycles;
+    let mut folds = Vec::new();
+    if runs > 1 {
+        for run in 0..runs {
+            let left_out = (0..runs).map(|other| vec![other == run; cycles(other)]);
+            folds.push(Fold {
+                left_out: left_out.collect(),
+            });
+        }
+    }
+    for block in 0..BLOCKS {
+        let left_out = (0..runs).map(|run| {
+            let first = plant.bins(run).bins.first().map_or(0, |bin| bin.cycle);
+            let count = cycles(run);
+            (0..count)
+                .map(|cycle| cycle >= first && (cycle - first) * BLOCKS / (count - first).max(1) == block)
+                .collect()
+        });
+        folds.push(Fold {
+            left_out: left_out.collect(),
+        });
+    }
+    folds
+}
+
+impl Fold {
+    /// For each residual, whether it stays in.
+    fn stays<P: Plant>(&self, problem: &FitProblem<'_, P>) -> Vec<bool> {
+        let stays = |(run, bin): (usize, usize)| !self.left_out[run][problem.plant.bins(run).bins[bin].cycle];
+        problem.bin_of_rows().into_iter().map(stays).collect()
+    }
+}
+
+/// Scores a fitted hypothesis, which has its derivatives, on every fold.
+pub(in crate::explain) fn hold_out<P: Plant>(problem: &FitProblem<'_, P>, fit: &Fit, folds: &[Fold]) -> HeldOut {
+    let refit = |fold: &Fold| {
+        let stays = fold.stays(problem);
+        let mut without = fit.clone();
+        for _ in 0..STEPS {
+            without = problem.step_without(without, &stays);
+        }
+        let chi_squared = score(&without, &stays);
+        without.jacobian = Vec::new();
+        (chi_squared, (without, fold.left_out.clone()))
+    };
+    let anew: Vec<(f64, FitWithout)> = folds.par_iter().map(refit).collect();
+    let runs = folds.len() - BLOCKS;
+    let partitions = if runs > 0 { 2.0 } else { 1.0 };
+    HeldOut {
+        chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / partitions
+            + prior_chi_squared(&fit.hypothesis.quantities(), &fit.at),
+        fits: anew.into_iter().map(|(_, without)| without).collect(),
+    }
+}
+
+/// Twice the negative logarithm of the probability, up to a constant that no hypothesis changes, of the data that do not stay.
+fn score(without: &Fit, stays: &[bool]) -> f64 {
+    let left_out: Vec<bool> = stays.iter().map(|stays| !stays).collect();
+    let residual = &without.residual;
+    let chi_squared = dot(residual, residual, Some(&left_out));
+    // What lies at a limit is known as well as it can be.
+    let open: Vec<usize> = (0..without.at.len())
+        .filter(|&quantity| !without.at_limit(quantity))
+        .collect();
+    let (known, whole) = (without.normal(Some(stays)), without.normal(None));
+    let factor = |normal: &DMatrix<f64>| {
+        let mut matrix = submatrix(normal, &open);
+        for row in 0..open.len() {
+            matrix[(row, row)] *= 1.0 + 1e-9;
+        }
+        matrix.cholesky()
+    };
+    let (Some(known), Some(whole)) = (factor(&known), factor(&whole)) else {
+        return chi_squared;
+    };
+    let drawn = DVector::from_iterator(
+        open.len(),
+        open.iter()
+            .map(|&quantity| dot(&without.jacobian[quantity], residual, Some(&left_out))),
+    );
+    chi_squared - drawn.dot(&whole.solve(&drawn)) + whole.ln_determinant() - known.ln_determinant()
+}

@@ -1,0 +1,185 @@
+//! The search itself, step by step.
+
+use super::cross_validation::{self, HeldOut};
+use super::discrepancy::Discrepancy;
+use super::fit::{Fit, FitProblem};
+use super::judge::candidate::{Candidate, kinds};
+use super::judge::decision::{Selected, decide};
+use super::judge::evidence::{InTime, evidence};
+use super::judge::prior;
+use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
+use super::onset::{mean_cycles, with_onsets};
+use super::parameter::Hypothesised;
+use super::plant::Plant;
+use super::refit::{REFITTED, alone, pair_up, refit};
+use super::score_test::{self, Expected, Screening};
+
+/// Single effects from which pairs are tried.
+const PAIR_SEEDS: usize = 2;
+
+/// Options of the search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Seed of everything drawn: the same input and seed give the same answer.
+    pub seed: u64,
+    /// Scale of the discrepancy between the model and any worm, as a fraction of the mean largest deformation of the tips; above 0.
+    /// Too small, and the model's own small errors get names; too large, and a wrong effect hides in it what it leaves.
+    pub discrepancy: f64,
+    /// Relative change of the advance or of the energy of a cycle below which an effect does not matter.
+    pub matters: f64,
+    /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; above 0.
+    pub expected_impact: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            discrepancy: 0.004,
+            matters: 0.02,
+            expected_impact: 0.06,
+        }
+    }
+}
+
+/// What was found.
+pub(in crate::explain) struct Found {
+    /// The model without recalibration, with derivatives.
+    pub nominal: Fit,
+    pub recalibrated_held_out: HeldOut,
+    /// Every effect that was screened, most probable first.
+    pub screened: Vec<Screening>,
+    pub selected: Selected,
+    /// Fraction of the gap that the best candidate leaves open.
+    pub open_share: f64,
+    /// Improvement that the best of the library reaches by chance in one campaign of a hundred.
+    pub threshold: f64,
+}
+
+/// Searches for the effect that the model of a plant lacks, beside a discrepancy; the recalibrated fit has its derivatives. Reports each
+/// stage with the fraction of the work that is done.
+pub(in crate::explain) fn find<P: Plant>(
+    problem: &FitProblem<'_, P>,
+    discrepancy: &Discrepancy,
+    recalibrated: &Fit,
+    options: &Options,
+    report: &mut dyn FnMut(&'static str, f64),
+) -> Found {
+    report("screening", 0.15);
+    let plant = problem.plant;
+    let hypothesised = plant.hypotheses();
+    let in_time = InTime::new(plant, discrepancy);
+    let judge = Judge {
+        problem,
+        discrepancy,
+        in_time: &in_time,
+        recalibrated,
+        none: evidence(discrepancy, Some(&in_time), recalibrated, &|_| None)
+            .with_rhythm(plant.ln_bayes_of_rhythms(recalibrated)),
+        campaign: prior::Campaign {
+            channels: plant.channels(),
+            runs: plant.runs(),
+            cycles: mean_cycles(plant),
+            families: prior::families(&hypothesised),
+        },
+        limit: options.matters,
+        expected_impact: options.expected_impact,
+    };
+    let ln_prior = |one: &Hypothesised| judge.ln_prior(&[*one]) - prior::NONE.ln();
+    let expected = Expected {
+        ln_prior: &ln_prior,
+        impact: options.expected_impact,
+        scales: judge.none.scales(),
+    };
+    let (screened, chance) = score_test::screen(
+        problem,
+        discrepancy,
+        recalibrated,
+        &hypothesised,
+        &expected,
+        options.seed,
+    );
+    report("refit", 0.3);
+    let nominal = problem.with_derivatives(&recalibrated.hypothesis, recalibrated.hypothesis.neutral());
+    let mut candidates = refit(problem, recalibrated, &nominal, &screened, REFITTED, &mut |fraction| {
+        report("refit", 0.3 + 0.35 * fraction)
+    });
+    judge.weigh(&mut candidates, &screened);
+    let best = candidates.first().filter(|best| judge.ln_odds(best) > 0.0);
+    let best = best.and_then(|best| best.evidence).unwrap_or(judge.none);
+    if judge.may_change(&best) {
+        report("onsets", 0.6);
+        candidates.extend(with_onsets(&judge, &nominal, &screened));
+        candidates.sort_by(|a, b| judge.ln_odds(b).total_cmp(&judge.ln_odds(a)));
+    }
+    report("pairs", 0.65);
+    let mut pairs: Vec<(Candidate, f64)> = Vec::new();
+    let mut seeds: Vec<Candidate> = kinds(&candidates).into_iter().take(PAIR_SEEDS).cloned().collect();
+    // What seems to begin in mid-run may be there from the start, with a second effect that hides that.
+    let throughout = seeds.iter().filter_map(|seed| {
+        let is_throughout = |one: &&Candidate| one.hypothesised[0].onset.is_none();
+        let same = candidates
+            .iter()
+            .filter(|one| one.hypothesised[0].is_same_effect(&seed.hypothesised[0]));
+        seed.hypothesised[0]
+            .onset
+            .and_then(|_| same.clone().find(is_throughout).cloned())
+    });
+    let throughout: Vec<Candidate> = throughout.collect();
+    seeds.extend(throughout);
+    for first in &seeds {
+        let beyond = judge.ln_odds_as_screened(first, None) - chance.ln_odds(FALSE_NAMES);
+        let is_near = judge.ln_odds(first) > judge.ln_odds(&seeds[0]) - WORTH_A_LOOK;
+        if beyond < 0.0 || !is_near && judge.is_closed_by(&seeds[0]) {
+            continue;
+        }
+        let (found, chance) = pair_up(&judge, first, &hypothesised, &screened, options.seed);
+        let beyond = found.into_iter().map(|pair| {
+            let beyond = judge.ln_odds_as_screened(&pair, Some(first)) - chance.ln_odds(FALSE_NAMES);
+            (pair, beyond)
+        });
+        pairs.extend(beyond);
+    }
+    pairs.sort_by(|a, b| judge.ln_odds(&b.0).total_cmp(&judge.ln_odds(&a.0)));
+    if let Some((best, _)) = pairs.first()
+        && let Some(single) = candidates.first()
+        && let Some(alone) = alone(problem, recalibrated, single, best)
+    {
+        candidates[0] = alone;
+        judge.weigh(&mut candidates[..1], &screened);
+    }
+    report("held-out selection", 0.8);
+    let folds = cross_validation::folds(plant);
+    let recalibrated_held_out = held_out(problem, recalibrated, &folds);
+    report("judgement", 0.9);
+    let judged = judge.judge(candidates, pairs, &chance, &folds, recalibrated_held_out.chi_squared);
+    let fitted: Vec<&Hypothesised> = judged.iter().flat_map(|one| &one.candidate.hypothesised).collect();
+    // What the rough fits dismissed counts by its prior at most: first order promises strong effects too much.
+    let unfitted: Vec<f64> = screened
+        .iter()
+        .filter(|screening| !fitted.contains(&&screening.hypothesised))
+        .map(|screening| judge.none.usual + judge.ln_prior(&[screening.hypothesised]) + screening.ln_bayes.min(0.0))
+        .collect();
+    let mut selected = decide(judge.none, judged, &unfitted);
+    for candidate in &mut selected.candidates {
+        candidate.fit = plant.with_whole_effects(candidate.fit.clone());
+    }
+    // What repeats and is smooth, beyond noise.
+    let gap = |fit: &Fit| {
+        let residual = problem.without_discrepancy(&fit.hypothesis, &fit.at);
+        discrepancy.beyond_noise(&residual)
+    };
+    let open_share = selected
+        .candidates
+        .first()
+        .map_or(1.0, |candidate| gap(&candidate.fit) / gap(recalibrated).max(1.0));
+    let threshold = chance.improvement(FALSE_NAMES);
+    Found {
+        nominal,
+        recalibrated_held_out,
+        screened,
+        selected,
+        open_share,
+        threshold,
+    }
+}

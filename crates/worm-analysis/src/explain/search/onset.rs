@@ -1,0 +1,345 @@
+//! Effects that begin or end in mid-run: screened at every cycle, of one run to stay so and of every run, and fitted with the time at
+//! which they do.
+//!
+//! The machine of an effect that begins at t₁ moves as without it before and about as with it throughout after, so the change of the
+//! residuals is that of the constant effect from t₁ on: its innovations are the same, and what is relative to a mean is about it again. That
+//! gives a score for every cycle from one simulation of each effect. The best are fitted with the motion predicted as it is, and t₁ by
+//! values on a grid. Those that end are the same the other way round: up to t₁ instead of from it on.
+
+use super::fit::{Fit, FitProblem};
+use super::hypothesis::Hypothesis;
+use super::judge::candidate::Candidate;
+use super::judge::ln_sum::ln_sum;
+use super::judge::prior;
+use super::judge::structural_change::Change;
+use super::judgement::Judge;
+use super::parameter::{Hypothesised, Onset};
+use super::plant::{Plant, Recorded};
+use super::refit::refit;
+use super::score_test::{Screening, ln_bayes, strong};
+use crate::least_squares::{cross, dot, submatrix};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Strength at which effects are tried for an onset, in notable changes.
+const STRENGTH: f64 = 8.0;
+/// Effects that are fitted with an onset, and with an end.
+const FITTED: usize = 4;
+const FITTED_WITH_END: usize = 2;
+/// Effects of which every probable onset is tried.
+const TRIED: usize = 12;
+/// Factors on the change of a trial for which its direction stands.
+const STANDS_FOR: (f64, f64) = (0.1, 3.0);
+/// Gauss-Newton steps of a recalibration on what was seen to one side of a change.
+const STEPS_BESIDE: usize = 3;
+/// Values of the onset that are tried about the best so far: their distance, cycles, and how many to either side.
+const GRIDS: [(f64, i32); 3] = [(1.0, 6), (0.25, 5), (0.0625, 4)];
+
+/// Cycles since the start of each run at which an effect may begin: those that leave a whole one before and after.
+fn cycles(plant: &impl Recorded, run: usize) -> std::ops::Range<usize> {
+    let bins = plant.bins(run);
+    let at = |bin: Option<&super::bins::Bin>| bin.map_or(0.0, |bin| bin.phase - bins.start_phase);
+    at(bins.bins.first()).ceil() as usize + 1..at(bins.bins.last()).floor() as usize
+}
+
+/// Number of cycles at which an effect may begin, on average over the runs; 1 or more.
+pub(in crate::explain) fn mean_cycles(plant: &impl Recorded) -> f64 {
+    let runs = plant.runs();
+    let sum: usize = (0..runs).map(|run| cycles(plant, run).len()).sum();
+    (sum as f64 / runs as f64).max(1.0)
+}
+
+/// Every onset, or every end, that is tried.
+fn onsets(plant: &impl Recorded, ends: bool) -> Vec<Onset> {
+    let runs = plant.runs();
+    let single = (0..runs).flat_map(|run| cycles(plant, run).map(move |cycle| (cycle, Some(run))));
+    let common = (0..runs)
+        .map(|run| cycles(plant, run))
+        .reduce(|a, b| a.start.max(b.start)..a.end.min(b.end));
+    let of_all = common
+        .filter(|_| runs > 1)
+        .into_iter()
+        .flatten()
+        .map(|cycle| (cycle, None));
+    single
+        .chain(of_all)
+        .map(|(cycle, run)| Onset {
+            cycle: cycle as f64,
+            run,
+            ends,
+        })
+        .collect()
+}
+
+/// The effects that most probably begin or end in mid-run, fitted with the time. `screened` are those that act throughout.
+pub(in crate::explain) fn with_onsets(
+    judge: &Judge<'_, impl Plant>,
+    nominal: &Fit,
+    screened: &[Screening],
+) -> Vec<Candidate> {
+    let fitted = [(false, FITTED), (true, FITTED_WITH_END)].map(|(ends, count)| {
+        let is_likely = judge.none.ln_bayes_of_change().is_some_and(|ln_bayes| ln_bayes > 0.0);
+        let base = match judge.none.changing {
+            Some((_, change)) if is_likely => beside_change(judge.problem, nominal, change, ends),
+            _ => judge.recalibrated.clone(),
+        };
+        let promising = screen(judge, &base, screened, ends);
+        let promising = try_out(judge, &base, promising, count);
+        refit(judge.problem, &base, nominal, &promising, count, &mut |_| ())
+    });
+    let mut candidates: Vec<Candidate> = fitted
+        .into_iter()
+        .flatten()
+        .map(|candidate| {
+            let (fit, ln_onset) = refine(judge.problem, in_best_run(judge.problem, candidate.fit));
+            Candidate {
+                ln_onset,
+                ..Candidate::of(judge.problem, judge.recalibrated, fit)
+            }
+        })
+        .collect();
+    judge.weigh(&mut candidates, screened);
+    candidates
+}
+
+/// The model recalibrated on what was seen before a change, or after it where something ends there: the rest would drive the
+/// recalibration astray.
+fn beside_change(problem: &FitProblem<'_, impl Plant>, nominal: &Fit, change: Change, ends: bool) -> Fit {
+    let rows = problem.bin_of_rows().into_iter();
+    let is_beside = |(run, bin): (usize, usize)| {
+        let bins = problem.plant.bins(run);
+        change.since(run, bins.bins[bin].phase - bins.start_phase).is_none() != ends
+    };
+    let stays: Vec<bool> = rows.map(is_beside).collect();
+    let mut fit = nominal.clone();
+    for _ in 0..STEPS_BESIDE {
+        fit = problem.step_without(fit, &stays);
+        problem.compute_jacobian(&mut fit);
+    }
+    fit
+}
+
+/// An effect that may begin or end, with when and how strongly it most probably does so in every run, or in one of them.
+struct Promising {
+    screening: Screening,
+    /// Logarithm of the Bayes factor, onset, and parameters.
+    each: Vec<(f64, Onset, Vec<f64>)>,
+}
+
+/// Scores of every effect about a fit for every onset, or every end; most probable first.
+fn screen(judge: &Judge<'_, impl Plant>, fit: &Fit, screened: &[Screening], ends: bool) -> Vec<Promising> {
+    let problem = judge.problem;
+    let onsets = onsets(problem.plant, ends);
+    let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
+    let jacobian = DMatrix::from_iterator(
+        fit.residual.len(),
+        open.len(),
+        open.iter().flat_map(|&quantity| fit.jacobian[quantity].iter().copied()),
+    );
+    let Some(normal) = submatrix(&fit.normal(None), &open).cholesky() else {
+        return Vec::new();
+    };
+    let residual = DVector::from_column_slice(&fit.residual);
+    let without = problem.without_discrepancy(&fit.hypothesis, &fit.at);
+    let of_effect = |screening: &Screening| {
+        let hypothesised = screening.hypothesised;
+        let mut starts = strong(hypothesised.effect, &[STRENGTH]);
+        starts.extend(screening.starts.first().cloned());
+        let mut each: Vec<(f64, Onset, Vec<f64>)> = Vec::new();
+        let mut all = Vec::new();
+        for values in starts {
+            let mut at = fit.at.clone();
+            at.extend(&values);
+            let with = problem.without_discrepancy(&Hypothesis::new(&fit.hypothesis.free, &[hypothesised]), &at);
+            let change: Vec<f64> = with
+                .iter()
+                .zip(&without)
+                .map(|(with, without)| with - without)
+                .collect();
+            let directions = onsets
+                .iter()
+                .map(|onset| problem.within_onset(&change, onset))
+                .collect();
+            let directions = problem.whiten_all(directions);
+            let directions = DMatrix::from_iterator(residual.len(), onsets.len(), directions.into_iter().flatten());
+            let shared = cross(&jacobian, &directions);
+            let projected = normal.solve(&shared);
+            let scores = -(directions.tr_mul(&residual));
+            for (number, onset) in onsets.iter().enumerate() {
+                let column = directions.column(number);
+                let square = dot(column.as_slice(), column.as_slice(), None)
+                    - shared.column(number).dot(&projected.column(number));
+                let found = ln_bayes(
+                    &screening.prior,
+                    values[0],
+                    STANDS_FOR,
+                    scores[number],
+                    square.max(1e-9),
+                );
+                all.push(found);
+                let (least, most) = STANDS_FOR;
+                let strength = (scores[number] / square.max(1e-9)).clamp(least, most);
+                let neutral = hypothesised.effect.severity().neutral;
+                let mut found_at = values.clone();
+                found_at[0] = neutral + strength * (values[0] - neutral);
+                match each.iter_mut().find(|(_, other, _)| other.run == onset.run) {
+                    Some(best) if best.0 < found => *best = (found, *onset, found_at),
+                    Some(_) => {}
+                    None => each.push((found, *onset, found_at)),
+                }
+            }
+        }
+        let screening = Screening {
+            ln_bayes: ln_sum(all.iter().copied()) - (all.len() as f64).ln(),
+            score: 0.0,
+            starts: Vec::new(),
+            ..screening.clone()
+        };
+        Promising { screening, each }
+    };
+    let may_begin = screened
+        .par_iter()
+        .filter(|screening| prior::may_begin(screening.hypothesised.effect));
+    let mut promising: Vec<Promising> = may_begin.map(of_effect).collect();
+    let ln_odds = |one: &Promising| one.screening.ln_bayes + judge.ln_prior(&[one.screening.hypothesised]);
+    promising.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
+    promising
+}
+
+/// The best effects, each with the onset and the strength that fit best as they are: first order promises strong effects too much.
+fn try_out(judge: &Judge<'_, impl Plant>, fit: &Fit, mut promising: Vec<Promising>, count: usize) -> Vec<Screening> {
+    promising.truncate(TRIED);
+    let tried = promising.into_par_iter().filter_map(|one| {
+        let with = |(_, onset, values): (f64, Onset, Vec<f64>)| {
+            let hypothesised = Hypothesised {
+                onset: Some(onset),
+                ..one.screening.hypothesised
+            };
+            let hypothesis = Hypothesis::new(&fit.hypothesis.free, &[hypothesised]);
+            let at = [&fit.at[..], &values].concat();
+            (
+                judge.problem.evaluate(&hypothesis, at).chi_squared,
+                hypothesised,
+                values,
+            )
+        };
+        let best = one.each.into_iter().map(with).min_by(|a, b| a.0.total_cmp(&b.0));
+        let (chi_squared, hypothesised, start) = best?;
+        let screening = Screening {
+            hypothesised,
+            starts: vec![start],
+            ..one.screening
+        };
+        Some((chi_squared, screening))
+    });
+    let mut tried: Vec<(f64, Screening)> = tried.collect();
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    tried.into_iter().map(|(_, screening)| screening).take(count).collect()
+}
+
+/// The last effect of a fit at the same cycle of another run, or of every run, where that fits better as it is.
+fn in_best_run(problem: &FitProblem<'_, impl Plant>, fit: Fit) -> Fit {
+    let runs = problem.plant.runs();
+    let with_run = |run: Option<usize>| {
+        let mut hypothesis = fit.hypothesis.clone();
+        hypothesis.hypothesised.last_mut()?.onset.as_mut()?.run = run;
+        Some(problem.evaluate(&hypothesis, fit.at.clone()))
+    };
+    let others = (0..runs).map(Some).chain((runs > 1).then_some(None));
+    let best = others
+        .filter_map(with_run)
+        .min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
+    match best {
+        Some(best) if best.chi_squared < fit.chi_squared => problem.fit(&best.hypothesis, best.at, Some(&fit)),
+        _ => fit,
+    }
+}
+
+/// Fits the onset of the last effect of a fit. Returns the fit with derivatives, and the logarithm of the cycles that the onset may be
+/// at by the data.
+fn refine(problem: &FitProblem<'_, impl Plant>, mut fit: Fit) -> (Fit, f64) {
+    let with_onset = |fit: &Fit, cycle: f64| {
+        let mut hypothesis = fit.hypothesis.clone();
+        if let Some(onset) = hypothesis.hypothesised.last_mut().and_then(|last| last.onset.as_mut()) {
+            onset.cycle = cycle;
+        }
+        hypothesis
+    };
+    let mut ln_width = 0.0;
+    for (distance, count) in GRIDS {
+        let Some(onset) = fit.hypothesis.hypothesised.last().and_then(|last| last.onset) else {
+            return (fit, 0.0);
+        };
+        let end_of = |run: usize| {
+            let bins = problem.plant.bins(run);
+            bins.bins.last().map(|bin| bin.phase - bins.start_phase)
+        };
+        let last = (0..problem.plant.runs()).filter_map(end_of).fold(0.0, f64::max);
+        let cycles: Vec<f64> = (-count..=count)
+            .map(|number| onset.cycle + distance * f64::from(number))
+            .filter(|cycle| (0.0..last).contains(cycle))
+            .collect();
+        let tried: Vec<f64> = cycles
+            .par_iter()
+            .map(|&cycle| problem.evaluate(&with_onset(&fit, cycle), fit.at.clone()).chi_squared)
+            .collect();
+        let Some(best) = (0..tried.len()).min_by(|&a, &b| tried[a].total_cmp(&tried[b])) else {
+            return (fit, 0.0);
+        };
+        ln_width = ln_sum(tried.iter().map(|chi_squared| -0.5 * (chi_squared - tried[best]))) + distance.ln();
+        let hypothesis = with_onset(&fit, cycles[best]);
+        let next = if distance > GRIDS[GRIDS.len() - 1].0 {
+            problem.fit_roughly(&hypothesis, fit.at.clone(), &fit)
+        } else {
+            problem.fit(&hypothesis, fit.at.clone(), Some(&fit))
+        };
+        if next.chi_squared <= fit.chi_squared {
+            fit = next;
+        }
+    }
+    if fit.jacobian.is_empty() {
+        problem.compute_jacobian(&mut fit);
+    }
+    (fit, ln_width)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::{RecordedRun, Simulation};
+    use crate::explain::fixture::{Campaign, begun, record_under};
+    use crate::explain::{Options, Verdict, explain};
+    use worm_estimator::config::Config;
+
+    /// Half the clamping of a cell, in the second run up to the middle or from there on.
+    #[test]
+    fn what_begins_and_what_ends_are_told_apart() {
+        for ends in [false, true] {
+            let campaign = Campaign {
+                simulation: Simulation {
+                    cycles: 8.0,
+                    ..Campaign::default().simulation
+                },
+                ..Campaign::default()
+            };
+            let onset = Onset {
+                cycle: 4.0,
+                run: Some(1),
+                ends,
+            };
+            let truth = Some(("unequal-clamping", Some(1), &[0.5][..]));
+            let recordings = record_under(&campaign, &begun(truth, onset), 5);
+            let runs: Vec<RecordedRun<'_>> = recordings
+                .iter()
+                .zip(&campaign.slopes_deg)
+                .map(|(recording, &slope_deg)| RecordedRun::at_slope(recording, slope_deg))
+                .collect();
+            let answer = explain(&runs, &Config::default(), &Options::default(), &mut |_| ()).expect("an answer");
+            assert_eq!(answer.verdict, Verdict::Explained, "{}", answer.sentence);
+            let effect = &answer.effects[0];
+            assert_eq!((effect.name.as_str(), effect.cell), ("unequal-clamping", Some(2)));
+            let found = effect.onset.as_ref().expect("it does not act throughout");
+            assert!(found.ends == ends && (found.cycle - 4.0).abs() < 0.5, "{found:?}");
+        }
+    }
+}

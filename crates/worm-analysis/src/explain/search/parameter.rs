@@ -1,0 +1,133 @@
+//! What the search may vary: nuisances within their priors, and the parameters of effects.
+//!
+//! Recalibration hides effects: with friction, stiffness and the like free, much of an effect disappears into them. So they are free only
+//! within what is not known of a machine that was built and measured with care, and what remains after fitting them is the gap. The
+//! priors are normal about the nominal value, with limits; a value on its limit is reported.
+
+use crate::least_squares::Quantity;
+use worm_physics::effect::{Effect, Parameter};
+
+/// Standard deviation of the prior of an effect's severity, in notable changes: 3° of slope, 0.4 N of drag, 0.4 of one cell's
+/// friction.
+const SEVERE: f64 = 20.0;
+
+/// A quantity that is free in a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::explain) struct Free {
+    pub what: What,
+    /// Its prior and its limits.
+    pub quantity: Quantity,
+}
+
+/// What a free quantity is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::explain) enum What {
+    /// The plant's nuisance of this number: not known exactly, and no effect is about it.
+    Nuisance(usize),
+    /// A parameter of the effect in this place of the hypothesis.
+    Effect { place: usize, parameter: usize },
+}
+
+impl Free {
+    /// A parameter of an effect. Shape parameters have no prior but their range. The severity has a weak one about neutral, so that it
+    /// returns there when the data that show it are left out.
+    pub fn of_effect(place: usize, number: usize, parameter: &Parameter) -> Self {
+        Self {
+            what: What::Effect {
+                place,
+                parameter: number,
+            },
+            quantity: Quantity {
+                centre: parameter.neutral,
+                sigma: if number == 0 {
+                    SEVERE * parameter.notable
+                } else {
+                    f64::INFINITY
+                },
+                min: parameter.min,
+                max: parameter.max,
+                step: 0.2 * parameter.notable,
+            },
+        }
+    }
+}
+
+/// When an effect begins or ends that does not act throughout.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::explain) struct Onset {
+    /// Cycles since the first sample of the run.
+    pub cycle: f64,
+    /// The run in which it happens, once: the runs before and after are as at its start and its end. In every run for none.
+    pub run: Option<usize>,
+    /// It acts up to then, instead of from then on.
+    pub ends: bool,
+}
+
+impl Onset {
+    /// Whether the effect begins or ends in a run.
+    pub fn is_in(&self, run: usize) -> bool {
+        self.run.is_none_or(|of| of == run)
+    }
+
+    /// Whether the effect acts at the start of a run.
+    pub fn acts_at_start(&self, run: usize) -> bool {
+        self.run.is_some_and(|of| of < run) != self.ends
+    }
+
+    /// Whether the effect acts at the end of a run.
+    pub fn acts_at_end(&self, run: usize) -> bool {
+        self.run.is_none_or(|of| of <= run) != self.ends
+    }
+}
+
+/// An effect assumed to act, on one cell or on all that it concerns.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::explain) struct Hypothesised {
+    pub effect: &'static Effect,
+    pub cell: Option<usize>,
+    /// When it begins or ends; it acts throughout for none.
+    pub onset: Option<Onset>,
+}
+
+impl Hypothesised {
+    /// An effect that acts throughout.
+    pub fn throughout(effect: &'static Effect, cell: Option<usize>) -> Self {
+        Self {
+            effect,
+            cell,
+            onset: None,
+        }
+    }
+
+    /// Whether it is the same effect of the same cell, whenever it begins.
+    pub fn is_same_effect(&self, other: &Self) -> bool {
+        self.effect.name == other.effect.name && self.cell == other.cell
+    }
+}
+
+impl PartialEq for Hypothesised {
+    fn eq(&self, other: &Self) -> bool {
+        self.is_same_effect(other) && self.onset == other.onset
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_happens_in_one_run_lasts_and_what_happens_in_each_does_not() {
+        let (yes, no) = (true, false);
+        for (run, ends, at_start, at_end) in [
+            (Some(1), no, [no, no, yes], [no, yes, yes]),
+            (Some(1), yes, [yes, yes, no], [yes, no, no]),
+            (None, no, [no, no, no], [yes, yes, yes]),
+            (None, yes, [yes, yes, yes], [no, no, no]),
+        ] {
+            let onset = Onset { cycle: 4.0, run, ends };
+            let found = [0, 1, 2].map(|run| (onset.acts_at_start(run), onset.acts_at_end(run)));
+            assert_eq!(found.map(|(start, _)| start), at_start, "{onset:?}");
+            assert_eq!(found.map(|(_, end)| end), at_end, "{onset:?}");
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! What the search needs to know of the machine whose model it judges.
+//!
+//! Nothing in [`super`] knows of worms. A plant was recorded in some runs, on some channels that are compared with a model's in bins of its
+//! motion; it has nuisances, effects of the library that its recordings can show, and predictions of both.
+
+use super::bins::Bins;
+use super::fit::Fit;
+use super::hypothesis::Hypothesis;
+use super::impact::Impact;
+use super::parameter::{Free, Hypothesised};
+use crate::explain::error::ExplainError;
+use std::ops::Range;
+
+/// The recordings of a machine, as the statistics see them.
+pub(in crate::explain) trait Recorded: Sync {
+    /// Number of runs.
+    fn runs(&self) -> usize;
+    /// Channels that are compared with the model's: for a worm, the positions of its cells. An effect may concern one of them.
+    fn channels(&self) -> usize;
+    /// The condition that differs from run to run, of the order of 1: for a worm, the sine of the slope.
+    fn condition(&self, run: usize) -> f64;
+    /// The bins of the gap in a run.
+    fn bins(&self, run: usize) -> &Bins;
+    /// The bin that each row of a run's residuals is in.
+    fn bin_of_rows(&self, run: usize) -> Vec<usize>;
+    /// The rows, whitened by the noise, of a pattern that every channel shows in every bin of a run: `[bin][channel]`, flat, in the unit of
+    /// the discrepancy's scale.
+    fn rows_of(&self, run: usize, pattern: &[f64]) -> Vec<f64>;
+    /// What is left of rows of a run where they count in some bins alone.
+    fn within(&self, run: usize, rows: &[f64], bins: Range<usize>) -> Vec<f64>;
+}
+
+/// What a hypothesis predicts for a run.
+pub(in crate::explain) struct PredictedRun {
+    /// Residuals, whitened by the noise; large throughout where the machine could not have made the run.
+    pub residuals: Vec<f64>,
+    /// What anybody asks of the run: for a worm, its advance in a cycle, m. `NaN` where it could not have made the run.
+    pub outcome: f64,
+}
+
+/// A machine with its model.
+pub(in crate::explain) trait Plant: Recorded {
+    /// Everything that is not known exactly and that no effect is about, with its prior.
+    fn nuisances(&self) -> Vec<Free>;
+    /// Whether a nuisance concerns a run.
+    fn concerns(&self, nuisance: usize, run: usize) -> bool;
+    /// Every hypothesis about a single effect that the recordings can show.
+    fn hypotheses(&self) -> Vec<Hypothesised>;
+    /// The stretch along which an effect that has a place may act, m.
+    fn stretch_m(&self) -> (f64, f64);
+
+    /// What a hypothesis predicts for a run.
+    fn predict(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> PredictedRun;
+    /// Whether what repeats is predicted once, which is not quite what predicting all of it gives.
+    fn repeats(&self, hypothesis: &Hypothesis, at: &[f64]) -> bool;
+    /// The least outcome of a run that changes of it are relative to.
+    fn least_outcome(&self, run: usize) -> f64;
+    /// What the effect in some place of a fitted hypothesis changes; `limit` is the relative change of outcome and energy that matters.
+    fn impact(&self, fit: &Fit, place: usize, limit: f64) -> Impact;
+    /// Logarithms of the Bayes factors of rhythms in what a fit leaves: from cycle to cycle, and within the cycles; none where it cannot
+    /// be told.
+    fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2];
+    /// A fit with what nuisances have of an effect's law moved into the effect; it predicts the same.
+    fn with_whole_effects(&self, fit: Fit) -> Fit;
+
+    /// Measures the noise by what a hypothesis leaves of the data.
+    ///
+    /// # Errors
+    /// [`ExplainError`] where the machine could not have made a run.
+    fn measure_noise(&mut self, hypothesis: &Hypothesis, at: &[f64]) -> Result<(), ExplainError>;
+    /// Judges anew, by a recalibrated model, what is assumed about the runs. Returns whether any of it is new.
+    fn judge_assumptions(&mut self, hypothesis: &Hypothesis, at: &[f64]) -> bool;
+    /// Keeps what makes predictions near a hypothesis quicker.
+    fn settle(&mut self, hypothesis: &Hypothesis, at: &[f64]);
+    /// Values from which a recalibration may reach another minimum than that at some values.
+    fn another_start(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64>;
+    /// What the discrepancy's scale is a fraction of: for a worm, the mean largest deformation of its tips, m.
+    fn discrepancy_unit(&self) -> f64;
+}

@@ -1,0 +1,93 @@
+//! Prepares the runs of a campaign.
+
+use super::super::error::ExplainError;
+use super::observed::Observed;
+use super::predict::{Scene, nominal, predict};
+use super::residual::Residual;
+use crate::experiment::RecordedRun;
+use worm_estimator::config::Config;
+use worm_physics::effect::Setting;
+use worm_physics::{Physics, Worm};
+
+/// Damping ratio of a body before it is known.
+const USUAL: f64 = 0.4;
+
+/// Prepares the runs of a campaign.
+pub(in crate::explain) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
+    if runs.is_empty() {
+        return Err(ExplainError::NoRun);
+    }
+    if config.worm.cells < 3 {
+        return Err(ExplainError::TwoCells);
+    }
+    let settings: Vec<Setting> = config
+        .effect
+        .iter()
+        .map(|effect| effect.setting(config.worm.cells))
+        .collect::<Result<_, _>>()?;
+    let mut scene = Scene {
+        observed: Vec::with_capacity(runs.len()),
+        nominal: Vec::with_capacity(runs.len()),
+    };
+    for run in runs {
+        let mut observed = Observed::new(*run, config)?;
+        if let Some(first) = scene.observed.first() {
+            same_order(first, &observed)?;
+        }
+        let worm = Worm::try_from(config)?.with_slope_rad(run.slope_deg.to_radians())?;
+        let physics = Physics::of(nominal(&observed, worm, run.payload_kg)).with(&settings);
+        if physics.clamped_worm().check_hold().is_err() {
+            return Err(ExplainError::SlidesDown {
+                recording: run.recording.source.display().to_string(),
+                slope_deg: run.slope_deg,
+            });
+        }
+        if observed.may_be_laid_down {
+            judge_start(&mut observed, &physics, USUAL);
+        }
+        scene.observed.push(observed);
+        scene.nominal.push(physics);
+    }
+    Ok(scene)
+}
+
+fn same_order(first: &Observed<'_>, other: &Observed<'_>) -> Result<(), ExplainError> {
+    if first.step_order == other.step_order {
+        return Ok(());
+    }
+    let from_one = |order: &[usize]| order.iter().map(|cell| cell + 1).collect();
+    Err(ExplainError::StepOrder {
+        recording: other.run.recording.source.display().to_string(),
+        found: from_one(&other.step_order),
+        first: first.run.recording.source.display().to_string(),
+        expected: from_one(&first.step_order),
+    })
+}
+
+/// Assumes that the worm was laid down at the start where its first cycle fits that better. Returns whether that is new.
+pub(super) fn judge_start(observed: &mut Observed<'_>, physics: &Physics, damping_ratio: f64) -> bool {
+    let before = observed.laid_down;
+    let first_cycle = |observed: &Observed<'_>| {
+        let predicted = predict(observed, physics, damping_ratio, physics.is_periodic())?;
+        let residual = Residual::new(observed, &predicted);
+        let until = observed.phase.partition_point(|&phase| phase < observed.phase[0] + 1.0);
+        let body: Vec<f64> = residual.body_m[..until]
+            .iter()
+            .copied()
+            .filter(|at_m| at_m.is_finite())
+            .collect();
+        let mean = body.iter().sum::<f64>() / body.len() as f64;
+        Some(body.iter().map(|at_m| (at_m - mean).powi(2)).sum::<f64>())
+    };
+    observed.assume_laid_down(true);
+    let laid_down = first_cycle(observed);
+    observed.assume_laid_down(false);
+    let under_way = first_cycle(observed);
+    let is_laid_down = match (laid_down, under_way) {
+        (Some(laid_down), Some(under_way)) => laid_down < under_way,
+        (Some(_), None) => true,
+        _ => false,
+    };
+    observed.assume_laid_down(is_laid_down);
+    is_laid_down != before
+}
