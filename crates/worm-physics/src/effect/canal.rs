@@ -1,6 +1,6 @@
 //! Effects of the slope and the surface of the canal.
 
-use super::definition::{Effect, Parameter, Scope, ShapeStarts, Visible};
+use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 use crate::physics::Patch;
 
 /// The same error on all runs, as from a badly levelled bench.
@@ -24,6 +24,9 @@ pub(super) static SLOPE_ERROR: Effect = Effect {
         notable: 0.15,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: Some(1.5),
+    may_begin: false,
     apply: |physics, _, values| physics.worm.tilt_rad(values[0].to_radians()),
 };
 
@@ -71,6 +74,9 @@ pub(super) static SLICK_PATCH: Effect = Effect {
         spacing_m: 0.015,
         lengths_m: &[0.02, 0.05],
     },
+    sense: Sense::Either,
+    care: None,
+    may_begin: false,
     apply: |physics, _, values| {
         physics.laws.patch = Patch {
             from_m: values[1],
@@ -101,5 +107,8 @@ pub(super) static SLOPE_CLAMPING: Effect = Effect {
         notable: 0.05,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: false,
     apply: |physics, _, values| physics.slope_clamping += values[0],
 };

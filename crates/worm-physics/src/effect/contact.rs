@@ -1,6 +1,6 @@
 //! Effects of the friction between tips and wall.
 
-use super::definition::{Effect, Parameter, Scope, ShapeStarts, Visible};
+use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// One cell holds harder or softer than the others. Positions show only the product of friction coefficient and normal force.
 pub(super) static UNEQUAL_CLAMPING: Effect = Effect {
@@ -23,6 +23,9 @@ pub(super) static UNEQUAL_CLAMPING: Effect = Effect {
         notable: 0.02,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, cell, values| physics.worm.scale_friction(cell, values[0]),
 };
 
@@ -48,6 +51,9 @@ pub(super) static DIRECTIONAL_FRICTION: Effect = Effect {
         notable: 0.02,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.worm.scale_backward_friction(values[0]),
 };
 
@@ -94,6 +100,9 @@ pub(super) static BREAKAWAY_FRICTION: Effect = Effect {
         },
     ],
     shape_starts: ShapeStarts::Grid(&[&[1e-5, 1e-4, 1e-3], &[0.05, 0.3]]),
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| {
         physics.laws.static_over_kinetic *= values[0];
         physics.laws.slip_m = values[1];
@@ -122,5 +131,8 @@ pub(super) static WEAR: Effect = Effect {
         notable: 0.0005,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Positive,
+    care: None,
+    may_begin: false,
     apply: |physics, _, values| physics.laws.wear_per_cycle += values[0],
 };

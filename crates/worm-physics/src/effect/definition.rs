@@ -28,6 +28,17 @@ pub enum Visible {
     PhaseTime,
 }
 
+/// Which senses of an effect's severity physics allows, about the value at which it does nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sense {
+    /// Above it and below.
+    Either,
+    /// Above it, unless something is odd: a payload may be mass that is missing.
+    UsuallyPositive,
+    /// Above it: what changes the other way has another cause.
+    Positive,
+}
+
 /// A quantity of an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
@@ -89,6 +100,13 @@ pub struct Effect {
     pub parameters: &'static [Parameter],
     /// Where a search starts in the parameters after the severity.
     pub shape_starts: ShapeStarts,
+    /// Which senses its severity may have.
+    pub sense: Sense,
+    /// Standard deviation of the severity that care with building the machine and laying it down leaves, where they set it.
+    pub care: Option<f64>,
+    /// Whether it may begin or end in mid-run: what changes the worm or its load may, what says in its law where or for how long it acts
+    /// has that there, and a measurement does not change by itself.
+    pub may_begin: bool,
     /// Adds it to some physics: on the cell (from 0) where one is given, with the values of its parameters.
     pub(super) apply: fn(&mut Physics, Option<usize>, &[f64]),
 }

@@ -1,6 +1,6 @@
 //! Effects of motor, cam and transmission.
 
-use super::definition::{Effect, Parameter, Scope, ShapeStarts, Visible};
+use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// A worn cam, a slipping belt. A negative value is a longer stroke.
 pub(super) static LOST_STROKE: Effect = Effect {
@@ -23,6 +23,9 @@ pub(super) static LOST_STROKE: Effect = Effect {
         notable: 0.005,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Positive,
+    care: Some(0.075),
+    may_begin: true,
     apply: |physics, cell, values| physics.worm.scale_stroke(cell, 1.0 - values[0]),
 };
 
@@ -47,6 +50,9 @@ pub(super) static ACTUATOR_COMPLIANCE: Effect = Effect {
         notable: 5e-6,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.laws.compliance_m_per_n += values[0],
 };
 
@@ -71,6 +77,9 @@ pub(super) static BACKLASH: Effect = Effect {
         notable: 2e-5,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.laws.play_m += values[0],
 };
 
@@ -95,6 +104,9 @@ pub(super) static STEP_OVERLAP: Effect = Effect {
         notable: 0.005,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: false,
     apply: |physics, _, values| physics.laws.overlap = (physics.laws.overlap + values[0]).min(0.5),
 };
 
@@ -119,5 +131,8 @@ pub(super) static MOTOR_DROOP: Effect = Effect {
         notable: 0.01,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.slowdown_per_n += values[0],
 };

@@ -1,6 +1,6 @@
 //! Effects of external forces and mass.
 
-use super::definition::{Effect, Parameter, Scope, ShapeStarts, Visible};
+use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// A fluid, a lubricant or a sleeve.
 pub(super) static VISCOUS_DRAG: Effect = Effect {
@@ -23,6 +23,9 @@ pub(super) static VISCOUS_DRAG: Effect = Effect {
         notable: 1.0,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.laws.drag_n_s_per_m += values[0],
 };
 
@@ -47,6 +50,9 @@ pub(super) static CONSTANT_DRAG: Effect = Effect {
         notable: 0.02,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Positive,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.worm.add_resisting_force_n(values[0]),
 };
 
@@ -71,6 +77,9 @@ pub(super) static PAYLOAD: Effect = Effect {
         notable: 0.004,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::UsuallyPositive,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.worm.add_mass_kg(values[0]),
 };
 
@@ -95,5 +104,8 @@ pub(super) static TETHER_DRAG: Effect = Effect {
         notable: 0.3,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Positive,
+    care: None,
+    may_begin: false,
     apply: |physics, _, values| physics.laws.tether_n_per_m += values[0],
 };

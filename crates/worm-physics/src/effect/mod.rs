@@ -28,7 +28,7 @@ mod search;
 mod sensor;
 mod setting;
 
-pub use definition::{Effect, MAX_PARAMETERS, Parameter, Scope, ShapeStarts, Visible};
+pub use definition::{Effect, MAX_PARAMETERS, Parameter, Scope, Sense, ShapeStarts, Visible};
 pub use error::SettingError;
 pub use library::{LIBRARY, MOTOR_DROOP, named};
 pub use setting::Setting;

@@ -1,6 +1,6 @@
 //! Effects of the elasticity of the pads.
 
-use super::definition::{Effect, Parameter, Scope, ShapeStarts, Visible};
+use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// One cell's pads are stiffer or softer. The friction force stays, so the largest deformation μN/k changes too.
 pub(super) static UNEQUAL_STIFFNESS: Effect = Effect {
@@ -23,6 +23,9 @@ pub(super) static UNEQUAL_STIFFNESS: Effect = Effect {
         notable: 0.03,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, cell, values| physics.worm.scale_stiffness(cell, values[0]),
 };
 
@@ -47,6 +50,9 @@ pub(super) static HARDENING: Effect = Effect {
         notable: 0.05,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.laws.hardening += values[0],
 };
 
@@ -82,6 +88,9 @@ pub(super) static CREEP: Effect = Effect {
         },
     ],
     shape_starts: ShapeStarts::Grid(&[&[0.1, 0.4, 1.5]]),
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| {
         physics.laws.creep_share += values[0];
         physics.laws.creep_time_s = values[1];
@@ -109,5 +118,8 @@ pub(super) static HYSTERESIS: Effect = Effect {
         notable: 0.03,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: true,
     apply: |physics, _, values| physics.laws.yielding_share = (physics.laws.yielding_share + values[0]).min(0.8),
 };

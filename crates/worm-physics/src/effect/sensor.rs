@@ -1,6 +1,6 @@
 //! Effects of the measurement, not of the worm.
 
-use super::definition::{Effect, Parameter, Scope, ShapeStarts, Visible};
+use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// A miscalibrated camera. Positions alone cannot distinguish it from a rescaled stroke, δ and weight/k.
 pub(super) static SCALE: Effect = Effect {
@@ -23,6 +23,9 @@ pub(super) static SCALE: Effect = Effect {
         notable: 0.005,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: false,
     apply: |physics, _, values| physics.view.scale *= values[0],
 };
 
@@ -47,5 +50,8 @@ pub(super) static LATENCY: Effect = Effect {
         notable: 0.001,
     }],
     shape_starts: ShapeStarts::Neutral,
+    sense: Sense::Either,
+    care: None,
+    may_begin: false,
     apply: |physics, _, values| physics.view.latency_s += values[0],
 };

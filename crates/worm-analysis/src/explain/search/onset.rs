@@ -10,7 +10,6 @@ use super::fit::{Fit, FitProblem};
 use super::hypothesis::Hypothesis;
 use super::judge::candidate::Candidate;
 use super::judge::ln_sum::ln_sum;
-use super::judge::prior;
 use super::judge::structural_change::Change;
 use super::judgement::Judge;
 use super::parameter::{Hypothesised, Onset};
@@ -199,7 +198,7 @@ fn screen(judge: &Judge<'_, impl Plant>, fit: &Fit, screened: &[Screening], ends
     };
     let may_begin = screened
         .par_iter()
-        .filter(|screening| prior::may_begin(screening.hypothesised.effect));
+        .filter(|screening| screening.hypothesised.effect.may_begin);
     let mut promising: Vec<Promising> = may_begin.map(of_effect).collect();
     let ln_odds = |one: &Promising| one.screening.ln_bayes + judge.ln_prior(&[one.screening.hypothesised]);
     promising.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));

@@ -14,7 +14,7 @@
 //! in one of them, at any cycle.
 
 use super::super::parameter::{Hypothesised, Onset};
-use worm_physics::effect::{Effect, Parameter, Scope};
+use worm_physics::effect::{Effect, Parameter, Scope, Sense};
 
 /// Prior probability of none, of something else, of a single effect and of a pair.
 pub(in crate::explain) const NONE: f64 = 0.5;
@@ -31,24 +31,9 @@ const MEASURABLE: std::ops::RangeInclusive<f64> = 2e-3..=0.8;
 const WITHOUT_IMPACT: f64 = 10.0;
 /// Mass of the sense that is hardly physical.
 const UNPHYSICAL: f64 = 0.1;
-/// Effects whose severity is positive unless something is odd.
-const ONE_SENSE: [&str; 5] = ["constant-drag", "tether-drag", "payload", "wear", "lost-stroke"];
-/// Those that have no other sense: what changes the other way has another cause. A payload may also be mass that is missing.
-const NO_OTHER_SENSE: [&str; 4] = ["constant-drag", "tether-drag", "wear", "lost-stroke"];
-/// Standard deviations set by the care with which a worm is built and laid down: of the slope, degrees, and of lost stroke.
-const CARE: [(&str, f64); 2] = [("slope-error", 1.5), ("lost-stroke", 0.075)];
-/// Probabilities that an effect which may begin in mid-run does, and that it ends there; and effects that do not.
+/// Probabilities that an effect which may begin in mid-run does, and that it ends there.
 const BEGINS: f64 = 0.3;
 const ENDS: f64 = 0.1;
-const NEVER_BEGIN: [&str; 7] = [
-    "slope-error",
-    "wear",
-    "tether-drag",
-    "sensor-scale",
-    "sensor-latency",
-    "step-overlap",
-    "slope-clamping",
-];
 /// Nodes of the integral that normalises the density of one sense.
 const NODES: usize = 60;
 
@@ -81,21 +66,17 @@ impl SeverityPrior {
             None => WITHOUT_IMPACT * severity.notable,
         };
         let ln_median = median.clamp(severity.notable, 0.7 * reach[0].max(reach[1])).ln();
-        let care = CARE
-            .iter()
-            .find(|(name, _)| *name == effect.name)
-            .map(|(_, care)| *care);
         let mut prior = Self {
             neutral: severity.neutral,
             reach,
             ln_median,
-            care,
+            care: effect.care,
             ln_mass: [0.0; 2],
         };
         let below = match (reach[0] > 0.0, reach[1] > 0.0) {
             (false, _) => 0.0,
             (true, false) => 1.0,
-            _ if ONE_SENSE.contains(&effect.name) => UNPHYSICAL,
+            _ if effect.sense != Sense::Either => UNPHYSICAL,
             _ => 0.5,
         };
         prior.ln_mass = [(below, 0), (1.0 - below, 1)].map(|(mass, side): (f64, usize)| {
@@ -150,7 +131,7 @@ impl SeverityPrior {
 
 /// Whether a severity has a sense that its effect can have.
 pub(in crate::explain) fn is_possible(effect: &Effect, value: f64) -> bool {
-    !NO_OTHER_SENSE.contains(&effect.name) || value >= effect.severity().neutral
+    effect.sense != Sense::Positive || value >= effect.severity().neutral
 }
 
 /// Logarithm of the density of a parameter of shape, and its width: uniform in the logarithm where it is positive, else along the canal.
@@ -199,7 +180,7 @@ impl Campaign {
         let twins = 1.0 + one.effect.twins.len() as f64;
         let at_some_cycle = |onset: Onset| if onset.ends { ENDS } else { BEGINS } / self.cycles;
         let when = match one.onset {
-            _ if !may_begin(one.effect) => 1.0,
+            _ if !one.effect.may_begin => 1.0,
             None => 1.0 - BEGINS - ENDS,
             // All runs as probable as any one.
             Some(onset) if self.runs == 1 => at_some_cycle(onset),
@@ -218,12 +199,6 @@ impl Campaign {
             _ => (2.0 * PAIR).ln() + shares,
         }
     }
-}
-
-/// Whether an effect may begin or end in mid-run: what changes the worm or its load may, what says where or for how long it acts has that in
-/// its law, and a measurement does not change by itself.
-pub(in crate::explain) fn may_begin(effect: &Effect) -> bool {
-    !effect.has_place() && !NEVER_BEGIN.contains(&effect.name)
 }
 
 #[cfg(test)]
@@ -303,7 +278,7 @@ mod tests {
         let at_cycle_3 = |run: Option<usize>| [true, false].map(|ends| Onset { cycle: 3.0, run, ends });
         let prior = |one: &Hypothesised| {
             let mut sum = campaign.ln_prior(&[*one]).exp();
-            if may_begin(one.effect) {
+            if one.effect.may_begin {
                 let onsets = [None, Some(0), Some(1), Some(2)].into_iter().flat_map(at_cycle_3);
                 let with_onset = onsets.map(|onset| Hypothesised {
                     onset: Some(onset),
