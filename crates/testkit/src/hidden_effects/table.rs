@@ -33,6 +33,12 @@ impl ScoreTable<'_> {
         answered.filter(move |one| one.truth.kind == kind)
     }
 
+    /// Worms with nothing wrong, or with a discrepancy put in.
+    fn clean(&self, discrepant: bool) -> impl Iterator<Item = &Assessment> {
+        self.of(CampaignKind::Clean)
+            .filter(move |one| one.truth.is_discrepant() == discrepant)
+    }
+
     /// Campaigns with something wrong in the recordings.
     fn spoiled(&self) -> impl Iterator<Item = &Assessment> {
         self.0.iter().filter(|one| !one.truth.artefacts.is_empty())
@@ -78,7 +84,7 @@ impl ScoreTable<'_> {
             proportion,
             target,
         };
-        use CampaignKind::{Clean, Pair, Single, Triple};
+        use CampaignKind::{Pair, Single, Triple};
         vec![
             row(
                 "no answer at all",
@@ -99,13 +105,19 @@ impl ScoreTable<'_> {
             ),
             row(
                 "clean: an effect named",
-                share(self.of(Clean), names),
+                share(self.clean(false), names),
                 "<= 3 % (MuJoCo 5 %)",
             ),
             row(
                 "clean: outside the library",
-                share(self.of(Clean), |one| is(one, Verdict::Outside)),
+                share(self.clean(false), |one| is(one, Verdict::Outside)),
                 "<= 10 % (15 %)",
+            ),
+            row("discrepant: an effect named", share(self.clean(true), names), ""),
+            row(
+                "discrepant: outside the library",
+                share(self.clean(true), |one| is(one, Verdict::Outside)),
+                "",
             ),
             row(
                 "single: strong by truth",

@@ -164,6 +164,11 @@ impl Truth {
         self.impact() < NEGLIGIBLE_IMPACT
     }
 
+    /// Whether it is a worm without an effect into which a discrepancy was put.
+    pub fn is_discrepant(&self) -> bool {
+        self.kind == CampaignKind::Clean && self.discrepancy_m > 0.0
+    }
+
     /// The first onset in the order of the runs.
     pub fn onset(&self) -> Option<TrueOnset> {
         self.runs.iter().find_map(|run| run.onset)

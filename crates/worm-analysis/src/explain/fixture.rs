@@ -2,10 +2,11 @@
 
 use crate::experiment::{RecordedRun, Simulation, simulate};
 use crate::explain::search::discrepancy::Discrepancy;
-use crate::explain::search::fit::{Fit, FitProblem};
+use crate::explain::search::fit::Fit;
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::parameter::{Hypothesised, Onset};
 use crate::explain::search::plant::Plant;
+use crate::explain::search::problem::FitProblem;
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::predict::Scene;
 use crate::explain::worm::recorded_worm::{RecordedWorm, WormProblem};

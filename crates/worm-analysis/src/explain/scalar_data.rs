@@ -28,7 +28,7 @@ use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::parameter::{Free, Hypothesised};
 use crate::explain::worm::nuisance::Nuisance;
-use crate::explain::worm::recorded_worm::hypotheses;
+use crate::explain::worm::plant::hypotheses;
 use crate::recording::Advance;
 use model_selection::{AdvanceKind, Selected};
 use rayon::prelude::*;

@@ -21,7 +21,8 @@ fn the_sample_is_explained_and_scored() {
     // What is counted, and of how many.
     let expected = [
         ("no answer at all", (0, 6)),
-        ("clean: an effect named", (0, 2)),
+        ("clean: an effect named", (0, 1)),
+        ("discrepant: an effect named", (0, 1)),
         ("single: false second effect", (0, 1)),
         ("strong: strictly right", (1, 1)),
         ("strong: cell right", (1, 1)),

@@ -1,9 +1,9 @@
 use super::*;
 use crate::experiment::{RecordedRun, Simulation, simulate};
 use crate::explain::answer::RunChange;
-use crate::explain::search::fit::FitProblem;
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::plant::Plant;
+use crate::explain::search::problem::FitProblem;
 use crate::explain::worm::nuisance::Nuisance;
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::predict::{Scene, nominal};

@@ -15,8 +15,9 @@
 //! A vague effect predicts everything with a low density and so pays for its freedom. The priors' part of chi-squared of the whole
 //! fit is added: of two hypotheses that predict the same, the one with less extreme values is more likely.
 
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::plant::{Plant, Recorded};
+use super::problem::FitProblem;
 use crate::least_squares::{dot, prior_chi_squared, submatrix};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

@@ -2,7 +2,7 @@
 
 use super::cross_validation::{self, HeldOut};
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::judge::candidate::{Candidate, kinds};
 use super::judge::decision::{Selected, decide};
 use super::judge::evidence::{InTime, evidence};
@@ -11,6 +11,7 @@ use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
 use super::onset::{mean_cycles, with_onsets};
 use super::parameter::Hypothesised;
 use super::plant::Plant;
+use super::problem::FitProblem;
 use super::refit::{REFITTED, alone, pair_up, refit};
 use super::score_test::{self, Expected, Screening};
 

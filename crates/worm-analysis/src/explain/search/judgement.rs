@@ -2,7 +2,7 @@
 
 use super::cross_validation::{self, Fold, HeldOut};
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::judge::candidate::Candidate;
 use super::judge::chance::Chance;
 use super::judge::decision::{Judged, MATTERS};
@@ -10,6 +10,7 @@ use super::judge::evidence::{Evidence, InTime, evidence};
 use super::judge::prior;
 use super::parameter::{Hypothesised, What};
 use super::plant::Plant;
+use super::problem::FitProblem;
 use super::score_test::Screening;
 
 /// Fraction of machines without an effect, and without a second one, for which the best of the library may pass.

@@ -4,9 +4,10 @@
 //! stand on the other side of an end, and a descent stops at the first of them. Such an effect lists values to restart from
 //! ([`Effect::restarts`](worm_physics::effect::Effect::restarts)); the fit goes on from the best of them, until none is better.
 
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::parameter::What;
 use super::plant::Plant;
+use super::problem::FitProblem;
 
 const MAX_ROUNDS: usize = 6;
 /// Fall of chi-squared for which it is worth going on.

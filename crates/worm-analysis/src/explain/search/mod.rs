@@ -7,7 +7,7 @@
 //! - `plant`: what a plant is; `bins`: where its gap is localised; `impact`: what an effect changes of it.
 //! - `parameter`: which quantities may be free, with priors; `hypothesis`: which effects act, and which quantities are free.
 //! - `find`: the search, step by step; `recalibrate`: the model within the priors of its nuisances, before it.
-//! - `fit`: a plant's recordings as a problem of least squares; `discrepancy`: by how much a model is wrong everywhere.
+//! - `problem`: a plant's recordings as a problem of least squares, `fit`: a solution of it; `discrepancy`: by how much a model is wrong everywhere.
 //! - `score_test`: screens all effects, by their `directions`; `refit`: fits them to the end, `local_restart`: from one local minimum to
 //!   another; `onset`: effects that begin in mid-run.
 //! - `judge`: priors, evidence, chance and the verdict; `judgement`: weighs the candidates by them; `cross_validation`: held-out data,
@@ -28,6 +28,7 @@ pub(in crate::explain) mod normal_probability;
 pub(in crate::explain) mod onset;
 pub(in crate::explain) mod parameter;
 pub(in crate::explain) mod plant;
+pub(in crate::explain) mod problem;
 pub(in crate::explain) mod recalibrate;
 pub(in crate::explain) mod refit;
 pub(in crate::explain) mod score_test;

@@ -6,7 +6,7 @@
 //! gives a score for every cycle from one simulation of each effect. The best are fitted with the motion predicted as it is, and t₁ by
 //! values on a grid. Those that end are the same the other way round: up to t₁ instead of from it on.
 
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::judge::candidate::Candidate;
 use super::judge::ln_sum::ln_sum;
@@ -14,6 +14,7 @@ use super::judge::structural_change::Change;
 use super::judgement::Judge;
 use super::parameter::{Hypothesised, Onset};
 use super::plant::{Plant, Recorded};
+use super::problem::FitProblem;
 use super::refit::refit;
 use super::score_test::{Screening, ln_bayes, strong};
 use crate::least_squares::{cross, dot, submatrix};

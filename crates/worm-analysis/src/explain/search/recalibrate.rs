@@ -1,9 +1,10 @@
 //! Recalibrates the model of a plant within the priors of its nuisances.
 
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::plant::Plant;
+use super::problem::FitProblem;
 use crate::explain::error::ExplainError;
 
 /// Most recalibrations before the last one, which each give the noise of the next and judge what is assumed about the runs.

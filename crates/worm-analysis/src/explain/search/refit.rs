@@ -1,6 +1,6 @@
 //! Fits effects to the end: alone, and in pairs.
 
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::judge::candidate::{Candidate, are_twins};
 use super::judge::chance::Chance;
@@ -8,6 +8,7 @@ use super::judgement::Judge;
 use super::local_restart::restart_locally;
 use super::parameter::{Hypothesised, What};
 use super::plant::Plant;
+use super::problem::FitProblem;
 use super::score_test::{self, Expected, Screening};
 use rayon::prelude::*;
 use std::collections::BTreeSet;

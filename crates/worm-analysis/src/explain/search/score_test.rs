@@ -8,13 +8,14 @@
 
 use super::directions::{Directions, Projector};
 use super::discrepancy::Discrepancy;
-use super::fit::{Fit, FitProblem};
+use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::judge::chance::Chance;
 use super::judge::ln_sum::ln_sum;
 use super::judge::prior::SeverityPrior;
 use super::parameter::Hypothesised;
 use super::plant::Plant;
+use super::problem::FitProblem;
 use crate::least_squares::dot;
 use rayon::prelude::*;
 use std::f64::consts::TAU;

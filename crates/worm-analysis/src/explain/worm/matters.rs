@@ -9,7 +9,6 @@ use super::recorded_worm::RecordedWorm;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::impact::Impact;
 use crate::explain::search::parameter::What;
-use crate::explain::search::plant::Plant;
 
 /// The impact of the effect in some place of a fitted hypothesis; `limit` is the relative change of advance and energy that matters.
 pub(in crate::explain) fn impact(worm: &RecordedWorm<'_>, fit: &Fit, place: usize, limit: f64) -> Impact {
@@ -34,7 +33,7 @@ pub(in crate::explain) fn impact(worm: &RecordedWorm<'_>, fit: &Fit, place: usiz
             continue;
         };
         let (on_m, off_m) = (on.advance_m(observed), off.advance_m(observed));
-        let of_advance = (on_m - off_m).abs() / off_m.abs().max(worm.least_outcome(run)) / limit;
+        let of_advance = (on_m - off_m).abs() / off_m.abs().max(worm.least_advance_m(run)) / limit;
         impact.outcome = impact.outcome.max(of_advance);
         let energies_j = (
             energy_per_cycle_j(&worm.scene, run, (&hypothesis, &fit.at)),

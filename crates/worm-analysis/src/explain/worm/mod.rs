@@ -1,7 +1,7 @@
 //! The worm as a plant of the search.
 //!
 //! # Modules, in reading order
-//! - `recorded_worm`: all that the search asks of a worm; `prepare`: its runs, before that.
+//! - `plant`: all that the search asks of a worm; `recorded_worm`: its runs with their noise; `prepare`: the runs before that.
 //! - `observed`: a recording as the search sees it; `binning`: its bins; `nuisance`: what is not known exactly.
 //! - `predict`: the positions that a hypothesis predicts, by a `walk` from `start` along a `track` at a `pace`, at samples by their `clock`;
 //!   `phase_correction`: for phases found from overlapping steps; `predicted`: the result.
@@ -20,6 +20,7 @@ pub(in crate::explain) mod observed;
 pub(in crate::explain) mod pace;
 pub(in crate::explain) mod period;
 pub(in crate::explain) mod phase_correction;
+pub(in crate::explain) mod plant;
 pub(in crate::explain) mod predict;
 pub(in crate::explain) mod predicted;
 pub(in crate::explain) mod prepare;

@@ -1,34 +1,16 @@
-//! A recorded worm, as the search sees it.
+//! A recorded worm, as the statistics of the search see it.
 
-use super::binning::bins;
-use super::matters::impact;
 use super::noise::RunNoise;
-use super::nuisance::Nuisance;
 use super::observed::Observed;
-use super::period;
 use super::predict::Scene;
-use super::prepare::judge_start;
 use super::residual::Residual;
-use super::sway;
-use super::whole_effects::with_whole_effects;
-use crate::explain::error::ExplainError;
 use crate::explain::search::bins::Bins;
-use crate::explain::search::fit::{Fit, FitProblem};
-use crate::explain::search::hypothesis::Hypothesis;
-use crate::explain::search::impact::Impact;
-use crate::explain::search::parameter::{Free, Hypothesised};
-use crate::explain::search::plant::{Plant, PredictedRun, Recorded};
+use crate::explain::search::plant::Recorded;
+use crate::explain::search::problem::FitProblem;
 use std::ops::Range;
-use worm_physics::effect::{LIBRARY, Scope};
 
-/// Residual of a run that the worm could not have made.
-const IMPOSSIBLE: f64 = 1e3;
-/// Logarithm of the damping ratio of a heavily damped body.
-const HEAVILY_DAMPED: f64 = std::f64::consts::LN_2;
 /// Part of the stroke that changes of a smaller advance are relative to: of a worm that hardly advances, no change is small.
 const OF_STROKE: f64 = 0.25;
-/// How far behind the last cell's first place a tip may be, m.
-const BEHIND_M: f64 = 0.02;
 
 /// The runs of a worm, with their noise once that is measured.
 pub(in crate::explain) struct RecordedWorm<'a> {
@@ -56,28 +38,17 @@ impl<'a> RecordedWorm<'a> {
         self.scene.observed.iter().any(|observed| observed.phase_recorded)
     }
 
-    fn whitened(&self, run: usize, residual: &Residual) -> Vec<f64> {
+    /// The least advance of a run that changes of it are relative to, m.
+    pub fn least_advance_m(&self, run: usize) -> f64 {
+        OF_STROKE * self.scene.nominal[run].worm.stroke_m()
+    }
+
+    /// A residual, whitened by the noise.
+    pub fn whitened(&self, run: usize, residual: &Residual) -> Vec<f64> {
         let mut rows = Vec::with_capacity(self.bins[run].len() * (1 + self.channels()));
         self.noise[run].whiten(residual, &mut rows);
         rows
     }
-}
-
-/// Every hypothesis about a single effect that positions can show.
-pub(in crate::explain) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<Hypothesised> {
-    let mut all = Vec::new();
-    for &effect in &LIBRARY {
-        if !effect.is_visible_in_positions(phase_recorded) {
-            continue;
-        }
-        if effect.scope != Scope::OneCell {
-            all.push(Hypothesised::throughout(effect, None));
-        }
-        if effect.scope != Scope::Worm {
-            all.extend((0..cells).map(|cell| Hypothesised::throughout(effect, Some(cell))));
-        }
-    }
-    all
 }
 
 /// Rows of a run: the body's in every bin, then every cell's relative to it in every bin.
@@ -122,120 +93,5 @@ impl Recorded for RecordedWorm<'_> {
             of_cell.iter_mut().for_each(|row| **row -= mean);
         }
         within
-    }
-}
-
-impl Plant for RecordedWorm<'_> {
-    fn nuisances(&self) -> Vec<Free> {
-        Nuisance::all(self.channels(), self.runs(), self.phase_recorded())
-    }
-
-    fn concerns(&self, nuisance: usize, run: usize) -> bool {
-        Nuisance::of_number(nuisance).concerns(run)
-    }
-
-    fn hypotheses(&self) -> Vec<Hypothesised> {
-        hypotheses(self.channels(), self.phase_recorded())
-    }
-
-    /// The stretch of canal where tips have been.
-    fn stretch_m(&self) -> (f64, f64) {
-        let observed = self.scene.observed.iter();
-        let seen = observed.flat_map(|observed| observed.position_m.iter().flatten());
-        let (min_m, max_m) = seen
-            .filter(|at_m| at_m.is_finite())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(min_m, max_m), &at_m| {
-                (f64::min(min_m, at_m), f64::max(max_m, at_m))
-            });
-        (min_m - BEHIND_M, max_m)
-    }
-
-    fn predict(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> PredictedRun {
-        let observed = &self.scene.observed[run];
-        match self.scene.predict(run, hypothesis, at) {
-            Some(predicted) => PredictedRun {
-                residuals: self.whitened(run, &Residual::binned(observed, &self.bins[run], &predicted)),
-                outcome: predicted.advance_m(observed),
-            },
-            None => PredictedRun {
-                residuals: vec![IMPOSSIBLE; self.bins[run].len() * (1 + self.channels())],
-                outcome: f64::NAN,
-            },
-        }
-    }
-
-    fn repeats(&self, hypothesis: &Hypothesis, at: &[f64]) -> bool {
-        self.scene.repeats(0, hypothesis, at)
-    }
-
-    fn least_outcome(&self, run: usize) -> f64 {
-        OF_STROKE * self.scene.nominal[run].worm.stroke_m()
-    }
-
-    fn impact(&self, fit: &Fit, place: usize, limit: f64) -> Impact {
-        impact(self, fit, place, limit)
-    }
-
-    fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2] {
-        [period::ln_bayes(self, fit), sway::ln_bayes(self, fit)]
-    }
-
-    fn with_whole_effects(&self, fit: Fit) -> Fit {
-        with_whole_effects(fit)
-    }
-
-    fn measure_noise(&mut self, hypothesis: &Hypothesis, at: &[f64]) -> Result<(), ExplainError> {
-        self.bins = self.scene.observed.iter().map(bins).collect();
-        self.noise.clear();
-        for (run, observed) in self.scene.observed.iter().enumerate() {
-            let predicted = self
-                .scene
-                .predict(run, hypothesis, at)
-                .ok_or_else(|| ExplainError::SlidesDown {
-                    recording: observed.run.recording.source.display().to_string(),
-                    slope_deg: observed.run.slope_deg,
-                })?;
-            let residual = Residual::binned(observed, &self.bins[run], &predicted);
-            self.noise.push(RunNoise::measure(observed, &self.bins[run], &residual));
-        }
-        Ok(())
-    }
-
-    /// Whether the worms were laid down at the start: the nominal model is too far from some.
-    fn judge_assumptions(&mut self, hypothesis: &Hypothesis, at: &[f64]) -> bool {
-        let mut is_new = false;
-        for run in 0..self.runs() {
-            let (physics, damping_ratio) = self.scene.physics(run, hypothesis, at);
-            let observed = &mut self.scene.observed[run];
-            if observed.may_be_laid_down {
-                is_new |= judge_start(observed, &physics, damping_ratio);
-            }
-        }
-        is_new
-    }
-
-    fn settle(&mut self, hypothesis: &Hypothesis, at: &[f64]) {
-        self.scene.settle(hypothesis, at);
-    }
-
-    /// A heavily damped body: with damping the data of a fast worm may have two minima.
-    fn another_start(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64> {
-        let free = hypothesis.free.iter().zip(at);
-        free.map(|(free, &value)| match Nuisance::of(free.what) {
-            Some(Nuisance::Damping) => HEAVILY_DAMPED,
-            Some(Nuisance::Presliding) => free.quantity.min,
-            _ => value,
-        })
-        .collect()
-    }
-
-    /// The mean largest deformation of the tips, m: friction over stiffness.
-    fn discrepancy_unit(&self) -> f64 {
-        let worms = self.scene.nominal.iter().map(|physics| &physics.worm);
-        let all_m: Vec<f64> = worms
-            .flat_map(|worm| worm.contacts())
-            .map(|contact| 0.5 * (contact.forward_bound_m + contact.backward_bound_m))
-            .collect();
-        all_m.iter().sum::<f64>() / all_m.len() as f64
     }
 }

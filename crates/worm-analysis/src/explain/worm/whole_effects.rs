@@ -37,9 +37,9 @@ pub(in crate::explain) fn with_whole_effects(mut fit: Fit) -> Fit {
 mod tests {
     use super::*;
     use crate::explain::fixture::{Campaign, hypothesis, record, worm};
-    use crate::explain::search::fit::FitProblem;
     use crate::explain::search::hypothesis::Hypothesis;
     use crate::explain::search::parameter::Hypothesised;
+    use crate::explain::search::problem::FitProblem;
 
     #[test]
     fn what_a_nuisance_has_of_an_effects_law_goes_to_the_effect() {

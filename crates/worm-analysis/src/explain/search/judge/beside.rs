@@ -91,7 +91,7 @@ impl Block {
 
 #[cfg(test)]
 pub(super) fn beside_the_nominal_worm<T>(
-    problem: &super::super::fit::FitProblem<'_, impl super::super::plant::Plant>,
+    problem: &super::super::problem::FitProblem<'_, impl super::super::plant::Plant>,
     ask: impl Fn(&Fitted<'_>) -> T,
 ) -> T {
     let residual = problem.residuals(&super::super::hypothesis::Hypothesis::default(), &[]);

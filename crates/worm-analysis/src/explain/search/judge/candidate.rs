@@ -1,9 +1,10 @@
 //! A fitted effect, or a pair, that may be the answer.
 
 use super::super::cross_validation::HeldOut;
-use super::super::fit::{Fit, FitProblem};
+use super::super::fit::Fit;
 use super::super::parameter::{Hypothesised, What};
 use super::super::plant::Plant;
+use super::super::problem::FitProblem;
 use super::evidence::Evidence;
 use super::prior::is_possible;
 

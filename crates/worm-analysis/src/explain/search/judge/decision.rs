@@ -249,7 +249,7 @@ mod tests {
     use crate::explain::search::fit::Fit;
     use crate::explain::search::hypothesis::Hypothesis;
     use crate::explain::search::parameter::Hypothesised;
-    use crate::explain::worm::recorded_worm::hypotheses;
+    use crate::explain::worm::plant::hypotheses;
     use crate::least_squares::Estimate;
     use worm_physics::effect::named;
 

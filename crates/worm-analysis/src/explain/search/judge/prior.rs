@@ -204,7 +204,7 @@ impl Campaign {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explain::worm::recorded_worm::hypotheses;
+    use crate::explain::worm::plant::hypotheses;
     use worm_physics::effect::named;
 
     /// An effect whose change by one unit changes the advance by so much.
