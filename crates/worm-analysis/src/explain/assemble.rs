@@ -8,9 +8,9 @@ mod stages;
 
 use super::answer::{Answer, Doubt, Figures, NamedEffect, Remainder, ResidualMap, RunSummary, Verdict};
 use super::experiment_design::propose;
-use super::gap::cycles;
 use super::residual_map::{map, places};
 use super::words;
+use super::worm::gap::cycles;
 use crate::explain::search::find::Found;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;

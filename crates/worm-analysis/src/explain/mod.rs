@@ -15,7 +15,7 @@
 //! - `recorded`: the search on recordings of a worm, from beginning to end.
 //! - `search`: the search for the missing effect of any machine, a plant.
 //! - `worm`: the worm as such a plant.
-//! - `assemble`: puts the answer together, from `residual_map`: where the gap is, `gap`: how it shrinks, `experiment_design`: the next
+//! - `assemble`: puts the answer together, from `residual_map`: where the gap is, `experiment_design`: the next
 //!   experiment, and `words`: the answer in words.
 //! - `scalar_data`: the same where only advances per cycle are known.
 //! - [`model_update`]: the model's file with the answer in it; `prediction`: what a model predicts, without any search.
@@ -26,7 +26,6 @@ mod error;
 mod experiment_design;
 #[cfg(test)]
 mod fixture;
-mod gap;
 pub mod model_update;
 mod prediction;
 mod recorded;

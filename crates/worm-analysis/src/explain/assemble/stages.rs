@@ -2,8 +2,8 @@
 
 use super::Parts;
 use crate::explain::answer::{Stage, StageKind};
-use crate::explain::gap::Measured;
 use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::worm::gap::{Measured, clusters};
 use crate::explain::worm::recorded_worm::RecordedWorm;
 
 /// The gap, stage by stage, and what fraction of it each candidate closes.
@@ -37,10 +37,10 @@ impl Gap {
                 .collect();
             measured.stage(kind, Some(names.join(" + ")), &candidate.fit, folds)
         };
-        let open = measured.clusters(&parts.recalibrated, &parts.found.recalibrated_held_out.fits);
+        let open = clusters(worm, &parts.recalibrated, &parts.found.recalibrated_held_out.fits);
         let closure = |candidate: &Candidate| {
             let folds = candidate.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
-            open.closure(&measured.clusters(&candidate.fit, folds), floor.held_out_rms_m)
+            open.closure(&clusters(worm, &candidate.fit, folds), floor.held_out_rms_m)
         };
         let of_named: Vec<Stage> = named
             .iter()

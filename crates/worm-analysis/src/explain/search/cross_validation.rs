@@ -15,7 +15,7 @@
 //! A vague effect predicts everything with a low density and so pays for its freedom. The priors' part of chi-squared of the whole
 //! fit is added: of two hypotheses that predict the same, the one with less extreme values is more likely.
 
-use super::fit::Fit;
+use super::fit::{Fit, FitWithout};
 use super::plant::{Plant, Recorded};
 use super::problem::FitProblem;
 use crate::least_squares::{dot, prior_chi_squared, submatrix};
@@ -33,9 +33,6 @@ pub(in crate::explain) struct Fold {
     /// For each run and whole cycle since its first sample, whether it is left out.
     pub left_out: Vec<Vec<bool>>,
 }
-
-/// A fit, and what was left out for it, as [`Fold::left_out`] says.
-pub(in crate::explain) type FitWithout = (Fit, Vec<Vec<bool>>);
 
 /// How a hypothesis does on data that it was not fitted to.
 #[derive(Debug, Clone)]

@@ -153,7 +153,7 @@ pub(in crate::explain) fn find<P: Plant>(
     let folds = cross_validation::folds(plant);
     let recalibrated_held_out = held_out(problem, recalibrated, &folds);
     report("judgement", 0.9);
-    let judged = judge.judge(candidates, pairs, &chance, &folds, recalibrated_held_out.chi_squared);
+    let judged = judge.judge(candidates, pairs, &chance, &folds, &recalibrated_held_out);
     let fitted: Vec<&Hypothesised> = judged.iter().flat_map(|one| &one.candidate.hypothesised).collect();
     // What the rough fits dismissed counts by its prior at most: first order promises strong effects too much.
     let unfitted: Vec<f64> = screened

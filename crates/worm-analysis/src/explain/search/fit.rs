@@ -18,6 +18,9 @@ pub(in crate::explain) struct Fit {
     pub converged: bool,
 }
 
+/// A fit, and what was left out for it: for each run and whole cycle since its first sample, whether it was.
+pub(in crate::explain) type FitWithout = (Fit, Vec<Vec<bool>>);
+
 impl Fit {
     pub fn new(hypothesis: &Hypothesis, estimate: Estimate) -> Self {
         let Estimate {

@@ -4,7 +4,7 @@
 //! motion; it has nuisances, effects of the library that its recordings can show, and predictions of both.
 
 use super::bins::Bins;
-use super::fit::Fit;
+use super::fit::{Fit, FitWithout};
 use super::hypothesis::Hypothesis;
 use super::impact::Impact;
 use super::parameter::{Free, Hypothesised};
@@ -60,6 +60,9 @@ pub(in crate::explain) trait Plant: Recorded {
     /// Logarithms of the Bayes factors of rhythms in what a fit leaves: from cycle to cycle, and within the cycles; none where it cannot
     /// be told.
     fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2];
+    /// 90 % interval of the fraction of the squared gap that one fit leaves open and another closes on data held out, down to noise and the
+    /// discrepancy's scale; none where that is within its error.
+    fn closed(&self, open: (&Fit, &[FitWithout]), left: (&Fit, &[FitWithout]), discrepancy: f64) -> Option<[f64; 2]>;
     /// A fit with what nuisances have of an effect's law moved into the effect; it predicts the same.
     fn with_whole_effects(&self, fit: Fit) -> Fit;
 

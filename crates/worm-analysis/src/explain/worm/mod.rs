@@ -6,6 +6,7 @@
 //! - `predict`: the positions that a hypothesis predicts, by a `walk` from `start` along a `track` at a `pace`, at samples by their `clock`;
 //!   `phase_correction`: for phases found from overlapping steps; `predicted`: the result.
 //! - `residual`: what a prediction leaves of the data; `noise`: how well the worm repeats itself.
+//! - `gap`: how far a model is off, from the nominal one down to the noise floor.
 //! - `energy`: what cycles cost, over the `settled_cycles`; `matters`: whether an effect changes what anybody asks.
 //! - `period`: whether the residual repeats from cycle to cycle, `sway`: within the cycles, `wave`: how probable that is.
 //! - `whole_effects`: what nuisances have of an effect's law, given to the effect; `speed_droop`: the one effect that shows in time alone.
@@ -13,6 +14,7 @@
 pub(in crate::explain) mod binning;
 pub(in crate::explain) mod clock;
 pub(in crate::explain) mod energy;
+pub(in crate::explain) mod gap;
 pub(in crate::explain) mod matters;
 pub(in crate::explain) mod noise;
 pub(in crate::explain) mod nuisance;

@@ -1,6 +1,7 @@
 //! The worm as a plant: what it predicts, its nuisances and its effects.
 
 use super::binning::bins;
+use super::gap::closed;
 use super::matters::impact;
 use super::noise::RunNoise;
 use super::nuisance::Nuisance;
@@ -11,7 +12,7 @@ use super::residual::Residual;
 use super::sway;
 use super::whole_effects::with_whole_effects;
 use crate::explain::error::ExplainError;
-use crate::explain::search::fit::Fit;
+use crate::explain::search::fit::{Fit, FitWithout};
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::impact::Impact;
 use crate::explain::search::parameter::{Free, Hypothesised};
@@ -95,6 +96,10 @@ impl Plant for RecordedWorm<'_> {
 
     fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2] {
         [period::ln_bayes(self, fit), sway::ln_bayes(self, fit)]
+    }
+
+    fn closed(&self, open: (&Fit, &[FitWithout]), left: (&Fit, &[FitWithout]), discrepancy_m: f64) -> Option<[f64; 2]> {
+        closed(self, open, left, discrepancy_m)
     }
 
     fn with_whole_effects(&self, fit: Fit) -> Fit {

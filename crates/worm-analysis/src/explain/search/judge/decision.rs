@@ -9,7 +9,7 @@
 //!    judged as a single effect. No contact is quite as the model says, and a small effect that is certain hides a large one that only
 //!    differs from recalibration by little.
 //! 3. An effect must also be more probable than the best of the library becomes by chance in one of a hundred machines without one, and
-//!    improve the prediction of data that it was not fitted to.
+//!    improve the prediction of data that it was not fitted to, and close four fifths of the gap there.
 //!    Something else beside an effect must be more than the effect's own law may be wrong by, for no law is known exactly.
 //! 4. A pair needs odds of twenty against the best single effect, and its second effect must pass 2 and 3 by itself, and improve
 //!    the fit by more than the first one's law may be wrong by.
@@ -49,7 +49,7 @@ pub(in crate::explain) struct Judged {
     pub matters: f64,
     /// Log odds by which chance was exceeded: those of the effect that was added last.
     pub beyond_chance: f64,
-    /// Whether it improves the prediction of data that it was not fitted to; true where that was not asked.
+    /// Whether it improves the prediction of data that it was not fitted to, and closes the gap there; true where that was not asked.
     pub holds: bool,
 }
 

@@ -1,6 +1,6 @@
-use super::super::fixture::{Campaign, NOISE_M, Truth, WALK_M, hypothesis, record, scene, taken, worm};
-use super::{Measured, cycles};
+use super::{Measured, closed, cycles};
 use crate::explain::answer::{Stage, StageKind};
+use crate::explain::fixture::{Campaign, NOISE_M, Truth, WALK_M, hypothesis, record, scene, taken, worm};
 use crate::explain::worm::predict::Scene;
 use crate::recording::Recording;
 
@@ -105,6 +105,27 @@ fn only_cycles_that_were_held_out_count_as_such() {
     // The sums run in another order.
     assert!((of_wrong_m / wrong_m - 1.0).abs() < 1e-12, "{of_wrong_m} for {wrong_m}");
     assert!(rms_m(&[(wrong, fold(&worm.scene, false))]).is_nan());
+}
+
+/// Of a wrong scale, which moves in proportion, a model with half leaves half of what it moves, a quarter of the square.
+#[test]
+fn half_the_effect_closes_three_quarters_of_the_gap() {
+    let [whole, half] = [&[1.04], &[1.02]].map(|scale| Some(("sensor-scale", None, &scale[..])));
+    let recordings = record(&Campaign::default(), whole, 5);
+    let worm = worm(&recordings, &Campaign::default(), &hypothesis(whole));
+    let open = taken(&worm, hypothesis(None));
+    let closed = |truth: Truth<'_>, discrepancy_m: f64| {
+        let left = taken(&worm, hypothesis(truth));
+        closed(&worm, (&open, &[]), (&left, &[]), discrepancy_m)
+    };
+    for (truth, expected) in [(whole, 1.0), (half, 0.75)] {
+        let [least, most] = closed(truth, 0.0).expect("it shows");
+        assert!(
+            least < expected && expected < most && most - least < 0.2,
+            "{least} to {most}"
+        );
+    }
+    assert_eq!(closed(half, 1e-3), None, "nothing is seen beside a discrepancy of 1 mm");
 }
 
 #[test]

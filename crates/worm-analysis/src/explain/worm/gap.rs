@@ -14,18 +14,18 @@
 
 mod free_form;
 mod mean_cycle;
+mod squares;
 
-use super::answer::{Stage, StageKind};
-use crate::explain::search::cross_validation::FitWithout;
-use crate::explain::search::fit::Fit;
-use crate::explain::worm::energy;
-use crate::explain::worm::observed::Observed;
-use crate::explain::worm::predicted::Predicted;
-use crate::explain::worm::recorded_worm::RecordedWorm;
-use crate::explain::worm::residual::Residual;
-use crate::explain::worm::settled_cycles::{Cycle, settled_cycles};
-pub(super) use mean_cycle::cycles;
-use std::f64::consts::SQRT_2;
+use super::energy;
+use super::observed::Observed;
+use super::predicted::Predicted;
+use super::recorded_worm::RecordedWorm;
+use super::residual::Residual;
+use super::settled_cycles::{Cycle, settled_cycles};
+use crate::explain::answer::{Stage, StageKind};
+use crate::explain::search::fit::{Fit, FitWithout};
+pub(in crate::explain) use mean_cycle::cycles;
+use squares::{Clusters, Squares};
 
 /// Standard errors to either end of a 90 % interval.
 const NINETY: f64 = 1.645;
@@ -33,7 +33,7 @@ const NINETY: f64 = 1.645;
 const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
 
 /// A campaign with the energy that its motion took by the contacts of the best model: the reference for all stages.
-pub(super) struct Measured<'p, 'a> {
+pub(in crate::explain) struct Measured<'p, 'a> {
     worm: &'p RecordedWorm<'a>,
     /// Of each run's settled cycles, J; none where the best model cannot make the run.
     energy_j: Vec<Option<Vec<f64>>>,
@@ -67,97 +67,65 @@ impl CellResiduals {
     }
 }
 
-/// Squares of each cycle of each run: neighbouring samples are not independent, cycles are nearly so.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Clusters(Vec<Vec<Squares>>);
-
-impl Clusters {
-    fn add(&mut self, run: usize, cycle: usize, squares: Squares) {
-        if self.0.len() <= run {
-            self.0.resize(run + 1, Vec::new());
+/// Squares of each cycle held out, as [`Measured::stage`] counts them.
+pub(in crate::explain) fn clusters(worm: &RecordedWorm<'_>, all: &Fit, folds: &[FitWithout]) -> Clusters {
+    let mut clusters = Clusters::default();
+    let mut add = |fit: &Fit, is_out: &dyn Fn(usize, usize) -> bool| {
+        for (run, observed) in worm.scene.observed.iter().enumerate() {
+            let residuals = CellResiduals::of(worm, run, fit);
+            for cycle in settled_cycles(observed).iter().filter(|cycle| is_out(run, cycle.index)) {
+                let squares = residuals.as_ref().map_or(
+                    Squares {
+                        sum: f64::NAN,
+                        count: 1.0,
+                    },
+                    |residuals| of_cycle(observed, residuals, cycle),
+                );
+                clusters.add(run, cycle.index, squares);
+            }
         }
-        if self.0[run].len() <= cycle {
-            self.0[run].resize(cycle + 1, Squares::default());
-        }
-        self.0[run][cycle].add(squares);
+    };
+    for (fit, out) in folds {
+        add(fit, &|run, cycle| {
+            out.get(run).and_then(|run| run.get(cycle)) == Some(&true)
+        });
     }
-
-    fn each(&self) -> impl Iterator<Item = Squares> {
-        self.0.iter().flatten().copied().filter(|squares| squares.count > 0.0)
+    if folds.is_empty() {
+        add(all, &|_, _| true);
     }
-
-    fn total(&self) -> Squares {
-        self.each().fold(Squares::default(), |mut sum, squares| {
-            sum.add(squares);
-            sum
-        })
-    }
-
-    /// 90 % interval of the root mean square.
-    fn interval_m(&self) -> [f64; 2] {
-        let total = self.total();
-        let mean_m2 = total.sum / total.count;
-        let off = self
-            .each()
-            .map(|squares| (squares.sum - mean_m2 * squares.count).powi(2));
-        let half_m2 = NINETY * off.sum::<f64>().sqrt() / total.count;
-        [mean_m2 - half_m2, mean_m2 + half_m2].map(|m2| m2.max(0.0).sqrt())
-    }
-
-    /// The fraction of the squared gap between these residuals and a floor that others close, with its 90 % interval; `NaN` where the
-    /// gap is within its own error, and where the interval is wider than from nothing to all on either side.
-    pub fn closure(&self, closed: &Self, floor_m: f64) -> (f64, [f64; 2]) {
-        let pairs: Vec<(f64, f64)> = self
-            .each()
-            .zip(closed.each())
-            .map(|(open, left)| {
-                let left_m2 = left.sum / left.count * open.count;
-                (open.sum - floor_m * floor_m * open.count, open.sum - left_m2)
-            })
-            .collect();
-        let (gap, gain) = pairs
-            .iter()
-            .fold((0.0, 0.0), |(gap, gain), pair| (gap + pair.0, gain + pair.1));
-        let count = pairs.len() as f64;
-        let spread = pairs
-            .iter()
-            .map(|(one, _)| (one - gap / count).powi(2))
-            .sum::<f64>()
-            .sqrt();
-        // The floor is as uncertain as the gap.
-        if gap.is_nan() || gap - NINETY * SQRT_2 * spread <= 0.0 {
-            return (f64::NAN, [f64::NAN; 2]);
-        }
-        let closure = gain / gap;
-        let off = pairs
-            .iter()
-            .map(|(gap, gain)| (gain - closure * gap).powi(2))
-            .sum::<f64>();
-        let half = NINETY * off.sqrt() / gap;
-        if half > 1.0 {
-            return (f64::NAN, [f64::NAN; 2]);
-        }
-        (closure, [closure - half, closure + half])
-    }
+    clusters
 }
 
-/// A running mean of squares.
-#[derive(Debug, Clone, Copy, Default)]
-struct Squares {
-    sum: f64,
-    count: f64,
+/// 90 % interval of the fraction of the squared gap that one fit leaves open and another closes on data held out, down to the scatter of
+/// single cycles and a discrepancy that no model is without, m; none where that is within its error.
+pub(in crate::explain) fn closed(
+    worm: &RecordedWorm<'_>,
+    (open, open_folds): (&Fit, &[FitWithout]),
+    (left, left_folds): (&Fit, &[FitWithout]),
+    discrepancy_m: f64,
+) -> Option<[f64; 2]> {
+    let runs = 0..worm.scene.observed.len();
+    let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(worm, run, left)).collect();
+    let floor_m = scatter(worm, &residuals).rms().hypot(discrepancy_m);
+    let left = clusters(worm, left, left_folds);
+    let (_, interval) = clusters(worm, open, open_folds).closure(&left, floor_m);
+    interval.iter().all(|end| end.is_finite()).then_some(interval)
 }
 
-impl Squares {
-    fn add(&mut self, other: Self) {
-        self.sum += other.sum;
-        self.count += other.count;
+/// Squares of the scatter of single cycles about their mean and trend, by the residuals of a model, corrected for the degrees of freedom
+/// of mean and trend.
+fn scatter(worm: &RecordedWorm<'_>, residuals: &[Option<CellResiduals>]) -> Squares {
+    let mut squares = Squares::default();
+    for (observed, residuals) in worm.scene.observed.iter().zip(residuals) {
+        squares.add(match residuals {
+            Some(residuals) => free_form::floor(observed, &free_form::all(observed, residuals)),
+            None => Squares {
+                sum: f64::NAN,
+                count: 0.0,
+            },
+        });
     }
-
-    /// `NaN` without values.
-    fn rms(self) -> f64 {
-        (self.sum / self.count).sqrt()
-    }
+    squares
 }
 
 impl<'p, 'a> Measured<'p, 'a> {
@@ -183,7 +151,7 @@ impl<'p, 'a> Measured<'p, 'a> {
     pub fn stage(&self, stage: StageKind, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
         let residuals = self.residuals(all);
         let fit_rms_m = self.rms(&residuals, |_, _| true);
-        let held_out = self.clusters(all, folds);
+        let held_out = clusters(self.worm, all, folds);
         let energy_j = |run: usize| {
             energy::own(&self.worm.scene, run, (&all.hypothesis, &all.at)).map(|walk| walk.energy_j(self.observed(run)))
         };
@@ -230,20 +198,10 @@ impl<'p, 'a> Measured<'p, 'a> {
         }
     }
 
-    /// The noise floor: the scatter of single cycles about their mean and trend, by the residual of the best model, corrected for the
-    /// degrees of freedom of mean and trend; and the expected error of a mean over as many cycles.
+    /// The noise floor: the scatter of single cycles, by the residual of the best model, and the expected error of a mean over as many
+    /// cycles.
     pub fn floor_stage(&self) -> Stage {
-        let scatter = self.free_forms(&self.residuals, free_form::all);
-        let mut squares = Squares::default();
-        for (run, scatter) in scatter.iter().enumerate() {
-            squares.add(match scatter {
-                Some(residuals) => free_form::floor(self.observed(run), residuals),
-                None => Squares {
-                    sum: f64::NAN,
-                    count: 0.0,
-                },
-            });
-        }
+        let squares = scatter(self.worm, &self.residuals);
         let chance = |sigma: f64, run: usize| {
             let cycles = settled_cycles(self.observed(run)).len() as f64;
             MEAN_ABSOLUTE * sigma / cycles.sqrt()
@@ -258,37 +216,6 @@ impl<'p, 'a> Measured<'p, 'a> {
             advance_error_m: self.mean_over_runs(|run| Some(chance(self.worm.noise[run].drift_per_cycle_m(), run))),
             energy_error_j: self.mean_over_runs(|run| Some(chance(deviation(self.energy_j[run].as_ref()?), run))),
         }
-    }
-
-    /// Squares of each cycle held out, as [`stage`](Self::stage) counts them.
-    pub fn clusters(&self, all: &Fit, folds: &[FitWithout]) -> Clusters {
-        let mut clusters = Clusters::default();
-        let mut add = |fit: &Fit, is_out: &dyn Fn(usize, usize) -> bool| {
-            for (run, residuals) in self.residuals(fit).iter().enumerate() {
-                for cycle in settled_cycles(self.observed(run))
-                    .iter()
-                    .filter(|cycle| is_out(run, cycle.index))
-                {
-                    let squares = residuals.as_ref().map_or(
-                        Squares {
-                            sum: f64::NAN,
-                            count: 1.0,
-                        },
-                        |residuals| of_cycle(self.observed(run), residuals, cycle),
-                    );
-                    clusters.add(run, cycle.index, squares);
-                }
-            }
-        };
-        for (fit, out) in folds {
-            add(fit, &|run, cycle| {
-                out.get(run).and_then(|run| run.get(cycle)) == Some(&true)
-            });
-        }
-        if folds.is_empty() {
-            add(all, &|_, _| true);
-        }
-        clusters
     }
 
     /// 90 % interval of the mean over the runs of how far the advance is off, m: by the scatter of the cycles.
