@@ -1,4 +1,4 @@
-//! A campaign as a problem of least squares, and hypotheses fitted to it.
+//! The recordings of a plant as a problem of least squares, and hypotheses fitted to it.
 //!
 //! The rows are the mean residuals of each bin (see [`super::bins`]), whitened by the noise and by the discrepancy, so that the square
 //! sum of a fit is minus twice its log likelihood with both marginalised.
@@ -34,6 +34,7 @@ const ROUGH: Method = Method {
 /// Damping of a single step without part of the data, and how often it is halved until it leads downhill.
 const SLIGHT_DAMPING: f64 = 1e-6;
 const HALVINGS: i32 = 3;
+
 /// The recordings of a plant, as a problem of least squares.
 pub(in crate::explain) struct FitProblem<'p, P> {
     pub plant: &'p P,
