@@ -37,10 +37,12 @@ impl Gap {
                 .collect();
             measured.stage(kind, Some(names.join(" + ")), &candidate.fit, folds)
         };
-        let open = clusters(worm, &parts.recalibrated, &parts.found.recalibrated_held_out.fits);
+        let without = &parts.found.recalibrated_held_out;
         let closure = |candidate: &Candidate| {
-            let folds = candidate.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
-            open.closure(&clusters(worm, &candidate.fit, folds), floor.held_out_rms_m)
+            let held_out = candidate.held_out.as_ref();
+            let (left, open) = held_out.map_or_else(Default::default, |held_out| held_out.determined_beside(without));
+            let left = clusters(worm, &candidate.fit, &left);
+            clusters(worm, &parts.recalibrated, &open).closure(&left, floor.held_out_rms_m)
         };
         let of_named: Vec<Stage> = named
             .iter()

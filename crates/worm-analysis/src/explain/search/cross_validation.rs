@@ -16,9 +16,10 @@
 //! fit is added: of two hypotheses that predict the same, the one with less extreme values is more likely.
 
 use super::fit::{Fit, FitWithout};
+use super::parameter::What;
 use super::plant::{Plant, Recorded};
 use super::problem::FitProblem;
-use crate::least_squares::{dot, prior_chi_squared, submatrix};
+use crate::least_squares::{dot, prior_chi_squared, standard_errors, submatrix};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -26,6 +27,8 @@ use rayon::prelude::*;
 const BLOCKS: usize = 3;
 /// Steps of each refit.
 const STEPS: usize = 2;
+/// Standard errors from its neutral value at which a severity is determined.
+const DETERMINED: f64 = 2.0;
 
 /// What is left out at once.
 #[derive(Debug, Clone)]
@@ -41,6 +44,20 @@ pub(in crate::explain) struct HeldOut {
     pub chi_squared: f64,
     /// The refit without each fold.
     pub fits: Vec<FitWithout>,
+    /// For each fold, whether what stays determines the severities of all effects: where it does not, because an effect began in what is
+    /// left out, the refit says nothing about what the effect does there.
+    pub determined: Vec<bool>,
+}
+
+impl HeldOut {
+    /// The refits of one's own and of another's same folds, where what stays determines one's own effects.
+    pub fn determined_beside<'h>(&'h self, other: &'h Self) -> (Vec<&'h FitWithout>, Vec<&'h FitWithout>) {
+        let pairs = self.fits.iter().zip(&other.fits).zip(&self.determined);
+        pairs
+            .filter(|(_, determined)| **determined)
+            .map(|(pair, _)| pair)
+            .unzip()
+    }
 }
 
 /// All folds of a campaign: first the runs, where there are several, then the blocks of cycles.
@@ -88,17 +105,30 @@ pub(in crate::explain) fn hold_out<P: Plant>(problem: &FitProblem<'_, P>, fit: &
             without = problem.step_without(without, &stays);
         }
         let chi_squared = score(&without, &stays);
+        let is_determined = determines(fit, &without, &stays);
         without.jacobian = Vec::new();
-        (chi_squared, (without, fold.left_out.clone()))
+        ((chi_squared, is_determined), (without, fold.left_out.clone()))
     };
-    let anew: Vec<(f64, FitWithout)> = folds.par_iter().map(refit).collect();
+    let (scores, fits): (Vec<(f64, bool)>, Vec<FitWithout>) = folds.par_iter().map(refit).unzip();
+    let (chi_squared, determined): (Vec<f64>, Vec<bool>) = scores.into_iter().unzip();
     let runs = folds.len() - BLOCKS;
     let partitions = if runs > 0 { 2.0 } else { 1.0 };
     HeldOut {
-        chi_squared: anew.iter().map(|(chi_squared, _)| chi_squared).sum::<f64>() / partitions
+        chi_squared: chi_squared.iter().sum::<f64>() / partitions
             + prior_chi_squared(&fit.hypothesis.quantities(), &fit.at),
-        fits: anew.into_iter().map(|(_, without)| without).collect(),
+        fits,
+        determined,
     }
+}
+
+/// Whether the rows that stay determine the severities that a fit to all of them found.
+fn determines(all: &Fit, without: &Fit, stays: &[bool]) -> bool {
+    let sigmas = standard_errors(without.normal(Some(stays)));
+    let mut free = all.hypothesis.free.iter().enumerate();
+    free.all(|(at, free)| match free.what {
+        What::Effect { parameter: 0, .. } => (all.at[at] - free.quantity.centre).abs() >= DETERMINED * sigmas[at],
+        _ => true,
+    })
 }
 
 /// Twice the negative logarithm of the probability, up to a constant that no hypothesis changes, of the data that do not stay.

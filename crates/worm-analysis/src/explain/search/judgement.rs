@@ -163,9 +163,10 @@ impl<P: Plant> Judge<'_, P> {
                         })
                         .map(|trace| held_out(self.problem, &trace.fit, folds).chi_squared);
                     let held_out = held_out(self.problem, &candidate.fit, folds);
+                    let (left, open) = held_out.determined_beside(without);
                     let closed = self.problem.plant.closed(
-                        (self.recalibrated, &without.fits),
-                        (&candidate.fit, &held_out.fits),
+                        (self.recalibrated, &open),
+                        (&candidate.fit, &left),
                         self.discrepancy.scale_m,
                     );
                     holds = of_trace.unwrap_or(without.chi_squared) > held_out.chi_squared

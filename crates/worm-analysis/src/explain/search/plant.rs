@@ -62,7 +62,7 @@ pub(in crate::explain) trait Plant: Recorded {
     fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2];
     /// 90 % interval of the fraction of the squared gap that one fit leaves open and another closes on data held out, down to noise and the
     /// discrepancy's scale; none where that is within its error.
-    fn closed(&self, open: (&Fit, &[FitWithout]), left: (&Fit, &[FitWithout]), discrepancy: f64) -> Option<[f64; 2]>;
+    fn closed(&self, open: (&Fit, &[&FitWithout]), left: (&Fit, &[&FitWithout]), discrepancy: f64) -> Option<[f64; 2]>;
     /// A fit with what nuisances have of an effect's law moved into the effect; it predicts the same.
     fn with_whole_effects(&self, fit: Fit) -> Fit;
 

@@ -68,7 +68,7 @@ impl CellResiduals {
 }
 
 /// Squares of each cycle held out, as [`Measured::stage`] counts them.
-pub(in crate::explain) fn clusters(worm: &RecordedWorm<'_>, all: &Fit, folds: &[FitWithout]) -> Clusters {
+pub(in crate::explain) fn clusters(worm: &RecordedWorm<'_>, all: &Fit, folds: &[&FitWithout]) -> Clusters {
     let mut clusters = Clusters::default();
     let mut add = |fit: &Fit, is_out: &dyn Fn(usize, usize) -> bool| {
         for (run, observed) in worm.scene.observed.iter().enumerate() {
@@ -100,8 +100,8 @@ pub(in crate::explain) fn clusters(worm: &RecordedWorm<'_>, all: &Fit, folds: &[
 /// single cycles and a discrepancy that no model is without, m; none where that is within its error.
 pub(in crate::explain) fn closed(
     worm: &RecordedWorm<'_>,
-    (open, open_folds): (&Fit, &[FitWithout]),
-    (left, left_folds): (&Fit, &[FitWithout]),
+    (open, open_folds): (&Fit, &[&FitWithout]),
+    (left, left_folds): (&Fit, &[&FitWithout]),
     discrepancy_m: f64,
 ) -> Option<[f64; 2]> {
     let runs = 0..worm.scene.observed.len();
@@ -151,7 +151,7 @@ impl<'p, 'a> Measured<'p, 'a> {
     pub fn stage(&self, stage: StageKind, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
         let residuals = self.residuals(all);
         let fit_rms_m = self.rms(&residuals, |_, _| true);
-        let held_out = clusters(self.worm, all, folds);
+        let held_out = clusters(self.worm, all, &folds.iter().collect::<Vec<_>>());
         let energy_j = |run: usize| {
             energy::own(&self.worm.scene, run, (&all.hypothesis, &all.at)).map(|walk| walk.energy_j(self.observed(run)))
         };

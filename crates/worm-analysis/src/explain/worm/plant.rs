@@ -98,7 +98,12 @@ impl Plant for RecordedWorm<'_> {
         [period::ln_bayes(self, fit), sway::ln_bayes(self, fit)]
     }
 
-    fn closed(&self, open: (&Fit, &[FitWithout]), left: (&Fit, &[FitWithout]), discrepancy_m: f64) -> Option<[f64; 2]> {
+    fn closed(
+        &self,
+        open: (&Fit, &[&FitWithout]),
+        left: (&Fit, &[&FitWithout]),
+        discrepancy_m: f64,
+    ) -> Option<[f64; 2]> {
         closed(self, open, left, discrepancy_m)
     }
 
