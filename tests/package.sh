@@ -130,6 +130,17 @@ stop_all() {
   done
 }
 is_failed() { [ "$(property control ActiveState)" = failed ]; }
+restarts_disarmed() {
+  local override=/etc/systemd/system/wormd-control@worm1.service.d killed
+  in_root mkdir "$override"
+  printf '[Service]\nRestartPreventExitStatus=\n' | in_root tee "$override/override.conf" >/dev/null
+  in_root systemctl daemon-reload
+  killed=$(property control MainPID)
+  kill_controller KILL
+  wait_for "another controller" 20 eval '[[ $(property control MainPID) != '"$killed"' ]] && stands disarmed'
+  in_root rm -r "$override"
+  in_root systemctl daemon-reload
+}
 kill_controller() { in_root sh -c 'kill -s "$0" "$1"' "$1" "$(property control MainPID)"; }
 same_process() { # what
   [ "$(property control MainPID)" = "$pid" ] || fail "$1: another controller"
@@ -225,15 +236,7 @@ in_root systemctl start wormd@worm1.target
 wait_for "a worm" 20 stands disarmed
 
 step "on the level it may be: with an empty RestartPreventExitStatus= it starts again by itself, disarmed"
-override=/etc/systemd/system/wormd-control@worm1.service.d
-in_root mkdir "$override"
-printf '[Service]\nRestartPreventExitStatus=\n' | in_root tee "$override/override.conf" >/dev/null
-in_root systemctl daemon-reload
-killed=$(property control MainPID)
-kill_controller KILL
-wait_for "another controller" 20 eval '[[ $(property control MainPID) != "$killed" ]] && stands disarmed'
-in_root rm -r "$override"
-in_root systemctl daemon-reload
+restarts_disarmed
 
 step "a controller that hangs is ended by the watchdog"
 worm command arm --name worm1
@@ -261,6 +264,13 @@ in_root systemctl enable --quiet wormd-crawl@worm1.service
 power_off
 boot
 wait_for "a crawl at power-up" 20 stands crawling
+
+step "after a crash it does not crawl again by itself, though the controller is started again"
+restarts_disarmed
+sleep 10
+stands disarmed || fail "it moved without being told"
+in_root systemctl start wormd-crawl@worm1.service
+wait_for "a crawl" 10 stands crawling
 in_root systemctl stop wormd-crawl@worm1.service
 wait_for "a hold" 10 stands holding
 
