@@ -1,5 +1,6 @@
 //! The estimator process: feeds every state to the pure [`Observer`] and publishes what it finds.
 
+use crate::attendance::RoundCounter;
 use crate::failure::Failure;
 use crate::realtime::{self, Grant};
 use crate::topics::{Estimator, Hub, Notifier, PortError, PublishError, Publisher, RoleLock, Subscriber};
@@ -22,7 +23,7 @@ const RECORDER_POLL: Duration = Duration::from_millis(100);
 pub(crate) const PRIORITY_BELOW_LOOP: u8 = 20;
 
 /// Estimates until `end` is set: sleeps until the controller's event, reads every new state, publishes the results.
-/// Calls `ready` once it listens, and `on_state` for each state as soon as it was read.
+/// Counts its rounds, calls `ready` once it listens, and `on_state` for each state as soon as it was read.
 ///
 /// # Errors
 /// [`Failure::Unusable`] for a configuration that cannot be used; [`Failure::Failed`] when the topics fail.
@@ -31,6 +32,7 @@ pub(crate) fn run(
     hub: &Hub,
     role: &RoleLock<Estimator>,
     end: &AtomicBool,
+    rounds: &RoundCounter,
     ready: impl FnOnce(&[Grant]),
     mut on_state: impl FnMut(&State),
 ) -> Result<(), Failure> {
@@ -43,6 +45,7 @@ pub(crate) fn run(
     let mut told_of_mismatch = false;
     ready(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     while !end.load(Ordering::Relaxed) {
+        rounds.count();
         state_event.wait(MAX_SLEEP).map_err(Failure::failed)?;
         if recorder_polled.elapsed() >= RECORDER_POLL {
             recorder_polled = Instant::now();

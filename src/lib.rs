@@ -40,7 +40,7 @@
 //! | [`realtime`] | what a process requests from the operating system, what it really gets, how the computer is set up for it | |
 //! | [`topics`] | iceoryx2: one namespace per worm, publishers, subscribers, the command service, the guard at start-up | |
 //! | [`link`] | the servo and the tracker on the bus; [`link::virtual_worm`] simulates both | |
-//! | [`attendance`] | the pipe from a parent, and the stop socket | `topics`, `realtime` |
+//! | [`attendance`] | the pipe from a parent, the stop socket, and what a service manager learns | `topics`, `realtime` |
 //! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | `link`, `topics`, `realtime`, `attendance` |
 //! | `estimator` | the process around the estimator | `topics`, `realtime` |
 //! | `recorder` | the process that logs the topics | `topics` |

@@ -1,6 +1,6 @@
 //! The `wormd` binary: finds the subcommand, runs it, and turns its outcome into an exit status.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -56,6 +56,11 @@ enum Subcommands {
     LatencyFloor(command::latency_floor::LatencyFloorArgs),
     /// Many hours in virtual time with drawn worms and faults: do alarms and stops come when they must, and only then?
     Soak(command::soak::SoakArgs),
+    /// The worms that run on this computer, and how they stand
+    Status(command::status::StatusArgs),
+    /// Man pages and shell completions, for a package
+    #[command(hide = true)]
+    Manual(command::manual::ManualArgs),
     /// Preflight: configuration, port, permissions, scheduler, and what to do about each finding
     Check(command::check::CheckArgs),
 }
@@ -108,6 +113,8 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Latency(args) => command::latency::run(&args, verbose),
         Subcommands::LatencyFloor(args) => command::latency_floor::run(&args),
         Subcommands::Soak(args) => command::soak::run(&args),
+        Subcommands::Status(args) => command::status::run(&args),
+        Subcommands::Manual(args) => command::manual::run(&args, Arguments::command()),
         Subcommands::Check(args) => command::check::run(&args),
     }
 }

@@ -3,21 +3,30 @@
 //! - `parent_pipe`: a pipe from the parent. Bytes say that it is there, the end of the pipe that it is gone.
 //! - `stop_socket`: an abstract Unix socket in the controller that takes `stop` and says how the worm stands.
 //! - `stop_client`: the other end of that socket.
+//! - `survey`: all controllers of this computer, by their stop sockets.
+//! - `standing`: where the controller stands, for the threads beside its loop.
+//! - `service_manager`: what systemd learns about a process that it has started.
 //! - `orphan`: how the processes around the controller end when their parent is gone.
 //! - `lock_watch`: notices that the lock file of a role has been removed.
 
 mod lock_watch;
 mod orphan;
 mod parent_pipe;
+mod service_manager;
+mod standing;
 mod stop_client;
 mod stop_socket;
+mod survey;
 
 pub(crate) use lock_watch::LockWatch;
 pub(crate) use orphan::end_after_controller;
 pub use parent_pipe::{Parent, ParentPipe};
+pub(crate) use service_manager::{ProcessStatus, RoundCounter, ServiceManager, announce_ready};
+pub use standing::Standing;
 pub(crate) use stop_client::{StopError, ask};
 pub(crate) use stop_socket::Request;
 pub use stop_socket::StopSocket;
+pub(crate) use survey::{RunningController, running_controllers};
 
 use std::time::Duration;
 use worm_estimator::message::{Command, Fault, Mode, Reply};
@@ -29,6 +38,8 @@ pub struct Attendance {
     pub parent: Option<ParentPipe>,
     /// The stop socket, if it could be bound.
     pub stop: Option<StopSocket>,
+    /// Where the controller stands; the stop socket's, if there is one.
+    pub standing: Standing,
 }
 
 impl Attendance {
@@ -50,10 +61,8 @@ impl Attendance {
         }
     }
 
-    /// Notes where the controller stands, for who asks at the stop socket.
-    pub fn note(&self, mode: Mode, fault: Fault) {
-        if let Some(stop) = &self.stop {
-            stop.note(mode, fault);
-        }
+    /// Notes where the controller stands after so many ticks, for who asks at the stop socket, and for the service manager.
+    pub fn note(&self, ticks: u64, mode: Mode, fault: Fault) {
+        self.standing.note(ticks, mode, fault);
     }
 }

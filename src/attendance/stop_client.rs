@@ -97,7 +97,7 @@ pub(crate) fn ask(config: &Config, request: Request) -> Result<Answer, StopError
 
 /// Connects to all of them, and leaves out those that are nobody's, or not their name's user's: anybody may bind any abstract name.
 /// Those that take no connection are tried for a while, unless one of the caller's own does; whether one was left comes second.
-fn connect_all(sockets: BTreeSet<(u32, String)>, caller: u32) -> (Vec<(u32, UnixStream)>, bool) {
+pub(super) fn connect_all(sockets: BTreeSet<(u32, String)>, caller: u32) -> (Vec<(u32, UnixStream)>, bool) {
     let mut connected = Vec::new();
     let mut waiting: Vec<_> = sockets.into_iter().collect();
     let begun = Instant::now();
@@ -132,18 +132,24 @@ fn connect(name: &str) -> io::Result<UnixStream> {
 /// The stop sockets of a worm on this computer: their user and name.
 fn sockets_of(worm: &str, root: &str) -> io::Result<BTreeSet<(u32, String)>> {
     let (head, tail) = name_parts(worm, root);
-    let table = std::fs::read(SOCKETS)?;
-    let table = String::from_utf8_lossy(&table);
-    let named = table
-        .lines()
-        .filter_map(|line| line.split_whitespace().last()?.strip_prefix('@'));
-    Ok(named
+    let names = abstract_names()?.into_iter();
+    Ok(names
         .filter_map(|name| {
             let (user, process) = name.strip_prefix(&head)?.split_once(&tail)?;
             process.parse::<u32>().ok()?;
-            Some((user.parse().ok()?, name.to_owned()))
+            Some((user.parse().ok()?, name))
         })
         .collect())
+}
+
+/// The abstract names at which sockets on this computer are bound, or connected; each once.
+pub(super) fn abstract_names() -> io::Result<BTreeSet<String>> {
+    let table = std::fs::read(SOCKETS)?;
+    let table = String::from_utf8_lossy(&table);
+    let names = table
+        .lines()
+        .filter_map(|line| line.split_whitespace().last()?.strip_prefix('@'));
+    Ok(names.map(str::to_owned).collect())
 }
 
 /// Those that the calling user may ask: its own, or for root those of the only user who has a worm of this name.
@@ -165,7 +171,7 @@ fn choose<S>(worm: &str, sockets: Vec<(u32, S)>, caller: u32) -> Result<Vec<(u32
     }
 }
 
-fn question(mut stream: UnixStream, request: Request) -> io::Result<Answer> {
+pub(super) fn question(mut stream: UnixStream, request: Request) -> io::Result<Answer> {
     stream.set_read_timeout(Some(TIMEOUT))?;
     stream.set_write_timeout(Some(TIMEOUT))?;
     let mut question = serde_json::to_string(&Question { request })?;

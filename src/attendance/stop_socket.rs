@@ -5,6 +5,7 @@
 //! the same user, or root. One line of JSON asks, one line answers.
 
 use super::parent_pipe::{Parent, ParentPipe};
+use super::standing::Standing;
 use crossbeam::queue::ArrayQueue;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
@@ -15,10 +16,10 @@ use std::os::fd::AsFd;
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Command, CommandKind, Fault, Mode, Reply};
+use worm_estimator::message::{Command, CommandKind, Reply};
 
 /// Commands that may wait for the next tick.
 const QUEUE: usize = 8;
@@ -97,6 +98,14 @@ pub(super) fn name_parts(worm: &str, root: &str) -> (String, String) {
     ("wormd/".to_owned(), format!("/{worm}/{hash:04x}/"))
 }
 
+/// User, worm and process of a stop socket's name.
+pub(super) fn parse_name(name: &str) -> Option<(u32, &str, u32)> {
+    let mut parts = name.strip_prefix("wormd/")?.split('/');
+    let (user, worm, _root, process) = (parts.next()?, parts.next()?, parts.next()?, parts.next()?);
+    parts.next().is_none().then_some(())?;
+    Some((user.parse().ok()?, worm, process.parse().ok()?))
+}
+
 /// The bound socket, and its thread. Dropping it closes it.
 #[derive(Debug)]
 pub struct StopSocket {
@@ -110,17 +119,21 @@ struct Shared {
     commands: ArrayQueue<(u64, Command)>,
     /// Replies on their way back.
     replies: ArrayQueue<(u64, Reply)>,
-    /// Mode in the lower half, fault in the upper.
-    standing: AtomicU64,
     closing: AtomicBool,
 }
 
 impl StopSocket {
-    /// Binds the socket and serves it in a thread. `end` is set on `Request::End`.
+    /// Binds the socket and serves it in a thread, which answers with where the controller has noted that it stands. `end` is set on
+    /// `Request::End`.
     ///
     /// # Errors
     /// When the socket cannot be bound, or there is no thread to be had.
-    pub fn bind(config: &Config, parent: Option<ParentPipe>, end: &Arc<AtomicBool>) -> io::Result<Self> {
+    pub fn bind(
+        config: &Config,
+        parent: Option<ParentPipe>,
+        standing: &Standing,
+        end: &Arc<AtomicBool>,
+    ) -> io::Result<Self> {
         let (head, tail) = name_parts(&config.worm.name, &config.topics.root);
         let user = nix::unistd::geteuid();
         let name = format!("{head}{user}{tail}{}", std::process::id());
@@ -129,12 +142,12 @@ impl StopSocket {
         let shared = Arc::new(Shared {
             commands: ArrayQueue::new(QUEUE),
             replies: ArrayQueue::new(QUEUE),
-            standing: AtomicU64::new(0),
             closing: AtomicBool::new(false),
         });
         let server = Server {
             shared: Arc::clone(&shared),
             parent,
+            standing: standing.clone(),
             end: Arc::clone(end),
             slope_deg: config.canal.slope_deg,
             crawl_limit_s: config.control.crawl_limit_s,
@@ -157,11 +170,6 @@ impl StopSocket {
         // As many fit as there can be commands; one that nobody waits for any more makes room.
         let _ = self.shared.replies.force_push((number, *reply));
     }
-
-    pub(super) fn note(&self, mode: Mode, fault: Fault) {
-        let standing = u64::from(mode.code()) | u64::from(fault.code()) << 32;
-        self.shared.standing.store(standing, Ordering::Relaxed);
-    }
 }
 
 impl Drop for StopSocket {
@@ -177,6 +185,7 @@ impl Drop for StopSocket {
 struct Server {
     shared: Arc<Shared>,
     parent: Option<ParentPipe>,
+    standing: Standing,
     end: Arc<AtomicBool>,
     slope_deg: f64,
     crawl_limit_s: f64,
@@ -261,11 +270,11 @@ impl Server {
     }
 
     fn send(&self, stream: &mut UnixStream, reply: Option<Reply>, refusal: Option<String>) -> io::Result<()> {
-        let standing = self.shared.standing.load(Ordering::Relaxed);
+        let (mode, fault) = self.standing.codes();
         let answer = Answer {
             pid: std::process::id(),
-            mode: reply.map_or(standing as u32, |reply| reply.mode),
-            fault: reply.map_or((standing >> 32) as u32, |reply| reply.fault),
+            mode: reply.map_or(mode, |reply| reply.mode),
+            fault: reply.map_or(fault, |reply| reply.fault),
             parent: self.parent().name().to_owned(),
             slope_deg: self.slope_deg,
             crawl_limit_s: self.crawl_limit_s,
@@ -304,4 +313,25 @@ fn read_line(mut stream: &UnixStream) -> io::Result<Vec<u8>> {
 /// Who is at the other end of a socket.
 pub(super) fn peer_of(stream: &UnixStream) -> io::Result<UnixCredentials> {
     getsockopt(stream, PeerCredentials).map_err(io::Error::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_says_user_worm_and_process_and_others_names_are_none() {
+        let (head, tail) = name_parts("worm-1", "auto");
+        let name = format!("{head}1000{tail}42");
+        assert_eq!(parse_name(&name), Some((1000, "worm-1", 42)));
+        for foreign in [
+            "wormd/1000/w/abcd",
+            "wormd/x/w/abcd/1",
+            "wormd/1/w/abcd/1/2",
+            "dbus/1/w/abcd/1",
+            "",
+        ] {
+            assert_eq!(parse_name(foreign), None, "{foreign}");
+        }
+    }
 }

@@ -2,6 +2,7 @@
 //! thread of this process, so that the time at which it receives a state is known.
 
 use super::settings::{Benchmark, ConfigFile};
+use crate::attendance::RoundCounter;
 use crate::estimator::{self, PRIORITY_BELOW_LOOP};
 use crate::failure::Failure;
 use crate::print;
@@ -247,7 +248,7 @@ fn start_estimator(
         let on_ready = |_: &[Grant]| {
             let _ = ready.send(gettid());
         };
-        estimator::run(&config, &hub, &role, &end, on_ready, on_state)
+        estimator::run(&config, &hub, &role, &end, &RoundCounter::default(), on_ready, on_state)
     })?;
     // If it ends instead, the channel closes, and joining returns the reason.
     match is_ready.recv() {

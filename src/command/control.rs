@@ -1,7 +1,7 @@
 //! `wormd control`: the controller alone, on a configured port.
 
 use super::{Failure, WormArgs, end_on_signal, print, report_advice, report_grants};
-use crate::attendance::{Attendance, LockWatch, ParentPipe, StopSocket};
+use crate::attendance::{Attendance, LockWatch, ParentPipe, ProcessStatus, ServiceManager, Standing, StopSocket};
 use crate::control::{self, Drive, link_settings};
 use crate::topics::{Controller, Hub, Instance, RoleLock};
 use clap::Args;
@@ -45,6 +45,10 @@ pub fn run(args: &ControlArgs) -> Result<(), Failure> {
     let lock_watch = LockWatch::start(place, &end)?;
     // Before the devices: from here on the worm can be stopped, and a parent that dies is noticed.
     let attendance = attend(&config, args.supervised, &end)?;
+    let _service = match args.supervised {
+        true => None,
+        false => Some(inform_service_manager(attendance.standing.clone(), &end)?),
+    };
     let settings = link_settings(&config, port.baud).map_err(Failure::unusable)?;
     let (mut drive, prepared, findings) = Drive::open(Path::new(&port.path), settings).map_err(Failure::unusable)?;
     for finding in &findings {
@@ -77,8 +81,21 @@ fn attend(config: &Config, supervised: bool, end: &Arc<AtomicBool>) -> Result<At
         true => Some(ParentPipe::watch(lease, priority).map_err(no_thread)?),
         false => None,
     };
-    let stop = StopSocket::bind(config, parent.clone(), end)
+    let standing = Standing::default();
+    let stop = StopSocket::bind(config, parent.clone(), &standing, end)
         .inspect_err(|error| tracing::warn!("no stop socket ({error}): `wormd command stop` works by the topics alone"))
         .ok();
-    Ok(Attendance { parent, stop })
+    Ok(Attendance { parent, stop, standing })
+}
+
+/// Ready with the first tick; a loop that does not tick any more is not reported as alive.
+fn inform_service_manager(standing: Standing, end: &Arc<AtomicBool>) -> Result<ServiceManager, Failure> {
+    ServiceManager::inform(end, move || {
+        let rounds = standing.ticks();
+        let words = match rounds {
+            0 => "starting".to_owned(),
+            _ => standing.words(),
+        };
+        ProcessStatus { rounds, words }
+    })
 }

@@ -1,7 +1,7 @@
 //! `wormd estimate`: the estimator alone, beside a running controller.
 
 use super::{Failure, WormArgs, end_on_signal, print, report_grants};
-use crate::attendance::end_after_controller;
+use crate::attendance::{RoundCounter, ServiceManager, end_after_controller};
 use crate::estimator;
 use crate::topics::{Estimator, Hub, Instance, RoleLock};
 use clap::Args;
@@ -25,14 +25,18 @@ pub fn run(args: &EstimateArgs) -> Result<(), Failure> {
     let config = args.worm.load()?;
     let end = end_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;
-    if args.supervised {
+    let rounds = RoundCounter::default();
+    let _service = if args.supervised {
         end_after_controller(&instance, &end)?;
-    }
+        None
+    } else {
+        Some(ServiceManager::inform_of_rounds(&end, &rounds)?)
+    };
     let role = RoleLock::<Estimator>::take(&instance).map_err(Failure::unusable)?;
     let hub = Hub::open(&instance).map_err(Failure::failed)?;
     let ready = |grants: &[_]| {
         report_grants(grants);
         print::ready();
     };
-    estimator::run(&config, &hub, &role, &end, ready, |_| {})
+    estimator::run(&config, &hub, &role, &end, &rounds, ready, |_| {})
 }

@@ -12,6 +12,7 @@ pub mod explain;
 pub mod fault;
 pub mod latency;
 pub mod latency_floor;
+pub mod manual;
 mod progress;
 pub mod record;
 mod recording_limits;
@@ -20,6 +21,7 @@ pub mod send_command;
 #[cfg(feature = "analysis")]
 pub mod simulate;
 pub mod soak;
+pub mod status;
 pub mod study;
 pub mod up;
 pub mod virtual_worm;

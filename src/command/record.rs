@@ -2,7 +2,7 @@
 
 use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
-use crate::attendance::end_after_controller;
+use crate::attendance::{RoundCounter, ServiceManager, end_after_controller};
 use crate::recorder::Recorder;
 use crate::topics::Instance;
 use clap::Args;
@@ -54,14 +54,18 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     let (config, text) = args.worm.load_with_text()?;
     let limits = args.limits.limits().map_err(Failure::unusable)?;
     let end = end_on_signal()?;
-    if args.supervised {
+    let rounds = RoundCounter::default();
+    let _service = if args.supervised {
         end_after_controller(&Instance::of(&config).map_err(Failure::unusable)?, &end)?;
-    }
+        None
+    } else {
+        Some(ServiceManager::inform_of_rounds(&end, &rounds)?)
+    };
     let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force, limits)?;
     let (worm, file) = (&config.worm.name, args.out.display());
     print::log_line(format_args!("recording {worm} to {file}, from its first message on"));
     print::ready();
-    let outcome = recorder.run(args.duration, &end);
+    let outcome = recorder.run(args.duration, &end, &rounds);
     // The log is completed whatever ended the recording.
     print::log_line(recorder.close()?);
     outcome

@@ -1,7 +1,7 @@
 //! `wormd virtual-worm`: the simulated devices on a pseudo-terminal.
 
 use super::{Failure, end_on_signal, print, report_grants};
-use crate::attendance::{Parent, ParentPipe};
+use crate::attendance::{Parent, ParentPipe, announce_ready};
 use crate::link::servo::BAUD_RATES;
 use crate::link::virtual_worm::{Fault, Options, PortLink, Server, ServerError, VirtualWormReport};
 use crate::realtime;
@@ -88,6 +88,9 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
     report_grants(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     // A parent that does not wait for this line may have closed the pipe.
     print::announce(args.link.display());
+    if !args.supervised {
+        announce_ready();
+    }
     let devices = server.run(&end).map_err(Failure::failed)?;
     drop(link);
     if args.supervised

@@ -287,7 +287,7 @@ impl Loop {
         // One system call for each listener, none without. A listener that cannot be woken is not the loop's problem.
         let _ = self.ports.state_event.notify();
         let notified = monotonic_ns();
-        attendance.note(self.controller.mode(), self.controller.fault());
+        attendance.note(self.ticks + 1, self.controller.mode(), self.controller.fault());
         if let Some(reply) = &outputs.reply {
             match responder {
                 // A client that has gone meanwhile needs no answer.

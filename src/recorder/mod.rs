@@ -13,6 +13,7 @@ mod status_reporter;
 
 pub(crate) use file_series::RotationLimits;
 
+use crate::attendance::RoundCounter;
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::topics::{Hub, Instance, Subscriber, Topic};
@@ -90,15 +91,21 @@ impl Recorder {
         })
     }
 
-    /// Records until `end` is set, or until `duration` has passed since the first message.
+    /// Records until `end` is set, or until `duration` has passed since the first message, and counts how often it has read the topics.
     ///
     /// # Errors
     /// As [`poll`](Self::poll).
-    pub(crate) fn run(&mut self, duration: Option<Duration>, end: &AtomicBool) -> Result<(), Failure> {
+    pub(crate) fn run(
+        &mut self,
+        duration: Option<Duration>,
+        end: &AtomicBool,
+        rounds: &RoundCounter,
+    ) -> Result<(), Failure> {
         let mut first_message: Option<Instant> = None;
         let is_over = |first: Instant| duration.is_some_and(|duration| first.elapsed() >= duration);
         while !first_message.is_some_and(is_over) && !end.load(Ordering::Relaxed) {
             std::thread::sleep(POLL_INTERVAL);
+            rounds.count();
             if self.poll()?.messages > 0 {
                 first_message.get_or_insert_with(Instant::now);
             }

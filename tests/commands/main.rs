@@ -9,6 +9,7 @@ mod explain_mujoco;
 mod latency_page;
 mod latency_sample;
 mod licences;
+mod manual;
 mod mcap_python;
 mod simulate;
 mod workspace;

@@ -13,6 +13,7 @@ mod leaks;
 mod leaving;
 mod recording;
 mod recording_stops;
+mod service;
 mod stopping;
 mod worm;
 

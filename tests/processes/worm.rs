@@ -224,6 +224,12 @@ impl Invocation {
         self
     }
 
+    /// Gives it a variable of the environment.
+    pub fn with_environment(mut self, name: &str, value: &str) -> Self {
+        self.command.env(name, value);
+        self
+    }
+
     /// Runs it to its end, which must come within three minutes: it hangs otherwise, however busy the computer is.
     pub fn output(mut self) -> Output {
         self.command.stdout(Stdio::piped()).stderr(Stdio::piped());
