@@ -4,11 +4,11 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::SystemTime;
-use worm_estimator::message::{JsonMessage, Mode, State, Timing};
+use worm_estimator::message::{Mode, ProtobufMessage, State, Timing};
 use worm_log::{Origin, Writer};
 
-/// Ticks in a chunk at 1 kHz and a chunk every 0.2 s.
-const TICKS: u64 = 200;
+/// Ticks in a chunk at 1 kHz and a chunk every second.
+const TICKS: u64 = 1000;
 
 /// A state with numbers of realistic length.
 fn state(tick: u64) -> State {
@@ -71,7 +71,7 @@ fn recording(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("log");
     group.throughput(Throughput::Elements(TICKS));
     group.bench_function(
-        "write state and timing of a tick, 200 ticks and their chunk",
+        "write state and timing of a tick, 1000 ticks and their chunk",
         |bencher| {
             let mut writer = Writer::new(std::io::sink(), Path::new("bench"), &origin).expect("a sink takes all");
             let mut tick = 0;
@@ -86,15 +86,15 @@ fn recording(criterion: &mut Criterion) {
         },
     );
     group.throughput(Throughput::Elements(1));
-    let mut text = Vec::new();
-    group.bench_function("a state to JSON", |bencher| {
+    let mut bytes = Vec::new();
+    group.bench_function("a state to Protocol Buffers", |bencher| {
         bencher.iter(|| {
-            text.clear();
-            black_box(state(1)).write_json(&mut text).expect("can be written");
+            bytes.clear();
+            black_box(state(1)).write_protobuf(&mut bytes);
         });
     });
-    group.bench_function("a state from JSON", |bencher| {
-        bencher.iter(|| State::read_json(black_box(&text)).expect("is a state"));
+    group.bench_function("a state from Protocol Buffers", |bencher| {
+        bencher.iter(|| State::read_protobuf(black_box(&bytes)).expect("is a state"));
     });
     group.finish();
 }

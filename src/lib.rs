@@ -31,7 +31,7 @@
 //! | `worm-physics` | the exact motion and one for any friction law, its energy, the steady cycle, the design study, effects beyond the paper's theory | |
 //! | `dynamixel-bus` | DYNAMIXEL Protocol 2.0: packets, the bus, serial ports, a fault injector | |
 //! | `worm-estimator` | configuration (one TOML file), messages (one plain type per topic), the estimator and its alarms | `worm-physics` |
-//! | `worm-log` | the topics as an MCAP log, and its replay through the estimator | `worm-estimator` |
+//! | `worm-log` | the topics as an MCAP log, its replay through the estimator, and tables of it (feature `tables`) | `worm-estimator` |
 //! | `worm-analysis` | recordings in every format; gait and parameters from positions; the paper's experiment; the search for a missing effect; reports. The feature `analysis` | `worm-log` |
 //!
 //! # The modules, bottom up

@@ -38,6 +38,8 @@ enum Subcommands {
     Record(command::record::RecordArgs),
     /// Run a log through the estimator again, and compare the results
     Replay(command::replay::ReplayArgs),
+    /// A log as Parquet or CSV tables, or as a complete log of one that was cut off
+    Export(command::export::ExportArgs),
     /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
     Study(command::study::StudyArgs),
     /// The paper's experiment on a recording: tip deformations, slides, energy, figures
@@ -103,6 +105,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Command(args) => command::send_command::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
+        Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Analyze(args) => command::analyze::run(&args),

@@ -9,6 +9,7 @@ mod dataset;
 pub mod estimate;
 #[cfg(feature = "analysis")]
 pub mod explain;
+pub mod export;
 pub mod fault;
 pub mod latency;
 pub mod latency_floor;

@@ -10,6 +10,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 use worm_log::Channel;
 
+/// What is recorded unless something else is asked for.
+pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm";
+
 /// Arguments of `wormd record`.
 #[derive(Debug, Args)]
 pub struct RecordArgs {
@@ -27,14 +30,14 @@ pub struct RecordArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, allow_negative_numbers = true)]
     duration: Option<Duration>,
     /// Only these topics
-    #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = "state,timing,estimate,cycle,alarm")]
+    #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = ALL_TOPICS)]
     topics: Vec<Channel>,
     /// Standard input is a pipe from the process that watches over the worm
     #[arg(long, hide = true)]
     supervised: bool,
 }
 
-fn channel(name: &str) -> Result<Channel, String> {
+pub(super) fn channel(name: &str) -> Result<Channel, String> {
     Channel::from_name(name).ok_or_else(|| {
         let names: Vec<_> = Channel::ALL.iter().map(|channel| channel.name()).collect();
         format!(
@@ -52,7 +55,7 @@ fn channel(name: &str) -> Result<Channel, String> {
 pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     print::log_in_background()?;
     let (config, text) = args.worm.load_with_text()?;
-    let limits = args.limits.limits().map_err(Failure::unusable)?;
+    let options = args.limits.file_options().map_err(Failure::unusable)?;
     let end = end_on_signal()?;
     let rounds = RoundCounter::default();
     let _service = if args.supervised {
@@ -61,7 +64,7 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     } else {
         Some(ServiceManager::inform_of_rounds(&end, &rounds)?)
     };
-    let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force, limits)?;
+    let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force, options)?;
     let (worm, file) = (&config.worm.name, args.out.display());
     print::log_line(format_args!("recording {worm} to {file}, from its first message on"));
     print::ready();

@@ -1,14 +1,18 @@
-//! The arguments that bound a recording, the same for `wormd record` and `wormd up --record`.
+//! The arguments for the files of a recording, the same for `wormd record` and `wormd up --record`.
 
-use crate::recorder::RotationLimits;
+use crate::recorder::FileOptions;
 use clap::Args;
 use std::ffi::OsString;
 use std::time::Duration;
+use worm_log::Index;
 
 /// Smallest size of a file, bytes: schemas and configuration take some tens of kB of each.
 const MIN_BYTES: u64 = 1_000_000;
 
-/// When a file of the recording is followed by the next, and how many are kept.
+/// Files that a quota is divided into: one is being written, and removing the oldest one loses this part of what is kept.
+const FILES_IN_QUOTA: u64 = 10;
+
+/// When a file of the recording is followed by the next, how many are kept, and whether they have an index.
 #[derive(Debug, Clone, Args)]
 pub struct RecordingLimits {
     /// Go on in the next file (run.1.mcap, run.2.mcap, …) when this one has that size, as 100MB or 2GB; without it, files
@@ -21,39 +25,70 @@ pub struct RecordingLimits {
     /// Keep only this many files, at least 2: the oldest of this recording is removed when a new one is begun
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     keep: Option<u32>,
+    /// Keep the files of this recording together below that size, as 2GB: a new file begins at a tenth of it, and the oldest is removed
+    #[arg(long, value_name = "SIZE", value_parser = Size::parse, conflicts_with_all = ["max_size", "keep"])]
+    max_total: Option<Size>,
+    /// Leave the index out: 30 % smaller. Foxglove and Python then read the file from the front, and some viewers not at all
+    /// until `wormd export --mcap` has added it
+    #[arg(long)]
+    no_index: bool,
 }
 
 impl RecordingLimits {
-    /// The limits, for the recorder.
+    /// The same, for the recorder.
     ///
     /// # Errors
-    /// When `--keep` is given without anything that begins a new file.
-    pub(crate) fn limits(&self) -> Result<RotationLimits, String> {
+    /// When `--keep` is given without anything that begins a new file, or a quota is too small to be divided.
+    pub(crate) fn file_options(&self) -> Result<FileOptions, String> {
         if self.keep.is_some() && self.max_size.is_none() && self.max_age.is_none() {
             return Err("--keep needs --max-size or --max-age: without them there is only one file".to_owned());
         }
-        Ok(RotationLimits {
+        let mut options = FileOptions {
             max_bytes: self.max_size.as_ref().map(|size| size.bytes),
             max_age: self.max_age.as_ref().map(|age| age.time),
             keep: self.keep.map(|keep| keep as usize),
-        })
+            index: if self.no_index { Index::None } else { Index::Messages },
+        };
+        if let Some(total) = &self.max_total {
+            let part = total.bytes / FILES_IN_QUOTA;
+            if part < MIN_BYTES {
+                let least = MIN_BYTES * FILES_IN_QUOTA / 1_000_000;
+                return Err(format!(
+                    "--max-total {} is too small: give at least {least}MB",
+                    total.text
+                ));
+            }
+            // A file becomes larger than its limit by a second of messages and its index, so one file less is kept.
+            (options.max_bytes, options.keep) = (Some(part), Some(FILES_IN_QUOTA as usize - 1));
+        }
+        Ok(options)
     }
 
     /// Whether none is given.
     pub(crate) const fn is_empty(&self) -> bool {
-        self.max_size.is_none() && self.max_age.is_none() && self.keep.is_none()
+        self.max_size.is_none()
+            && self.max_age.is_none()
+            && self.keep.is_none()
+            && self.max_total.is_none()
+            && !self.no_index
     }
 
-    /// The same limits as arguments for another process.
+    /// The same as arguments for another process.
     pub(crate) fn forward(&self) -> Vec<OsString> {
         let keep = self.keep.map(|keep| keep.to_string());
         let arguments = [
             ("--max-size", self.max_size.as_ref().map(|size| &size.text)),
             ("--max-age", self.max_age.as_ref().map(|age| &age.text)),
             ("--keep", keep.as_ref()),
+            ("--max-total", self.max_total.as_ref().map(|size| &size.text)),
         ];
         let given = arguments.into_iter().filter_map(|(flag, value)| Some([flag, value?]));
-        given.flatten().map(OsString::from).collect()
+        let no_index = self.no_index.then_some("--no-index");
+        given
+            .flatten()
+            .map(OsString::from)
+            .chain(no_index.map(OsString::from))
+            .collect()
     }
 }
 
@@ -111,6 +146,31 @@ fn quantity(text: &str, units: &[(&str, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_quota_holds_for_all_files_together() {
+        let of = |text: &str| {
+            let limits = RecordingLimits {
+                max_size: None,
+                max_age: None,
+                keep: None,
+                max_total: Some(Size::parse(text).expect("a size")),
+                no_index: false,
+            };
+            limits.file_options()
+        };
+        let options = of("2GB").expect("enough");
+        let (each, files) = (options.max_bytes.expect("a size"), options.keep.expect("a number"));
+        // Each file may become a twentieth larger than its limit.
+        assert!(
+            each * 21 / 20 * files as u64 <= 2_000_000_000 && files >= 5,
+            "{options:?}"
+        );
+        assert_eq!(
+            of("9MB"),
+            Err("--max-total 9MB is too small: give at least 10MB".to_owned())
+        );
+    }
 
     #[test]
     fn sizes_and_times_are_read_or_refused_with_an_example() {

@@ -64,7 +64,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
             "--max-size, --max-age and --keep are for a recording: give --record FILE, too",
         ));
     }
-    args.record_limits.limits().map_err(Failure::unusable)?;
+    args.record_limits.file_options().map_err(Failure::unusable)?;
     // From here on nothing that this thread does waits for a terminal.
     print::log_in_background()?;
     let end = end_on_signal()?;

@@ -12,20 +12,22 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
-use worm_log::{Channel, Logged, Origin, WriteError, Writer};
+use worm_log::{Channel, Index, Logged, Origin, WriteError, Writer};
 
-/// When a file is followed by the next, and how many are kept. By default there is one file, of any size.
+/// What the files of a recording are like. By default there is one file, of any size, with an index.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct RotationLimits {
+pub(crate) struct FileOptions {
     /// A file that has so many bytes is followed by the next.
     pub max_bytes: Option<u64>,
     /// A file whose first message is so old is followed by the next.
     pub max_age: Option<Duration>,
     /// Only so many files are kept, the present one among them.
     pub keep: Option<usize>,
+    /// Whether each file gets an index of its messages.
+    pub index: Index,
 }
 
-impl RotationLimits {
+impl FileOptions {
     /// Whether there can be more than one file.
     pub(super) const fn is_rotating(&self) -> bool {
         self.max_bytes.is_some() || self.max_age.is_some()
@@ -60,7 +62,7 @@ pub(super) struct FileSeries {
     first: PathBuf,
     overwrite: bool,
     origin: Origin,
-    limits: RotationLimits,
+    options: FileOptions,
     progress: Arc<Progress>,
     /// The number of the file in use.
     number: u64,
@@ -81,18 +83,18 @@ impl FileSeries {
         file: LogFile,
         overwrite: bool,
         origin: Origin,
-        limits: RotationLimits,
+        options: FileOptions,
         progress: &Arc<Progress>,
     ) -> Result<Self, WriteError> {
         let kept = file.identity(first).into_iter().collect();
         Ok(Self {
             first: first.to_owned(),
             overwrite,
-            limits,
+            options,
             progress: Arc::clone(progress),
             number: 0,
             current: Current {
-                writer: Writer::new(BufWriter::new(file.clone()), first, &origin)?,
+                writer: Writer::with_index(BufWriter::new(file.clone()), first, &origin, options.index)?,
                 file,
                 path: first.to_owned(),
                 first_message: None,
@@ -109,10 +111,10 @@ impl FileSeries {
     /// [`SeriesError`] when this file cannot be completed or the next one not be begun.
     pub(super) fn prepared(mut self, now: Instant) -> Result<Self, SeriesError> {
         let first_message = *self.current.first_message.get_or_insert(now);
-        let limits = &self.limits;
-        let is_full = limits.max_bytes.is_some_and(|max| self.current.file.bytes() >= max);
+        let options = &self.options;
+        let is_full = options.max_bytes.is_some_and(|max| self.current.file.bytes() >= max);
         let age = now.saturating_duration_since(first_message);
-        let is_old = limits.max_age.is_some_and(|max| age >= max);
+        let is_old = options.max_age.is_some_and(|max| age >= max);
         if is_full || is_old { self.rotated(now) } else { Ok(self) }
     }
 
@@ -171,7 +173,12 @@ impl FileSeries {
         let mut series = Self {
             number: next.number,
             current: Current {
-                writer: Writer::new(BufWriter::new(next.file.clone()), &next.path, &origin)?,
+                writer: Writer::with_index(
+                    BufWriter::new(next.file.clone()),
+                    &next.path,
+                    &origin,
+                    self.options.index,
+                )?,
                 file: next.file,
                 path: next.path,
                 first_message: Some(now),
@@ -184,7 +191,7 @@ impl FileSeries {
 
     /// Removes what is more than may be kept. A file that cannot be removed is tried again when the next one begins.
     fn remove_oldest(&mut self) {
-        let Some(keep) = self.limits.keep else { return };
+        let Some(keep) = self.options.keep else { return };
         let surplus = self.kept.len().saturating_sub(keep.max(1));
         let mut refused = Vec::new();
         for oldest in self.kept.drain(..surplus) {

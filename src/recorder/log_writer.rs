@@ -1,6 +1,6 @@
 //! The thread that writes the log, with a queue in front of it for as long as a disk may stall.
 
-use super::file_series::{FileSeries, RotationLimits, SeriesError};
+use super::file_series::{FileOptions, FileSeries, SeriesError};
 use super::log_file::{LogFile, creation_failure};
 use super::progress::Progress;
 use crate::failure::Failure;
@@ -12,8 +12,9 @@ use std::time::{Duration, Instant};
 use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
 use worm_log::{Channel, Origin};
 
-/// Interval of the synchronisation to disk: a power loss costs at most this, and what is in the queue.
-const SYNC_INTERVAL: Duration = Duration::from_millis(200);
+/// Interval at which a chunk is finished and synchronised to disk: a killed recorder or a power loss costs at most this, and what is in the
+/// queue. Longer chunks compress better, by 5 % from 0.2 s to this, and hardly beyond.
+const SYNC_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Batches that may wait for the disk: 10 s of them. Beyond that the topics are not read, and in time lose their oldest messages.
 const QUEUE: usize = 500;
@@ -52,18 +53,18 @@ impl LogWriter {
     pub(super) fn open(
         path: &Path,
         force: bool,
-        limits: RotationLimits,
+        options: FileOptions,
         origin: Origin,
         progress: &Arc<Progress>,
     ) -> Result<Self, Failure> {
         let file = LogFile::create(path, force, progress).map_err(|error| creation_failure(path, &error))?;
-        if limits.is_rotating() && !file.is_regular() {
+        if options.is_rotating() && !file.is_regular() {
             return Err(Failure::unusable(format!(
                 "{} is no ordinary file, which no other can follow: leave out --max-size and --max-age",
                 path.display()
             )));
         }
-        let series = FileSeries::begin(path, file, force, origin, limits, progress).map_err(Failure::failed)?;
+        let series = FileSeries::begin(path, file, force, origin, options, progress).map_err(Failure::failed)?;
         let (queue, batches) = bounded(QUEUE);
         let thread = std::thread::Builder::new()
             .name("log".to_owned())

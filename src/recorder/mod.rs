@@ -11,7 +11,7 @@ mod log_writer;
 mod progress;
 mod status_reporter;
 
-pub(crate) use file_series::RotationLimits;
+pub(crate) use file_series::FileOptions;
 
 use crate::attendance::RoundCounter;
 use crate::failure::Failure;
@@ -65,7 +65,7 @@ impl Recorder {
         topics: &[Channel],
         out: &Path,
         force: bool,
-        limits: RotationLimits,
+        options: FileOptions,
     ) -> Result<Self, Failure> {
         let instance = Instance::of(config).map_err(Failure::unusable)?;
         let origin = Origin {
@@ -80,7 +80,7 @@ impl Recorder {
         let hub = Hub::open(&instance).map_err(Failure::failed)?;
         let topics = RecordedTopics::open(&hub, topics)?;
         let progress = Arc::default();
-        let writer = LogWriter::open(out, force, limits, origin, &progress)?;
+        let writer = LogWriter::open(out, force, options, origin, &progress)?;
         Ok(Self {
             status: StatusReporter::open(&hub, &instance),
             topics,

@@ -62,6 +62,23 @@ fn unusable_input_is_named_and_ends_with_status_2() {
         (&["study", "--cells", "1"], &["1 cells", "2 to 16"]),
         (&["study", "--slopes", "steep"], &["steep"]),
         (&["study", "--battery=-5"], &["-5", "above 0"]),
+        (&["export", "no/such.mcap"], &["--mcap", "--parquet"]),
+        (
+            &["export", "no/such.mcap", "--mcap", "copy.mcap"],
+            &["no/such.mcap: cannot be read", "check that the file is there"],
+        ),
+        (
+            &["export", &not_toml, "--mcap", &not_toml, "--force"],
+            &["not.toml is the log itself", "choose another name"],
+        ),
+        (
+            &["record", "--out", "x.mcap", "--max-total", "9MB"],
+            &["--max-total 9MB is too small", "10MB"],
+        ),
+        (
+            &["record", "--out", "x.mcap", "--max-total", "1GB", "--keep", "3"],
+            &["--max-total", "--keep"],
+        ),
         (&["virtual-worm"], &["--link"]),
         (
             &["virtual-worm", "--link", "/no/such/folder/port"],

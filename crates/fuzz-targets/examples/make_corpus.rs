@@ -7,11 +7,11 @@ use dynamixel_bus::packet::{
 };
 use std::fmt::Write;
 use std::path::Path;
-use testkit::log_sample::{Telemetry, crawl};
+use testkit::log_sample::{Sink, Telemetry, crawl, origin};
 use testkit::recording_files::{as_csv, crawl as scene, simulated};
 use worm_analysis::experiment::Simulation;
-use worm_estimator::message::JsonMessage;
-use worm_log::Channel;
+use worm_estimator::message::{JsonMessage, ProtobufMessage};
+use worm_log::{Channel, Logged, Writer};
 
 fn main() {
     let folder = std::env::args().nth(1).expect("give the folder of the corpora");
@@ -35,7 +35,12 @@ fn main() {
     put("c3d", "crawl", &c3d(&short, false));
     put("c3d", "crawl_in_integers", &c3d(&short, true));
     let telemetry = crawl(0.03);
-    put("mcap_log", "crawl", &log(&telemetry));
+    put("mcap_log", "crawl", &log(&telemetry, Encoding::Json));
+    put("mcap_log", "crawl_in_protobuf", &log(&telemetry, Encoding::Protobuf));
+    put("mcap_log", "crawl_compressed", &compressed_log(&telemetry));
+    put("protobuf_message", "state", &protobuf(0, &telemetry.states[9]));
+    put("protobuf_message", "timing", &protobuf(1, &telemetry.timings[9]));
+    put("protobuf_message", "estimate", &protobuf(2, &telemetry.estimates[1]));
     put("log_messages", "crawl", &messages(&telemetry));
 }
 
@@ -230,46 +235,90 @@ fn c3d(simulation: &Simulation, in_integers: bool) -> Vec<u8> {
     [header, parameters, data].concat()
 }
 
+/// How a log holds its messages.
+#[derive(Clone, Copy)]
+enum Encoding {
+    Json,
+    Protobuf,
+}
+
+impl Encoding {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Json => "json",
+            Self::Protobuf => "protobuf",
+        }
+    }
+
+    fn of<T: Logged>(self, message: &T) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        match self {
+            Self::Json => message.write_json(&mut bytes).expect("a vector takes all"),
+            Self::Protobuf => message.write_protobuf(&mut bytes),
+        }
+        bytes
+    }
+}
+
+/// A message with the byte before it that names its type to the target.
+fn protobuf<T: ProtobufMessage>(of_type: u8, message: &T) -> Vec<u8> {
+    let mut bytes = vec![of_type];
+    message.write_protobuf(&mut bytes);
+    bytes
+}
+
+/// A short log as a recorder writes it.
+fn compressed_log(telemetry: &Telemetry) -> Vec<u8> {
+    let sink = Sink::default();
+    let mut writer = Writer::new(sink.clone(), Path::new("worm.mcap"), &origin()).expect("memory takes all");
+    for (state, timing) in telemetry.states.iter().zip(&telemetry.timings) {
+        writer.write(state).expect("memory takes all");
+        writer.write(timing).expect("memory takes all");
+    }
+    writer.write(&telemetry.estimates[0]).expect("memory takes all");
+    writer.finish().expect("memory takes all");
+    sink.bytes()
+}
+
 /// A log without compression and schemas, so that a fuzzer reaches its messages: some as records of their own, some in a chunk without a
 /// checksum.
-fn log(telemetry: &Telemetry) -> Vec<u8> {
+fn log(telemetry: &Telemetry, encoding: Encoding) -> Vec<u8> {
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";
     let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
     let record = |opcode: u8, parts: &[&[u8]]| {
         let content = parts.concat();
         [&[opcode][..], &(content.len() as u64).to_le_bytes(), &content].concat()
     };
-    let message = |channel: Channel, sequence: u32, json: &[u8]| {
+    let message = |channel: Channel, sequence: u32, content: &[u8]| {
         let head = [
             &(channel as u16 + 1).to_le_bytes()[..],
             &sequence.to_le_bytes(),
             &[0; 16],
         ];
-        record(0x05, &[&head.concat(), json])
+        record(0x05, &[&head.concat(), content])
     };
     let mut bytes = [MAGIC, &record(0x01, &[&text(""), &text("")])].concat();
     for &channel in Channel::ALL {
         let id = (channel as u16 + 1).to_le_bytes();
-        bytes.extend(record(
-            0x03,
-            &[&id, &text(channel.type_name()), &text("jsonschema"), &text("")],
-        ));
+        bytes.extend(record(0x03, &[&id, &text(channel.type_name()), &text(""), &text("")]));
         bytes.extend(record(
             0x04,
-            &[&id, &id, &text(&channel.topic()), &text("json"), &text("")],
+            &[&id, &id, &text(&channel.topic()), &text(encoding.name()), &text("")],
         ));
     }
-    let of = |channel: Channel, lines: Vec<u8>| {
-        let lines = lines.split(|byte| *byte == b'\n').filter(|line| !line.is_empty());
-        let messages: Vec<Vec<u8>> = (0..)
-            .zip(lines)
-            .map(|(sequence, line)| message(channel, sequence, line))
-            .collect();
-        messages.concat()
-    };
-    bytes.extend(of(Channel::State, lines(&telemetry.states[..4])));
-    let later = of(Channel::State, lines(&telemetry.states[4..6]));
-    let estimates = of(Channel::Estimate, lines(&telemetry.estimates[..1]));
+    fn records<T: Logged>(
+        messages: &[T],
+        encoding: Encoding,
+        record: impl Fn(Channel, u32, &[u8]) -> Vec<u8>,
+    ) -> Vec<u8> {
+        let numbered = (0..).zip(messages);
+        numbered
+            .flat_map(|(sequence, message)| record(T::CHANNEL, sequence, &encoding.of(message)))
+            .collect()
+    }
+    bytes.extend(records(&telemetry.states[..4], encoding, message));
+    let later = records(&telemetry.states[4..6], encoding, message);
+    let estimates = records(&telemetry.estimates[..1], encoding, message);
     let length = ((later.len() + estimates.len()) as u64).to_le_bytes();
     bytes.extend(record(
         0x06,

@@ -47,7 +47,7 @@ const KIB: usize = 1024;
 const MIB: usize = 1024 * KIB;
 
 /// Every target.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [Target; 10] = [
     Target {
         name: "packets",
         run: packets::packets,
@@ -93,8 +93,15 @@ pub const TARGETS: [Target; 9] = [
     Target {
         name: "mcap_log",
         run: log::mcap_log,
-        memory_per_byte: 1024,
+        // A chunk may unpack to 64 times its size, and an empty message of 31 bytes to 1 kB in a list with as much room to spare.
+        memory_per_byte: 5 * KIB,
         memory_base: 8 * MIB,
+    },
+    Target {
+        name: "protobuf_message",
+        run: log::protobuf_message,
+        memory_per_byte: 64,
+        memory_base: 64 * KIB,
     },
     Target {
         name: "log_messages",

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::Path;
 use worm_analysis::recording::mcap;
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, RecordingStatus, State, Timing};
 use worm_log::{Log, compare, messages_from, replay};
 
 /// A log: as its messages, as a recording, and through the estimator.
@@ -44,6 +44,39 @@ pub(crate) fn log_messages(data: &[u8]) {
         read::<Timing>(line);
     }
     check(&log);
+}
+
+/// One message in Protocol Buffers, of the type that the first byte names.
+pub(crate) fn protobuf_message(data: &[u8]) {
+    let Some((of_type, bytes)) = data.split_first() else {
+        return;
+    };
+    match of_type {
+        0 => read_bytes::<State>(bytes),
+        1 => read_bytes::<Timing>(bytes),
+        2 => read_bytes::<Estimate>(bytes),
+        3 => read_bytes::<Cycle>(bytes),
+        4 => read_bytes::<Alarm>(bytes),
+        _ => read_bytes::<RecordingStatus>(bytes),
+    }
+}
+
+/// Reads a message, if it is one; then it is the same when it was written and read again.
+fn read_bytes<T: ProtobufMessage>(bytes: &[u8]) {
+    let message = match T::read_protobuf(bytes) {
+        Ok(message) => message,
+        Err(error) => return drop(readable(error)),
+    };
+    let mut once = Vec::new();
+    message.write_protobuf(&mut once);
+    let again = T::read_protobuf(&once).expect("what was written can be read");
+    for (place, field) in T::FIELDS.iter().enumerate() {
+        // As text, for `NaN` is not equal to itself.
+        let text = |message: &T| format!("{:?}", message.field(place));
+        assert_eq!(text(&message), text(&again), "{}", field.name);
+    }
+    // Whatever came in Protocol Buffers has a form in JSON.
+    written(&message);
 }
 
 /// Reads a message, if it is one; then it is written and read to the same text again.

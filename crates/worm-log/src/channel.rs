@@ -1,17 +1,15 @@
 //! The channels of a log.
 
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, State, Timing};
 
-/// Encoding of messages, as MCAP names it.
-pub(super) const MESSAGE_ENCODING: &str = "json";
-/// Encoding of schemas, as MCAP names it.
-pub(super) const SCHEMA_ENCODING: &str = "jsonschema";
+/// Encoding of the messages that are written, and of their schemas, as MCAP names it.
+pub(super) const PROTOBUF: &str = "protobuf";
 /// The metadata record and the attachment of a log.
 pub(super) const METADATA: &str = "wormd";
 pub(super) const CONFIG_ATTACHMENT: &str = "worm.toml";
 
 /// A message with a channel in a log.
-pub trait Logged: JsonMessage {
+pub trait Logged: ProtobufMessage {
     /// Its channel.
     const CHANNEL: Channel;
 }
@@ -41,9 +39,14 @@ macro_rules! channels {
                 match self { $(Self::$message => <$message as JsonMessage>::TYPE_NAME,)+ }
             }
 
-            /// The JSON Schema of its messages.
+            /// The JSON Schema of its messages: the meaning and the unit of each field.
             pub fn schema(self) -> serde_json::Value {
                 match self { $(Self::$message => <$message as JsonMessage>::schema(),)+ }
+            }
+
+            /// The descriptor of its messages, a serialised `google.protobuf.FileDescriptorSet`.
+            pub fn descriptor_set(self) -> Vec<u8> {
+                match self { $(Self::$message => <$message as ProtobufMessage>::descriptor_set(),)+ }
             }
         }
 

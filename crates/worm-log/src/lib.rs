@@ -1,36 +1,39 @@
 //! Logs of a worm's topics as MCAP files: every message of its processes, to the last bit.
 //!
-//! A log has one channel for each topic (`/state`, `/timing`, `/estimate`, `/cycle`, `/alarm`), with messages as JSON
-//! ([`JsonMessage`](worm_estimator::message::JsonMessage)) and their schema, so the official readers of any language, Foxglove and
-//! PlotJuggler read it as named series. Log time is the time in the message, ns of `CLOCK_MONOTONIC`. The metadata record `wormd` gives the
-//! corresponding wall-clock time, the worm and the version that wrote the file, and the attachment `worm.toml` is the configuration. So
-//! the file is all that an analysis needs.
+//! A log has one channel for each topic (`/state`, `/timing`, `/estimate`, `/cycle`, `/alarm`), with messages in Protocol Buffers
+//! ([`ProtobufMessage`](worm_estimator::message::ProtobufMessage)) and their descriptor, so the official readers of any language, Foxglove
+//! and PlotJuggler read it as named series. Log time is the time in the message, ns of `CLOCK_MONOTONIC`. The metadata record `wormd` gives
+//! the corresponding wall-clock time, the worm and the version that wrote the file, and the attachment `worm.toml` is the configuration. So
+//! the file is all that an analysis needs. Logs of older versions hold JSON, and are read as well.
 //!
 //! # How it works
-//! `writer` puts messages into lz4 chunks, each written as a whole: if the writer is killed, the file ends after its last chunk, without a
+//! `writer` puts messages into zstd chunks, each written as a whole: if the writer is killed, the file ends after its last chunk, without a
 //! summary. `scan` therefore reads from the front and never uses the index; of a truncated file it reads all that is there, even within a
 //! chunk, and reports how far it came. [`messages`] returns the contents of a log. [`replay`] feeds the states to the estimator again, and
-//! [`compare`] says whether the results are the same as live.
+//! [`compare`] says whether the results are the same as live. [`export`] makes whole logs of damaged or old ones, and tables.
 //!
 //! # Cost
-//! Writing the state and the timing of a tick takes 4.4 µs, so 0.4 % of a CPU at 1 kHz. All topics together take 200 bytes a tick on disk,
-//! 0.7 GB an hour. Reading a state takes 1.6 µs (`benches/recording_mcap.rs`).
+//! What a tick takes on disk and of a CPU is measured in `docs/results.md`, part by part (`benches/recording_mcap.rs`).
 
 mod channel;
 mod compare;
 mod error;
+pub mod export;
 mod log;
 mod older;
+mod payload;
 mod recorder_alarm;
 mod replay;
 mod scan;
 mod shape;
+mod unpack;
 mod writer;
 
 pub use channel::{Channel, Logged};
 pub use compare::{Comparison, compare};
 pub use error::ReadError;
 pub use log::{Log, messages, messages_from, nothing, without_messages};
+pub use payload::{Payload, PayloadError};
 pub use replay::{Replay, replay};
 pub use scan::{Contents, scan, scan_from};
-pub use writer::{Origin, WriteError, Writer};
+pub use writer::{Index, Origin, WriteError, Writer};

@@ -1,13 +1,14 @@
 //! The contents of a log.
 
 use super::channel::Channel;
+use super::payload::{Payload, PayloadError};
 use super::scan::{Contents, refusal, scan, scan_from};
 use crate::ReadError;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use worm_estimator::config::{Config, ConfigError};
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
 
 /// The messages of a log, by topic, each topic in the order in which it was recorded.
 #[derive(Debug, Clone, Default)]
@@ -63,21 +64,21 @@ pub fn messages_from(input: impl Read + Seek, path: &Path) -> Result<Log, ReadEr
     gather(path, |take| scan_from(input, path, take))
 }
 
-/// What receives the messages of a log, still as JSON.
-type Take<'t> = &'t mut dyn FnMut(Channel, &[u8]) -> serde_json::Result<()>;
+/// What receives the messages of a log, still as they stand in it.
+type Take<'t> = &'t mut dyn FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>;
 
 fn gather(path: &Path, scan: impl FnOnce(Take<'_>) -> Result<Contents, ReadError>) -> Result<Log, ReadError> {
     let mut log = Log {
         file: path.to_owned(),
         ..Log::default()
     };
-    let contents = scan(&mut |channel, text| {
+    let contents = scan(&mut |channel, payload| {
         match channel {
-            Channel::State => log.states.push(State::read_json(text)?),
-            Channel::Timing => log.timings.push(Timing::read_json(text)?),
-            Channel::Estimate => log.estimates.push(Estimate::read_json(text)?),
-            Channel::Cycle => log.cycles.push(Cycle::read_json(text)?),
-            Channel::Alarm => log.alarms.push(Alarm::read_json(text)?),
+            Channel::State => log.states.push(payload.read()?),
+            Channel::Timing => log.timings.push(payload.read()?),
+            Channel::Estimate => log.estimates.push(payload.read()?),
+            Channel::Cycle => log.cycles.push(payload.read()?),
+            Channel::Alarm => log.alarms.push(payload.read()?),
         }
         Ok(())
     })?;

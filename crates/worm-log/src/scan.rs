@@ -1,12 +1,13 @@
 //! Reading a log from the front, to wherever it ends.
 //!
 //! A file that was not finished has no index, so none is used. The checksum of each chunk is verified before its
-//! messages are used. The beginning of one more chunk may follow the last whole record: what can be unpacked of it (lz4 works in blocks
-//! of 64 kB) is read, too, up to the last whole message, and a warning says so.
+//! messages are used. The beginning of one more chunk may follow the last whole record: what can be unpacked of it (zstd works in blocks
+//! of 128 kB, lz4 of 64) is read, too, up to the last whole message, and a warning says so.
 
-use super::channel::{CONFIG_ATTACHMENT, Channel, MESSAGE_ENCODING, METADATA};
-use super::older::{completed, lacking_members};
+use super::channel::{CONFIG_ATTACHMENT, Channel, METADATA};
+use super::payload::{ENCODINGS, Encoding, Payload, PayloadError, Unknown};
 use super::shape::{are_whole_records, is_whole, uncompressed_records};
+use super::unpack::{BoundedZstd, MAX_RATIO};
 use crate::ReadError;
 use mcap::records::{Channel as FileChannel, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -20,8 +21,6 @@ use worm_estimator::abridged::{abridged, first_of};
 
 /// Largest size of an unpacked record, bytes; a greater length is damaged.
 const LARGEST_RECORD: usize = 1 << 28;
-/// lz4 makes nothing smaller than by this factor: a byte of its format stands for at most 255 bytes.
-const MAX_LZ4_RATIO: u64 = 256;
 /// More bytes than a chunk has before its records, with the name of any compression that is known.
 const MAX_CHUNK_HEAD: usize = 64;
 /// Bytes of a record before its content: its opcode and its length.
@@ -45,12 +44,15 @@ pub struct Contents {
     pub warnings: Vec<String>,
 }
 
-/// Reads a log and hands each of its messages, still as JSON, to `take`, in the order of the file.
+/// Reads a log and hands each of its messages, still as it stands there, to `take`, in the order of the file.
 ///
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is not MCAP, has no channel of a worm, or has one whose messages this
 /// version cannot read; with channel and number if `take` refuses a message.
-pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>) -> Result<Contents, ReadError> {
+pub fn scan(
+    path: &Path,
+    take: impl FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>,
+) -> Result<Contents, ReadError> {
     let file = File::open(path).map_err(|error| unreadable(path, &error))?;
     scan_from(file, path, take)
 }
@@ -62,7 +64,7 @@ pub fn scan(path: &Path, take: impl FnMut(Channel, &[u8]) -> serde_json::Result<
 pub fn scan_from(
     mut input: impl Read + Seek,
     path: &Path,
-    take: impl FnMut(Channel, &[u8]) -> serde_json::Result<()>,
+    take: impl FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>,
 ) -> Result<Contents, ReadError> {
     let length = skip_magic(&mut input, path)?;
     let mut scanner = Scanner::new(path, take);
@@ -101,11 +103,17 @@ pub fn scan_from(
         Some((&op::CHUNK, rest)) => rest.get(RECORD_HEAD as usize - 1..).and_then(uncompressed_records),
         _ => None,
     };
-    let rest = LinearReaderOptions::default().with_record_length_limit(unpacked_at_most(length.saturating_sub(at)));
+    let most = unpacked_at_most(length.saturating_sub(at));
+    let rest = LinearReaderOptions::default().with_record_length_limit(most);
+    let mut unpacked = 0;
     let salvaged = each_record(
         begun.unwrap_or(&head).chain(BufReader::new(&mut input)),
         rest,
         |opcode, content| {
+            unpacked += content.len();
+            if unpacked > most {
+                return Err(McapError::DecompressionError("too much for its size".to_owned()).into());
+            }
             scanner.take_plain(opcode, content)?;
             Ok(ControlFlow::Continue(()))
         },
@@ -150,7 +158,7 @@ fn at_most(length: u64) -> usize {
 
 /// The largest record that so many compressed bytes can hold.
 fn unpacked_at_most(length: u64) -> usize {
-    at_most(length.saturating_mul(MAX_LZ4_RATIO))
+    at_most(length.saturating_mul(MAX_RATIO))
 }
 
 /// Why reading ends.
@@ -174,6 +182,7 @@ fn each_record(
 ) -> Result<(), Trouble> {
     let options = options.with_skip_start_magic(true).with_skip_end_magic(true);
     let mut reader = LinearReader::new_with_options(options);
+    reader.add_decompressor(BoundedZstd::new()?)?;
     while let Some(event) = reader.next_event() {
         match event? {
             LinearReadEvent::ReadRequest(wanted) => {
@@ -199,8 +208,8 @@ struct Scanner<'a, F> {
     path: &'a Path,
     take: F,
     schemas: HashMap<u16, String>,
-    /// The channels of the file by their IDs, with the members that their messages lack; none for unknown channels.
-    channels: HashMap<u16, Option<(Channel, Option<&'static str>)>>,
+    /// The channels of the file by their IDs, with the encoding of their messages; none for unknown channels.
+    channels: HashMap<u16, Option<(Channel, Encoding)>>,
     foreign: Vec<String>,
     damaged_chunks: usize,
     contents: Contents,
@@ -208,7 +217,7 @@ struct Scanner<'a, F> {
     latest_ns: u64,
 }
 
-impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
+impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a, F> {
     fn new(path: &'a Path, take: F) -> Self {
         Self {
             path,
@@ -279,11 +288,12 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
                     .channels
                     .get(&header.channel_id)
                     .ok_or(McapError::UnknownChannel(header.sequence, header.channel_id))?;
-                let Some((channel, lacking)) = *channel else {
+                let Some((channel, encoding)) = *channel else {
                     return Ok(());
                 };
-                (self.take)(channel, &completed(&data, lacking)).map_err(|error| {
-                    let place = format!("channel {}, message {}", channel.topic(), header.sequence);
+                let payload = Payload { encoding, data: &data };
+                (self.take)(channel, payload).map_err(|error| {
+                    let place = format!("channel {}, message {} of the file", channel.topic(), self.count + 1);
                     let remedy = "the file was not written by wormd, or was changed: record it again";
                     Trouble::Refused(refusal(
                         self.path,
@@ -328,22 +338,19 @@ impl<'a, F: FnMut(Channel, &[u8]) -> serde_json::Result<()>> Scanner<'a, F> {
             }
             return Ok(());
         }
-        let problem = if channel.message_encoding != MESSAGE_ENCODING {
-            format!(
-                "holds messages encoded as '{}', not as '{MESSAGE_ENCODING}'",
+        let problem = match Encoding::of(known, &channel.message_encoding, schema) {
+            Ok(encoding) => {
+                self.channels.insert(channel.id, Some((known, encoding)));
+                return Ok(());
+            }
+            Err(Unknown::Encoding) => format!(
+                "holds messages encoded as '{}', not as {ENCODINGS}",
                 channel.message_encoding
-            )
-        } else if let Some(lacking) = lacking_members(known, schema) {
-            self.channels.insert(channel.id, Some((known, Some(lacking))));
-            return Ok(());
-        } else if schema != known.type_name() {
-            format!(
+            ),
+            Err(Unknown::Type) => format!(
                 "holds '{schema}', and this version of wormd reads '{}'",
                 known.type_name()
-            )
-        } else {
-            self.channels.insert(channel.id, Some((known, None)));
-            return Ok(());
+            ),
         };
         let writer = self.contents.metadata.get("wormd_version");
         let remedy = match writer {

@@ -3,7 +3,7 @@
 use crate::command::dataset::READING;
 use crate::command::progress::Progress;
 use crate::command::{Failure, end_on_signal_until};
-use crate::recorder::{POLL_INTERVAL, Recorder, RotationLimits};
+use crate::recorder::{FileOptions, POLL_INTERVAL, Recorder};
 use crate::topics::{Controller, Hub, Instance, RoleLock};
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -41,7 +41,7 @@ pub(super) fn record(
     }
     let (end, over) = end_on_signal_until()?;
     let topics = [Channel::State, Channel::Estimate, Channel::Cycle, Channel::Alarm];
-    let mut recorder = Recorder::open(config, text, &topics, log, true, RotationLimits::default())?;
+    let mut recorder = Recorder::open(config, text, &topics, log, true, FileOptions::default())?;
     let mut cycles_recorded = CycleProgress::new(&config.worm.name, cycles);
     let mut done = Ok(false);
     while matches!(done, Ok(false)) {

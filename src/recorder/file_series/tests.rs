@@ -11,7 +11,7 @@ struct Recording {
 }
 
 impl Recording {
-    fn begin(limits: RotationLimits) -> Self {
+    fn begin(limits: FileOptions) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let first = folder.path().join("run.mcap");
         let progress = Arc::new(Progress::default());
@@ -94,9 +94,9 @@ impl Recording {
 #[test]
 fn every_message_is_in_one_file_and_each_file_is_whole() {
     let max_bytes = 60_000;
-    let mut recording = Recording::begin(RotationLimits {
+    let mut recording = Recording::begin(FileOptions {
         max_bytes: Some(max_bytes),
-        ..RotationLimits::default()
+        ..FileOptions::default()
     });
     let now = Instant::now();
     for _ in 0..60 {
@@ -119,9 +119,9 @@ fn every_message_is_in_one_file_and_each_file_is_whole() {
 
 #[test]
 fn a_file_that_is_old_is_followed_by_another_when_there_is_something_to_write() {
-    let mut recording = Recording::begin(RotationLimits {
+    let mut recording = Recording::begin(FileOptions {
         max_age: Some(Duration::from_secs(10)),
-        ..RotationLimits::default()
+        ..FileOptions::default()
     });
     let begun = Instant::now();
     for at_s in [100, 105, 109, 110, 115, 200, 201] {
@@ -142,10 +142,10 @@ fn a_file_that_is_old_is_followed_by_another_when_there_is_something_to_write() 
 
 #[test]
 fn only_the_newest_are_kept_and_only_own_files_are_removed() {
-    let mut recording = Recording::begin(RotationLimits {
+    let mut recording = Recording::begin(FileOptions {
         max_age: Some(Duration::from_secs(1)),
         keep: Some(2),
-        ..RotationLimits::default()
+        ..FileOptions::default()
     });
     let foreign = "of an earlier recording";
     std::fs::write(recording.path(2), foreign).expect("can be written");
@@ -180,10 +180,10 @@ fn only_the_newest_are_kept_and_only_own_files_are_removed() {
 
 #[test]
 fn a_file_that_cannot_be_removed_is_tried_again_with_the_next() {
-    let mut recording = Recording::begin(RotationLimits {
+    let mut recording = Recording::begin(FileOptions {
         max_age: Some(Duration::from_secs(1)),
         keep: Some(2),
-        ..RotationLimits::default()
+        ..FileOptions::default()
     });
     // The oldest file lies in a folder that cannot be entered for a while.
     let [folder, aside] = ["folder", "aside"].map(|name| recording.folder.path().join(name));
@@ -218,9 +218,9 @@ fn a_file_that_cannot_be_removed_is_tried_again_with_the_next() {
 
 #[test]
 fn a_file_that_cannot_be_begun_leaves_the_one_before_complete() {
-    let mut recording = Recording::begin(RotationLimits {
+    let mut recording = Recording::begin(FileOptions {
         max_age: Some(Duration::from_secs(1)),
-        ..RotationLimits::default()
+        ..FileOptions::default()
     });
     recording.series.as_mut().expect("is open").overwrite = true;
     let begun = Instant::now();
@@ -241,7 +241,7 @@ fn a_file_that_cannot_be_begun_leaves_the_one_before_complete() {
 
 #[test]
 fn a_removed_file_stops_the_recording() {
-    let mut recording = Recording::begin(RotationLimits::default());
+    let mut recording = Recording::begin(FileOptions::default());
     recording.write(1, Instant::now()).expect("there is room");
     std::fs::remove_file(recording.path(0)).expect("is there");
     let error = recording
@@ -256,7 +256,7 @@ fn a_removed_file_stops_the_recording() {
 
 #[test]
 fn a_file_that_another_process_writes_is_not_overwritten() {
-    let mut recording = Recording::begin(RotationLimits::default());
+    let mut recording = Recording::begin(FileOptions::default());
     recording.write(3, Instant::now()).expect("there is room");
     let error = LogFile::create(&recording.path(0), true, &recording.progress).expect_err("is in use");
     assert_eq!(error.kind(), io::ErrorKind::ResourceBusy);

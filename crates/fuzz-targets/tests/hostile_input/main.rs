@@ -48,6 +48,7 @@ targets! {
     vicon_csv: 6_000,
     c3d: 10_000,
     mcap_log: 1_000,
+    protobuf_message: 50_000,
     log_messages: 2_000,
 }
 

@@ -4,6 +4,7 @@
 use std::path::Path;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin};
 use worm_estimator::config::Config;
+use worm_estimator::message::{Estimate, FieldAccess};
 use worm_log::Writer;
 
 /// Bytes of a long input.
@@ -27,6 +28,7 @@ pub fn inputs(target: &str) -> Vec<(&'static str, Vec<u8>)> {
         "c3d" => c3d_attacks(),
         "mcap_log" => mcap_attacks(),
         "log_messages" => message_attacks(),
+        "protobuf_message" => protobuf_attacks(),
         _ => Vec::new(),
     }
 }
@@ -369,6 +371,36 @@ fn mcap_attacks() -> Vec<(&'static str, Vec<u8>)> {
             "many damaged chunks",
             after_magic(chunk(11, "", b"\x05\x02\0\0\0\0\0\0\0{}").repeat(10_000)),
         ),
+        ("a chunk that unpacks to far more than its size", {
+            // Nothing but the same empty message, again and again: what zstd makes smallest.
+            let sink = Sink::default();
+            let mut writer = Writer::new(sink.clone(), Path::new("worm.mcap"), &origin()).expect("memory takes all");
+            for _ in 0..300_000 {
+                writer.write(&Estimate::empty()).expect("memory takes all");
+            }
+            writer.finish().expect("memory takes all");
+            sink.bytes()
+        }),
+        ("the same, cut off", {
+            let sink = Sink::default();
+            let mut writer = Writer::new(sink.clone(), Path::new("worm.mcap"), &origin()).expect("memory takes all");
+            let begin = sink.bytes().len();
+            for _ in 0..30_000 {
+                writer.write(&Estimate::empty()).expect("memory takes all");
+            }
+            writer.flush().expect("memory takes all");
+            let bytes = sink.bytes();
+            bytes[..begin + (bytes.len() - begin) / 3].to_vec()
+        }),
+        (
+            "a chunk whose decoder is to reserve much",
+            // A zstd frame with a window of 3.75 TB.
+            after_magic(chunk(
+                200_000_000,
+                "zstd",
+                &[0x28, 0xb5, 0x2f, 0xfd, 0x00, 0xff, 0x00, 0x00],
+            )),
+        ),
         ("many channels", after_magic(channels(u16::MAX).collect())),
         ("many empty records", after_magic(record(0x80, 0, b"").repeat(100_000))),
         ("a configuration of another version", {
@@ -403,5 +435,17 @@ fn message_attacks() -> Vec<(&'static str, Vec<u8>)> {
         ("nested lists", long(b"[")),
         ("nested objects", long(b"{\"a\":")),
         ("empty lines", long(b"\n")),
+    ]
+}
+
+fn protobuf_attacks() -> Vec<(&'static str, Vec<u8>)> {
+    vec![
+        (
+            "a list that claims to be endless",
+            [&[0, 0x6a][..], &[0xff; 9], &[1]].concat(),
+        ),
+        ("a number without an end", [&[0][..], &long(b"\xff")].concat()),
+        ("a field again and again", [&[0][..], &long(b"\x08\x01")].concat()),
+        ("a list again and again", [&[0][..], &long(b"\x6a\x00")].concat()),
     ]
 }

@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 use worm_estimator::estimate::{Capture, MotorTime};
-use worm_estimator::message::{JsonMessage, State};
+use worm_estimator::message::State;
 use worm_log::{Channel, ReadError, nothing, scan_from};
 
 /// Reads a log's states as a recording: one sample for each new sample of the tracker.
@@ -37,11 +37,11 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
 /// As [`read`].
 pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, ReadError> {
     let mut runs: Vec<ControllerRun> = Vec::new();
-    let contents = scan_from(input, path, |channel, text| {
+    let contents = scan_from(input, path, |channel, payload| {
         if channel != Channel::State {
             return Ok(());
         }
-        let state = State::read_json(text)?;
+        let state: State = payload.read()?;
         match runs.last_mut() {
             Some(run) if run.continues_with(&state) => run.push(&state),
             _ => runs.push(ControllerRun::begin(&state)),

@@ -7,6 +7,7 @@
 //!
 //! Schemas give one plain type for each member, though it may be `null`: viewers such as Foxglove do not accept unions of types.
 
+use super::fields::{Codes, FieldKind, FieldValue, prose};
 use serde::de::{DeserializeOwned, Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Value, json};
@@ -38,8 +39,14 @@ pub trait JsonMessage: Copy {
     fn schema() -> Value;
 }
 
-/// The JSON form of a field of type `T`.
+/// The JSON form of a field of type `T`, and what the field is in every other form.
 pub(super) trait Form<T>: Serialize + DeserializeOwned {
+    /// What the field holds.
+    const KIND: FieldKind;
+    /// Whether it may be missing.
+    const IS_OPTIONAL: bool = false;
+    /// Its value in an empty message.
+    const EMPTY: T;
     /// The form of `value` in a message with so many cells.
     fn of(value: T, cells: usize) -> Self;
     /// The value itself.
@@ -50,6 +57,10 @@ pub(super) trait Form<T>: Serialize + DeserializeOwned {
     fn cells(&self) -> Option<usize> {
         None
     }
+    /// The value of a field in a message with so many cells.
+    fn read(field: &T, cells: usize) -> FieldValue<'_>;
+    /// Sets a field; returns whether it takes such a value.
+    fn assign(field: &mut T, value: FieldValue<'_>) -> bool;
 }
 
 /// A field type that has only one form.
@@ -58,16 +69,24 @@ pub(super) trait Plain: Sized {
 }
 
 macro_rules! whole_numbers {
-    ($($type:ty)+) => {$(
+    ($($type:ty = $kind:ident)+) => {$(
         impl Plain for $type { type Form = Self; }
         impl Form<$type> for $type {
+            const KIND: FieldKind = FieldKind::$kind;
+            const EMPTY: Self = 0;
             fn of(value: $type, _: usize) -> Self { value }
             fn value(&self) -> $type { *self }
             fn schema() -> Value { json!({"type": "integer"}) }
+            fn read(field: &$type, _: usize) -> FieldValue<'_> { FieldValue::$kind(*field) }
+            fn assign(field: &mut $type, value: FieldValue<'_>) -> bool {
+                let FieldValue::$kind(value) = value else { return false };
+                *field = value;
+                true
+            }
         }
     )+};
 }
-whole_numbers! { u64 u32 i32 }
+whole_numbers! { u64 = U64 u32 = U32 i32 = I32 }
 
 /// A number, known or not.
 #[derive(Debug, Clone, Copy)]
@@ -78,6 +97,9 @@ impl Plain for f64 {
 }
 
 impl Form<f64> for Number {
+    const KIND: FieldKind = FieldKind::Number;
+    const EMPTY: f64 = 0.0;
+
     fn of(value: f64, _: usize) -> Self {
         Self(value)
     }
@@ -88,6 +110,18 @@ impl Form<f64> for Number {
 
     fn schema() -> Value {
         json!({"type": "number"})
+    }
+
+    fn read(field: &f64, _: usize) -> FieldValue<'_> {
+        FieldValue::Number(*field)
+    }
+
+    fn assign(field: &mut f64, value: FieldValue<'_>) -> bool {
+        let FieldValue::Number(value) = value else {
+            return false;
+        };
+        *field = value;
+        true
     }
 }
 
@@ -153,6 +187,9 @@ impl Plain for [f64; MAX_CELLS] {
 }
 
 impl Form<[f64; MAX_CELLS]> for PerCell {
+    const KIND: FieldKind = FieldKind::PerCell;
+    const EMPTY: [f64; MAX_CELLS] = [f64::NAN; MAX_CELLS];
+
     fn of(values: [f64; MAX_CELLS], cells: usize) -> Self {
         let cells = cells.min(MAX_CELLS);
         Self { values, cells }
@@ -168,6 +205,22 @@ impl Form<[f64; MAX_CELLS]> for PerCell {
 
     fn cells(&self) -> Option<usize> {
         Some(self.cells)
+    }
+
+    fn read(field: &[f64; MAX_CELLS], cells: usize) -> FieldValue<'_> {
+        FieldValue::PerCell(&field[..cells.min(MAX_CELLS)])
+    }
+
+    fn assign(field: &mut [f64; MAX_CELLS], value: FieldValue<'_>) -> bool {
+        let FieldValue::PerCell(values) = value else {
+            return false;
+        };
+        let Some((used, rest)) = field.split_at_mut_checked(values.len()) else {
+            return false;
+        };
+        used.copy_from_slice(values);
+        rest.fill(f64::NAN);
+        true
     }
 }
 
@@ -206,6 +259,7 @@ impl<'de> Deserialize<'de> for PerCell {
 pub(super) trait Coded: Copy + TryFrom<u32> + 'static {
     const WHAT: &'static str;
     const VALUES: &'static [Self];
+    const CODES: &'static Codes;
     fn name_of(self) -> &'static str;
     fn code_of(self) -> u32;
 }
@@ -215,6 +269,9 @@ pub(super) trait Coded: Copy + TryFrom<u32> + 'static {
 pub(super) struct Name<T>(u32, PhantomData<T>);
 
 impl<T: Coded> Form<u32> for Name<T> {
+    const KIND: FieldKind = FieldKind::Code(T::CODES);
+    const EMPTY: u32 = 0;
+
     fn of(code: u32, _: usize) -> Self {
         Self(code, PhantomData)
     }
@@ -226,6 +283,18 @@ impl<T: Coded> Form<u32> for Name<T> {
     fn schema() -> Value {
         let names: Vec<_> = T::VALUES.iter().map(|&value| value.name_of()).collect();
         json!({"type": "string", "enum": names})
+    }
+
+    fn read(field: &u32, _: usize) -> FieldValue<'_> {
+        FieldValue::Code(*field)
+    }
+
+    fn assign(field: &mut u32, value: FieldValue<'_>) -> bool {
+        let FieldValue::Code(code) = value else {
+            return false;
+        };
+        *field = code;
+        true
     }
 }
 
@@ -269,6 +338,10 @@ impl<'de, T: Coded> Deserialize<'de> for Name<T> {
 pub(super) struct OrNone<F>(Option<F>);
 
 impl<F: Form<u32>> Form<u32> for OrNone<F> {
+    const KIND: FieldKind = F::KIND;
+    const IS_OPTIONAL: bool = true;
+    const EMPTY: u32 = u32::MAX;
+
     fn of(value: u32, cells: usize) -> Self {
         Self((value != u32::MAX).then(|| F::of(value, cells)))
     }
@@ -279,6 +352,21 @@ impl<F: Form<u32>> Form<u32> for OrNone<F> {
 
     fn schema() -> Value {
         F::schema()
+    }
+
+    fn read(field: &u32, cells: usize) -> FieldValue<'_> {
+        match *field {
+            u32::MAX => FieldValue::Missing,
+            _ => F::read(field, cells),
+        }
+    }
+
+    fn assign(field: &mut u32, value: FieldValue<'_>) -> bool {
+        match value {
+            FieldValue::Missing => *field = u32::MAX,
+            value => return F::assign(field, value),
+        }
+        true
     }
 }
 
@@ -292,13 +380,6 @@ pub(super) fn member(name: &str, documentation: &str, mut schema: Value) -> Valu
     schema["title"] = name.replace('_', " ").into();
     schema["description"] = prose(documentation).into();
     schema
-}
-
-/// Documentation without rustdoc markup, and without mention of codes, which are names here.
-pub(super) fn prose(documentation: &str) -> String {
-    ["[`", "`]", "`", "super::", "Self::", " as a code"]
-        .iter()
-        .fold(documentation.trim().to_owned(), |text, mark| text.replace(mark, ""))
 }
 
 /// The error for a list whose length is not the number of cells.

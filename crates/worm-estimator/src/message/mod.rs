@@ -9,14 +9,17 @@
 //! `f64`. Arrays over cells have [`MAX_CELLS`](worm_physics::MAX_CELLS) entries, of which the first `cell_count` are in use; cell 1 of the
 //! paper is index 0. Times are nanoseconds of `CLOCK_MONOTONIC`.
 //!
-//! Each type of a topic is declared as one table. From it come the structure, its documentation, its JSON form and its JSON schema
-//! ([`JsonMessage`]): Foxglove shows the documentation of a field next to it.
+//! Each type of a topic is declared as one table. From it come the structure, its documentation, its JSON form with a schema
+//! ([`JsonMessage`]), its Protocol Buffers form with a descriptor ([`ProtobufMessage`]), and the columns of an exported table
+//! ([`FieldAccess`]).
 
 mod alarm;
 mod command;
 mod cycle;
 mod estimate;
+mod fields;
 mod json;
+mod protobuf;
 mod recording;
 mod state;
 mod timing;
@@ -25,7 +28,9 @@ pub use alarm::{Alarm, AlarmKind, Severity};
 pub use command::{Command, CommandKind, CommandOutcome, Reply};
 pub use cycle::Cycle;
 pub use estimate::Estimate;
+pub use fields::{Codes, Field, FieldAccess, FieldKind, FieldValue};
 pub use json::JsonMessage;
+pub use protobuf::{ProtobufError, ProtobufMessage};
 pub use recording::{RecordingProblem, RecordingState, RecordingStatus};
 pub use state::{Fault, HoldReason, Mode, State};
 pub use timing::{Culprit, Timing};
@@ -75,6 +80,10 @@ macro_rules! coded_enum {
         impl $crate::message::json::Coded for $name {
             const WHAT: &'static str = $what;
             const VALUES: &'static [Self] = Self::ALL;
+            const CODES: &'static $crate::message::fields::Codes = &$crate::message::fields::Codes {
+                name: stringify!($name),
+                values: &[$(($code, $text)),+],
+            };
             fn name_of(self) -> &'static str { self.name() }
             fn code_of(self) -> u32 { self.code() }
         }
@@ -86,7 +95,7 @@ macro_rules! coded_enum {
 }
 pub(crate) use coded_enum;
 
-/// Declares a message as one table: the structure that crosses the topic, and its JSON form.
+/// Declares a message as one table: the structure that crosses the topic, its JSON form, and access to its fields one by one.
 ///
 /// `made` names the field with the time, `cells` returns the number of cells in use. A field whose JSON form is not the usual one of its
 /// type names it after `as`.
@@ -109,6 +118,7 @@ macro_rules! message {
         }
 
         const _: () = {
+            use $crate::message::fields::{self, Field, FieldAccess, FieldValue};
             use $crate::message::json::{self, Form, Plain};
 
             macro_rules! form {
@@ -167,11 +177,54 @@ macro_rules! message {
                     serde_json::json!({
                         "$schema": "https://json-schema.org/draft/2020-12/schema",
                         "title": $type_name,
-                        "description": json::prose(concat!($($doc),+)),
+                        "description": fields::prose(concat!($($doc),+)),
                         "type": "object",
                         "required": names,
                         "properties": serde_json::Map::from_iter(fields.map(|(name, schema)| (name.to_owned(), schema))),
                     })
+                }
+            }
+
+            #[allow(non_camel_case_types, reason = "the places of the fields bear the fields' names")]
+            enum Place { $($field,)+ }
+
+            impl FieldAccess for $name {
+                const FIELDS: &'static [Field] = &[$(
+                    Field {
+                        name: stringify!($field),
+                        documentation: concat!($($field_doc),+),
+                        kind: <form!($type $(, $form)?) as Form<$type>>::KIND,
+                        is_optional: <form!($type $(, $form)?) as Form<$type>>::IS_OPTIONAL,
+                    },
+                )+];
+                const DOCUMENTATION: &'static str = concat!($($doc),+);
+                const TIME_FIELD: usize = Place::$made as usize;
+
+                fn empty() -> Self {
+                    Self { $($field: <form!($type $(, $form)?) as Form<$type>>::EMPTY,)+ }
+                }
+
+                fn cells(&self) -> usize {
+                    let cells: fn(&Self) -> u32 = $cells;
+                    cells(self) as usize
+                }
+
+                fn field(&self, place: usize) -> Option<FieldValue<'_>> {
+                    $(
+                        if place == Place::$field as usize {
+                            return Some(<form!($type $(, $form)?) as Form<$type>>::read(&self.$field, self.cells()));
+                        }
+                    )+
+                    None
+                }
+
+                fn set_field(&mut self, place: usize, value: FieldValue<'_>) -> bool {
+                    $(
+                        if place == Place::$field as usize {
+                            return <form!($type $(, $form)?) as Form<$type>>::assign(&mut self.$field, value);
+                        }
+                    )+
+                    false
                 }
             }
         };

@@ -3,7 +3,7 @@
 use std::fs;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
 use worm_estimator::message::{Estimate, JsonMessage, State};
-use worm_log::{Channel, Writer, messages};
+use worm_log::{Channel, Index, Writer, messages};
 
 fn text<T: JsonMessage>(messages: &[T]) -> Vec<u8> {
     let mut text = Vec::new();
@@ -50,8 +50,30 @@ fn an_estimate_that_rests_on_nothing_takes_the_time_of_its_log() {
     assert_eq!(message.log_time, origin().begun_ns);
 }
 
-/// A log of one message, number 7, that another program wrote.
-fn foreign(topic: &str, type_name: &str, encoding: &str, message: &str) -> Vec<u8> {
+#[test]
+fn a_log_without_an_index_is_smaller_and_says_as_much() {
+    let crawl = crawl(1.0);
+    let size = |index| {
+        let sink = Sink::default();
+        let mut writer = Writer::with_index(sink.clone(), "x".as_ref(), &origin(), index).expect("memory takes all");
+        for state in &crawl.states {
+            writer.write(state).expect("memory takes all");
+        }
+        writer.finish().expect("memory takes all");
+        let bytes = sink.bytes();
+        let summary = mcap::Summary::read(&bytes).expect("MCAP").expect("a summary");
+        // Viewers take an index without messages for a log without messages, and then show nothing.
+        assert_eq!(summary.chunk_indexes.is_empty(), index == Index::None);
+        assert_eq!(summary.stats.expect("statistics").message_count, 1000);
+        assert_eq!(mcap::MessageStream::new(&bytes).expect("MCAP").count(), 1000);
+        bytes.len()
+    };
+    let (with, without) = (size(Index::Messages), size(Index::None));
+    assert!(with - without >= 16 * 1000, "{with} and {without} bytes");
+}
+
+/// A log of one message that another program wrote.
+fn foreign(topic: &str, type_name: &str, encoding: &str, message: impl AsRef<[u8]>) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let options = mcap::WriteOptions::new().compression(None);
     let mut writer = options.create(&mut bytes).expect("memory takes all");
@@ -66,7 +88,7 @@ fn foreign(topic: &str, type_name: &str, encoding: &str, message: &str) -> Vec<u
         publish_time: 1,
     };
     writer
-        .write_to_known_channel(&header, message.as_bytes())
+        .write_to_known_channel(&header, message.as_ref())
         .expect("a message");
     writer.finish().expect("memory takes all");
     drop(writer);
@@ -116,9 +138,17 @@ fn other_files_are_refused_with_what_to_do() {
         (
             foreign("/state", "wormd_state_v3", "cdr", "x"),
             &[
-                "channel /state: holds messages encoded as 'cdr', not as 'json'",
+                "channel /state: holds messages encoded as 'cdr', not as 'protobuf' or 'json'",
                 "wormd record",
             ],
+        ),
+        (
+            foreign("/state", "wormd_state_v2", "protobuf", ""),
+            &["channel /state: holds 'wormd_state_v2', and this version of wormd reads 'wormd_state_v3'"],
+        ),
+        (
+            foreign("/state", "wormd_state_v3", "protobuf", [0x90, 1, 2]),
+            &["channel /state, message 1 of the file: cannot be read: position_m has 0 values for 2 cells"],
         ),
         (
             foreign("/state", "wormd_state_v9", "json", "{}"),
@@ -127,7 +157,7 @@ fn other_files_are_refused_with_what_to_do() {
         (
             foreign("/state", "wormd_state_v3", "json", "{\"sequence\": -1}"),
             &[
-                "channel /state, message 7: cannot be read: invalid value: integer `-1`",
+                "channel /state, message 1 of the file: cannot be read: invalid value: integer `-1`",
                 "line 1 column",
             ],
         ),

@@ -1,0 +1,96 @@
+//! A file that bears its name only once it is complete.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Why a file cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// There is one of this name.
+    #[error("{} exists already: choose another name, or overwrite it with --force", .0.display())]
+    Exists(PathBuf),
+    /// The file cannot be written.
+    #[error("{}: cannot be written: {problem}: make room or choose another place", file.display())]
+    Refused {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl OutputError {
+    pub(super) fn of(file: &Path, problem: impl ToString) -> Self {
+        Self::Refused {
+            file: file.to_owned(),
+            problem: problem.to_string(),
+        }
+    }
+}
+
+/// A file under construction: removed unless it is kept.
+#[derive(Debug)]
+pub(super) struct Output {
+    file: BufWriter<File>,
+    /// Its name for now.
+    part: PathBuf,
+    target: PathBuf,
+    is_kept: bool,
+}
+
+impl Output {
+    /// Begins a file that is to be called `target`.
+    ///
+    /// # Errors
+    /// [`OutputError`] when there is one already and `overwrite` is not set, or it cannot be made.
+    pub(super) fn create(target: &Path, overwrite: bool) -> Result<Self, OutputError> {
+        if !overwrite && target.symlink_metadata().is_ok() {
+            return Err(OutputError::Exists(target.to_owned()));
+        }
+        let mut part = OsString::from(target);
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let file = File::create(&part).map_err(|error| OutputError::of(target, error))?;
+        Ok(Self {
+            file: BufWriter::new(file),
+            part,
+            target: target.to_owned(),
+            is_kept: false,
+        })
+    }
+
+    /// Gives the file its name, once it is safe on the disk.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the operating system refuses.
+    pub(super) fn keep(mut self) -> Result<(), OutputError> {
+        let kept = self
+            .file
+            .flush()
+            .and_then(|()| self.file.get_ref().sync_all())
+            .and_then(|()| std::fs::rename(&self.part, &self.target));
+        self.is_kept = kept.is_ok();
+        kept.map_err(|error| OutputError::of(&self.target, error))
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        if !self.is_kept {
+            // If it cannot be removed, it is still no file of the wanted name.
+            let _ = std::fs::remove_file(&self.part);
+        }
+    }
+}
