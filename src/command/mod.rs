@@ -12,9 +12,11 @@ pub mod explain;
 pub mod fault;
 pub mod latency;
 pub mod latency_floor;
+mod live;
 mod progress;
 pub mod record;
 mod recording_limits;
+pub mod relay;
 pub mod replay;
 pub mod send_command;
 #[cfg(feature = "analysis")]
@@ -23,6 +25,7 @@ pub mod soak;
 pub mod study;
 pub mod up;
 pub mod virtual_worm;
+pub mod watch;
 
 pub use crate::failure::Failure;
 pub use crate::print::{LogOutput, finish_log, log_line};

@@ -14,6 +14,7 @@ mod leaving;
 mod recording;
 mod recording_stops;
 mod stopping;
+mod watching;
 mod worm;
 
 use std::time::Duration;
