@@ -41,9 +41,8 @@ pub fn run(args: &WatchArgs) -> Result<(), Failure> {
     print::log_in_background()?;
     let end = end_on_signal()?;
     let suspend = suspend_on_signal()?;
-    let (config, there) = (config, instance.clone());
     let mut screen = Screen::open(true, move || {
-        WatchScreen::open(Seat::Watch, &config, &there, link, None)
+        WatchScreen::open(Seat::Watch, &config, &instance, link, None)
     })?;
     while !end.load(Ordering::Relaxed) {
         let wish = screen.wait_for_wish(POLL);

@@ -420,6 +420,34 @@ mod tests {
         assert!(matches!(read, Line::Answer(read) if read == answer));
     }
 
+    proptest::proptest! {
+        /// Both readers take any line, and refuse it in a text that is not much longer.
+        #[test]
+        fn any_line_is_read_or_refused_in_words(
+            any in proptest::collection::vec(proptest::num::u8::ANY, 0..200),
+            which in 0..4_usize,
+            at in proptest::num::usize::ANY,
+        ) {
+            let whole: [&[u8]; 4] = [
+                br#"{"id":1,"command":"crawl","cycles_per_s":0.4}"#,
+                br#"{"command":"acknowledge","alarms":["motor-stall"]}"#,
+                br#"{"answer":{"id":1,"watcher":7,"command":"hold","verdict":"accepted"}}"#,
+                br#"{"lost":{"frames":3}}"#,
+            ];
+            let mut mutated = whole[which].to_vec();
+            let at = at % mutated.len();
+            drop(mutated.splice(at..at, any.iter().copied().take(3)));
+            for line in [any, mutated] {
+                if let Err(refusal) = read_line(&line) {
+                    proptest::prop_assert!(!refusal.is_empty() && refusal.len() < 300 + 4 * line.len());
+                }
+                if let Err(error) = serde_json::from_slice::<RequestLine>(&line) {
+                    proptest::prop_assert!(error.to_string().len() < 300 + 4 * line.len());
+                }
+            }
+        }
+    }
+
     #[test]
     fn requests_are_what_the_documentation_says() {
         for (text, request) in [

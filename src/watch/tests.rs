@@ -374,7 +374,7 @@ fn keys_ask_for_what_they_say() {
     };
     let crawl = Request::Crawl { cycles_per_s: None };
     assert_eq!(pressed(&[('c', 0)]), []);
-    assert_eq!(pressed(&[('c', 4_999)]), [crawl.clone()]);
+    assert_eq!(pressed(&[('c', 4_999)]), [crawl]);
     assert_eq!(
         pressed(&[('c', 5_000), ('c', 10_001), ('r', 10_002)]),
         [],

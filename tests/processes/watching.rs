@@ -115,7 +115,7 @@ fn resident_mb(process: &Process) -> f64 {
 
 #[test]
 fn who_joins_late_gets_the_history_first() {
-    let (relay, crawling) = crawling_with_relay("watch-late");
+    let (relay, crawling) = crawling_with_relay("w-late");
     let mut first = Client::connect(&crawling.worm);
     wait_for("a finished cycle", PATIENCE, || {
         assert!(first.read());
@@ -165,7 +165,7 @@ fn who_joins_late_gets_the_history_first() {
 
 #[test]
 fn fifty_watchers_are_served_though_one_of_them_never_reads() {
-    let (relay, crawling) = crawling_with_relay("watch-many");
+    let (relay, crawling) = crawling_with_relay("w-many");
     let mut stalled = Client::connect(&crawling.worm);
     let mut watchers: Vec<_> = (0..49).map(|_| Client::connect(&crawling.worm)).collect();
     let mut read_for = |seconds: f64| {
@@ -315,7 +315,7 @@ fn crawl_by_keys(terminal: &mut Terminal, crawling: &Crawling) {
 
 #[test]
 fn one_drives_anyone_may_halt_and_a_driver_that_goes_leaves_a_worm_that_holds() {
-    let crawling = Crawling::start_again(Worm::on_a_steady_computer("watch-drive"));
+    let crawling = Crawling::start_again(Worm::on_a_steady_computer("w-drive"));
     crawling.worm.order(CommandKind::Hold);
     crawling.wait_for_mode(Mode::Holding);
     // The first watcher starts the relay.
@@ -399,7 +399,7 @@ fn one_drives_anyone_may_halt_and_a_driver_that_goes_leaves_a_worm_that_holds() 
 
 #[test]
 fn a_relay_that_is_killed_leaves_the_worm_as_leased_and_comes_back_without_moving_it() {
-    let crawling = Crawling::start_again(Worm::on_a_steady_computer("watch-relay"));
+    let crawling = Crawling::start_again(Worm::on_a_steady_computer("w-relay"));
     crawling.worm.order(CommandKind::Hold);
     crawling.wait_for_mode(Mode::Holding);
     let mut terminal = Terminal::watch(&crawling.worm);
@@ -450,7 +450,7 @@ fn a_relay_that_is_killed_leaves_the_worm_as_leased_and_comes_back_without_movin
 
 #[test]
 fn without_a_worm_there_is_nothing_to_watch() {
-    let worm = Worm::on_a_steady_computer("watch-none");
+    let worm = Worm::on_a_steady_computer("w-none");
     let pty = stalled_terminal();
     let watch = worm.wormd(&["watch"]).start_in(pty.slave);
     assert_eq!(watch.ends_by_itself().code(), Some(2));
