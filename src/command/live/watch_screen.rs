@@ -13,8 +13,8 @@ use std::ffi::OsString;
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 
-/// How long `wormd up` waits at its end for the relay that it alone has used.
-const RELAY_TIMEOUT: Duration = Duration::from_millis(700);
+/// How long `wormd up` waits at its end for the relay that it alone has used: less than its screen may take to close.
+const RELAY_TIMEOUT: Duration = Duration::from_millis(400);
 
 /// The screen of one watcher. That it paints is its sign of life: a terminal that takes nothing any more attends to nothing.
 pub(crate) struct WatchScreen {
