@@ -10,7 +10,7 @@
 //! ```text
 //!   config ──► everything
 //!
-//!   worm ◄─serial─► link ◄──► control ──► topics ──► estimator ──► topics ──► watch, Python, C
+//!   worm ◄─serial─► link ◄──► control ──► topics ──► estimator ──► topics ──► relay, Python, C
 //!                    ▲           ▲                      │  ▲           │
 //!         link::virtual_worm     └───── alarms ─────────┘  │           └──► alarms back to control
 //!                    ▲                                     │
@@ -45,7 +45,8 @@
 //! | `estimator` | the process around the estimator | `topics`, `realtime` |
 //! | `recorder` | the process that logs the topics | `topics` |
 //! | [`latency`] | durations in histograms, where each tick's time went, the page about it | |
-//! | [`watch`] | telemetry of a running worm: gathered, as a live display, as a summary | `latency` |
+//! | [`watch`] | telemetry of a running worm: gathered, as a live display fed by the relay, as a summary | `latency` |
+//! | `relay` | one process that serves all watchers: history, frames, commands, one driver at a time | `topics`, `watch`, `supervisor` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
@@ -76,6 +77,7 @@ mod preflight;
 mod print;
 pub mod realtime;
 mod recorder;
+mod relay;
 pub mod soak;
 mod supervisor;
 pub mod topics;

@@ -34,6 +34,10 @@ enum Subcommands {
     Fault(command::fault::FaultArgs),
     /// A command to a running controller
     Command(command::send_command::SendCommandArgs),
+    /// A running worm in a terminal, with keys to crawl, hold, stop and reset
+    Watch(command::watch::WatchArgs),
+    /// Serves the watchers of a worm; they start it by themselves
+    Relay(command::relay::RelayArgs),
     /// The topics of a worm into a log (MCAP)
     Record(command::record::RecordArgs),
     /// Run a log through the estimator again, and compare the results
@@ -103,6 +107,8 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::VirtualWorm(args) => command::virtual_worm::run(&args),
         Subcommands::Fault(args) => command::fault::run(&args),
         Subcommands::Command(args) => command::send_command::run(&args),
+        Subcommands::Watch(args) => command::watch::run(&args),
+        Subcommands::Relay(args) => command::relay::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Export(args) => command::export::run(&args),

@@ -13,10 +13,12 @@ pub mod export;
 pub mod fault;
 pub mod latency;
 pub mod latency_floor;
+mod live;
 pub mod manual;
 mod progress;
 pub mod record;
 mod recording_limits;
+pub mod relay;
 pub mod replay;
 pub mod send_command;
 #[cfg(feature = "analysis")]
@@ -26,6 +28,7 @@ pub mod status;
 pub mod study;
 pub mod up;
 pub mod virtual_worm;
+pub mod watch;
 
 pub use crate::failure::Failure;
 pub use crate::print::{LogOutput, finish_log, log_line};

@@ -1,7 +1,8 @@
 //! `wormd up`: the main job. Starts the processes of a worm, makes it crawl, shows what it does, stops it in order, sums up.
 
-mod screen;
+mod line_painter;
 
+use super::live::{Screen, WatchScreen, is_on_terminal};
 use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print, suspend_on_signal};
 use crate::supervisor::child_process::Log;
@@ -9,11 +10,13 @@ use crate::supervisor::crawl::{self, Limits, SharedTelemetry};
 use crate::supervisor::processes::{Launch, Processes};
 use crate::supervisor::takeover;
 use crate::topics::{Instance, RoleLock, Supervisor};
+use crate::watch::app::Seat;
 use crate::watch::{Summary, Telemetry};
 use clap::Args;
-use screen::Screen;
+use line_painter::LinePainter;
 use std::path::PathBuf;
 use std::time::Duration;
+use worm_estimator::config::Config;
 use worm_estimator::message::{AlarmKind, Fault, Mode};
 
 /// How long standard output may take nothing of the summary.
@@ -85,7 +88,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
     let mut processes = Processes::start(&launch, &config, &instance, &log, &end)?;
     let telemetry = SharedTelemetry::default();
     // Opened only now: until here Ctrl-C is a signal, and errors are visible.
-    let mut screen = Screen::open(args.json, args.plain, &config, &telemetry, &log)?;
+    let mut screen = open_screen(args, &config, &instance, &telemetry, &log)?;
     let limits = Limits {
         duration: args.duration,
         end: &end,
@@ -126,6 +129,31 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
         ))),
         (None, _) => Ok(()),
     }
+}
+
+/// The live display, or lines where that cannot be.
+///
+/// The live display is that of `wormd watch`, fed by the relay. The summary is not: it counts every tick, cycle and alarm from the
+/// first on, and must not depend on a process that may come late, be shared, or be killed.
+fn open_screen(
+    args: &UpArgs,
+    config: &Config,
+    instance: &Instance,
+    telemetry: &SharedTelemetry,
+    log: &Log,
+) -> Result<Screen, Failure> {
+    let lines = log.share();
+    if args.json || args.plain || !is_on_terminal() {
+        let (is_silent, step_order, telemetry) = (args.json, config.worm.step_order.clone(), telemetry.clone());
+        return Screen::open(false, move || {
+            Ok(LinePainter::new(is_silent, step_order, telemetry, lines))
+        });
+    }
+    let link = WatchScreen::link(instance, args.worm.forward(), Seat::Up);
+    let (config, instance) = (config.clone(), instance.clone());
+    Screen::open(true, move || {
+        WatchScreen::open(Seat::Up, &config, &instance, link, Some(lines))
+    })
 }
 
 /// The latched fault, and the alarm behind it.

@@ -100,7 +100,7 @@ impl Answer {
     pub(crate) fn to_json(&self) -> serde_json::Value {
         serde_json::json!({
             "command": self.kind.name(),
-            "verdict": self.outcome.name(),
+            "verdict": self.verdict(),
             "mode": self.mode(),
             "fault": self.fault(),
             "tick": self.reply.sequence,
@@ -160,11 +160,18 @@ impl Answer {
         self.reply.sequence
     }
 
-    fn mode(&self) -> &'static str {
+    /// The outcome, by name.
+    pub(crate) fn verdict(&self) -> &'static str {
+        self.outcome.name()
+    }
+
+    /// The controller's mode after the command.
+    pub(crate) fn mode(&self) -> &'static str {
         Mode::try_from(self.reply.mode).map_or("unknown", Mode::name)
     }
 
-    fn fault(&self) -> &'static str {
+    /// The controller's fault.
+    pub(crate) fn fault(&self) -> &'static str {
         Fault::try_from(self.reply.fault).map_or("unknown", Fault::name)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::error::InstanceError;
 use super::folder::{WormFolder, auto_root};
+use super::stale_resources;
 use iceoryx2::prelude::{Config as IoxConfig, FileName, Path as IoxPath, SemanticString};
 use std::borrow::Cow;
 use std::os::fd::OwnedFd;
@@ -99,6 +100,16 @@ impl Instance {
 
     pub(super) fn lock_path(&self, name: &str) -> PathBuf {
         self.folder.join(format!("{name}.lock"))
+    }
+
+    /// Where the relay of the worm's watchers listens.
+    pub(crate) fn relay_socket(&self) -> PathBuf {
+        self.folder.join("relay.sock")
+    }
+
+    /// Removes the folder when nothing is in it: for who only looked whether the worm runs.
+    pub(crate) fn remove_folder_if_empty(&self) {
+        stale_resources::remove_folder_if_empty(self);
     }
 
     /// Opens the folder, verified as this user's, and creates it where it is missing: the last process of a worm removes it, so a

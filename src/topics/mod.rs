@@ -107,7 +107,7 @@ pub use instance::Instance;
 pub use lock::LockError;
 pub(crate) use lock::LockPlace;
 pub use publisher::{PublishError, Publisher};
-pub use role::{AlreadyRunning, Controller, Estimator, Recorder, Role, RoleError, RoleLock, Supervisor};
+pub use role::{AlreadyRunning, Controller, Estimator, Recorder, Relay, Role, RoleError, RoleLock, Supervisor};
 pub use stale_resources::Peer;
 pub use start::StartError;
 pub use subscriber::{ReceiveError, Sample, Subscriber};

@@ -41,6 +41,8 @@ roles! {
     Recorder = "recorder",
     /// The process that starts and ends the others: `wormd up`.
     Supervisor = "supervisor",
+    /// The process that serves the watchers.
+    Relay = "relay",
 }
 
 /// Another process has the role.

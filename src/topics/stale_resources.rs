@@ -126,6 +126,7 @@ fn or_empty<T>(result: io::Result<T>) -> io::Result<Option<T>> {
 /// Whether anything of an earlier life of this worm is there.
 pub(super) fn is_there(instance: &Instance) -> bool {
     ICEORYX_FOLDERS.iter().any(|name| instance.folder().join(name).exists())
+        || instance.relay_socket().exists()
         || files(instance).is_ok_and(|files| !files.is_empty())
 }
 
@@ -137,6 +138,7 @@ pub(super) fn wipe(instance: &Instance) -> io::Result<()> {
     for name in ICEORYX_FOLDERS {
         or_empty(fs::remove_dir_all(instance.folder().join(name)))?;
     }
+    or_empty(fs::remove_file(instance.relay_socket()))?;
     Ok(())
 }
 

@@ -1,14 +1,17 @@
 //! A running worm for people to watch: its telemetry, a terminal view of it, and the summary at the end.
 //!
-//! [`Telemetry`] gathers the messages of the topics, whoever reads them; [`view::draw`] paints it, and [`Summary`] sums it up
-//! as text and as the JSON that scripts read.
+//! [`Telemetry`] gathers the messages of the topics, and [`Summary`] sums it up as text and as the JSON that scripts read. The live
+//! display knows the worm from its relay: `picture` has what was sent, `app` is the screen with its keys, `view` paints it.
 
+pub(crate) mod app;
 pub(crate) mod mismatch;
+mod picture;
 mod recent;
 pub(crate) mod recording;
+mod remedy;
 mod summary;
 mod telemetry;
-pub mod view;
+mod view;
 
 pub use recent::Recent;
 pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, Summary, TimingSummary, remarks};

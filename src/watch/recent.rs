@@ -29,6 +29,12 @@ impl<T> Recent<T> {
         self.values.push_back(value);
     }
 
+    /// Forgets everything.
+    pub(crate) fn clear(&mut self) {
+        self.values.clear();
+        self.dropped = 0;
+    }
+
     /// The values that are kept, the oldest first.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &T> + ExactSizeIterator {
         self.values.iter()

@@ -35,21 +35,26 @@ pub struct Telemetry {
 
 impl Default for Telemetry {
     fn default() -> Self {
+        Self::with_limits(MAX_CYCLES, MAX_ALARMS)
+    }
+}
+
+impl Telemetry {
+    /// Nothing yet; will keep so many cycles and changes of alarms.
+    pub fn with_limits(cycles: usize, alarms: usize) -> Self {
         Self {
             first_state: None,
             state: None,
             estimate: None,
             timing: None,
             recording: None,
-            cycles: Recent::with_limit(MAX_CYCLES),
-            alarms: Recent::with_limit(MAX_ALARMS),
+            cycles: Recent::with_limit(cycles),
+            alarms: Recent::with_limit(alarms),
             tick_stats: TickStats::default(),
             newest_changes: [None; AlarmKind::ALL.len()],
         }
     }
-}
 
-impl Telemetry {
     /// Takes a state.
     pub fn take_state(&mut self, state: &State) {
         self.first_state.get_or_insert(*state);
@@ -90,9 +95,18 @@ impl Telemetry {
         self.state.map_or(0, |state| state.sequence + 1)
     }
 
-    /// Alarms that are raised now, by the newest change of each.
+    /// Alarms that are raised now, by the newest change of each. One that a newer estimate does not know as raised is not: the
+    /// estimator that raised it has been restarted.
     pub fn raised(&self) -> Vec<Alarm> {
+        let is_forgotten = |alarm: &Alarm| {
+            self.estimate.is_some_and(|estimate| {
+                estimate.time_ns > alarm.time_ns && estimate.raised_mask >> (alarm.kind & 31) & 1 == 0
+            })
+        };
         let newest = self.newest_changes.iter().flatten();
-        newest.filter(|alarm| alarm.raised != 0).copied().collect()
+        newest
+            .filter(|alarm| alarm.raised != 0 && !is_forgotten(alarm))
+            .copied()
+            .collect()
     }
 }

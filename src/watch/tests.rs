@@ -1,8 +1,11 @@
-use super::view::{Subject, draw};
+use super::app::{App, Seat};
 use super::*;
+use crate::relay::client::read_line;
+use crate::relay::source::{Seen, Worm as RelayedWorm};
+use crate::relay::wire::{Answer, Driver, Line, Request, Subject, to_bytes};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use std::collections::VecDeque;
+use ratatui::style::Color;
 use worm_estimator::config::Worm as WormConfig;
 use worm_estimator::message::{
     Alarm, AlarmKind, Cycle, Estimate, Mode, RecordingProblem, RecordingState, RecordingStatus, Severity, State, Timing,
@@ -128,22 +131,52 @@ fn alarm(sequence: u64, time_ns: u64, raised: u32) -> Alarm {
     }
 }
 
-fn painted(width: u16, height: u16, telemetry: &Telemetry) -> String {
+const NOW_NS: u64 = 20_000_000_000;
+
+/// The screen of a watcher to whom the relay has sent this telemetry.
+fn screen(seat: Seat, telemetry: &Telemetry, driver: Option<Driver>) -> App {
     let subject = Subject {
         name: "worm1".to_owned(),
-        port: "the virtual worm".to_owned(),
+        cells: 4,
+        port: None,
         slope_deg: 0.0,
         backward: false,
         rate_hz: 1000.0,
         step_order: vec![1, 2, 3, 4],
         full_scale_m: 0.00175,
+        mass_kg: 0.333,
     };
-    let log = VecDeque::from(["[control] a line of the log".to_owned()]);
+    let mut worm = RelayedWorm::new(subject.clone());
+    let mut app = App::new(seat, subject);
+    let mut send = |line: Line| {
+        let bytes = to_bytes(&line).expect("can be written");
+        app.take(read_line(&bytes).expect("can be read"), NOW_NS);
+    };
+    send(Line::Answer(Answer::own(7, None, "hello", "accepted", None)));
+    send(Line::Hello(Box::new(worm.hello(NOW_NS))));
+    worm.telemetry = telemetry.clone();
+    let time_ns = telemetry.state.map_or(NOW_NS, |state| state.time_ns);
+    worm.update(time_ns);
+    send(Line::Frame(Box::new(worm.frame(
+        1,
+        time_ns,
+        Seen::default(),
+        1,
+        driver,
+    ))));
+    app.note("[control] a line of the log".to_owned());
+    app
+}
+
+fn drawn(width: u16, height: u16, app: &App, now_ns: u64) -> Terminal<TestBackend> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a terminal in memory");
+    terminal.draw(|frame| app.draw(frame, now_ns)).expect("paints");
     terminal
-        .draw(|frame| draw(frame, &subject, telemetry, &log))
-        .expect("paints");
-    terminal.backend().to_string()
+}
+
+fn painted(width: u16, height: u16, telemetry: &Telemetry) -> String {
+    let app = screen(Seat::Up, telemetry, None);
+    drawn(width, height, &app, NOW_NS).backend().to_string()
 }
 
 #[test]
@@ -210,8 +243,185 @@ fn an_unsettled_cycle_has_no_energy() {
 #[test]
 fn no_terminal_is_too_small() {
     for (width, height) in [(1, 1), (10, 3), (40, 12), (79, 24), (250, 80)] {
-        painted(width, height, &Telemetry::default());
-        painted(width, height, &received(1.5));
+        for telemetry in [Telemetry::default(), received(1.5)] {
+            let mut app = screen(Seat::Watch, &telemetry, None);
+            for key in "1n2e a?c".chars() {
+                app.key(key, NOW_NS);
+                drawn(width, height, &app, NOW_NS);
+                drawn(width, height, &app, 3 * NOW_NS);
+            }
+        }
+    }
+}
+
+proptest::proptest! {
+    /// Whatever a broken controller or estimator publishes, no page panics or hangs.
+    #[test]
+    fn any_value_can_be_painted(
+        values in proptest::array::uniform16(proptest::num::f64::ANY),
+        codes in proptest::array::uniform8(proptest::num::u32::ANY),
+        time_ns in proptest::num::u64::ANY,
+    ) {
+        let mut telemetry = received(1.5);
+        let [mode, fault, cells, mask, kind, cell, severity, state] = codes;
+        telemetry.take_state(&State {
+            time_ns, mode, fault, fault_alarm: kind, phase: values[0], motor_current_a: values[1], position_m: values,
+            acknowledged_mask: mask, ..telemetry.state.expect("a state")
+        });
+        telemetry.take_estimate(&Estimate {
+            time_ns, cell_count: cells % 17, position_m: values, contact_m: values, deformation_m: values, force_n: values,
+            battery_fraction: values[2], sliding_mask: mask, raised_mask: mask, ..telemetry.estimate.expect("an estimate")
+        });
+        telemetry.take_cycle(&Cycle {
+            advance_m: values[3], energy_electrical_j: values[4], energy_copper_j: values[5], energy_loss_j: values[6], cot: values[7],
+            ..*telemetry.cycles.last().expect("a cycle")
+        });
+        telemetry.take_alarm(&Alarm { time_ns, kind, cell, severity, phase: values[8], ..alarm(9, 1_000_000_000, 1) });
+        telemetry.take_recording(&RecordingStatus {
+            sequence: 0, time_ns, bytes: time_ns, messages: 0, messages_lost: time_ns, files: time_ns, state, problem: kind,
+        });
+        let mut app = screen(Seat::Watch, &telemetry, None);
+        for key in "1e a?".chars() {
+            app.key(key, NOW_NS);
+            drawn(80, 24, &app, NOW_NS);
+        }
+    }
+}
+
+/// Each page has what it is for, in the usual terminal and in a large one.
+#[test]
+fn every_page_shows_what_it_is_for() {
+    let mut telemetry = received(3.4);
+    telemetry.take_estimate(&Estimate {
+        time_ns: telemetry.state.map_or(0, |state| state.time_ns),
+        ..telemetry.estimate.expect("an estimate")
+    });
+    for (width, height) in [(80, 24), (120, 40)] {
+        for (key, parts) in [
+            ('2', ["cell 2: position", "it slides at 1.75", "60 s ago"]),
+            ('e', ["copper", "200.0", "370.0"]),
+            ('a', ["jammed-cell cell 2", "critical", "free the cell, then reset"]),
+            ('?', ["asks once more", "take over", "q leaves"]),
+        ] {
+            let mut app = screen(Seat::Watch, &telemetry, None);
+            assert_eq!(app.key(key, NOW_NS), None);
+            let picture = drawn(width, height, &app, NOW_NS).backend().to_string();
+            for part in parts {
+                assert!(
+                    picture.contains(part),
+                    "{part:?} is missing on page {key} in\n{picture}"
+                );
+            }
+            app.key(key, NOW_NS);
+            let picture = drawn(width, height, &app, NOW_NS).backend().to_string();
+            assert!(picture.contains("gait cycles"), "its key leaves a page:\n{picture}");
+        }
+    }
+}
+
+/// What is old is grey, and says how old it is; the same values a moment before are not.
+#[test]
+fn what_is_old_looks_old() {
+    let telemetry = received(3.4);
+    let app = screen(Seat::Watch, &telemetry, None);
+    let grey = |now_ns| {
+        let terminal = drawn(80, 24, &app, now_ns);
+        let buffer = terminal.backend().buffer();
+        let worm = (0..80).map(|column| buffer[(column, 3)].fg);
+        let is_grey = worm.clone().filter(|colour| *colour == Color::DarkGray).count() == 80;
+        (is_grey, terminal.backend().to_string())
+    };
+    let (is_grey, picture) = grey(NOW_NS + 900_000_000);
+    assert!(!is_grey && !picture.contains("nothing heard"), "{picture}");
+    let (is_grey, picture) = grey(NOW_NS + 3_000_000_000);
+    assert!(
+        is_grey && picture.contains("nothing heard of the relay for 3 s"),
+        "{picture}"
+    );
+    // The relay is there, the controller is not.
+    let mut old = telemetry.clone();
+    old.take_state(&State {
+        time_ns: 1_000_000_000,
+        ..old.state.expect("a state")
+    });
+    let mut app = screen(Seat::Watch, &old, None);
+    let frame = |time_ns: u64| {
+        let mut worm = RelayedWorm::new(Subject::of(&worm_estimator::config::Config::default()));
+        worm.telemetry = old.clone();
+        Line::Frame(Box::new(worm.frame(2, time_ns, Seen::default(), 1, None)))
+    };
+    app.take(frame(4_000_000_000), NOW_NS);
+    let picture = drawn(80, 24, &app, NOW_NS).backend().to_string();
+    assert!(picture.contains("no state for 3 s"), "{picture}");
+    app.lose("the connection to the relay was lost".to_owned(), NOW_NS);
+    let picture = drawn(80, 24, &app, NOW_NS + 2_000_000_000).backend().to_string();
+    assert!(
+        picture.contains("2 s old: the connection to the relay was lost"),
+        "{picture}"
+    );
+}
+
+/// What moves the worm is asked for once more; what halts it is not; and who drives is said.
+#[test]
+fn keys_ask_for_what_they_say() {
+    let telemetry = received(3.4);
+    let mut app = screen(Seat::Watch, &telemetry, None);
+    let mut pressed = |keys: &[(char, u64)]| -> Vec<Request> {
+        let asked = keys
+            .iter()
+            .filter_map(|(key, at_ms)| app.key(*key, NOW_NS + at_ms * 1_000_000));
+        asked.map(|(_, request)| request).collect()
+    };
+    let crawl = Request::Crawl { cycles_per_s: None };
+    assert_eq!(pressed(&[('c', 0)]), []);
+    assert_eq!(pressed(&[('c', 4_999)]), [crawl]);
+    assert_eq!(
+        pressed(&[('c', 5_000), ('c', 10_001), ('r', 10_002)]),
+        [],
+        "too late, or another"
+    );
+    assert_eq!(
+        pressed(&[('r', 10_003), ('c', 10_004), ('x', 10_005), ('c', 10_006)]),
+        [Request::Reset]
+    );
+    assert_eq!(
+        pressed(&[('h', 0), (' ', 0), ('s', 0), ('t', 0)]),
+        [Request::Hold, Request::Hold, Request::Stop, Request::TakeOver]
+    );
+
+    let mut disarmed = telemetry.clone();
+    disarmed.take_state(&State {
+        mode: Mode::Disarmed.code(),
+        ..disarmed.state.expect("a state")
+    });
+    let mut app = screen(Seat::Watch, &disarmed, None);
+    app.key('c', NOW_NS);
+    let picture = drawn(80, 24, &app, NOW_NS).backend().to_string();
+    assert!(picture.contains("c once more to arm the worm"), "{picture}");
+    assert_eq!(app.key('c', NOW_NS), Some((1, Request::Arm)));
+
+    let driver = |watcher, name: &str| Driver {
+        watcher,
+        name: name.to_owned(),
+        user: 1000,
+        since_ms: 12_345,
+        attends: true,
+    };
+    for (driver, parts) in [
+        (
+            driver(7, "me"),
+            ["you drive since 12 s", "q leaves, and the worm holds"],
+        ),
+        (
+            driver(8, "ann"),
+            ["ann drives since 12 s", "q leaves; the worm goes on"],
+        ),
+    ] {
+        let app = screen(Seat::Watch, &telemetry, Some(driver));
+        let picture = drawn(80, 24, &app, NOW_NS).backend().to_string();
+        for part in parts {
+            assert!(picture.contains(part), "{part:?} is missing in\n{picture}");
+        }
     }
 }
 

@@ -1,7 +1,11 @@
 //! The live picture in a terminal: the worm in its canal, each tip, cycles, alarms and loop health.
 
-use super::telemetry::Telemetry;
+mod canal;
+mod panels;
+
+use super::picture::Picture;
 use super::{mismatch, recording};
+use crate::relay::wire::Subject;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -10,40 +14,74 @@ use ratatui::widgets::{Block, Cell as TableCell, Paragraph, Row, Table};
 use std::collections::VecDeque;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Fault, Mode, Severity};
 
-/// What the picture shows of the worm besides its telemetry.
-#[derive(Debug, Clone)]
-pub struct Subject {
-    /// Name of the worm.
-    pub name: String,
-    /// The port that drives it, or "virtual worm".
-    pub port: String,
-    /// Slope of the canal, degrees.
-    pub slope_deg: f64,
-    /// Whether the gait is driven backward.
-    pub backward: bool,
-    /// Tick rate, Hz.
-    pub rate_hz: f64,
-    /// The order in which the cells step, from 1.
-    pub step_order: Vec<usize>,
-    /// Largest deformation that the bars show, m.
-    pub full_scale_m: f64,
+/// What is painted.
+pub(crate) struct View<'a> {
+    /// The worm, as it was last seen.
+    pub(crate) picture: &'a Picture,
+    /// The line below the head: what was asked, answered, or who drives.
+    pub(crate) status: Line<'a>,
+    /// What is silent, and for how long; then the values are grey.
+    pub(crate) stale: Option<String>,
+    /// What stands below the canal.
+    pub(crate) panel: Panel,
+    /// What leaving does, for the lower edge of the canal.
+    pub(crate) leaving: &'a str,
+    /// The last lines of the log.
+    pub(crate) log: &'a VecDeque<String>,
+}
+
+/// What stands below the canal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Panel {
+    /// Tips, alarms, cycles, loop and log.
+    Overview,
+    /// The last minute of a cell, from 0.
+    Cell(usize),
+    /// Where the energy of the last cycles went.
+    Energy,
+    /// The alarms, with what to do.
+    Alarms,
+    /// The keys.
+    Help,
 }
 
 /// Paints the whole screen.
-pub fn draw(frame: &mut Frame<'_>, subject: &Subject, telemetry: &Telemetry, log: &VecDeque<String>) {
-    let cells = telemetry
-        .estimate
-        .map_or(4, |estimate| estimate.cell_count.min(worm_physics::MAX_CELLS as u32)) as u16;
+pub(crate) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
+    let picture = view.picture;
+    let cells = picture.subject.cells.min(worm_physics::MAX_CELLS) as u16;
     let heights = Heights::of(frame.area().height, cells);
-    let [head, canal, middle, bottom, messages] = Layout::vertical([
+    let [head, status, canal, below] = Layout::vertical([
+        Constraint::Length(1),
         Constraint::Length(1),
         Constraint::Length(heights.canal),
+        Constraint::Min(0),
+    ])
+    .areas(frame.area());
+    canal::draw(frame, canal, view);
+    match view.panel {
+        Panel::Overview => draw_overview(frame, below, view, &heights),
+        Panel::Cell(cell) => panels::draw_cell(frame, below, picture, cell),
+        Panel::Energy => panels::draw_energy(frame, below, picture),
+        Panel::Alarms => panels::draw_alarms(frame, below, picture),
+        Panel::Help => panels::draw_help(frame, below, view.leaving),
+    }
+    if view.stale.is_some() {
+        for area in [canal, below] {
+            frame.buffer_mut().set_style(area, Style::new().fg(Color::DarkGray));
+        }
+    }
+    frame.render_widget(headline(picture, view.stale.as_deref()), head);
+    frame.render_widget(&view.status, status);
+}
+
+fn draw_overview(frame: &mut Frame<'_>, area: Rect, view: &View<'_>, heights: &Heights) {
+    let [middle, bottom, messages] = Layout::vertical([
         Constraint::Length(heights.tips),
         Constraint::Min(0),
         Constraint::Length(heights.log),
     ])
-    .areas(frame.area());
-    let side = match frame.area().width {
+    .areas(area);
+    let side = match area.width {
         0..78 => 24,
         78..100 => 30,
         _ => 34,
@@ -51,14 +89,12 @@ pub fn draw(frame: &mut Frame<'_>, subject: &Subject, telemetry: &Telemetry, log
     let columns = [Constraint::Min(0), Constraint::Length(side)];
     let [tips, alarms] = Layout::horizontal(columns).areas(middle);
     let [cycles, health] = Layout::horizontal(columns).areas(bottom);
-
-    frame.render_widget(headline(subject, telemetry), head);
-    draw_canal(frame, canal, subject, telemetry);
-    draw_tips(frame, tips, subject, telemetry);
-    draw_alarms(frame, alarms, subject, telemetry);
-    draw_cycles(frame, cycles, telemetry);
-    draw_health(frame, health, subject, telemetry);
-    let lines: Vec<Line<'_>> = log
+    draw_tips(frame, tips, view.picture);
+    draw_alarms(frame, alarms, view.picture);
+    draw_cycles(frame, cycles, view.picture);
+    draw_health(frame, health, view.picture);
+    let lines: Vec<Line<'_>> = view
+        .log
         .iter()
         .rev()
         .take(usize::from(heights.log.saturating_sub(2)))
@@ -80,8 +116,8 @@ impl Heights {
     const BOTTOM: u16 = 6;
 
     fn of(height: u16, cells: u16) -> Self {
-        let canal = height.saturating_sub(1).min(7);
-        let rest = height.saturating_sub(1 + canal);
+        let canal = height.saturating_sub(2).min(7);
+        let rest = height.saturating_sub(2 + canal);
         let wanted = cells + 3;
         let spare = rest.saturating_sub(wanted + Self::BOTTOM);
         let log = match spare {
@@ -115,120 +151,47 @@ fn table<'a>(rows: Vec<Row<'a>>, columns: &[(&'a str, u16)]) -> Table<'a> {
     Table::new(rows, widths).header(Row::new(heads).bold())
 }
 
-fn headline(subject: &Subject, telemetry: &Telemetry) -> Line<'static> {
-    let Some(state) = telemetry.state else {
-        return Line::from(format!(" {}  starting …", subject.name)).bold();
+fn headline(picture: &Picture, stale: Option<&str>) -> Line<'static> {
+    let subject = &picture.subject;
+    let mut spans = vec![Span::from(format!(" {} ", subject.name)).bold()];
+    if let Some(stale) = stale {
+        spans.push(Span::from(format!(" {stale} ")).style(Style::new().fg(Color::White).bg(Color::Red).bold()));
+    }
+    let Some(state) = picture.state else {
+        spans.push(Span::from(" no state yet"));
+        return Line::from(spans);
     };
     let mode = Mode::try_from(state.mode).map_or("?", Mode::name);
     let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
     let mode_style = match Mode::try_from(state.mode) {
+        _ if stale.is_some() => Style::new().fg(Color::DarkGray),
         Ok(Mode::Crawling) => Style::new().fg(Color::Green),
         Ok(Mode::Fault) => Style::new().fg(Color::White).bg(Color::Red),
         _ => Style::new().fg(Color::Yellow),
     };
-    let mut spans = vec![
-        Span::from(format!(" {} ", subject.name)).bold(),
-        Span::from(format!(" {mode} ")).style(mode_style.add_modifier(Modifier::BOLD)),
-    ];
+    spans.push(Span::from(format!(" {mode} ")).style(mode_style.add_modifier(Modifier::BOLD)));
     if fault != Fault::None {
         let alarm = AlarmKind::try_from(state.fault_alarm).map_or(String::new(), |alarm| format!(" {alarm}"));
         spans.push(Span::from(format!(" {fault}{alarm}")).fg(Color::Red).bold());
     }
-    spans.push(Span::from(format!(
-        "  cycle {:.2}  {:.1} rev/min  {:.0} mA  {:.1} V  {:.0} °C  on {}",
+    let port = subject
+        .port
+        .as_ref()
+        .map_or(String::new(), |port| format!("  on {port}"));
+    let values = Span::from(format!(
+        "  cycle {:.2}  {:.1} rev/min  {:.0} mA  {:.1} V  {:.0} °C{port}",
         state.phase,
         state.motor_velocity_rad_s * 60.0 / std::f64::consts::TAU,
         state.motor_current_a * 1e3,
         state.bus_voltage_v,
         state.motor_temperature_c,
-        subject.port,
-    )));
+    ));
+    spans.push(if stale.is_some() {
+        values.fg(Color::DarkGray)
+    } else {
+        values
+    });
     Line::from(spans)
-}
-
-/// Metres of canal that the picture shows beyond the worm, before and behind it.
-const MARGIN_M: f64 = 0.03;
-
-fn draw_canal(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
-    let direction = if subject.backward { "left" } else { "right" };
-    let title = format!(
-        " canal, {}° — mm, the worm crawls to the {direction} ",
-        subject.slope_deg
-    );
-    let block = Block::bordered()
-        .title(title)
-        .title_bottom(" Ctrl-C or q stops the worm ");
-    let inner = block.inner(area);
-    frame.render_widget(block, area);
-    let Some(estimate) = telemetry.estimate else { return };
-    let positions = known_positions(&estimate);
-    let (Some(rear_m), Some(front_m)) = (
-        positions.iter().map(|cell| cell.1).reduce(f64::min),
-        positions.iter().map(|cell| cell.1).reduce(f64::max),
-    ) else {
-        return;
-    };
-    let columns = usize::from(inner.width);
-    if columns < 20 || inner.height < 5 {
-        return;
-    }
-    // The window moves in whole steps of the ruler, so that the worm visibly crawls and the canal does not flicker.
-    let label_mm = label_distance_mm(front_m - rear_m + 2.0 * MARGIN_M, columns);
-    let step_m = label_mm as f64 * 1e-3 / 5.0;
-    let start_m = ((rear_m - MARGIN_M) / step_m).floor() * step_m;
-    let width_m = front_m - rear_m + 2.0 * MARGIN_M + step_m;
-    let column = |x_m: f64| (((x_m - start_m) / width_m * columns as f64) as usize).min(columns - 1);
-
-    let mut body = vec![Span::raw(" "); columns];
-    let mut feet = vec![Span::raw(" "); columns];
-    let (tail, nose) = (column(rear_m), column(front_m));
-    for slot in &mut body[tail..=nose] {
-        *slot = Span::raw("═").fg(Color::DarkGray);
-    }
-    for &(cell, x_m) in &positions {
-        let at = column(x_m);
-        let style = tip_style(&estimate, cell);
-        for (offset, text) in [(0, "▐"), (1, ""), (2, "▌")] {
-            let Some(slot) = (at + offset).checked_sub(1).and_then(|index| body.get_mut(index)) else {
-                continue;
-            };
-            *slot = if offset == 1 {
-                Span::from(cell_label(cell)).style(style.add_modifier(Modifier::BOLD | Modifier::REVERSED))
-            } else {
-                Span::raw(text).style(style)
-            };
-        }
-        let contact_m = estimate.contact_m[cell];
-        let foot = if contact_m.is_finite() { column(contact_m) } else { at };
-        feet[foot] = Span::raw(match foot.cmp(&at) {
-            std::cmp::Ordering::Less => "╱",
-            std::cmp::Ordering::Equal => "│",
-            std::cmp::Ordering::Greater => "╲",
-        })
-        .style(style);
-    }
-    let ruler: String = (0..columns)
-        .map(|index| {
-            let here = (start_m + index as f64 / columns as f64 * width_m) / step_m;
-            let next = (start_m + (index + 1) as f64 / columns as f64 * width_m) / step_m;
-            if here.floor() != next.floor() || index == 0 {
-                '┴'
-            } else {
-                '─'
-            }
-        })
-        .collect();
-    let labels = ruler_labels(columns, start_m, width_m, label_mm);
-    frame.render_widget(
-        Paragraph::new(vec![
-            Line::from(body),
-            Line::from(feet),
-            Line::raw(ruler),
-            Line::raw(labels),
-            legend(),
-        ]),
-        inner,
-    );
 }
 
 fn cell_label(cell: usize) -> String {
@@ -243,45 +206,6 @@ fn cell_number(cell: usize) -> String {
     } else {
         format!("{} {}", cell + 1, cell_label(cell))
     }
-}
-
-fn legend() -> Line<'static> {
-    Line::from(vec![
-        Span::raw(" tip: "),
-        Span::raw("sticks").fg(Color::Cyan),
-        Span::raw("  "),
-        Span::raw("slides forward").fg(Color::Green),
-        Span::raw("  "),
-        Span::raw("slides backward").fg(Color::Red),
-    ])
-}
-
-/// Millimetres between the labels of a ruler: the smallest distance that leaves them room in these columns.
-fn label_distance_mm(width_m: f64, columns: usize) -> i64 {
-    const ROOM: f64 = 10.0;
-    let min_mm = width_m * 1e3 * ROOM / columns as f64;
-    let mut distance_mm = 50;
-    while (distance_mm as f64) < min_mm {
-        distance_mm *= 2;
-    }
-    distance_mm
-}
-
-fn ruler_labels(columns: usize, start_m: f64, width_m: f64, label_mm: i64) -> String {
-    let mut labels = vec![' '; columns];
-    let first = (start_m * 1e3 / label_mm as f64).ceil() as i64;
-    for multiple in first.. {
-        let mm = multiple * label_mm;
-        let at = ((mm as f64 * 1e-3 - start_m) / width_m * columns as f64) as usize;
-        let text = mm.to_string();
-        if at + text.len() > columns {
-            break;
-        }
-        for (slot, character) in labels[at..].iter_mut().zip(text.chars()) {
-            *slot = character;
-        }
-    }
-    labels.into_iter().collect()
 }
 
 fn known_positions(estimate: &Estimate) -> Vec<(usize, f64)> {
@@ -301,9 +225,9 @@ fn tip_style(estimate: &Estimate, cell: usize) -> Style {
     })
 }
 
-fn draw_tips(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
+fn draw_tips(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
     let block = Block::bordered().title(" tips ");
-    let Some(estimate) = telemetry.estimate else {
+    let Some(estimate) = picture.estimate else {
         frame.render_widget(block, area);
         return;
     };
@@ -323,7 +247,7 @@ fn draw_tips(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &T
         let fields = [
             TableCell::from(cell_number(cell)),
             TableCell::from(format!("{:8.2}", x_m * 1e3)),
-            TableCell::from(bar(deformation_m / subject.full_scale_m)).style(tip_style(&estimate, cell)),
+            TableCell::from(bar(deformation_m / picture.subject.full_scale_m)).style(tip_style(&estimate, cell)),
             TableCell::from(number(deformation_m * 1e3, 2)),
             TableCell::from(number(estimate.force_n[cell], 2)),
             TableCell::from(format!(
@@ -364,16 +288,16 @@ fn bar(fraction: f64) -> String {
         .collect()
 }
 
-fn draw_alarms(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
-    let raised = telemetry.raised();
-    let (armed_mask, raised_mask) = telemetry
+fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
+    let raised = &picture.raised;
+    let (armed_mask, raised_mask) = picture
         .estimate
         .map_or((0, 0), |estimate| (estimate.armed_mask, estimate.raised_mask));
     let armed = armed_mask.count_ones();
-    let mut lines: Vec<Line<'_>> = raised.iter().map(|alarm| alarm_line(alarm, subject)).collect();
+    let mut lines: Vec<Line<'_>> = raised.iter().map(|alarm| alarm_line(alarm, &picture.subject)).collect();
     if lines.is_empty() && raised_mask == 0 {
         lines.push(Line::raw("none raised").fg(Color::Green));
-        if let Some(last) = telemetry.alarms.last() {
+        if let Some(last) = picture.alarms.last() {
             let name = AlarmKind::try_from(last.kind).map_or("?", AlarmKind::name);
             lines.push(Line::raw(format!("the last: {name}, cleared")).fg(Color::Yellow));
         }
@@ -411,9 +335,9 @@ fn alarm_line(alarm: &Alarm, subject: &Subject) -> Line<'static> {
     Line::from(text).fg(colour).bold()
 }
 
-fn draw_cycles(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {
+fn draw_cycles(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
     let room = usize::from(area.height.saturating_sub(3));
-    let newest = telemetry.cycles.iter().rev().take(room).rev();
+    let newest = picture.cycles.iter().rev().take(room).rev();
     let block = Block::bordered().title(" gait cycles, advance in mm ");
     let columns = fitting(
         &[
@@ -459,38 +383,34 @@ fn draw_cycles(frame: &mut Frame<'_>, area: Rect, telemetry: &Telemetry) {
     frame.render_widget(table(rows, &columns).block(block), area);
 }
 
-fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: &Telemetry) {
-    let tick_stats = &telemetry.tick_stats;
-    let held_hz = telemetry.timing.map(|timing| (1e9 / timing.period_ns as f64).round());
-    let rate_hz = held_hz.filter(|hz| hz.is_finite()).unwrap_or(subject.rate_hz);
+fn draw_health(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
+    let held_hz = picture.timing.map(|timing| (1e9 / timing.period_ns as f64).round());
+    let rate_hz = held_hz.filter(|hz| hz.is_finite()).unwrap_or(picture.subject.rate_hz);
     let mut lines = vec![
-        Line::raw(format!("{} ticks at {rate_hz} Hz", telemetry.ticks())),
+        Line::raw(format!("{} ticks at {rate_hz} Hz", picture.ticks())),
         Line::raw(format!(
             "{} overruns, {} link faults",
-            telemetry.timing.map_or(0, |timing| timing.overruns),
-            telemetry.state.map_or(0, |state| state.link_failures),
+            picture.timing.map_or(0, |timing| timing.overruns),
+            picture.state.map_or(0, |state| state.link_failures),
         )),
         Line::raw("µs         p50     p99      max").bold(),
     ];
-    for (name, durations) in [
-        ("wake", &tick_stats.wake),
-        ("bus", &tick_stats.bus),
-        ("compute", &tick_stats.compute),
-    ] {
-        let us = durations.percentiles();
+    let durations = picture
+        .statistics
+        .map(|it| [("wake", it.wake_us), ("bus", it.bus_us), ("compute", it.compute_us)]);
+    for (name, us) in durations.into_iter().flatten() {
         lines.push(Line::raw(format!(
             "{name:<8}{:>6.0}{:>8.0}{:>9.0}",
             us.p50, us.p99, us.max
         )));
     }
-    let pauses = tick_stats.host_pauses;
-    if pauses.count > 0 {
+    if let Some(statistics) = picture.statistics.filter(|it| it.host_pauses > 0) {
         lines.push(Line::raw(format!(
             "{} host pauses, {:.2} s",
-            pauses.count, pauses.total_s
+            statistics.host_pauses, statistics.host_paused_s
         )));
     }
-    lines.extend(telemetry.recording.as_ref().map(|status| {
+    lines.extend(picture.recording.as_ref().map(|status| {
         let line = Line::raw(recording::progress_text(status));
         if recording::has_stopped(status) {
             line.fg(Color::Red)
@@ -498,7 +418,7 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
             line
         }
     }));
-    if let Some(fraction) = telemetry
+    if let Some(fraction) = picture
         .estimate
         .map(|estimate| estimate.battery_fraction)
         .filter(|fraction| fraction.is_finite())

@@ -1,0 +1,216 @@
+//! The thread that gives the controller commands and waits for its answers, so that no watcher has to.
+
+use super::drive::{LIMIT_S, WatcherId};
+use super::wire::{Answer, Request};
+use crate::failure::Failure;
+use crate::supervisor::controller::{self, command};
+use crate::topics::{CommandClient, Hub};
+use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::thread::JoinHandle;
+use worm_estimator::config::Config;
+use worm_estimator::message::{AlarmKind, Command, CommandKind};
+
+/// Commands that may wait. The controller answers within a tick unless it arms or resets.
+const QUEUE: usize = 32;
+
+/// What the controller is to be told.
+#[derive(Debug)]
+pub(super) enum Job {
+    /// The request of a watcher.
+    Request {
+        watcher: WatcherId,
+        /// Its user, for the controller's record.
+        user: u32,
+        id: Option<u64>,
+        request: Request,
+    },
+    /// Hold, because nobody attends any more.
+    Hold,
+    /// Go on crawling for a moment.
+    Renew,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    /// For the watcher that asked.
+    Answer(Answer),
+    /// The hold was refused, or got no answer.
+    NotHeld(String),
+    /// The worm does not crawl any more, for this reason.
+    NotRenewed(String),
+}
+
+/// The way to the thread, and back.
+pub(super) struct Commander {
+    /// None once the thread is to end.
+    jobs: Option<Sender<Job>>,
+    thread: Option<JoinHandle<()>>,
+    outcomes: Receiver<Outcome>,
+    /// Has a byte to read for each outcome, as far as they fit.
+    answered: UnixStream,
+}
+
+impl Commander {
+    /// Starts the thread. Its port is of this hub.
+    pub(super) fn start(config: &Config, hub: Hub) -> Result<Self, Failure> {
+        let (jobs, queue) = bounded::<Job>(QUEUE);
+        let (results, outcomes) = bounded(4 * QUEUE);
+        let (answered, mut wake) = UnixStream::pair().map_err(Failure::failed)?;
+        for end in [&answered, &wake] {
+            end.set_nonblocking(true).map_err(Failure::failed)?;
+        }
+        let config = config.clone();
+        let work = move || {
+            // Ports belong to the thread that makes them. They are gone before their hub.
+            let client = match hub.command_client() {
+                Ok(client) => client,
+                Err(error) => {
+                    tracing::error!("no commands can be given: {error}");
+                    return;
+                }
+            };
+            for job in queue {
+                let Some(outcome) = carry_out(&client, &config, job) else {
+                    continue;
+                };
+                // There is room for all that can be queued, but at the end nobody takes them any more.
+                let _ = results.try_send(outcome);
+                // One that is full wakes as well.
+                let _ = wake.write(&[0]);
+            }
+        };
+        let thread = std::thread::Builder::new()
+            .name("commander".to_owned())
+            .spawn(work)
+            .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))?;
+        Ok(Self {
+            jobs: Some(jobs),
+            thread: Some(thread),
+            outcomes,
+            answered,
+        })
+    }
+
+    /// Hands over a job; gives it back when too many wait, or nobody carries them out.
+    pub(super) fn order(&self, job: Job) -> Result<(), Job> {
+        match &self.jobs {
+            Some(jobs) => jobs.try_send(job).map_err(TrySendError::into_inner),
+            None => Err(job),
+        }
+    }
+
+    /// What came of jobs since the last call.
+    pub(super) fn outcomes(&self) -> impl Iterator<Item = Outcome> + '_ {
+        // Nothing to read is no error.
+        let _ = (&self.answered).read(&mut [0; 2 * QUEUE]);
+        self.outcomes.try_iter()
+    }
+
+    /// Becomes readable when there are outcomes.
+    pub(super) fn answered(&self) -> &UnixStream {
+        &self.answered
+    }
+}
+
+impl Drop for Commander {
+    /// Waits for the thread: what is queued is still carried out, and its port is closed in order.
+    fn drop(&mut self) {
+        self.jobs = None;
+        if let Some(thread) = self.thread.take() {
+            // It has nothing to say about how it ended.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn carry_out(client: &CommandClient, config: &Config, job: Job) -> Option<Outcome> {
+    match job {
+        Job::Request {
+            watcher,
+            user,
+            id,
+            request,
+        } => Some(Outcome::Answer(answer(client, config, watcher, user, id, &request))),
+        Job::Hold => {
+            let refusal = match controller::send(client, command(CommandKind::Hold)) {
+                Ok(answer) => answer.refusal()?,
+                Err(failure) => failure.to_string(),
+            };
+            Some(Outcome::NotHeld(refusal))
+        }
+        Job::Renew => {
+            let renewal = Command {
+                limit_s: LIMIT_S,
+                ..command(CommandKind::Renew)
+            };
+            let refusal = match controller::send(client, renewal) {
+                Ok(answer) => answer.refusal()?,
+                Err(failure) => failure.to_string(),
+            };
+            Some(Outcome::NotRenewed(refusal))
+        }
+    }
+}
+
+/// Gives a watcher's command, and words the answer as `wormd command` does.
+fn answer(
+    client: &CommandClient,
+    config: &Config,
+    watcher: WatcherId,
+    user: u32,
+    id: Option<u64>,
+    request: &Request,
+) -> Answer {
+    let refused = |verdict, refusal| Answer::own(watcher, id, request.name(), verdict, Some(refusal));
+    let command = match controllers_command(request, user) {
+        Ok(command) => command,
+        Err(refusal) => return refused("unusable", refusal),
+    };
+    let sent = match request {
+        // The way that needs neither the topics nor room in shared memory comes first.
+        Request::Stop => match controller::stop_by_socket(config) {
+            Ok(answer) => Ok(answer),
+            Err(Some(failure)) => Err(failure),
+            Err(None) => controller::send(client, command),
+        },
+        _ => controller::send(client, command),
+    };
+    match sent {
+        Ok(answer) => Answer {
+            mode: Some(answer.mode().to_owned()),
+            fault: Some(answer.fault().to_owned()),
+            tick: Some(answer.tick()),
+            ..Answer::own(watcher, id, request.name(), answer.verdict(), answer.refusal())
+        },
+        Err(failure) => refused("no-answer", failure.to_string()),
+    }
+}
+
+/// The command that a request is for the controller.
+fn controllers_command(request: &Request, user: u32) -> Result<Command, String> {
+    let kind = request.kind().ok_or("it is not for the controller")?;
+    let mut command = Command {
+        user,
+        ..Command::new(kind)
+    };
+    match request {
+        Request::Crawl { cycles_per_s } => {
+            command.cycles_per_s = cycles_per_s.unwrap_or(0.0);
+            command.limit_s = LIMIT_S;
+        }
+        Request::Acknowledge { alarms } if alarms.is_empty() => {
+            command.alarm_mask = AlarmKind::ALL.iter().fold(0, |mask, kind| mask | 1 << kind.code());
+        }
+        Request::Acknowledge { alarms } => {
+            for name in alarms {
+                let kind = AlarmKind::from_name(name).ok_or_else(|| format!("there is no alarm {name:?}"))?;
+                command.alarm_mask |= 1 << kind.code();
+            }
+        }
+        _ => {}
+    }
+    Ok(command)
+}

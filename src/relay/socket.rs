@@ -1,0 +1,44 @@
+//! Where the relay listens: a Unix socket in the worm's folder, which is its user's alone.
+
+use crate::topics::Instance;
+use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
+use std::io;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::PathBuf;
+
+/// The bound socket; its name goes when it is dropped.
+#[derive(Debug)]
+pub(super) struct Listener {
+    pub(super) socket: UnixListener,
+    path: PathBuf,
+}
+
+impl Listener {
+    /// Binds the socket, in the place of one that a killed relay has left. Only for who has the role of the relay.
+    pub(super) fn bind(instance: &Instance) -> io::Result<Self> {
+        let path = instance.relay_socket();
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        let socket = UnixListener::bind(&path)?;
+        std::fs::set_permissions(&path, PermissionsExt::from_mode(0o600))?;
+        socket.set_nonblocking(true)?;
+        Ok(Self { socket, path })
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        if let Err(error) = std::fs::remove_file(&self.path) {
+            tracing::debug!("{}: {error}", self.path.display());
+        }
+    }
+}
+
+/// User and process at the other end, by the kernel.
+pub(super) fn peer_of(stream: &UnixStream) -> io::Result<(u32, i32)> {
+    let peer = getsockopt(stream, PeerCredentials)?;
+    Ok((peer.uid(), peer.pid()))
+}

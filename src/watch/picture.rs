@@ -1,0 +1,112 @@
+//! A worm as a watcher knows it: what its relay has sent.
+
+use super::recent::Recent;
+use crate::relay::History;
+use crate::relay::message_json::Json;
+use crate::relay::wire::{Ages, Driver, Event, Frame, Hello, Statistics, Subject};
+use worm_estimator::message::{Alarm, Cycle, Estimate, RecordingStatus, State, Timing};
+
+/// Gait cycles that are kept: an hour and a half of the usual gait, 1.5 MB.
+const MAX_CYCLES: usize = 2048;
+/// Changes of alarms, and events, that are kept.
+const MAX_CHANGES: usize = 1024;
+
+/// What was seen of a worm, in bounded memory.
+#[derive(Debug, Clone)]
+pub(crate) struct Picture {
+    /// What does not change.
+    pub(crate) subject: Subject,
+    /// When the newest frame was made, ns of `CLOCK_MONOTONIC`.
+    pub(crate) time_ns: u64,
+    /// How old the newest messages were then.
+    pub(crate) ages: Ages,
+    pub(crate) state: Option<State>,
+    pub(crate) estimate: Option<Estimate>,
+    pub(crate) timing: Option<Timing>,
+    pub(crate) statistics: Option<Statistics>,
+    pub(crate) recording: Option<RecordingStatus>,
+    pub(crate) raised: Vec<Alarm>,
+    pub(crate) cycles: Recent<Cycle>,
+    pub(crate) alarms: Recent<Alarm>,
+    pub(crate) events: Recent<Event>,
+    pub(crate) history: History,
+    pub(crate) driver: Option<Driver>,
+    pub(crate) watchers: usize,
+}
+
+impl Picture {
+    /// A worm of which nothing was seen yet.
+    pub(crate) fn new(subject: Subject) -> Self {
+        Self {
+            subject,
+            time_ns: 0,
+            ages: Ages::default(),
+            state: None,
+            estimate: None,
+            timing: None,
+            statistics: None,
+            recording: None,
+            raised: Vec::new(),
+            cycles: Recent::with_limit(MAX_CYCLES),
+            alarms: Recent::with_limit(MAX_CHANGES),
+            events: Recent::with_limit(MAX_CHANGES),
+            history: History::default(),
+            driver: None,
+            watchers: 0,
+        }
+    }
+
+    /// Takes what a relay says first. What was seen before it began stays.
+    pub(crate) fn take_hello(&mut self, hello: Hello) {
+        self.subject = hello.worm;
+        self.time_ns = hello.time_ns;
+        self.history.merge(&hello.samples);
+        merge(
+            &mut self.cycles,
+            hello.cycles.into_iter().map(|Json(cycle)| cycle),
+            |cycle| cycle.end_ns,
+        );
+        merge(
+            &mut self.alarms,
+            hello.alarms.into_iter().map(|Json(alarm)| alarm),
+            |alarm| alarm.time_ns,
+        );
+        merge(&mut self.events, hello.events.into_iter(), |event| event.time_ns);
+    }
+
+    /// Takes a frame.
+    pub(crate) fn take_frame(&mut self, frame: Frame) {
+        self.time_ns = frame.time_ns;
+        self.ages = frame.age_ms;
+        self.state = frame.state.map(|Json(state)| state);
+        self.estimate = frame.estimate.map(|Json(estimate)| estimate);
+        self.timing = frame.timing.map(|Json(timing)| timing);
+        self.statistics = frame.statistics;
+        self.recording = frame.recording.map(|Json(status)| status);
+        self.raised = frame.raised.into_iter().map(|Json(alarm)| alarm).collect();
+        frame.cycles.into_iter().for_each(|Json(cycle)| self.cycles.push(cycle));
+        frame.alarms.into_iter().for_each(|Json(alarm)| self.alarms.push(alarm));
+        frame.events.into_iter().for_each(|event| self.events.push(event));
+        self.driver = frame.driver;
+        self.watchers = frame.watchers;
+        if let (Some(state), Some(estimate)) = (&self.state, &self.estimate) {
+            self.history.take(state, estimate);
+        }
+    }
+
+    /// Ticks that the controller ran.
+    pub(crate) fn ticks(&self) -> u64 {
+        self.state.map_or(0, |state| state.sequence + 1)
+    }
+}
+
+/// Appends what somebody else knows; own values of the same time give way.
+fn merge<T: Clone>(own: &mut Recent<T>, others: impl Iterator<Item = T>, time_ns: impl Fn(&T) -> u64) {
+    let mut others = others.peekable();
+    let Some(first_ns) = others.peek().map(&time_ns) else {
+        return;
+    };
+    let older: Vec<T> = own.iter().filter(|value| time_ns(value) < first_ns).cloned().collect();
+    own.clear();
+    older.into_iter().chain(others).for_each(|value| own.push(value));
+}
