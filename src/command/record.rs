@@ -27,7 +27,7 @@ pub struct RecordArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, allow_negative_numbers = true)]
     duration: Option<Duration>,
     /// Only these topics
-    #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = "state,timing,estimate,cycle,alarm")]
+    #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = "state,timing,estimate,cycle,alarm,range")]
     topics: Vec<Channel>,
     /// Standard input is a pipe from the process that watches over the worm
     #[arg(long, hide = true)]

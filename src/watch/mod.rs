@@ -4,6 +4,7 @@
 //! as text and as the JSON that scripts read.
 
 pub(crate) mod mismatch;
+pub(crate) mod range;
 mod recent;
 pub(crate) mod recording;
 mod summary;
@@ -11,7 +12,7 @@ mod telemetry;
 pub mod view;
 
 pub use recent::Recent;
-pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, Summary, TimingSummary, remarks};
+pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, RangeSummary, Summary, TimingSummary, remarks};
 pub use telemetry::Telemetry;
 
 #[cfg(test)]

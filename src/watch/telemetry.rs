@@ -2,7 +2,7 @@
 
 use super::recent::Recent;
 use crate::latency::TickStats;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Range, RecordingStatus, State, Timing};
 
 /// How many cycles are kept: nearly two days of the usual gait, 45 MB.
 const MAX_CYCLES: usize = 1 << 16;
@@ -25,6 +25,8 @@ pub struct Telemetry {
     pub recording: Option<RecordingStatus>,
     /// The newest cycles.
     pub cycles: Recent<Cycle>,
+    /// How far the battery lasts, after the newest cycles; empty without a battery.
+    pub ranges: Recent<Range>,
     /// The newest changes of alarms.
     pub alarms: Recent<Alarm>,
     /// Where the ticks' time went, and what made late ones late.
@@ -42,6 +44,7 @@ impl Default for Telemetry {
             timing: None,
             recording: None,
             cycles: Recent::with_limit(MAX_CYCLES),
+            ranges: Recent::with_limit(MAX_CYCLES),
             alarms: Recent::with_limit(MAX_ALARMS),
             tick_stats: TickStats::default(),
             newest_changes: [None; AlarmKind::ALL.len()],
@@ -70,6 +73,11 @@ impl Telemetry {
     /// Takes a finished cycle.
     pub fn take_cycle(&mut self, cycle: &Cycle) {
         self.cycles.push(*cycle);
+    }
+
+    /// Takes how far the battery lasts.
+    pub fn take_range(&mut self, range: &Range) {
+        self.ranges.push(*range);
     }
 
     /// Takes an alarm change.

@@ -505,5 +505,11 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, subject: &Subject, telemetry: 
     {
         lines.push(Line::raw(format!("battery {:.0} %", fraction * 100.0)));
     }
+    if let Some(range) = telemetry.ranges.last() {
+        lines.push(Line::raw(format!(
+            "range {:.1} to {:.1} m",
+            range.range_low_m, range.range_high_m
+        )));
+    }
     frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(" loop ")), area);
 }

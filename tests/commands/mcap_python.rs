@@ -4,7 +4,7 @@
 
 use std::process::{Command, Stdio};
 use std::time::UNIX_EPOCH;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, JsonMessage, Mode, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, JsonMessage, Mode, Range, State, Timing};
 use worm_log::{Origin, Writer};
 
 /// Prints what the reader finds, by topic: schema, and time and content of each message.
@@ -96,6 +96,7 @@ fn the_official_reader_yields_named_series() {
         ("/estimate", Estimate::TYPE_NAME, Estimate::schema()),
         ("/cycle", Cycle::TYPE_NAME, Cycle::schema()),
         ("/alarm", Alarm::TYPE_NAME, Alarm::schema()),
+        ("/range", Range::TYPE_NAME, Range::schema()),
     ] {
         let channel = &found["topics"][topic];
         assert_eq!(

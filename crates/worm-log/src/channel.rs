@@ -1,6 +1,6 @@
 //! The channels of a log.
 
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, Range, State, Timing};
 
 /// Encoding of messages, as MCAP names it.
 pub(super) const MESSAGE_ENCODING: &str = "json";
@@ -59,6 +59,7 @@ channels! {
     Estimate = "estimate",
     Cycle = "cycle",
     Alarm = "alarm",
+    Range = "range",
 }
 
 impl Channel {

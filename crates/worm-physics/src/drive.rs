@@ -133,9 +133,7 @@ mod tests {
 
     #[test]
     fn a_worm_that_cannot_hold_has_no_load() {
-        let steep = Worm::paper()
-            .with_resisting_force_n(100.0)
-            .expect("any force is valid");
+        let steep = Worm::paper().with_resisting_force_n(100.0).expect("any force is valid");
         assert!(driven_cycle(&Physics::of(steep), 2.5).is_err());
     }
 }

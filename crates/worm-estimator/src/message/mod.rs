@@ -1,7 +1,7 @@
 //! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
-//! The controller fills [`State`] and [`Timing`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`], [`Cycle`] and
-//! [`Alarm`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the same values. The types are separate from the transport, so that
+//! The controller fills [`State`] and [`Timing`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`], [`Cycle`],
+//! [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the same values. The types are separate from the transport, so that
 //! nothing here depends on it.
 //!
 //! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, wide fields first, no
@@ -17,6 +17,7 @@ mod command;
 mod cycle;
 mod estimate;
 mod json;
+mod range;
 mod recording;
 mod state;
 mod timing;
@@ -26,6 +27,7 @@ pub use command::{Command, CommandKind, CommandOutcome, Reply};
 pub use cycle::Cycle;
 pub use estimate::Estimate;
 pub use json::JsonMessage;
+pub use range::Range;
 pub use recording::{RecordingProblem, RecordingState, RecordingStatus};
 pub use state::{Fault, HoldReason, Mode, State};
 pub use timing::{Culprit, Timing};

@@ -5,7 +5,7 @@ use crate::command::{Failure, print};
 use crate::supervisor::child_process::LogLines;
 use crate::supervisor::crawl::SharedTelemetry;
 use crate::watch::view::{self, Subject};
-use crate::watch::{mismatch, recording, remarks};
+use crate::watch::{RangeSummary, mismatch, range, recording, remarks};
 use ratatui::DefaultTerminal;
 use std::collections::VecDeque;
 use worm_estimator::config::{Config, Direction};
@@ -19,8 +19,9 @@ pub(super) struct Painter {
     telemetry: SharedTelemetry,
     log: LogLines,
     step_order: Vec<usize>,
-    /// Cycles and alarms that were shown.
+    /// Cycles, ranges and alarms that were shown.
     cycles: u64,
+    ranges: u64,
     alarms: u64,
     style: Style,
     live: Option<Live>,
@@ -50,6 +51,7 @@ impl Painter {
             log,
             step_order: config.worm.step_order.clone(),
             cycles: 0,
+            ranges: 0,
             alarms: 0,
             style,
             live,
@@ -85,7 +87,11 @@ impl Painter {
         let mut lines: Vec<String> = {
             let telemetry = self.telemetry.lock();
             let seen = std::mem::replace(&mut self.cycles, telemetry.cycles.total());
-            telemetry.cycles.since(seen).map(cycle_line).collect()
+            let mut lines: Vec<String> = telemetry.cycles.since(seen).map(cycle_line).collect();
+            let seen = std::mem::replace(&mut self.ranges, telemetry.ranges.total());
+            let ranges = telemetry.ranges.since(seen);
+            lines.extend(ranges.map(|range| range::text(&RangeSummary::of(range))));
+            lines
         };
         lines.extend(self.new_alarms());
         lines
