@@ -12,6 +12,7 @@ pub mod explain;
 pub mod fault;
 pub mod latency;
 pub mod latency_floor;
+pub mod plan;
 mod progress;
 pub mod record;
 mod recording_limits;

@@ -86,7 +86,7 @@ pub struct CycleSummary {
     pub predicted_energy_loss_j: Option<f64>,
     /// Predicted positive actuator work, J.
     pub predicted_energy_positive_j: Option<f64>,
-    /// How far and how long the battery lasted then; null without a battery.
+    /// How far and how long the battery lasted then; null without a battery, and in cycles older than the newest 16,384.
     pub range: Option<RangeSummary>,
 }
 

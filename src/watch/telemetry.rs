@@ -7,6 +7,9 @@ use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Range, Recordin
 /// How many cycles are kept: nearly two days of the usual gait, 45 MB.
 const MAX_CYCLES: usize = 1 << 16;
 
+/// How many ranges are kept: those of the newest cycles, 3 MB.
+const MAX_RANGES: usize = 1 << 14;
+
 /// How many changes of alarms are kept, 0.6 MB.
 const MAX_ALARMS: usize = 1 << 13;
 
@@ -44,7 +47,7 @@ impl Default for Telemetry {
             timing: None,
             recording: None,
             cycles: Recent::with_limit(MAX_CYCLES),
-            ranges: Recent::with_limit(MAX_CYCLES),
+            ranges: Recent::with_limit(MAX_RANGES),
             alarms: Recent::with_limit(MAX_ALARMS),
             tick_stats: TickStats::default(),
             newest_changes: [None; AlarmKind::ALL.len()],

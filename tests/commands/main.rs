@@ -10,5 +10,6 @@ mod latency_page;
 mod latency_sample;
 mod licences;
 mod mcap_python;
+mod plan;
 mod simulate;
 mod workspace;
