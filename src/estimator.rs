@@ -1,14 +1,17 @@
 //! The estimator process: feeds every state to the pure [`Observer`] and publishes what it finds.
 
+mod gauge;
+
 use crate::attendance::RoundCounter;
 use crate::failure::Failure;
 use crate::realtime::{self, Grant};
 use crate::topics::{Estimator, Hub, Notifier, PortError, PublishError, Publisher, RoleLock, Subscriber};
+use gauge::Gauge;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{Observer, ObserverOutput};
-use worm_estimator::message::{Alarm, Cycle, Estimate, RecordingStatus, State};
+use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State};
 
 /// Longest sleep without an event from the controller; should an event get lost, its state is read this much later.
 const MAX_SLEEP: Duration = Duration::from_millis(10);
@@ -16,7 +19,7 @@ const MAX_SLEEP: Duration = Duration::from_millis(10);
 /// Interval at which the last estimate is published again while no state comes, so that the controller knows it is alive.
 const HEARTBEAT: Duration = Duration::from_millis(50);
 
-/// How often the recorder's reports are read, which come once a second.
+/// How often the recorder's reports, which come once a second, and the gauge's readings are read.
 const RECORDER_POLL: Duration = Duration::from_millis(100);
 
 /// The estimator's priority lies this far below the loop's: above ordinary processes, and never in the loop's way.
@@ -42,6 +45,10 @@ pub(crate) fn run(
     let mut recorder_polled = Instant::now();
     let state_event = hub.listener::<State>().map_err(Failure::failed)?;
     let mut output = OutputTopics::open(hub, role).map_err(Failure::failed)?;
+    let gauge = match config.battery.as_ref().and_then(|battery| battery.gauge.as_ref()) {
+        Some(file) => Some(Gauge::open(file.into()).map_err(Failure::failed)?),
+        None => None,
+    };
     let mut told_of_mismatch = false;
     ready(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     while !end.load(Ordering::Relaxed) {
@@ -50,6 +57,9 @@ pub(crate) fn run(
         if recorder_polled.elapsed() >= RECORDER_POLL {
             recorder_polled = Instant::now();
             note_recording(&mut recordings, &mut observer);
+            if let Some(share) = gauge.as_ref().and_then(Gauge::next) {
+                observer.note_gauge(share);
+            }
         }
         while let Some(state) = states.next().map_err(Failure::failed)? {
             on_state(&state);
@@ -82,6 +92,7 @@ struct OutputTopics {
     estimate: Publisher<Estimate>,
     cycle: Publisher<Cycle>,
     alarm: Publisher<Alarm>,
+    range: Publisher<Range>,
     alarm_event: Notifier<Alarm>,
     /// When an estimate was last published.
     last_published: Instant,
@@ -93,6 +104,7 @@ impl OutputTopics {
             estimate: hub.publisher(role)?,
             cycle: hub.publisher(role)?,
             alarm: hub.publisher(role)?,
+            range: hub.publisher(role)?,
             alarm_event: hub.notifier(role)?,
             last_published: Instant::now(),
         })
@@ -113,6 +125,9 @@ impl OutputTopics {
         if let Some(cycle) = &found.cycle {
             self.cycle.publish(cycle)?;
         }
+        if let Some(range) = &found.range {
+            self.range.publish(range)?;
+        }
         Ok(())
     }
 
@@ -121,6 +136,7 @@ impl OutputTopics {
         self.estimate.publish(latest)?;
         self.last_published = Instant::now();
         self.cycle.idle()?;
+        self.range.idle()?;
         self.alarm.idle()
     }
 }

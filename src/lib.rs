@@ -32,7 +32,8 @@
 //! | `dynamixel-bus` | DYNAMIXEL Protocol 2.0: packets, the bus, serial ports, a fault injector | |
 //! | `worm-estimator` | configuration (one TOML file), messages (one plain type per topic), the estimator and its alarms | `worm-physics` |
 //! | `worm-log` | the topics as an MCAP log, its replay through the estimator, and tables of it (feature `tables`) | `worm-estimator` |
-//! | `worm-analysis` | recordings in every format; gait and parameters from positions; the paper's experiment; the search for a missing effect; reports. The feature `analysis` | `worm-log` |
+//! | `worm-plan` | trips on a battery: what a route costs, where it fails, the best design for it | `worm-estimator` |
+//! | `worm-analysis` | recordings in every format; gait and parameters from positions; the paper's experiment; the search for a missing effect; reports. The feature `analysis` | `worm-log`, `worm-plan` |
 //!
 //! # The modules, bottom up
 //! | module | contents | uses |

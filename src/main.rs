@@ -46,6 +46,8 @@ enum Subcommands {
     Export(command::export::ExportArgs),
     /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
     Study(command::study::StudyArgs),
+    /// A trip on the battery: energy, time, range, where it fails, and the best design for a route
+    Plan(command::plan::PlanArgs),
     /// The paper's experiment on a recording: tip deformations, slides, energy, figures
     #[cfg(feature = "analysis")]
     Analyze(command::analyze::AnalyzeArgs),
@@ -113,6 +115,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
+        Subcommands::Plan(args) => command::plan::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Analyze(args) => command::analyze::run(&args),
         #[cfg(feature = "analysis")]

@@ -15,6 +15,7 @@ pub mod latency;
 pub mod latency_floor;
 mod live;
 pub mod manual;
+pub mod plan;
 mod progress;
 pub mod record;
 mod recording_limits;

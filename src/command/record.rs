@@ -11,7 +11,7 @@ use std::time::Duration;
 use worm_log::Channel;
 
 /// What is recorded unless something else is asked for.
-pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm";
+pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range";
 
 /// Arguments of `wormd record`.
 #[derive(Debug, Args)]

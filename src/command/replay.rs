@@ -64,6 +64,10 @@ fn in_words(comparison: &Comparison) -> String {
         comparison.alarms_identical,
         comparison.alarms_compared,
     );
+    if comparison.ranges_compared > 0 {
+        let (identical, compared) = (comparison.ranges_identical, comparison.ranges_compared);
+        text += &format!(", {identical} of {compared} ranges");
+    }
     for warning in &comparison.warnings {
         text += &format!("\nnote: {warning}");
     }

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use worm_estimator::message::{Alarm, Cycle, Estimate, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, Range, State, Timing};
 use worm_log::{Channel, Origin};
 
 /// Interval at which a chunk is finished and synchronised to disk: a killed recorder or a power loss costs at most this, and what is in the
@@ -27,12 +27,14 @@ pub(super) struct Batch {
     pub estimates: Vec<Estimate>,
     pub cycles: Vec<Cycle>,
     pub alarms: Vec<Alarm>,
+    pub ranges: Vec<Range>,
 }
 
 impl Batch {
     /// How many messages.
     pub(super) fn len(&self) -> usize {
-        self.states.len() + self.timings.len() + self.estimates.len() + self.cycles.len() + self.alarms.len()
+        let by_tick = self.states.len() + self.timings.len() + self.estimates.len();
+        by_tick + self.cycles.len() + self.alarms.len() + self.ranges.len()
     }
 }
 
@@ -122,6 +124,7 @@ fn write_batches(mut series: FileSeries, batches: &Receiver<Batch>) -> Result<Co
                 series.write(&batch.estimates)?;
                 series.write(&batch.cycles)?;
                 series.write(&batch.alarms)?;
+                series.write(&batch.ranges)?;
                 unsynced_since.get_or_insert_with(Instant::now);
             }
             Err(RecvTimeoutError::Timeout) => {}

@@ -25,7 +25,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, Cycle, Estimate, RecordingProblem, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingProblem, State, Timing};
 use worm_log::{Channel, Logged, Origin};
 
 /// How often the topics are emptied. At 1 kHz even the fullest holds a second.
@@ -187,6 +187,7 @@ struct RecordedTopics {
     estimate: Recorded<Estimate>,
     cycle: Recorded<Cycle>,
     alarm: Recorded<Alarm>,
+    range: Recorded<Range>,
 }
 
 impl RecordedTopics {
@@ -201,6 +202,7 @@ impl RecordedTopics {
             estimate: subscribe(hub, topics)?,
             cycle: subscribe(hub, topics)?,
             alarm: subscribe(hub, topics)?,
+            range: subscribe(hub, topics)?,
         })
     }
 
@@ -220,6 +222,7 @@ impl RecordedTopics {
             estimates: take(&mut self.estimate)?,
             cycles: take(&mut self.cycle)?,
             alarms: take(&mut self.alarm)?,
+            ranges: take(&mut self.range)?,
         })
     }
 
@@ -231,6 +234,7 @@ impl RecordedTopics {
             Channel::Estimate => None,
             Channel::Cycle => self.cycle.as_ref().map(Subscriber::lost),
             Channel::Alarm => self.alarm.as_ref().map(Subscriber::lost),
+            Channel::Range => self.range.as_ref().map(Subscriber::lost),
         }
     }
 }

@@ -135,6 +135,7 @@ impl Worm {
             timing: telemetry.timing.map(Json),
             statistics: self.statistics,
             recording: telemetry.recording.map(Json),
+            range: telemetry.ranges.last().copied().map(Json),
             raised: telemetry.raised().into_iter().map(Json).collect(),
             cycles: telemetry.cycles.since(seen.cycles).copied().map(Json).collect(),
             alarms: telemetry.alarms.since(seen.alarms).copied().map(Json).collect(),

@@ -4,7 +4,7 @@ use super::message_json::Json;
 use crate::latency::Percentiles;
 use serde::{Deserialize, Serialize};
 use worm_estimator::config::{Config, Direction};
-use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Range, RecordingStatus, State, Timing};
 
 /// Version of this language. A higher one may have taken fields away or changed what they mean; new fields need no new version,
 /// because both sides ignore what they do not know.
@@ -149,6 +149,8 @@ pub(crate) struct Frame {
     pub statistics: Option<Statistics>,
     /// How the recording goes, if there is one.
     pub recording: Option<Json<RecordingStatus>>,
+    /// How far and how long the battery lasts, after the newest gait cycle, if there is one.
+    pub range: Option<Json<Range>>,
     /// The alarms that are raised.
     pub raised: Vec<Json<Alarm>>,
     /// Gait cycles since the frame before.

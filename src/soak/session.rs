@@ -5,7 +5,9 @@ use super::machine::{Exchange, Machine, SERVICE_TIMEOUT_S, Served};
 use crate::control::{Controller, EstimateSeen, Inputs, Lease, Outputs, Service, ServiceOutcome};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{EstimatorError, Observer};
-use worm_estimator::message::{Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, State};
+use worm_estimator::message::{
+    Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, Range, State,
+};
 
 /// The estimator's heartbeat while no sample comes, s.
 const HEARTBEAT_S: f64 = 0.1;
@@ -54,6 +56,8 @@ pub struct Session<M> {
     pub raised: Vec<Alarm>,
     /// Every cycle that ended, if they are collected.
     pub cycles: Option<Vec<Cycle>>,
+    /// How far the battery lasts, after each of them.
+    pub ranges: Vec<Range>,
 }
 
 /// What a tick showed.
@@ -94,6 +98,7 @@ impl<M: Machine> Session<M> {
             spoken_ns: 0,
             raised: Vec::new(),
             cycles: None,
+            ranges: Vec::new(),
         })
     }
 
@@ -249,6 +254,7 @@ impl<M: Machine> Session<M> {
         }
         if let (Some(cycles), Some(cycle)) = (&mut self.cycles, report.cycle) {
             cycles.push(cycle);
+            self.ranges.extend(report.range);
         }
     }
 

@@ -7,7 +7,7 @@ use crate::watch::Telemetry;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Mode, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Mode, Range, RecordingStatus, State, Timing};
 
 /// How long the worm may take to reach a commanded mode, beyond the time of the ramp.
 pub(crate) const MODE_TIMEOUT: Duration = Duration::from_secs(5);
@@ -19,6 +19,7 @@ pub(crate) struct TelemetryReceiver {
     estimate: Subscriber<Estimate>,
     cycle: Subscriber<Cycle>,
     alarm: Subscriber<Alarm>,
+    range: Subscriber<Range>,
     recording: Subscriber<RecordingStatus>,
 }
 
@@ -34,6 +35,7 @@ impl TelemetryReceiver {
             estimate: hub.subscriber().map_err(Failure::failed)?,
             cycle: hub.subscriber().map_err(Failure::failed)?,
             alarm: hub.subscriber().map_err(Failure::failed)?,
+            range: hub.subscriber().map_err(Failure::failed)?,
             recording: hub.subscriber().map_err(Failure::failed)?,
         })
     }
@@ -54,6 +56,9 @@ impl TelemetryReceiver {
         }
         while let Ok(Some(alarm)) = self.alarm.next() {
             telemetry.take_alarm(&alarm);
+        }
+        while let Ok(Some(range)) = self.range.next() {
+            telemetry.take_range(&range);
         }
         while let Ok(Some(status)) = self.recording.next() {
             telemetry.take_recording(&status);

@@ -40,6 +40,7 @@ pub(super) fn open(instance: &Instance) -> Result<Services, Refused> {
         estimate: open_topic(&node, instance)?,
         cycle: open_topic(&node, instance)?,
         alarm: open_topic(&node, instance)?,
+        range: open_topic(&node, instance)?,
         recording: open_topic(&node, instance)?,
         state_event: open_event(&node, instance, State::NAME)?,
         alarm_event: open_event(&node, instance, Alarm::NAME)?,

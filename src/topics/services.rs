@@ -2,7 +2,7 @@
 
 use iceoryx2::prelude::{Node, ipc};
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
-use worm_estimator::message::{Alarm, Command, Cycle, Estimate, RecordingStatus, Reply, State, Timing};
+use worm_estimator::message::{Alarm, Command, Cycle, Estimate, Range, RecordingStatus, Reply, State, Timing};
 
 /// The variant of iceoryx2 in use: between processes, ports bound to their thread.
 pub type Ipc = ipc::Service;
@@ -26,6 +26,7 @@ pub struct Services {
     pub(super) estimate: TopicService<Estimate>,
     pub(super) cycle: TopicService<Cycle>,
     pub(super) alarm: TopicService<Alarm>,
+    pub(super) range: TopicService<Range>,
     pub(super) recording: TopicService<RecordingStatus>,
     pub(super) state_event: EventService,
     pub(super) alarm_event: EventService,

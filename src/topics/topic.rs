@@ -4,7 +4,7 @@ use super::role::{Controller, Estimator, Recorder, Role};
 use super::services::{EventService, Services, TopicService};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
-use worm_estimator::message::{Alarm, Cycle, Estimate, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State, Timing};
 
 /// A message that is published on a topic of its own.
 pub trait Topic: sealed::Carried {
@@ -67,6 +67,7 @@ topics! {
     Estimate { estimate, owner: Estimator, buffer: 256, history: 1, number: |_| None }
     Cycle { cycle, owner: Estimator, buffer: 64, history: 16, number: |cycle| Some(cycle.index) }
     Alarm { alarm, owner: Estimator, buffer: 64, history: 32, number: |alarm| Some(alarm.sequence) }
+    Range { range, owner: Estimator, buffer: 64, history: 1, number: |range| Some(range.index) }
     RecordingStatus { recording, owner: Recorder, buffer: 16, history: 1, number: |status| Some(status.sequence) }
 }
 

@@ -6,6 +6,7 @@
 pub(crate) mod app;
 pub(crate) mod mismatch;
 mod picture;
+pub(crate) mod range;
 mod recent;
 pub(crate) mod recording;
 mod remedy;
@@ -14,7 +15,7 @@ mod telemetry;
 mod view;
 
 pub use recent::Recent;
-pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, Summary, TimingSummary, remarks};
+pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, RangeSummary, Summary, TimingSummary, remarks};
 pub use telemetry::Telemetry;
 
 #[cfg(test)]

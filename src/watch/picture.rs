@@ -4,7 +4,7 @@ use super::recent::Recent;
 use crate::relay::History;
 use crate::relay::message_json::Json;
 use crate::relay::wire::{Ages, Driver, Event, Frame, Hello, Statistics, Subject};
-use worm_estimator::message::{Alarm, Cycle, Estimate, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State, Timing};
 
 /// Gait cycles that are kept: an hour and a half of the usual gait, 1.5 MB.
 const MAX_CYCLES: usize = 2048;
@@ -25,6 +25,7 @@ pub(crate) struct Picture {
     pub(crate) timing: Option<Timing>,
     pub(crate) statistics: Option<Statistics>,
     pub(crate) recording: Option<RecordingStatus>,
+    pub(crate) range: Option<Range>,
     pub(crate) raised: Vec<Alarm>,
     pub(crate) cycles: Recent<Cycle>,
     pub(crate) alarms: Recent<Alarm>,
@@ -46,6 +47,7 @@ impl Picture {
             timing: None,
             statistics: None,
             recording: None,
+            range: None,
             raised: Vec::new(),
             cycles: Recent::with_limit(MAX_CYCLES),
             alarms: Recent::with_limit(MAX_CHANGES),
@@ -83,6 +85,7 @@ impl Picture {
         self.timing = frame.timing.map(|Json(timing)| timing);
         self.statistics = frame.statistics;
         self.recording = frame.recording.map(|Json(status)| status);
+        self.range = frame.range.map(|Json(range)| range);
         self.raised = frame.raised.into_iter().map(|Json(alarm)| alarm).collect();
         frame.cycles.into_iter().for_each(|Json(cycle)| self.cycles.push(cycle));
         frame.alarms.into_iter().for_each(|Json(alarm)| self.alarms.push(alarm));

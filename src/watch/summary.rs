@@ -1,13 +1,13 @@
 //! The summary of a run that `wormd up` prints, as text and as JSON. The JSON names are a contract.
 
 use super::telemetry::Telemetry;
-use super::{mismatch, recording};
+use super::{mismatch, range, recording};
 use crate::latency::{HostPauses, Percentiles, WorstTicks};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use worm_estimator::config::Worm;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Severity};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Range, Severity};
 use worm_estimator::time::seconds;
 
 /// A run in numbers.
@@ -33,6 +33,8 @@ pub struct Summary {
     pub fault: &'static str,
     /// Every finished gait cycle, the newest 65,536 of a longer run.
     pub cycles: Vec<CycleSummary>,
+    /// How far and how long the battery lasts, after the newest cycle; null without a battery.
+    pub range: Option<RangeSummary>,
     /// Older cycles, which are not among them.
     pub cycles_dropped: u64,
     /// Every alarm that was raised, as far as it is among the newest 8,192 changes.
@@ -84,6 +86,33 @@ pub struct CycleSummary {
     pub predicted_energy_loss_j: Option<f64>,
     /// Predicted positive actuator work, J.
     pub predicted_energy_positive_j: Option<f64>,
+    /// How far and how long the battery lasted then; null without a battery, and in cycles older than the newest 16,384.
+    pub range: Option<RangeSummary>,
+}
+
+/// How far and how long the battery lasts if the worm crawls on as in its last cycles. Low and high bound a 90 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RangeSummary {
+    /// Share of the battery's energy that is left.
+    pub charge_share: f64,
+    /// Its standard error.
+    pub charge_sigma_share: f64,
+    /// Energy that a cycle takes from the battery, J.
+    pub energy_per_cycle_j: f64,
+    /// Gait cycles left.
+    pub cycles: f64,
+    /// Distance left, m.
+    pub range_m: f64,
+    /// Lower bound of it, m.
+    pub range_low_m: f64,
+    /// Upper bound of it, m.
+    pub range_high_m: f64,
+    /// Time left, s.
+    pub time_s: f64,
+    /// Lower bound of it, s.
+    pub time_low_s: f64,
+    /// Upper bound of it, s.
+    pub time_high_s: f64,
 }
 
 /// One alarm that was raised.
@@ -160,7 +189,8 @@ impl Summary {
             link_failures: state.map_or(0, |state| state.link_failures),
             mode: end_mode.name(),
             fault: fault.name(),
-            cycles: telemetry.cycles.iter().map(CycleSummary::new).collect(),
+            cycles: cycle_summaries(telemetry),
+            range: telemetry.ranges.last().map(RangeSummary::of),
             cycles_dropped: telemetry.cycles.dropped(),
             alarms: alarm_summaries(telemetry.alarms.iter(), start_ns, &worm.step_order),
             alarm_changes_dropped: telemetry.alarms.dropped(),
@@ -178,6 +208,36 @@ impl Summary {
                 host_pauses: tick_stats.host_pauses,
                 worst_ticks: tick_stats.worst.clone(),
             },
+        }
+    }
+}
+
+/// Every cycle, with the range that followed it.
+fn cycle_summaries(telemetry: &Telemetry) -> Vec<CycleSummary> {
+    let ranges: BTreeMap<u64, &Range> = telemetry.ranges.iter().map(|range| (range.index, range)).collect();
+    let cycles = telemetry.cycles.iter();
+    cycles
+        .map(|cycle| CycleSummary {
+            range: ranges.get(&cycle.index).map(|range| RangeSummary::of(range)),
+            ..CycleSummary::new(cycle)
+        })
+        .collect()
+}
+
+impl RangeSummary {
+    /// What the message says.
+    pub fn of(range: &Range) -> Self {
+        Self {
+            charge_share: range.charge_share,
+            charge_sigma_share: range.charge_sigma_share,
+            energy_per_cycle_j: range.energy_per_cycle_j,
+            cycles: range.cycles,
+            range_m: range.range_m,
+            range_low_m: range.range_low_m,
+            range_high_m: range.range_high_m,
+            time_s: range.time_s,
+            time_low_s: range.time_low_s,
+            time_high_s: range.time_high_s,
         }
     }
 }
@@ -210,6 +270,7 @@ impl CycleSummary {
             predicted_advance_m: known(cycle.predicted_advance_m),
             predicted_energy_loss_j: known(cycle.predicted_energy_loss_j),
             predicted_energy_positive_j: known(cycle.predicted_energy_positive_j),
+            range: None,
         }
     }
 }
@@ -324,6 +385,9 @@ impl fmt::Display for Summary {
                 .and_then(|cycle| cycle.predicted_energy_loss_j)
                 .unwrap_or(f64::NAN);
             writeln!(f, "model  {:>7.3}  {:>7.2}", predicted_m * 1e3, energy_j * 1e3)?;
+        }
+        if let Some(range) = &self.range {
+            writeln!(f, "{}", range::text(range))?;
         }
         for alarm in &self.alarms {
             let cell = match (alarm.cell, &alarm.place) {

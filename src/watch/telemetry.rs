@@ -2,10 +2,13 @@
 
 use super::recent::Recent;
 use crate::latency::TickStats;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Range, RecordingStatus, State, Timing};
 
 /// How many cycles are kept: nearly two days of the usual gait, 45 MB.
 const MAX_CYCLES: usize = 1 << 16;
+
+/// How many ranges are kept: those of the newest cycles, 3 MB.
+const MAX_RANGES: usize = 1 << 14;
 
 /// How many changes of alarms are kept, 0.6 MB.
 const MAX_ALARMS: usize = 1 << 13;
@@ -25,6 +28,8 @@ pub struct Telemetry {
     pub recording: Option<RecordingStatus>,
     /// The newest cycles.
     pub cycles: Recent<Cycle>,
+    /// How far the battery lasts, after the newest cycles; empty without a battery.
+    pub ranges: Recent<Range>,
     /// The newest changes of alarms.
     pub alarms: Recent<Alarm>,
     /// Where the ticks' time went, and what made late ones late.
@@ -49,6 +54,7 @@ impl Telemetry {
             timing: None,
             recording: None,
             cycles: Recent::with_limit(cycles),
+            ranges: Recent::with_limit(cycles.min(MAX_RANGES)),
             alarms: Recent::with_limit(alarms),
             tick_stats: TickStats::default(),
             newest_changes: [None; AlarmKind::ALL.len()],
@@ -75,6 +81,11 @@ impl Telemetry {
     /// Takes a finished cycle.
     pub fn take_cycle(&mut self, cycle: &Cycle) {
         self.cycles.push(*cycle);
+    }
+
+    /// Takes how far the battery lasts.
+    pub fn take_range(&mut self, range: &Range) {
+        self.ranges.push(*range);
     }
 
     /// Takes an alarm change.

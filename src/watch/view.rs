@@ -425,5 +425,11 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
     {
         lines.push(Line::raw(format!("battery {:.0} %", fraction * 100.0)));
     }
+    if let Some(range) = &picture.range {
+        lines.push(Line::raw(format!(
+            "range {:.1} to {:.1} m",
+            range.range_low_m, range.range_high_m
+        )));
+    }
     frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(" loop ")), area);
 }

@@ -11,5 +11,6 @@ mod latency_sample;
 mod licences;
 mod manual;
 mod mcap_python;
+mod plan;
 mod simulate;
 mod workspace;

@@ -8,6 +8,7 @@
 //! - `soak`: a few segments of `wormd soak`.
 //! - `mismatch`: worms that the model does not explain are reported; the configured worm and those a few per cent off are not.
 //! - `pauses`: a pause of the computer, in whole or in part, is not a fault of the worm and does not distort the energies.
+//! - `range`: how far the battery lasts, against worms that crawl until it does not.
 //! - `hours`: healthy worms on many kinds of journeys raise no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
 //!   With it, `mismatch` tries all of its healthy worms, otherwise half of them.
 //!
@@ -21,5 +22,6 @@ mod harness;
 mod hours;
 mod mismatch;
 mod pauses;
+mod range;
 mod soak;
 mod stall;

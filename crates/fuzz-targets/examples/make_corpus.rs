@@ -25,6 +25,7 @@ fn main() {
     put("config_toml", "effects", CONFIG.as_bytes());
     put("campaign_toml", "advances", ADVANCES.as_bytes());
     put("campaign_toml", "recordings", RECORDINGS.as_bytes());
+    put("route_csv", "legs", ROUTE.as_bytes());
     let short = Simulation {
         rate_hz: 10.0,
         cycles: 1.0,
@@ -43,6 +44,8 @@ fn main() {
     put("protobuf_message", "estimate", &protobuf(2, &telemetry.estimates[1]));
     put("log_messages", "crawl", &messages(&telemetry));
 }
+
+const ROUTE: &str = "# there and back\nlength_m,slope_deg\n2.5,0\n0.8,30\n1e-1,-12.5\n";
 
 fn device(id: u8) -> DeviceId {
     DeviceId::new(id).expect("a valid ID")

@@ -12,6 +12,7 @@
 mod log;
 mod packets;
 mod recording;
+mod route;
 mod text;
 mod tracker;
 
@@ -47,7 +48,7 @@ const KIB: usize = 1024;
 const MIB: usize = 1024 * KIB;
 
 /// Every target.
-pub const TARGETS: [Target; 10] = [
+pub const TARGETS: [Target; 11] = [
     Target {
         name: "packets",
         run: packets::packets,
@@ -75,6 +76,12 @@ pub const TARGETS: [Target; 10] = [
     Target {
         name: "recording_csv",
         run: recording::recording_csv,
+        memory_per_byte: 128,
+        memory_base: MIB,
+    },
+    Target {
+        name: "route_csv",
+        run: route::route_csv,
         memory_per_byte: 128,
         memory_base: MIB,
     },

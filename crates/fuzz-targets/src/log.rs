@@ -5,7 +5,9 @@ use std::io::Cursor;
 use std::path::Path;
 use worm_analysis::recording::mcap;
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, RecordingStatus, State, Timing};
+use worm_estimator::message::{
+    Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
+};
 use worm_log::{Log, compare, messages_from, replay};
 
 /// A log: as its messages, as a recording, and through the estimator.
@@ -41,6 +43,7 @@ pub(crate) fn log_messages(data: &[u8]) {
         log.estimates.extend(read::<Estimate>(line));
         log.cycles.extend(read::<Cycle>(line));
         log.alarms.extend(read::<Alarm>(line));
+        log.ranges.extend(read::<Range>(line));
         read::<Timing>(line);
     }
     check(&log);

@@ -6,9 +6,9 @@ use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 use std::time::{Duration, UNIX_EPOCH};
-use worm_estimator::config::Config;
+use worm_estimator::config::{Battery, Config};
 use worm_estimator::estimate::Observer;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Range, State, Timing};
 use worm_log::{Log, Logged, Origin, Writer};
 
 pub const ORIGIN_CONFIG: &str = "[worm]\nname = \"tester\"\n";
@@ -22,6 +22,7 @@ pub struct Telemetry {
     pub estimates: Vec<Estimate>,
     pub cycles: Vec<Cycle>,
     pub alarms: Vec<Alarm>,
+    pub ranges: Vec<Range>,
 }
 
 impl Telemetry {
@@ -32,6 +33,7 @@ impl Telemetry {
             estimates: self.estimates,
             cycles: self.cycles,
             alarms: self.alarms,
+            ranges: self.ranges,
             ..Log::default()
         }
     }
@@ -44,12 +46,24 @@ pub fn crawl(seconds: f64) -> Telemetry {
 
 /// A crawl whose estimator starts `late` states after the controller and sends a heartbeat now and then.
 pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Telemetry {
+    crawl_of(seconds, late, None)
+}
+
+/// A crawl on the usual battery with a gauge, and with an estimator from the first state on.
+pub fn crawl_on_battery(seconds: f64) -> Telemetry {
+    crawl_of(seconds, 0, Some(Battery::default()))
+}
+
+fn crawl_of(seconds: f64, late: usize, battery: Option<Battery>) -> Telemetry {
     let scene = Scene {
         cycles_per_s: 0.5,
         ..Scene::default()
     };
     let worm = paper_worm(0.0, true);
-    let config = config_of(&worm, &scene);
+    let config = Config {
+        battery,
+        ..config_of(&worm, &scene)
+    };
     let mut observer = Observer::new(&config).expect("a valid configuration");
     let mut crawl = Crawl::new(worm, scene);
     let mut telemetry = Telemetry::default();
@@ -78,9 +92,13 @@ pub fn crawl_with_late_estimator(seconds: f64, late: usize) -> Telemetry {
         if tick < late {
             continue;
         }
+        if tick % 700 == 0 {
+            observer.note_gauge(0.8 - 1e-6 * tick as f64);
+        }
         let report = observer.update(&state);
         telemetry.alarms.extend(report.alarms.iter());
         telemetry.cycles.extend(report.cycle);
+        telemetry.ranges.extend(report.range);
         telemetry.estimates.extend(report.estimate);
         if tick % 100 == 99 {
             telemetry.estimates.push(Estimate {
@@ -118,6 +136,7 @@ pub fn write_log(path: &Path, telemetry: &Telemetry) {
     all(&mut writer, &telemetry.estimates);
     all(&mut writer, &telemetry.cycles);
     all(&mut writer, &telemetry.alarms);
+    all(&mut writer, &telemetry.ranges);
     writer.finish().expect("there is room");
 }
 

@@ -2,6 +2,7 @@
 //!
 //! | module | what it holds | does not depend on |
 //! |---|---|---|
+//! | [`battery`] | open-circuit voltage, and how much is left | processes, topics |
 //! | [`config`] | the worm and how it is run: one TOML file, checked once, then trusted | processes, topics |
 //! | [`message`] | one plain, fixed-size type per topic, its JSON form and schema | how messages travel |
 //! | [`estimate`] | contact points, deformation, energy, cycles and alarms from the controller's states | clocks, files, topics |
@@ -11,6 +12,7 @@
 //! to the last bit.
 
 pub mod abridged;
+pub mod battery;
 pub mod config;
 pub mod estimate;
 pub mod message;

@@ -1,6 +1,6 @@
 //! The channels of a log.
 
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, State, Timing};
 
 /// Encoding of the messages that are written, and of their schemas, as MCAP names it.
 pub(super) const PROTOBUF: &str = "protobuf";
@@ -62,6 +62,7 @@ channels! {
     Estimate = "estimate",
     Cycle = "cycle",
     Alarm = "alarm",
+    Range = "range",
 }
 
 impl Channel {

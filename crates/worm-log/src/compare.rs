@@ -25,6 +25,10 @@ pub struct Comparison {
     pub alarms_compared: usize,
     /// Those that are identical.
     pub alarms_identical: usize,
+    /// Recorded ranges that were compared.
+    pub ranges_compared: usize,
+    /// Those that are identical.
+    pub ranges_identical: usize,
     /// The log has every state since the estimator's first, and every result.
     pub complete: bool,
     /// What is missing, and other remarks.
@@ -34,8 +38,10 @@ pub struct Comparison {
 impl Comparison {
     /// Whether everything that was compared is identical.
     pub fn is_identical(&self) -> bool {
-        (self.estimates_compared, self.cycles_compared, self.alarms_compared)
-            == (self.estimates_identical, self.cycles_identical, self.alarms_identical)
+        self.estimates_compared == self.estimates_identical
+            && self.cycles_compared == self.cycles_identical
+            && self.alarms_compared == self.alarms_identical
+            && self.ranges_compared == self.ranges_identical
     }
 }
 
@@ -58,6 +64,11 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
     let recorded = recorder_alarm::others(&log.alarms);
     let alarms = span.agreement("alarms", recorded, &replay.alarms, |alarm| {
         (alarm.sequence, alarm.time_ns)
+    });
+    // Logs of older versions have none, and miss nothing.
+    let replayed: &[_] = if log.ranges.is_empty() { &[] } else { &replay.ranges };
+    let ranges = span.agreement("ranges", log.ranges.iter().copied(), replayed, |range| {
+        (range.index, range.end_ns)
     });
 
     let mut gaps = Vec::new();
@@ -87,10 +98,10 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
             "the estimator was started anew at t = {time_s:.3} s, and its replay was not"
         ));
     }
-    let agreements = [estimates, cycles, alarms];
+    let agreements = [estimates, cycles, alarms, ranges];
     gaps.extend(agreements.iter().flat_map(|agreement| agreement.gap.clone()));
     let complete = gaps.is_empty();
-    let [estimates, cycles, alarms] = agreements;
+    let [estimates, cycles, alarms, ranges] = agreements;
     Comparison {
         states: log.states.len(),
         estimates_compared: estimates.compared,
@@ -99,6 +110,8 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
         cycles_identical: cycles.identical,
         alarms_compared: alarms.compared,
         alarms_identical: alarms.identical,
+        ranges_compared: ranges.compared,
+        ranges_identical: ranges.identical,
         complete,
         warnings: log.warnings.iter().cloned().chain(gaps).collect(),
     }

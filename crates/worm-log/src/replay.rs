@@ -4,7 +4,7 @@ use super::log::Log;
 use super::recorder_alarm;
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{EstimatorError, Observer};
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, State};
+use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, Range, State};
 
 /// So many recorded estimates must be reproduced to identify the estimator's first state.
 const FIRST_ESTIMATES: usize = 20;
@@ -27,6 +27,8 @@ pub struct Replay {
     pub cycles: Vec<Cycle>,
     /// Alarms raised and cleared.
     pub alarms: Vec<Alarm>,
+    /// How far the battery lasts, after each cycle.
+    pub ranges: Vec<Range>,
 }
 
 /// Feeds a log's states to the estimator, in their order.
@@ -44,7 +46,7 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
         .map(recorder_alarm::without)
         .collect();
     for first in possible_starts(&log.states, recorded.first()) {
-        let (mut found, fed) = run(&log.states[first..], config, recorded.len())?;
+        let (mut found, fed) = run(log, first, config, recorded.len())?;
         let is_same = found.estimates.len() == recorded.len()
             && found
                 .estimates
@@ -52,14 +54,14 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
                 .zip(&recorded)
                 .all(|(ours, theirs)| same(ours, theirs));
         if is_same {
-            (found, _) = run(&log.states[first..], config, usize::MAX)?;
+            (found, _) = run(log, first, config, usize::MAX)?;
             (found.first, found.first_is_known) = (first, true);
             return Ok(found);
         }
         let Some(left) = budget.checked_sub(fed) else { break };
         budget = left;
     }
-    Ok(run(&log.states, config, usize::MAX)?.0)
+    Ok(run(log, 0, config, usize::MAX)?.0)
 }
 
 /// Indices of the states at which an estimator with this first estimate can have started.
@@ -76,28 +78,45 @@ fn possible_starts(states: &[State], first_estimate: Option<&Estimate>) -> std::
 }
 
 /// Runs the estimator until it has made so many estimates, and returns how many states that took.
-fn run(states: &[State], config: &Config, enough: usize) -> Result<(Replay, usize), EstimatorError> {
+///
+/// The readings of a gauge are no states: they come from the recorded ranges, each of which says what it used.
+fn run(log: &Log, first: usize, config: &Config, enough: usize) -> Result<(Replay, usize), EstimatorError> {
     let mut observer = Observer::new(config)?;
+    let mut gauged = log.ranges.iter().peekable();
+    note_gauge(&mut observer, gauged.peek().copied());
     let mut replay = Replay {
         first: 0,
         first_is_known: false,
         estimates: Vec::new(),
         cycles: Vec::new(),
         alarms: Vec::new(),
+        ranges: Vec::new(),
     };
     let mut fed = 0;
-    for state in states {
+    for state in &log.states[first..] {
         fed += 1;
         observer.check(state)?;
         let report = observer.update(state);
         replay.alarms.extend(report.alarms.iter());
         replay.estimates.extend(report.estimate);
         replay.cycles.extend(report.cycle);
+        if let Some(range) = report.range {
+            while gauged.next_if(|recorded| recorded.end_ns <= range.end_ns).is_some() {}
+            replay.ranges.push(range);
+            note_gauge(&mut observer, gauged.peek().copied());
+        }
         if replay.estimates.len() >= enough {
             break;
         }
     }
     Ok((replay, fed))
+}
+
+/// What the gauge said in the cycle that this range followed. It counts at the end of the cycle, and so may come early.
+fn note_gauge(observer: &mut Observer, recorded: Option<&Range>) {
+    if let Some(range) = recorded {
+        observer.note_gauge(range.gauge_share);
+    }
 }
 
 /// The estimates without heartbeats, which repeat the last estimate with the present alarms, or are sent before the first.

@@ -134,10 +134,11 @@ pub fn steady_cycle(worm: &Worm) -> Outcome {
 ///
 /// A worm that begins to slide down in one of these cycles does so in the [`Outcome`].
 pub fn steady_cycle_of(physics: &Physics, cycle_s: f64) -> Outcome {
-    crawl_until_periodic(physics, cycle_s).map_or_else(Outcome::SlidesDown, Outcome::Steady)
+    crawl_until_periodic(physics, cycle_s).map_or_else(Outcome::SlidesDown, |(cycle, _)| Outcome::Steady(cycle))
 }
 
-fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<Cycle, SlidesDown> {
+/// The steady cycle, and the motion at its end.
+pub(super) fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<(Cycle, Locomotion), SlidesDown> {
     let worm = &physics.worm;
     let mut motion = Locomotion::at_rest(physics, &[0.0; MAX_CELLS][..worm.cells()])?;
     let (fraction, max_cycles) = match (motion.is_exact(), physics.laws.are_periodic()) {
@@ -156,7 +157,7 @@ fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<Cycle, Slides
         if is_closed || cycles == max_cycles {
             let advance_m = motion.mean_position_m() - before.mean_position_m();
             let ledger = motion.ledger().since(before.ledger());
-            return Ok(Cycle::new(worm, advance_m, &ledger, cycles, closure_m));
+            return Ok((Cycle::new(worm, advance_m, &ledger, cycles, closure_m), motion));
         }
         cycles += 1;
     }

@@ -19,6 +19,7 @@
 //!   physics need.
 //! - [`ledger`]: [`Ledger`], where the energy goes, with a balance that closes at every instant.
 //! - [`cycle`]: [`steady_cycle`] and [`steady_cycle_of`], one cycle of the periodic crawl, and closed forms to compare with.
+//! - [`drive`]: the torque that a crawl asks of the cam, and what a motor needs to give it.
 //! - [`study`]: Tables 1 and 2 of the paper for any design, and the range on a battery.
 //!
 //! # Limits
@@ -35,6 +36,7 @@ pub const MAX_CELLS: usize = 16;
 
 mod crawl;
 pub mod cycle;
+pub mod drive;
 pub mod effect;
 pub mod ledger;
 mod locomotion;
@@ -47,6 +49,7 @@ pub mod worm;
 
 pub use crawl::{Crawl, longest_increment_s};
 pub use cycle::{Cycle, LevelCycle, Outcome, level_closed_form, rigid_energy_j, steady_cycle, steady_cycle_of};
+pub use drive::{DriveLoad, Motor, MotorCycle, driven_cycle};
 pub use ledger::Ledger;
 pub use locomotion::Locomotion;
 pub use mechanics::Mechanics;

@@ -4,7 +4,7 @@ use crate::command::live::Painter;
 use crate::command::{Failure, print};
 use crate::supervisor::child_process::LogLines;
 use crate::supervisor::crawl::SharedTelemetry;
-use crate::watch::{mismatch, recording, remarks};
+use crate::watch::{RangeSummary, mismatch, range, recording, remarks};
 use worm_estimator::message::{Alarm, AlarmKind, Cycle};
 
 /// Shows a run on standard output, or only alarms in the log.
@@ -12,8 +12,9 @@ pub(super) struct LinePainter {
     telemetry: SharedTelemetry,
     log: LogLines,
     step_order: Vec<usize>,
-    /// Cycles and alarms that were shown.
+    /// Cycles, ranges and alarms that were shown.
     cycles: u64,
+    ranges: u64,
     alarms: u64,
     /// Standard output is reserved for the JSON.
     is_silent: bool,
@@ -26,6 +27,7 @@ impl LinePainter {
             log,
             step_order,
             cycles: 0,
+            ranges: 0,
             alarms: 0,
             is_silent,
         }
@@ -36,7 +38,11 @@ impl LinePainter {
         let mut lines: Vec<String> = {
             let telemetry = self.telemetry.lock();
             let seen = std::mem::replace(&mut self.cycles, telemetry.cycles.total());
-            telemetry.cycles.since(seen).map(cycle_line).collect()
+            let mut lines: Vec<String> = telemetry.cycles.since(seen).map(cycle_line).collect();
+            let seen = std::mem::replace(&mut self.ranges, telemetry.ranges.total());
+            let ranges = telemetry.ranges.since(seen);
+            lines.extend(ranges.map(|range| range::text(&RangeSummary::of(range))));
+            lines
         };
         lines.extend(self.new_alarms());
         lines

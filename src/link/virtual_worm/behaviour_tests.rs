@@ -170,6 +170,7 @@ fn empty_battery_silences_the_servo() {
         internal_resistance_ohm: 0.2,
         hotel_power_w: 0.5,
         reserve_share: 0.1,
+        ..worm_estimator::config::Battery::default()
     });
     let mut harness = harness_with(&config, &["battery:charge=0.0002@1"]);
     harness.crawl(105);

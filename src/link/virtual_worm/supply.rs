@@ -1,5 +1,6 @@
 //! What feeds the servo: a battery whose voltage falls as it empties, or a bench supply.
 
+use worm_estimator::battery::OpenCircuit;
 use worm_estimator::config::Config;
 
 /// Volts on the bus never fall below this in the equations, so that power over voltage stays finite.
@@ -8,8 +9,8 @@ const MIN_BUS_V: f64 = 0.1;
 /// A voltage source with inner resistance; with a battery also a finite store.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Supply {
-    full_v: f64,
-    empty_v: f64,
+    curve: Option<OpenCircuit>, // none for a bench supply
+    bench_v: f64,
     resistance_ohm: f64,
     hotel_power_w: f64,
     capacity_j: f64, // infinite for a bench supply
@@ -24,8 +25,8 @@ impl Supply {
         let bench = &config.virtual_worm;
         match &config.battery {
             Some(battery) => Self {
-                full_v: battery.full_v,
-                empty_v: battery.empty_v,
+                curve: Some(OpenCircuit::new(battery)),
+                bench_v: bench.supply_v,
                 resistance_ohm: battery.internal_resistance_ohm,
                 hotel_power_w: battery.hotel_power_w,
                 capacity_j: battery.capacity_j,
@@ -34,8 +35,8 @@ impl Supply {
                 extra_ohm: 0.0,
             },
             None => Self {
-                full_v: bench.supply_v,
-                empty_v: bench.supply_v,
+                curve: None,
+                bench_v: bench.supply_v,
                 resistance_ohm: bench.supply_resistance_ohm,
                 hotel_power_w: 0.0,
                 capacity_j: f64::INFINITY,
@@ -68,12 +69,15 @@ impl Supply {
         self.extra_ohm = extra_ohm;
     }
 
-    /// Voltage without load, V: linear in the charge, and the battery's protection opens when it is empty.
+    /// Voltage without load, V: by the battery's curve, and the battery's protection opens when it is empty.
     pub fn open_circuit_v(&self) -> f64 {
         if self.charge_j <= 0.0 {
             return 0.0;
         }
-        let charged_v = self.empty_v + (self.full_v - self.empty_v) * self.charge_share();
+        let charged_v = match &self.curve {
+            Some(curve) => curve.volts(self.charge_share()),
+            None => self.bench_v,
+        };
         (charged_v - self.drop_v).max(0.0)
     }
 
@@ -114,6 +118,7 @@ mod tests {
                 internal_resistance_ohm: 0.2,
                 hotel_power_w: 0.5,
                 reserve_share: 0.1,
+                ..Battery::default()
             }),
             ..Config::default()
         })

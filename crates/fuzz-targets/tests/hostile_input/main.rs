@@ -45,6 +45,7 @@ targets! {
     config_toml: 4_000,
     campaign_toml: 20_000,
     recording_csv: 6_000,
+    route_csv: 20_000,
     vicon_csv: 6_000,
     c3d: 10_000,
     mcap_log: 1_000,

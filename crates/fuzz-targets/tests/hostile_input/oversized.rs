@@ -24,6 +24,7 @@ pub fn inputs(target: &str) -> Vec<(&'static str, Vec<u8>)> {
         "config_toml" => [toml_attacks(), config_attacks()].concat(),
         "campaign_toml" => [toml_attacks(), campaign_attacks()].concat(),
         "recording_csv" => csv_attacks(),
+        "route_csv" => route_attacks(),
         "vicon_csv" => vicon_attacks(),
         "c3d" => c3d_attacks(),
         "mcap_log" => mcap_attacks(),
@@ -113,6 +114,17 @@ fn campaign_attacks() -> Vec<(&'static str, Vec<u8>)> {
             "a long path",
             text(&["[[run]]\nslope_deg=1\nrecording=\"", &"x/".repeat(LONG / 2), "\""]),
         ),
+    ]
+}
+
+fn route_attacks() -> Vec<(&'static str, Vec<u8>)> {
+    let head = "length_m,slope_deg\n";
+    vec![
+        ("many legs", text(&[head, &"1,0\n".repeat(LONG / 4)])),
+        ("many columns", text(&["length_m,slope_deg", &",x".repeat(LONG / 2)])),
+        ("a long column", long(b"column")),
+        ("a long number", text(&[head, &"1".repeat(LONG), ",0\n"])),
+        ("an open quote", text(&[head, "\"", &"1,0\n".repeat(LONG / 4)])),
     ]
 }
 

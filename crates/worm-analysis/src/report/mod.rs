@@ -9,6 +9,7 @@
 //! - [`page`]: the page, its figures, tables and tiles. Neither knows anything of worms.
 //! - `runs`, `summary`, `figure`, `tables`: the contents of this report.
 //! - `sheets` and [`mod@file`]: the CSV, and how files are replaced.
+//! - [`plan`]: a page on a trip and the design for it.
 //! - [`explain`]: another page, on the search for the effect that the model misses.
 
 pub mod explain;
@@ -16,6 +17,7 @@ mod figure;
 pub mod file;
 
 pub mod page;
+pub mod plan;
 pub mod plot;
 mod runs;
 mod sheets;

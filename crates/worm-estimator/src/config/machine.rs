@@ -1,4 +1,4 @@
-//! The hardware and software around the worm: port, servo, tracker, loop, limits, battery, operating system, topics.
+//! The hardware and software around the worm: port, servo, tracker, loop, limits, operating system, topics.
 
 use super::check::Checker;
 use serde::Deserialize;
@@ -409,46 +409,6 @@ impl Estimator {
             "cycles",
         );
         checker.range("estimator.outlier_sigmas", self.outlier_sigmas, 3.0..=20.0, "");
-    }
-}
-
-/// The battery on board.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Battery {
-    /// Energy when full, J.
-    pub capacity_j: f64,
-    /// Open-circuit voltage when full, V.
-    pub full_v: f64,
-    /// Open-circuit voltage when empty, V.
-    pub empty_v: f64,
-    /// Internal resistance, ohm.
-    pub internal_resistance_ohm: f64,
-    /// Power of everything but the motor, W.
-    pub hotel_power_w: f64,
-    /// Fraction of the charge kept in reserve beyond the way home.
-    pub reserve_share: f64,
-}
-
-impl Battery {
-    pub(super) fn check(&self, checker: &mut Checker) {
-        checker.range("battery.capacity_j", self.capacity_j, 1.0..=1e7, "J");
-        checker.range("battery.full_v", self.full_v, 1.0..=60.0, "V");
-        checker.range("battery.empty_v", self.empty_v, 0.5..=60.0, "V");
-        checker.require(
-            self.empty_v < self.full_v,
-            "battery.empty_v",
-            self.empty_v,
-            "must be below battery.full_v",
-        );
-        checker.range(
-            "battery.internal_resistance_ohm",
-            self.internal_resistance_ohm,
-            0.0..=10.0,
-            "ohm",
-        );
-        checker.range("battery.hotel_power_w", self.hotel_power_w, 0.0..=100.0, "W");
-        checker.range("battery.reserve_share", self.reserve_share, 0.0..=0.9, "");
     }
 }
 

@@ -7,7 +7,9 @@
 
 mod advice;
 mod alarms;
+mod battery;
 mod check;
+mod drive;
 mod effect;
 mod machine;
 mod physics;
@@ -16,10 +18,11 @@ mod worm;
 
 pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
+pub use battery::{Battery, Chemistry, MAX_CURVE_POINTS};
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use machine::{
-    Battery, Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode,
+    Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode,
     Realtime, Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;

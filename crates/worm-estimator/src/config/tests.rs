@@ -120,6 +120,18 @@ fn bad_values_are_named_with_file_place_and_remedy() {
             "worm.toml: worm.cells = 1: must be from 2 to 16 cells",
         ),
         (
+            "[battery]\nopen_circuit_v = [4.0, 4.9, 4.8, 5.6]\n",
+            "worm.toml: battery.open_circuit_v = [4.0, 4.9, 4.8, 5.6]: must be 2 to 32 voltages, each above",
+        ),
+        (
+            "[battery]\nopen_circuit_v = [3.0, 4.2]\n",
+            "worm.toml: battery.open_circuit_v = [3.0, 4.2]: must begin with battery.empty_v",
+        ),
+        (
+            "[battery]\ngauge = \"BAT0\"\n",
+            "worm.toml: battery.gauge = \"BAT0\": must be the absolute path",
+        ),
+        (
             "[worm]\nname = \"../x\"\n",
             "worm.toml: worm.name = \"../x\": must be 1 to 16 of a-z",
         ),

@@ -1,9 +1,9 @@
 //! Estimator and alarms together: what the estimator process runs, and a replay.
 
 use super::alarm::{self, AlarmChanges, AlarmMonitor};
-use super::{Estimator, EstimatorError, ResidualMap};
+use super::{Estimator, EstimatorError, RangeEstimator, ResidualMap};
 use crate::config::Config;
-use crate::message::{Cycle, Estimate, RecordingStatus, State};
+use crate::message::{Cycle, Estimate, Range, RecordingStatus, State};
 
 /// What one state gave.
 #[derive(Debug, Clone)]
@@ -12,16 +12,19 @@ pub struct ObserverOutput {
     pub estimate: Option<Estimate>,
     /// The gait cycle that ended, if one did.
     pub cycle: Option<Cycle>,
+    /// How far the battery lasts, if a cycle ended and a battery is configured.
+    pub range: Option<Range>,
     /// Alarms that were raised or cleared.
     pub alarms: AlarmChanges,
 }
 
 /// Follows one worm by its states. The same states give the same output, to the last bit; a recorder's reports change nothing but the
-/// alarm `recording-stopped`.
+/// alarm `recording-stopped`, and a gauge's readings nothing but the range.
 #[derive(Debug)]
 pub struct Observer {
     estimator: Estimator,
     monitor: AlarmMonitor,
+    range: Option<RangeEstimator>,
 }
 
 impl Observer {
@@ -33,6 +36,7 @@ impl Observer {
         Ok(Self {
             estimator: Estimator::new(config)?,
             monitor: AlarmMonitor::new(config),
+            range: RangeEstimator::new(config),
         })
     }
 
@@ -50,6 +54,7 @@ impl Observer {
             return ObserverOutput {
                 estimate: None,
                 cycle: None,
+                range: None,
                 alarms: AlarmChanges::none(),
             };
         }
@@ -65,9 +70,14 @@ impl Observer {
         if !self.monitor.is_fault_free() {
             self.estimator.exclude_cycle();
         }
+        let range = self.range.as_mut().and_then(|range| {
+            range.note_state(state);
+            cycle.as_ref().and_then(|cycle| range.note_cycle(cycle))
+        });
         ObserverOutput {
             estimate: estimate.map(|estimate| self.with_alarms(estimate)),
             cycle,
+            range,
             alarms,
         }
     }
@@ -75,6 +85,13 @@ impl Observer {
     /// Takes what the worm's recorder reports, for the alarm `recording-stopped`.
     pub const fn note_recording(&mut self, status: &RecordingStatus) {
         self.monitor.note_recording(status);
+    }
+
+    /// Takes the reading of the battery's gauge, 0 to 1, for the range. A range says which reading it used.
+    pub fn note_gauge(&mut self, share: f64) {
+        if let Some(range) = &mut self.range {
+            range.note_gauge(share);
+        }
     }
 
     /// The newest estimate with the present alarms: a heartbeat while no sample comes.

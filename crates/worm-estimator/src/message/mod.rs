@@ -1,7 +1,7 @@
 //! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
-//! The controller fills [`State`] and [`Timing`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`], [`Cycle`] and
-//! [`Alarm`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the same values. The types are separate from the transport, so that
+//! The controller fills [`State`] and [`Timing`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`], [`Cycle`],
+//! [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the same values. The types are separate from the transport, so that
 //! nothing here depends on it.
 //!
 //! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, wide fields first, no
@@ -20,6 +20,7 @@ mod estimate;
 mod fields;
 mod json;
 mod protobuf;
+mod range;
 mod recording;
 mod state;
 mod timing;
@@ -31,6 +32,7 @@ pub use estimate::Estimate;
 pub use fields::{Codes, Field, FieldAccess, FieldKind, FieldValue};
 pub use json::JsonMessage;
 pub use protobuf::{ProtobufError, ProtobufMessage};
+pub use range::Range;
 pub use recording::{RecordingProblem, RecordingState, RecordingStatus};
 pub use state::{Fault, HoldReason, Mode, State};
 pub use timing::{Culprit, Timing};

@@ -15,7 +15,7 @@ use super::super::scan::{Contents, scan};
 use super::ExportError;
 use super::output::{Output, OutputError};
 use std::path::{Path, PathBuf};
-use worm_estimator::message::{Alarm, Cycle, Estimate, FieldKind, FieldValue, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, FieldKind, FieldValue, Range, State, Timing};
 
 /// Name of the column with the wall-clock time.
 const WALL_TIME: &str = "wall_time";
@@ -90,6 +90,7 @@ pub fn tables(
                 Channel::Estimate => table.add::<Estimate>(payload, clock),
                 Channel::Cycle => table.add::<Cycle>(payload, clock),
                 Channel::Alarm => table.add::<Alarm>(payload, clock),
+                Channel::Range => table.add::<Range>(payload, clock),
             }?;
         }
         Ok(())
@@ -118,6 +119,7 @@ fn cells(channel: Channel, payload: Payload<'_>) -> Result<usize, PayloadError> 
         Channel::Estimate => of::<Estimate>(payload),
         Channel::Cycle => of::<Cycle>(payload),
         Channel::Alarm => of::<Alarm>(payload),
+        Channel::Range => of::<Range>(payload),
     }
 }
 
@@ -251,6 +253,7 @@ impl OpenTable {
             Channel::Estimate => columns::<Estimate>(cells),
             Channel::Cycle => columns::<Cycle>(cells),
             Channel::Alarm => columns::<Alarm>(cells),
+            Channel::Range => columns::<Range>(cells),
         };
         let output = Output::create(&file, overwrite)?;
         let rows = match format {

@@ -1,6 +1,6 @@
 //! The same results live and from a log.
 
-use testkit::log_sample::{Telemetry, crawl, crawl_with_late_estimator};
+use testkit::log_sample::{Telemetry, crawl, crawl_on_battery, crawl_with_late_estimator};
 use worm_estimator::message::{Alarm, AlarmKind};
 use worm_log::{Comparison, compare, replay};
 
@@ -37,6 +37,26 @@ fn a_whole_log_comes_out_as_recorded() {
             "no heartbeat is among them: {comparison:?}"
         );
     }
+}
+
+#[test]
+fn ranges_come_out_as_recorded_and_an_older_log_has_none() {
+    let telemetry = crawl_on_battery(6.5);
+    let ranges = telemetry.ranges.len();
+    assert_eq!((ranges, ranges), (telemetry.cycles.len(), 3));
+    let comparison = replayed(telemetry);
+    assert!(comparison.complete && comparison.is_identical(), "{comparison:?}");
+    assert_eq!(
+        (comparison.ranges_compared, comparison.ranges_identical),
+        (ranges, ranges)
+    );
+    let mut older = crawl_on_battery(6.5);
+    older.ranges.clear();
+    let comparison = replayed(older);
+    assert!(comparison.complete && comparison.ranges_compared == 0, "{comparison:?}");
+    let mut other = crawl_on_battery(6.5);
+    other.ranges[1].range_m += 1e-9;
+    assert!(!replayed(other).is_identical());
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! Battery low: the remaining charge is needed for the way home.
 //!
 //! **Charge.** Between corrections the charge falls by the energy drawn: the motor's power (duty × bus voltage × current), the hotel power,
-//! and the loss in the battery's internal resistance. The open-circuit voltage, bus voltage + current × internal resistance, taken as
-//! linear from empty to full, corrects it: at first with the weight of a mean over the time since the start, so a usable value is there
+//! and the loss in the battery's internal resistance. The open-circuit voltage, bus voltage + current × internal resistance, which
+//! the battery's curve turns into a charge, corrects it: at first with the weight of a mean over the time since the start, so a usable value is there
 //! after a second; later with a time constant of [`CORRECTION_S`], so that neither a start of the motor nor the 0.1 V steps of the
-//! servo's reading show.
+//! servo's reading show. The `range` topic has the charge with its standard error, from the end of the first gait cycle; this one is there
+//! after a second.
 //!
 //! **Way home.** Distance from where the estimator first saw the worm × electrical energy per metre, hotel power included, over the last
 //! cycles. The way home may be steeper or flatter than the way out was; the last known cost is used for both. Before the first cycle that
@@ -15,6 +16,7 @@
 use super::cam_motion::{Tick, finite_or_zero};
 use super::latch::{DetectorOutput, Reading, ReadingState};
 use super::sample::Positions;
+use crate::battery::OpenCircuit;
 use crate::config::{Battery, Config};
 use crate::message::{Cycle, Severity, State};
 
@@ -36,6 +38,7 @@ const LARGEST_RATIO: f64 = 1000.0;
 #[derive(Debug, Clone)]
 pub(super) struct BatteryLow {
     battery: Option<Battery>,
+    curve: Option<OpenCircuit>,
     threshold: f64,
     stroke_m: f64,
     fraction: f64,
@@ -51,6 +54,7 @@ impl BatteryLow {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             battery: config.battery.clone(),
+            curve: config.battery.as_ref().map(OpenCircuit::new),
             threshold: config.alarms.battery_low.threshold,
             stroke_m: config.worm.stroke_m,
             fraction: f64::NAN,
@@ -97,7 +101,7 @@ impl BatteryLow {
     }
 
     pub(super) fn update(&mut self, tick: &Tick, state: &State) -> DetectorOutput {
-        let Some(battery) = &self.battery else {
+        let (Some(battery), Some(curve)) = (&self.battery, &self.curve) else {
             return DetectorOutput::Unknown;
         };
         let volts = state.bus_voltage_v;
@@ -107,7 +111,7 @@ impl BatteryLow {
             let amperes = load_w / volts;
             let drawn_w = load_w + amperes * amperes * battery.internal_resistance_ohm;
             let open_v = volts + amperes * battery.internal_resistance_ohm;
-            let by_voltage = ((open_v - battery.empty_v) / (battery.full_v - battery.empty_v)).clamp(0.0, 1.0);
+            let by_voltage = curve.share(open_v);
             self.known_s += tick.step_s;
             if self.fraction.is_nan() {
                 self.fraction = by_voltage;

@@ -193,6 +193,7 @@ fn the_battery_warns_while_the_way_home_is_still_possible() {
             internal_resistance_ohm: 0.2,
             hotel_power_w: 0.5,
             reserve_share: 0.1,
+            ..Battery::default()
         }),
         ..Config::default()
     };

@@ -38,7 +38,8 @@ proptest! {
         config.worm.step_order = (1..=cells).collect();
         config.estimator.calibration_cycles = 1;
         config.battery = Some(Battery {
-            capacity_j: 100.0, full_v: 5.6, empty_v: 4.0, internal_resistance_ohm: 0.2, hotel_power_w: 0.5, reserve_share: 0.1,
+            capacity_j: 100.0,
+            ..Battery::default()
         });
         let mut monitor = AlarmMonitor::new(&config);
         let mut state = State::unknown(cells);

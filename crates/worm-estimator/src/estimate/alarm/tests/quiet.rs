@@ -72,6 +72,7 @@ fn live(day: &Day, seed: u64, hours: f64) {
         internal_resistance_ohm: 0.2,
         hotel_power_w: 0.5,
         reserve_share: 0.1,
+        ..Battery::default()
     });
     let mut bench = Bench::new(config, seed);
     bench.noise_m = day.noise_m;
