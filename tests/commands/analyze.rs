@@ -48,9 +48,10 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
         "worm = \"worm.toml\"\n[[run]]\nrecording = \"good.csv\"\nslope_deg = 0.0\n",
     );
     writer.write("worm.toml", "");
-    let short_log = writer.simulate("log.mcap", "0", &["--cycles", "4"]);
+    let short_log = writer.simulate("log.mcap", "0", &["--cycles", "1"]);
+    let cut_log = writer.path("cut.mcap");
     let log = std::fs::read(&short_log).expect("a log");
-    std::fs::write(&short_log, &log[..log.len() / 5]).expect("it is cut");
+    std::fs::write(&cut_log, &log[..log.len() / 2]).expect("it is cut");
 
     let position = |cell: usize| 1 + cell; // time comes first
     let to_millimetres = |_: usize, fields: &mut Vec<String>| {
@@ -154,6 +155,7 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
             &["phase", "counted in cycles"],
         ),
         (short_log, level, &["log.mcap", "cycles are too few"]),
+        (cut_log, level, &["cut.mcap", "holds no message, cut off"]),
         (good.clone(), &["--slope", "100"], &["100", "-90 to 90"]),
         (good.clone(), &["--slope", "nan"], &["NaN", "-90 to 90"]),
         (

@@ -52,15 +52,15 @@ pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, Read
     let count = runs.len();
     let longest = runs.into_iter().max_by_key(|run| run.samples.len());
     let longest = longest.filter(|run| !run.samples.is_empty()).ok_or_else(|| {
-        let (problem, remedy) = if count == 0 {
-            ("holds no message", "record the topic `state`")
-        } else {
-            (
-                "holds no sample of the tracker",
-                "record a worm whose tracker works: see `wormd check`",
-            )
-        };
-        nothing(path, problem, remedy)
+        if count > 0 {
+            let remedy = "record a worm whose tracker works: see `wormd check`";
+            return nothing(path, "holds no sample of the tracker", remedy);
+        }
+        // What is compressed may be lost whole where the file is cut.
+        match warnings.first() {
+            Some(damage) => nothing(path, &format!("holds no message, {damage}"), "record for longer"),
+            None => nothing(path, "holds no message", "record the topic `state`"),
+        }
     })?;
     if longest.cells < 2 {
         let problem = format!("is of {} cell, and a worm has at least 2", longest.cells);
