@@ -44,7 +44,7 @@ struct Wake {
     p99: f64,
 }
 
-/// Watchers in one thread, until this is asked for what they got.
+/// Watchers in one thread, until they are to say what they got.
 struct Watchers {
     relay: Child,
     end: Arc<AtomicBool>,

@@ -14,7 +14,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Command, CommandKind, CommandOutcome, Cycle, Fault, Mode};
+use worm_estimator::message::{Command, CommandKind, CommandOutcome, Cycle, Fault, Mode, ShortText};
 use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
 
 const DISTANCE_M: f64 = 0.05;
@@ -70,6 +70,8 @@ fn follow(cycles: &mut Subscriber<Cycle>) -> Result<f64, Box<dyn Error>> {
 fn command(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Result<(), Box<dyn Error>> {
     let request = Command {
         cycles_per_s,
+        // Who sends it, for the record.
+        sender: ShortText::new("drive example"),
         ..Command::new(kind)
     };
     let reply = client.call(request, ANSWER_TIME)?;

@@ -63,7 +63,7 @@ pub(crate) enum StopError {
 ///
 /// # Errors
 /// [`StopError`] when there is no stop socket of a controller that this user may ask, or it does not answer.
-pub(crate) fn ask(config: &Config, request: Request) -> Result<Answer, StopError> {
+pub(crate) fn ask(config: &Config, question: &Question) -> Result<Answer, StopError> {
     let worm = &config.worm.name;
     let no_answer = |source| StopError::NoAnswer {
         worm: worm.clone(),
@@ -75,16 +75,16 @@ pub(crate) fn ask(config: &Config, request: Request) -> Result<Answer, StopError
     let mut answers = Vec::new();
     let mut failure = None;
     for (_, stream) in choose(worm, connected, caller)? {
-        match question(stream, request) {
+        match put(question, stream) {
             Ok(answer) => answers.push(answer),
             Err(source) => failure = Some(source),
         }
-        if request != Request::Stop && !answers.is_empty() {
+        if question.request != Request::Stop && !answers.is_empty() {
             break;
         }
     }
     match failure {
-        Some(source) if answers.is_empty() || request == Request::Stop => Err(no_answer(source)),
+        Some(source) if answers.is_empty() || question.request == Request::Stop => Err(no_answer(source)),
         _ => {
             let answer = answers.into_iter().max_by_key(|answer| answer.refusal.is_some());
             answer.ok_or_else(|| match is_one_busy {
@@ -171,13 +171,14 @@ fn choose<S>(worm: &str, sockets: Vec<(u32, S)>, caller: u32) -> Result<Vec<(u32
     }
 }
 
-pub(super) fn question(mut stream: UnixStream, request: Request) -> io::Result<Answer> {
+/// Puts the question and waits for the answer.
+pub(super) fn put(question: &Question, mut stream: UnixStream) -> io::Result<Answer> {
     stream.set_read_timeout(Some(TIMEOUT))?;
     stream.set_write_timeout(Some(TIMEOUT))?;
-    let mut question = serde_json::to_string(&Question { request })?;
-    question.push('\n');
-    stream.write_all(question.as_bytes())?;
-    let mut line = String::new();
+    let mut line = serde_json::to_string(question)?;
+    line.push('\n');
+    stream.write_all(line.as_bytes())?;
+    line.clear();
     BufReader::new(stream).read_line(&mut line)?;
     Ok(serde_json::from_str(&line)?)
 }

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Command, CommandKind, Reply};
+use worm_estimator::message::{Command, CommandKind, Reply, ShortText};
 
 /// Commands that may wait for the next tick.
 const QUEUE: usize = 8;
@@ -46,9 +46,25 @@ pub(crate) enum Request {
 }
 
 /// The question on the wire.
-#[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Question {
-    pub(super) request: Request,
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Question {
+    pub(crate) request: Request,
+    /// Who wants the worm to stop, for the record; older programs do not say.
+    #[serde(default)]
+    pub(crate) sender: String,
+    /// The user on whose behalf that is; without it, the one who asks.
+    #[serde(default)]
+    pub(crate) user: Option<u32>,
+}
+
+impl From<Request> for Question {
+    fn from(request: Request) -> Self {
+        Self {
+            request,
+            sender: String::new(),
+            user: None,
+        }
+    }
 }
 
 /// The answer on the wire.
@@ -229,7 +245,9 @@ impl Server {
             Request::Status => self.send(&mut stream, None, None),
             Request::Stop => {
                 let reply = self.command(Command {
-                    user: peer.uid(),
+                    // Who gets here is root or the worm's own user, such as its relay, and may speak for others.
+                    user: question.user.unwrap_or(peer.uid()),
+                    sender: ShortText::new(&question.sender),
                     ..Command::new(CommandKind::Stop)
                 });
                 let refusal = reply

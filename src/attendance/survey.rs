@@ -1,6 +1,6 @@
 //! Which worms run on this computer, whoever started them: found by their controllers' stop sockets.
 
-use super::stop_client::{abstract_names, connect_all, question};
+use super::stop_client::{abstract_names, connect_all, put};
 use super::stop_socket::{Answer, Request, parse_name};
 use std::io;
 
@@ -29,7 +29,7 @@ pub(crate) fn running_controllers() -> io::Result<Vec<RunningController>> {
         };
         let (connected, is_busy) = connect_all([(user, name.clone())].into(), user);
         let answer = match connected.into_iter().next() {
-            Some((_, stream)) => question(stream, Request::Status).ok(),
+            Some((_, stream)) => put(&Request::Status.into(), stream).ok(),
             None if is_busy => None,
             // It has ended, or somebody else has bound that name.
             None => continue,

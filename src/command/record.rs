@@ -10,8 +10,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 use worm_log::Channel;
 
-/// What is recorded unless something else is asked for.
-pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range";
+/// What is recorded by default.
+pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range,command";
 
 /// Arguments of `wormd record`.
 #[derive(Debug, Args)]
@@ -29,7 +29,7 @@ pub struct RecordArgs {
     /// End after this time, counted from the first message; without it, on Ctrl-C
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds, allow_negative_numbers = true)]
     duration: Option<Duration>,
-    /// Only these topics
+    /// Only these topics, and always the commands that the controller got
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = ALL_TOPICS)]
     topics: Vec<Channel>,
     /// Standard input is a pipe from the process that watches over the worm

@@ -9,6 +9,9 @@ use std::time::Duration;
 use worm_estimator::config::Config;
 use worm_estimator::message::{AlarmKind, Command, CommandKind};
 
+/// Its name in the record of commands.
+const SENDER: &str = "wormd command";
+
 /// Arguments of `wormd command`.
 #[derive(Debug, Args)]
 pub struct SendCommandArgs {
@@ -79,7 +82,7 @@ pub fn run(args: &SendCommandArgs) -> Result<(), Failure> {
     let config = args.worm.load()?;
     args.check()?;
     let answer = match args.order {
-        Order::Stop => match controller::stop_by_socket(&config) {
+        Order::Stop => match controller::stop_by_socket(&config, &controller::command(CommandKind::Stop, SENDER)) {
             Ok(answer) => answer,
             Err(Some(failure)) => return Err(failure),
             Err(None) => send(args, &config)?,
@@ -150,7 +153,7 @@ impl SendCommandArgs {
                 true => alarms.iter().fold(0, |mask, alarm| mask | 1 << alarm.code()),
                 false => 0,
             },
-            ..controller::command(self.order.kind())
+            ..controller::command(self.order.kind(), SENDER)
         }
     }
 

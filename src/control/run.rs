@@ -20,7 +20,7 @@ use crate::topics::{
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, AlarmKind, Command, Culprit, Estimate, Mode, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, Command, CommandRecord, Culprit, Estimate, Mode, State, Timing};
 
 /// Maximum number of alarm changes that one tick reads; more wait for the next tick.
 const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
@@ -28,6 +28,9 @@ const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
 /// The witness's priority lies this far below the loop's: never in its way, and above everything that could delay a device's
 /// answer.
 const WITNESS_BELOW_LOOP: u8 = 5;
+
+/// So many ticks lie between two of those that let late joiners into the topic `command`.
+const TICKS_TO_JOIN: u64 = 32;
 
 /// Stack that is touched before the first tick, bytes: many times what a tick uses.
 const STACK_BYTES: usize = 256 * 1024;
@@ -54,6 +57,7 @@ struct Ports {
     estimates: Subscriber<Estimate>,
     alarms: Subscriber<Alarm>,
     commands: CommandServer,
+    command_records: Publisher<CommandRecord>,
 }
 
 impl Ports {
@@ -65,6 +69,7 @@ impl Ports {
             estimates: hub.subscriber()?,
             alarms: hub.subscriber()?,
             commands: hub.command_server(role)?,
+            command_records: hub.publisher(role)?,
         })
     }
 
@@ -141,6 +146,7 @@ pub fn run(
         host_pauses: 0,
         unpublished: 0,
         ticks: 0,
+        commands: 0,
         was_gone: false,
     };
     while !tick_loop.tick(drive, attendance, end.load(Ordering::Relaxed)) {}
@@ -188,6 +194,8 @@ struct Loop {
     host_pauses: u64,
     unpublished: u64,
     ticks: u64,
+    /// Commands that were answered.
+    commands: u64,
     was_gone: bool,
 }
 
@@ -260,6 +268,7 @@ impl Loop {
         let estimate = self.ports.estimates.latest().ok().flatten();
         let (command, responder) = take_command(&self.ports.commands, attendance);
         let parent = attendance.parent_in_tick(Duration::from_nanos(self.schedule.period_ns()));
+        let lease = lease_of(parent);
         let inputs = Inputs {
             now_ns: exchanged,
             absent_ns,
@@ -269,7 +278,7 @@ impl Loop {
             command,
             alarms: &self.alarms[..alarm_count],
             estimate: estimate.as_deref().map(EstimateSeen::from),
-            lease: lease_of(parent),
+            lease,
             emergency_stop,
             end: end || (parent == Parent::Gone && is_without_torque(self.controller.mode())),
             service: self.served.outcome,
@@ -288,6 +297,7 @@ impl Loop {
         let _ = self.ports.state_event.notify();
         let notified = monotonic_ns();
         attendance.note(self.ticks + 1, self.controller.mode(), self.controller.fault());
+        self.publish_command(command.as_ref(), lease, &outputs);
         if let Some(reply) = &outputs.reply {
             match responder {
                 // A client that has gone meanwhile needs no answer.
@@ -359,6 +369,23 @@ impl Loop {
 
     fn count_unpublished(&mut self, outcome: Result<(), PublishError>) {
         self.unpublished += u64::from(outcome.is_err());
+    }
+
+    /// Publishes what became of this tick's command. Without one it lets late joiners in, but not in every tick: the other topics do
+    /// that with each message.
+    fn publish_command(&mut self, command: Option<&Command>, lease: Lease, outputs: &Outputs) {
+        let records = &self.ports.command_records;
+        let published = match (command, &outputs.reply) {
+            (Some(command), Some(reply)) => {
+                let (time_ns, supervised) = (outputs.state.time_ns, lease == Lease::Held);
+                let record = CommandRecord::new(self.commands, time_ns, supervised, command, reply);
+                self.commands += 1;
+                records.publish(&record)
+            }
+            _ if self.ticks.is_multiple_of(TICKS_TO_JOIN) => records.idle(),
+            _ => return,
+        };
+        self.count_unpublished(published);
     }
 
     /// Ends the tick on the schedule and publishes where its time went. A tick with a service has paused on purpose, while the worm

@@ -25,7 +25,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingProblem, State, Timing};
+use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, RecordingProblem, State, Timing};
 use worm_log::{Channel, Logged, Origin};
 
 /// How often the topics are emptied. At 1 kHz even the fullest holds a second.
@@ -188,6 +188,7 @@ struct RecordedTopics {
     cycle: Recorded<Cycle>,
     alarm: Recorded<Alarm>,
     range: Recorded<Range>,
+    command: Recorded<CommandRecord>,
 }
 
 impl RecordedTopics {
@@ -203,6 +204,8 @@ impl RecordedTopics {
             cycle: subscribe(hub, topics)?,
             alarm: subscribe(hub, topics)?,
             range: subscribe(hub, topics)?,
+            // Part of every recording: nobody can tell from the rest why the worm began or ended to crawl.
+            command: subscribe(hub, &[Channel::CommandRecord])?,
         })
     }
 
@@ -223,6 +226,7 @@ impl RecordedTopics {
             cycles: take(&mut self.cycle)?,
             alarms: take(&mut self.alarm)?,
             ranges: take(&mut self.range)?,
+            commands: take(&mut self.command)?,
         })
     }
 
@@ -235,6 +239,7 @@ impl RecordedTopics {
             Channel::Cycle => self.cycle.as_ref().map(Subscriber::lost),
             Channel::Alarm => self.alarm.as_ref().map(Subscriber::lost),
             Channel::Range => self.range.as_ref().map(Subscriber::lost),
+            Channel::CommandRecord => self.command.as_ref().map(Subscriber::lost),
         }
     }
 }

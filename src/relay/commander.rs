@@ -10,10 +10,13 @@ use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::thread::JoinHandle;
 use worm_estimator::config::Config;
-use worm_estimator::message::{AlarmKind, Command, CommandKind};
+use worm_estimator::message::{AlarmKind, Command, CommandKind, ShortText};
 
 /// Commands that may wait. The controller answers within a tick unless it arms or resets.
 const QUEUE: usize = 32;
+
+/// The relay's name in the record of commands, where it acts by itself.
+const SENDER: &str = "relay";
 
 /// What the controller is to be told.
 #[derive(Debug)]
@@ -23,6 +26,8 @@ pub(super) enum Job {
         watcher: WatcherId,
         /// Its user, for the controller's record.
         user: u32,
+        /// Its name, for the same.
+        name: String,
         id: Option<u64>,
         request: Request,
     },
@@ -131,11 +136,15 @@ fn carry_out(client: &CommandClient, config: &Config, job: Job) -> Option<Outcom
         Job::Request {
             watcher,
             user,
+            name,
             id,
             request,
-        } => Some(Outcome::Answer(answer(client, config, watcher, user, id, &request))),
+        } => {
+            let command = controllers_command(&request, user, &name);
+            Some(Outcome::Answer(answer(client, config, watcher, id, &request, command)))
+        }
         Job::Hold => {
-            let refusal = match controller::send(client, command(CommandKind::Hold)) {
+            let refusal = match controller::send(client, command(CommandKind::Hold, SENDER)) {
                 Ok(answer) => answer.refusal()?,
                 Err(failure) => failure.to_string(),
             };
@@ -144,7 +153,7 @@ fn carry_out(client: &CommandClient, config: &Config, job: Job) -> Option<Outcom
         Job::Renew => {
             let renewal = Command {
                 limit_s: LIMIT_S,
-                ..command(CommandKind::Renew)
+                ..command(CommandKind::Renew, SENDER)
             };
             let refusal = match controller::send(client, renewal) {
                 Ok(answer) => answer.refusal()?,
@@ -160,18 +169,18 @@ fn answer(
     client: &CommandClient,
     config: &Config,
     watcher: WatcherId,
-    user: u32,
     id: Option<u64>,
     request: &Request,
+    command: Result<Command, String>,
 ) -> Answer {
     let refused = |verdict, refusal| Answer::own(watcher, id, request.name(), verdict, Some(refusal));
-    let command = match controllers_command(request, user) {
+    let command = match command {
         Ok(command) => command,
         Err(refusal) => return refused("unusable", refusal),
     };
     let sent = match request {
         // The way that needs neither the topics nor room in shared memory comes first.
-        Request::Stop => match controller::stop_by_socket(config) {
+        Request::Stop => match controller::stop_by_socket(config, &command) {
             Ok(answer) => Ok(answer),
             Err(Some(failure)) => Err(failure),
             Err(None) => controller::send(client, command),
@@ -190,10 +199,11 @@ fn answer(
 }
 
 /// The command that a request is for the controller.
-fn controllers_command(request: &Request, user: u32) -> Result<Command, String> {
+fn controllers_command(request: &Request, user: u32, sender: &str) -> Result<Command, String> {
     let kind = request.kind().ok_or("it is not for the controller")?;
     let mut command = Command {
         user,
+        sender: ShortText::new(sender),
         ..Command::new(kind)
     };
     match request {

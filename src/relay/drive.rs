@@ -177,6 +177,11 @@ impl Drive {
         )
     }
 
+    /// The name of a watcher.
+    pub(super) fn name(&self, id: WatcherId) -> String {
+        name_of(&self.watchers, id)
+    }
+
     /// How many watchers there are.
     pub(super) fn watchers(&self) -> usize {
         self.watchers.len()

@@ -9,8 +9,9 @@
 //! - [`history`]: ten minutes of samples.
 //! - [`drive`]: who drives, as a pure state machine.
 //! - [`source`]: the topics, gathered into frames.
+//! - [`event_log`]: what happened, in words.
 //! - [`commander`]: the thread that waits for the controller's answers.
-//! - [`outbox`]: what waits for one watcher.
+//! - [`outbox`]: what waits for one watcher; [`watcher`]: its connection.
 //! - [`server`]: the process.
 //! - [`socket`]: where it listens, and who may connect.
 //! - [`client`]: the other end: connects, and starts a relay where there is none.
@@ -18,12 +19,14 @@
 pub(crate) mod client;
 mod commander;
 mod drive;
+mod event_log;
 mod history;
 pub(crate) mod message_json;
 mod outbox;
 pub(crate) mod server;
 mod socket;
 pub(crate) mod source;
+mod watcher;
 pub(crate) mod wire;
 
 pub(crate) use history::History;

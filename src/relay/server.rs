@@ -2,20 +2,21 @@
 
 use super::commander::{Commander, Job, Outcome};
 use super::drive::{Decision, Drive, Effect, Identity, WatcherId};
-use super::outbox::{Outbox, Overflow, SharedLine};
+use super::event_log::EventLog;
+use super::outbox::{Outbox, SharedLine};
 use super::socket::{Listener, peer_of};
 use super::source::{Seen, Source};
-use super::wire::{Answer, Line, MAX_REQUEST, Request, RequestLine, VERSION, to_bytes};
+use super::watcher::{Gone, Watcher, shared};
+use super::wire::{Answer, Line, Request, RequestLine, VERSION};
 use crate::failure::Failure;
-use crate::print;
 use crate::realtime::monotonic_ns;
 use crate::topics::{Controller, Hub, Instance, Relay, RoleLock};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::socket::{setsockopt, sockopt::SndBuf};
 use std::collections::BTreeMap;
-use std::io::{self, Read};
+use std::io;
 use std::os::fd::AsFd;
-use std::os::unix::net::{UnixDatagram, UnixStream};
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -29,8 +30,6 @@ const LINGER: Duration = Duration::from_secs(5);
 const STALL_LIMIT: Duration = Duration::from_secs(30);
 /// What the kernel keeps for one watcher beside that, bytes: a second of frames.
 const SEND_BUFFER: usize = 64 << 10;
-/// Where the computer's log takes lines.
-const SYSLOG: &str = "/dev/log";
 /// Most watchers: bounds the relay's memory.
 const MAX_WATCHERS: usize = 256;
 
@@ -61,6 +60,7 @@ pub(crate) fn run(
         commander,
         source,
         drive: Drive::default(),
+        event_log: EventLog::new(instance.worm()),
         watchers: BTreeMap::new(),
         next_id: 1,
         frames: 0,
@@ -73,36 +73,13 @@ pub(crate) fn run(
     server.serve(end)
 }
 
-/// One connection.
-struct Watcher {
-    stream: UnixStream,
-    /// Its user, by the kernel.
-    user: u32,
-    input: Vec<u8>,
-    outbox: Outbox,
-    /// What there was of the worm in the last line that it was sent about it.
-    seen: Seen,
-    /// When it last took something, or nothing waited for it.
-    took: Instant,
-    /// Once everything is sent, it is closed.
-    is_refused: bool,
-}
-
-/// A connection that is over, and why, where that is of interest.
-struct Gone(Option<String>);
-
-impl From<Overflow> for Gone {
-    fn from(_: Overflow) -> Self {
-        Self(Some("it asks and does not read the answers".to_owned()))
-    }
-}
-
 struct Server {
     instance: Instance,
     listener: Listener,
     commander: Commander,
     source: Source,
     drive: Drive,
+    event_log: EventLog,
     watchers: BTreeMap<WatcherId, Watcher>,
     next_id: WatcherId,
     frames: u64,
@@ -311,6 +288,7 @@ impl Server {
                 let job = Job::Request {
                     watcher: id,
                     user,
+                    name: self.drive.name(id),
                     id: number,
                     request,
                 };
@@ -329,7 +307,8 @@ impl Server {
             }
         };
         if answer.refusal.is_some() {
-            self.note_answer(&answer);
+            self.event_log
+                .note_answer(&mut self.source.worm, &self.drive.who(answer.watcher), &answer);
         }
         match self.watchers.get_mut(&id) {
             Some(watcher) => watcher.answer(answer),
@@ -345,7 +324,11 @@ impl Server {
                     if answer.refusal.is_some() && answer.command == "crawl" {
                         self.drive.crawl_ended();
                     }
-                    self.note_answer(&answer);
+                    // What the controller took or refused comes by the topic `command`, whoever sent it.
+                    if answer.tick.is_none() {
+                        self.event_log
+                            .note_answer(&mut self.source.worm, &self.drive.who(answer.watcher), &answer);
+                    }
                     let id = answer.watcher;
                     if let Some(watcher) = self.watchers.get_mut(&id)
                         && let Err(gone) = watcher.answer(answer)
@@ -374,7 +357,9 @@ impl Server {
             self.remove(id, Gone(Some(format!("it took nothing for {STALL_LIMIT:?}"))));
         }
 
-        let worm = self.source.poll(now_ns);
+        self.source.poll(now_ns);
+        self.event_log.note_commands(&mut self.source.worm);
+        let worm = &self.source.worm;
         let (seen, driver) = (worm.seen(), self.drive.driver(now_ns));
         self.frames += 1;
         let number = self.frames;
@@ -453,79 +438,7 @@ impl Server {
         self.carry_out(effect);
     }
 
-    /// Records what a watcher commanded, and what came of it.
-    fn note_answer(&mut self, answer: &Answer) {
-        let who = self.drive.who(answer.watcher);
-        let Answer { command, verdict, .. } = answer;
-        self.note(match &answer.refusal {
-            Some(refusal) if refusal.starts_with(command.as_str()) => format!("{who}: {refusal}"),
-            Some(refusal) => format!("{who}: {command} refused: {refusal}"),
-            None => format!("{who}: {command} {verdict}"),
-        });
-    }
-
-    /// Records something: in the log, which may have no reader any more, in that of the computer, and for all watchers.
     fn note(&mut self, text: String) {
-        print::log_line(&text);
-        if let Err(error) = self.write_syslog(&text) {
-            tracing::debug!("{SYSLOG}: {error}");
-        }
-        self.source.worm.note(monotonic_ns(), text);
+        self.event_log.note(&mut self.source.worm, text);
     }
-
-    /// Gives a line to the computer's log, where there is one. Does not wait.
-    fn write_syslog(&self, text: &str) -> io::Result<()> {
-        /// Facility user, severity notice (RFC 5424).
-        const PRIORITY: u32 = 8 + 5;
-        let socket = UnixDatagram::unbound()?;
-        socket.set_nonblocking(true)?;
-        let (worm, pid) = (self.instance.worm(), std::process::id());
-        let line = format!("<{PRIORITY}>wormd-relay[{pid}]: {worm}: {text}");
-        socket.send_to(line.as_bytes(), SYSLOG).map(drop)
-    }
-}
-
-impl Watcher {
-    /// Reads what is there; returns its whole lines.
-    fn read(&mut self) -> Result<Vec<Vec<u8>>, Gone> {
-        let mut bytes = [0; MAX_REQUEST];
-        // Once: who sends more gets its next turn after the others.
-        match self.stream.read(&mut bytes) {
-            Ok(0) => return Err(Gone(None)),
-            Ok(count) => self.input.extend_from_slice(&bytes[..count]),
-            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
-            Err(_) => return Err(Gone(None)),
-        }
-        let mut lines = Vec::new();
-        while let Some(end) = self.input.iter().position(|byte| *byte == b'\n') {
-            let rest = self.input.split_off(end + 1);
-            let mut line = std::mem::replace(&mut self.input, rest);
-            line.pop();
-            if !line.is_empty() {
-                lines.push(line);
-            }
-        }
-        if self.input.len() > MAX_REQUEST {
-            return Err(Gone(Some(format!("its line is longer than {MAX_REQUEST} bytes"))));
-        }
-        Ok(lines)
-    }
-
-    fn answer(&mut self, answer: Answer) -> Result<(), Gone> {
-        let line = shared(&Line::Answer(answer)).map_err(|failure| Gone(Some(failure.to_string())))?;
-        Ok(self.outbox.add(line)?)
-    }
-
-    /// Says why, and closes the connection after that.
-    fn refuse(&mut self, reason: String) {
-        self.is_refused = true;
-        if let Ok(line) = shared(&Line::Refused { reason }) {
-            // It is the first line, or one of few.
-            let _ = self.outbox.add(line);
-        }
-    }
-}
-
-fn shared(line: &Line) -> Result<SharedLine, Failure> {
-    to_bytes(line).map(Arc::new).map_err(Failure::failed)
 }

@@ -44,10 +44,9 @@ impl Source {
     }
 
     /// Reads everything new.
-    pub(super) fn poll(&mut self, now_ns: u64) -> &mut Worm {
+    pub(super) fn poll(&mut self, now_ns: u64) {
         self.receiver.poll(&mut self.worm.telemetry);
         self.worm.update(now_ns);
-        &mut self.worm
     }
 }
 

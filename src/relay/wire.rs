@@ -217,7 +217,7 @@ pub(crate) struct RequestLine {
     /// Comes back in the answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u64>,
-    /// What is asked for.
+    /// What the watcher wants.
     #[serde(flatten)]
     pub request: Request,
 }

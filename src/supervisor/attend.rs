@@ -11,6 +11,8 @@ use worm_estimator::message::{Command, CommandKind, Mode, State};
 const LIMIT_S: f64 = 1.0;
 /// How often the crawl is permitted anew.
 const RENEWAL: Duration = Duration::from_millis(250);
+/// Its name in the record of commands.
+const SENDER: &str = "wormd command --attend";
 /// How often the end is looked for.
 const POLL: Duration = Duration::from_millis(10);
 
@@ -43,7 +45,7 @@ pub(crate) fn crawl(hub: &Hub, cycles_per_s: f64, end: &AtomicBool, begun: impl 
             renewed = Instant::now();
         }
     }
-    accepted(&client, command(CommandKind::Hold)).map(drop)
+    accepted(&client, command(CommandKind::Hold, SENDER)).map(drop)
 }
 
 /// Permits the crawl for a little longer; returns the controller's tick that did.
@@ -51,7 +53,7 @@ fn permit(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Resul
     let permission = Command {
         cycles_per_s,
         limit_s: LIMIT_S,
-        ..command(kind)
+        ..command(kind, SENDER)
     };
     accepted(client, permission)
 }

@@ -1,14 +1,19 @@
 //! Commands to a running controller, and why it refuses one.
 
-use crate::attendance::{Request, StopError, ask};
+use crate::attendance::{Question, Request, StopError, ask};
 use crate::failure::Failure;
 use crate::topics::CommandClient;
 use std::time::Duration;
 use worm_estimator::config::Config;
-use worm_estimator::message::{AlarmKind, Command, CommandKind, CommandOutcome, Fault, Mode, Reply};
+use worm_estimator::message::{
+    AlarmKind, Command, CommandKind, CommandOutcome, CommandRecord, Fault, Mode, Reply, ShortText,
+};
 
 /// How long the controller may take to answer: a reset prepares the servo again, which takes a while on a slow bus.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// The name of `wormd up`, and of what else starts a worm and watches over it, in the record of commands.
+const SENDER: &str = "supervisor";
 
 /// What the controller answered.
 pub(crate) struct Answer {
@@ -17,9 +22,10 @@ pub(crate) struct Answer {
     reply: Reply,
 }
 
-/// A command of the calling user.
-pub(crate) fn command(kind: CommandKind) -> Command {
+/// A command of the calling user; `sender` is who sends it, for the record.
+pub(crate) fn command(kind: CommandKind, sender: &str) -> Command {
     Command {
+        sender: ShortText::new(sender),
         user: nix::unistd::getuid().as_raw(),
         ..Command::new(kind)
     }
@@ -35,12 +41,17 @@ pub(crate) fn send(client: &CommandClient, command: Command) -> Result<Answer, F
     Answer::new(kind, reply)
 }
 
-/// Stops the worm through the controller's stop socket, which needs neither the topics' folder nor room in `/dev/shm`.
+/// Stops the worm, as `command` says, through the controller's stop socket, which needs neither the topics' folder nor room in `/dev/shm`.
 ///
 /// # Errors
 /// None when nobody answers there, so that the topics have to do; [`Failure::Failed`] when the answer is a refusal.
-pub(crate) fn stop_by_socket(config: &Config) -> Result<Answer, Option<Failure>> {
-    let answer = ask(config, Request::Stop).map_err(|error| match error {
+pub(crate) fn stop_by_socket(config: &Config, command: &Command) -> Result<Answer, Option<Failure>> {
+    let question = Question {
+        request: Request::Stop,
+        sender: command.sender.to_string(),
+        user: Some(command.user),
+    };
+    let answer = ask(config, &question).map_err(|error| match error {
         StopError::SeveralUsers { .. } | StopError::Foreign { .. } => Some(Failure::failed(error)),
         StopError::NoSocket { .. } | StopError::NoAnswer { .. } => {
             tracing::debug!("{error}");
@@ -65,7 +76,7 @@ pub(crate) fn stop_by_socket(config: &Config) -> Result<Answer, Option<Failure>>
 /// # Errors
 /// [`Failure::Failed`] when only others have a worm of this name.
 pub(crate) fn refuse_foreign(config: &Config) -> Result<(), Failure> {
-    match ask(config, Request::Status) {
+    match ask(config, &Request::Status.into()) {
         Err(error @ StopError::Foreign { .. }) => Err(Failure::failed(error)),
         // A controller that does not answer here may do so at the topics.
         _ => Ok(()),
@@ -75,7 +86,7 @@ pub(crate) fn refuse_foreign(config: &Config) -> Result<(), Failure> {
 /// How long the worm may crawl by a command that names no time, s: as long as the one who watches over it is there, if somebody
 /// does. `None` then, and also when the controller does not say.
 pub(crate) fn crawl_limit_s(config: &Config) -> Option<f64> {
-    let answer = ask(config, Request::Status).ok()?;
+    let answer = ask(config, &Request::Status.into()).ok()?;
     (!answer.is_supervised()).then_some(answer.crawl_limit_s)
 }
 
@@ -84,7 +95,7 @@ pub(crate) fn crawl_limit_s(config: &Config) -> Option<f64> {
 /// # Errors
 /// [`Failure::Failed`] when the controller does not answer, or refuses.
 pub(super) fn order(client: &CommandClient, kind: CommandKind) -> Result<(), Failure> {
-    match send(client, command(kind))?.refusal() {
+    match send(client, command(kind, SENDER))?.refusal() {
         None => Ok(()),
         Some(refusal) => Err(Failure::failed(format!("the controller: {refusal}"))),
     }
@@ -94,6 +105,18 @@ impl Answer {
     fn new(kind: CommandKind, reply: Reply) -> Result<Self, Failure> {
         let outcome = CommandOutcome::try_from(reply.verdict).map_err(Failure::failed)?;
         Ok(Self { kind, outcome, reply })
+    }
+
+    /// The answer of a recorded command; none where a newer controller has given one that is not known here.
+    pub(crate) fn recorded(record: &CommandRecord) -> Option<Self> {
+        let reply = Reply {
+            sequence: record.state_sequence,
+            verdict: record.outcome,
+            mode: record.mode,
+            fault: record.fault,
+            alarm_mask: record.answer_alarm_mask,
+        };
+        Self::new(CommandKind::try_from(record.kind).ok()?, reply).ok()
     }
 
     /// The answer as the JSON that `wormd command --json` prints.
@@ -153,6 +176,11 @@ impl Answer {
             }
         };
         Some(format!("{} refused: {why}", self.kind))
+    }
+
+    /// The command.
+    pub(crate) fn kind(&self) -> CommandKind {
+        self.kind
     }
 
     /// The controller's tick that took the command.

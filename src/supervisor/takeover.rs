@@ -22,7 +22,7 @@ const POLL: Duration = Duration::from_millis(20);
 /// # Errors
 /// [`Failure::Unusable`] for a worm that is held on a slope, where it would slip without torque.
 pub(crate) fn end_orphans(config: &Config, instance: &Instance, end: &AtomicBool) -> Result<(), Failure> {
-    let is_attended = match ask(config, Request::Status) {
+    let is_attended = match ask(config, &Request::Status.into()) {
         Ok(answer) if answer.is_orphaned() => {
             let has_torque = !matches!(Mode::try_from(answer.mode), Ok(Mode::Disarmed | Mode::Fault));
             if has_torque && answer.slope_deg.abs() > IdleDisarm::LEVEL_DEG {
@@ -37,7 +37,7 @@ pub(crate) fn end_orphans(config: &Config, instance: &Instance, end: &AtomicBool
                 config.worm.name,
                 answer.pid
             );
-            if let Err(error) = ask(config, Request::End) {
+            if let Err(error) = ask(config, &Request::End.into()) {
                 // It may have ended by itself.
                 tracing::debug!("{error}");
             }

@@ -7,7 +7,9 @@ use crate::watch::Telemetry;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Mode, Range, RecordingStatus, State, Timing};
+use worm_estimator::message::{
+    Alarm, CommandKind, CommandRecord, Cycle, Estimate, Mode, Range, RecordingStatus, State, Timing,
+};
 
 /// How long the worm may take to reach a commanded mode, beyond the time of the ramp.
 pub(crate) const MODE_TIMEOUT: Duration = Duration::from_secs(5);
@@ -20,6 +22,7 @@ pub(crate) struct TelemetryReceiver {
     cycle: Subscriber<Cycle>,
     alarm: Subscriber<Alarm>,
     range: Subscriber<Range>,
+    command: Subscriber<CommandRecord>,
     recording: Subscriber<RecordingStatus>,
 }
 
@@ -36,6 +39,7 @@ impl TelemetryReceiver {
             cycle: hub.subscriber().map_err(Failure::failed)?,
             alarm: hub.subscriber().map_err(Failure::failed)?,
             range: hub.subscriber().map_err(Failure::failed)?,
+            command: hub.subscriber().map_err(Failure::failed)?,
             recording: hub.subscriber().map_err(Failure::failed)?,
         })
     }
@@ -59,6 +63,9 @@ impl TelemetryReceiver {
         }
         while let Ok(Some(range)) = self.range.next() {
             telemetry.take_range(&range);
+        }
+        while let Ok(Some(record)) = self.command.next() {
+            telemetry.take_command(&record);
         }
         while let Ok(Some(status)) = self.recording.next() {
             telemetry.take_recording(&status);

@@ -81,7 +81,7 @@ impl CommandServer {
         let full = ServerCreateError::ExceedsMaxSupportedServers;
         let service = presence.instance().service("command");
         let port = services
-            .command
+            .command_service
             .server_builder()
             .create()
             .map_err(PortError::from_iceoryx(service, "server", MAX_WRITERS, full))?;
@@ -134,7 +134,7 @@ impl CommandClient {
         let full = ClientCreateError::ExceedsMaxSupportedClients;
         let service = presence.instance().service("command");
         let port = services
-            .command
+            .command_service
             .client_builder()
             .create()
             .map_err(PortError::from_iceoryx(service, "client", MAX_READERS, full))?;

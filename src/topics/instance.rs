@@ -2,9 +2,9 @@
 
 use super::error::InstanceError;
 use super::folder::{WormFolder, auto_root};
-use super::stale_resources;
 use iceoryx2::prelude::{Config as IoxConfig, FileName, Path as IoxPath, SemanticString};
 use std::borrow::Cow;
+use std::fs;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -107,9 +107,11 @@ impl Instance {
         self.folder.join("relay.sock")
     }
 
-    /// Removes the folder when nothing is in it: for who only looked whether the worm runs.
+    /// Removes the folder when nothing is in it any more: for the last process of a worm, and for who only looked whether it runs.
     pub(crate) fn remove_folder_if_empty(&self) {
-        stale_resources::remove_folder_if_empty(self);
+        if let Err(error) = fs::remove_dir(&self.folder) {
+            tracing::trace!("{}: {error}", self.folder.display());
+        }
     }
 
     /// Opens the folder, verified as this user's, and creates it where it is missing: the last process of a worm removes it, so a

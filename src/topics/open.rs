@@ -44,7 +44,8 @@ pub(super) fn open(instance: &Instance) -> Result<Services, Refused> {
         recording: open_topic(&node, instance)?,
         state_event: open_event(&node, instance, State::NAME)?,
         alarm_event: open_event(&node, instance, Alarm::NAME)?,
-        command: open_command(&node, instance)?,
+        command: open_topic(&node, instance)?,
+        command_service: open_command(&node, instance)?,
         _node: node,
     })
 }
@@ -105,5 +106,5 @@ fn open_command(node: &Node<Ipc>, instance: &Instance) -> Result<CommandService,
         .max_servers(MAX_WRITERS)
         .max_nodes(MAX_NODES)
         .open_or_create()
-        .map_err(Refused::at(instance.service("command")))
+        .map_err(Refused::at(format!("{} (service)", instance.service("command"))))
 }

@@ -3,7 +3,6 @@
 use super::instance::Instance;
 use super::lock::{LockError, LockFile, LockKind, LockPlace};
 use super::lock_holder;
-use super::stale_resources;
 use std::io;
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};
@@ -131,7 +130,7 @@ impl<R: Role> RoleLock<R> {
 impl<R: Role> Drop for RoleLock<R> {
     fn drop(&mut self) {
         self.file.remove();
-        stale_resources::remove_folder_if_empty(&self.instance);
+        self.instance.remove_folder_if_empty();
     }
 }
 

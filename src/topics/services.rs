@@ -2,7 +2,9 @@
 
 use iceoryx2::prelude::{Node, ipc};
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
-use worm_estimator::message::{Alarm, Command, Cycle, Estimate, Range, RecordingStatus, Reply, State, Timing};
+use worm_estimator::message::{
+    Alarm, Command, CommandRecord, Cycle, Estimate, Range, RecordingStatus, Reply, State, Timing,
+};
 
 /// The variant of iceoryx2 in use: between processes, ports bound to their thread.
 pub type Ipc = ipc::Service;
@@ -30,7 +32,8 @@ pub struct Services {
     pub(super) recording: TopicService<RecordingStatus>,
     pub(super) state_event: EventService,
     pub(super) alarm_event: EventService,
-    pub(super) command: CommandService,
+    pub(super) command: TopicService<CommandRecord>,
+    pub(super) command_service: CommandService,
     // Last, so that it is dropped last.
     pub(super) _node: Node<Ipc>,
 }

@@ -159,10 +159,3 @@ pub(super) fn remove_stillborn(instance: &Instance) -> io::Result<usize> {
     }
     Ok(removed)
 }
-
-/// Removes the instance's folder when nothing is in it any more.
-pub(super) fn remove_folder_if_empty(instance: &Instance) {
-    if let Err(error) = fs::remove_dir(instance.folder()) {
-        tracing::trace!("{}: {error}", instance.folder().display());
-    }
-}

@@ -99,7 +99,7 @@ impl Drop for Presence {
         role::remove_abandoned(&self.instance);
         self.lock.remove();
         start.remove();
-        stale_resources::remove_folder_if_empty(&self.instance);
+        self.instance.remove_folder_if_empty();
     }
 }
 

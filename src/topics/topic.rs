@@ -4,7 +4,7 @@ use super::role::{Controller, Estimator, Recorder, Role};
 use super::services::{EventService, Services, TopicService};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
-use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing};
 
 /// A message that is published on a topic of its own.
 pub trait Topic: sealed::Carried {
@@ -54,7 +54,7 @@ macro_rules! topics {
             }
         }
 
-        // SAFETY: `message` has f64, u64, u32 and i32 fields and arrays of them, and no padding.
+        // SAFETY: `message` has f64, u64, u32 and i32 fields, arrays of them and of bytes, and no padding.
         unsafe impl sealed::Carried for $message {
             fn service(services: &Services) -> &TopicService<Self> { &services.$field }
         })+
@@ -68,6 +68,7 @@ topics! {
     Cycle { cycle, owner: Estimator, buffer: 64, history: 16, number: |cycle| Some(cycle.index) }
     Alarm { alarm, owner: Estimator, buffer: 64, history: 32, number: |alarm| Some(alarm.sequence) }
     Range { range, owner: Estimator, buffer: 64, history: 1, number: |range| Some(range.index) }
+    CommandRecord { command, owner: Controller, buffer: 256, history: 32, number: |record| Some(record.sequence) }
     RecordingStatus { recording, owner: Recorder, buffer: 16, history: 1, number: |status| Some(status.sequence) }
 }
 

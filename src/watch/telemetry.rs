@@ -2,7 +2,9 @@
 
 use super::recent::Recent;
 use crate::latency::TickStats;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Range, RecordingStatus, State, Timing};
+use worm_estimator::message::{
+    Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing,
+};
 
 /// How many cycles are kept: nearly two days of the usual gait, 45 MB.
 const MAX_CYCLES: usize = 1 << 16;
@@ -12,6 +14,9 @@ const MAX_RANGES: usize = 1 << 14;
 
 /// How many changes of alarms are kept, 0.6 MB.
 const MAX_ALARMS: usize = 1 << 13;
+
+/// How many commands are kept, 30 kB.
+const MAX_COMMANDS: usize = 256;
 
 /// What was received so far, in bounded memory: of cycles and alarms the newest.
 #[derive(Debug, Clone)]
@@ -32,6 +37,8 @@ pub struct Telemetry {
     pub ranges: Recent<Range>,
     /// The newest changes of alarms.
     pub alarms: Recent<Alarm>,
+    /// The newest commands, but for those that only prolonged a crawl.
+    pub commands: Recent<CommandRecord>,
     /// Where the ticks' time went, and what made late ones late.
     pub tick_stats: TickStats,
     /// The newest change of each alarm, by its code.
@@ -56,6 +63,7 @@ impl Telemetry {
             cycles: Recent::with_limit(cycles),
             ranges: Recent::with_limit(cycles.min(MAX_RANGES)),
             alarms: Recent::with_limit(alarms),
+            commands: Recent::with_limit(MAX_COMMANDS),
             tick_stats: TickStats::default(),
             newest_changes: [None; AlarmKind::ALL.len()],
         }
@@ -94,6 +102,13 @@ impl Telemetry {
             *newest = Some(*alarm);
         }
         self.alarms.push(*alarm);
+    }
+
+    /// Takes a command that the controller answered.
+    pub fn take_command(&mut self, record: &CommandRecord) {
+        if !record.is_mere_renewal() {
+            self.commands.push(*record);
+        }
     }
 
     /// Takes a recorder's report.

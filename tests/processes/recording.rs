@@ -4,6 +4,7 @@ use super::worm::{Worm, wait_for};
 use super::{Crawling, PATIENCE};
 use std::path::{Path, PathBuf};
 use worm_analysis::recording::mcap::read;
+use worm_estimator::message::{CommandKind, CommandOutcome};
 use worm_log::messages;
 
 /// A gait fast enough for some cycles in a few seconds.
@@ -52,6 +53,20 @@ fn the_main_job_records_what_replays_to_the_same_results() {
     );
     assert_eq!(log.states.len(), log.timings.len());
     assert_eq!(Some(log.cycles.len()), summary["cycles"].as_array().map(Vec::len));
+
+    let commands = log.commands.iter().map(|record| {
+        let kind = CommandKind::try_from(record.kind).expect("a known command");
+        let at = log.states.iter().find(|state| state.sequence == record.state_sequence);
+        assert_eq!(at.map(|state| state.time_ns), Some(record.time_ns), "{record:?}");
+        (kind, record.outcome, record.sender.to_string())
+    });
+    let ordered = |kind| (kind, CommandOutcome::Accepted.code(), "supervisor".to_owned());
+    let commands: Vec<_> = commands.collect();
+    assert_eq!(
+        commands[..2],
+        [CommandKind::Arm, CommandKind::Crawl].map(ordered),
+        "{commands:?}"
+    );
 
     let output = worm.replay(&file);
     let replay: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");

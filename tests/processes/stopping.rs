@@ -93,7 +93,7 @@ fn a_worm_can_be_stopped_when_shared_memory_is_full() {
     if needs_root("a /dev/shm that is full") {
         return;
     }
-    let crawling = Crawling::start("full");
+    let crawling = Crawling::start("full-shm");
     let script = format!(
         "mount -t tmpfs -o size=16k,nr_inodes=8 none /dev/shm || exit 77; \
          cat /dev/zero > /dev/shm/full 2> /dev/null; exec {} command stop --name {}",

@@ -4,7 +4,8 @@ use super::home::{Home, segments};
 use std::thread;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{
-    Alarm, AlarmKind, Command, CommandKind, CommandOutcome, Cycle, Estimate, Mode, Reply, Severity, State, Timing,
+    Alarm, AlarmKind, Command, CommandKind, CommandOutcome, CommandRecord, Cycle, Estimate, Mode, Reply, Severity,
+    ShortText, State, Timing,
 };
 use worm_physics::MAX_CELLS;
 use wormd::topics::{
@@ -41,6 +42,21 @@ fn timing(sequence: u64) -> Timing {
         minor_faults: 0,
         major_faults: 0,
     }
+}
+
+fn command_record(sequence: u64) -> CommandRecord {
+    let reply = Reply {
+        sequence: 10 * sequence,
+        verdict: CommandOutcome::Accepted.code(),
+        mode: Mode::Armed.code(),
+        fault: 0,
+        alarm_mask: 0,
+    };
+    let command = Command {
+        sender: ShortText::new("tester"),
+        ..Command::new(CommandKind::Hold)
+    };
+    CommandRecord::new(sequence, 7 * sequence, false, &command, &reply)
 }
 
 fn estimate(state_sequence: u64) -> Estimate {
@@ -181,6 +197,7 @@ fn a_late_joiner_gets_the_last_values_from_an_idle_publisher() {
     let hub = Hub::open(&instance).expect("hub");
     sends_history(&hub, &controller, state);
     sends_history(&hub, &controller, timing);
+    sends_history(&hub, &controller, command_record);
     sends_history(&hub, &estimator, estimate);
     sends_history(&hub, &estimator, cycle);
     sends_history(&hub, &estimator, alarm);

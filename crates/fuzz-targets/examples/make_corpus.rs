@@ -10,7 +10,9 @@ use std::path::Path;
 use testkit::log_sample::{Sink, Telemetry, crawl, origin};
 use testkit::recording_files::{as_csv, crawl as scene, simulated};
 use worm_analysis::experiment::Simulation;
-use worm_estimator::message::{JsonMessage, ProtobufMessage};
+use worm_estimator::message::{
+    Command, CommandKind, CommandOutcome, CommandRecord, JsonMessage, Mode, ProtobufMessage, Reply, ShortText,
+};
 use worm_log::{Channel, Logged, Writer};
 
 fn main() {
@@ -42,6 +44,7 @@ fn main() {
     put("protobuf_message", "state", &protobuf(0, &telemetry.states[9]));
     put("protobuf_message", "timing", &protobuf(1, &telemetry.timings[9]));
     put("protobuf_message", "estimate", &protobuf(2, &telemetry.estimates[1]));
+    put("protobuf_message", "command", &protobuf(5, &refused_crawl()));
     put("log_messages", "crawl", &messages(&telemetry));
 }
 
@@ -261,6 +264,26 @@ impl Encoding {
         }
         bytes
     }
+}
+
+/// A command with a value in every field.
+fn refused_crawl() -> CommandRecord {
+    let command = Command {
+        cycles_per_s: -0.5,
+        limit_s: 1.5,
+        alarm_mask: 6,
+        user: 1000,
+        sender: ShortText::new("änn"),
+        ..Command::new(CommandKind::Crawl)
+    };
+    let reply = Reply {
+        sequence: 7,
+        verdict: CommandOutcome::AlarmStands.code(),
+        mode: Mode::Armed.code(),
+        fault: 1,
+        alarm_mask: 4,
+    };
+    CommandRecord::new(3, 1_000_000_001, true, &command, &reply)
 }
 
 /// A message with the byte before it that names its type to the target.

@@ -6,7 +6,7 @@ use std::path::Path;
 use worm_analysis::recording::mcap;
 use worm_estimator::config::Config;
 use worm_estimator::message::{
-    Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
+    Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
 };
 use worm_log::{Log, compare, messages_from, replay};
 
@@ -44,6 +44,7 @@ pub(crate) fn log_messages(data: &[u8]) {
         log.cycles.extend(read::<Cycle>(line));
         log.alarms.extend(read::<Alarm>(line));
         log.ranges.extend(read::<Range>(line));
+        log.commands.extend(read::<CommandRecord>(line));
         read::<Timing>(line);
     }
     check(&log);
@@ -60,6 +61,7 @@ pub(crate) fn protobuf_message(data: &[u8]) {
         2 => read_bytes::<Estimate>(bytes),
         3 => read_bytes::<Cycle>(bytes),
         4 => read_bytes::<Alarm>(bytes),
+        5 => read_bytes::<CommandRecord>(bytes),
         _ => read_bytes::<RecordingStatus>(bytes),
     }
 }

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use std::time::{Duration, UNIX_EPOCH};
 use worm_estimator::config::{Battery, Config};
 use worm_estimator::estimate::Observer;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Range, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, State, Timing};
 use worm_log::{Log, Logged, Origin, Writer};
 
 pub const ORIGIN_CONFIG: &str = "[worm]\nname = \"tester\"\n";
@@ -23,6 +23,7 @@ pub struct Telemetry {
     pub cycles: Vec<Cycle>,
     pub alarms: Vec<Alarm>,
     pub ranges: Vec<Range>,
+    pub commands: Vec<CommandRecord>,
 }
 
 impl Telemetry {
@@ -34,6 +35,7 @@ impl Telemetry {
             cycles: self.cycles,
             alarms: self.alarms,
             ranges: self.ranges,
+            commands: self.commands,
             ..Log::default()
         }
     }
@@ -137,6 +139,7 @@ pub fn write_log(path: &Path, telemetry: &Telemetry) {
     all(&mut writer, &telemetry.cycles);
     all(&mut writer, &telemetry.alarms);
     all(&mut writer, &telemetry.ranges);
+    all(&mut writer, &telemetry.commands);
     writer.finish().expect("there is room");
 }
 

@@ -1,6 +1,8 @@
 //! The channels of a log.
 
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, State, Timing};
+use worm_estimator::message::{
+    Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, State, Timing,
+};
 
 /// Encoding of the messages that are written, and of their schemas, as MCAP names it.
 pub(super) const PROTOBUF: &str = "protobuf";
@@ -63,6 +65,7 @@ channels! {
     Cycle = "cycle",
     Alarm = "alarm",
     Range = "range",
+    CommandRecord = "command",
 }
 
 impl Channel {

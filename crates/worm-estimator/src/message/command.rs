@@ -2,6 +2,7 @@
 
 use super::ZeroCopySend;
 use super::coded_enum;
+use super::short_text::ShortText;
 
 coded_enum! {
     /// A kind of request to the controller.
@@ -49,7 +50,7 @@ coded_enum! {
 
 /// A request to the controller.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_command_v2")]
+#[type_name("wormd_command_v3")]
 #[repr(C)]
 pub struct Command {
     /// Gait cycles per second for [`CommandKind::Crawl`], negative for backward; 0 means the configured gait.
@@ -65,10 +66,12 @@ pub struct Command {
     pub user: u32,
     /// Padding to a multiple of eight bytes; zero.
     pub reserved: u32,
+    /// Who sends it, for the record: a program, or the person on whose behalf it sends.
+    pub sender: ShortText,
 }
 
 impl Command {
-    /// A command without parameters, of user 0.
+    /// A command without parameters, of user 0 and an unnamed sender.
     pub const fn new(kind: CommandKind) -> Self {
         Self {
             cycles_per_s: 0.0,
@@ -77,6 +80,7 @@ impl Command {
             alarm_mask: 0,
             user: 0,
             reserved: 0,
+            sender: ShortText::EMPTY,
         }
     }
 }

@@ -7,7 +7,7 @@
 //!
 //! Schemas give one plain type for each member, though it may be `null`: viewers such as Foxglove do not accept unions of types.
 
-use super::fields::{Codes, FieldKind, FieldValue, prose};
+use super::field_kind::{Codes, FieldKind, FieldValue, prose};
 use serde::de::{DeserializeOwned, Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Value, json};

@@ -1,12 +1,12 @@
 //! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
-//! The controller fills [`State`] and [`Timing`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`], [`Cycle`],
-//! [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the same values. The types are separate from the transport, so that
-//! nothing here depends on it.
+//! The controller fills [`State`], [`Timing`] and [`CommandRecord`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`],
+//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the
+//! same values. The types are separate from the transport, so that nothing here depends on it.
 //!
-//! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, wide fields first, no
-//! padding, and a version in the type name, because iceoryx2 compares name, size and alignment but not fields. "Not known" is `NaN` in an
-//! `f64`. Arrays over cells have [`MAX_CELLS`](worm_physics::MAX_CELLS) entries, of which the first `cell_count` are in use; cell 1 of the
+//! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, and texts of 32 bytes
+//! ([`ShortText`]), wide fields first, no padding, and a version in the type name, because iceoryx2 compares name, size and alignment
+//! but not fields. "Not known" is `NaN` in an `f64`. Arrays over cells have [`MAX_CELLS`](worm_physics::MAX_CELLS) entries, of which the first `cell_count` are in use; cell 1 of the
 //! paper is index 0. Times are nanoseconds of `CLOCK_MONOTONIC`.
 //!
 //! Each type of a topic is declared as one table. From it come the structure, its documentation, its JSON form with a schema
@@ -15,25 +15,31 @@
 
 mod alarm;
 mod command;
+mod command_record;
 mod cycle;
 mod estimate;
+mod field_kind;
 mod fields;
 mod json;
 mod protobuf;
 mod range;
 mod recording;
+mod short_text;
 mod state;
 mod timing;
 
 pub use alarm::{Alarm, AlarmKind, Severity};
 pub use command::{Command, CommandKind, CommandOutcome, Reply};
+pub use command_record::CommandRecord;
 pub use cycle::Cycle;
 pub use estimate::Estimate;
-pub use fields::{Codes, Field, FieldAccess, FieldKind, FieldValue};
+pub use field_kind::{Codes, FieldKind, FieldValue};
+pub use fields::{Field, FieldAccess};
 pub use json::JsonMessage;
 pub use protobuf::{ProtobufError, ProtobufMessage};
 pub use range::Range;
 pub use recording::{RecordingProblem, RecordingState, RecordingStatus};
+pub use short_text::ShortText;
 pub use state::{Fault, HoldReason, Mode, State};
 pub use timing::{Culprit, Timing};
 
@@ -82,7 +88,7 @@ macro_rules! coded_enum {
         impl $crate::message::json::Coded for $name {
             const WHAT: &'static str = $what;
             const VALUES: &'static [Self] = Self::ALL;
-            const CODES: &'static $crate::message::fields::Codes = &$crate::message::fields::Codes {
+            const CODES: &'static $crate::message::field_kind::Codes = &$crate::message::field_kind::Codes {
                 name: stringify!($name),
                 values: &[$(($code, $text)),+],
             };
@@ -120,7 +126,8 @@ macro_rules! message {
         }
 
         const _: () = {
-            use $crate::message::fields::{self, Field, FieldAccess, FieldValue};
+            use $crate::message::field_kind::{FieldValue, prose};
+            use $crate::message::fields::{Field, FieldAccess};
             use $crate::message::json::{self, Form, Plain};
 
             macro_rules! form {
@@ -179,7 +186,7 @@ macro_rules! message {
                     serde_json::json!({
                         "$schema": "https://json-schema.org/draft/2020-12/schema",
                         "title": $type_name,
-                        "description": fields::prose(concat!($($doc),+)),
+                        "description": prose(concat!($($doc),+)),
                         "type": "object",
                         "required": names,
                         "properties": serde_json::Map::from_iter(fields.map(|(name, schema)| (name.to_owned(), schema))),

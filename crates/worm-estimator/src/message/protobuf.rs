@@ -4,6 +4,7 @@
 //! - a field's number is its place in the table, from 1; the message's name is its [`TYPE_NAME`](JsonMessage::TYPE_NAME);
 //! - a number is a `double`, `NaN` where it is not known; a list over cells ends with the last cell in use;
 //! - an enumeration has its values as `HOLD_REASON_LEASE_LAPSED`; a code without a name stays a number;
+//! - a text is a `string`;
 //! - what may be missing is `optional`;
 //! - the message's own time is `fixed64` and comes first, all else as compact as usual. A log repeats that time before each message, and its
 //!   compression finds the eight bytes again: 6 bytes a tick less than with a varint in the order of the table.
@@ -13,9 +14,11 @@
 mod descriptor;
 mod wire;
 
-use super::fields::{FieldAccess, FieldKind, FieldValue};
+use super::field_kind::{FieldKind, FieldValue};
+use super::fields::FieldAccess;
 #[cfg(doc)]
 use super::json::JsonMessage;
+use super::short_text::ShortText;
 use wire::{Reader, Truncated, Wire};
 use worm_physics::MAX_CELLS;
 
@@ -100,7 +103,7 @@ pub enum ProtobufError {
 fn wire_of<T: FieldAccess>(place: usize, kind: FieldKind) -> Wire {
     match kind {
         FieldKind::Number => Wire::Fixed64,
-        FieldKind::PerCell => Wire::LengthDelimited,
+        FieldKind::PerCell | FieldKind::Text => Wire::LengthDelimited,
         FieldKind::U64 if place == T::TIME_FIELD => Wire::Fixed64,
         FieldKind::U64 | FieldKind::U32 | FieldKind::I32 | FieldKind::Code(_) => Wire::Varint,
     }
@@ -125,6 +128,11 @@ fn write_field<T: FieldAccess>(message: &T, place: usize, out: &mut Vec<u8>) {
             for value in values {
                 out.extend(value.to_le_bytes());
             }
+        }
+        FieldValue::Text(text) if !is_left_out(text.is_empty()) => {
+            wire::tag(number, wire, out);
+            wire::varint(text.len() as u64, out);
+            out.extend(text.as_bytes());
         }
         FieldValue::U64(value) if !is_left_out(value == 0) => {
             wire::tag(number, wire, out);
@@ -186,6 +194,12 @@ fn read_field<T: FieldAccess>(
             }
             lengths.note(place, list.len());
             FieldValue::PerCell(used)
+        }
+        FieldKind::Text => {
+            let bytes = reader.bytes().map_err(cut_off)?;
+            let text = std::str::from_utf8(bytes).ok();
+            let fitting = text.filter(|text| ShortText::exact(text).is_some());
+            FieldValue::Text(fitting.ok_or_else(out_of_range)?)
         }
         FieldKind::U64 if wire == Wire::Fixed64 => {
             FieldValue::U64(u64::from_le_bytes(reader.fixed64().map_err(cut_off)?))

@@ -15,7 +15,9 @@ use super::super::scan::{Contents, scan};
 use super::ExportError;
 use super::output::{Output, OutputError};
 use std::path::{Path, PathBuf};
-use worm_estimator::message::{Alarm, Cycle, Estimate, FieldKind, FieldValue, Range, State, Timing};
+use worm_estimator::message::{
+    Alarm, CommandRecord, Cycle, Estimate, FieldKind, FieldValue, Range, ShortText, State, Timing,
+};
 
 /// Name of the column with the wall-clock time.
 const WALL_TIME: &str = "wall_time";
@@ -91,6 +93,7 @@ pub fn tables(
                 Channel::Cycle => table.add::<Cycle>(payload, clock),
                 Channel::Alarm => table.add::<Alarm>(payload, clock),
                 Channel::Range => table.add::<Range>(payload, clock),
+                Channel::CommandRecord => table.add::<CommandRecord>(payload, clock),
             }?;
         }
         Ok(())
@@ -120,6 +123,7 @@ fn cells(channel: Channel, payload: Payload<'_>) -> Result<usize, PayloadError> 
         Channel::Cycle => of::<Cycle>(payload),
         Channel::Alarm => of::<Alarm>(payload),
         Channel::Range => of::<Range>(payload),
+        Channel::CommandRecord => of::<CommandRecord>(payload),
     }
 }
 
@@ -146,6 +150,7 @@ enum Entry {
     Whole(Option<i64>),
     Number(Option<f64>),
     Text(Option<&'static str>),
+    ShortText(ShortText),
     /// A code without a name.
     Code(u32),
 }
@@ -161,7 +166,7 @@ fn columns<T: Logged>(cells: usize) -> Vec<Column> {
             FieldKind::Number => (ColumnKind::Number, None),
             FieldKind::PerCell => (ColumnKind::Number, Some(cells)),
             FieldKind::U64 | FieldKind::U32 | FieldKind::I32 => (ColumnKind::Whole, None),
-            FieldKind::Code(_) => (ColumnKind::Text, None),
+            FieldKind::Code(_) | FieldKind::Text => (ColumnKind::Text, None),
         };
         let names = match of_cells {
             None => vec![field.name.to_owned()],
@@ -189,6 +194,10 @@ fn entries<T: Logged>(message: &T, cells: usize, clock: Option<WallClock>, row: 
                 None => Entry::Code(code),
             }),
             (FieldKind::Code(_), _) => row.push(Entry::Text(None)),
+            (FieldKind::Text, Some(FieldValue::Text(text))) if !text.is_empty() => {
+                row.push(Entry::ShortText(ShortText::new(text)));
+            }
+            (FieldKind::Text, _) => row.push(Entry::Text(None)),
             (FieldKind::Number, Some(FieldValue::Number(value))) => row.push(known(value)),
             (_, value) => row.push(Entry::Whole(match value {
                 // No count or time of a worm comes near.
@@ -254,6 +263,7 @@ impl OpenTable {
             Channel::Cycle => columns::<Cycle>(cells),
             Channel::Alarm => columns::<Alarm>(cells),
             Channel::Range => columns::<Range>(cells),
+            Channel::CommandRecord => columns::<CommandRecord>(cells),
         };
         let output = Output::create(&file, overwrite)?;
         let rows = match format {

@@ -1,12 +1,14 @@
 //! Logs in other forms.
 
+use super::text;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use testkit::log_sample::{ORIGIN_CONFIG, Telemetry, crawl, write_log};
-use worm_estimator::message::JsonMessage;
 #[cfg(feature = "tables")]
-use worm_estimator::message::{Alarm, AlarmKind, Estimate, State};
+use worm_estimator::message::{
+    Alarm, AlarmKind, Command, CommandKind, CommandOutcome, CommandRecord, Estimate, Mode, Reply, ShortText, State,
+};
 use worm_log::export::copy;
 use worm_log::{Logged, messages, replay};
 
@@ -46,14 +48,6 @@ fn write_json_log(path: &Path, telemetry: &Telemetry) {
     all(&mut mcap, &telemetry.estimates);
     all(&mut mcap, &telemetry.cycles);
     mcap.finish().expect("there is room");
-}
-
-fn text<T: JsonMessage>(messages: &[T]) -> Vec<u8> {
-    let mut text = Vec::new();
-    for message in messages {
-        message.write_json(&mut text).expect("can be written");
-    }
-    text
 }
 
 #[test]
@@ -128,6 +122,19 @@ fn with_gaps() -> Telemetry {
         ..Alarm::NONE
     }];
     telemetry.timings.clear();
+    let crawl = Command {
+        cycles_per_s: -0.5,
+        sender: ShortText::new("änn"),
+        ..Command::new(CommandKind::Crawl)
+    };
+    let reply = Reply {
+        sequence: 7,
+        verdict: CommandOutcome::AlarmStands.code(),
+        mode: Mode::Armed.code(),
+        fault: 0,
+        alarm_mask: 1 << AlarmKind::JammedCell.code(),
+    };
+    telemetry.commands = vec![CommandRecord::new(3, 1_000_000_001, true, &crawl, &reply)];
     telemetry
 }
 
@@ -149,10 +156,20 @@ mod tables {
         let names: Vec<_> = written.iter().filter_map(|table| table.file.file_name()).collect();
         assert_eq!(
             names,
-            ["state.parquet", "estimate.parquet", "alarm.parquet"],
+            ["state.parquet", "estimate.parquet", "alarm.parquet", "command.parquet"],
             "no empty ones"
         );
         assert_eq!((written[0].rows, warnings), (1000, Vec::new()));
+        let file = fs::File::open(&written[3].file).expect("is there");
+        let mut rows = SerializedFileReader::new(file).expect("Parquet").into_iter();
+        let row: BTreeMap<String, Field> = rows
+            .next()
+            .expect("a row")
+            .expect("readable")
+            .into_columns()
+            .into_iter()
+            .collect();
+        assert_eq!(row["sender"], Field::Str("änn".to_owned()));
 
         let file = fs::File::open(&written[0].file).expect("is there");
         let reader = SerializedFileReader::new(file).expect("Parquet");
@@ -208,9 +225,9 @@ mod tables {
         let log = folder.path().join("worm.mcap");
         let telemetry = with_gaps();
         write_log(&log, &telemetry);
-        let topics = [Channel::State, Channel::Alarm];
+        let topics = [Channel::State, Channel::Alarm, Channel::CommandRecord];
         let (written, _) = tables(&log, folder.path(), TableFormat::Csv, &topics, false).expect("a log");
-        assert_eq!(written.len(), 2);
+        assert_eq!(written.len(), 3);
         let mut reader = csv::Reader::from_path(&written[0].file).expect("CSV");
         let rows: Vec<BTreeMap<String, String>> = reader.deserialize().map(|row| row.expect("a row")).collect();
         assert_eq!(rows.len(), telemetry.states.len());
@@ -230,6 +247,9 @@ mod tables {
         );
         let alarms = fs::read_to_string(&written[1].file).expect("is there");
         assert!(alarms.contains(",jammed-cell,warning,0,2\n"), "{alarms}");
+        let commands = fs::read_to_string(&written[2].file).expect("is there");
+        let row = ",3,1000000001,7,-0.5,0.0,crawl,alarm-stands,0,2,armed,none,1,0,änn\n";
+        assert!(commands.contains(row), "{commands}");
 
         let error = tables(&log, folder.path(), TableFormat::Csv, &topics, false).expect_err("are there already");
         assert!(error.to_string().contains("state.csv exists already"), "{error}");

@@ -4,3 +4,14 @@ mod damage;
 mod export;
 mod replay;
 mod writing;
+
+use worm_estimator::message::JsonMessage;
+
+/// Messages as lines of JSON, to compare them to the last digit.
+fn text<T: JsonMessage>(messages: &[T]) -> Vec<u8> {
+    let mut text = Vec::new();
+    for message in messages {
+        message.write_json(&mut text).expect("can be written");
+    }
+    text
+}

@@ -1,17 +1,10 @@
 //! The contents of a log.
 
+use super::text;
 use std::fs;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
-use worm_estimator::message::{Estimate, JsonMessage, State};
+use worm_estimator::message::{Estimate, State};
 use worm_log::{Channel, Index, Writer, messages};
-
-fn text<T: JsonMessage>(messages: &[T]) -> Vec<u8> {
-    let mut text = Vec::new();
-    for message in messages {
-        message.write_json(&mut text).expect("can be written");
-    }
-    text
-}
 
 #[test]
 fn a_log_holds_what_was_written() {

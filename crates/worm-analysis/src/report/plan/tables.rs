@@ -49,15 +49,13 @@ pub(super) fn legs(name: &str, trip: &Trip) -> Table {
             "fails because",
         ],
     );
-    let value =
-        |value: Option<f64>, scale: f64, decimals| fixed(value.map_or(f64::NAN, |value| value * scale), decimals);
     for (number, leg) in (1..).zip(&trip.legs) {
         let is_first_failure = trip.failed_leg == Some(number);
         table.rows.push(vec![
             number.to_string(),
             shortest(leg.leg.length_m),
             format!("{}°", shortest(leg.leg.slope_deg)),
-            value(leg.advance_per_cycle_m, 1e3, 2),
+            scaled(leg.advance_per_cycle_m, 1e3, 2),
             with_bounds(leg.time_s, per_s),
             with_bounds(leg.energy_j, 1.0),
             with_bounds(leg.charge_left_share, 100.0),
@@ -130,18 +128,21 @@ pub(super) fn inertia(plan: &Plan) -> Table {
             "difference, %",
         ],
     );
-    let value =
-        |value: Option<f64>, scale: f64, decimals| fixed(value.map_or(f64::NAN, |value| value * scale), decimals);
     for check in &plan.inertia_check {
         table.rows.push(vec![
             format!("{}°", shortest(check.slope_deg)),
-            value(check.advance_m, 1e3, 3),
-            value(check.inertial_advance_m, 1e3, 3),
-            value(check.advance_difference, 100.0, 2),
-            value(check.energy_j, 1e3, 1),
-            value(check.inertial_energy_j, 1e3, 1),
-            value(check.energy_difference, 100.0, 2),
+            scaled(check.advance_m, 1e3, 3),
+            scaled(check.inertial_advance_m, 1e3, 3),
+            scaled(check.advance_difference, 100.0, 2),
+            scaled(check.energy_j, 1e3, 1),
+            scaled(check.inertial_energy_j, 1e3, 1),
+            scaled(check.energy_difference, 100.0, 2),
         ]);
     }
     table
+}
+
+/// A figure in the unit of its column, or none.
+fn scaled(value: Option<f64>, scale: f64, decimals: usize) -> String {
+    fixed(value.map_or(f64::NAN, |value| value * scale), decimals)
 }

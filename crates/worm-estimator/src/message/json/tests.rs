@@ -1,6 +1,6 @@
 //! Messages as JSON, there and back.
 
-use crate::message::{Alarm, Cycle, Estimate, JsonMessage, State, Timing};
+use crate::message::{Alarm, CommandRecord, Cycle, Estimate, JsonMessage, State, Timing};
 use proptest::prelude::*;
 use worm_physics::MAX_CELLS;
 
@@ -49,6 +49,7 @@ proptest! {
         round(message(&bytes, |estimate: &mut Estimate| estimate.cell_count = cells as u32))?;
         round(message(&bytes, |cycle: &mut Cycle| cycle.cell_count = cells as u32))?;
         round(message(&bytes, |_: &mut Alarm| ()))?;
+        round(message(&bytes, |_: &mut CommandRecord| ()))?;
     }
 }
 

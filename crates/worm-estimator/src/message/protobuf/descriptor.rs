@@ -4,7 +4,8 @@
 
 use super::wire::{self, Wire};
 use super::wire_of;
-use crate::message::fields::{Codes, Field, FieldAccess, FieldKind, prose};
+use crate::message::field_kind::{Codes, FieldKind, prose};
+use crate::message::fields::{Field, FieldAccess};
 
 /// A message of `descriptor.proto` while it is built.
 #[derive(Default)]
@@ -91,6 +92,7 @@ fn field<T: FieldAccess>(place: usize, row: &Field, oneof: Option<u64>) -> Build
         FieldKind::U64 => (OPTIONAL, 4),
         FieldKind::U32 => (OPTIONAL, 13),
         FieldKind::I32 => (OPTIONAL, 17), // sint32
+        FieldKind::Text => (OPTIONAL, 9),
         FieldKind::Code(_) => (OPTIONAL, 14),
     };
     // FieldDescriptorProto

@@ -1,7 +1,10 @@
 //! Messages in Protocol Buffers: there and back, and by their descriptor alone, as the viewers read them.
 
 use super::{ProtobufError, ProtobufMessage};
-use crate::message::{Alarm, AlarmKind, Cycle, Estimate, FieldValue, HoldReason, Mode, RecordingStatus, State, Timing};
+use crate::message::{
+    Alarm, AlarmKind, CommandRecord, Cycle, Estimate, FieldAccess, FieldValue, HoldReason, Mode, RecordingStatus,
+    State, Timing,
+};
 use proptest::prelude::*;
 use prost_reflect::{DescriptorPool, DynamicMessage, Kind, MessageDescriptor, Value};
 use worm_physics::MAX_CELLS;
@@ -37,6 +40,7 @@ fn check_described<T: ProtobufMessage>(descriptor: &MessageDescriptor, message: 
             (FieldValue::U32(ours), Value::U32(theirs)) => ours == *theirs && (is_there || !field.is_optional),
             (FieldValue::I32(ours), Value::I32(theirs)) => ours == *theirs,
             (FieldValue::Code(ours), Value::EnumNumber(theirs)) => ours == theirs.cast_unsigned(),
+            (FieldValue::Text(ours), Value::String(theirs)) => ours == theirs,
             (FieldValue::Missing, _) => !is_there && field.is_optional,
             _ => false,
         };
@@ -51,8 +55,9 @@ fn any_message<T: ProtobufMessage>(bits: &[u64], cells: usize) -> T {
     let mut bits = bits.iter().copied().cycle();
     let mut next = || bits.next().expect("endless");
     for (place, field) in T::FIELDS.iter().enumerate() {
-        use crate::message::FieldKind::{Code, I32, Number, PerCell, U32, U64};
+        use crate::message::FieldKind::{Code, I32, Number, PerCell, Text, U32, U64};
         let list: Vec<f64> = (0..cells).map(|_| f64::from_bits(next())).collect();
+        let text = "ä".repeat((next() % 17) as usize);
         let value = match field.kind {
             Number => FieldValue::Number(f64::from_bits(next())),
             PerCell => FieldValue::PerCell(&list),
@@ -61,6 +66,7 @@ fn any_message<T: ProtobufMessage>(bits: &[u64], cells: usize) -> T {
             U32 => FieldValue::U32(next() as u32),
             I32 => FieldValue::I32(next() as i32),
             Code(_) => FieldValue::Code(next() as u32),
+            Text => FieldValue::Text(&text),
         };
         assert!(message.set_field(place, value), "{}", field.name);
     }
@@ -101,6 +107,7 @@ proptest! {
         check::<Estimate>(&bits, cells)?;
         check::<Cycle>(&bits, cells)?;
         check::<Alarm>(&bits, cells)?;
+        check::<CommandRecord>(&bits, cells)?;
         check::<RecordingStatus>(&bits, cells)?;
     }
 
@@ -117,8 +124,7 @@ proptest! {
         let bytes = written(&state);
         if let Ok(cut) = State::read_protobuf(&bytes[..at.min(bytes.len())]) {
             // Only between two fields, when the lists are there, and then the rest is empty.
-            for (place, field) in <State as crate::message::FieldAccess>::FIELDS.iter().enumerate() {
-                use crate::message::FieldAccess;
+            for (place, field) in State::FIELDS.iter().enumerate() {
                 let (found, empty) = (cut.field(place), State::empty());
                 prop_assert!(found == state.field(place) || found == empty.field(place), "{}", field.name);
             }
@@ -158,6 +164,16 @@ fn the_descriptor_says_what_a_field_is() {
         of_phase.expect("a comment").leading_comments(),
         "Gait cycles done, unwrapped: the cam angle over one turn, zero at the configured home."
     );
+}
+
+#[test]
+fn a_text_that_is_none_or_too_long_is_refused() {
+    let number = CommandRecord::FIELDS.len() as u8;
+    for text in [&[0xff; 3][..], &[b'x'; 33], b"a\0b"] {
+        let bytes = [&[number << 3 | 2, text.len() as u8], text].concat();
+        let refused = CommandRecord::read_protobuf(&bytes).expect_err("no sender");
+        assert_eq!(refused.to_string(), "sender is out of range", "{text:?}");
+    }
 }
 
 #[test]

@@ -17,6 +17,7 @@ impl CsvRows {
                 Entry::Whole(value) => value.map(|value| value.to_string()),
                 Entry::Number(value) => value.map(|value| format!("{value:?}")),
                 Entry::Text(value) => value.map(str::to_owned),
+                Entry::ShortText(text) => Some(text.to_string()),
                 Entry::Code(code) => Some(code.to_string()),
             };
             self.0.write_field(text.unwrap_or_default())?;

@@ -98,6 +98,7 @@ impl ParquetRows {
                 (Values::Whole(values), Entry::Whole(value)) => values.extend(value),
                 (Values::Number(values), Entry::Number(value)) => values.extend(value),
                 (Values::Text(values), Entry::Text(value)) => values.extend(value.map(ByteArray::from)),
+                (Values::Text(values), Entry::ShortText(text)) => values.push(ByteArray::from(text.as_str())),
                 (Values::Text(values), Entry::Code(code)) => {
                     values.push(ByteArray::from(code.to_string().into_bytes()));
                 }

@@ -1,0 +1,81 @@
+//! One watcher's connection.
+
+use super::outbox::{Outbox, Overflow, SharedLine};
+use super::source::Seen;
+use super::wire::{Answer, Line, MAX_REQUEST, to_bytes};
+use crate::failure::Failure;
+use std::io::{self, Read};
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One connection.
+pub(super) struct Watcher {
+    pub(super) stream: UnixStream,
+    /// Its user, by the kernel.
+    pub(super) user: u32,
+    pub(super) input: Vec<u8>,
+    pub(super) outbox: Outbox,
+    /// What there was of the worm in the last line that it was sent about it.
+    pub(super) seen: Seen,
+    /// When it last took something, or nothing waited for it.
+    pub(super) took: Instant,
+    /// Once everything is sent, it is closed.
+    pub(super) is_refused: bool,
+}
+
+/// A connection that is over, and why, where that is of interest.
+pub(super) struct Gone(pub(super) Option<String>);
+
+impl From<Overflow> for Gone {
+    fn from(_: Overflow) -> Self {
+        Self(Some("it asks and does not read the answers".to_owned()))
+    }
+}
+
+impl Watcher {
+    /// Reads what is there; returns its whole lines.
+    pub(super) fn read(&mut self) -> Result<Vec<Vec<u8>>, Gone> {
+        let mut bytes = [0; MAX_REQUEST];
+        // Once: who sends more gets its next turn after the others.
+        match self.stream.read(&mut bytes) {
+            Ok(0) => return Err(Gone(None)),
+            Ok(count) => self.input.extend_from_slice(&bytes[..count]),
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
+            Err(_) => return Err(Gone(None)),
+        }
+        let mut lines = Vec::new();
+        while let Some(end) = self.input.iter().position(|byte| *byte == b'\n') {
+            let rest = self.input.split_off(end + 1);
+            let mut line = std::mem::replace(&mut self.input, rest);
+            line.pop();
+            if !line.is_empty() {
+                lines.push(line);
+            }
+        }
+        if self.input.len() > MAX_REQUEST {
+            return Err(Gone(Some(format!("its line is longer than {MAX_REQUEST} bytes"))));
+        }
+        Ok(lines)
+    }
+
+    /// Sends an answer, once there is room for it.
+    pub(super) fn answer(&mut self, answer: Answer) -> Result<(), Gone> {
+        let line = shared(&Line::Answer(answer)).map_err(|failure| Gone(Some(failure.to_string())))?;
+        Ok(self.outbox.add(line)?)
+    }
+
+    /// Says why, and closes the connection after that.
+    pub(super) fn refuse(&mut self, reason: String) {
+        self.is_refused = true;
+        if let Ok(line) = shared(&Line::Refused { reason }) {
+            // It is the first line, or one of few.
+            let _ = self.outbox.add(line);
+        }
+    }
+}
+
+/// A line for several watchers.
+pub(super) fn shared(line: &Line) -> Result<SharedLine, Failure> {
+    to_bytes(line).map(Arc::new).map_err(Failure::failed)
+}
