@@ -51,7 +51,7 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
     let short_log = writer.simulate("log.mcap", "0", &["--cycles", "1"]);
     let cut_log = writer.path("cut.mcap");
     let log = std::fs::read(&short_log).expect("a log");
-    // In the first block of the first compressed chunk, of which nothing can be unpacked.
+    // Within the first compressed chunk, of which nothing can be unpacked.
     std::fs::write(&cut_log, &log[..1000]).expect("it is cut");
 
     let position = |cell: usize| 1 + cell; // time comes first
@@ -156,7 +156,7 @@ fn what_cannot_be_analysed_is_named_and_ends_with_status_2() {
             &["phase", "counted in cycles"],
         ),
         (short_log, level, &["log.mcap", "cycles are too few"]),
-        (cut_log, level, &["cut.mcap", "holds no message, cut off"]),
+        (cut_log, level, &["cut.mcap", "cut off after 0 messages"]),
         (good.clone(), &["--slope", "100"], &["100", "-90 to 90"]),
         (good.clone(), &["--slope", "nan"], &["NaN", "-90 to 90"]),
         (
