@@ -13,3 +13,4 @@ mod recording;
 mod report;
 mod score;
 mod search;
+mod servo_bench;

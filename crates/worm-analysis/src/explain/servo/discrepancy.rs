@@ -20,7 +20,7 @@ const SHARED: f64 = 0.5;
 /// Covariance over the gains: constant, and proportional to the standardised logarithm.
 const OVER_GAINS: [f64; 2] = [0.7, 0.3];
 /// Correlation time, s.
-const CORRELATED_S: f64 = 0.2;
+const CORRELATED_S: f64 = 0.06;
 /// Cosines for each second, and most columns in all.
 const COSINES_PER_S: f64 = 6.0;
 const MOST_COLUMNS: usize = 900;
@@ -70,7 +70,7 @@ pub(super) fn columns(servo: &RecordedServo<'_>, scale_rad: f64) -> DMatrix<f64>
 
 /// Standard deviations of the cosines, for a variance of 1 in all.
 fn weights(cosines: usize, longest_s: f64) -> Vec<f64> {
-    let weight = |m: usize| (1.0 + (PI * m as f64 / longest_s * CORRELATED_S).powi(2)).recip();
+    let weight = |m: usize| (1.0 + (PI * m as f64 / longest_s * correlated()).powi(2)).sqrt().recip();
     let variance: f64 = (0..cosines)
         .map(|m| weight(m).powi(2) * if m == 0 { 1.0 } else { 0.5 })
         .sum();
@@ -89,3 +89,5 @@ fn over_gains(servo: &RecordedServo<'_>) -> Vec<Vec<f64>> {
     };
     values.into_iter().map(of).collect()
 }
+
+fn correlated() -> f64 { std::env::var("TAU").ok().and_then(|t| t.parse().ok()).unwrap_or(CORRELATED_S) }

@@ -20,7 +20,7 @@ const COMPARED: usize = 200;
 
 /// What any model of a servo is taken to be wrong by, as a fraction of the root mean square of its positions, unless the user says
 /// otherwise: about 1°.
-pub const DISCREPANCY: f64 = 0.05;
+pub const DISCREPANCY: f64 = 0.1;
 
 /// A servo on a bench with its recordings.
 pub struct Bench<'a> {

@@ -143,7 +143,9 @@ impl Plant for RecordedServo<'_> {
             }
         }
         let quantum_rad = COUNT_RAD / 12.0_f64.sqrt();
-        self.noise_rad = (square / f64::max(count, 1.0)).sqrt().max(quantum_rad);
+        let share: f64 = std::env::var("SHARE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.03);
+        let of_law_rad = share * self.rms_position_rad();
+        self.noise_rad = (square / f64::max(count, 1.0)).sqrt().max(quantum_rad).hypot(of_law_rad);
         Ok(())
     }
 
