@@ -32,14 +32,35 @@ fn a_recording_is_read_with_the_sign_of_its_current() {
 fn what_is_wrong_is_said_with_place_and_remedy() {
     let good = swing(COUNT_RAD, 1.0, -3);
     for (text, said) in [
-        (good.replace("goal_rad", "target"), "run.csv: line 1: no column goal_rad"),
-        (swing(COUNT_RAD, 1.0, 65_533), "line 401: current_ma = 65533: that is -3 read without its sign"),
-        (good.replace("\n0.5000,", "\n0.4900,"), "line 102: time runs backward or stands still: 0.49 s after 0.495 s"),
+        (
+            good.replace("goal_rad", "target"),
+            "run.csv: line 1: no column goal_rad",
+        ),
+        (
+            swing(COUNT_RAD, 1.0, 65_533),
+            "line 401: current_ma = 65533: that is -3 read without its sign",
+        ),
+        (
+            good.replace("\n0.5000,", "\n0.4900,"),
+            "line 102: time runs backward or stands still: 0.49 s after 0.495 s",
+        ),
         (good.replace("\n0.5000,0.0", "\n0.5000,x"), "line 102: goal_rad is `x`"),
-        (swing(5.11e-3, 1.0, -3), "another servo's scale: the positions change by 5.11 mrad at least"),
-        (swing(COUNT_RAD, 9.5, -3), "another servo's scale: the velocities are 9."),
-        (good.replace(",0.0,0.000000,", ",2048.0,2048.0,"), "that is no angle in rad"),
-        (good.lines().take(40).collect::<Vec<_>>().join("\n"), "39 readings, at least 100 are needed"),
+        (
+            swing(5.11e-3, 1.0, -3),
+            "another servo's scale: the positions change by 5.11 mrad at least",
+        ),
+        (
+            swing(COUNT_RAD, 9.5, -3),
+            "another servo's scale: the velocities are 9.",
+        ),
+        (
+            good.replace(",0.0,0.000000,", ",2048.0,2048.0,"),
+            "that is no angle in rad",
+        ),
+        (
+            good.lines().take(40).collect::<Vec<_>>().join("\n"),
+            "39 readings, at least 100 are needed",
+        ),
         (String::new(), "no column time_s"),
     ] {
         let error = read(&text).expect_err(said);
@@ -60,12 +81,28 @@ fn a_campaign_is_read_and_its_errors_have_a_line() {
     assert_eq!((read.pendulum.arm_mass_kg, read.runs[0].gain), (0.0, 400.0));
     assert_eq!(read.runs[0].recording, Path::new("here/a.csv"));
     for (from, to, said) in [
-        ("mass_kg = 0.49\n", "", "here/bench.toml: line 2: [bench] has no mass_kg: give the mass at the end of the arm, in kg"),
-        ("mass_kg = 0.49", "mass_kg = 0", "line 3: mass_kg = 0: must be from 0.0001 to 100 kg"),
+        (
+            "mass_kg = 0.49\n",
+            "",
+            "here/bench.toml: line 2: [bench] has no mass_kg: give the mass at the end of the arm, in kg",
+        ),
+        (
+            "mass_kg = 0.49",
+            "mass_kg = 0",
+            "line 3: mass_kg = 0: must be from 0.0001 to 100 kg",
+        ),
         ("position_p_gain = 400\n", "", "line 8: a run without position_p_gain"),
-        ("\"XL330-M288-T\"", "\"AX-12\"", "line 6: servo = \"AX-12\" is not known"),
+        (
+            "\"XL330-M288-T\"",
+            "\"AX-12\"",
+            "line 6: servo = \"AX-12\" is not known",
+        ),
         ("supply_v", "voltage", "line 5: unknown field `voltage`"),
-        ("[bench]\nmass_kg = 0.49\nlength_m = 0.1\nsupply_v = 7.4\nservo = \"XL330-M288-T\"\n", "", "there is no [bench]"),
+        (
+            "[bench]\nmass_kg = 0.49\nlength_m = 0.1\nsupply_v = 7.4\nservo = \"XL330-M288-T\"\n",
+            "",
+            "there is no [bench]",
+        ),
     ] {
         let error = campaign(&CAMPAIGN.replace(from, to)).expect_err(said);
         assert!(error.contains(said), "{error} for {said}");
@@ -79,7 +116,11 @@ fn the_plant_is_told_from_the_campaign() {
     let plant = |text: &str| plant_of(text, Path::new("c.toml")).map_err(|error| error.to_string());
     assert_eq!(plant(CAMPAIGN), Ok(Plant::ServoBench));
     assert_eq!(plant("[[run]]\nslope_deg = 0.0\n"), Ok(Plant::Worm));
-    assert!(plant("plant = \"rover\"").expect_err("unknown").contains("line 1: plant = \"rover\""));
+    assert!(
+        plant("plant = \"rover\"")
+            .expect_err("unknown")
+            .contains("line 1: plant = \"rover\"")
+    );
 }
 
 #[test]
@@ -92,9 +133,16 @@ fn a_model_that_was_written_is_read_as_the_same() {
         ..ServoModel::xl330_m288_t()
     };
     let text = model.to_toml();
-    assert_eq!(ServoModel::from_toml(&text, Path::new("model.toml")).expect(&text), model);
+    assert_eq!(
+        ServoModel::from_toml(&text, Path::new("model.toml")).expect(&text),
+        model
+    );
     for (from, to, said) in [
-        ("winding_ohm = 3.4000", "winding_ohm = -1", "winding_ohm = -1: must be above 0"),
+        (
+            "winding_ohm = 3.4000",
+            "winding_ohm = -1",
+            "winding_ohm = -1: must be above 0",
+        ),
         ("load-friction", "load-frictio", "did you mean `load-friction`?"),
         ("motor_share", "share", "share"),
         ("current = \"winding\"", "current = \"rotor\"", "unknown variant"),

@@ -59,6 +59,13 @@ pub struct Parameter {
     pub notable: f64,
 }
 
+impl Parameter {
+    /// Whether it is a fraction of a whole: the ends of its range are as possible as anything between them.
+    pub fn is_fraction(&self) -> bool {
+        self.unit.is_empty() && (self.min, self.max) == (0.0, 1.0)
+    }
+}
+
 /// Where a search starts in the parameters of shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ShapeStarts {

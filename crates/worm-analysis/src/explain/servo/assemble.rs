@@ -1,6 +1,6 @@
 //! The answer on a servo, put together from what was found.
 
-use super::answer::{FrictionRemainder, RunSeries, ServoAnswer, ServoFigures, ServoRun, Supply};
+use super::answer::{FrictionRemainder, RunSeries, ServoAnswer, ServoFigures, ServoRun, ServoStage, Supply};
 use super::friction_map::{map, places};
 use super::gap::{Stages, closed, mean_absolute, residual_rad};
 use super::next_experiment::propose;
@@ -44,7 +44,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
     let closure = |candidate: &Candidate| {
         let held_out = candidate.held_out.as_ref();
         let (left, open) = held_out.map_or_else(Default::default, |held_out| held_out.determined_beside(without));
-        closed(servo, (recalibrated, &open), (&candidate.fit, &left), 0.0)
+        closed(servo, (recalibrated, &open), (&candidate.fit, &left), servo.scatter_rad)
     };
     let closures: Vec<(f64, [f64; 2])> = named.iter().map(closure).collect();
     let of_wrong = selected.best_wrong.as_ref().map_or(0.0, |wrong| closure(wrong).0);
@@ -63,12 +63,24 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
         .iter()
         .enumerate()
         .map(|(place, candidate)| {
-            named_effects(&when, candidate, selected.probability[place], closures[place], margin(place))
+            named_effects(
+                &when,
+                candidate,
+                selected.probability[place],
+                closures[place],
+                margin(place),
+            )
         })
         .collect();
     let effects = of_each.first().cloned().unwrap_or_default();
     let is_new = |rival: &NamedEffect| !effects.iter().any(|effect| effect.name == rival.name);
-    let mut rivals: Vec<NamedEffect> = of_each.iter().skip(1).flatten().filter(|rival| is_new(rival)).cloned().collect();
+    let mut rivals: Vec<NamedEffect> = of_each
+        .iter()
+        .skip(1)
+        .flatten()
+        .filter(|rival| is_new(rival))
+        .cloned()
+        .collect();
     if of_each.len() > 1 && rivals.is_empty() {
         rivals = of_each[1..].concat();
     }
@@ -145,12 +157,8 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
     }
 }
 
-/// The gap in the order in which it closes: of a pair, its first effect alone comes before it.
-fn stages(
-    problem: &ServoProblem<'_, '_>,
-    parts: &Parts,
-    named: &[Candidate],
-) -> Vec<super::answer::ServoStage> {
+/// The gap in the order in which it closes: the effects of a pair alone come before it.
+fn stages(problem: &ServoProblem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Vec<ServoStage> {
     let servo = problem.plant;
     let (found, selected) = (&parts.found, &parts.found.selected);
     let measured = Stages::new(servo, &parts.folds);
@@ -167,17 +175,30 @@ fn stages(
     };
     let mut stages = vec![
         measured.stage(StageKind::Baseline, None, &found.nominal, None),
-        measured.stage(StageKind::Recalibrated, None, &parts.recalibrated, Some(&found.recalibrated_held_out)),
+        measured.stage(
+            StageKind::Recalibrated,
+            None,
+            &parts.recalibrated,
+            Some(&found.recalibrated_held_out),
+        ),
     ];
-    if let Some(first) = named.first().filter(|first| first.named().count() > 1) {
-        let of_pair = |single: &&Candidate| {
-            single.hypothesised.len() == 1 && first.hypothesised.iter().any(|one| *one == single.hypothesised[0])
-        };
-        let singles = selected.all.iter().filter(of_pair);
-        let best = singles.min_by(|a, b| a.fit.chi_squared.total_cmp(&b.fit.chi_squared));
-        stages.extend(best.map(|single| stage(StageKind::Step, single)));
-    }
-    stages.extend(selected.best_wrong.as_ref().map(|wrong| stage(StageKind::BestWrong, wrong)));
+    let is_named = |single: &Candidate| {
+        let all = named.first().map_or(&[][..], |first| &first.hypothesised);
+        single.hypothesised.iter().all(|one| all.contains(one))
+    };
+    let singles = || selected.all.iter().filter(|one| one.hypothesised.len() == 1);
+    let is_pair = named.first().is_some_and(|first| first.named().count() > 1);
+    let mut steps: Vec<ServoStage> = singles()
+        .filter(|single| is_pair && is_named(single))
+        .map(|single| stage(StageKind::Step, single))
+        .collect();
+    steps.sort_by(|a, b| b.fit_mean_absolute_error_rad.total_cmp(&a.fit_mean_absolute_error_rad));
+    stages.extend(steps);
+    // The best single effect that is no part of the answer.
+    let wrong = singles()
+        .filter(|single| !is_named(single))
+        .min_by(|a, b| a.fit.chi_squared.total_cmp(&b.fit.chi_squared));
+    stages.extend(wrong.map(|wrong| stage(StageKind::BestWrong, wrong)));
     stages.extend(named.first().map(|candidate| stage(StageKind::Named, candidate)));
     stages.push(measured.free_form(problem, &parts.recalibrated, &parts.folds));
     stages.push(measured.floor());
@@ -302,7 +323,9 @@ fn warnings(servo: &RecordedServo<'_>, fit: &Fit, folds: &Folds) -> Vec<String> 
         );
     }
     let limits = fit.hypothesis.free.iter().enumerate();
-    let at_limit = limits.filter(|(at, free)| matches!(free.what, What::Nuisance(_)) && fit.would_go_beyond(*at)).count();
+    let at_limit = limits
+        .filter(|(at, free)| matches!(free.what, What::Nuisance(_)) && fit.would_go_beyond(*at))
+        .count();
     if at_limit > 0 {
         warnings.push(format!(
             "{at_limit} of the recalibrated values lie at the end of what their priors allow: see the calibration"

@@ -6,7 +6,8 @@
 //! ```text
 //! δ = a [√ρ g(t, trajectory, gain) + √(1 − ρ) h(t, r)]
 //! ```
-//! g and h are sums of cosines in the time of the longest run, their weights falling as those of a Matérn process of correlation time τ.
+//! g and h are sums of cosines in the time of the longest run up to 3 Hz, their weights falling as those of an Ornstein-Uhlenbeck process of
+//! a short correlation time: what a model lacks shows at every frequency at which the arm moves. What is faster counts as noise.
 //! What the runs of a trajectory have in common varies with the logarithm of the gain, as a worm's with its slope.
 
 use super::recorded_servo::RecordedServo;
@@ -19,7 +20,7 @@ use std::f64::consts::PI;
 const SHARED: f64 = 0.5;
 /// Covariance over the gains: constant, and proportional to the standardised logarithm.
 const OVER_GAINS: [f64; 2] = [0.7, 0.3];
-/// Correlation time, s.
+/// Correlation time, s. Longer ones would give fast errors too much weight, and a fit would follow those instead of the arm.
 const CORRELATED_S: f64 = 0.06;
 /// Cosines for each second, and most columns in all.
 const COSINES_PER_S: f64 = 6.0;
@@ -29,14 +30,19 @@ const MOST_COLUMNS: usize = 900;
 pub(super) fn columns(servo: &RecordedServo<'_>, scale_rad: f64) -> DMatrix<f64> {
     let runs = servo.observed.len();
     let trajectories = servo.observed.iter().map(|one| one.trajectory + 1).max().unwrap_or(0);
-    let longest_s = servo.observed.iter().map(|one| one.recording.duration_s()).fold(0.0, f64::max);
+    let longest_s = servo
+        .observed
+        .iter()
+        .map(|one| one.recording.duration_s())
+        .fold(0.0, f64::max);
     let over_gains = over_gains(servo);
     let functions = over_gains.first().map_or(1, Vec::len);
     let most = MOST_COLUMNS / (runs + functions * trajectories).max(1);
     let cosines = ((COSINES_PER_S * longest_s) as usize).clamp(4, most.max(4));
     let weights = weights(cosines, longest_s);
     // Of a trajectory with a function of the gain, or of a run.
-    let shared = (0..trajectories).flat_map(|trajectory| (0..functions).map(move |function| (Some((trajectory, function)), 0)));
+    let shared =
+        (0..trajectories).flat_map(|trajectory| (0..functions).map(move |function| (Some((trajectory, function)), 0)));
     let kinds: Vec<(Option<(usize, usize)>, usize)> = shared.chain((0..runs).map(|run| (None, run))).collect();
     let all: Vec<Vec<f64>> = kinds
         .par_iter()
@@ -70,7 +76,11 @@ pub(super) fn columns(servo: &RecordedServo<'_>, scale_rad: f64) -> DMatrix<f64>
 
 /// Standard deviations of the cosines, for a variance of 1 in all.
 fn weights(cosines: usize, longest_s: f64) -> Vec<f64> {
-    let weight = |m: usize| (1.0 + (PI * m as f64 / longest_s * correlated()).powi(2)).sqrt().recip();
+    let weight = |m: usize| {
+        (1.0 + (PI * m as f64 / longest_s * CORRELATED_S).powi(2))
+            .sqrt()
+            .recip()
+    };
     let variance: f64 = (0..cosines)
         .map(|m| weight(m).powi(2) * if m == 0 { 1.0 } else { 0.5 })
         .sum();
@@ -89,5 +99,3 @@ fn over_gains(servo: &RecordedServo<'_>) -> Vec<Vec<f64>> {
     };
     values.into_iter().map(of).collect()
 }
-
-fn correlated() -> f64 { std::env::var("TAU").ok().and_then(|t| t.parse().ok()).unwrap_or(CORRELATED_S) }

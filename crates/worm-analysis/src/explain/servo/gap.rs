@@ -62,15 +62,13 @@ fn clusters(servo: &RecordedServo<'_>, all: &Fit, folds: &[&FitWithout]) -> Clus
     clusters
 }
 
-/// The fraction of the squared gap that one fit leaves open and another closes on data held out, down to noise and a discrepancy that no
-/// model is without, with its 90 % interval; `NaN` where that is within its error.
+/// The fraction of the squared gap that one fit leaves open and another closes on data held out, down to a floor, with its 90 % interval; `NaN` where that is within its error.
 pub(super) fn closed(
     servo: &RecordedServo<'_>,
     (open, open_folds): (&Fit, &[&FitWithout]),
     (left, left_folds): (&Fit, &[&FitWithout]),
-    discrepancy_rad: f64,
+    floor_rad: f64,
 ) -> (f64, [f64; 2]) {
-    let floor_rad = servo.noise_rad.hypot(discrepancy_rad);
     clusters(servo, open, open_folds).closure(&clusters(servo, left, left_folds), floor_rad)
 }
 
@@ -108,7 +106,8 @@ impl<'s, 'a> Stages<'s, 'a> {
                 .par_iter()
                 .flat_map_iter(|(fit, out)| {
                     let runs = (0..servo.runs()).filter(|&run| out[run].iter().all(|out| *out));
-                    runs.map(|run| mean_absolute(&residual_rad(servo, run, fit))).collect::<Vec<f64>>()
+                    runs.map(|run| mean_absolute(&residual_rad(servo, run, fit)))
+                        .collect::<Vec<f64>>()
                 })
                 .collect();
             (!errors.is_empty()).then(|| mean(&errors))
@@ -141,7 +140,7 @@ impl<'s, 'a> Stages<'s, 'a> {
 
     /// The noise.
     pub fn floor(&self) -> ServoStage {
-        let rad = self.servo.noise_rad;
+        let rad = self.servo.scatter_rad;
         ServoStage {
             stage: StageKind::Floor,
             effect: None,

@@ -18,6 +18,8 @@ use worm_physics::servo::COUNT_RAD;
 const IMPOSSIBLE: f64 = 1e3;
 /// Energy that changes of a run's are relative to at least, J.
 const LEAST_J: f64 = 0.5;
+/// What any model is wrong by from bin to bin, too fast for the discrepancy, as a fraction of the root mean square of the positions.
+const TOO_FAST: f64 = 0.06;
 /// Variance of the third point of three less the mean of its neighbours, times two, over that of one.
 const OF_SECOND_DIFFERENCE: f64 = 6.0;
 
@@ -31,7 +33,9 @@ impl Plant for RecordedServo<'_> {
     }
 
     fn hypotheses(&self) -> Vec<Hypothesised> {
-        SERVO_LIBRARY.map(|effect| Hypothesised::throughout(effect, None)).to_vec()
+        SERVO_LIBRARY
+            .map(|effect| Hypothesised::throughout(effect, None))
+            .to_vec()
     }
 
     /// No effect of a servo has a place but the phase of a wave.
@@ -89,8 +93,14 @@ impl Plant for RecordedServo<'_> {
         for observed in &self.observed {
             let [on, off] = [&on, &off].map(|physics| predict(observed, physics));
             let [on_j, off_j] = [&on, &off].map(|predicted| predicted.energy.electrical_j);
-            impact.energy = impact.energy.max((on_j - off_j).abs() / off_j.abs().max(LEAST_J) / limit);
-            let squares = on.angle_rad.iter().zip(&off.angle_rad).map(|(on, off)| (on - off).powi(2));
+            impact.energy = impact
+                .energy
+                .max((on_j - off_j).abs() / off_j.abs().max(LEAST_J) / limit);
+            let squares = on
+                .angle_rad
+                .iter()
+                .zip(&off.angle_rad)
+                .map(|(on, off)| (on - off).powi(2));
             let rms_rad = (squares.sum::<f64>() / on.angle_rad.len() as f64).sqrt();
             impact.position = impact.position.max(rms_rad / limit_rad);
         }
@@ -108,18 +118,18 @@ impl Plant for RecordedServo<'_> {
         left: (&Fit, &[&FitWithout]),
         discrepancy_rad: f64,
     ) -> Option<[f64; 2]> {
-        let (_, interval) = closed(self, open, left, discrepancy_rad);
+        let (_, interval) = closed(self, open, left, self.noise_rad.hypot(discrepancy_rad));
         interval.iter().all(|end| end.is_finite()).then_some(interval)
     }
 
     /// The offset of the zero angle is a nuisance and an effect.
     fn with_whole_effects(&self, mut fit: Fit) -> Fit {
         let free = &fit.hypothesis.free;
-        let nuisance = free.iter().position(|free| Nuisance::of(free.what) == Some(Nuisance::Zero));
+        let nuisance = free
+            .iter()
+            .position(|free| Nuisance::of(free.what) == Some(Nuisance::Zero));
         let effect = free.iter().position(|free| match free.what {
-            What::Effect { place, parameter: 0 } => {
-                fit.hypothesis.hypothesised[place].effect.name == "zero-offset"
-            }
+            What::Effect { place, parameter: 0 } => fit.hypothesis.hypothesised[place].effect.name == "zero-offset",
             _ => false,
         });
         if let Some((nuisance, effect)) = nuisance.zip(effect) {
@@ -128,24 +138,26 @@ impl Plant for RecordedServo<'_> {
         fit
     }
 
-    /// What no smooth discrepancy can follow: how far the residual of a bin is from the mean of its neighbours.
+    /// What no smooth discrepancy can follow: how far the residual of a bin is from the mean of its neighbours, and what any model is wrong by
+    /// that fast.
     fn measure_noise(&mut self, hypothesis: &Hypothesis, at: &[f64]) -> Result<(), ExplainError> {
         let physics = physics(&self.nominal, hypothesis, at);
         self.supply = supply::read(&self.observed, &physics);
         let (mut square, mut count) = (0.0, 0.0);
         for (run, observed) in self.observed.iter().enumerate() {
             let predicted = predict(observed, &physics);
-            let residual_rad =
-                self.binned(run, |reading| predicted.angle_rad[reading] - observed.recording.position_rad[reading]);
+            let residual_rad = self.binned(run, |reading| {
+                predicted.angle_rad[reading] - observed.recording.position_rad[reading]
+            });
             for three in residual_rad.windows(3) {
                 square += (three[0] - 2.0 * three[1] + three[2]).powi(2) / OF_SECOND_DIFFERENCE;
                 count += 1.0;
             }
         }
         let quantum_rad = COUNT_RAD / 12.0_f64.sqrt();
-        let share: f64 = std::env::var("SHARE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.03);
-        let of_law_rad = share * self.rms_position_rad();
-        self.noise_rad = (square / f64::max(count, 1.0)).sqrt().max(quantum_rad).hypot(of_law_rad);
+        let of_law_rad = TOO_FAST * self.rms_position_rad();
+        self.scatter_rad = (square / f64::max(count, 1.0)).sqrt().max(quantum_rad);
+        self.noise_rad = self.scatter_rad.hypot(of_law_rad);
         Ok(())
     }
 

@@ -16,8 +16,10 @@ use worm_physics::servo::{COUNT_RAD, ServoPhysics};
 pub(in crate::explain) struct RecordedServo<'a> {
     pub(super) observed: Vec<Observed<'a>>,
     pub(super) nominal: ServoPhysics,
-    /// Standard deviation of the mean residual of a bin, rad.
+    /// Standard deviation of the mean residual of a bin that is taken for noise, rad; and what of it is in the data: how far a bin's residual
+    /// is from the mean of its neighbours.
     pub(super) noise_rad: f64,
+    pub(super) scatter_rad: f64,
     /// What the voltages say of the supply.
     pub(super) supply: Option<SupplyReading>,
 }
@@ -32,6 +34,7 @@ impl<'a> RecordedServo<'a> {
             observed,
             nominal,
             noise_rad: COUNT_RAD,
+            scatter_rad: COUNT_RAD,
             supply: None,
         }
     }
@@ -43,7 +46,10 @@ impl<'a> RecordedServo<'a> {
 
     /// Root mean square of the positions, rad: what the discrepancy's scale is a fraction of.
     pub(super) fn rms_position_rad(&self) -> f64 {
-        let all = self.observed.iter().flat_map(|observed| &observed.recording.position_rad);
+        let all = self
+            .observed
+            .iter()
+            .flat_map(|observed| &observed.recording.position_rad);
         let (sum, count) = all.fold((0.0, 0.0), |(sum, count), rad| (sum + rad * rad, count + 1.0));
         (sum / count).sqrt()
     }
@@ -58,7 +64,11 @@ impl<'a> RecordedServo<'a> {
     /// For each kind, a mark for each run: its trajectory, and its gain.
     fn partitions(&self) -> [Vec<usize>; 2] {
         let trajectories = self.observed.iter().map(|observed| observed.trajectory).collect();
-        let gains = self.observed.iter().map(|observed| observed.gain.to_bits() as usize).collect();
+        let gains = self
+            .observed
+            .iter()
+            .map(|observed| observed.gain.to_bits() as usize)
+            .collect();
         [trajectories, gains]
     }
 }

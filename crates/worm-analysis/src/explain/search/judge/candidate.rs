@@ -70,7 +70,10 @@ impl Candidate {
         });
         let free = self.fit.hypothesis.free.iter().enumerate();
         let mut shapes = free.filter(|(_, free)| match free.what {
-            What::Effect { place, parameter } => parameter > 0 && self.trace != Some(place),
+            What::Effect { place, parameter } => {
+                let is_fraction = || self.hypothesised[place].effect.parameters[parameter].is_fraction();
+                parameter > 0 && self.trace != Some(place) && !is_fraction()
+            }
             What::Nuisance(_) => false,
         });
         is_strong && shapes.all(|(quantity, _)| !self.fit.at_limit(quantity))
