@@ -43,9 +43,10 @@ pub struct ExplainArgs {
     /// of a servo of the positions' root mean square, 0.05 unless given; 0.0005 to 0.2
     #[arg(long, value_name = "FRACTION", value_parser = |text: &str| fraction(text, 0.0005..=0.2))]
     discrepancy: Option<f64>,
-    /// Relative change of the advance or of the energy of a cycle below which an effect is not named; 0 to 0.5
-    #[arg(long, value_name = "FRACTION", default_value_t = Options::default().matters, value_parser = |text: &str| fraction(text, 0.0..=0.5))]
-    matters: f64,
+    /// Relative change below which an effect is not named: of a worm's advance or energy in a cycle, 0.02 unless given; of a servo's energy in
+    /// a run or of its positions, 0.05 unless given; 0 to 0.5
+    #[arg(long, value_name = "FRACTION", value_parser = |text: &str| fraction(text, 0.0..=0.5))]
+    matters: Option<f64>,
     /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; 0.01 to 0.5
     #[arg(long, value_name = "FRACTION", default_value_t = Options::default().expected_impact, value_parser = |text: &str| fraction(text, 0.01..=0.5))]
     expected_impact: f64,
@@ -75,7 +76,7 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     let mut progress = Progress::begin();
     let (source, dataset) = args.read(&mut progress)?;
     let folder = args.out.as_deref().map(Folder::prepare).transpose()?;
-    let mut answer = match search(&dataset, args.options(), &mut progress) {
+    let mut answer = match search(&dataset, args.options(Options::default()), &mut progress) {
         Ok(answer) => answer,
         Err((failure, stage)) => {
             if let Some(folder) = &folder {
@@ -122,11 +123,12 @@ fn fraction(text: &str, range: RangeInclusive<f64>) -> Result<f64, String> {
 }
 
 impl ExplainArgs {
-    fn options(&self) -> Options {
+    /// What is given, over the usual options of the plant.
+    fn options(&self, usual: Options) -> Options {
         Options {
             seed: self.seed,
-            discrepancy: self.discrepancy.unwrap_or(Options::default().discrepancy),
-            matters: self.matters,
+            discrepancy: self.discrepancy.unwrap_or(usual.discrepancy),
+            matters: self.matters.unwrap_or(usual.matters),
             expected_impact: self.expected_impact,
         }
     }

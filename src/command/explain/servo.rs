@@ -8,7 +8,7 @@ use std::path::Path;
 use worm_analysis::bench::BenchCampaign;
 use worm_analysis::experiment::Progress as Step;
 use worm_analysis::explain::Options;
-use worm_analysis::explain::servo::{Bench, DISCREPANCY, explain_servo, model_update};
+use worm_analysis::explain::servo::{Bench, explain_servo, model_update};
 use worm_analysis::report;
 
 /// Searches, writes and prints the answer.
@@ -18,10 +18,7 @@ pub(super) fn run(args: &ExplainArgs, campaign: &Path) -> Result<(), Failure> {
     let campaign = BenchCampaign::load(campaign).map_err(Failure::unusable)?;
     let recordings = campaign.open_all().map_err(Failure::unusable)?;
     let folder = args.out.as_deref().map(Folder::prepare).transpose()?;
-    let options = Options {
-        discrepancy: args.discrepancy.unwrap_or(DISCREPANCY),
-        ..args.options()
-    };
+    let options = args.options(Options::of_servo());
     let bench = Bench::new(&campaign, &recordings);
     let mut report_step = |step: Step| progress.tell(step.stage, step.fraction);
     let mut answer = explain_servo(&bench, &options, &mut report_step).map_err(Failure::unusable)?;

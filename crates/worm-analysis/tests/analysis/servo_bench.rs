@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::path::Path;
 use worm_analysis::bench::{BenchCampaign, BenchRun, ServoRecording};
 use worm_analysis::explain::servo::answer::ServoAnswer;
-use worm_analysis::explain::servo::{Bench, DISCREPANCY, Measures, explain_servo, prediction_errors};
+use worm_analysis::explain::servo::{Bench, Measures, explain_servo, prediction_errors};
 use worm_analysis::explain::{Options, Verdict};
 use worm_physics::effect::{Setting, named_of_servo};
 use worm_physics::servo::{COUNT_RAD, Command, LONGEST_STEP_S, SPEED_COUNT_RAD_S, ServoMotion, ServoPhysics};
@@ -19,10 +19,7 @@ fn real() -> (BenchCampaign, Vec<ServoRecording>) {
 }
 
 fn explain(campaign: &BenchCampaign, recordings: &[ServoRecording]) -> ServoAnswer {
-    let options = Options {
-        discrepancy: DISCREPANCY,
-        ..Options::default()
-    };
+    let options = Options::of_servo();
     explain_servo(&Bench::new(campaign, recordings), &options, &mut |_| ()).expect("an answer")
 }
 
@@ -176,7 +173,7 @@ fn hidden_effects_of_simulated_servos() {
         ("duty-dead-band", &[0.06]),
     ];
     for (name, values) in effects {
-        for seed in 1..=if name == "none" { 10 } else { 3 } {
+        for seed in 1..=if name == "none" { 6 } else { 2 } {
             let mut physics = off_nominal(&real.0, seed);
             if name != "none" {
                 physics = with_effect(&physics, name, values);

@@ -107,6 +107,10 @@ pub(in crate::explain) trait Plant: Recorded {
     fn settle(&mut self, hypothesis: &Hypothesis, at: &[f64]);
     /// Values from which a recalibration may reach another minimum than that at some values.
     fn another_start(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64>;
+    /// Values from which every fit is tried again, about those at which it ended: for residuals with many minima. They lie within the limits.
+    fn other_starts(&self, _hypothesis: &Hypothesis, _at: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
     /// What the discrepancy's scale is a fraction of: for a worm, the mean largest deformation of its tips, m.
     fn discrepancy_unit(&self) -> f64;
 }

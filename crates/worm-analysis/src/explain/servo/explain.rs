@@ -20,7 +20,22 @@ const COMPARED: usize = 200;
 
 /// What any model of a servo is taken to be wrong by, as a fraction of the root mean square of its positions, unless the user says
 /// otherwise. On the twelve recordings of a real servo the model of the answer leaves some 0.08, and any friction over speed and load as much.
-pub const DISCREPANCY: f64 = 0.1;
+const DISCREPANCY: f64 = 0.1;
+
+/// Relative change of the electrical energy of a run, or of its positions against their root mean square, below which an effect of a servo
+/// does not matter, unless the user says otherwise: half of what any model is wrong by.
+const MATTERS: f64 = 0.05;
+
+impl Options {
+    /// Those of a search on a servo.
+    pub fn of_servo() -> Self {
+        Self {
+            discrepancy: DISCREPANCY,
+            matters: MATTERS,
+            ..Self::default()
+        }
+    }
+}
 
 /// A servo on a bench with its recordings.
 pub struct Bench<'a> {

@@ -16,6 +16,13 @@ use worm_physics::servo::COUNT_RAD;
 
 /// Residual of a run that the servo could not have made.
 const IMPOSSIBLE: f64 = 1e3;
+/// Starts of a fit: dry friction over the nominal one, factor on the severities, fractions, and whether the other nuisances are nominal.
+const STARTS: [(f64, f64, f64, bool); 4] = [
+    (0.5, 1.0, 0.9, true),
+    (0.3, 0.5, 0.95, false),
+    (1.2, 1.3, 0.4, true),
+    (0.6, 1.0, 0.55, false),
+];
 /// Energy that changes of a run's are relative to at least, J.
 const LEAST_J: f64 = 0.5;
 /// What any model is wrong by from bin to bin, too fast for the discrepancy, as a fraction of the root mean square of the positions.
@@ -176,6 +183,32 @@ impl Plant for RecordedServo<'_> {
             _ => value,
         })
         .collect()
+    }
+
+    /// Where an arm comes to rest changes by leaps, so there are many minima: with little and with much dry friction, effects weaker and
+    /// stronger, and pressed gears at either end.
+    fn other_starts(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<Vec<f64>> {
+        let start = |&(dry, severity, fraction, is_nominal): &(f64, f64, f64, bool)| -> Vec<f64> {
+            let free = hypothesis.free.iter().zip(at);
+            free.map(|(free, &value)| {
+                let quantity = &free.quantity;
+                let start = match (free.what, Nuisance::of(free.what)) {
+                    (_, Some(Nuisance::Table(_))) => value,
+                    (_, Some(Nuisance::Dry)) => dry * quantity.centre,
+                    (_, Some(_)) if is_nominal => quantity.centre,
+                    (What::Effect { parameter: 0, .. }, _) => quantity.centre + severity * (value - quantity.centre),
+                    (What::Effect { place, parameter }, _)
+                        if hypothesis.hypothesised[place].effect.parameters[parameter].is_fraction() =>
+                    {
+                        fraction
+                    }
+                    _ => value,
+                };
+                start.clamp(quantity.min, quantity.max)
+            })
+            .collect()
+        };
+        STARTS.iter().map(start).collect()
     }
 
     fn discrepancy_unit(&self) -> f64 {
