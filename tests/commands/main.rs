@@ -12,5 +12,6 @@ mod licences;
 mod manual;
 mod mcap_python;
 mod plan;
+mod servo_bench;
 mod simulate;
 mod workspace;

@@ -9,6 +9,7 @@
 //! - an error is a text that a person can read: it is no longer than [`MAX_ERROR_LEN`];
 //! - what was accepted is consistent, and reads back the same where it can be written.
 
+mod bench;
 mod log;
 mod packets;
 mod recording;
@@ -48,7 +49,7 @@ const KIB: usize = 1024;
 const MIB: usize = 1024 * KIB;
 
 /// Every target.
-pub const TARGETS: [Target; 11] = [
+pub const TARGETS: [Target; 13] = [
     Target {
         name: "packets",
         run: packets::packets,
@@ -71,6 +72,18 @@ pub const TARGETS: [Target; 11] = [
         name: "campaign_toml",
         run: text::campaign_toml,
         memory_per_byte: 256,
+        memory_base: MIB,
+    },
+    Target {
+        name: "bench_toml",
+        run: bench::bench_toml,
+        memory_per_byte: 256,
+        memory_base: MIB,
+    },
+    Target {
+        name: "servo_csv",
+        run: bench::servo_csv,
+        memory_per_byte: 64,
         memory_base: MIB,
     },
     Target {

@@ -165,7 +165,7 @@ fn hidden_effects_of_simulated_servos() {
         ("load-friction", &[0.35, 0.7]),
         ("load-squared-friction", &[0.9, 0.5]),
         ("back-driving-friction", &[3.5]),
-        ("gear-backlash", &[0.1]),
+        ("gear-backlash", &[0.03]),
         ("gear-ripple", &[0.05, 12.0, 0.3]),
         ("supply-sag", &[1.5]),
         ("winding-heat", &[3.0, 30.0]),

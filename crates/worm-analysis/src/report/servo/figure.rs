@@ -33,7 +33,7 @@ pub(super) fn friction_map(answer: &ServoAnswer) -> Result<Figure, DrawError> {
             Key::new(Mark::Line, ACCENT, "by the model"),
         ],
         panels,
-        caption: "A row for each range of speed; across, the torque on the gears (the mean of both their ends). The torque balance takes the \
+        caption: "A row for each range of speed, from the one at its right on, in rad/s; across, the torque on the gears (the mean of both their ends). The torque balance takes the \
                   motor's constants from the model, so the dots move a little between the two pictures."
             .to_owned(),
     })
@@ -60,7 +60,7 @@ fn picture(cells: &[FrictionCell]) -> Result<Svg, DrawError> {
         rows: speeds
             .iter()
             .map(|speed| Row {
-                label: Some((format!("{}–{}", speed[0], speed[1]), INK)),
+                label: Some((format!("≥ {}", speed[0]), INK)),
                 ..Row::new(Axis::around(rows_of(speed).into_iter().flat_map(ends), 4), MAP_ROW)
             })
             .collect(),
