@@ -1,7 +1,7 @@
 //! `wormd predict`: how well a model predicts recordings, without fitting it.
 //!
-//! A worm is placed as its first samples show it, its gait is found in the positions where no phase was recorded, and everything else is the
-//! configuration's. A servo starts at its first reading, under the recorded goals, and is never reset.
+//! A worm's gait is found in the positions where no phase was recorded, where its markers lie on their cells is taken from the run, and
+//! everything else is the configuration's. A servo starts at its first reading, under the recorded goals, and is never reset.
 
 use super::dataset::plant_of;
 use super::{Failure, log_line, print};
@@ -159,20 +159,23 @@ fn predict_worm(args: &PredictArgs) -> Result<(), Failure> {
     ))
 }
 
-/// Mean absolute and root mean square error of all cells in all samples that show them, m.
+/// Mean absolute and root mean square error of all cells in all samples that show them, m: where each marker lies on its cell is not
+/// predicted, so each cell's mean error is taken off.
 fn errors_m(recording: &Recording, predicted_m: &[f64]) -> (f64, f64) {
     let cells = recording.cells();
     let (mut absolute_m, mut square_m2, mut count) = (0.0, 0.0, 0.0);
     for (cell, measured_m) in recording.position_m.iter().enumerate() {
-        for (sample, measured_m) in measured_m.iter().enumerate() {
-            let off_m = predicted_m
-                .get(sample * cells + cell)
-                .map_or(f64::NAN, |predicted_m| predicted_m - measured_m);
-            if off_m.is_finite() {
-                absolute_m += off_m.abs();
-                square_m2 += off_m * off_m;
-                count += 1.0;
-            }
+        let predicted_m = predicted_m.iter().skip(cell).step_by(cells);
+        let off_m: Vec<f64> = predicted_m
+            .zip(measured_m)
+            .map(|(predicted_m, measured_m)| predicted_m - measured_m)
+            .filter(|off_m| off_m.is_finite())
+            .collect();
+        let mean_m = off_m.iter().sum::<f64>() / off_m.len() as f64;
+        for off_m in &off_m {
+            absolute_m += (off_m - mean_m).abs();
+            square_m2 += (off_m - mean_m).powi(2);
+            count += 1.0;
         }
     }
     (absolute_m / count, f64::sqrt(square_m2 / count))

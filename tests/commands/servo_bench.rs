@@ -169,12 +169,7 @@ fn changed(lines: &[&str], column: usize, change: impl Fn(f64) -> f64) -> String
 #[test]
 fn predict_knows_how_far_a_worm_is_from_its_model() {
     let files = Workspace::new();
-    let effect = [
-        "--effect",
-        "unequal-clamping:cell=2,friction_factor=0.6",
-        "--cycles",
-        "6",
-    ];
+    let effect = ["--effect", "constant-drag:force_n=0.5", "--cycles", "6"];
     files.simulate("up.csv", "20", &effect);
     let campaign = files.write(
         "campaign.toml",
@@ -183,7 +178,7 @@ fn predict_knows_how_far_a_worm_is_from_its_model() {
     let text = std::fs::read_to_string("config/worm.toml").expect("the configuration");
     let model = files.write(
         "model.toml",
-        &format!("{text}\n[[effect]]\nname = \"unequal-clamping\"\ncell = 2\nfriction_factor = 0.6\n"),
+        &format!("{text}\n[[effect]]\nname = \"constant-drag\"\nforce_n = 0.5\n"),
     );
     let (campaign, model) = (campaign.to_str().expect("plain"), model.to_str().expect("plain"));
     let mean = |answer: &Value| answer["runs"][0]["mean_absolute_error_m"].as_f64().expect("a number");
