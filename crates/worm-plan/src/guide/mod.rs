@@ -10,6 +10,8 @@
 mod place;
 mod rules;
 mod status;
+#[cfg(test)]
+mod tests;
 
 use super::correction::Correction;
 use super::design::{Going, Workbench};
