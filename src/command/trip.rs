@@ -127,7 +127,13 @@ fn travel(args: &TripArgs, file: &Path) -> Result<(), Failure> {
     require_worm(&instance)?;
     let role = RoleLock::<Trip>::take(&instance).map_err(Failure::unusable)?;
     print::log_line(plan_text(&config, &guide, !args.one_way));
-    let last = trip::run(guide, &instance, &role, &end, print::ready)?;
+    // With --json nothing but the object is printed there.
+    let begun = || {
+        if !args.json {
+            print::ready();
+        }
+    };
+    let last = trip::run(guide, &instance, &role, &end, begun)?;
     args.print(&config, &last)?;
     if last.phase == TripPhase::Done.code() {
         Ok(())

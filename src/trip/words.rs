@@ -13,6 +13,14 @@ pub(crate) fn differs(a: &TripStatus, b: &TripStatus) -> bool {
     of(a) != of(b)
 }
 
+/// Whether it is over.
+pub(crate) fn is_over(trip: &TripStatus) -> bool {
+    matches!(
+        TripPhase::try_from(trip.phase),
+        Ok(TripPhase::Done | TripPhase::Aborted)
+    )
+}
+
 /// A change, for the log: `outbound, leg 2 of 3, 1.20 m from home: started`.
 pub(crate) fn change(trip: &TripStatus) -> String {
     let phase = TripPhase::try_from(trip.phase).map_or("?", TripPhase::name);

@@ -64,10 +64,16 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
     ])
     .areas(frame.area());
     let trip_line = picture.trip.as_ref().map(|trip| {
+        let silent_s = picture.ages.trip.unwrap_or(0) / 1000;
+        if silent_s >= 2 && !words::is_over(trip) {
+            let text =
+                format!(" the trip has been silent for {silent_s} s: its process was ended, and nothing resumes it");
+            return Line::raw(text).fg(Color::Red);
+        }
         let energy = words::energy(trip).map_or(String::new(), |energy| format!("  {energy}"));
-        Line::raw(format!(" {}{energy}", words::line(trip)))
+        Line::raw(format!(" {}{energy}", words::line(trip))).fg(Color::Blue)
     });
-    frame.render_widget(trip_line.unwrap_or_default().fg(Color::Blue), trip);
+    frame.render_widget(trip_line.unwrap_or_default(), trip);
     match view.panel {
         Panel::Overview => draw_overview(frame, below, view, &heights),
         Panel::Cell(cell) => panels::draw_cell(frame, below, picture, cell),

@@ -34,7 +34,13 @@ impl Energy {
     /// Bounds of a 90 % interval, J.
     pub(super) fn bounds_j(&self) -> [f64; 2] {
         let half_j = INTERVAL_SIGMAS * self.sigma_j;
-        [(self.mean_j - half_j).max(0.0), self.mean_j + half_j]
+        // What is not known stays so: the greater of a number and NaN is the number.
+        let low_j = if self.mean_j >= half_j {
+            self.mean_j - half_j
+        } else {
+            0.0 * self.mean_j
+        };
+        [low_j, self.mean_j + half_j]
     }
 }
 

@@ -38,7 +38,13 @@ impl Time {
 
     fn bounds_s(&self) -> [f64; 2] {
         let half_s = INTERVAL_SIGMAS * self.sigma_s;
-        [(self.mean_s - half_s).max(0.0), self.mean_s + half_s]
+        // What is not known stays so: the greater of a number and NaN is the number.
+        let low_s = if self.mean_s >= half_s {
+            self.mean_s - half_s
+        } else {
+            0.0 * self.mean_s
+        };
+        [low_s, self.mean_s + half_s]
     }
 }
 
