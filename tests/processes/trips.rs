@@ -30,7 +30,7 @@ fn out_and_home_one_at_a_time_and_whoever_holds_it_makes_it_wait() {
     let up = worm.wormd(&["up", "--plain"]).start_without_reader();
     wait_for("a worm that crawls", PATIENCE, || is_in(&worm, Mode::Crawling));
 
-    let trip = worm.wormd(&["trip", &file, "--link-loss", "continue"]).start();
+    let trip = worm.wormd(&["trip", &file, "--link-loss", "continue"]).start_silent();
     wait_for("an outbound trip", PATIENCE, || stands(&worm)["phase"] == "outbound");
     let second = worm.wormd(&["trip", &file]).output();
     let error = String::from_utf8_lossy(&second.stderr);
@@ -51,7 +51,7 @@ fn out_and_home_one_at_a_time_and_whoever_holds_it_makes_it_wait() {
     wait_for("a worm that holds", PATIENCE, || is_in(&worm, Mode::Holding));
 
     // A trip that is killed.
-    let mut trip = worm.wormd(&["trip", &file]).start();
+    let mut trip = worm.wormd(&["trip", &file]).start_silent();
     wait_for("a worm that crawls", PATIENCE, || is_in(&worm, Mode::Crawling));
     trip.kill();
     wait_for("a worm that holds", Duration::from_secs(3), || {
