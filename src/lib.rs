@@ -32,7 +32,7 @@
 //! | `dynamixel-bus` | DYNAMIXEL Protocol 2.0: packets, the bus, serial ports, a fault injector | |
 //! | `worm-estimator` | configuration (one TOML file), messages (one plain type per topic), the estimator and its alarms | `worm-physics` |
 //! | `worm-log` | the topics as an MCAP log, its replay through the estimator, and tables of it (feature `tables`) | `worm-estimator` |
-//! | `worm-plan` | trips on a battery: what a route costs, where it fails, the best design for it | `worm-estimator` |
+//! | `worm-plan` | trips on a battery: what a route costs, where it fails, the best design for it; the decisions on the way, and where a silent worm is | `worm-estimator` |
 //! | `worm-analysis` | recordings in every format; gait and parameters from positions; the paper's experiment; the search for a missing effect; reports. The feature `analysis` | `worm-log`, `worm-plan` |
 //!
 //! # The modules, bottom up
@@ -47,6 +47,7 @@
 //! | `recorder` | the process that logs the topics | `topics` |
 //! | [`latency`] | durations in histograms, where each tick's time went, the page about it | |
 //! | [`watch`] | telemetry of a running worm: gathered, as a live display fed by the relay, as a summary | `latency` |
+//! | `trip` | the process that makes a trip: the topics into the guide of `worm-plan`, its commands to the controller | `topics`, `supervisor` |
 //! | `relay` | one process that serves all watchers: history, frames, commands, one driver at a time | `topics`, `watch`, `supervisor` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
@@ -54,7 +55,7 @@
 //! | `preflight` | the checks of `wormd check` | `control`, `topics`, `realtime` |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | all |
 //!
-//! `logging`, `print` and `failure` are small helpers: summed log messages, output that never panics, errors with an exit status.
+//! `logging`, `print`, `syslog` and `failure` are small helpers: summed log messages, output that never panics, errors with an exit status.
 //!
 //! # Rules
 //! - The core is pure and takes time as an argument: [`control::Controller`], [`worm_estimator::estimate::Observer`],
@@ -81,5 +82,7 @@ mod recorder;
 mod relay;
 pub mod soak;
 mod supervisor;
+mod syslog;
 pub mod topics;
+mod trip;
 pub mod watch;

@@ -48,6 +48,8 @@ enum Subcommands {
     Study(command::study::StudyArgs),
     /// A trip on the battery: energy, time, range, where it fails, and the best design for a route
     Plan(command::plan::PlanArgs),
+    /// Make a trip along a route on board: out and home, as far as battery and link allow
+    Trip(command::trip::TripArgs),
     /// The paper's experiment on a recording: tip deformations, slides, energy, figures
     #[cfg(feature = "analysis")]
     Analyze(command::analyze::AnalyzeArgs),
@@ -116,6 +118,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
         Subcommands::Plan(args) => command::plan::run(&args),
+        Subcommands::Trip(args) => command::trip::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Analyze(args) => command::analyze::run(&args),
         #[cfg(feature = "analysis")]

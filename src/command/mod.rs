@@ -27,6 +27,7 @@ pub mod simulate;
 pub mod soak;
 pub mod status;
 pub mod study;
+pub mod trip;
 pub mod up;
 pub mod virtual_worm;
 pub mod watch;
@@ -84,13 +85,7 @@ impl WormArgs {
                 None => config.port = Some(worm_estimator::config::Port::at(path)),
             }
         }
-        let problems = config.problems();
-        if problems.is_empty() {
-            Ok((config, text))
-        } else {
-            let file = PathBuf::from("command line");
-            Err(ConfigError::Values { file, problems }.into())
-        }
+        Ok((checked(config)?, text))
     }
 
     /// The same worm as arguments for another process of it.
@@ -111,6 +106,16 @@ impl WormArgs {
         }
         arguments
     }
+}
+
+/// A configuration of which the command line has changed something.
+fn checked(config: Config) -> Result<Config, Failure> {
+    let problems = config.problems();
+    if problems.is_empty() {
+        return Ok(config);
+    }
+    let file = PathBuf::from("command line");
+    Err(ConfigError::Values { file, problems }.into())
 }
 
 /// Parses a duration in seconds.

@@ -11,7 +11,7 @@ use std::time::Duration;
 use worm_log::Channel;
 
 /// What is recorded by default.
-pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range,command";
+pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range,command,trip";
 
 /// Arguments of `wormd record`.
 #[derive(Debug, Args)]

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing};
+use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing, TripStatus};
 use worm_log::{Channel, Origin};
 
 /// Interval at which a chunk is finished and synchronised to disk: a killed recorder or a power loss costs at most this, and what is in the
@@ -29,13 +29,14 @@ pub(super) struct Batch {
     pub alarms: Vec<Alarm>,
     pub ranges: Vec<Range>,
     pub commands: Vec<CommandRecord>,
+    pub trips: Vec<TripStatus>,
 }
 
 impl Batch {
     /// How many messages.
     pub(super) fn len(&self) -> usize {
         let by_tick = self.states.len() + self.timings.len() + self.estimates.len();
-        by_tick + self.cycles.len() + self.alarms.len() + self.ranges.len() + self.commands.len()
+        by_tick + self.cycles.len() + self.alarms.len() + self.ranges.len() + self.commands.len() + self.trips.len()
     }
 }
 
@@ -127,6 +128,7 @@ fn write_batches(mut series: FileSeries, batches: &Receiver<Batch>) -> Result<Co
                 series.write(&batch.alarms)?;
                 series.write(&batch.ranges)?;
                 series.write(&batch.commands)?;
+                series.write(&batch.trips)?;
                 unsynced_since.get_or_insert_with(Instant::now);
             }
             Err(RecvTimeoutError::Timeout) => {}

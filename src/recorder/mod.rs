@@ -25,7 +25,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, RecordingProblem, State, Timing};
+use worm_estimator::message::{
+    Alarm, CommandRecord, Cycle, Estimate, Range, RecordingProblem, State, Timing, TripStatus,
+};
 use worm_log::{Channel, Logged, Origin};
 
 /// How often the topics are emptied. At 1 kHz even the fullest holds a second.
@@ -189,6 +191,7 @@ struct RecordedTopics {
     alarm: Recorded<Alarm>,
     range: Recorded<Range>,
     command: Recorded<CommandRecord>,
+    trip: Recorded<TripStatus>,
 }
 
 impl RecordedTopics {
@@ -206,6 +209,7 @@ impl RecordedTopics {
             range: subscribe(hub, topics)?,
             // Part of every recording: nobody can tell from the rest why the worm began or ended to crawl.
             command: subscribe(hub, &[Channel::CommandRecord])?,
+            trip: subscribe(hub, topics)?,
         })
     }
 
@@ -227,6 +231,7 @@ impl RecordedTopics {
             alarms: take(&mut self.alarm)?,
             ranges: take(&mut self.range)?,
             commands: take(&mut self.command)?,
+            trips: take(&mut self.trip)?,
         })
     }
 
@@ -240,6 +245,7 @@ impl RecordedTopics {
             Channel::Alarm => self.alarm.as_ref().map(Subscriber::lost),
             Channel::Range => self.range.as_ref().map(Subscriber::lost),
             Channel::CommandRecord => self.command.as_ref().map(Subscriber::lost),
+            Channel::TripStatus => self.trip.as_ref().map(Subscriber::lost),
         }
     }
 }

@@ -42,6 +42,8 @@ roles! {
     Supervisor = "supervisor",
     /// The process that serves the watchers.
     Relay = "relay",
+    /// The process that makes a trip.
+    Trip = "trip",
 }
 
 /// Another process has the role.

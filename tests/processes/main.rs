@@ -15,6 +15,7 @@ mod recording;
 mod recording_stops;
 mod service;
 mod stopping;
+mod trips;
 mod watching;
 mod worm;
 

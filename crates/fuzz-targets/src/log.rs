@@ -7,6 +7,7 @@ use worm_analysis::recording::mcap;
 use worm_estimator::config::Config;
 use worm_estimator::message::{
     Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
+    TripStatus,
 };
 use worm_log::{Log, compare, messages_from, replay};
 
@@ -45,6 +46,7 @@ pub(crate) fn log_messages(data: &[u8]) {
         log.alarms.extend(read::<Alarm>(line));
         log.ranges.extend(read::<Range>(line));
         log.commands.extend(read::<CommandRecord>(line));
+        log.trips.extend(read::<TripStatus>(line));
         read::<Timing>(line);
     }
     check(&log);
@@ -62,6 +64,7 @@ pub(crate) fn protobuf_message(data: &[u8]) {
         3 => read_bytes::<Cycle>(bytes),
         4 => read_bytes::<Alarm>(bytes),
         5 => read_bytes::<CommandRecord>(bytes),
+        6 => read_bytes::<TripStatus>(bytes),
         _ => read_bytes::<RecordingStatus>(bytes),
     }
 }

@@ -1,6 +1,6 @@
 //! Logs of a worm's topics as MCAP files: every message of its processes, to the last bit.
 //!
-//! A log has one channel for each topic (`/state`, `/timing`, `/estimate`, `/cycle`, `/alarm`, `/range`, `/command`), with messages in Protocol Buffers
+//! A log has one channel for each topic (`/state`, `/timing`, `/estimate`, `/cycle`, `/alarm`, `/range`, `/command`, `/trip`), with messages in Protocol Buffers
 //! ([`ProtobufMessage`](worm_estimator::message::ProtobufMessage)) and their descriptor, so the official readers of any language, Foxglove
 //! and PlotJuggler read it as named series. Log time is the time in the message, ns of `CLOCK_MONOTONIC`. The metadata record `wormd` gives
 //! the corresponding wall-clock time, the worm and the version that wrote the file, and the attachment `worm.toml` is the configuration. So

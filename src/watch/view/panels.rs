@@ -203,7 +203,7 @@ pub(super) fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) 
 }
 
 /// The keys.
-const KEYS: [(&str, &str); 10] = [
+const KEYS: [(&str, &str); 12] = [
     ("c", "crawl, as long as this screen is here; asks once more"),
     ("h, space", "hold; anyone may"),
     ("s", "stop: torque goes off"),
@@ -212,6 +212,8 @@ const KEYS: [(&str, &str); 10] = [
         "reset: leave a fault, permit motion despite alarms; asks once more",
     ),
     ("t", "take over from whoever drives"),
+    ("p", "the trip waits; or, twice, goes on"),
+    ("b", "the trip goes home; asks once more"),
     ("1 … 9, n", "the last minute of a cell; the next cell"),
     ("e", "where the energy of each cycle went"),
     ("a", "alarms, and what to do; k acknowledges them"),

@@ -13,6 +13,7 @@ mod drive;
 mod effect;
 mod machine;
 mod physics;
+mod trip;
 mod virtual_worm;
 mod worm;
 
@@ -26,6 +27,7 @@ pub use machine::{
     Realtime, Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;
+pub use trip::{OnLinkBack, OnLinkLoss, OnStuck, Trip};
 pub use virtual_worm::VirtualWorm;
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
 
@@ -64,6 +66,8 @@ pub struct Config {
     pub alarms: Alarms,
     /// The battery; absent: its charge is not estimated.
     pub battery: Option<Battery>,
+    /// What a trip does on its own.
+    pub trip: Trip,
     /// What the loop requests from the operating system.
     pub realtime: Realtime,
     /// Where the shared-memory topics live.
@@ -155,6 +159,7 @@ impl Config {
         if let Some(battery) = &self.battery {
             battery.check(&mut checker);
         }
+        self.trip.check(&mut checker);
         self.realtime.check(&mut checker);
         self.topics.check(&self.worm.name, &mut checker);
         self.virtual_worm.check(self.worm.cells, &mut checker);

@@ -1,7 +1,7 @@
 //! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
 //! The controller fills [`State`], [`Timing`] and [`CommandRecord`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`],
-//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the
+//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`], and a trip [`TripStatus`]. Topics carry them all without a copy, and a log holds the
 //! same values. The types are separate from the transport, so that nothing here depends on it.
 //!
 //! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, and texts of 32 bytes
@@ -27,6 +27,7 @@ mod recording;
 mod short_text;
 mod state;
 mod timing;
+mod trip;
 
 pub use alarm::{Alarm, AlarmKind, Severity};
 pub use command::{Command, CommandKind, CommandOutcome, Reply};
@@ -42,6 +43,7 @@ pub use recording::{RecordingProblem, RecordingState, RecordingStatus};
 pub use short_text::ShortText;
 pub use state::{Fault, HoldReason, Mode, State};
 pub use timing::{Culprit, Timing};
+pub use trip::{LinkLoss, TripPhase, TripReason, TripStatus};
 
 // The trait and its derive share a name, as in iceoryx2's own prelude. Taken from its parts, they do without shared memory.
 use iceoryx2_bb_derive_macros::ZeroCopySend;
@@ -188,7 +190,7 @@ macro_rules! message {
                         "title": $type_name,
                         "description": prose(concat!($($doc),+)),
                         "type": "object",
-                        "required": names,
+                        "required": names.as_slice(),
                         "properties": serde_json::Map::from_iter(fields.map(|(name, schema)| (name.to_owned(), schema))),
                     })
                 }
