@@ -32,9 +32,11 @@ def main(name: str, log: str) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main(*sys.argv[1:3])
-    except (TypeError, KeyboardInterrupt):
+    if len(sys.argv) != 3:
         sys.exit((__doc__ or "").strip())
+    try:
+        main(*sys.argv[1:])
+    except KeyboardInterrupt:
+        sys.exit("interrupted; the worm holds")
     except wormd.WormError as error:
         sys.exit(str(error))

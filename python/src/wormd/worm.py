@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -228,7 +227,7 @@ class Worm:
             topics: only these; the commands are always recorded.
             force: replace a file that is there.
         """
-        command = [find(self._program, self._instance.holder("controller")), "record", "--name", self.name]
+        command = [find(self._program, self._instance.holder("controller")), "record", "--end-with-stdin", "--name", self.name]
         command += ["--out", os.fspath(out)]
         if self._config is not None:
             command += ["--config", os.fspath(self._config)]
@@ -298,7 +297,7 @@ class Worm:
 
 
 class Recorder:
-    """``wormd record`` while a ``with`` block lasts. The log is complete when the block has ended."""
+    """``wormd record`` while a ``with`` block lasts. The log is complete when the block has ended, or the script, however it ends."""
 
     path: Path
     """The log."""
@@ -306,8 +305,8 @@ class Recorder:
     def __init__(self, command: list[str], path: Path) -> None:
         self.path = path
         pipe = subprocess.PIPE
-        # Ctrl-C ends the script, which ends the recorder in order.
-        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+        # Ctrl-C ends the script, and the end of its pipe the recorder.
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
         assert self._process.stdout is not None
         if self._process.stdout.readline() != "ready\n":
             self._finish()
@@ -325,11 +324,10 @@ class Recorder:
             ProgramFailed: it could not be written to the end, or ended before; the text says why.
         """
         if self._process.returncode is None:
-            self._process.send_signal(signal.SIGINT)
             self._finish()
 
     def _finish(self) -> None:
-        _, log = self._process.communicate()
+        _, log = self._process.communicate()  # closes its standard input
         if self._process.returncode != 0:
             raise ProgramFailed(log.strip().removeprefix("wormd: "), self._process.returncode)
 

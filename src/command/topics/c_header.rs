@@ -107,6 +107,9 @@ fn write_structure(out: &mut String, structure: &Structure) -> std::fmt::Result 
 /// What a field means, and which enumeration its code is of.
 fn about(field: &DescribedField) -> String {
     let mut text = field.documentation.replace("u32::MAX", "WORMD_NONE");
+    if field.holds == "text" {
+        text += " UTF-8; it ends with a zero, or with the array.";
+    }
     if let Some(enumeration) = field.enumeration {
         text += &format!(" A code of enum wormd_{}.", snake_case(enumeration));
     }
