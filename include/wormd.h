@@ -835,7 +835,8 @@ typedef struct wormd_command_record {
   uint32_t supervised;
   /* User ID of the sender, as the sender gave it. */
   uint32_t user;
-  /* Who sent it, as the sender says: a program, or the watcher whose command it passed on. */
+  /* Who sent it, as the sender says: a program, or the watcher whose command it passed on. UTF-8; it ends
+     with a zero, or with the array. */
   char sender[32];
 } wormd_command_record;
 
@@ -901,7 +902,8 @@ typedef struct wormd_command {
   uint32_t user;
   /* Padding to a multiple of eight bytes; zero. */
   uint32_t reserved;
-  /* Who sends it, for the record: a program, or the person on whose behalf it sends. */
+  /* Who sends it, for the record: a program, or the person on whose behalf it sends. UTF-8; it ends with a
+     zero, or with the array. */
   char sender[32];
 } wormd_command;
 

@@ -53,7 +53,7 @@ fn the_committed_files_are_what_the_binary_says() {
 
 /// Two messages in which every field has a value of its own: in the first one everything is there and known, and in the second one
 /// what may be missing is missing, and numbers are extreme or not known.
-fn messages<T: FieldAccess>() -> [T; 2] {
+fn two_messages<T: FieldAccess>() -> [T; 2] {
     const CELLS: usize = 3;
     [false, true].map(|is_second| {
         let mut message = T::empty();
@@ -108,10 +108,10 @@ fn every_field_of_every_topic_is_read_as_it_was_published() {
     macro_rules! prepare {
         ($($message:ident of $role:ident),+) => {$(
             let publisher = hub.publisher::<$message>(&$role).expect("publisher");
-            let messages = messages::<$message>();
+            let pair = two_messages::<$message>();
             let topic = <$message as wormd::topics::Topic>::NAME;
-            expected.extend(messages.iter().map(|message| json!({"topic": topic, "message": as_json(message)})));
-            publish.push(Box::new(move || messages.iter().for_each(|it| publisher.publish(it).expect("publish"))));
+            expected.extend(pair.iter().map(|message| json!({"topic": topic, "message": as_json(message)})));
+            publish.push(Box::new(move || pair.iter().for_each(|it| publisher.publish(it).expect("publish"))));
         )+};
     }
     prepare! {

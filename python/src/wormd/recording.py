@@ -194,5 +194,5 @@ def _pandas() -> Any:
         import pandas  # noqa: PLC0415, an extra
         import pyarrow  # noqa: F401, PLC0415
     except ImportError as error:
-        raise WormError('data frames need pandas and pyarrow: pip install "wormd[data]"') from error
+        raise WormError("data frames need pandas and pyarrow: pip install pandas pyarrow") from error
     return pandas
