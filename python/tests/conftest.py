@@ -22,6 +22,17 @@ from wormd import _program
 PATIENCE_S = 30.0
 PROGRAM = _program.find()
 
+CONFIG = """
+[servo]
+watchdog_ms = 2000
+[control]
+link_timeout_s = 2.0
+tracker_timeout_s = 5.0
+estimator_timeout_s = 5.0
+lease_s = 10.0
+"""
+"""A computer that runs tests may keep a worm waiting, which is not what they are about."""
+
 
 def wait_for(what: str, condition: Callable[[], object]) -> None:
     begun = time.monotonic()
@@ -36,12 +47,14 @@ class Up:
     def __init__(self, name: str, folder: Path) -> None:
         self.name = f"{name}-{os.getpid() % 100_000}"
         self.folder = folder
+        self.config = folder / "worm.toml"
+        self.config.write_text(CONFIG)
         self.process: subprocess.Popen[bytes] | None = None
         self.start()
 
     def start(self) -> None:
         log = (self.folder / f"{self.name}.log").open("ab")
-        command = [PROGRAM, "up", "--plain", "--allow-faults", "--name", self.name]
+        command = [PROGRAM, "up", "--plain", "--allow-faults", "--name", self.name, "--config", str(self.config)]
         self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
         wait_for(f"{self.name} crawls", self.is_crawling)
 
@@ -58,12 +71,16 @@ class Up:
 
     def make_crawl(self) -> None:
         """Make it crawl again by its own supervisor's lease, whatever the last test left."""
+        with self.worm() as worm:
+            if worm.latest().state.mode == wormd.Mode.FAULT:
+                wait_for("the fault is over", functools.partial(self._command, "reset"))
         for command in ("stop", "arm", "crawl"):
             wait_for(f"{command} is accepted", functools.partial(self._command, command))
         wait_for(f"{self.name} crawls", self.is_crawling)
 
     def _command(self, command: str) -> bool:
-        done = subprocess.run([PROGRAM, "command", command, "--name", self.name], capture_output=True, check=False)
+        command_line = [PROGRAM, "command", command, "--name", self.name, "--config", str(self.config)]
+        done = subprocess.run(command_line, capture_output=True, check=False)
         return done.returncode == 0
 
     def end(self) -> None:
@@ -73,8 +90,16 @@ class Up:
             self.process = None
 
 
+@pytest.fixture
+def up(session_worm: Up) -> Up:
+    """Return a worm that crawls, whatever the last test left."""
+    if not session_worm.is_crawling():
+        session_worm.make_crawl()
+    return session_worm
+
+
 @pytest.fixture(scope="session")
-def up(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Up]:
+def session_worm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Up]:
     worm = Up("pytest", tmp_path_factory.mktemp("up"))
     yield worm
     worm.end()

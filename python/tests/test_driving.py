@@ -13,6 +13,9 @@ from conftest import Up, wait_for
 
 import wormd
 
+HOLD_S = 1.25
+"""A crawl is permitted for a second at a time; a busy computer gets a quarter more."""
+
 Script = Callable[[str], "subprocess.Popen[str]"]
 
 CRAWL = "worm.crawl(0.3)\nprint('crawls', flush=True)\ntime.sleep(60)"
@@ -40,7 +43,9 @@ def seconds_to_hold(up: Up, ending: Callable[[], object]) -> float:
         ending()
         state = worm.wait_for_mode("holding")
     assert state.hold_reason in ("command", "time-limit")
-    return (state.time_ns - begun_ns) * 1e-9
+    seconds = (state.time_ns - begun_ns) * 1e-9
+    print(f"holds {seconds:.3f} s after it, for {state.hold_reason}")
+    return seconds
 
 
 def test_a_crawl_ends_with_its_block(up: Up) -> None:
@@ -59,12 +64,12 @@ def test_a_crawl_ends_with_its_block(up: Up) -> None:
 
 def test_a_killed_script_leaves_a_worm_that_holds(up: Up, script: Script) -> None:
     process = start(script, CRAWL)
-    assert seconds_to_hold(up, process.kill) < 1.0
+    assert seconds_to_hold(up, process.kill) < HOLD_S
 
 
 def test_ctrl_c_leaves_a_worm_that_holds(up: Up, script: Script) -> None:
     process = start(script, f"with worm:\n  {CRAWL.replace(chr(10), chr(10) + '  ')}")
-    assert seconds_to_hold(up, lambda: process.send_signal(signal.SIGINT)) < 1.0
+    assert seconds_to_hold(up, lambda: process.send_signal(signal.SIGINT)) < HOLD_S
     assert process.wait(5) == -signal.SIGINT
 
 
@@ -80,7 +85,7 @@ def test_ctrl_c_interrupts_a_wait_for_an_event(script: Script) -> None:
 
 def test_a_frozen_script_leaves_a_worm_that_holds(up: Up, script: Script) -> None:
     process = start(script, CRAWL)
-    assert seconds_to_hold(up, lambda: process.send_signal(signal.SIGSTOP)) < 1.5
+    assert seconds_to_hold(up, lambda: process.send_signal(signal.SIGSTOP)) < 0.75 + HOLD_S
 
 
 def test_a_killed_relay_leaves_a_worm_that_holds_and_the_next_command_finds_another(up: Up) -> None:
@@ -88,7 +93,7 @@ def test_a_killed_relay_leaves_a_worm_that_holds_and_the_next_command_finds_anot
         worm.crawl(0.3)
         relay = worm._instance.holder("relay")
         assert relay is not None
-        assert seconds_to_hold(up, lambda: os.kill(relay, signal.SIGKILL)) < 1.5
+        assert seconds_to_hold(up, lambda: os.kill(relay, signal.SIGKILL)) < HOLD_S
         assert worm.crawl(0.3).mode == "crawling"
         assert worm._instance.holder("relay") not in (None, relay)
 

@@ -15,9 +15,10 @@ pytest.importorskip("pyarrow")
 
 
 @pytest.fixture(scope="module")
-def log(up: Up, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def log(session_worm: Up, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "run.mcap"
-    with up.worm() as worm, worm.record(path):
+    session_worm.make_crawl()
+    with session_worm.worm() as worm, worm.record(path):
         list(islice(worm.cycles(timeout=20), 2))
     return path
 
@@ -38,8 +39,8 @@ def test_a_log_becomes_frames(up: Up, log: Path) -> None:
     cycles = run.cycles
     assert len(cycles) >= 2 and cycles["advance_m"].between(0.004, 0.009).all()
     assert cycles.index[-1] <= states.index[-1] + 0.5, "one clock for all frames"
-    assert len(run.estimates) > 100 and len(run.timing) >= len(states) - 2
-    assert run.alarms.empty and "kind" in run.alarms and run.range.empty and "range_m" in run.range
+    assert len(run.estimates) > 100 and len(run.timing) > 0.99 * len(states)
+    assert "kind" in run.alarms and run.range.empty and "range_m" in run.range
     assert "state" in repr(run)
 
 
