@@ -26,10 +26,11 @@ def test_the_hidden_effect_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     client.execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     text = "".join(output.text for output in outputs if output.get("name") == "stdout")
-    assert "unequal-clamping of cell 2, with a probability of" in text, text
+    assert text.count("unequal-clamping of cell 2, with a probability of") == 2, text
+    print(text)
     pictures = [output.data["image/png"] for output in outputs if "image/png" in output.get("data", {})]
     assert len(pictures) == 4
-    # To look at them.
+    # WORMD_PICTURES is a folder for who wants to look at them.
     for number, picture in enumerate(pictures):
         folder = Path(os.environ.get("WORMD_PICTURES", tmp_path))
         (folder / f"notebook-{number}.png").write_bytes(base64.b64decode(picture))
