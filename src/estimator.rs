@@ -74,6 +74,9 @@ pub(crate) fn run(
         if output.last_published.elapsed() >= HEARTBEAT {
             output.publish_heartbeat(&observer.latest()).map_err(Failure::failed)?;
         }
+        if output.admitted.elapsed() >= HEARTBEAT {
+            output.admit_late_joiners().map_err(Failure::failed)?;
+        }
     }
     Ok(())
 }
@@ -96,6 +99,8 @@ struct OutputTopics {
     alarm_event: Notifier<Alarm>,
     /// When an estimate was last published.
     last_published: Instant,
+    /// When late joiners were last admitted.
+    admitted: Instant,
 }
 
 impl OutputTopics {
@@ -107,6 +112,7 @@ impl OutputTopics {
             range: hub.publisher(role)?,
             alarm_event: hub.notifier(role)?,
             last_published: Instant::now(),
+            admitted: Instant::now(),
         })
     }
 
@@ -131,10 +137,16 @@ impl OutputTopics {
         Ok(())
     }
 
-    /// Shows that the estimator is alive, and delivers the last values of the rarely written topics to late joiners.
+    /// Shows that the estimator is alive.
     fn publish_heartbeat(&mut self, latest: &Estimate) -> Result<(), PublishError> {
         self.estimate.publish(latest)?;
         self.last_published = Instant::now();
+        Ok(())
+    }
+
+    /// Gives late joiners the last values of the topics that are rarely written.
+    fn admit_late_joiners(&mut self) -> Result<(), PublishError> {
+        self.admitted = Instant::now();
         self.cycle.idle()?;
         self.range.idle()?;
         self.alarm.idle()

@@ -40,6 +40,8 @@ enum Subcommands {
     Relay(command::relay::RelayArgs),
     /// The topics of a worm into a log (MCAP)
     Record(command::record::RecordArgs),
+    /// The topics of a worm and the messages on them, for programs in other languages
+    Topics(command::topics::TopicsArgs),
     /// Run a log through the estimator again, and compare the results
     Replay(command::replay::ReplayArgs),
     /// A log as Parquet or CSV tables, or as a complete log of one that was cut off
@@ -114,6 +116,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Watch(args) => command::watch::run(&args),
         Subcommands::Relay(args) => command::relay::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
+        Subcommands::Topics(args) => command::topics::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),

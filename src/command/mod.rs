@@ -27,6 +27,7 @@ pub mod simulate;
 pub mod soak;
 pub mod status;
 pub mod study;
+pub mod topics;
 pub mod trip;
 pub mod up;
 pub mod virtual_worm;

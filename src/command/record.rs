@@ -2,7 +2,7 @@
 
 use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
-use crate::attendance::{RoundCounter, ServiceManager, end_after_controller};
+use crate::attendance::{RoundCounter, ServiceManager, end_after_controller, end_with_parent};
 use crate::recorder::Recorder;
 use crate::topics::Instance;
 use clap::Args;
@@ -32,8 +32,11 @@ pub struct RecordArgs {
     /// Only these topics, and always the commands that the controller got
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = ALL_TOPICS)]
     topics: Vec<Channel>,
+    /// End when standard input ends: for a program that starts the recorder, whose end then completes the log
+    #[arg(long)]
+    end_with_stdin: bool,
     /// Standard input is a pipe from the process that watches over the worm
-    #[arg(long, hide = true)]
+    #[arg(long, hide = true, conflicts_with = "end_with_stdin")]
     supervised: bool,
 }
 
@@ -57,6 +60,9 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     let (config, text) = args.worm.load_with_text()?;
     let options = args.limits.file_options().map_err(Failure::unusable)?;
     let end = end_on_signal()?;
+    if args.end_with_stdin {
+        end_with_parent(&end)?;
+    }
     let rounds = RoundCounter::default();
     let _service = if args.supervised {
         end_after_controller(&Instance::of(&config).map_err(Failure::unusable)?, &end)?;

@@ -114,4 +114,4 @@ pub use role::{AlreadyRunning, Controller, Estimator, Recorder, Relay, Role, Rol
 pub use stale_resources::Peer;
 pub use start::StartError;
 pub use subscriber::{ReceiveError, Sample, Subscriber};
-pub use topic::{Announced, Topic};
+pub use topic::{Announced, Topic, TopicDescription, describe_topics};

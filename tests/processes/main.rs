@@ -11,6 +11,7 @@ mod kills;
 mod latency;
 mod leaks;
 mod leaving;
+mod python_package;
 mod recording;
 mod recording_stops;
 mod service;

@@ -10,8 +10,8 @@
 //! paper is index 0. Times are nanoseconds of `CLOCK_MONOTONIC`.
 //!
 //! Each type of a topic is declared as one table. From it come the structure, its documentation, its JSON form with a schema
-//! ([`JsonMessage`]), its Protocol Buffers form with a descriptor ([`ProtobufMessage`]), and the columns of an exported table
-//! ([`FieldAccess`]).
+//! ([`JsonMessage`]), its Protocol Buffers form with a descriptor ([`ProtobufMessage`]), the columns of an exported table
+//! ([`FieldAccess`]), and its layout in memory ([`InMemory`]), from which the types of other languages are made.
 
 mod alarm;
 mod command;
@@ -34,8 +34,8 @@ pub use command::{Command, CommandKind, CommandOutcome, Reply};
 pub use command_record::CommandRecord;
 pub use cycle::Cycle;
 pub use estimate::Estimate;
-pub use field_kind::{Codes, FieldKind, FieldValue};
-pub use fields::{Field, FieldAccess};
+pub use field_kind::{CodeValue, Codes, FieldKind, FieldValue, prose};
+pub use fields::{Field, FieldAccess, InMemory, Layout};
 pub use json::JsonMessage;
 pub use protobuf::{ProtobufError, ProtobufMessage};
 pub use range::Range;
@@ -56,11 +56,11 @@ pub struct UnknownCode(pub u32, pub &'static str);
 
 /// Declares an enumeration that crosses a topic as a `u32`, with a name for people and JSON.
 macro_rules! coded_enum {
-    ($(#[$meta:meta])* $name:ident, $what:literal { $($(#[$vmeta:meta])* $variant:ident = $code:literal => $text:literal,)+ }) => {
-        $(#[$meta])*
+    ($(#[doc = $doc:literal])+ $name:ident, $what:literal { $($(#[doc = $vdoc:literal])+ $variant:ident = $code:literal => $text:literal,)+ }) => {
+        $(#[doc = $doc])+
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[repr(u32)]
-        pub enum $name { $($(#[$vmeta])* $variant = $code,)+ }
+        pub enum $name { $($(#[doc = $vdoc])+ $variant = $code,)+ }
 
         impl $name {
             /// Every value, in the order of the codes.
@@ -92,7 +92,12 @@ macro_rules! coded_enum {
             const VALUES: &'static [Self] = Self::ALL;
             const CODES: &'static $crate::message::field_kind::Codes = &$crate::message::field_kind::Codes {
                 name: stringify!($name),
-                values: &[$(($code, $text)),+],
+                documentation: concat!($($doc),+),
+                values: &[$($crate::message::field_kind::CodeValue {
+                    code: $code,
+                    name: $text,
+                    documentation: concat!($($vdoc),+),
+                }),+],
             };
             fn name_of(self) -> &'static str { self.name() }
             fn code_of(self) -> u32 { self.code() }
@@ -105,14 +110,36 @@ macro_rules! coded_enum {
 }
 pub(crate) use coded_enum;
 
-/// Declares a message as one table: the structure that crosses the topic, its JSON form, and access to its fields one by one.
-///
-/// `made` names the field with the time, `cells` returns the number of cells in use. A field whose JSON form is not the usual one of its
-/// type names it after `as`.
-macro_rules! message {
+/// The fields of a structure, from the same rows as the structure itself.
+macro_rules! field_table {
+    ($name:ident, { $($(#[doc = $doc:literal])+ $field:ident: $type:ty $(as $form:ty)?,)+ }) => {{
+        use $crate::message::fields::Field;
+        use $crate::message::json::{Form, Plain};
+
+        macro_rules! form {
+            ($plain:ty) => { <$plain as Plain>::Form };
+            ($plain:ty, $other:ty) => { $other };
+        }
+
+        &[$(
+            Field {
+                name: stringify!($field),
+                documentation: concat!($($doc),+),
+                kind: <form!($type $(, $form)?) as Form<$type>>::KIND,
+                is_optional: <form!($type $(, $form)?) as Form<$type>>::IS_OPTIONAL,
+                offset: ::std::mem::offset_of!($name, $field),
+                size: ::std::mem::size_of::<$type>(),
+            },
+        )+]
+    }};
+}
+pub(crate) use field_table;
+
+/// Declares a structure that crosses a service as it lies in memory, and its layout.
+macro_rules! structure {
     (
         $(#[doc = $doc:literal])+
-        $name:ident = $type_name:tt, made: $made:ident, cells: $cells:expr, {
+        $name:ident = $type_name:tt, {
             $($(#[doc = $field_doc:literal])+ $field:ident: $type:ty $(as $form:ty)?,)+
         }
     ) => {
@@ -127,9 +154,39 @@ macro_rules! message {
             )+
         }
 
+        impl $crate::message::fields::InMemory for $name {
+            const LAYOUT: $crate::message::fields::Layout = $crate::message::fields::Layout {
+                name: stringify!($name),
+                type_name: $type_name,
+                documentation: concat!($($doc),+),
+                size: ::std::mem::size_of::<Self>(),
+                alignment: ::std::mem::align_of::<Self>(),
+                fields: $crate::message::field_table!($name, { $($(#[doc = $field_doc])+ $field: $type $(as $form)?,)+ }),
+            };
+        }
+    };
+}
+pub(crate) use structure;
+
+/// Declares a message as one table: the structure that crosses the topic, its JSON form, and access to its fields one by one.
+///
+/// `made` names the field with the time, `cells` returns the number of cells in use. A field whose JSON form is not the usual one of its
+/// type names it after `as`.
+macro_rules! message {
+    (
+        $(#[doc = $doc:literal])+
+        $name:ident = $type_name:tt, made: $made:ident, cells: $cells:expr, {
+            $($(#[doc = $field_doc:literal])+ $field:ident: $type:ty $(as $form:ty)?,)+
+        }
+    ) => {
+        $crate::message::structure! {
+            $(#[doc = $doc])+
+            $name = $type_name, { $($(#[doc = $field_doc])+ $field: $type $(as $form)?,)+ }
+        }
+
         const _: () = {
             use $crate::message::field_kind::{FieldValue, prose};
-            use $crate::message::fields::{Field, FieldAccess};
+            use $crate::message::fields::FieldAccess;
             use $crate::message::json::{self, Form, Plain};
 
             macro_rules! form {
@@ -200,15 +257,6 @@ macro_rules! message {
             enum Place { $($field,)+ }
 
             impl FieldAccess for $name {
-                const FIELDS: &'static [Field] = &[$(
-                    Field {
-                        name: stringify!($field),
-                        documentation: concat!($($field_doc),+),
-                        kind: <form!($type $(, $form)?) as Form<$type>>::KIND,
-                        is_optional: <form!($type $(, $form)?) as Form<$type>>::IS_OPTIONAL,
-                    },
-                )+];
-                const DOCUMENTATION: &'static str = concat!($($doc),+);
                 const TIME_FIELD: usize = Place::$made as usize;
 
                 fn empty() -> Self {
