@@ -1,10 +1,12 @@
 //! The topics: which type travels under which name, who writes it, and how much of it is kept.
 
-use super::role::{Controller, Estimator, Recorder, Role};
+use super::role::{BlackBox, Controller, Estimator, Recorder, Role};
 use super::services::{EventService, Services, TopicService};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing};
+use worm_estimator::message::{
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing,
+};
 
 /// A message that is published on a topic of its own.
 pub trait Topic: sealed::Carried {
@@ -70,6 +72,7 @@ topics! {
     Range { range, owner: Estimator, buffer: 64, history: 1, number: |range| Some(range.index) }
     CommandRecord { command, owner: Controller, buffer: 256, history: 32, number: |record| Some(record.sequence) }
     RecordingStatus { recording, owner: Recorder, buffer: 16, history: 1, number: |status| Some(status.sequence) }
+    BlackBoxStatus { black_box, owner: BlackBox, buffer: 16, history: 1, number: |status| Some(status.sequence) }
 }
 
 macro_rules! announced {

@@ -25,3 +25,4 @@ mod pauses;
 mod range;
 mod soak;
 mod stall;
+mod why;

@@ -8,6 +8,7 @@
 mod advice;
 mod alarms;
 mod battery;
+mod black_box;
 mod check;
 mod drive;
 mod effect;
@@ -19,6 +20,7 @@ mod worm;
 pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use battery::{Battery, Chemistry, MAX_CURVE_POINTS};
+pub use black_box::BlackBox;
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use machine::{
@@ -64,6 +66,8 @@ pub struct Config {
     pub alarms: Alarms,
     /// The battery; absent: its charge is not estimated.
     pub battery: Option<Battery>,
+    /// The black box; absent: there is none, unless the command line asks for one.
+    pub black_box: Option<BlackBox>,
     /// What the loop requests from the operating system.
     pub realtime: Realtime,
     /// Where the shared-memory topics live.
@@ -154,6 +158,9 @@ impl Config {
         self.alarms.check(&mut checker);
         if let Some(battery) = &self.battery {
             battery.check(&mut checker);
+        }
+        if let Some(black_box) = &self.black_box {
+            black_box.check(&mut checker);
         }
         self.realtime.check(&mut checker);
         self.topics.check(&self.worm.name, &mut checker);
