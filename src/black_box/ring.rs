@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn it_holds_its_time_and_never_more_than_its_memory() {
-        let mut writer = ChunkWriter::new().expect("a compressor");
+        let mut writer = ChunkWriter::new(0).expect("a compressor");
         let mut ring = Ring::new(60_000_000_000, 1 << 20);
         for second in 1..=1000 {
             ring.push(chunk(&mut writer, second));

@@ -122,6 +122,12 @@ pub struct LastCycles {
 /// Explains the stop with this number, from 1; without one, that of the box's event, or else the last. `trigger` is what a box was
 /// made of.
 pub fn explain_stop(log: &Log, config: &Config, trigger: Option<&Trigger>, wanted: Option<usize>) -> Explanation {
+    let mut config = config.clone();
+    // The name may have been given on the command line.
+    if let Some(worm) = log.metadata.get("worm") {
+        config.worm.name.clone_from(worm);
+    }
+    let config = &config;
     let mut all = stops(log, config);
     if let Some(trigger) = trigger
         && trigger.event == GONE

@@ -256,8 +256,8 @@ fn silences_of_tracker(states: &[State], config: &Config) -> Vec<Moment> {
         }
     };
     for state in states {
-        // While the bus is used for something else, or the servo is silent, nobody asks the tracker.
-        if state.sample_is_new == 1 || state.motor_is_new == 0 {
+        // While the servo is armed, prepared or silent, nobody asks the tracker.
+        if state.sample_is_new == 1 || state.motor_is_new == 0 || state.mode == Mode::Disarmed.code() {
             end(since_ns, state.time_ns);
             since_ns = Some(state.time_ns);
         }

@@ -5,7 +5,7 @@
 
 use super::channel::Logged;
 use super::scan::Contents;
-use super::writer::{Index, Origin, WriteError, Writer};
+use super::writer::{BEGUN_NS, Index, Origin, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
@@ -33,7 +33,6 @@ impl Chunk {
 
 /// Makes chunks of messages.
 pub struct ChunkWriter {
-    contents: Contents,
     writer: Writer<Buffer>,
     buffer: Buffer,
     span_ns: Option<[u64; 2]>,
@@ -42,19 +41,17 @@ pub struct ChunkWriter {
 }
 
 impl ChunkWriter {
-    /// A writer without messages.
+    /// A writer without messages, begun at this time, ns of `CLOCK_MONOTONIC`: that of messages that have none of their own.
     ///
     /// # Errors
     /// [`WriteError`] when the compressor cannot be set up.
-    pub fn new() -> Result<Self, WriteError> {
-        let contents = Contents::default();
-        let (writer, buffer) = begin(&contents)?;
+    pub fn new(begun_ns: u64) -> Result<Self, WriteError> {
+        let (writer, buffer) = begin(begun_ns)?;
         Ok(Self {
-            contents,
             writer,
             buffer,
             span_ns: None,
-            latest_ns: 0,
+            latest_ns: begun_ns,
             chunks: 0,
         })
     }
@@ -80,14 +77,13 @@ impl ChunkWriter {
     pub fn take(&mut self) -> Result<Option<Chunk>, WriteError> {
         self.writer.flush()?;
         let bytes = self.buffer.take();
-        let span_ns = self.span_ns.take();
+        let [first_ns, last_ns] = self.span_ns.take().unwrap_or([self.latest_ns; 2]);
+        self.latest_ns = last_ns;
         self.chunks += 1;
         if self.chunks >= CHUNKS_OF_A_WRITER {
-            (self.writer, self.buffer) = begin(&self.contents)?;
+            (self.writer, self.buffer) = begin(self.latest_ns)?;
             self.chunks = 0;
         }
-        let [first_ns, last_ns] = span_ns.unwrap_or([self.latest_ns; 2]);
-        self.latest_ns = last_ns;
         Ok((!bytes.is_empty()).then(|| Chunk {
             bytes: bytes.into(),
             first_ns,
@@ -120,7 +116,7 @@ pub fn head(origin: &Origin, records: &[(&str, BTreeMap<String, String>)]) -> Re
 /// # Errors
 /// [`WriteError`] never, as far as known.
 pub fn metadata_record(name: &str, entries: BTreeMap<String, String>) -> Result<Vec<u8>, WriteError> {
-    let (mut writer, buffer) = begin(&Contents::default())?;
+    let (mut writer, buffer) = begin(0)?;
     writer.write_metadata(name, entries)?;
     writer.flush()?;
     Ok(buffer.take())
@@ -130,9 +126,13 @@ pub fn metadata_record(name: &str, entries: BTreeMap<String, String>) -> Result<
 const IN_MEMORY: &str = "the log in memory";
 
 /// A writer whose head was written already, and thrown away.
-fn begin(contents: &Contents) -> Result<(Writer<Buffer>, Buffer), WriteError> {
+fn begin(begun_ns: u64) -> Result<(Writer<Buffer>, Buffer), WriteError> {
+    let contents = Contents {
+        metadata: [(BEGUN_NS.to_owned(), begun_ns.to_string())].into(),
+        ..Contents::default()
+    };
     let buffer = Buffer::default();
-    let writer = Writer::with_contents(buffer.clone(), Path::new(IN_MEMORY), contents, Index::Messages)?;
+    let writer = Writer::with_contents(buffer.clone(), Path::new(IN_MEMORY), &contents, Index::Messages)?;
     buffer.take();
     Ok((writer, buffer))
 }

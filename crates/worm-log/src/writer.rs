@@ -77,7 +77,7 @@ impl Origin {
 }
 
 /// The metadata with the time on `CLOCK_MONOTONIC` at which a log was begun.
-const BEGUN_NS: &str = "begun_monotonic_ns";
+pub(super) const BEGUN_NS: &str = "begun_monotonic_ns";
 
 /// Writes one log. [`Writer::finish`] adds the index; without it, the log is readable up to the last [`Writer::flush`].
 pub struct Writer<W: Write> {
