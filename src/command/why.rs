@@ -96,8 +96,13 @@ fn explain_last_cycles(args: &WhyArgs, log: &Log, config: &Config, explanation: 
 }
 
 #[cfg(not(feature = "analysis"))]
-fn explain_last_cycles(_args: &WhyArgs, _log: &Log, _config: &Config, explanation: &mut Explanation) {
-    explanation.last_cycles.why_not = Some("this wormd was built without the feature `analysis`".to_owned());
+fn explain_last_cycles(args: &WhyArgs, _log: &Log, _config: &Config, explanation: &mut Explanation) {
+    let why_not = if args.no_explain {
+        "--no-explain was given"
+    } else {
+        "this wormd was built without the feature `analysis`"
+    };
+    explanation.last_cycles.why_not = Some(why_not.to_owned());
 }
 
 #[cfg(feature = "analysis")]

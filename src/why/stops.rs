@@ -90,7 +90,7 @@ pub fn stops(log: &Log, config: &Config) -> Vec<Stop> {
 fn cause(state: &State, to: Mode, log: &Log, config: &Config) -> (Cause, Option<Alarm>) {
     let fault = Fault::try_from(state.fault).unwrap_or(Fault::None);
     if to == Mode::Fault && fault != Fault::Alarm {
-        return (Cause::Fault(fault), None);
+        return (Cause::Fault(turned_out(fault, state, log)), None);
     }
     if to == Mode::Fault {
         let Ok(kind) = AlarmKind::try_from(state.fault_alarm) else {
@@ -116,6 +116,21 @@ fn cause(state: &State, to: Mode, log: &Log, config: &Config) -> (Cause, Option<
             }
         }
         HoldReason::Command | HoldReason::None => (last_command(log, state.time_ns), None),
+    }
+}
+
+/// A servo that restarts is silent at first: its first answer changes the lost link into what it was.
+fn turned_out(fault: Fault, state: &State, log: &Log) -> Fault {
+    if fault != Fault::LinkLost {
+        return fault;
+    }
+    let later = log.states.partition_point(|other| other.time_ns <= state.time_ns);
+    let mut same_fault = log.states[later..]
+        .iter()
+        .take_while(|other| other.mode == Mode::Fault.code());
+    match same_fault.any(|other| other.fault == Fault::ServoRestarted.code()) {
+        true => Fault::ServoRestarted,
+        false => fault,
     }
 }
 

@@ -37,7 +37,7 @@ pub struct Outline {
     pub is_complete: bool,
     /// Where its last whole record ends, bytes.
     whole_bytes: u64,
-    /// Whether it may end within the index of its last chunk.
+    /// Whether it ends within the index of its last chunk.
     is_cut_in_index: bool,
     index: Index,
 }
@@ -82,7 +82,9 @@ pub fn outline(input: &mut (impl Read + Seek)) -> io::Result<Outline> {
     let mut head = [0; RECORD_HEAD as usize];
     loop {
         if length - outline.whole_bytes < RECORD_HEAD {
-            outline.is_cut_in_index = outline.whole_bytes < length;
+            // The opcode alone says what was cut off.
+            outline.is_cut_in_index =
+                outline.whole_bytes < length && read_array::<1>(&mut reader)?[0] == op::MESSAGE_INDEX;
             break;
         }
         let at = outline.whole_bytes;
