@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{Observer, ObserverOutput};
-use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State};
+use worm_estimator::message::{Alarm, BlackBoxStatus, Cycle, Estimate, Range, RecordingStatus, State};
 
 /// Longest sleep without an event from the controller; should an event get lost, its state is read this much later.
 const MAX_SLEEP: Duration = Duration::from_millis(10);
@@ -42,6 +42,7 @@ pub(crate) fn run(
     let mut observer = Observer::new(config).map_err(Failure::unusable)?;
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
     let mut recordings = hub.subscriber::<RecordingStatus>().map_err(Failure::failed)?;
+    let mut black_boxes = hub.subscriber::<BlackBoxStatus>().map_err(Failure::failed)?;
     let mut recorder_polled = Instant::now();
     let state_event = hub.listener::<State>().map_err(Failure::failed)?;
     let mut output = OutputTopics::open(hub, role).map_err(Failure::failed)?;
@@ -56,7 +57,7 @@ pub(crate) fn run(
         state_event.wait(MAX_SLEEP).map_err(Failure::failed)?;
         if recorder_polled.elapsed() >= RECORDER_POLL {
             recorder_polled = Instant::now();
-            note_recording(&mut recordings, &mut observer);
+            note_recording(&mut recordings, &mut black_boxes, &mut observer);
             if let Some(share) = gauge.as_ref().and_then(Gauge::next) {
                 observer.note_gauge(share);
             }
@@ -81,10 +82,19 @@ pub(crate) fn run(
     Ok(())
 }
 
-/// Reads the recorder's reports. One that cannot be read is one that did not come.
-fn note_recording(recordings: &mut Subscriber<RecordingStatus>, observer: &mut Observer) {
+/// Reads the reports of recorder and black box. One that cannot be read is one that did not come.
+fn note_recording(
+    recordings: &mut Subscriber<RecordingStatus>,
+    black_boxes: &mut Subscriber<BlackBoxStatus>,
+    observer: &mut Observer,
+) {
     match recordings.latest() {
         Ok(Some(status)) => observer.note_recording(&status),
+        Ok(None) => {}
+        Err(error) => tracing::debug!("{error}"),
+    }
+    match black_boxes.latest() {
+        Ok(Some(status)) => observer.note_black_box(&status),
         Ok(None) => {}
         Err(error) => tracing::debug!("{error}"),
     }

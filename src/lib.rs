@@ -45,6 +45,7 @@
 //! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | `link`, `topics`, `realtime`, `attendance` |
 //! | `estimator` | the process around the estimator | `topics`, `realtime` |
 //! | `recorder` | the process that logs the topics | `topics` |
+//! | `black_box` | the moments around alarms and faults, and a thin log of the rest; its files, for who lists and copies them | `recorder` |
 //! | [`latency`] | durations in histograms, where each tick's time went, the page about it | |
 //! | [`watch`] | telemetry of a running worm: gathered, as a live display fed by the relay, as a summary | `latency` |
 //! | `trip` | the process that makes a trip: the topics into the guide of `worm-plan`, its commands to the controller | `topics`, `supervisor` |
@@ -53,9 +54,12 @@
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
 //! | `preflight` | the checks of `wormd check` | `control`, `topics`, `realtime` |
+//! | [`why`] | why a worm stopped: the first reason, the events before it, the remedy, from any log | `black_box` |
+//! | `bundle` | everything that support needs, in one archive | `black_box`, `preflight` |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | all |
 //!
-//! `logging`, `print`, `syslog` and `failure` are small helpers: summed log messages, output that never panics, errors with an exit status.
+//! `logging`, `print`, `remedy`, `syslog` and `failure` are small helpers: summed log messages, output that never panics, what to do about an alarm,
+//! the computer's log, errors with an exit status.
 //!
 //! # Rules
 //! - The core is pure and takes time as an argument: [`control::Controller`], [`worm_estimator::estimate::Observer`],
@@ -68,6 +72,8 @@
 
 pub mod attendance;
 mod benchmark;
+mod black_box;
+mod bundle;
 pub mod command;
 pub mod control;
 mod estimator;
@@ -80,9 +86,11 @@ mod print;
 pub mod realtime;
 mod recorder;
 mod relay;
+mod remedy;
 pub mod soak;
 mod supervisor;
 mod syslog;
 pub mod topics;
 mod trip;
 pub mod watch;
+pub mod why;

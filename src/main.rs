@@ -42,6 +42,10 @@ enum Subcommands {
     Record(command::record::RecordArgs),
     /// The topics of a worm and the messages on them, for programs in other languages
     Topics(command::topics::TopicsArgs),
+    /// What the black box has kept: lists, and copies over a link that breaks
+    BlackBox(command::black_box::BlackBoxArgs),
+    /// Why a worm stopped: the first reason, what led there, and what to do, from a box or any other log
+    Why(command::why::WhyArgs),
     /// Run a log through the estimator again, and compare the results
     Replay(command::replay::ReplayArgs),
     /// A log as Parquet or CSV tables, or as a complete log of one that was cut off
@@ -70,6 +74,8 @@ enum Subcommands {
     Soak(command::soak::SoakArgs),
     /// The worms that run on this computer, and how they stand
     Status(command::status::StatusArgs),
+    /// Everything that support needs of a worm, in one archive: configuration, versions, check, last box, logs
+    Bundle(command::bundle::BundleArgs),
     /// Man pages and shell completions, for a package
     #[command(hide = true)]
     Manual(command::manual::ManualArgs),
@@ -117,6 +123,8 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Relay(args) => command::relay::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Topics(args) => command::topics::run(&args),
+        Subcommands::BlackBox(args) => command::black_box::run(&args),
+        Subcommands::Why(args) => command::why::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
@@ -132,6 +140,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::LatencyFloor(args) => command::latency_floor::run(&args),
         Subcommands::Soak(args) => command::soak::run(&args),
         Subcommands::Status(args) => command::status::run(&args),
+        Subcommands::Bundle(args) => command::bundle::run(&args),
         Subcommands::Manual(args) => command::manual::run(&args, Arguments::command()),
         Subcommands::Check(args) => command::check::run(&args),
     }

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "analysis")]
 pub mod analyze;
+pub mod black_box;
+pub mod bundle;
 pub mod check;
 pub mod control;
 #[cfg(feature = "analysis")]
@@ -32,6 +34,7 @@ pub mod trip;
 pub mod up;
 pub mod virtual_worm;
 pub mod watch;
+pub mod why;
 
 pub use crate::failure::Failure;
 pub use crate::print::{LogOutput, finish_log, log_line};

@@ -1,11 +1,11 @@
 //! The topics: which type travels under which name, who writes it, and how much of it is kept.
 
-use super::role::{Controller, Estimator, Recorder, Role, Trip};
+use super::role::{BlackBox, Controller, Estimator, Recorder, Role, Trip};
 use super::services::{EventService, Services, TopicService};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, FieldAccess, FieldValue, Layout, Range, RecordingStatus, State, Timing, TripStatus,
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldValue, Layout, Range, RecordingStatus, State, Timing, TripStatus,
 };
 
 /// A message that is published on a topic of its own.
@@ -114,6 +114,7 @@ topics! {
     CommandRecord { command, owner: Controller, buffer: 256, history: 32, number: |record| Some(record.sequence) }
     TripStatus { trip, owner: Trip, buffer: 32, history: 1, number: |trip| Some(trip.sequence) }
     RecordingStatus { recording, owner: Recorder, buffer: 16, history: 1, number: |status| Some(status.sequence) }
+    BlackBoxStatus { black_box, owner: BlackBox, buffer: 16, history: 1, number: |status| Some(status.sequence) }
 }
 
 macro_rules! announced {

@@ -10,7 +10,6 @@ mod picture;
 pub(crate) mod range;
 mod recent;
 pub(crate) mod recording;
-mod remedy;
 mod summary;
 mod telemetry;
 mod view;

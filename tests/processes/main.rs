@@ -5,6 +5,7 @@
 
 mod any_order;
 mod attending;
+mod black_box;
 mod explaining;
 mod faulting;
 mod kills;

@@ -9,7 +9,7 @@ use worm_estimator::message::{
     Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
     TripStatus,
 };
-use worm_log::{Log, compare, messages_from, replay};
+use worm_log::{Log, compare, messages_from, outline, replay};
 
 /// A log: as its messages, as a recording, and through the estimator.
 pub(crate) fn mcap_log(data: &[u8]) {
@@ -17,6 +17,9 @@ pub(crate) fn mcap_log(data: &[u8]) {
     match messages_from(Cursor::new(data), path) {
         Ok(log) => check(&log),
         Err(error) => drop(readable(error)),
+    }
+    if let Ok(held) = outline(&mut Cursor::new(data)) {
+        assert!(held.metadata.len() <= data.len(), "a record takes room");
     }
     match mcap::read_from(Cursor::new(data), path) {
         Ok(read) => assert!(read.time_s.iter().all(|time_s| time_s.is_finite()), "a time"),

@@ -1,8 +1,8 @@
 //! What can stand below the canal in the place of the overview: a cell, the energy, the alarms, the keys.
 
 use super::{TableCell, alarm_line, cell_number, fitting, number, table};
+use crate::remedy;
 use crate::watch::picture::Picture;
-use crate::watch::remedy;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};

@@ -8,6 +8,7 @@
 mod advice;
 mod alarms;
 mod battery;
+mod black_box;
 mod check;
 mod drive;
 mod effect;
@@ -20,6 +21,7 @@ mod worm;
 pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use battery::{Battery, Chemistry, MAX_CURVE_POINTS};
+pub use black_box::BlackBox;
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use machine::{
@@ -68,6 +70,8 @@ pub struct Config {
     pub battery: Option<Battery>,
     /// What a trip does on its own.
     pub trip: Trip,
+    /// The black box; absent: there is none, unless the command line asks for one.
+    pub black_box: Option<BlackBox>,
     /// What the loop requests from the operating system.
     pub realtime: Realtime,
     /// Where the shared-memory topics live.
@@ -160,6 +164,9 @@ impl Config {
             battery.check(&mut checker);
         }
         self.trip.check(&mut checker);
+        if let Some(black_box) = &self.black_box {
+            black_box.check(&mut checker);
+        }
         self.realtime.check(&mut checker);
         self.topics.check(&self.worm.name, &mut checker);
         self.virtual_worm.check(self.worm.cells, &mut checker);

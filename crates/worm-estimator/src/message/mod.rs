@@ -1,7 +1,8 @@
 //! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
 //! The controller fills [`State`], [`Timing`] and [`CommandRecord`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`],
-//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`], and a trip [`TripStatus`]. Topics carry them all without a copy, and a log holds the
+//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`], the black box [`BlackBoxStatus`], and a trip [`TripStatus`].
+//! Topics carry them all without a copy, and a log holds the
 //! same values. The types are separate from the transport, so that nothing here depends on it.
 //!
 //! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, and texts of 32 bytes
@@ -14,6 +15,7 @@
 //! ([`FieldAccess`]), and its layout in memory ([`InMemory`]), from which the types of other languages are made.
 
 mod alarm;
+mod black_box;
 mod command;
 mod command_record;
 mod cycle;
@@ -30,6 +32,7 @@ mod timing;
 mod trip;
 
 pub use alarm::{Alarm, AlarmKind, Severity};
+pub use black_box::BlackBoxStatus;
 pub use command::{Command, CommandKind, CommandOutcome, Reply};
 pub use command_record::CommandRecord;
 pub use cycle::Cycle;
