@@ -4,6 +4,8 @@
 pub mod analyze;
 pub mod check;
 pub mod control;
+#[cfg(feature = "dashboard")]
+pub mod dashboard;
 #[cfg(feature = "analysis")]
 mod dataset;
 pub mod estimate;

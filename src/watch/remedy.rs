@@ -21,6 +21,19 @@ pub(crate) fn of(kind: AlarmKind) -> String {
     without_markup(&text)
 }
 
+/// What to do about a fault of the controller; nothing where the page has no word for it.
+#[cfg(feature = "dashboard")]
+pub(crate) fn of_fault(fault: worm_estimator::message::Fault) -> String {
+    let head = format!("| `{}` |", fault.name());
+    let row = PAGE
+        .lines()
+        .skip_while(|line| *line != "## Faults of the controller")
+        .find(|line| line.starts_with(&head));
+    // Name, meaning, watched while, do.
+    let text = row.and_then(|row| row.trim_matches(['|', ' ']).split('|').nth(3));
+    without_markup(text.unwrap_or_default().trim())
+}
+
 /// Markdown without code marks, and with links as their text.
 fn without_markup(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
@@ -50,6 +63,11 @@ mod tests {
             println!("{kind}: {text}");
             assert!(text.len() > 20 && text.ends_with(['.', '?']), "{kind}: {text:?}");
             assert!(!text.contains(['`', '[', ']', '\n']), "{kind}: {text:?}");
+        }
+        #[cfg(feature = "dashboard")]
+        for &fault in worm_estimator::message::Fault::ALL {
+            let is_none = fault == worm_estimator::message::Fault::None;
+            assert_eq!(of_fault(fault).is_empty(), is_none, "{fault}: {:?}", of_fault(fault));
         }
         assert!(of(AlarmKind::MotorStall).contains("wormd command reset"));
         assert!(of(AlarmKind::ModelMismatch).ends_with("Which effect does the model miss?"));
