@@ -49,7 +49,10 @@ pub fn run(args: &DashboardArgs) -> Result<(), Failure> {
 fn serve(args: &DashboardArgs, config: worm_estimator::config::Config, instance: &Instance) -> Result<(), Failure> {
     if let Some(folder) = &args.reports {
         std::fs::read_dir(folder).map_err(|error| {
-            Failure::unusable(format!("--reports {}: {error}: give a folder with reports", folder.display()))
+            Failure::unusable(format!(
+                "--reports {}: {error}: give a folder with reports",
+                folder.display()
+            ))
         })?;
     }
     let configured = Token::configured(args.token_file.as_deref())?;

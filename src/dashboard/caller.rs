@@ -16,7 +16,7 @@ const AGENTS: [(&str, &str); 7] = [
     ("Safari/", "Safari"),
     ("curl/", "curl"),
     ("Wget/", "wget"),
-    ("python", "Python"),
+    ("ython", "Python"),
 ];
 
 /// Where it runs, the more special first.
@@ -69,7 +69,8 @@ impl Caller {
 
 /// A `User-Agent` in a word or two.
 fn agent_text(agent: &str) -> String {
-    let first = |table: &[(&str, &'static str)]| table.iter().find(|(part, _)| agent.contains(part)).map(|found| found.1);
+    let first =
+        |table: &[(&str, &'static str)]| table.iter().find(|(part, _)| agent.contains(part)).map(|found| found.1);
     match (first(&AGENTS), first(&SYSTEMS)) {
         (Some(program), Some(system)) => format!("{program}/{system}"),
         (Some(program), None) => program.to_owned(),

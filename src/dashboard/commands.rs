@@ -59,7 +59,10 @@ pub(super) async fn command(
         }
     };
     let Some(request) = request(&command, details) else {
-        return refused(StatusCode::NOT_FOUND, &format!("there is no such command: there are {COMMANDS}"));
+        return refused(
+            StatusCode::NOT_FOUND,
+            &format!("there is no such command: there are {COMMANDS}"),
+        );
     };
     let answer = match request {
         Request::Acknowledge { .. } => app.relay.anyone(caller, request).await,
@@ -69,7 +72,11 @@ pub(super) async fn command(
 }
 
 /// `POST /api/alive`: the page that drives is there.
-pub(super) async fn alive(State(app): State<Arc<App>>, Extension(peer): Extension<Peer>, headers: HeaderMap) -> Response {
+pub(super) async fn alive(
+    State(app): State<Arc<App>>,
+    Extension(peer): Extension<Peer>,
+    headers: HeaderMap,
+) -> Response {
     if let Some(refusal) = unauthorised(&app, &headers) {
         return refusal;
     }
@@ -103,7 +110,10 @@ fn request(command: &str, details: Details) -> Option<Request> {
 }
 
 fn unauthorised(app: &App, headers: &HeaderMap) -> Option<Response> {
-    let token = headers.get(AUTHORIZATION).and_then(|header| header.to_str().ok()).and_then(bearer);
+    let token = headers
+        .get(AUTHORIZATION)
+        .and_then(|header| header.to_str().ok())
+        .and_then(bearer);
     if token.is_some_and(|token| app.token.is(token)) {
         return None;
     }

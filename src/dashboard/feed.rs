@@ -291,7 +291,11 @@ impl Feed {
             worm: &picture.subject,
             samples: History::samples(&picture.history),
             cycles: picture.cycles.iter().copied().map(Json).collect(),
-            energy: picture.cycles.iter().map(|cycle| Breakdown::of(cycle, &picture.subject)).collect(),
+            energy: picture
+                .cycles
+                .iter()
+                .map(|cycle| Breakdown::of(cycle, &picture.subject))
+                .collect(),
             alarms: picture.alarms.iter().copied().map(Json).collect(),
             events: picture.events.iter().cloned().collect(),
             remedies: remedies.collect(),
@@ -307,7 +311,10 @@ impl Feed {
         };
         let cycles: Vec<_> = picture.cycles.since(seen.cycles).copied().collect();
         let extra = Extra {
-            energy: cycles.iter().map(|cycle| Breakdown::of(cycle, &picture.subject)).collect(),
+            energy: cycles
+                .iter()
+                .map(|cycle| Breakdown::of(cycle, &picture.subject))
+                .collect(),
             raised_text: picture
                 .raised
                 .iter()

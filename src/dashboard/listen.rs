@@ -46,7 +46,9 @@ fn parse(text: &str) -> Result<SocketAddr, Failure> {
 fn refusal(address: SocketAddr, error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::AddrInUse => {
-            format!("{address} is in use, by another dashboard perhaps: give another port with --listen, or 0 for any that is free")
+            format!(
+                "{address} is in use, by another dashboard perhaps: give another port with --listen, or 0 for any that is free"
+            )
         }
         io::ErrorKind::AddrNotAvailable => {
             format!("{address} is no address of this computer: `ip address` shows those that are")

@@ -94,7 +94,11 @@ pub(super) fn text(feed: &Feed, now_ns: u64, pages: usize) -> String {
 /// Whether there is anything behind the rest.
 fn source(out: &mut Text, feed: &Feed, now_ns: u64, pages: usize) {
     let ages = feed.ages(now_ns);
-    out.gauge("wormd_up", "Whether the newest state of the worm is younger than a second.", flag(feed.is_live(now_ns)));
+    out.gauge(
+        "wormd_up",
+        "Whether the newest state of the worm is younger than a second.",
+        flag(feed.is_live(now_ns)),
+    );
     out.gauges(
         "wormd_build_info",
         "Version of the dashboard, as a label.",
@@ -121,15 +125,30 @@ fn source(out: &mut Text, feed: &Feed, now_ns: u64, pages: usize) {
         "How old the newest message of a topic is, by the monotonic clock.",
         of_topics.map(|(topic, age)| (label("topic", topic), seconds_of_ms(age))),
     );
-    out.gauge("wormd_dashboard_pages", "Pages that are open at this dashboard.", pages as f64);
+    out.gauge(
+        "wormd_dashboard_pages",
+        "Pages that are open at this dashboard.",
+        pages as f64,
+    );
     if feed.frame_age_ms(now_ns).is_some_and(|age_ms| age_ms < EXPIRY_MS) {
         let picture = &feed.picture;
-        out.gauge("wormd_watchers", "Watchers of the relay; a dashboard is one, and each page that drives.", picture.watchers as f64);
-        out.gauge("wormd_driven", "Whether somebody drives.", flag(picture.driver.is_some()));
+        out.gauge(
+            "wormd_watchers",
+            "Watchers of the relay; a dashboard is one, and each page that drives.",
+            picture.watchers as f64,
+        );
+        out.gauge(
+            "wormd_driven",
+            "Whether somebody drives.",
+            flag(picture.driver.is_some()),
+        );
         out.gauges(
             "wormd_driver_attends",
             "Whether the worm crawls for as long as this driver is heard.",
-            picture.driver.iter().map(|driver| (label("driver", &driver.name), flag(driver.attends))),
+            picture
+                .driver
+                .iter()
+                .map(|driver| (label("driver", &driver.name), flag(driver.attends))),
         );
     }
 }
@@ -139,40 +158,102 @@ fn state(out: &mut Text, feed: &Feed) {
     out.gauges(
         "wormd_mode",
         "The mode of the controller: 1 for the present one.",
-        Mode::ALL.iter().map(|mode| (label("mode", mode.name()), flag(mode.code() == state.mode))),
+        Mode::ALL
+            .iter()
+            .map(|mode| (label("mode", mode.name()), flag(mode.code() == state.mode))),
     );
     out.gauges(
         "wormd_fault",
         "Why the controller stopped: 1 for the present reason.",
-        Fault::ALL.iter().map(|fault| (label("fault", fault.name()), flag(fault.code() == state.fault))),
+        Fault::ALL
+            .iter()
+            .map(|fault| (label("fault", fault.name()), flag(fault.code() == state.fault))),
     );
     out.counter("wormd_ticks_total", "Ticks of the control loop.", feed.picture.ticks());
-    out.counter("wormd_link_failures_total", "Exchanges without a usable answer of the servo.", state.link_failures);
-    out.counter("wormd_samples_missed_total", "Tracker samples that came and went between two reads.", state.samples_missed);
-    out.gauge("wormd_phase_cycles", "Gait cycles done, by the angle of the cam.", state.phase);
-    out.gauge("wormd_motor_current_amperes", "Current in the motor winding.", state.motor_current_a);
-    out.gauge("wormd_motor_velocity_radians_per_second", "Velocity of the cam.", state.motor_velocity_rad_s);
-    out.gauge("wormd_motor_temperature_celsius", "Temperature of the servo.", state.motor_temperature_c);
+    out.counter(
+        "wormd_link_failures_total",
+        "Exchanges without a usable answer of the servo.",
+        state.link_failures,
+    );
+    out.counter(
+        "wormd_samples_missed_total",
+        "Tracker samples that came and went between two reads.",
+        state.samples_missed,
+    );
+    out.gauge(
+        "wormd_phase_cycles",
+        "Gait cycles done, by the angle of the cam.",
+        state.phase,
+    );
+    out.gauge(
+        "wormd_motor_current_amperes",
+        "Current in the motor winding.",
+        state.motor_current_a,
+    );
+    out.gauge(
+        "wormd_motor_velocity_radians_per_second",
+        "Velocity of the cam.",
+        state.motor_velocity_rad_s,
+    );
+    out.gauge(
+        "wormd_motor_temperature_celsius",
+        "Temperature of the servo.",
+        state.motor_temperature_c,
+    );
     out.gauge("wormd_bus_voltage_volts", "Voltage at the servo.", state.bus_voltage_v);
     let Some(estimate) = &feed.picture.estimate else { return };
     let cells = (estimate.cell_count as usize).min(worm_physics::MAX_CELLS);
     let of_cells = |values: &[f64]| -> Vec<Labelled> {
-        values[..cells].iter().enumerate().map(|(cell, value)| (label("cell", cell + 1), *value)).collect()
+        values[..cells]
+            .iter()
+            .enumerate()
+            .map(|(cell, value)| (label("cell", cell + 1), *value))
+            .collect()
     };
-    out.gauges("wormd_position_meters", "Position of a cell along the canal.", of_cells(&estimate.position_m));
-    out.gauges("wormd_deformation_meters", "Deformation of a cell's tip.", of_cells(&estimate.deformation_m));
+    out.gauges(
+        "wormd_position_meters",
+        "Position of a cell along the canal.",
+        of_cells(&estimate.position_m),
+    );
+    out.gauges(
+        "wormd_deformation_meters",
+        "Deformation of a cell's tip.",
+        of_cells(&estimate.deformation_m),
+    );
 }
 
 fn timing(out: &mut Text, feed: &Feed) {
     if let Some(timing) = &feed.picture.timing {
-        out.counter("wormd_overruns_total", "Deadlines of the control loop that passed without a tick.", timing.overruns);
-        out.gauge("wormd_tick_period_seconds", "Period of the control loop at present.", timing.period_ns as f64 * 1e-9);
+        out.counter(
+            "wormd_overruns_total",
+            "Deadlines of the control loop that passed without a tick.",
+            timing.overruns,
+        );
+        out.gauge(
+            "wormd_tick_period_seconds",
+            "Period of the control loop at present.",
+            timing.period_ns as f64 * 1e-9,
+        );
     }
-    let Some(statistics) = &feed.picture.statistics else { return };
+    let Some(statistics) = &feed.picture.statistics else {
+        return;
+    };
     for (name, help, us) in [
-        ("wormd_wake_lateness_seconds", "How long after its deadline a tick begins, since the relay began.", statistics.wake_us),
-        ("wormd_bus_exchange_seconds", "How long the exchange on the bus takes, since the relay began.", statistics.bus_us),
-        ("wormd_compute_seconds", "How long a tick computes, since the relay began.", statistics.compute_us),
+        (
+            "wormd_wake_lateness_seconds",
+            "How long after its deadline a tick begins, since the relay began.",
+            statistics.wake_us,
+        ),
+        (
+            "wormd_bus_exchange_seconds",
+            "How long the exchange on the bus takes, since the relay began.",
+            statistics.bus_us,
+        ),
+        (
+            "wormd_compute_seconds",
+            "How long a tick computes, since the relay began.",
+            statistics.compute_us,
+        ),
     ] {
         let quantiles = [
             ("0.5", us.p50),
@@ -181,9 +262,18 @@ fn timing(out: &mut Text, feed: &Feed) {
             ("0.999", us.p99_9),
             ("1", us.max),
         ];
-        out.metric("summary", name, help, quantiles.map(|(quantile, us)| (label("quantile", quantile), us * 1e-6)));
+        out.metric(
+            "summary",
+            name,
+            help,
+            quantiles.map(|(quantile, us)| (label("quantile", quantile), us * 1e-6)),
+        );
     }
-    out.counter("wormd_host_pauses_total", "Pauses of the computer since the relay began.", statistics.host_pauses);
+    out.counter(
+        "wormd_host_pauses_total",
+        "Pauses of the computer since the relay began.",
+        statistics.host_pauses,
+    );
     out.metric(
         "counter",
         "wormd_host_paused_seconds_total",
@@ -197,11 +287,21 @@ fn alarms(out: &mut Text, feed: &Feed) {
         return;
     };
     for (name, help, mask) in [
-        ("wormd_alarm_raised", "Whether an alarm is raised.", estimate.raised_mask),
+        (
+            "wormd_alarm_raised",
+            "Whether an alarm is raised.",
+            estimate.raised_mask,
+        ),
         ("wormd_alarm_armed", "Whether an alarm watches.", estimate.armed_mask),
-        ("wormd_alarm_acknowledged", "Whether somebody has acknowledged an alarm that is raised.", state.acknowledged_mask),
+        (
+            "wormd_alarm_acknowledged",
+            "Whether somebody has acknowledged an alarm that is raised.",
+            state.acknowledged_mask,
+        ),
     ] {
-        let of_kinds = AlarmKind::ALL.iter().map(|kind| (label("alarm", kind.name()), flag(mask >> kind.code() & 1 == 1)));
+        let of_kinds = AlarmKind::ALL
+            .iter()
+            .map(|kind| (label("alarm", kind.name()), flag(mask >> kind.code() & 1 == 1)));
         out.gauges(name, help, of_kinds);
     }
 }
@@ -210,9 +310,21 @@ fn last_cycle(out: &mut Text, feed: &Feed) {
     let picture = &feed.picture;
     let Some(cycle) = picture.cycles.last() else { return };
     let energy = Breakdown::of(cycle, &picture.subject);
-    out.counter("wormd_cycles_total", "Gait cycles since crawling began.", cycle.index + 1);
-    out.gauge("wormd_cycle_duration_seconds", "How long the last gait cycle took.", cycle.duration_s);
-    out.gauge("wormd_cycle_advance_meters", "Distance of the last gait cycle.", cycle.advance_m);
+    out.counter(
+        "wormd_cycles_total",
+        "Gait cycles since crawling began.",
+        cycle.index + 1,
+    );
+    out.gauge(
+        "wormd_cycle_duration_seconds",
+        "How long the last gait cycle took.",
+        cycle.duration_s,
+    );
+    out.gauge(
+        "wormd_cycle_advance_meters",
+        "Distance of the last gait cycle.",
+        cycle.advance_m,
+    );
     out.gauges(
         "wormd_cycle_energy_joules",
         "Where the electrical energy of the last gait cycle went: copper, gears, sliding, weight.",
@@ -224,8 +336,16 @@ fn last_cycle(out: &mut Text, feed: &Feed) {
         ]
         .map(|(part, energy_j)| (label("part", part), energy_j)),
     );
-    out.gauge("wormd_cycle_electrical_energy_joules", "Electrical energy of the last gait cycle.", energy.electrical_j);
-    out.gauge("wormd_cycle_cost_of_transport_ratio", "Positive work of the last gait cycle over weight and distance.", cycle.cot);
+    out.gauge(
+        "wormd_cycle_electrical_energy_joules",
+        "Electrical energy of the last gait cycle.",
+        energy.electrical_j,
+    );
+    out.gauge(
+        "wormd_cycle_cost_of_transport_ratio",
+        "Positive work of the last gait cycle over weight and distance.",
+        cycle.cot,
+    );
 }
 
 fn range(out: &mut Text, feed: &Feed) {
@@ -233,7 +353,11 @@ fn range(out: &mut Text, feed: &Feed) {
     let bounds = |low: f64, expected: f64, high: f64| {
         [("low", low), ("expected", expected), ("high", high)].map(|(bound, value)| (label("bound", bound), value))
     };
-    out.gauge("wormd_battery_charge_ratio", "Share of the battery's energy that is left.", range.charge_share);
+    out.gauge(
+        "wormd_battery_charge_ratio",
+        "Share of the battery's energy that is left.",
+        range.charge_share,
+    );
     out.gauges(
         "wormd_range_meters",
         "How far the battery lasts, with its 90 % interval.",
@@ -251,8 +375,18 @@ fn recording(out: &mut Text, feed: &Feed) {
     out.gauges(
         "wormd_recording_state",
         "What the recorder does: 1 for the present state.",
-        RecordingState::ALL.iter().map(|state| (label("state", state.name()), flag(state.code() == status.state))),
+        RecordingState::ALL
+            .iter()
+            .map(|state| (label("state", state.name()), flag(state.code() == status.state))),
     );
-    out.counter("wormd_recording_bytes_total", "Bytes written by the recorder.", status.bytes);
-    out.counter("wormd_recording_messages_lost_total", "Messages that did not arrive at the recorder.", status.messages_lost);
+    out.counter(
+        "wormd_recording_bytes_total",
+        "Bytes written by the recorder.",
+        status.bytes,
+    );
+    out.counter(
+        "wormd_recording_messages_lost_total",
+        "Messages that did not arrive at the recorder.",
+        status.messages_lost,
+    );
 }

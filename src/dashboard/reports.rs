@@ -83,14 +83,23 @@ fn report(page: &Path, name: &str) -> Option<Report> {
     let mut head = Vec::new();
     fs::File::open(page).ok()?.take(4096).read_to_end(&mut head).ok()?;
     let head = String::from_utf8_lossy(&head);
-    let title = head.split_once("<title>").and_then(|(_, rest)| rest.split_once("</title>"));
+    let title = head
+        .split_once("<title>")
+        .and_then(|(_, rest)| rest.split_once("</title>"));
     let folder = name.trim_end_matches('/');
     let name = if folder.is_empty() { "." } else { folder };
     Some(Report {
         title: title.map_or(name, |(title, _)| title).trim().to_owned(),
         name: name.to_owned(),
         modified_s: modified.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()),
-        url: format!("/reports/{}{PAGE}", if folder.is_empty() { String::new() } else { format!("{folder}/") }),
+        url: format!(
+            "/reports/{}{PAGE}",
+            if folder.is_empty() {
+                String::new()
+            } else {
+                format!("{folder}/")
+            }
+        ),
     })
 }
 
@@ -127,7 +136,10 @@ fn descend(root: &Path, wanted: &str) -> Option<PathBuf> {
     let step = |folder: &Path, name: &str, is_right: fn(&fs::FileType) -> bool| {
         let mut entries = entries(folder);
         let entry = entries.find(|entry| plain_name(entry).as_deref() == Some(name))?;
-        entry.file_type().is_ok_and(|kind| is_right(&kind)).then(|| entry.path())
+        entry
+            .file_type()
+            .is_ok_and(|kind| is_right(&kind))
+            .then(|| entry.path())
     };
     let mut folder = root.to_path_buf();
     for name in folders {
@@ -173,7 +185,10 @@ mod tests {
         std::os::unix::fs::symlink(folder.path().join("secret.html"), root.join("why/link.html")).expect("a link");
 
         let reports = list(&root).expect("can be listed");
-        let mut names: Vec<_> = reports.iter().map(|report| (report.name.as_str(), report.title.as_str())).collect();
+        let mut names: Vec<_> = reports
+            .iter()
+            .map(|report| (report.name.as_str(), report.title.as_str()))
+            .collect();
         names.sort_unstable();
         assert_eq!(names, [("why", "Why it slips"), ("why/run-1", "why/run-1")]);
         for (wanted, is_there) in [

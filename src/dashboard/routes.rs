@@ -9,8 +9,8 @@ use axum::Router;
 use axum::body::Body;
 use axum::extract::{DefaultBodyLimit, Path, Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, HOST, HeaderName, IF_NONE_MATCH, ORIGIN, REFERRER_POLICY,
-    X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, HOST, HeaderName, IF_NONE_MATCH, ORIGIN,
+    REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
@@ -73,7 +73,12 @@ pub(super) fn router(app: Arc<App>) -> Router {
         .route("/api/alive", post(commands::alive))
         .route("/reports/{*path}", get(open_report))
         .route("/metrics", get(metrics_text))
-        .fallback(async || refused(StatusCode::NOT_FOUND, "there is nothing here; docs/dashboard.md says what there is"))
+        .fallback(async || {
+            refused(
+                StatusCode::NOT_FOUND,
+                "there is nothing here; docs/dashboard.md says what there is",
+            )
+        })
         .layer(DefaultBodyLimit::max(MAX_BODY))
         .layer(from_fn_with_state(Arc::clone(&app), guard))
         .with_state(app)
@@ -105,7 +110,10 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
     headers.insert(X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
     headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     let same_origin = HeaderValue::from_static("same-origin");
-    headers.insert(HeaderName::from_static("cross-origin-resource-policy"), same_origin.clone());
+    headers.insert(
+        HeaderName::from_static("cross-origin-resource-policy"),
+        same_origin.clone(),
+    );
     headers.insert(HeaderName::from_static("cross-origin-opener-policy"), same_origin);
     response
 }
@@ -136,7 +144,9 @@ async fn asset_of(Path(path): Path<String>, headers: HeaderMap) -> Response {
 /// A file of the page. A browser keeps it, and asks each time whether it is still the same.
 fn asset(asset: &Asset, headers: &HeaderMap) -> Response {
     let tag = asset.tag();
-    let is_known = headers.get(IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes());
+    let is_known = headers
+        .get(IF_NONE_MATCH)
+        .is_some_and(|known| known.as_bytes() == tag.as_bytes());
     let head = [
         (CONTENT_TYPE, asset.content_type.to_owned()),
         (CACHE_CONTROL, "no-cache".to_owned()),
@@ -167,7 +177,10 @@ async fn state(State(app): State<Arc<App>>) -> Response {
         Some(text) => ([(CONTENT_TYPE, "application/json")], text).into_response(),
         None => {
             let problem = feed.connection().problem.as_deref();
-            refused(StatusCode::SERVICE_UNAVAILABLE, problem.unwrap_or("nothing was heard of the worm yet"))
+            refused(
+                StatusCode::SERVICE_UNAVAILABLE,
+                problem.unwrap_or("nothing was heard of the worm yet"),
+            )
         }
     }
 }
@@ -224,7 +237,9 @@ async fn open_report(State(app): State<Arc<App>>, Path(wanted): Path<String>) ->
 }
 
 /// Disks may be slow: the pages do not wait for them.
-async fn in_background<T: Send + 'static>(work: impl FnOnce() -> std::io::Result<T> + Send + 'static) -> Result<T, String> {
+async fn in_background<T: Send + 'static>(
+    work: impl FnOnce() -> std::io::Result<T> + Send + 'static,
+) -> Result<T, String> {
     match tokio::task::spawn_blocking(work).await {
         Ok(outcome) => outcome.map_err(|error| error.to_string()),
         Err(error) => Err(error.to_string()),

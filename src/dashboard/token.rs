@@ -110,11 +110,22 @@ mod tests {
         assert_eq!(text.len(), 32);
         assert_ne!(Some(text.as_str()), Token::random().expect("again").to_tell());
         assert!(token.is(&text));
-        for wrong in ["", &text[1..], &format!("{text}0"), &text.to_uppercase().replace('0', "1")] {
+        for wrong in [
+            "",
+            &text[1..],
+            &format!("{text}0"),
+            &text.to_uppercase().replace('0', "1"),
+        ] {
             assert!(!token.is(wrong), "{wrong:?}");
         }
         assert!(!format!("{token:?}").contains(&text));
-        for unusable in ["", "short", "with a space in it, long", "fünfzehn-und-mehr", &"x".repeat(257)] {
+        for unusable in [
+            "",
+            "short",
+            "with a space in it, long",
+            "fünfzehn-und-mehr",
+            &"x".repeat(257),
+        ] {
             let refusal = Token::new(unusable, "the file").expect_err(unusable).to_string();
             assert!(refusal.starts_with("the file: a token has 16 to 256"), "{refusal}");
             assert!(unusable.is_empty() || !refusal.contains(unusable), "it is not printed");

@@ -36,6 +36,7 @@ const stream = new Stream({
 });
 
 let isDrawingDue = false;
+let hasDrawn = false;
 let slowMs = -Infinity;
 
 /** Draws with the next picture of the screen, once for all that came. */
@@ -52,6 +53,11 @@ function draw() {
   if (!store.worm) return;
   panels.drawHead(store, driver);
   if (store.frame) picture.draw(store.worm, store.frame);
+  if (store.frame && !hasDrawn) {
+    hasDrawn = true;
+    // For whoever measures how long the first picture takes.
+    performance.mark("first-picture");
+  }
   const nowMs = performance.now();
   if (store.frame && nowMs - slowMs >= SLOW_MS) {
     slowMs = nowMs;
