@@ -50,6 +50,7 @@
 //! | [`watch`] | telemetry of a running worm: gathered, as a live display fed by the relay, as a summary | `latency` |
 //! | `trip` | the process that makes a trip: the topics into the guide of `worm-plan`, its commands to the controller | `topics`, `supervisor` |
 //! | `relay` | one process that serves all watchers: history, frames, commands, one driver at a time | `topics`, `watch`, `supervisor` |
+//! | `dashboard` | the worm in a browser: an HTTP server between the relay and any number of pages. The feature `dashboard` | `relay`, `watch` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
@@ -76,6 +77,8 @@ mod black_box;
 mod bundle;
 pub mod command;
 pub mod control;
+#[cfg(feature = "dashboard")]
+mod dashboard;
 mod estimator;
 mod failure;
 pub mod latency;

@@ -36,6 +36,9 @@ enum Subcommands {
     Command(command::send_command::SendCommandArgs),
     /// A running worm in a terminal, with keys to crawl, hold, stop and reset
     Watch(command::watch::WatchArgs),
+    /// A running worm in a browser, for anyone to watch and halt, and for one to drive
+    #[cfg(feature = "dashboard")]
+    Dashboard(command::dashboard::DashboardArgs),
     /// Serves the watchers of a worm; they start it by themselves
     Relay(command::relay::RelayArgs),
     /// The topics of a worm into a log (MCAP)
@@ -120,6 +123,8 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Fault(args) => command::fault::run(&args),
         Subcommands::Command(args) => command::send_command::run(&args),
         Subcommands::Watch(args) => command::watch::run(&args),
+        #[cfg(feature = "dashboard")]
+        Subcommands::Dashboard(args) => command::dashboard::run(&args),
         Subcommands::Relay(args) => command::relay::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Topics(args) => command::topics::run(&args),

@@ -6,6 +6,8 @@ pub mod black_box;
 pub mod bundle;
 pub mod check;
 pub mod control;
+#[cfg(feature = "dashboard")]
+pub mod dashboard;
 #[cfg(feature = "analysis")]
 mod dataset;
 pub mod estimate;

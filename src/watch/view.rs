@@ -4,7 +4,7 @@ mod canal;
 mod panels;
 
 use super::picture::Picture;
-use super::{mismatch, recording};
+use super::{alarm_text, recording};
 use crate::relay::wire::Subject;
 use crate::trip::words;
 use ratatui::Frame;
@@ -333,23 +333,12 @@ fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
 }
 
 fn alarm_line(alarm: &Alarm, subject: &Subject) -> Line<'static> {
-    let name = AlarmKind::try_from(alarm.kind).map_or("?", AlarmKind::name);
-    let cell = if alarm.cell == u32::MAX {
-        String::new()
-    } else {
-        format!(" cell {}", alarm.cell + 1)
-    };
     let colour = if alarm.severity == Severity::Critical.code() {
         Color::Red
     } else {
         Color::Yellow
     };
-    let words = mismatch::text_of(alarm, &subject.step_order).or_else(|| recording::alarm_text(alarm));
-    let text = words.map_or_else(
-        || format!("{name}{cell}: {:.4} against {:.4}", alarm.value, alarm.threshold),
-        |what| format!("{name}: {what}"),
-    );
-    Line::from(text).fg(colour).bold()
+    Line::from(alarm_text::of(alarm, subject)).fg(colour).bold()
 }
 
 fn draw_cycles(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
