@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
-use worm_estimator::config::{BlackBox as Settings, Config};
+use worm_estimator::config::Config;
 use worm_log::{Channel, Origin, WriteError};
 
 /// Looks at the topics that may wait for the disk: 10 s of them. Beyond that the topics are not read, and in time lose their oldest messages.
@@ -49,7 +49,7 @@ impl BlackBox {
     /// [`Failure::Unusable`] for a worm that has a black box already, and a folder that cannot be used; [`Failure::Failed`] when the topics fail.
     pub(crate) fn open(config: &Config, text: Option<String>, folder: &Path) -> Result<Self, Failure> {
         let instance = Instance::of(config).map_err(Failure::unusable)?;
-        let settings = config.black_box.clone().unwrap_or_else(Settings::default);
+        let settings = config.black_box.clone().unwrap_or_default();
         let now = now();
         let origin = Origin {
             worm: config.worm.name.clone(),

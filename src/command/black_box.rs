@@ -52,7 +52,8 @@ struct ListArgs {
 #[derive(Debug, Args)]
 struct GetArgs {
     /// The box: its name or number from the list, or "last"
-    name: String,
+    #[arg(value_name = "NAME")]
+    file: String,
     /// Where the copy goes; a partial one (FILE.part) is gone on with, and its checksum is verified
     #[arg(long, value_name = "FILE", conflicts_with = "offset")]
     out: Option<PathBuf>,
@@ -69,7 +70,8 @@ struct GetArgs {
 #[derive(Debug, Args)]
 struct ChecksumArgs {
     /// The box: its name or number from the list, or "last"
-    name: String,
+    #[arg(value_name = "NAME")]
+    file: String,
     #[command(flatten)]
     place: PlaceArgs,
 }
@@ -83,7 +85,7 @@ pub fn run(args: &BlackBoxArgs) -> Result<(), Failure> {
         Action::List(args) => list(args),
         Action::Get(args) => get(args),
         Action::Checksum(args) => {
-            let path = args.place.find(&args.name)?;
+            let path = args.place.find(&args.file)?;
             let sum = checksum(&path).map_err(|error| unreadable(&path, &error))?;
             print::line(serde_json::to_string(&sum).map_err(Failure::failed)?)
         }
@@ -178,7 +180,7 @@ fn utc_text(unix_ns: u64) -> String {
 
 fn get(args: &GetArgs) -> Result<(), Failure> {
     let Some(out) = &args.out else {
-        let path = args.place.find(&args.name)?;
+        let path = args.place.find(&args.file)?;
         let mut input = open_from(&path, args.offset).map_err(|error| unreadable(&path, &error))?;
         let mut stdout = io::stdout().lock();
         return io::copy(&mut input, &mut stdout)
@@ -188,13 +190,13 @@ fn get(args: &GetArgs) -> Result<(), Failure> {
     let begun = SystemTime::now();
     let wanted = match &args.via {
         None => {
-            let path = args.place.find(&args.name)?;
+            let path = args.place.find(&args.file)?;
             let wanted = checksum(&path).map_err(|error| unreadable(&path, &error))?;
             copy(&Source::File(&path), &wanted, out)?;
             wanted
         }
         Some(via) => {
-            let words = remote_words(via, "checksum", &args.name, &args.place)?;
+            let words = remote_words(via, "checksum", &args.file, &args.place)?;
             let wanted = remote_checksum(&words)?;
             // By its name from now on: "last" may be another one soon.
             let words = remote_words(via, "get", &wanted.name, &args.place)?;

@@ -72,7 +72,8 @@ pub fn stops(log: &Log, config: &Config) -> Vec<Stop> {
             continue;
         }
         let ends_crawl = from == Mode::Crawling && to != Mode::Crawling;
-        if !ends_crawl && !(had_torque && to == Mode::Fault) {
+        let loses_torque = had_torque && to == Mode::Fault;
+        if !ends_crawl && !loses_torque {
             continue;
         }
         let (cause, alarm) = cause(state, to, log, config);

@@ -1,4 +1,4 @@
-//! The black box with real processes: a box around a stop, a black box that is killed while it writes, and one without room.
+//! The black box with real processes: a box around a stop, a black box that is killed while it writes, and one that cannot write.
 
 use super::worm::{Worm, wait_for};
 use super::{Crawling, PATIENCE};
@@ -136,11 +136,11 @@ fn a_black_box_that_is_killed_while_it_writes_loses_nothing_older() {
 }
 
 #[test]
-fn a_black_box_without_room_raises_an_alarm_and_goes_on() {
+fn a_black_box_that_cannot_write_raises_an_alarm_and_goes_on() {
     let worm = Worm::new("fullbox");
     let config = worm.config(CONFIG);
     let folder = tempfile::tempdir().expect("a folder");
-    let boxes = folder.path().to_string_lossy().into_owned();
+    let boxes = folder.path().join("boxes").to_string_lossy().into_owned();
     let crawling = Crawling::at_rest(worm, &["--config", &config]);
     crawling.make_crawl();
     let worm = &crawling.worm;
@@ -149,11 +149,12 @@ fn a_black_box_without_room_raises_an_alarm_and_goes_on() {
     let mut alarms = hub
         .subscriber::<worm_estimator::message::Alarm>()
         .expect("a subscriber");
-    // Less than the head of any file.
     let mut black_box = worm
         .wormd(&["record", "--config", &config, "--black-box", &boxes])
-        .with_file_size_limit(5_000)
         .start();
+    // Something else is in the place of its folder.
+    std::fs::remove_dir_all(&boxes).expect("it is there");
+    std::fs::write(&boxes, b"").expect("room");
     let kind = AlarmKind::RecordingStopped.code();
     wait_for("the alarm", PATIENCE, || {
         let newest = estimates
@@ -167,7 +168,27 @@ fn a_black_box_without_room_raises_an_alarm_and_goes_on() {
         raised = (alarm.kind == kind && alarm.raised == 1).then_some(*alarm).or(raised);
     }
     let raised = raised.expect("the alarm's message");
-    assert_eq!(raised.value, f64::from(RecordingProblem::DiskFull.code()), "{raised:?}");
+    assert_eq!(
+        raised.value,
+        f64::from(RecordingProblem::WriteError.code()),
+        "{raised:?}"
+    );
     assert!(black_box.exit_status().is_none(), "it goes on");
     assert_eq!(worm.state().map(|state| state.mode), Some(Mode::Crawling.code()));
+    // It is tried again, and nothing of what waited is lost.
+    std::fs::remove_file(&boxes).expect("it is there");
+    wait_for("the alarm's end", PATIENCE, || {
+        let newest = estimates
+            .latest()
+            .expect("readable")
+            .map(|estimate| estimate.raised_mask);
+        newest.is_some_and(|mask| mask >> kind & 1 == 0)
+    });
+    black_box.end();
+    let list = json(worm, &["black-box", "list", "--folder", &boxes, "--json", "--thin"]);
+    assert_eq!(
+        (&list[0]["kind"], &list[0]["complete"]),
+        (&"thin".into(), &true.into()),
+        "{list}"
+    );
 }

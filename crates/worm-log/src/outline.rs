@@ -267,9 +267,12 @@ pub fn complete(file: &mut File) -> io::Result<Outline> {
     Ok(outline)
 }
 
+/// The contents of records of one kind.
+type Records = Vec<Vec<u8>>;
+
 /// The records of schemas and channels, which stand in the first chunks.
-fn schemas_and_channels(file: &mut File, outline: &Outline) -> io::Result<(Vec<Vec<u8>>, Vec<Vec<u8>>)> {
-    let (mut schemas, mut channels) = (Vec::new(), Vec::new());
+fn schemas_and_channels(file: &mut File, outline: &Outline) -> io::Result<(Records, Records)> {
+    let (mut schemas, mut channels) = (Records::new(), Records::new());
     for chunk in outline.index.chunks.iter().take(CHUNKS_UNPACKED) {
         if chunk.header.uncompressed_size > LARGEST_UNPACKED || chunk.header.compressed_size > LARGEST_UNPACKED {
             continue;
