@@ -51,10 +51,20 @@
 #define WORMD_COMMAND_BUFFER 256
 #define WORMD_COMMAND_HISTORY 32
 
+#define WORMD_TRIP_TOPIC "trip"
+#define WORMD_TRIP_TYPE "wormd_trip_v1"
+#define WORMD_TRIP_BUFFER 32
+#define WORMD_TRIP_HISTORY 1
+
 #define WORMD_RECORDING_TOPIC "recording"
 #define WORMD_RECORDING_TYPE "wormd_recording_v1"
 #define WORMD_RECORDING_BUFFER 16
 #define WORMD_RECORDING_HISTORY 1
+
+#define WORMD_BLACK_BOX_TOPIC "black_box"
+#define WORMD_BLACK_BOX_TYPE "wormd_black_box_v1"
+#define WORMD_BLACK_BOX_BUFFER 16
+#define WORMD_BLACK_BOX_HISTORY 1
 
 /* Request and response on the service worm/NAME/command. */
 #define WORMD_COMMAND_REQUEST_TYPE "wormd_command_v3"
@@ -327,6 +337,117 @@ static inline const char *wormd_command_outcome_name(uint32_t code) {
     case WORMD_COMMAND_OUTCOME_NO_ESTIMATOR: return "no-estimator";
     case WORMD_COMMAND_OUTCOME_ALARM_STANDS: return "alarm-stands";
     case WORMD_COMMAND_OUTCOME_NO_LEASE: return "no-lease";
+    default: return "unknown";
+  }
+}
+
+/* What a trip does. */
+enum wormd_trip_phase {
+  /* It crawls along the route, away from home. */
+  WORMD_TRIP_PHASE_OUTBOUND = 0,
+  /* It crawls home. */
+  WORMD_TRIP_PHASE_RETURNING = 1,
+  /* It waits, and does not command motion; the reason says for what. */
+  WORMD_TRIP_PHASE_HOLDING = 2,
+  /* It is over as it should be: the worm is at home, or at the end of a route that goes one way. */
+  WORMD_TRIP_PHASE_DONE = 3,
+  /* It is over before that. */
+  WORMD_TRIP_PHASE_ABORTED = 4,
+};
+
+/* The name, as in logs; "unknown" for a code of a newer version. */
+static inline const char *wormd_trip_phase_name(uint32_t code) {
+  switch (code) {
+    case WORMD_TRIP_PHASE_OUTBOUND: return "outbound";
+    case WORMD_TRIP_PHASE_RETURNING: return "returning";
+    case WORMD_TRIP_PHASE_HOLDING: return "holding";
+    case WORMD_TRIP_PHASE_DONE: return "done";
+    case WORMD_TRIP_PHASE_ABORTED: return "aborted";
+    default: return "unknown";
+  }
+}
+
+/* Why a trip is in its phase. */
+enum wormd_trip_reason {
+  /* It was begun. */
+  WORMD_TRIP_REASON_STARTED = 0,
+  /* The end of the route was reached. */
+  WORMD_TRIP_REASON_END_OF_ROUTE = 1,
+  /* The worm is at home. */
+  WORMD_TRIP_REASON_HOME = 2,
+  /* What is left in the battery is needed for the way home. */
+  WORMD_TRIP_REASON_ENERGY = 3,
+  /* Nobody was heard for the time after which that counts as a lost link. */
+  WORMD_TRIP_REASON_LINK_LOST = 4,
+  /* Somebody is heard again. */
+  WORMD_TRIP_REASON_LINK_BACK = 5,
+  /* An operator told the trip so. */
+  WORMD_TRIP_REASON_OPERATOR = 6,
+  /* Somebody commanded the worm to hold. */
+  WORMD_TRIP_REASON_HOLD_COMMANDED = 7,
+  /* Somebody stopped the worm. */
+  WORMD_TRIP_REASON_STOP_COMMANDED = 8,
+  /* Somebody else drives. */
+  WORMD_TRIP_REASON_OTHER_DRIVER = 9,
+  /* The controller holds because of an alarm. */
+  WORMD_TRIP_REASON_ALARM = 10,
+  /* The controller stopped because of a fault. */
+  WORMD_TRIP_REASON_FAULT = 11,
+  /* The worm does not get ahead. */
+  WORMD_TRIP_REASON_STUCK = 12,
+  /* The crawl ended without a command too often: this process is not run in time. */
+  WORMD_TRIP_REASON_LAPSED = 13,
+  /* This process was suspended. */
+  WORMD_TRIP_REASON_SUSPENDED = 14,
+  /* The controller refuses to crawl. */
+  WORMD_TRIP_REASON_REFUSED = 15,
+  /* The controller is gone. */
+  WORMD_TRIP_REASON_CONTROLLER_GONE = 16,
+  /* This process was told to end. */
+  WORMD_TRIP_REASON_ENDED = 17,
+};
+
+/* The name, as in logs; "unknown" for a code of a newer version. */
+static inline const char *wormd_trip_reason_name(uint32_t code) {
+  switch (code) {
+    case WORMD_TRIP_REASON_STARTED: return "started";
+    case WORMD_TRIP_REASON_END_OF_ROUTE: return "end-of-route";
+    case WORMD_TRIP_REASON_HOME: return "home";
+    case WORMD_TRIP_REASON_ENERGY: return "energy";
+    case WORMD_TRIP_REASON_LINK_LOST: return "link-lost";
+    case WORMD_TRIP_REASON_LINK_BACK: return "link-back";
+    case WORMD_TRIP_REASON_OPERATOR: return "operator";
+    case WORMD_TRIP_REASON_HOLD_COMMANDED: return "hold-commanded";
+    case WORMD_TRIP_REASON_STOP_COMMANDED: return "stop-commanded";
+    case WORMD_TRIP_REASON_OTHER_DRIVER: return "other-driver";
+    case WORMD_TRIP_REASON_ALARM: return "alarm";
+    case WORMD_TRIP_REASON_FAULT: return "fault";
+    case WORMD_TRIP_REASON_STUCK: return "stuck";
+    case WORMD_TRIP_REASON_LAPSED: return "lapsed";
+    case WORMD_TRIP_REASON_SUSPENDED: return "suspended";
+    case WORMD_TRIP_REASON_REFUSED: return "refused";
+    case WORMD_TRIP_REASON_CONTROLLER_GONE: return "controller-gone";
+    case WORMD_TRIP_REASON_ENDED: return "ended";
+    default: return "unknown";
+  }
+}
+
+/* What a trip does when its link is lost. */
+enum wormd_link_loss {
+  /* It holds. */
+  WORMD_LINK_LOSS_HOLD = 0,
+  /* It goes home. */
+  WORMD_LINK_LOSS_RETURN = 1,
+  /* It goes on. */
+  WORMD_LINK_LOSS_CONTINUE = 2,
+};
+
+/* The name, as in logs; "unknown" for a code of a newer version. */
+static inline const char *wormd_link_loss_name(uint32_t code) {
+  switch (code) {
+    case WORMD_LINK_LOSS_HOLD: return "hold";
+    case WORMD_LINK_LOSS_RETURN: return "return";
+    case WORMD_LINK_LOSS_CONTINUE: return "continue";
     default: return "unknown";
   }
 }
@@ -856,6 +977,147 @@ static_assert(offsetof(wormd_command_record, supervised) == 64, "wormd_command_r
 static_assert(offsetof(wormd_command_record, user) == 68, "wormd_command_record.user lies elsewhere in wormd");
 static_assert(offsetof(wormd_command_record, sender) == 72, "wormd_command_record.sender lies elsewhere in wormd");
 
+/* How a trip stands: twice a second, and at every change. Low and high values bound a 90 % interval. Energies
+   and what follows from them are not known without a battery. The lists are where the worm is expected if all
+   goes on as planned: the way ahead, and the way home. They hold up to 16 points. */
+typedef struct wormd_trip_status {
+  /* Number of this message since the trip began. */
+  uint64_t sequence;
+  /* When it was made, ns of CLOCK_MONOTONIC. */
+  uint64_t time_ns;
+  /* When the trip began, ns of CLOCK_MONOTONIC. */
+  uint64_t started_ns;
+  /* When it came into its phase, for its reason, ns of CLOCK_MONOTONIC. */
+  uint64_t since_ns;
+  /* Distance from home along the route, m. */
+  double position_m;
+  /* Its standard error, m. */
+  double position_sigma_m;
+  /* Length of the route, m. */
+  double length_m;
+  /* Furthest distance from home that the trip is expected to reach, m; where a trip returns already, the
+     furthest it has reached. */
+  double turn_m;
+  /* Length of the present leg that is still ahead, in the direction of the trip, m. */
+  double leg_left_m;
+  /* Speed of the cam that the trip commands, gait cycles per second, negative for backward; 0 while it
+     commands none. */
+  double cycles_per_s;
+  /* Distance that a gait cycle is expected to advance on the present leg, m. */
+  double advance_per_cycle_m;
+  /* Its standard error, m. */
+  double advance_per_cycle_sigma_m;
+  /* Standard deviation of the advance from cycle to cycle, m. */
+  double advance_scatter_m;
+  /* Energy left in the battery above the reserve of this trip, J. */
+  double energy_left_j;
+  /* Lower bound of it, J. */
+  double energy_left_low_j;
+  /* Upper bound of it, J. */
+  double energy_left_high_j;
+  /* Energy that the way home needs from here, J. */
+  double energy_home_j;
+  /* Lower bound of it, J. */
+  double energy_home_low_j;
+  /* Upper bound of it, J. */
+  double energy_home_high_j;
+  /* Time that the way home takes from here, s. */
+  double home_s;
+  /* Lower bound of it, s. */
+  double home_low_s;
+  /* Upper bound of it, s. */
+  double home_high_s;
+  /* Time until the trip is over, s; not known while it waits. */
+  double left_s;
+  /* Lower bound of it, s. */
+  double left_low_s;
+  /* Upper bound of it, s. */
+  double left_high_s;
+  /* How long ago somebody was last heard, s. */
+  double link_age_s;
+  /* Silence after which the link counts as lost, s. */
+  double link_timeout_s;
+  /* Distances from home of the points ahead, m. */
+  double point_m[WORMD_MAX_CELLS];
+  /* Times from now at which the worm is expected there, s. */
+  double point_s[WORMD_MAX_CELLS];
+  /* Standard errors of the place at these times, m. */
+  double point_sigma_m[WORMD_MAX_CELLS];
+  /* What it does: TripPhase. A code of enum wormd_trip_phase. */
+  uint32_t phase;
+  /* Why: TripReason. A code of enum wormd_trip_reason. */
+  uint32_t reason;
+  /* What it goes on with when it no longer waits, outbound or returning: TripPhase. A code of enum
+     wormd_trip_phase. */
+  uint32_t heading;
+  /* Alarm behind the reason alarm or fault: AlarmKind, or WORMD_NONE. A code of enum wormd_alarm_kind. */
+  uint32_t alarm;
+  /* What it does when the link is lost: LinkLoss. A code of enum wormd_link_loss. */
+  uint32_t link_loss;
+  /* 1 while the link counts as lost, else 0. */
+  uint32_t link_is_lost;
+  /* 1 where the worm comes home at the end of the route, 0 where the trip ends there. */
+  uint32_t return_home;
+  /* Number of the present leg, from 1. */
+  uint32_t leg;
+  /* Legs of the route. */
+  uint32_t leg_count;
+  /* Points in the lists. */
+  uint32_t point_count;
+  /* Gait cycles that were measured on this trip. */
+  uint32_t cycles;
+  /* 1 where only an operator can make it go on: wormd trip resume. */
+  uint32_t needs_operator;
+  /* Who commanded what it waits for, or how it goes on: a program, or a watcher; empty where nobody did.
+     UTF-8; it ends with a zero, or with the array. */
+  char by[32];
+} wormd_trip_status;
+
+static_assert(sizeof(wormd_trip_status) == 680, "wormd_trip_status has another size here than in wormd");
+static_assert(offsetof(wormd_trip_status, sequence) == 0, "wormd_trip_status.sequence lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, time_ns) == 8, "wormd_trip_status.time_ns lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, started_ns) == 16, "wormd_trip_status.started_ns lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, since_ns) == 24, "wormd_trip_status.since_ns lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, position_m) == 32, "wormd_trip_status.position_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, position_sigma_m) == 40, "wormd_trip_status.position_sigma_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, length_m) == 48, "wormd_trip_status.length_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, turn_m) == 56, "wormd_trip_status.turn_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, leg_left_m) == 64, "wormd_trip_status.leg_left_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, cycles_per_s) == 72, "wormd_trip_status.cycles_per_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, advance_per_cycle_m) == 80, "wormd_trip_status.advance_per_cycle_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, advance_per_cycle_sigma_m) == 88, "wormd_trip_status.advance_per_cycle_sigma_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, advance_scatter_m) == 96, "wormd_trip_status.advance_scatter_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, energy_left_j) == 104, "wormd_trip_status.energy_left_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, energy_left_low_j) == 112, "wormd_trip_status.energy_left_low_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, energy_left_high_j) == 120, "wormd_trip_status.energy_left_high_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, energy_home_j) == 128, "wormd_trip_status.energy_home_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, energy_home_low_j) == 136, "wormd_trip_status.energy_home_low_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, energy_home_high_j) == 144, "wormd_trip_status.energy_home_high_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, home_s) == 152, "wormd_trip_status.home_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, home_low_s) == 160, "wormd_trip_status.home_low_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, home_high_s) == 168, "wormd_trip_status.home_high_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, left_s) == 176, "wormd_trip_status.left_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, left_low_s) == 184, "wormd_trip_status.left_low_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, left_high_s) == 192, "wormd_trip_status.left_high_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, link_age_s) == 200, "wormd_trip_status.link_age_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, link_timeout_s) == 208, "wormd_trip_status.link_timeout_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, point_m) == 216, "wormd_trip_status.point_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, point_s) == 344, "wormd_trip_status.point_s lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, point_sigma_m) == 472, "wormd_trip_status.point_sigma_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, phase) == 600, "wormd_trip_status.phase lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, reason) == 604, "wormd_trip_status.reason lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, heading) == 608, "wormd_trip_status.heading lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, alarm) == 612, "wormd_trip_status.alarm lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, link_loss) == 616, "wormd_trip_status.link_loss lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, link_is_lost) == 620, "wormd_trip_status.link_is_lost lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, return_home) == 624, "wormd_trip_status.return_home lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, leg) == 628, "wormd_trip_status.leg lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, leg_count) == 632, "wormd_trip_status.leg_count lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, point_count) == 636, "wormd_trip_status.point_count lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, cycles) == 640, "wormd_trip_status.cycles lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, needs_operator) == 644, "wormd_trip_status.needs_operator lies elsewhere in wormd");
+static_assert(offsetof(wormd_trip_status, by) == 648, "wormd_trip_status.by lies elsewhere in wormd");
+
 /* The state of the worm's recorder: once a second and at every change. */
 typedef struct wormd_recording_status {
   /* Number of this message since the recorder started. */
@@ -885,6 +1147,40 @@ static_assert(offsetof(wormd_recording_status, messages_lost) == 32, "wormd_reco
 static_assert(offsetof(wormd_recording_status, files) == 40, "wormd_recording_status.files lies elsewhere in wormd");
 static_assert(offsetof(wormd_recording_status, state) == 48, "wormd_recording_status.state lies elsewhere in wormd");
 static_assert(offsetof(wormd_recording_status, problem) == 52, "wormd_recording_status.problem lies elsewhere in wormd");
+
+/* The state of the worm's black box: once a second and at every change. */
+typedef struct wormd_black_box_status {
+  /* Number of this message since the black box started. */
+  uint64_t sequence;
+  /* When it was sent, ns of CLOCK_MONOTONIC. */
+  uint64_t time_ns;
+  /* Compressed messages in memory, bytes. */
+  uint64_t memory_bytes;
+  /* Written since it started, bytes. */
+  uint64_t written_bytes;
+  /* Boxes begun since it started. */
+  uint64_t boxes;
+  /* Messages handed to it. */
+  uint64_t messages;
+  /* Messages that were published and did not arrive at it. */
+  uint64_t messages_lost;
+  /* RecordingState: stopped while it cannot write. It goes on in memory, and tries again. A code of enum
+     wormd_recording_state. */
+  uint32_t state;
+  /* RecordingProblem: why it cannot write. A code of enum wormd_recording_problem. */
+  uint32_t problem;
+} wormd_black_box_status;
+
+static_assert(sizeof(wormd_black_box_status) == 64, "wormd_black_box_status has another size here than in wormd");
+static_assert(offsetof(wormd_black_box_status, sequence) == 0, "wormd_black_box_status.sequence lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, time_ns) == 8, "wormd_black_box_status.time_ns lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, memory_bytes) == 16, "wormd_black_box_status.memory_bytes lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, written_bytes) == 24, "wormd_black_box_status.written_bytes lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, boxes) == 32, "wormd_black_box_status.boxes lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, messages) == 40, "wormd_black_box_status.messages lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, messages_lost) == 48, "wormd_black_box_status.messages_lost lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, state) == 56, "wormd_black_box_status.state lies elsewhere in wormd");
+static_assert(offsetof(wormd_black_box_status, problem) == 60, "wormd_black_box_status.problem lies elsewhere in wormd");
 
 /* A request to the controller. */
 typedef struct wormd_command {

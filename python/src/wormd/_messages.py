@@ -185,6 +185,73 @@ class CommandOutcome(Code):
     """The lease of the supervisor has lapsed, and the command gives no time of its own."""
 
 
+class TripPhase(Code):
+    """What a trip does."""
+
+    OUTBOUND = "outbound", 0
+    """It crawls along the route, away from home."""
+    RETURNING = "returning", 1
+    """It crawls home."""
+    HOLDING = "holding", 2
+    """It waits, and does not command motion; the reason says for what."""
+    DONE = "done", 3
+    """It is over as it should be: the worm is at home, or at the end of a route that goes one way."""
+    ABORTED = "aborted", 4
+    """It is over before that."""
+
+
+class TripReason(Code):
+    """Why a trip is in its phase."""
+
+    STARTED = "started", 0
+    """It was begun."""
+    END_OF_ROUTE = "end-of-route", 1
+    """The end of the route was reached."""
+    HOME = "home", 2
+    """The worm is at home."""
+    ENERGY = "energy", 3
+    """What is left in the battery is needed for the way home."""
+    LINK_LOST = "link-lost", 4
+    """Nobody was heard for the time after which that counts as a lost link."""
+    LINK_BACK = "link-back", 5
+    """Somebody is heard again."""
+    OPERATOR = "operator", 6
+    """An operator told the trip so."""
+    HOLD_COMMANDED = "hold-commanded", 7
+    """Somebody commanded the worm to hold."""
+    STOP_COMMANDED = "stop-commanded", 8
+    """Somebody stopped the worm."""
+    OTHER_DRIVER = "other-driver", 9
+    """Somebody else drives."""
+    ALARM = "alarm", 10
+    """The controller holds because of an alarm."""
+    FAULT = "fault", 11
+    """The controller stopped because of a fault."""
+    STUCK = "stuck", 12
+    """The worm does not get ahead."""
+    LAPSED = "lapsed", 13
+    """The crawl ended without a command too often: this process is not run in time."""
+    SUSPENDED = "suspended", 14
+    """This process was suspended."""
+    REFUSED = "refused", 15
+    """The controller refuses to crawl."""
+    CONTROLLER_GONE = "controller-gone", 16
+    """The controller is gone."""
+    ENDED = "ended", 17
+    """This process was told to end."""
+
+
+class LinkLoss(Code):
+    """What a trip does when its link is lost."""
+
+    HOLD = "hold", 0
+    """It holds."""
+    RETURN = "return", 1
+    """It goes home."""
+    CONTINUE = "continue", 2
+    """It goes on."""
+
+
 class RecordingState(Code):
     """What a recorder does."""
 
@@ -1019,6 +1086,216 @@ CommandRecord.TOPIC = Topic(
 )
 
 
+class _TripStatusMemory(Memory):
+    _fields_ = [
+        ("sequence", ctypes.c_uint64),
+        ("time_ns", ctypes.c_uint64),
+        ("started_ns", ctypes.c_uint64),
+        ("since_ns", ctypes.c_uint64),
+        ("position_m", ctypes.c_double),
+        ("position_sigma_m", ctypes.c_double),
+        ("length_m", ctypes.c_double),
+        ("turn_m", ctypes.c_double),
+        ("leg_left_m", ctypes.c_double),
+        ("cycles_per_s", ctypes.c_double),
+        ("advance_per_cycle_m", ctypes.c_double),
+        ("advance_per_cycle_sigma_m", ctypes.c_double),
+        ("advance_scatter_m", ctypes.c_double),
+        ("energy_left_j", ctypes.c_double),
+        ("energy_left_low_j", ctypes.c_double),
+        ("energy_left_high_j", ctypes.c_double),
+        ("energy_home_j", ctypes.c_double),
+        ("energy_home_low_j", ctypes.c_double),
+        ("energy_home_high_j", ctypes.c_double),
+        ("home_s", ctypes.c_double),
+        ("home_low_s", ctypes.c_double),
+        ("home_high_s", ctypes.c_double),
+        ("left_s", ctypes.c_double),
+        ("left_low_s", ctypes.c_double),
+        ("left_high_s", ctypes.c_double),
+        ("link_age_s", ctypes.c_double),
+        ("link_timeout_s", ctypes.c_double),
+        ("point_m", ctypes.c_double * 16),
+        ("point_s", ctypes.c_double * 16),
+        ("point_sigma_m", ctypes.c_double * 16),
+        ("phase", ctypes.c_uint32),
+        ("reason", ctypes.c_uint32),
+        ("heading", ctypes.c_uint32),
+        ("alarm", ctypes.c_uint32),
+        ("link_loss", ctypes.c_uint32),
+        ("link_is_lost", ctypes.c_uint32),
+        ("return_home", ctypes.c_uint32),
+        ("leg", ctypes.c_uint32),
+        ("leg_count", ctypes.c_uint32),
+        ("point_count", ctypes.c_uint32),
+        ("cycles", ctypes.c_uint32),
+        ("needs_operator", ctypes.c_uint32),
+        ("by", ctypes.c_uint8 * 32),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "wormd_trip_v1"
+
+
+@dataclass(frozen=True, slots=True)
+class TripStatus(Message):
+    """How a trip stands: twice a second, and at every change. Low and high values bound a 90 % interval. Energies and
+    what follows from them are not known without a battery. The lists are where the worm is expected if all goes on as
+    planned: the way ahead, and the way home. They hold up to 16 points."""
+
+    TOPIC: ClassVar[Topic[TripStatus]]
+
+    sequence: int
+    """Number of this message since the trip began."""
+    time_ns: int
+    """When it was made, ns of CLOCK_MONOTONIC."""
+    started_ns: int
+    """When the trip began, ns of CLOCK_MONOTONIC."""
+    since_ns: int
+    """When it came into its phase, for its reason, ns of CLOCK_MONOTONIC."""
+    position_m: float
+    """Distance from home along the route, m."""
+    position_sigma_m: float
+    """Its standard error, m."""
+    length_m: float
+    """Length of the route, m."""
+    turn_m: float
+    """Furthest distance from home that the trip is expected to reach, m; where a trip returns already, the furthest
+    it has reached."""
+    leg_left_m: float
+    """Length of the present leg that is still ahead, in the direction of the trip, m."""
+    cycles_per_s: float
+    """Speed of the cam that the trip commands, gait cycles per second, negative for backward; 0 while it commands
+    none."""
+    advance_per_cycle_m: float
+    """Distance that a gait cycle is expected to advance on the present leg, m."""
+    advance_per_cycle_sigma_m: float
+    """Its standard error, m."""
+    advance_scatter_m: float
+    """Standard deviation of the advance from cycle to cycle, m."""
+    energy_left_j: float
+    """Energy left in the battery above the reserve of this trip, J."""
+    energy_left_low_j: float
+    """Lower bound of it, J."""
+    energy_left_high_j: float
+    """Upper bound of it, J."""
+    energy_home_j: float
+    """Energy that the way home needs from here, J."""
+    energy_home_low_j: float
+    """Lower bound of it, J."""
+    energy_home_high_j: float
+    """Upper bound of it, J."""
+    home_s: float
+    """Time that the way home takes from here, s."""
+    home_low_s: float
+    """Lower bound of it, s."""
+    home_high_s: float
+    """Upper bound of it, s."""
+    left_s: float
+    """Time until the trip is over, s; not known while it waits."""
+    left_low_s: float
+    """Lower bound of it, s."""
+    left_high_s: float
+    """Upper bound of it, s."""
+    link_age_s: float
+    """How long ago somebody was last heard, s."""
+    link_timeout_s: float
+    """Silence after which the link counts as lost, s."""
+    point_m: tuple[float, ...]
+    """Distances from home of the points ahead, m."""
+    point_s: tuple[float, ...]
+    """Times from now at which the worm is expected there, s."""
+    point_sigma_m: tuple[float, ...]
+    """Standard errors of the place at these times, m."""
+    phase: TripPhase
+    """What it does: TripPhase."""
+    reason: TripReason
+    """Why: TripReason."""
+    heading: TripPhase
+    """What it goes on with when it no longer waits, outbound or returning: TripPhase."""
+    alarm: AlarmKind | None
+    """Alarm behind the reason alarm or fault: AlarmKind, or None."""
+    link_loss: LinkLoss
+    """What it does when the link is lost: LinkLoss."""
+    link_is_lost: int
+    """1 while the link counts as lost, else 0."""
+    return_home: int
+    """1 where the worm comes home at the end of the route, 0 where the trip ends there."""
+    leg: int
+    """Number of the present leg, from 1."""
+    leg_count: int
+    """Legs of the route."""
+    point_count: int
+    """Points in the lists."""
+    cycles: int
+    """Gait cycles that were measured on this trip."""
+    needs_operator: int
+    """1 where only an operator can make it go on: wormd trip resume."""
+    by: str
+    """Who commanded what it waits for, or how it goes on: a program, or a watcher; empty where nobody did."""
+
+    @classmethod
+    def _from_memory(cls, m: _TripStatusMemory) -> TripStatus:
+        cells = min(m.cell_count, MAX_CELLS)
+        return cls(
+            sequence=m.sequence,
+            time_ns=m.time_ns,
+            started_ns=m.started_ns,
+            since_ns=m.since_ns,
+            position_m=m.position_m,
+            position_sigma_m=m.position_sigma_m,
+            length_m=m.length_m,
+            turn_m=m.turn_m,
+            leg_left_m=m.leg_left_m,
+            cycles_per_s=m.cycles_per_s,
+            advance_per_cycle_m=m.advance_per_cycle_m,
+            advance_per_cycle_sigma_m=m.advance_per_cycle_sigma_m,
+            advance_scatter_m=m.advance_scatter_m,
+            energy_left_j=m.energy_left_j,
+            energy_left_low_j=m.energy_left_low_j,
+            energy_left_high_j=m.energy_left_high_j,
+            energy_home_j=m.energy_home_j,
+            energy_home_low_j=m.energy_home_low_j,
+            energy_home_high_j=m.energy_home_high_j,
+            home_s=m.home_s,
+            home_low_s=m.home_low_s,
+            home_high_s=m.home_high_s,
+            left_s=m.left_s,
+            left_low_s=m.left_low_s,
+            left_high_s=m.left_high_s,
+            link_age_s=m.link_age_s,
+            link_timeout_s=m.link_timeout_s,
+            point_m=tuple(m.point_m[:cells]),
+            point_s=tuple(m.point_s[:cells]),
+            point_sigma_m=tuple(m.point_sigma_m[:cells]),
+            phase=TripPhase.of(m.phase),
+            reason=TripReason.of(m.reason),
+            heading=TripPhase.of(m.heading),
+            alarm=None if m.alarm == _NONE else AlarmKind.of(m.alarm),
+            link_loss=LinkLoss.of(m.link_loss),
+            link_is_lost=m.link_is_lost,
+            return_home=m.return_home,
+            leg=m.leg,
+            leg_count=m.leg_count,
+            point_count=m.point_count,
+            cycles=m.cycles,
+            needs_operator=m.needs_operator,
+            by=text(m.by),
+        )
+
+
+TripStatus.TOPIC = Topic(
+    name="trip",
+    memory=_TripStatusMemory,
+    decode=TripStatus._from_memory,
+    buffer=32,
+    history=1,
+    has_event=False,
+    number="sequence",
+)
+
+
 class _RecordingStatusMemory(Memory):
     _fields_ = [
         ("sequence", ctypes.c_uint64),
@@ -1077,6 +1354,75 @@ RecordingStatus.TOPIC = Topic(
     name="recording",
     memory=_RecordingStatusMemory,
     decode=RecordingStatus._from_memory,
+    buffer=16,
+    history=1,
+    has_event=False,
+    number="sequence",
+)
+
+
+class _BlackBoxStatusMemory(Memory):
+    _fields_ = [
+        ("sequence", ctypes.c_uint64),
+        ("time_ns", ctypes.c_uint64),
+        ("memory_bytes", ctypes.c_uint64),
+        ("written_bytes", ctypes.c_uint64),
+        ("boxes", ctypes.c_uint64),
+        ("messages", ctypes.c_uint64),
+        ("messages_lost", ctypes.c_uint64),
+        ("state", ctypes.c_uint32),
+        ("problem", ctypes.c_uint32),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "wormd_black_box_v1"
+
+
+@dataclass(frozen=True, slots=True)
+class BlackBoxStatus(Message):
+    """The state of the worm's black box: once a second and at every change."""
+
+    TOPIC: ClassVar[Topic[BlackBoxStatus]]
+
+    sequence: int
+    """Number of this message since the black box started."""
+    time_ns: int
+    """When it was sent, ns of CLOCK_MONOTONIC."""
+    memory_bytes: int
+    """Compressed messages in memory, bytes."""
+    written_bytes: int
+    """Written since it started, bytes."""
+    boxes: int
+    """Boxes begun since it started."""
+    messages: int
+    """Messages handed to it."""
+    messages_lost: int
+    """Messages that were published and did not arrive at it."""
+    state: RecordingState
+    """RecordingState: stopped while it cannot write. It goes on in memory, and tries again."""
+    problem: RecordingProblem
+    """RecordingProblem: why it cannot write."""
+
+    @classmethod
+    def _from_memory(cls, m: _BlackBoxStatusMemory) -> BlackBoxStatus:
+        return cls(
+            sequence=m.sequence,
+            time_ns=m.time_ns,
+            memory_bytes=m.memory_bytes,
+            written_bytes=m.written_bytes,
+            boxes=m.boxes,
+            messages=m.messages,
+            messages_lost=m.messages_lost,
+            state=RecordingState.of(m.state),
+            problem=RecordingProblem.of(m.problem),
+        )
+
+
+BlackBoxStatus.TOPIC = Topic(
+    name="black_box",
+    memory=_BlackBoxStatusMemory,
+    decode=BlackBoxStatus._from_memory,
     buffer=16,
     history=1,
     has_event=False,
