@@ -65,6 +65,9 @@ enum Subcommands {
     /// Where model and recordings disagree, and which physical effect the model misses
     #[cfg(feature = "analysis")]
     Explain(command::explain::ExplainArgs),
+    /// Predict recordings by a model that was not fitted to them, and say how far off it is
+    #[cfg(feature = "analysis")]
+    Predict(command::predict::PredictArgs),
     /// A recording from the model: what motion capture would have seen
     #[cfg(feature = "analysis")]
     Simulate(command::simulate::SimulateArgs),
@@ -139,6 +142,8 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Analyze(args) => command::analyze::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Explain(args) => command::explain::run(&args),
+        #[cfg(feature = "analysis")]
+        Subcommands::Predict(args) => command::predict::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Latency(args) => command::latency::run(&args, verbose),

@@ -4,6 +4,7 @@ use super::Failure;
 use super::progress::Progress;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use worm_analysis::bench::{self, Plant};
 use worm_analysis::experiment::RecordedRun;
 use worm_analysis::recording::{Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, open_with_progress};
 use worm_estimator::config::Config;
@@ -82,7 +83,38 @@ impl Dataset {
     }
 }
 
+/// What a campaign is of; anything but a TOML file is of a worm.
+///
+/// # Errors
+/// [`Failure::Unusable`] for a plant that is not known.
+pub(super) fn plant_of(path: &Path) -> Result<Plant, Failure> {
+    if !has_extension(path, "toml") {
+        return Ok(Plant::Worm);
+    }
+    match worm_estimator::config::read_text(path) {
+        Ok(text) => bench::plant_of(&text, path).map_err(Failure::unusable),
+        // What is wrong with it is said where it is read.
+        Err(_) => Ok(Plant::Worm),
+    }
+}
+
 impl SourceArgs {
+    /// Refuses conditions of a worm for the campaign of a servo.
+    ///
+    /// # Errors
+    /// [`Failure::Unusable`].
+    pub(super) fn refuse_conditions(&self, path: &Path) -> Result<(), Failure> {
+        let is_given = self.slope.is_some() || self.payload != 0.0 || self.config.is_some() || self.axis.is_some();
+        if is_given || self.from.is_some() || self.to.is_some() {
+            return Err(Failure::unusable(format!(
+                "{}: a servo on a bench has no slope, payload, axis or worm, and its recordings count as a whole: leave out --slope, \
+                 --payload, --axis, --config, --from and --to",
+                path.display()
+            )));
+        }
+        Ok(())
+    }
+
     /// Reads a campaign of recordings, a TOML file, or else one recording.
     ///
     /// # Errors

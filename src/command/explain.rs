@@ -1,11 +1,13 @@
 //! `wormd explain`: where model and recordings disagree, which physical effect the model misses, and what to try next.
 //!
-//! It takes a campaign of recordings or of advances alone, one recording, or the worm that is crawling now (`live`). What is
+//! It takes a campaign of recordings or of advances alone, one recording, the worm that is crawling now (`live`), or the campaign of a
+//! servo on a bench (`servo`). What is
 //! stated of them is checked first (`conditions`). The answer is kept in a folder (`folder`) and printed.
 
 mod conditions;
 mod folder;
 mod live;
+mod servo;
 
 use super::dataset::{Dataset, READING, SourceArgs};
 use super::progress::Progress;
@@ -14,6 +16,7 @@ use clap::Args;
 use folder::Folder;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use worm_analysis::bench::Plant;
 use worm_analysis::experiment::Progress as Step;
 use worm_analysis::explain::{Answer, Options, explain, explain_advances, model_update};
 use worm_analysis::report;
@@ -36,9 +39,10 @@ pub struct ExplainArgs {
     /// Seed of the search
     #[arg(long, value_name = "N", default_value_t = Options::default().seed)]
     seed: u64,
-    /// What the model is taken to be wrong by everywhere, as a fraction of the tips' mean largest deformation; 0.0005 to 0.1
-    #[arg(long, value_name = "FRACTION", default_value_t = Options::default().discrepancy, value_parser = |text: &str| fraction(text, 0.0005..=0.1))]
-    discrepancy: f64,
+    /// What the model is taken to be wrong by everywhere: of a worm as a fraction of the tips' mean largest deformation, 0.004 unless given;
+    /// of a servo of the positions' root mean square, 0.05 unless given; 0.0005 to 0.2
+    #[arg(long, value_name = "FRACTION", value_parser = |text: &str| fraction(text, 0.0005..=0.2))]
+    discrepancy: Option<f64>,
     /// Relative change of the advance or of the energy of a cycle below which an effect is not named; 0 to 0.5
     #[arg(long, value_name = "FRACTION", default_value_t = Options::default().matters, value_parser = |text: &str| fraction(text, 0.0..=0.5))]
     matters: f64,
@@ -63,6 +67,11 @@ pub struct ExplainArgs {
 /// [`Failure::Unusable`] for a recording, campaign, configuration or folder that cannot be used, and a running worm that does
 /// not crawl; [`Failure::Failed`] when the worm stops while it is recorded or a file cannot be written.
 pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
+    if let Some(campaign) = args.recording.as_deref()
+        && super::dataset::plant_of(campaign)? == Plant::ServoBench
+    {
+        return servo::run(args, campaign);
+    }
     let mut progress = Progress::begin();
     let (source, dataset) = args.read(&mut progress)?;
     let folder = args.out.as_deref().map(Folder::prepare).transpose()?;
@@ -116,7 +125,7 @@ impl ExplainArgs {
     fn options(&self) -> Options {
         Options {
             seed: self.seed,
-            discrepancy: self.discrepancy,
+            discrepancy: self.discrepancy.unwrap_or(Options::default().discrepancy),
             matters: self.matters,
             expected_impact: self.expected_impact,
         }

@@ -20,6 +20,8 @@ pub mod latency_floor;
 mod live;
 pub mod manual;
 pub mod plan;
+#[cfg(feature = "analysis")]
+pub mod predict;
 mod progress;
 pub mod record;
 mod recording_limits;

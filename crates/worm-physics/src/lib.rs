@@ -20,6 +20,7 @@
 //! - [`ledger`]: [`Ledger`], where the energy goes, with a balance that closes at every instant.
 //! - [`cycle`]: [`steady_cycle`] and [`steady_cycle_of`], one cycle of the periodic crawl, and closed forms to compare with.
 //! - [`drive`]: the torque that a crawl asks of the cam, and what a motor needs to give it.
+//! - [`servo`]: a servo that lifts an arm on a bench, as a model of its own.
 //! - [`study`]: Tables 1 and 2 of the paper for any design, and the range on a battery.
 //!
 //! # Limits
@@ -44,6 +45,7 @@ mod mechanics;
 pub mod motion;
 mod pad;
 mod physics;
+pub mod servo;
 pub mod study;
 pub mod worm;
 

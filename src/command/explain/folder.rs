@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain::Answer;
 use worm_analysis::explain::model_update::{self, ModelText};
+use worm_analysis::explain::servo::ServoAnswer;
 use worm_analysis::report;
 
 /// A folder that can be written to.
@@ -55,6 +56,13 @@ impl Folder {
         self.write("model.diff", &model.unified)
     }
 
+    /// `report.html` of a servo.
+    pub(super) fn write_servo_page(&self, answer: &ServoAnswer, title: &str) -> Result<(), Failure> {
+        report::servo::write(answer, title, &self.0)
+            .map(drop)
+            .map_err(Failure::failed)
+    }
+
     /// `report.html`.
     pub(super) fn write_page(&self, answer: &Answer, title: &str) -> Result<(), Failure> {
         report::explain::write(answer, title, &self.0)
@@ -62,7 +70,7 @@ impl Folder {
             .map_err(Failure::failed)
     }
 
-    fn write_json(&self, value: &impl Serialize) -> Result<(), Failure> {
+    pub(super) fn write_json(&self, value: &impl Serialize) -> Result<(), Failure> {
         let text = serde_json::to_string_pretty(value).map_err(Failure::failed)?;
         self.write("report.json", &(text + "\n"))
     }

@@ -204,6 +204,8 @@ pub enum StageKind {
     Recalibrated,
     /// The best effect of another kind than the one named.
     BestWrong,
+    /// One effect of a pair that is named, alone: a step on the way.
+    Step,
     /// The effect named, or the best of several candidates.
     Named,
     /// A correction of any form: about as much as any model could explain.
@@ -475,6 +477,7 @@ mod tests {
             (StageKind::Baseline, "baseline"),
             (StageKind::Recalibrated, "recalibrated"),
             (StageKind::BestWrong, "best-wrong"),
+            (StageKind::Step, "step"),
             (StageKind::Named, "named"),
             (StageKind::FreeForm, "free-form"),
             (StageKind::Floor, "floor"),

@@ -22,7 +22,7 @@ use crate::explain::worm::recorded_worm::{RecordedWorm, WormProblem};
 use crate::explain::worm::speed_droop::SpeedDroop;
 pub(super) use calibration::calibration;
 pub(super) use effects::named_effects;
-pub(super) use screening::add_unscreened;
+pub(super) use screening::{add_unscreened, screening};
 use worm_estimator::config::Config;
 
 /// Places listed at most.
@@ -65,7 +65,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     let mut rivals = Vec::new();
     for (place, candidate) in named.iter().enumerate() {
         let found = named_effects(
-            &worm.scene.observed,
+            &|onset| effects::found_onset(&worm.scene.observed, onset),
             candidate,
             selected.probability[place],
             gap.closure[place],
@@ -122,7 +122,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     let runs = runs::runs(worm, parts, named.first());
     Answer {
         verdict,
-        sentence: words::sentence(verdict, &effects, &rivals, selected, found.open_share, change.as_ref()),
+        sentence: words::sentence(verdict, &effects, &rivals, selected, found.open_share, change.as_ref(), "cycles"),
         r#where: places(&maps_before, PLACES),
         effects,
         rivals,
@@ -131,7 +131,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         next_experiment,
         calibration: calibration(final_fit, config),
         written_back: calibration(&as_written(problem, final_fit), config),
-        screening: screening::screening(&found.screened, selected, speed_droop.is_some()),
+        screening: screening::of_worm(&found.screened, selected, speed_droop.is_some()),
         threshold: found.threshold,
         doubt: Doubt {
             null_probability: selected.null_probability,

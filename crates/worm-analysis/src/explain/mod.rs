@@ -14,7 +14,7 @@
 //! - [`answer`]: the result and its JSON contract.
 //! - `recorded`: the search on recordings of a worm, from beginning to end.
 //! - `search`: the search for the missing effect of any machine, a plant.
-//! - `worm`: the worm as such a plant.
+//! - `worm`: the worm as such a plant; [`servo`]: a servo on a bench, with an answer of its own.
 //! - `assemble`: puts the answer together, from `residual_map`: where the gap is, `experiment_design`: the next
 //!   experiment, and `words`: the answer in words.
 //! - `scalar_data`: the same where only advances per cycle are known.
@@ -32,6 +32,7 @@ mod recorded;
 mod residual_map;
 mod scalar_data;
 mod search;
+pub mod servo;
 mod words;
 mod worm;
 

@@ -55,6 +55,15 @@ pub struct ModelText {
     pub unified: String,
 }
 
+/// A new file with its difference to the old one.
+pub(super) fn difference(old: &str, text: String) -> ModelText {
+    ModelText {
+        diff: diff::lines(old, &text),
+        unified: diff::unified(old, &text),
+        text,
+    }
+}
+
 /// Writes the result into the nominal model: `config_text` is what `config` was read from, [`Config::COMMENTED`] where
 /// there was no file.
 ///
@@ -82,11 +91,7 @@ pub fn model(config_text: &str, config: &Config, answer: &Answer) -> Result<Mode
     }
     text += &entries;
     Config::from_toml(&text, Path::new(FILE))?;
-    Ok(ModelText {
-        diff: diff::lines(config_text, &text),
-        unified: diff::unified(config_text, &text),
-        text,
-    })
+    Ok(difference(config_text, text))
 }
 
 /// Factors on the worm's values, cell by cell, and the stroke.

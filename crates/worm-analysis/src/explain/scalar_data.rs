@@ -19,14 +19,14 @@ mod model_selection;
 mod next_experiment;
 mod table;
 
-use super::answer::{Answer, Doubt, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
+use super::answer::{Answer, Doubt, Figures, FoundOnset, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
 use super::assemble::{add_unscreened, calibration, named_effects};
 use super::error::ExplainError;
 use crate::experiment::Progress;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::judge::candidate::Candidate;
-use crate::explain::search::parameter::{Free, Hypothesised};
+use crate::explain::search::parameter::{Free, Hypothesised, Onset};
 use crate::explain::worm::nuisance::Nuisance;
 use crate::explain::worm::plant::hypotheses;
 use crate::recording::Advance;
@@ -185,12 +185,19 @@ fn assemble(
     screening: Vec<Screened>,
     selected: &Selected,
 ) -> Answer {
+    // None of these begins in mid-run, for a table has no cycles.
+    let when = |onset: Onset| FoundOnset {
+        cycle: onset.cycle,
+        time_s: f64::NAN,
+        run: None,
+        ends: onset.ends,
+    };
     let mut named = selected
         .set
         .iter()
         .zip(&selected.probability)
         .flat_map(|(kind, &probability)| {
-            let mut named = named_effects(&[], &kind.candidate, probability, (f64::NAN, [f64::NAN; 2]), f64::NAN);
+            let mut named = named_effects(&when, &kind.candidate, probability, (f64::NAN, [f64::NAN; 2]), f64::NAN);
             // The parameters are still those of one cell, and name it.
             named
                 .iter_mut()

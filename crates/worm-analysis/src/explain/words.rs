@@ -13,7 +13,7 @@ use worm_physics::effect::{LIBRARY, Visible};
 /// Probability from which an effect that is not named is mentioned.
 const WORTH_A_WORD: f64 = 0.1;
 
-/// The verdict in a sentence or two.
+/// The verdict in a sentence or two; `held_out` is what the effects were judged on that they were not fitted to.
 pub(super) fn sentence(
     verdict: Verdict,
     effects: &[NamedEffect],
@@ -21,6 +21,7 @@ pub(super) fn sentence(
     selected: &Selected,
     open_share: f64,
     change: Option<&FoundOnset>,
+    held_out: &str,
 ) -> String {
     match verdict {
         Verdict::Agrees => format!(
@@ -28,19 +29,19 @@ pub(super) fn sentence(
             percent(selected.null_probability),
             not_sure_enough(selected)
         ),
-        Verdict::Explained => format!("{} explains the data{}.", names(effects), closing(effects)),
+        Verdict::Explained => format!("{} explains the data{}.", names(effects), closing(effects, held_out)),
         Verdict::Ambiguous if rivals.is_empty() => format!(
             "{} explains the data{}, but it is not sure: that nothing which matters is missing has a probability of {}, that something \
              else is one of {}.",
             names(effects),
-            closing(effects),
+            closing(effects, held_out),
             percent(selected.null_probability),
             percent(selected.other_probability)
         ),
         Verdict::Ambiguous => format!(
             "{} explains the data{}, but so does {}: these data cannot decide between them.",
             names(effects),
-            closing(effects),
+            closing(effects, held_out),
             answers_in_words(rivals).join(", and so does ")
         ),
         Verdict::OutsideLibrary => {
@@ -100,10 +101,10 @@ fn names(effects: &[NamedEffect]) -> String {
     effects.iter().map(name).collect::<Vec<_>>().join(" together with ")
 }
 
-fn closing(effects: &[NamedEffect]) -> String {
+fn closing(effects: &[NamedEffect], held_out: &str) -> String {
     match effects.first() {
         Some(effect) if effect.closure.is_finite() => format!(
-            ": it closes {:.0} % of the gap on cycles that it was not fitted to",
+            ": it closes {:.0} % of the gap on {held_out} that it was not fitted to",
             100.0 * effect.closure
         ),
         _ => String::new(),

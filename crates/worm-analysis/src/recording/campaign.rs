@@ -115,6 +115,8 @@ pub struct CampaignRun {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CampaignFile {
+    /// `worm`; another plant's campaign has a reader of its own.
+    plant: Option<Spanned<String>>,
     worm: Option<Spanned<PathBuf>>,
     #[serde(default)]
     run: Vec<RunEntry>,
@@ -158,6 +160,11 @@ impl Campaign {
                  and cycle_s";
             reader.invalid(error.span().unwrap_or(0..0), error.message().trim(), remedy)
         })?;
+        if let Some(plant) = file.plant.filter(|plant| plant.get_ref() != "worm") {
+            let problem = format!("plant = \"{}\" is no worm", plant.get_ref());
+            let remedy = "give a worm's campaign; `wormd explain` and `wormd predict` take those of a servo-bench, too";
+            return Err(reader.invalid(plant.span(), &problem, remedy));
+        }
         if file.run.is_empty() {
             let remedy = "add a section [[run]] with recording and slope_deg for each recording";
             return Err(reader.invalid(0..0, "there is no run in it", remedy));

@@ -10,7 +10,7 @@
 //! - `runs`, `summary`, `figure`, `tables`: the contents of this report.
 //! - `sheets` and [`mod@file`]: the CSV, and how files are replaced.
 //! - [`plan`]: a page on a trip and the design for it.
-//! - [`explain`]: another page, on the search for the effect that the model misses.
+//! - [`explain`]: another page, on the search for the effect that the model misses; [`servo`]: the same of a servo on a bench.
 
 pub mod explain;
 mod figure;
@@ -20,6 +20,7 @@ pub mod page;
 pub mod plan;
 pub mod plot;
 mod runs;
+pub mod servo;
 mod sheets;
 mod summary;
 mod tables;

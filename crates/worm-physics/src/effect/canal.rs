@@ -1,6 +1,6 @@
 //! Effects of the slope and the surface of the canal.
 
-use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
+use super::definition::{Apply, Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 use crate::physics::Patch;
 
 /// The same error on all runs, as from a badly levelled bench.
@@ -27,7 +27,7 @@ pub(super) static SLOPE_ERROR: Effect = Effect {
     sense: Sense::Either,
     care: Some(1.5),
     may_begin: false,
-    apply: |physics, _, values| physics.worm.tilt_rad(values[0].to_radians()),
+    apply: Apply::Worm(|physics, _, values| physics.worm.tilt_rad(values[0].to_radians())),
 };
 
 /// A wet spot, a polished tile.
@@ -77,13 +77,13 @@ pub(super) static SLICK_PATCH: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: false,
-    apply: |physics, _, values| {
+    apply: Apply::Worm(|physics, _, values| {
         physics.laws.patch = Patch {
             from_m: values[1],
             length_m: values[2],
             friction_factor: values[0],
         };
-    },
+    }),
 };
 
 /// Part of the clamping force is the component of the weight across the canal.
@@ -110,5 +110,5 @@ pub(super) static SLOPE_CLAMPING: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: false,
-    apply: |physics, _, values| physics.slope_clamping += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.slope_clamping += values[0]),
 };

@@ -1,6 +1,6 @@
 //! Effects of the friction between tips and wall.
 
-use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
+use super::definition::{Apply, Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// One cell holds harder or softer than the others. Positions show only the product of friction coefficient and normal force.
 pub(super) static UNEQUAL_CLAMPING: Effect = Effect {
@@ -26,7 +26,7 @@ pub(super) static UNEQUAL_CLAMPING: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, cell, values| physics.worm.scale_friction(cell, values[0]),
+    apply: Apply::Worm(|physics, cell, values| physics.worm.scale_friction(cell, values[0])),
 };
 
 /// Tips hold better in one direction than in the other. Positions cannot distinguish it from a constant force of Σ kᵢ cᵢ with
@@ -54,7 +54,7 @@ pub(super) static DIRECTIONAL_FRICTION: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.worm.scale_backward_friction(values[0]),
+    apply: Apply::Worm(|physics, _, values| physics.worm.scale_backward_friction(values[0])),
 };
 
 /// Static friction above kinetic friction, by a rate and state law (Dieterich 1979, Ruina 1983): slip loses the excess, rest restores
@@ -103,11 +103,11 @@ pub(super) static BREAKAWAY_FRICTION: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| {
+    apply: Apply::Worm(|physics, _, values| {
         physics.laws.static_over_kinetic *= values[0];
         physics.laws.slip_m = values[1];
         physics.laws.grip_s = values[2];
-    },
+    }),
 };
 
 /// Friction falls with each cycle: dust, a pad that dries or warms up. Each run starts afresh.
@@ -134,5 +134,5 @@ pub(super) static WEAR: Effect = Effect {
     sense: Sense::Positive,
     care: None,
     may_begin: false,
-    apply: |physics, _, values| physics.laws.wear_per_cycle += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.laws.wear_per_cycle += values[0]),
 };

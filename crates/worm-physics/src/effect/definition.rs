@@ -2,6 +2,7 @@
 
 use super::error::SettingError;
 use crate::physics::Physics;
+use crate::servo::ServoPhysics;
 
 /// Most parameters of one effect.
 pub const MAX_PARAMETERS: usize = 3;
@@ -75,6 +76,15 @@ pub enum ShapeStarts {
     },
 }
 
+/// What an effect does to the physics of the machine that it belongs to.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Apply {
+    /// To a worm: on the cell (from 0) where one is given, with the values of its parameters.
+    Worm(fn(&mut Physics, Option<usize>, &[f64])),
+    /// To a servo, with the values of its parameters.
+    Servo(fn(&mut ServoPhysics, &[f64])),
+}
+
 /// An effect of the library.
 #[derive(Debug)]
 pub struct Effect {
@@ -107,8 +117,8 @@ pub struct Effect {
     /// Whether it may begin or end in mid-run: what changes the worm or its load may, what says in its law where or for how long it acts
     /// has that there, and a measurement does not change by itself.
     pub may_begin: bool,
-    /// Adds it to some physics: on the cell (from 0) where one is given, with the values of its parameters.
-    pub(super) apply: fn(&mut Physics, Option<usize>, &[f64]),
+    /// What it does.
+    pub(super) apply: Apply,
 }
 
 impl Effect {

@@ -1,6 +1,6 @@
 //! Effects of motor, cam and transmission.
 
-use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
+use super::definition::{Apply, Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// A worn cam, a slipping belt. A negative value is a longer stroke.
 pub(super) static LOST_STROKE: Effect = Effect {
@@ -26,7 +26,7 @@ pub(super) static LOST_STROKE: Effect = Effect {
     sense: Sense::Positive,
     care: Some(0.075),
     may_begin: true,
-    apply: |physics, cell, values| physics.worm.scale_stroke(cell, 1.0 - values[0]),
+    apply: Apply::Worm(|physics, cell, values| physics.worm.scale_stroke(cell, 1.0 - values[0])),
 };
 
 /// A spring between drive and cell; it shows in the distances between cells.
@@ -53,7 +53,7 @@ pub(super) static ACTUATOR_COMPLIANCE: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.laws.compliance_m_per_n += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.laws.compliance_m_per_n += values[0]),
 };
 
 /// Without a recorded phase it looks like a motor that pauses between steps.
@@ -80,7 +80,7 @@ pub(super) static BACKLASH: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.laws.play_m += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.laws.play_m += values[0]),
 };
 
 /// A cam whose ramps overlap.
@@ -107,7 +107,7 @@ pub(super) static STEP_OVERLAP: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: false,
-    apply: |physics, _, values| physics.laws.overlap = (physics.laws.overlap + values[0]).min(0.5),
+    apply: Apply::Worm(|physics, _, values| physics.laws.overlap = (physics.laws.overlap + values[0]).min(0.5)),
 };
 
 /// It changes when things happen and not where.
@@ -134,5 +134,5 @@ pub(super) static MOTOR_DROOP: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.slowdown_per_n += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.slowdown_per_n += values[0]),
 };

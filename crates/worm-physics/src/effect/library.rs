@@ -42,16 +42,22 @@ const SIMILAR: f64 = 0.8;
 /// [`SettingError::Unknown`] with the nearest name, where one is near, and all that there are.
 pub fn named(name: &str) -> Result<&'static Effect, SettingError> {
     let found = LIBRARY.iter().find(|effect| effect.name == name);
-    found.copied().ok_or_else(|| SettingError::Unknown {
+    found.copied().ok_or_else(|| unknown(name, &LIBRARY))
+}
+
+/// The error for a name that a library does not have.
+pub(super) fn unknown(name: &str, library: &[&'static Effect]) -> SettingError {
+    let names: Vec<&str> = library.iter().map(|effect| effect.name).collect();
+    SettingError::Unknown {
         name: name.to_owned(),
-        nearest: nearest(name),
-        names: LIBRARY.map(|effect| effect.name).join(", "),
-    })
+        nearest: nearest(name, library),
+        names: names.join(", "),
+    }
 }
 
 /// The name most like one that was mistyped.
-fn nearest(name: &str) -> Option<&'static str> {
-    let similar = LIBRARY
+fn nearest(name: &str, library: &[&'static Effect]) -> Option<&'static str> {
+    let similar = library
         .iter()
         .map(|effect| (strsim::jaro_winkler(name, effect.name), effect.name));
     let best = similar.max_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -1,6 +1,6 @@
 //! Effects of external forces and mass.
 
-use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
+use super::definition::{Apply, Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// A fluid, a lubricant or a sleeve.
 pub(super) static VISCOUS_DRAG: Effect = Effect {
@@ -26,7 +26,7 @@ pub(super) static VISCOUS_DRAG: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.laws.drag_n_s_per_m += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.laws.drag_n_s_per_m += values[0]),
 };
 
 /// Positions cannot distinguish it from tips that hold better in one direction.
@@ -53,7 +53,7 @@ pub(super) static CONSTANT_DRAG: Effect = Effect {
     sense: Sense::Positive,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.worm.add_resisting_force_n(values[0]),
+    apply: Apply::Worm(|physics, _, values| physics.worm.add_resisting_force_n(values[0])),
 };
 
 /// Only weight over stiffness shows, unless the stiffness is known from the bench.
@@ -80,7 +80,7 @@ pub(super) static PAYLOAD: Effect = Effect {
     sense: Sense::UsuallyPositive,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.worm.add_mass_kg(values[0]),
+    apply: Apply::Worm(|physics, _, values| physics.worm.add_mass_kg(values[0])),
 };
 
 /// A cable, a hose, a spring.
@@ -107,5 +107,5 @@ pub(super) static TETHER_DRAG: Effect = Effect {
     sense: Sense::Positive,
     care: None,
     may_begin: false,
-    apply: |physics, _, values| physics.laws.tether_n_per_m += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.laws.tether_n_per_m += values[0]),
 };

@@ -1,6 +1,6 @@
 //! Effects of the elasticity of the pads.
 
-use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
+use super::definition::{Apply, Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// One cell's pads are stiffer or softer. The friction force stays, so the largest deformation μN/k changes too.
 pub(super) static UNEQUAL_STIFFNESS: Effect = Effect {
@@ -26,7 +26,7 @@ pub(super) static UNEQUAL_STIFFNESS: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, cell, values| physics.worm.scale_stiffness(cell, values[0]),
+    apply: Apply::Worm(|physics, cell, values| physics.worm.scale_stiffness(cell, values[0])),
 };
 
 /// Hardening spring. The friction force stays; the largest deformation shrinks.
@@ -53,7 +53,7 @@ pub(super) static HARDENING: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.laws.hardening += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.laws.hardening += values[0]),
 };
 
 /// A Maxwell branch beside the spring: slow runs feel k alone, fast ones (1 + s) k.
@@ -91,10 +91,10 @@ pub(super) static CREEP: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| {
+    apply: Apply::Worm(|physics, _, values| {
         physics.laws.creep_share += values[0];
         physics.laws.creep_time_s = values[1];
-    },
+    }),
 };
 
 /// Distributed sliders (Iwan model).
@@ -121,5 +121,7 @@ pub(super) static HYSTERESIS: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: |physics, _, values| physics.laws.yielding_share = (physics.laws.yielding_share + values[0]).min(0.8),
+    apply: Apply::Worm(|physics, _, values| {
+        physics.laws.yielding_share = (physics.laws.yielding_share + values[0]).min(0.8)
+    }),
 };

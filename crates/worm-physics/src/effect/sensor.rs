@@ -1,6 +1,6 @@
 //! Effects of the measurement, not of the worm.
 
-use super::definition::{Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
+use super::definition::{Apply, Effect, Parameter, Scope, Sense, ShapeStarts, Visible};
 
 /// A miscalibrated camera. Positions alone cannot distinguish it from a rescaled stroke, δ and weight/k.
 pub(super) static SCALE: Effect = Effect {
@@ -26,7 +26,7 @@ pub(super) static SCALE: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: false,
-    apply: |physics, _, values| physics.view.scale *= values[0],
+    apply: Apply::Worm(|physics, _, values| physics.view.scale *= values[0]),
 };
 
 /// Delay between the true position and its time stamp.
@@ -53,5 +53,5 @@ pub(super) static LATENCY: Effect = Effect {
     sense: Sense::Either,
     care: None,
     may_begin: false,
-    apply: |physics, _, values| physics.view.latency_s += values[0],
+    apply: Apply::Worm(|physics, _, values| physics.view.latency_s += values[0]),
 };

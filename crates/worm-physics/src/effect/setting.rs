@@ -1,9 +1,11 @@
 //! Effects switched on, and added to a worm.
 
-use super::definition::{Effect, MAX_PARAMETERS};
+use super::definition::{Apply, Effect, MAX_PARAMETERS};
 use super::error::SettingError;
 use super::library::named;
+use super::servo_library::named_of_servo;
 use crate::physics::Physics;
+use crate::servo::ServoPhysics;
 use std::collections::BTreeMap;
 
 /// An effect switched on.
@@ -61,7 +63,23 @@ impl Setting {
         parameters: &BTreeMap<String, f64>,
         cells: usize,
     ) -> Result<Self, SettingError> {
-        let effect = named(name)?;
+        Self::of_values(named(name)?, cell, parameters, cells)
+    }
+
+    /// An effect of a servo by names, as a model's file gives it.
+    ///
+    /// # Errors
+    /// [`SettingError`].
+    pub fn of_servo_by_names(name: &str, parameters: &BTreeMap<String, f64>) -> Result<Self, SettingError> {
+        Self::of_values(named_of_servo(name)?, None, parameters, 0)
+    }
+
+    fn of_values(
+        effect: &'static Effect,
+        cell: Option<usize>,
+        parameters: &BTreeMap<String, f64>,
+        cells: usize,
+    ) -> Result<Self, SettingError> {
         let known = |given: &str| effect.parameters.iter().any(|parameter| parameter.name == given);
         if let Some(unknown) = parameters.keys().find(|given| !known(given)) {
             let names: Vec<&str> = effect.parameters.iter().map(|parameter| parameter.name).collect();
@@ -121,7 +139,25 @@ impl Setting {
     }
 
     fn apply(&self, physics: &mut Physics) {
-        (self.effect.apply)(physics, self.cell, self.values());
+        if let Apply::Worm(apply) = self.effect.apply {
+            apply(physics, self.cell, self.values());
+        }
+    }
+
+    fn apply_to_servo(&self, physics: &mut ServoPhysics) {
+        if let Apply::Servo(apply) = self.effect.apply {
+            apply(physics, self.values());
+        }
+    }
+}
+
+impl ServoPhysics {
+    /// These physics with effects of a servo; their order does not matter.
+    pub fn with<'a>(mut self, effects: impl IntoIterator<Item = &'a Setting>) -> Self {
+        for effect in effects {
+            effect.apply_to_servo(&mut self);
+        }
+        self
     }
 }
 

@@ -11,9 +11,9 @@ use worm_physics::effect::MOTOR_DROOP;
 /// by laws of another form.
 const LAW_ERROR: f64 = 0.07;
 
-/// The effects of a candidate.
+/// The effects of a candidate; `when` says when one begins or ends.
 pub(in crate::explain) fn named_effects(
-    observed: &[Observed<'_>],
+    when: &dyn Fn(Onset) -> FoundOnset,
     candidate: &Candidate,
     probability: f64,
     (closure, closure_interval): (f64, [f64; 2]),
@@ -53,7 +53,7 @@ pub(in crate::explain) fn named_effects(
                 .collect(),
             parameters: parameters.collect(),
             cell: hypothesised.cell.map(|cell| cell + 1),
-            onset: hypothesised.onset.map(|onset| found_onset(observed, onset)),
+            onset: hypothesised.onset.map(when),
             together_with: candidate
                 .named()
                 .filter(|(other, _)| *other != place)

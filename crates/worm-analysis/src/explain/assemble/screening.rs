@@ -5,9 +5,20 @@ use crate::explain::search::judge::decision::Selected;
 use crate::explain::search::score_test::Screening;
 use worm_physics::effect::{Effect, LIBRARY};
 
-/// The library's scores, and what became of each effect.
-pub(super) fn screening(screened: &[Screening], selected: &Selected, droops: bool) -> Vec<Screened> {
-    let mut rows: Vec<Screened> = screened
+/// The scores of a worm's library, and what became of each effect.
+pub(super) fn of_worm(screened: &[Screening], selected: &Selected, droops: bool) -> Vec<Screened> {
+    let mut rows = screening(screened, selected);
+    add_unscreened(&mut rows, |effect| match (effect.shows_in_time_alone(), droops) {
+        (true, true) => ScreeningOutcome::Refitted,
+        (true, false) => ScreeningOutcome::ScreenedOut,
+        (false, _) => ScreeningOutcome::NotVisible,
+    });
+    rows
+}
+
+/// The scores of the effects that were screened, and what became of each.
+pub(in crate::explain) fn screening(screened: &[Screening], selected: &Selected) -> Vec<Screened> {
+    screened
         .iter()
         .map(|screening| {
             let candidate = selected
@@ -28,13 +39,7 @@ pub(super) fn screening(screened: &[Screening], selected: &Selected, droops: boo
                 },
             }
         })
-        .collect();
-    add_unscreened(&mut rows, |effect| match (effect.shows_in_time_alone(), droops) {
-        (true, true) => ScreeningOutcome::Refitted,
-        (true, false) => ScreeningOutcome::ScreenedOut,
-        (false, _) => ScreeningOutcome::NotVisible,
-    });
-    rows
+        .collect()
 }
 
 /// Adds every effect of the library that has no row yet, with what became of it.

@@ -1,6 +1,7 @@
 //! How well a hypothesis predicts data that it was not fitted to.
 //!
-//! The data are partitioned in two ways: by runs, and by blocks of neighbouring cycles of all runs. Each part is left out in turn;
+//! The data are partitioned in two ways: a worm's by runs, and by blocks of neighbouring cycles of all runs; a servo's by trajectories, and
+//! by gains. Each part is left out in turn;
 //! the hypothesis is refitted to the rest by Gauss-Newton steps, and its residuals on the part left out are simulated exactly. The
 //! score is the mean over both partitions.
 //!
@@ -25,8 +26,6 @@ use rayon::prelude::*;
 
 /// Blocks of neighbouring cycles.
 const BLOCKS: usize = 3;
-/// Steps of each refit.
-const STEPS: usize = 2;
 /// Standard errors from its neutral value at which a severity is determined.
 const DETERMINED: f64 = 2.0;
 
@@ -60,32 +59,43 @@ impl HeldOut {
     }
 }
 
-/// All folds of a campaign: first the runs, where there are several, then the blocks of cycles.
-pub(in crate::explain) fn folds(plant: &impl Recorded) -> Vec<Fold> {
-    let runs = plant.runs();
-    let cycles = |run: usize| plant.bins(run).cycles;
-    let mut folds = Vec::new();
-    if runs > 1 {
-        for run in 0..runs {
-            let left_out = (0..runs).map(|other| vec![other == run; cycles(other)]);
-            folds.push(Fold {
+/// The parts of a campaign that are left out in turn. Each partition of the data is in it as a whole.
+#[derive(Debug, Clone)]
+pub(in crate::explain) struct Folds {
+    pub each: Vec<Fold>,
+    /// Number of partitions.
+    pub partitions: f64,
+}
+
+impl Folds {
+    /// First the runs, where there are several, then the blocks of cycles.
+    pub fn of_runs_and_cycles(plant: &impl Recorded) -> Self {
+        let runs = plant.runs();
+        let cycles = |run: usize| plant.bins(run).cycles;
+        let mut each = Vec::new();
+        if runs > 1 {
+            for run in 0..runs {
+                let left_out = (0..runs).map(|other| vec![other == run; cycles(other)]);
+                each.push(Fold {
+                    left_out: left_out.collect(),
+                });
+            }
+        }
+        for block in 0..BLOCKS {
+            let left_out = (0..runs).map(|run| {
+                let first = plant.bins(run).bins.first().map_or(0, |bin| bin.cycle);
+                let count = cycles(run);
+                (0..count)
+                    .map(|cycle| cycle >= first && (cycle - first) * BLOCKS / (count - first).max(1) == block)
+                    .collect()
+            });
+            each.push(Fold {
                 left_out: left_out.collect(),
             });
         }
+        let partitions = if runs > 1 { 2.0 } else { 1.0 };
+        Self { each, partitions }
     }
-    for block in 0..BLOCKS {
-        let left_out = (0..runs).map(|run| {
-            let first = plant.bins(run).bins.first().map_or(0, |bin| bin.cycle);
-            let count = cycles(run);
-            (0..count)
-                .map(|cycle| cycle >= first && (cycle - first) * BLOCKS / (count - first).max(1) == block)
-                .collect()
-        });
-        folds.push(Fold {
-            left_out: left_out.collect(),
-        });
-    }
-    folds
 }
 
 impl Fold {
@@ -97,11 +107,11 @@ impl Fold {
 }
 
 /// Scores a fitted hypothesis, which has its derivatives, on every fold.
-pub(in crate::explain) fn hold_out<P: Plant>(problem: &FitProblem<'_, P>, fit: &Fit, folds: &[Fold]) -> HeldOut {
+pub(in crate::explain) fn hold_out<P: Plant>(problem: &FitProblem<'_, P>, fit: &Fit, folds: &Folds) -> HeldOut {
     let refit = |fold: &Fold| {
         let stays = fold.stays(problem);
         let mut without = fit.clone();
-        for _ in 0..STEPS {
+        for _ in 0..problem.plant.steps_without() {
             without = problem.step_without(without, &stays);
         }
         let chi_squared = score(&without, &stays);
@@ -109,12 +119,10 @@ pub(in crate::explain) fn hold_out<P: Plant>(problem: &FitProblem<'_, P>, fit: &
         without.jacobian = Vec::new();
         ((chi_squared, is_determined), (without, fold.left_out.clone()))
     };
-    let (scores, fits): (Vec<(f64, bool)>, Vec<FitWithout>) = folds.par_iter().map(refit).unzip();
+    let (scores, fits): (Vec<(f64, bool)>, Vec<FitWithout>) = folds.each.par_iter().map(refit).unzip();
     let (chi_squared, determined): (Vec<f64>, Vec<bool>) = scores.into_iter().unzip();
-    let runs = folds.len() - BLOCKS;
-    let partitions = if runs > 0 { 2.0 } else { 1.0 };
     HeldOut {
-        chi_squared: chi_squared.iter().sum::<f64>() / partitions
+        chi_squared: chi_squared.iter().sum::<f64>() / folds.partitions
             + prior_chi_squared(&fit.hypothesis.quantities(), &fit.at),
         fits,
         determined,

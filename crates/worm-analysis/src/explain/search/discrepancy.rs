@@ -1,7 +1,8 @@
 //! The discrepancy: by how much the model is wrong everywhere, whatever is missing from it.
 //!
 //! No model is quite right, and what it lacks repeats with the phase as an effect does. So the residual holds, beside
-//! noise, a smooth unknown function (Kennedy and O'Hagan 2001, <https://doi.org/10.1111/1467-9868.00294>):
+//! noise, a smooth unknown function, which a plant gives as columns ([`Recorded::discrepancy_columns`]). That of a machine that does the
+//! same in every cycle is (Kennedy and O'Hagan 2001, <https://doi.org/10.1111/1467-9868.00294>):
 //!
 //! ```text
 //! δᵢ = a [√ρ g(i − s, u, λ) + √(1 − ρ) h(s, i, u, λ)] + a (c + φ) ψ(λ)
@@ -51,7 +52,7 @@ pub(in crate::explain) struct Discrepancy {
 impl Discrepancy {
     /// The discrepancy whose standard deviation a₀ is `scale_m`.
     pub fn new(plant: &impl Recorded, scale_m: f64) -> Self {
-        let columns = columns(plant, scale_m);
+        let columns = plant.discrepancy_columns(scale_m);
         let gram = cross(&columns, &columns);
         let eigen = gram.symmetric_eigen();
         let kept: Vec<usize> = (0..eigen.eigenvalues.len())
@@ -146,7 +147,8 @@ enum Column {
     Ramp(usize),
 }
 
-fn columns(plant: &impl Recorded, scale_m: f64) -> DMatrix<f64> {
+/// Columns of a machine that does the same in every cycle, whitened by the noise.
+pub(in crate::explain) fn repeating_columns(plant: &impl Recorded, scale_m: f64) -> DMatrix<f64> {
     let channels = plant.channels();
     let over_conditions = over_conditions(plant);
     let functions = over_conditions.first().map_or(0, Vec::len);

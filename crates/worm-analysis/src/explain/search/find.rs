@@ -1,6 +1,6 @@
 //! The search itself, step by step.
 
-use super::cross_validation::{self, HeldOut};
+use super::cross_validation::HeldOut;
 use super::discrepancy::Discrepancy;
 use super::fit::Fit;
 use super::judge::candidate::{Candidate, kinds};
@@ -69,13 +69,13 @@ pub(in crate::explain) fn find<P: Plant>(
     report("screening", 0.15);
     let plant = problem.plant;
     let hypothesised = plant.hypotheses();
-    let in_time = InTime::new(plant, discrepancy);
+    let in_time = plant.has_cycles().then(|| InTime::new(plant, discrepancy));
     let judge = Judge {
         problem,
         discrepancy,
-        in_time: &in_time,
+        in_time: in_time.as_ref(),
         recalibrated,
-        none: evidence(discrepancy, Some(&in_time), recalibrated, &|_| None)
+        none: evidence(discrepancy, in_time.as_ref(), recalibrated, &|_| None)
             .with_rhythm(plant.ln_bayes_of_rhythms(recalibrated)),
         campaign: prior::Campaign {
             channels: plant.channels(),
@@ -150,7 +150,7 @@ pub(in crate::explain) fn find<P: Plant>(
         judge.weigh(&mut candidates[..1], &screened);
     }
     report("held-out selection", 0.8);
-    let folds = cross_validation::folds(plant);
+    let folds = plant.folds();
     let recalibrated_held_out = held_out(problem, recalibrated, &folds);
     report("judgement", 0.9);
     let judged = judge.judge(candidates, pairs, &chance, &folds, &recalibrated_held_out);

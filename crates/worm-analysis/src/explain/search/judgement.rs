@@ -1,6 +1,6 @@
 //! Weighs candidates: their evidence, their odds, and everything else that the decision asks of them.
 
-use super::cross_validation::{self, Fold, HeldOut};
+use super::cross_validation::{self, Folds, HeldOut};
 use super::discrepancy::Discrepancy;
 use super::fit::Fit;
 use super::judge::candidate::Candidate;
@@ -28,7 +28,8 @@ const MAY_CHANGE: f64 = 3.0;
 pub(in crate::explain) struct Judge<'j, P> {
     pub problem: &'j FitProblem<'j, P>,
     pub discrepancy: &'j Discrepancy,
-    pub in_time: &'j InTime,
+    /// None of a machine that does not do the same in every cycle.
+    pub in_time: Option<&'j InTime>,
     pub recalibrated: &'j Fit,
     /// Evidence without any effect.
     pub none: Evidence,
@@ -89,7 +90,7 @@ impl<P: Plant> Judge<'_, P> {
                     .find(|screening| screening.hypothesised.is_same_effect(&hypothesised))?;
                 Some((mine.prior.ln_density(value), mine.prior.width(value)))
             };
-            let found = evidence(self.discrepancy, Some(self.in_time), &candidate.fit, &of_effect);
+            let found = evidence(self.discrepancy, self.in_time, &candidate.fit, &of_effect);
             let excess = 0.5 * self.problem.excess_of_repeating(self.recalibrated, &candidate.fit) - candidate.ln_onset;
             let rhythms = self.problem.plant.ln_bayes_of_rhythms(&candidate.fit);
             candidate.evidence = Some(found.with_rhythm(rhythms).less(excess));
@@ -121,7 +122,7 @@ impl<P: Plant> Judge<'_, P> {
         candidates: Vec<Candidate>,
         pairs: Vec<(Candidate, f64)>,
         chance: &Chance,
-        folds: &[Fold],
+        folds: &Folds,
         without: &HeldOut,
     ) -> Vec<Judged> {
         let singles = candidates.into_iter().map(|single| {
@@ -214,7 +215,7 @@ fn trace(of_each: &[f64]) -> Option<usize> {
 
 /// How a fit does on data that it was not fitted to, by the likelihood that it was fitted by: without the discrepancy, refits would
 /// go where the model is wrong anyway.
-pub(in crate::explain) fn held_out(problem: &FitProblem<'_, impl Plant>, fit: &Fit, folds: &[Fold]) -> HeldOut {
+pub(in crate::explain) fn held_out(problem: &FitProblem<'_, impl Plant>, fit: &Fit, folds: &Folds) -> HeldOut {
     let fit = problem.with_derivatives(&fit.hypothesis, fit.at.clone());
     cross_validation::hold_out(problem, &fit, folds)
 }

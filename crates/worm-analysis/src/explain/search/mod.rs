@@ -11,7 +11,8 @@
 //! - `score_test`: screens all effects, by their `directions`; `refit`: fits them to the end, `local_restart`: from one local minimum to
 //!   another; `onset`: effects that begin in mid-run.
 //! - `judge`: priors, evidence, chance and the verdict; `judgement`: weighs the candidates by them; `cross_validation`: held-out data,
-//!   which may veto.
+//!   which may veto; `squares`: what
+//!   fraction of a gap is closed there.
 
 pub(in crate::explain) mod bins;
 pub(in crate::explain) mod cross_validation;
@@ -32,3 +33,4 @@ pub(in crate::explain) mod problem;
 pub(in crate::explain) mod recalibrate;
 pub(in crate::explain) mod refit;
 pub(in crate::explain) mod score_test;
+pub(in crate::explain) mod squares;

@@ -4,11 +4,14 @@
 //! motion; it has nuisances, effects of the library that its recordings can show, and predictions of both.
 
 use super::bins::Bins;
+use super::cross_validation::Folds;
+use super::discrepancy;
 use super::fit::{Fit, FitWithout};
 use super::hypothesis::Hypothesis;
 use super::impact::Impact;
 use super::parameter::{Free, Hypothesised};
 use crate::explain::error::ExplainError;
+use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// The recordings of a machine, as the statistics see them.
@@ -28,6 +31,33 @@ pub(in crate::explain) trait Recorded: Sync {
     fn rows_of(&self, run: usize, pattern: &[f64]) -> Vec<f64>;
     /// What is left of rows of a run where they count in some bins alone.
     fn within(&self, run: usize, rows: &[f64], bins: Range<usize>) -> Vec<f64>;
+
+    /// Whether it does the same in every cycle, so that changes in mid-run and rhythms can be told from the rest.
+    fn has_cycles(&self) -> bool {
+        true
+    }
+
+    /// The discrepancy's columns, whitened by the noise, at a scale: what the model may be wrong by everywhere is their sum with standard
+    /// normal coefficients. For a machine that does the same in every cycle it repeats with them.
+    fn discrepancy_columns(&self, scale: f64) -> DMatrix<f64>
+    where
+        Self: Sized,
+    {
+        discrepancy::repeating_columns(self, scale)
+    }
+
+    /// The parts that are left out in turn to see how a hypothesis predicts what it was not fitted to.
+    fn folds(&self) -> Folds
+    where
+        Self: Sized,
+    {
+        Folds::of_runs_and_cycles(self)
+    }
+
+    /// Steps of a refit without such a part.
+    fn steps_without(&self) -> usize {
+        2
+    }
 }
 
 /// What a hypothesis predicts for a run.

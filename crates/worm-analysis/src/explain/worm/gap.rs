@@ -14,7 +14,6 @@
 
 mod free_form;
 mod mean_cycle;
-mod squares;
 
 use super::energy;
 use super::observed::Observed;
@@ -24,11 +23,9 @@ use super::residual::Residual;
 use super::settled_cycles::{Cycle, settled_cycles};
 use crate::explain::answer::{Stage, StageKind};
 use crate::explain::search::fit::{Fit, FitWithout};
+use crate::explain::search::squares::{Clusters, NINETY, Squares};
 pub(in crate::explain) use mean_cycle::cycles;
-use squares::{Clusters, Squares};
 
-/// Standard errors to either end of a 90 % interval.
-const NINETY: f64 = 1.645;
 /// Mean of the absolute value of a normal quantity, in standard deviations.
 const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
 

@@ -1,6 +1,6 @@
 //! The mean cycle of the residual: what a model of any form could add.
 
-use super::squares::Squares;
+use crate::explain::search::squares::Squares;
 use super::{CellResiduals, advance_m, within_cycles};
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::settled_cycles::{Cycle, settled_cycles};

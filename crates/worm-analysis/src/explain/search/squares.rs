@@ -1,14 +1,16 @@
-//! Squares of residuals by cycles, and what fraction of a gap is closed.
+//! Squares of residuals by blocks of a run (the cycles of a worm), and what fraction of a gap is closed.
 
-use super::NINETY;
 use std::f64::consts::SQRT_2;
+
+/// Standard errors to either end of a 90 % interval.
+pub(in crate::explain) const NINETY: f64 = 1.645;
 
 /// Squares of each cycle of each run: neighbouring samples are not independent, cycles are nearly so.
 #[derive(Debug, Clone, Default)]
 pub(in crate::explain) struct Clusters(Vec<Vec<Squares>>);
 
 impl Clusters {
-    pub(super) fn add(&mut self, run: usize, cycle: usize, squares: Squares) {
+    pub fn add(&mut self, run: usize, cycle: usize, squares: Squares) {
         if self.0.len() <= run {
             self.0.resize(run + 1, Vec::new());
         }
@@ -22,7 +24,7 @@ impl Clusters {
         self.0.iter().flatten().copied().filter(|squares| squares.count > 0.0)
     }
 
-    pub(super) fn total(&self) -> Squares {
+    pub fn total(&self) -> Squares {
         self.each().fold(Squares::default(), |mut sum, squares| {
             sum.add(squares);
             sum
@@ -79,7 +81,7 @@ impl Clusters {
 
 /// A running mean of squares.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Squares {
+pub(in crate::explain) struct Squares {
     pub sum: f64,
     pub count: f64,
 }

@@ -1,0 +1,14 @@
+//! A servo on a bench: its recordings, the campaign that lists them, and its model's file.
+//!
+//! - [`recording`]: what the servo reported while it moved an arm, a CSV file.
+//! - [`campaign`]: `plant = "servo-bench"`: the bench, and its recordings with the position gain of each.
+//! - [`model`]: the servo's model as a file, with the effects in it.
+
+pub mod campaign;
+mod checks;
+pub mod model;
+pub mod recording;
+
+pub use campaign::{BenchCampaign, BenchRun, Plant, plant_of};
+pub use model::ServoModel;
+pub use recording::ServoRecording;

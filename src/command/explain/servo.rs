@@ -1,0 +1,50 @@
+//! `wormd explain` for the campaign of a servo on a bench.
+
+use super::folder::Folder;
+use super::{ExplainArgs, title};
+use crate::command::progress::Progress;
+use crate::command::{Failure, log_line, print};
+use std::path::Path;
+use worm_analysis::bench::BenchCampaign;
+use worm_analysis::experiment::Progress as Step;
+use worm_analysis::explain::Options;
+use worm_analysis::explain::servo::{Bench, DISCREPANCY, explain_servo, model_update};
+use worm_analysis::report;
+
+/// Searches, writes and prints the answer.
+pub(super) fn run(args: &ExplainArgs, campaign: &Path) -> Result<(), Failure> {
+    args.source.refuse_conditions(campaign)?;
+    let mut progress = Progress::begin();
+    let campaign = BenchCampaign::load(campaign).map_err(Failure::unusable)?;
+    let recordings = campaign.open_all().map_err(Failure::unusable)?;
+    let folder = args.out.as_deref().map(Folder::prepare).transpose()?;
+    let options = Options {
+        discrepancy: args.discrepancy.unwrap_or(DISCREPANCY),
+        ..args.options()
+    };
+    let bench = Bench::new(&campaign, &recordings);
+    let mut report_step = |step: Step| progress.tell(step.stage, step.fraction);
+    let mut answer = explain_servo(&bench, &options, &mut report_step).map_err(Failure::unusable)?;
+    let model = model_update::model(&campaign.model, campaign.model_text.as_deref(), &answer);
+    answer.figures.model_diff.clone_from(&model.diff);
+    let written = folder.as_ref().map(|folder| {
+        progress.tell("report", 1.0);
+        folder.write_json(&answer)?;
+        folder.write_model(&model)?;
+        folder.write_servo_page(&answer, &title(&campaign.file))
+    });
+    drop(progress);
+    for warning in &answer.warnings {
+        log_line(format_args!("note: {warning}"));
+    }
+    if args.json {
+        print::line(serde_json::to_string(&answer).map_err(Failure::failed)?)?;
+    } else {
+        print::line(report::servo::text(&answer))?;
+    }
+    written.transpose()?;
+    if let Some(folder) = &folder {
+        log_line(folder);
+    }
+    Ok(())
+}
