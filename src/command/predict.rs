@@ -115,7 +115,10 @@ fn predict_worm(args: &PredictArgs) -> Result<(), Failure> {
     for (number, run) in runs.iter().enumerate() {
         let name = run.recording.source.display();
         let Some(predicted_m) = prediction.positions_m(number) else {
-            log_line(format_args!("note: {name}: this model slides down a slope of {}°", run.slope_deg));
+            log_line(format_args!(
+                "note: {name}: this model slides down a slope of {}°",
+                run.slope_deg
+            ));
             errors.push((name.to_string(), f64::NAN, f64::NAN));
             continue;
         };
@@ -150,7 +153,10 @@ fn predict_worm(args: &PredictArgs) -> Result<(), Failure> {
             significant(1e3 * square_m, 3)
         ))?;
     }
-    print::line(format!("mean over the runs: cells off by {} mm", significant(1e3 * mean_m, 3)))
+    print::line(format!(
+        "mean over the runs: cells off by {} mm",
+        significant(1e3 * mean_m, 3)
+    ))
 }
 
 /// Mean absolute and root mean square error of all cells in all samples that show them, m.
@@ -159,7 +165,9 @@ fn errors_m(recording: &Recording, predicted_m: &[f64]) -> (f64, f64) {
     let (mut absolute_m, mut square_m2, mut count) = (0.0, 0.0, 0.0);
     for (cell, measured_m) in recording.position_m.iter().enumerate() {
         for (sample, measured_m) in measured_m.iter().enumerate() {
-            let off_m = predicted_m.get(sample * cells + cell).map_or(f64::NAN, |predicted_m| predicted_m - measured_m);
+            let off_m = predicted_m
+                .get(sample * cells + cell)
+                .map_or(f64::NAN, |predicted_m| predicted_m - measured_m);
             if off_m.is_finite() {
                 absolute_m += off_m.abs();
                 square_m2 += off_m * off_m;

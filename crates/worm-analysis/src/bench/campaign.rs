@@ -161,15 +161,33 @@ impl BenchCampaign {
             reader.within(key, value, range, unit)
         };
         let pendulum = Pendulum {
-            mass_kg: needed("mass_kg", &bench.mass_kg, MASSES_KG, "kg", "the mass at the end of the arm")?,
-            length_m: needed("length_m", &bench.length_m, LENGTHS_M, "m", "the length from the shaft to that mass")?,
+            mass_kg: needed(
+                "mass_kg",
+                &bench.mass_kg,
+                MASSES_KG,
+                "kg",
+                "the mass at the end of the arm",
+            )?,
+            length_m: needed(
+                "length_m",
+                &bench.length_m,
+                LENGTHS_M,
+                "m",
+                "the length from the shaft to that mass",
+            )?,
             arm_mass_kg: match &bench.arm_mass_kg {
                 Some(mass_kg) => reader.within("arm_mass_kg", mass_kg, ARM_MASSES_KG, "kg")?,
                 None => 0.0,
             },
             zero_rad: 0.0,
         };
-        let supply_v = needed("supply_v", &bench.supply_v, SUPPLIES_V, "V", "the voltage of the supply without load")?;
+        let supply_v = needed(
+            "supply_v",
+            &bench.supply_v,
+            SUPPLIES_V,
+            "V",
+            "the voltage of the supply without load",
+        )?;
         let (model, model_text) = reader.servo(bench.servo.as_ref())?;
         if file.run.is_empty() || file.run.len() > MAX_RUNS {
             let problem = format!("{} runs", file.run.len());
@@ -208,7 +226,10 @@ impl BenchCampaign {
     /// # Errors
     /// [`ReadError`] for the first that cannot be used.
     pub fn open_all(&self) -> Result<Vec<ServoRecording>, ReadError> {
-        self.runs.iter().map(|run| ServoRecording::open(&run.recording)).collect()
+        self.runs
+            .iter()
+            .map(|run| ServoRecording::open(&run.recording))
+            .collect()
     }
 }
 

@@ -41,10 +41,16 @@ pub(super) fn signed_current(path: &Path, line: u64, current_ma: f64) -> Result<
 /// Refuses positions and velocities that are not those of a servo with 4096 counts in a turn, in rad and rad/s.
 pub(super) fn scale(recording: &ServoRecording) -> Result<(), ReadError> {
     let path = &recording.source;
-    for (name, values) in [("position_rad", &recording.position_rad), ("goal_rad", &recording.goal_rad)] {
+    for (name, values) in [
+        ("position_rad", &recording.position_rad),
+        ("goal_rad", &recording.goal_rad),
+    ] {
         let far = values.iter().position(|value| value.abs() > MAX_RAD);
         if let Some(at) = far {
-            let problem = format!("{name} = {} at {} s: that is no angle in rad", values[at], recording.time_s[at]);
+            let problem = format!(
+                "{name} = {} at {} s: that is no angle in rad",
+                values[at], recording.time_s[at]
+            );
             let remedy = "turn counts or degrees into rad: 2π/4096 for each count of an X-series servo";
             return Err(ReadError::whole(path, problem, remedy));
         }
@@ -62,14 +68,16 @@ pub(super) fn scale(recording: &ServoRecording) -> Result<(), ReadError> {
             1e3 * least,
             1e3 * COUNT_RAD
         );
-        return Err(ReadError::whole(path, problem, "give position_rad of a servo with 4096 counts in a turn"));
+        return Err(ReadError::whole(
+            path,
+            problem,
+            "give position_rad of a servo with 4096 counts in a turn",
+        ));
     }
     match velocity_over_slope(recording) {
         Some(ratio) if !RATIO.contains(&ratio) => Err(ReadError::whole(
             path,
-            format!(
-                "another servo's scale: the velocities are {ratio:.2} times what the positions change by"
-            ),
+            format!("another servo's scale: the velocities are {ratio:.2} times what the positions change by"),
             "give position_rad in rad and velocity_rad_s in rad/s: 2π/4096 and 0.02398 for each count of an X-series servo",
         )),
         _ => Ok(()),

@@ -8,6 +8,8 @@ pub mod campaign;
 mod checks;
 pub mod model;
 pub mod recording;
+#[cfg(test)]
+mod tests;
 
 pub use campaign::{BenchCampaign, BenchRun, Plant, plant_of};
 pub use model::ServoModel;

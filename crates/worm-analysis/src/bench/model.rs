@@ -116,13 +116,22 @@ impl ServoModel {
             ("viscous_n_m_s", servo.viscous_n_m_s, 10.0),
         ] {
             let may_be_zero = matches!(key, "dry_n_m" | "viscous_n_m_s");
-            if !(value <= max && (value > 1e-9 || may_be_zero && value >= 0.0)) {
+            let min = if may_be_zero { 0.0 } else { f64::MIN_POSITIVE };
+            if !(min..=max).contains(&value) {
                 let from = if may_be_zero { "from 0" } else { "above 0, up" };
-                return Err(ReadError::whole(path, format!("{key} = {value}"), format!("must be {from} to {max}")));
+                return Err(ReadError::whole(
+                    path,
+                    format!("{key} = {value}"),
+                    format!("must be {from} to {max}"),
+                ));
             }
         }
-        if !(servo.zero_rad.abs() <= 1.0) {
-            return Err(ReadError::whole(path, format!("zero_rad = {}", servo.zero_rad), "must be from -1 to 1 rad"));
+        if !(-1.0..=1.0).contains(&servo.zero_rad) {
+            return Err(ReadError::whole(
+                path,
+                format!("zero_rad = {}", servo.zero_rad),
+                "must be from -1 to 1 rad",
+            ));
         }
         let effects = file.effect.iter().map(|effect| {
             Setting::of_servo_by_names(&effect.name, &effect.parameters)
@@ -161,7 +170,12 @@ impl ServoModel {
         );
         for setting in &self.effects {
             // Writing to a string cannot fail.
-            let _ = write!(text, "\n# {}\n[[effect]]\nname = \"{}\"\n", setting.effect().sentence, setting.effect().name);
+            let _ = write!(
+                text,
+                "\n# {}\n[[effect]]\nname = \"{}\"\n",
+                setting.effect().sentence,
+                setting.effect().name
+            );
             for (parameter, value) in setting.effect().parameters.iter().zip(setting.values()) {
                 let _ = writeln!(text, "{} = {value:?}", parameter.name);
             }

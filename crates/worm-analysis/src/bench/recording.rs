@@ -63,7 +63,11 @@ impl ServoRecording {
             return Err(ReadError::whole(path, "it is not a file", REMEDY));
         }
         if metadata.len() > MAX_BYTES {
-            return Err(ReadError::whole(path, format!("longer than {MAX_BYTES} bytes"), "record for a shorter time"));
+            return Err(ReadError::whole(
+                path,
+                format!("longer than {MAX_BYTES} bytes"),
+                "record for a shorter time",
+            ));
         }
         Self::read(file.take(MAX_BYTES), path)
     }

@@ -122,7 +122,15 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     let runs = runs::runs(worm, parts, named.first());
     Answer {
         verdict,
-        sentence: words::sentence(verdict, &effects, &rivals, selected, found.open_share, change.as_ref(), "cycles"),
+        sentence: words::sentence(
+            verdict,
+            &effects,
+            &rivals,
+            selected,
+            found.open_share,
+            change.as_ref(),
+            "cycles",
+        ),
         r#where: places(&maps_before, PLACES),
         effects,
         rivals,

@@ -25,7 +25,8 @@ struct Section {
 /// [`DrawError`] where a figure could not be drawn.
 pub fn page(answer: &ServoAnswer, title: &str) -> Result<String, DrawError> {
     let runs = answer.runs.len();
-    let lead = format!("{runs} recordings of a servo on a bench: where its model is wrong, and which effect it misses.");
+    let lead =
+        format!("{runs} recordings of a servo on a bench: where its model is wrong, and which effect it misses.");
     let mut page = Page::new(title, &lead).with_style(include_str!("explain/style.css"));
     page.add(html! {
         section class={ "verdict " (class(answer.verdict)) } {
@@ -64,7 +65,10 @@ pub fn page(answer: &ServoAnswer, title: &str) -> Result<String, DrawError> {
 
 /// The same for the terminal, without figures.
 pub fn text(answer: &ServoAnswer) -> String {
-    let mut parts = vec![format!("{}. {}", badge(answer.verdict), headline(answer)), answer.sentence.clone()];
+    let mut parts = vec![
+        format!("{}. {}", badge(answer.verdict), headline(answer)),
+        answer.sentence.clone(),
+    ];
     for section in sections(answer) {
         let underline = "─".repeat(section.heading.chars().count());
         parts.push(format!("{}\n{underline}", section.heading));
@@ -157,8 +161,11 @@ fn sections(answer: &ServoAnswer) -> Vec<Section> {
         table: Some(library_table(answer)),
     });
     if let Some(next) = &answer.next_experiment {
-        let predictions: Vec<String> =
-            next.predictions.iter().map(|one| format!("with {} {}", one.effect, one.description)).collect();
+        let predictions: Vec<String> = next
+            .predictions
+            .iter()
+            .map(|one| format!("with {} {}", one.effect, one.description))
+            .collect();
         sections.push(Section {
             heading: "The next run",
             text: format!("To decide, {}: {}.", next.description, predictions.join(", ")),
@@ -192,7 +199,13 @@ fn stage_name(stage: &ServoStage) -> String {
 }
 
 fn gap_table(stages: &[ServoStage]) -> Table {
-    let head = ["", "as fitted, mrad", "without its trajectory", "without its gain", "rms held out"];
+    let head = [
+        "",
+        "as fitted, mrad",
+        "without its trajectory",
+        "without its gain",
+        "rms held out",
+    ];
     let mrad = |rad: f64| fixed(1e3 * rad, 1);
     let row = |stage: &ServoStage| {
         vec![
@@ -230,7 +243,13 @@ fn effects_table(answer: &ServoAnswer) -> Table {
 }
 
 fn places_table(places: &[FrictionPlace]) -> Table {
-    let head = ["speed, rad/s", "load, N m", "friction beyond the model's, mN m", "standard errors", "most of it in"];
+    let head = [
+        "speed, rad/s",
+        "load, N m",
+        "friction beyond the model's, mN m",
+        "standard errors",
+        "most of it in",
+    ];
     let range = |[from, to]: [f64; 2]| format!("{from} to {to}");
     let row = |place: &FrictionPlace| {
         vec![
@@ -274,7 +293,11 @@ fn calibration_table(answer: &ServoAnswer) -> Table {
     };
     Table {
         rows: answer.calibration.iter().map(row).collect(),
-        ..Table::new("Nominal and found", ["", "unit", "nominal", "found", "within its prior"]).with_word_columns(2)
+        ..Table::new(
+            "Nominal and found",
+            ["", "unit", "nominal", "found", "within its prior"],
+        )
+        .with_word_columns(2)
     }
 }
 

@@ -63,12 +63,24 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
         .iter()
         .enumerate()
         .map(|(place, candidate)| {
-            named_effects(&when, candidate, selected.probability[place], closures[place], margin(place))
+            named_effects(
+                &when,
+                candidate,
+                selected.probability[place],
+                closures[place],
+                margin(place),
+            )
         })
         .collect();
     let effects = of_each.first().cloned().unwrap_or_default();
     let is_new = |rival: &NamedEffect| !effects.iter().any(|effect| effect.name == rival.name);
-    let mut rivals: Vec<NamedEffect> = of_each.iter().skip(1).flatten().filter(|rival| is_new(rival)).cloned().collect();
+    let mut rivals: Vec<NamedEffect> = of_each
+        .iter()
+        .skip(1)
+        .flatten()
+        .filter(|rival| is_new(rival))
+        .cloned()
+        .collect();
     if of_each.len() > 1 && rivals.is_empty() {
         rivals = of_each[1..].concat();
     }
@@ -146,11 +158,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
 }
 
 /// The gap in the order in which it closes: of a pair, its first effect alone comes before it.
-fn stages(
-    problem: &ServoProblem<'_, '_>,
-    parts: &Parts,
-    named: &[Candidate],
-) -> Vec<super::answer::ServoStage> {
+fn stages(problem: &ServoProblem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Vec<super::answer::ServoStage> {
     let servo = problem.plant;
     let (found, selected) = (&parts.found, &parts.found.selected);
     let measured = Stages::new(servo, &parts.folds);
@@ -167,7 +175,12 @@ fn stages(
     };
     let mut stages = vec![
         measured.stage(StageKind::Baseline, None, &found.nominal, None),
-        measured.stage(StageKind::Recalibrated, None, &parts.recalibrated, Some(&found.recalibrated_held_out)),
+        measured.stage(
+            StageKind::Recalibrated,
+            None,
+            &parts.recalibrated,
+            Some(&found.recalibrated_held_out),
+        ),
     ];
     if let Some(first) = named.first().filter(|first| first.named().count() > 1) {
         let of_pair = |single: &&Candidate| {
@@ -177,7 +190,12 @@ fn stages(
         let best = singles.min_by(|a, b| a.fit.chi_squared.total_cmp(&b.fit.chi_squared));
         stages.extend(best.map(|single| stage(StageKind::Step, single)));
     }
-    stages.extend(selected.best_wrong.as_ref().map(|wrong| stage(StageKind::BestWrong, wrong)));
+    stages.extend(
+        selected
+            .best_wrong
+            .as_ref()
+            .map(|wrong| stage(StageKind::BestWrong, wrong)),
+    );
     stages.extend(named.first().map(|candidate| stage(StageKind::Named, candidate)));
     stages.push(measured.free_form(problem, &parts.recalibrated, &parts.folds));
     stages.push(measured.floor());
@@ -302,7 +320,9 @@ fn warnings(servo: &RecordedServo<'_>, fit: &Fit, folds: &Folds) -> Vec<String> 
         );
     }
     let limits = fit.hypothesis.free.iter().enumerate();
-    let at_limit = limits.filter(|(at, free)| matches!(free.what, What::Nuisance(_)) && fit.would_go_beyond(*at)).count();
+    let at_limit = limits
+        .filter(|(at, free)| matches!(free.what, What::Nuisance(_)) && fit.would_go_beyond(*at))
+        .count();
     if at_limit > 0 {
         warnings.push(format!(
             "{at_limit} of the recalibrated values lie at the end of what their priors allow: see the calibration"

@@ -29,14 +29,19 @@ const MOST_COLUMNS: usize = 900;
 pub(super) fn columns(servo: &RecordedServo<'_>, scale_rad: f64) -> DMatrix<f64> {
     let runs = servo.observed.len();
     let trajectories = servo.observed.iter().map(|one| one.trajectory + 1).max().unwrap_or(0);
-    let longest_s = servo.observed.iter().map(|one| one.recording.duration_s()).fold(0.0, f64::max);
+    let longest_s = servo
+        .observed
+        .iter()
+        .map(|one| one.recording.duration_s())
+        .fold(0.0, f64::max);
     let over_gains = over_gains(servo);
     let functions = over_gains.first().map_or(1, Vec::len);
     let most = MOST_COLUMNS / (runs + functions * trajectories).max(1);
     let cosines = ((COSINES_PER_S * longest_s) as usize).clamp(4, most.max(4));
     let weights = weights(cosines, longest_s);
     // Of a trajectory with a function of the gain, or of a run.
-    let shared = (0..trajectories).flat_map(|trajectory| (0..functions).map(move |function| (Some((trajectory, function)), 0)));
+    let shared =
+        (0..trajectories).flat_map(|trajectory| (0..functions).map(move |function| (Some((trajectory, function)), 0)));
     let kinds: Vec<(Option<(usize, usize)>, usize)> = shared.chain((0..runs).map(|run| (None, run))).collect();
     let all: Vec<Vec<f64>> = kinds
         .par_iter()

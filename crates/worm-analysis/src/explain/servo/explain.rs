@@ -42,7 +42,9 @@ impl<'a> Bench<'a> {
             pendulum: campaign.pendulum,
             supply_v: campaign.supply_v,
             model: &campaign.model,
-            runs: runs.map(|(run, recording)| (recording, run.gain, run.trajectory.as_deref())).collect(),
+            runs: runs
+                .map(|(run, recording)| (recording, run.gain, run.trajectory.as_deref()))
+                .collect(),
         }
     }
 
@@ -57,7 +59,10 @@ impl<'a> Bench<'a> {
                 _ => false,
             });
             let trajectory = known.unwrap_or_else(|| {
-                let stem = recording.source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+                let stem = recording
+                    .source
+                    .file_stem()
+                    .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
                 firsts.push((recording, name, name.map_or(stem, str::to_owned)));
                 firsts.len() - 1
             });
@@ -70,7 +75,9 @@ impl<'a> Bench<'a> {
 fn have_same_goals(one: &ServoRecording, other: &ServoRecording) -> bool {
     let duration_s = one.duration_s().min(other.duration_s());
     let goal = |recording: &ServoRecording, after_s: f64| {
-        let at = recording.time_s.partition_point(|time_s| *time_s <= recording.time_s[0] + after_s);
+        let at = recording
+            .time_s
+            .partition_point(|time_s| *time_s <= recording.time_s[0] + after_s);
         recording.goal_rad[at.saturating_sub(1)]
     };
     let (mut apart, mut square) = (0.0, 0.0);

@@ -58,15 +58,16 @@ pub(super) fn map(servo: &RecordedServo<'_>, physics: &ServoPhysics) -> Vec<Fric
                 let balance = motor - arm - inertia * observed.acceleration_rad_s2[reading];
                 second.readings += 1.0;
                 second.measured += balance * speed.signum();
-                second.model +=
-                    physics.friction_n_m(motor, arm, speed) + physics.motor.viscous_n_m_s * speed.abs();
+                second.model += physics.friction_n_m(motor, arm, speed) + physics.motor.viscous_n_m_s * speed.abs();
                 second.load += load;
             }
         }
     }
     let cells = seconds.into_iter().filter_map(|((speed, load), seconds)| {
-        let seconds: Vec<((usize, usize), Second)> =
-            seconds.into_iter().filter(|(_, second)| second.readings >= MIN_READINGS as f64).collect();
+        let seconds: Vec<((usize, usize), Second)> = seconds
+            .into_iter()
+            .filter(|(_, second)| second.readings >= MIN_READINGS as f64)
+            .collect();
         if seconds.len() < MIN_SECONDS {
             return None;
         }

@@ -108,7 +108,8 @@ impl<'s, 'a> Stages<'s, 'a> {
                 .par_iter()
                 .flat_map_iter(|(fit, out)| {
                     let runs = (0..servo.runs()).filter(|&run| out[run].iter().all(|out| *out));
-                    runs.map(|run| mean_absolute(&residual_rad(servo, run, fit))).collect::<Vec<f64>>()
+                    runs.map(|run| mean_absolute(&residual_rad(servo, run, fit)))
+                        .collect::<Vec<f64>>()
                 })
                 .collect();
             (!errors.is_empty()).then(|| mean(&errors))

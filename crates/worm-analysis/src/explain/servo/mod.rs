@@ -27,5 +27,5 @@ mod recorded_servo;
 mod supply;
 
 pub use answer::{Measures, ServoAnswer};
-pub use prediction::{ServoPredictionError, prediction_errors};
 pub use explain::{Bench, DISCREPANCY, explain_servo};
+pub use prediction::{ServoPredictionError, prediction_errors};

@@ -32,14 +32,21 @@ pub(super) fn propose(servo: &RecordedServo<'_>, rivals: &[Candidate], discrepan
         }
     }
     let recorded = |observed: &Observed<'_>, gain: f64| {
-        let mut same = servo.observed.iter().filter(|other| other.trajectory == observed.trajectory);
+        let mut same = servo
+            .observed
+            .iter()
+            .filter(|other| other.trajectory == observed.trajectory);
         same.any(|other| other.gain == gain)
     };
     let trials: Vec<Trial<'_, '_>> = trajectories
         .iter()
         .flat_map(|observed| {
             let gains = GAINS.into_iter().filter(|gain| !recorded(observed, *gain));
-            let by_gain = gains.map(|gain| Trial { observed, gain, mass: 1.0 });
+            let by_gain = gains.map(|gain| Trial {
+                observed,
+                gain,
+                mass: 1.0,
+            });
             let by_mass = MASSES.into_iter().map(|mass| Trial {
                 observed,
                 gain: observed.gain,
@@ -69,7 +76,9 @@ pub(super) fn propose(servo: &RecordedServo<'_>, rivals: &[Candidate], discrepan
             (square * independent).sqrt() / floor_rad
         };
         let pairs = (0..angles.len()).flat_map(|one| (0..one).map(move |other| (one, other)));
-        pairs.map(|(one, other)| apart(&angles[one], &angles[other])).fold(f64::INFINITY, f64::min)
+        pairs
+            .map(|(one, other)| apart(&angles[one], &angles[other]))
+            .fold(f64::INFINITY, f64::min)
     };
     let separations: Vec<f64> = trials.par_iter().map(separation).collect();
     let best = (0..trials.len()).max_by(|&a, &b| separations[a].total_cmp(&separations[b]))?;

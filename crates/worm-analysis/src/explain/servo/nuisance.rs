@@ -61,7 +61,12 @@ impl Nuisance {
         let What::Nuisance(number) = what else {
             return None;
         };
-        Some(OF_ALL.get(number).copied().unwrap_or_else(|| Self::Table(number - OF_ALL.len())))
+        Some(
+            OF_ALL
+                .get(number)
+                .copied()
+                .unwrap_or_else(|| Self::Table(number - OF_ALL.len())),
+        )
     }
 
     fn number(self) -> usize {

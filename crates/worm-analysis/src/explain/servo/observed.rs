@@ -103,7 +103,9 @@ fn smoothed(time_s: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
         }
         let normal = nalgebra::Matrix3::from_fn(|row, column| powers[row + column]);
         let found = normal.lu().solve(&nalgebra::Vector3::from(products));
-        found.map_or((0.0, 0.0), |found| (found[1] / SMOOTHED_S, 2.0 * found[2] / SMOOTHED_S.powi(2)))
+        found.map_or((0.0, 0.0), |found| {
+            (found[1] / SMOOTHED_S, 2.0 * found[2] / SMOOTHED_S.powi(2))
+        })
     };
     (0..time_s.len()).map(of_reading).unzip()
 }

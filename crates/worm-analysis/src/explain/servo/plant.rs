@@ -31,7 +31,9 @@ impl Plant for RecordedServo<'_> {
     }
 
     fn hypotheses(&self) -> Vec<Hypothesised> {
-        SERVO_LIBRARY.map(|effect| Hypothesised::throughout(effect, None)).to_vec()
+        SERVO_LIBRARY
+            .map(|effect| Hypothesised::throughout(effect, None))
+            .to_vec()
     }
 
     /// No effect of a servo has a place but the phase of a wave.
@@ -89,8 +91,14 @@ impl Plant for RecordedServo<'_> {
         for observed in &self.observed {
             let [on, off] = [&on, &off].map(|physics| predict(observed, physics));
             let [on_j, off_j] = [&on, &off].map(|predicted| predicted.energy.electrical_j);
-            impact.energy = impact.energy.max((on_j - off_j).abs() / off_j.abs().max(LEAST_J) / limit);
-            let squares = on.angle_rad.iter().zip(&off.angle_rad).map(|(on, off)| (on - off).powi(2));
+            impact.energy = impact
+                .energy
+                .max((on_j - off_j).abs() / off_j.abs().max(LEAST_J) / limit);
+            let squares = on
+                .angle_rad
+                .iter()
+                .zip(&off.angle_rad)
+                .map(|(on, off)| (on - off).powi(2));
             let rms_rad = (squares.sum::<f64>() / on.angle_rad.len() as f64).sqrt();
             impact.position = impact.position.max(rms_rad / limit_rad);
         }
@@ -115,11 +123,11 @@ impl Plant for RecordedServo<'_> {
     /// The offset of the zero angle is a nuisance and an effect.
     fn with_whole_effects(&self, mut fit: Fit) -> Fit {
         let free = &fit.hypothesis.free;
-        let nuisance = free.iter().position(|free| Nuisance::of(free.what) == Some(Nuisance::Zero));
+        let nuisance = free
+            .iter()
+            .position(|free| Nuisance::of(free.what) == Some(Nuisance::Zero));
         let effect = free.iter().position(|free| match free.what {
-            What::Effect { place, parameter: 0 } => {
-                fit.hypothesis.hypothesised[place].effect.name == "zero-offset"
-            }
+            What::Effect { place, parameter: 0 } => fit.hypothesis.hypothesised[place].effect.name == "zero-offset",
             _ => false,
         });
         if let Some((nuisance, effect)) = nuisance.zip(effect) {
@@ -135,8 +143,9 @@ impl Plant for RecordedServo<'_> {
         let (mut square, mut count) = (0.0, 0.0);
         for (run, observed) in self.observed.iter().enumerate() {
             let predicted = predict(observed, &physics);
-            let residual_rad =
-                self.binned(run, |reading| predicted.angle_rad[reading] - observed.recording.position_rad[reading]);
+            let residual_rad = self.binned(run, |reading| {
+                predicted.angle_rad[reading] - observed.recording.position_rad[reading]
+            });
             for three in residual_rad.windows(3) {
                 square += (three[0] - 2.0 * three[1] + three[2]).powi(2) / OF_SECOND_DIFFERENCE;
                 count += 1.0;

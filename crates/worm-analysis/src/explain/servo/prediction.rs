@@ -39,7 +39,11 @@ pub fn prediction_errors(bench: &Bench<'_>, model: &ServoModel) -> Vec<ServoPred
         let recording = observed.recording;
         let predicted = predict(observed, &physics);
         let off = |predicted: &[f64], measured: &[f64]| -> Vec<f64> {
-            predicted.iter().zip(measured).map(|(predicted, measured)| predicted - measured).collect()
+            predicted
+                .iter()
+                .zip(measured)
+                .map(|(predicted, measured)| predicted - measured)
+                .collect()
         };
         let position = off(&predicted.angle_rad, &recording.position_rad);
         let lagged: Vec<f64> = (0..recording.readings())

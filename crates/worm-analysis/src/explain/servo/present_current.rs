@@ -65,7 +65,9 @@ pub(super) fn decide(observed: &[Observed<'_>], physics: &ServoPhysics) -> Prese
             true => 1.0,
             false => (product / square.max(1e-30)).clamp(*SCALE.start(), *SCALE.end()),
         };
-        let left = values.iter().map(|(reported, predicted)| (reported - scale * predicted[of][lag]).powi(2));
+        let left = values
+            .iter()
+            .map(|(reported, predicted)| (reported - scale * predicted[of][lag]).powi(2));
         (left.sum::<f64>() / count).sqrt().max(QUANTUM_A)
     };
     let mut hypotheses: Vec<CurrentHypothesis> = Measures::ALL
@@ -82,7 +84,9 @@ pub(super) fn decide(observed: &[Observed<'_>], physics: &ServoPhysics) -> Prese
     let ln_odds_winding_over_supply = ln_odds(hypotheses[0].rms_a, hypotheses[1].rms_a);
     hypotheses.sort_by(|a, b| a.rms_a.total_cmp(&b.rms_a));
     let best = hypotheses[0].rms_a;
-    hypotheses.iter_mut().for_each(|one| one.ln_odds = ln_odds(one.rms_a, best));
+    hypotheses
+        .iter_mut()
+        .for_each(|one| one.ln_odds = ln_odds(one.rms_a, best));
     let whole: f64 = hypotheses.iter().map(|one| one.ln_odds.exp()).sum();
     let reported_rms_a = (spread / count).sqrt();
     // What leaves most of the current unexplained measures something else.

@@ -43,7 +43,10 @@ impl<'a> RecordedServo<'a> {
 
     /// Root mean square of the positions, rad: what the discrepancy's scale is a fraction of.
     pub(super) fn rms_position_rad(&self) -> f64 {
-        let all = self.observed.iter().flat_map(|observed| &observed.recording.position_rad);
+        let all = self
+            .observed
+            .iter()
+            .flat_map(|observed| &observed.recording.position_rad);
         let (sum, count) = all.fold((0.0, 0.0), |(sum, count), rad| (sum + rad * rad, count + 1.0));
         (sum / count).sqrt()
     }
@@ -58,7 +61,11 @@ impl<'a> RecordedServo<'a> {
     /// For each kind, a mark for each run: its trajectory, and its gain.
     fn partitions(&self) -> [Vec<usize>; 2] {
         let trajectories = self.observed.iter().map(|observed| observed.trajectory).collect();
-        let gains = self.observed.iter().map(|observed| observed.gain.to_bits() as usize).collect();
+        let gains = self
+            .observed
+            .iter()
+            .map(|observed| observed.gain.to_bits() as usize)
+            .collect();
         [trajectories, gains]
     }
 }

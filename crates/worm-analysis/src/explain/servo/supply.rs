@@ -35,14 +35,20 @@ pub(super) fn read(observed: &[Observed<'_>], physics: &ServoPhysics) -> Option<
         }
     }
     let count = points.len() as f64;
-    let (sum_a, sum_v) = points.iter().fold((0.0, 0.0), |(a, v), point| (a + point.0, v + point.1));
+    let (sum_a, sum_v) = points
+        .iter()
+        .fold((0.0, 0.0), |(a, v), point| (a + point.0, v + point.1));
     let (mean_a, mean_v) = (sum_a / count, sum_v / count);
     let square = points.iter().map(|(a, _)| (a - mean_a).powi(2)).sum::<f64>();
     if points.is_empty() || (square / count).sqrt() < MIN_SPREAD_A {
         return None;
     }
     let slope = points.iter().map(|(a, v)| (a - mean_a) * (v - mean_v)).sum::<f64>() / square;
-    let rest = points.iter().map(|(a, v)| (v - mean_v - slope * (a - mean_a)).powi(2)).sum::<f64>() / count;
+    let rest = points
+        .iter()
+        .map(|(a, v)| (v - mean_v - slope * (a - mean_a)).powi(2))
+        .sum::<f64>()
+        / count;
     if rest == 0.0 {
         return None; // a voltage that was written down once
     }

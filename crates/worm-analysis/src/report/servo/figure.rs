@@ -13,9 +13,17 @@ const MOST_RUNS: usize = 16;
 /// Friction by the torque balance over load, a row for each range of speed, before and after.
 pub(super) fn friction_map(answer: &ServoAnswer) -> Result<Figure, DrawError> {
     let figures = &answer.figures;
-    let mut panels = vec![Panel::new("recalibrated model", "friction, mN m", picture(&figures.map_before)?)];
+    let mut panels = vec![Panel::new(
+        "recalibrated model",
+        "friction, mN m",
+        picture(&figures.map_before)?,
+    )];
     if !figures.map_after.is_empty() {
-        panels.push(Panel::new("with the answer", "friction, mN m", picture(&figures.map_after)?));
+        panels.push(Panel::new(
+            "with the answer",
+            "friction, mN m",
+            picture(&figures.map_after)?,
+        ));
     }
     Ok(Figure {
         id: "friction",
@@ -35,9 +43,8 @@ fn picture(cells: &[FrictionCell]) -> Result<Svg, DrawError> {
     let mut speeds: Vec<[f64; 2]> = cells.iter().map(|cell| cell.speed_rad_s).collect();
     speeds.sort_by(|a, b| a[0].total_cmp(&b[0]));
     speeds.dedup();
-    let rows_of = |speed: &[f64; 2]| -> Vec<&FrictionCell> {
-        cells.iter().filter(|cell| cell.speed_rad_s == *speed).collect()
-    };
+    let rows_of =
+        |speed: &[f64; 2]| -> Vec<&FrictionCell> { cells.iter().filter(|cell| cell.speed_rad_s == *speed).collect() };
     let ends = |cell: &FrictionCell| {
         let (measured, sigma) = (1e3 * cell.measured_n_m, 1e3 * cell.sigma_n_m);
         [measured - sigma, measured + sigma, 1e3 * cell.model_n_m, 0.0]
@@ -45,7 +52,11 @@ fn picture(cells: &[FrictionCell]) -> Result<Svg, DrawError> {
     let sheet = Sheet {
         description: format!("Friction over load in {} ranges of speed", speeds.len()),
         x_label: Some("torque on the gears, N m".to_owned()),
-        x: Axis::between(0.0, cells.iter().map(|cell| cell.mean_load_n_m).fold(0.1, f64::max) * 1.08, 5),
+        x: Axis::between(
+            0.0,
+            cells.iter().map(|cell| cell.mean_load_n_m).fold(0.1, f64::max) * 1.08,
+            5,
+        ),
         rows: speeds
             .iter()
             .map(|speed| Row {
@@ -64,15 +75,20 @@ fn picture(cells: &[FrictionCell]) -> Result<Svg, DrawError> {
             let (measured, sigma) = (1e3 * cell.measured_n_m, 1e3 * cell.sigma_n_m);
             plot.whisker(cell.mean_load_n_m, measured - sigma, measured + sigma, 0.004)?;
         }
-        plot.dots(cells.iter().map(|cell| (cell.mean_load_n_m, 1e3 * cell.measured_n_m)), INK, 3.0)
+        plot.dots(
+            cells.iter().map(|cell| (cell.mean_load_n_m, 1e3 * cell.measured_n_m)),
+            INK,
+            3.0,
+        )
     })
 }
 
 /// Each run: goal, measured, and both models.
 pub(super) fn runs(answer: &ServoAnswer) -> Result<Figure, DrawError> {
     let runs = answer.figures.runs.iter().take(MOST_RUNS);
-    let panels: Result<Vec<Panel>, DrawError> =
-        runs.map(|run| Ok(Panel::new(run.name.clone(), "angle, rad", run_picture(run)?))).collect();
+    let panels: Result<Vec<Panel>, DrawError> = runs
+        .map(|run| Ok(Panel::new(run.name.clone(), "angle, rad", run_picture(run)?)))
+        .collect();
     Ok(Figure {
         id: "runs",
         title: "The runs: measured, and predicted from the first reading on",
@@ -101,10 +117,16 @@ fn run_picture(run: &RunSeries) -> Result<Svg, DrawError> {
     let (low, high) = (sheet.rows[0].y.low(), sheet.rows[0].y.high());
     draw(&sheet, |_, plot| {
         // The goal of a weak loop is far beyond the arm.
-        let goal = run.goal_rad.iter().map(|rad| if (low..=high).contains(rad) { *rad } else { f64::NAN });
+        let goal = run
+            .goal_rad
+            .iter()
+            .map(|rad| if (low..=high).contains(rad) { *rad } else { f64::NAN });
         plot.line(time().zip(goal), Stroke::new(SHADE, 1.2))?;
         plot.line(time().zip(run.measured_rad.iter().copied()), Stroke::new(INK, 2.0))?;
-        plot.line(time().zip(run.recalibrated_rad.iter().copied()), Stroke::new(MID, 1.4).dashed())?;
+        plot.line(
+            time().zip(run.recalibrated_rad.iter().copied()),
+            Stroke::new(MID, 1.4).dashed(),
+        )?;
         plot.line(time().zip(run.named_rad.iter().copied()), Stroke::new(ACCENT, 1.6))
     })
 }

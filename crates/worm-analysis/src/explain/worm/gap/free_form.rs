@@ -1,7 +1,7 @@
 //! The mean cycle of the residual: what a model of any form could add.
 
-use crate::explain::search::squares::Squares;
 use super::{CellResiduals, advance_m, within_cycles};
+use crate::explain::search::squares::Squares;
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::settled_cycles::{Cycle, settled_cycles};
 
