@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, FieldAccess, FieldKind, FieldValue, Range, RecordingStatus, State, Timing,
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldKind, FieldValue, Range, RecordingStatus,
+    State, Timing, TripStatus,
 };
-use wormd::topics::{Controller, Estimator, Hub, Recorder, RoleLock, describe_topics};
+use wormd::topics::{BlackBox, Controller, Estimator, Hub, Recorder, RoleLock, Trip, describe_topics};
 
 const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -102,6 +103,8 @@ fn every_field_of_every_topic_is_read_as_it_was_published() {
     let controller = RoleLock::<Controller>::take(&instance).expect("role");
     let estimator = RoleLock::<Estimator>::take(&instance).expect("role");
     let recorder = RoleLock::<Recorder>::take(&instance).expect("role");
+    let trip = RoleLock::<Trip>::take(&instance).expect("role");
+    let black_box = RoleLock::<BlackBox>::take(&instance).expect("role");
     let hub = Hub::open(&instance).expect("hub");
     let mut expected = Vec::new();
     let mut publish: Vec<Box<dyn Fn()>> = Vec::new();
@@ -116,7 +119,8 @@ fn every_field_of_every_topic_is_read_as_it_was_published() {
     }
     prepare! {
         State of controller, Timing of controller, Estimate of estimator, Cycle of estimator, Alarm of estimator,
-        Range of estimator, CommandRecord of controller, RecordingStatus of recorder
+        Range of estimator, CommandRecord of controller, RecordingStatus of recorder, TripStatus of trip,
+        BlackBoxStatus of black_box
     }
     assert_eq!(publish.len(), describe_topics().len(), "every topic is tried");
 

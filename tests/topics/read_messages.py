@@ -50,6 +50,8 @@ with wormd.Worm(config=sys.argv[1]) as worm:
         worm.range(),
         worm.commands(),
         worm.recording(),
+        worm.trip(),
+        worm.black_box(),
     ]
     print(json.dumps("ready"), flush=True)
     for stream in streams:

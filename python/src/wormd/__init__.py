@@ -12,7 +12,8 @@
 - `read`: a log, or a CSV of positions, as pandas data frames.
 - `analyze`, `explain`, `simulate`: the program's analyses, with results as objects.
 
-Messages are `State`, `Timing`, `Estimate`, `Cycle`, `Alarm`, `Range`, `CommandRecord` and `RecordingStatus`. All units are
+Messages are `State`, `Timing`, `Estimate`, `Cycle`, `Alarm`, `Range`, `CommandRecord`, `TripStatus`, `RecordingStatus` and
+`BlackBoxStatus`. All units are
 SI and stand in the names. Everything that can go wrong is a `WormError`. ``python -m wormd`` shows how a worm is.
 """
 
@@ -21,6 +22,7 @@ from ._messages import (
     VERSION,
     Alarm,
     AlarmKind,
+    BlackBoxStatus,
     CommandKind,
     CommandOutcome,
     CommandRecord,
@@ -37,6 +39,7 @@ from ._messages import (
     Severity,
     State,
     Timing,
+    TripStatus,
 )
 from ._relay import Answer, Driver
 from .analysis import Analysis, CampaignAnalysis, analyze, analyze_campaign
@@ -65,6 +68,7 @@ __all__ = [
     "Alarm",
     "AlarmKind",
     "Analysis",
+    "BlackBoxStatus",
     "Answer",
     "CampaignAnalysis",
     "CommandKind",
@@ -99,6 +103,7 @@ __all__ = [
     "State",
     "Stream",
     "Timing",
+    "TripStatus",
     "Worm",
     "WormError",
     "alarms_of",

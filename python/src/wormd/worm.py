@@ -16,7 +16,19 @@ from types import TracebackType
 from typing import TypeVar
 
 from ._instance import locate
-from ._messages import Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing
+from ._messages import (
+    Alarm,
+    AlarmKind,
+    BlackBoxStatus,
+    CommandRecord,
+    Cycle,
+    Estimate,
+    Range,
+    RecordingStatus,
+    State,
+    Timing,
+    TripStatus,
+)
 from ._program import StrPath, call, find
 from ._relay import Answer, Driver, RelayLink
 from ._topic import Message, Topic
@@ -133,6 +145,14 @@ class Worm:
     def recording(self, *, timeout: float | None = None) -> Stream[RecordingStatus]:
         """Iterate over how the recorder is doing, once a second, while there is one."""
         return self._stream(RecordingStatus.TOPIC, RecordingStatus.TOPIC.history, timeout)
+
+    def black_box(self, *, timeout: float | None = None) -> Stream[BlackBoxStatus]:
+        """Iterate over how the black box is doing, once a second, while there is one."""
+        return self._stream(BlackBoxStatus.TOPIC, BlackBoxStatus.TOPIC.history, timeout)
+
+    def trip(self, *, timeout: float | None = None) -> Stream[TripStatus]:
+        """Iterate over how a trip is doing, twice a second and on change, while there is one."""
+        return self._stream(TripStatus.TOPIC, TripStatus.TOPIC.history, timeout)
 
     def latest(self, *, timeout: float = _TICK_TIMEOUT_S) -> Latest:
         """Return the newest messages. Use it in one thread.
