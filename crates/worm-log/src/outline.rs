@@ -3,6 +3,7 @@
 //! [`outline`] goes from record to record and reads little more than their heads. [`complete`] does the same, cuts off what is
 //! not whole at the end, and adds the index that the log's own writer would have added; no message is written anew.
 
+use crate::shape::is_whole;
 use mcap::MAGIC;
 use mcap::read::ChunkReader;
 use mcap::records::{AttachmentIndex, ChunkHeader, Record, op};
@@ -165,6 +166,9 @@ impl Outline {
             op::METADATA | op::ATTACHMENT if content_len <= LARGEST_READ => {
                 let mut content = vec![0; content_len as usize];
                 reader.read_exact(&mut content)?;
+                if !is_whole(opcode, &content) {
+                    return Ok(ControlFlow::Break(()));
+                }
                 match mcap::parse_record(opcode, &content) {
                     Ok(Record::Metadata(metadata)) => {
                         self.index.metadata.push((at, length, metadata.name.clone()));
