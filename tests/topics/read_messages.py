@@ -27,6 +27,8 @@ MESSAGES = [
     wormd.Range,
     wormd.CommandRecord,
     wormd.RecordingStatus,
+    wormd.TripStatus,
+    wormd.BlackBoxStatus,
 ]
 
 layouts = {}
