@@ -73,12 +73,13 @@ fn serve(args: &DashboardArgs, config: worm_estimator::config::Config, instance:
     }
     let address = listener.local_addr().map_err(Failure::failed)?;
     let worm = instance.worm();
-    print::line(format_args!("The dashboard of {worm} is at http://{address}/"))?;
+    let mut text = format!("The dashboard of {worm} is at http://{address}/");
     if let Some(token) = token.to_tell() {
-        print::line(format_args!(
-            "To drive, open http://{address}/#token={token}\n(that token is for this run; --token-file gives one that stays)"
-        ))?;
+        text += &format!("\nTo drive, open http://{address}/#token={token}");
+        text += "\n(that token is for this run; --token-file gives one that stays)";
     }
+    // At once: who reads only the first line may be gone before a second write, and that is no reason to end.
+    print::announce(text);
     let mut hosts = args.host.clone();
     hosts.extend(own_names());
     let settings = Settings {

@@ -360,3 +360,114 @@ fn to_json(value: &impl Serialize) -> String {
         "{}".to_owned()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relay::source::Worm;
+    use crate::watch::Telemetry;
+    use serde_json::Value;
+    use worm_estimator::config::Config;
+    use worm_estimator::message::State;
+
+    const MS: u64 = 1_000_000;
+
+    /// A relay's worm, without the relay.
+    fn worm() -> Worm {
+        let mut worm = Worm::new(Subject::of(&Config::default()));
+        worm.telemetry = Telemetry::with_limits(10, 10);
+        worm
+    }
+
+    /// Takes all events that there are for a page: their names and data.
+    fn events(feed: &mut Feed, cursor: &mut Cursor, now_ns: u64) -> Vec<(String, Value)> {
+        std::iter::from_fn(|| feed.next_event(cursor, now_ns))
+            .map(|event| {
+                let text = String::from_utf8(event.to_vec()).expect("is text");
+                let (name, data) = text
+                    .strip_prefix("event: ")
+                    .and_then(|rest| rest.strip_suffix("\n\n"))
+                    .and_then(|rest| rest.split_once("\ndata: "))
+                    .unwrap_or_else(|| panic!("{text}"));
+                assert!(!data.contains('\n'), "{data}");
+                (name.to_owned(), serde_json::from_str(data).expect("is JSON"))
+            })
+            .collect()
+    }
+
+    fn names(events: &[(String, Value)]) -> Vec<&str> {
+        events.iter().map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// The texts of an event's list.
+    fn texts(event: &(String, Value)) -> Vec<&str> {
+        let list = event.1["events"].as_array().expect("a list");
+        list.iter().filter_map(|event| event["text"].as_str()).collect()
+    }
+
+    #[test]
+    fn a_page_gets_everything_once_however_slowly_it_reads() {
+        let (mut worm, mut feed) = (worm(), Feed::new(Subject::of(&Config::default())));
+        let mut early = Cursor::default();
+        assert!(feed.lose("the worm does not run", 0));
+        assert!(!feed.lose("the worm does not run", MS), "is known");
+        let before = events(&mut feed, &mut early, MS);
+        assert_eq!(names(&before), ["hello", "status"], "without a worm");
+        assert_eq!(before[1].1["problem"], "the worm does not run");
+        assert!(feed.state_json(MS).is_none());
+
+        feed.take_hello(worm.hello(2 * MS));
+        assert_eq!(names(&events(&mut feed, &mut early, 2 * MS)), ["hello", "status"]);
+        let mut slow = early;
+        let mut seen = worm.seen();
+        for number in 1..=3 {
+            worm.telemetry.state = Some(State {
+                time_ns: number * 50 * MS,
+                ..State::unknown(4)
+            });
+            worm.note(number * 50 * MS, format!("event {number}"));
+            feed.take_frame(worm.frame(number, number * 50 * MS, seen, 1, None), number * 50 * MS);
+            seen = worm.seen();
+            let new = events(&mut feed, &mut early, number * 50 * MS);
+            assert_eq!(names(&new), ["frame"]);
+            assert_eq!(texts(&new[0]), [format!("event {number}")]);
+        }
+        let missed = events(&mut feed, &mut slow, 150 * MS);
+        assert_eq!(names(&missed), ["frame"], "the newest alone");
+        assert_eq!(missed[0].1["number"], 3);
+        assert_eq!(texts(&missed[0]), ["event 1", "event 2", "event 3"]);
+        let late = events(&mut feed, &mut Cursor::default(), 150 * MS);
+        assert_eq!(names(&late), ["hello", "frame", "status"]);
+        assert_eq!(texts(&late[0]), ["event 1", "event 2", "event 3"]);
+        assert!(texts(&late[1]).is_empty(), "nothing twice");
+    }
+
+    #[test]
+    fn what_is_known_grows_old_also_when_nothing_comes() {
+        let (mut worm, mut feed) = (worm(), Feed::new(Subject::of(&Config::default())));
+        worm.telemetry.state = Some(State {
+            time_ns: 100 * MS,
+            ..State::unknown(4)
+        });
+        feed.take_hello(worm.hello(110 * MS));
+        feed.take_frame(worm.frame(1, 120 * MS, worm.seen(), 1, None), 120 * MS);
+        assert_eq!((feed.ages(120 * MS).state, feed.is_live(120 * MS)), (Some(20), true));
+        assert!(!feed.is_silent(600 * MS) && feed.is_silent(620 * MS));
+        assert!(!feed.is_silent(700 * MS), "was said");
+        assert_eq!(
+            (feed.ages(1100 * MS).state, feed.is_live(1100 * MS)),
+            (Some(1000), false)
+        );
+        let state: Value = serde_json::from_str(&feed.state_json(1120 * MS).expect("is known")).expect("JSON");
+        assert_eq!(state["age_ms"]["state"], 1020);
+        assert_eq!(
+            (&state["server"]["frame_age_ms"], &state["number"]),
+            (&1000.into(), &1.into())
+        );
+
+        // The page has had that frame: one of a relay before is not shown as news.
+        let mut page = Cursor::default();
+        feed.take_hello(worm.hello(1200 * MS));
+        assert_eq!(names(&events(&mut feed, &mut page, 1200 * MS)), ["hello", "status"]);
+    }
+}

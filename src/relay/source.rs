@@ -87,7 +87,7 @@ impl Worm {
     }
 
     /// Notes an event.
-    pub(super) fn note(&mut self, time_ns: u64, text: String) {
+    pub(crate) fn note(&mut self, time_ns: u64, text: String) {
         self.events.push(Event { time_ns, text });
     }
 

@@ -445,6 +445,30 @@ fn on_a_phone_a_stall_is_shown_with_what_to_do() {
 }
 
 #[test]
+fn who_reads_only_the_first_line_of_its_output_does_not_end_it() {
+    let worm = Worm::on_a_steady_computer("d-line");
+    let mut dashboard = worm
+        .wormd(&["dashboard", "--listen", "127.0.0.1:0"])
+        .into_command()
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    let mut line = String::new();
+    BufReader::new(dashboard.stdout.take().expect("is piped"))
+        .read_line(&mut line)
+        .expect("it says where it is");
+    let (_, url) = line.split_once("http://").expect("an address");
+    let address: SocketAddr = url.trim().trim_end_matches('/').parse().expect("an address");
+    assert_eq!(
+        request(address, "POST", "/api/command/crawl", &[], "").status,
+        401,
+        "a token was made"
+    );
+    let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(dashboard.id() as i32), Signal::SIGTERM);
+    assert_eq!(dashboard.wait().expect("ends").code(), Some(0), "it ends in order");
+}
+
+#[test]
 fn what_cannot_be_used_ends_with_exit_status_2() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = folder.path().join("token");
