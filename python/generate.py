@@ -131,7 +131,10 @@ def message(topic: Json) -> str:
         lines.append(docstring(field["documentation"], "    "))
     lines += ["", "    @classmethod", f"    def _from_memory(cls, m: _{name}Memory) -> {name}:"]
     if any(field["holds"] == "per-cell" for field in described["fields"]):
-        lines.append("        cells = min(m.cell_count, MAX_CELLS)")
+        # A list is as long as there are cells; that of a trip as there are points.
+        names = [field["name"] for field in described["fields"]]
+        count = "cell_count" if "cell_count" in names else "point_count"
+        lines.append(f"        cells = min(m.{count}, MAX_CELLS)")
     lines.append("        return cls(")
     lines += [f"            {field['name']}={decoded(field)}," for field in described["fields"]]
     lines += ["        )"]

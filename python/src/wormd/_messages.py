@@ -1237,7 +1237,7 @@ class TripStatus(Message):
 
     @classmethod
     def _from_memory(cls, m: _TripStatusMemory) -> TripStatus:
-        cells = min(m.cell_count, MAX_CELLS)
+        cells = min(m.point_count, MAX_CELLS)
         return cls(
             sequence=m.sequence,
             time_ns=m.time_ns,
