@@ -54,8 +54,9 @@ def test_each_topic_delivers(up: Up) -> None:
         first, new = next(cycles), next(worm.cycles(timeout=10))
         assert new.end_ns > first.end_ns
         assert 0.004 < new.advance_m < 0.009
-        arm = next(command for command in worm.commands(history=True, timeout=10) if command.kind == "arm")
-        assert arm.outcome == wormd.CommandOutcome.ACCEPTED
+        # On a busy computer the first may come too early, and is refused.
+        arms = (command for command in worm.commands(history=True, timeout=10) if command.kind == "arm")
+        assert any(arm.outcome == wormd.CommandOutcome.ACCEPTED for arm in arms)
         latest = worm.latest()
         assert latest.cycle is not None and latest.cycle.end_ns >= new.end_ns
         assert latest.estimate is not None and latest.range is None

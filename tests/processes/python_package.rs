@@ -23,7 +23,8 @@ fn its_own_tests_pass() {
     let output = Command::new(interpreter)
         .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"])
         .current_dir(FOLDER)
-        .env("PYTHONPATH", "src")
+        // The kernel of a notebook works in another folder.
+        .env("PYTHONPATH", concat!(env!("CARGO_MANIFEST_DIR"), "/python/src"))
         .env("WORMD", env!("CARGO_BIN_EXE_wormd"))
         .output()
         .expect("python");
