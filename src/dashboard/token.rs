@@ -16,7 +16,7 @@ const MAX_LENGTH: usize = 256;
 /// Bytes of a token that is made here.
 const RANDOM: usize = 16;
 
-/// A token. Neither printed by accident nor compared in a time that tells how much of it was right.
+/// A token. It is never printed by accident, and how long a comparison takes gives away nothing of it.
 #[derive(Clone)]
 pub(crate) struct Token {
     text: String,
