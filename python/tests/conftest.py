@@ -111,7 +111,9 @@ def script(up: Up) -> Iterator[Callable[[str], subprocess.Popen[str]]]:
     started = []
 
     def start(text: str) -> subprocess.Popen[str]:
-        head = f"import time, wormd\nworm = wormd.Worm({up.name!r}, sender='script')\n"
+        # As in a terminal, also where the tests run in the background: there Ctrl-C is ignored, and Python keeps that.
+        head = "import signal, time, wormd\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        head += f"worm = wormd.Worm({up.name!r}, sender='script')\n"
         process = subprocess.Popen([sys.executable, "-c", head + text], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         started.append(process)
         return process
