@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{Observer, ObserverOutput};
-use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State};
+use worm_estimator::message::{Alarm, BlackBoxStatus, Cycle, Estimate, Range, RecordingStatus, State};
 
 /// Longest sleep without an event from the controller; should an event get lost, its state is read this much later.
 const MAX_SLEEP: Duration = Duration::from_millis(10);
@@ -42,6 +42,7 @@ pub(crate) fn run(
     let mut observer = Observer::new(config).map_err(Failure::unusable)?;
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
     let mut recordings = hub.subscriber::<RecordingStatus>().map_err(Failure::failed)?;
+    let mut black_boxes = hub.subscriber::<BlackBoxStatus>().map_err(Failure::failed)?;
     let mut recorder_polled = Instant::now();
     let state_event = hub.listener::<State>().map_err(Failure::failed)?;
     let mut output = OutputTopics::open(hub, role).map_err(Failure::failed)?;
@@ -56,7 +57,7 @@ pub(crate) fn run(
         state_event.wait(MAX_SLEEP).map_err(Failure::failed)?;
         if recorder_polled.elapsed() >= RECORDER_POLL {
             recorder_polled = Instant::now();
-            note_recording(&mut recordings, &mut observer);
+            note_recording(&mut recordings, &mut black_boxes, &mut observer);
             if let Some(share) = gauge.as_ref().and_then(Gauge::next) {
                 observer.note_gauge(share);
             }
@@ -74,14 +75,26 @@ pub(crate) fn run(
         if output.last_published.elapsed() >= HEARTBEAT {
             output.publish_heartbeat(&observer.latest()).map_err(Failure::failed)?;
         }
+        if output.admitted.elapsed() >= HEARTBEAT {
+            output.admit_late_joiners().map_err(Failure::failed)?;
+        }
     }
     Ok(())
 }
 
-/// Reads the recorder's reports. One that cannot be read is one that did not come.
-fn note_recording(recordings: &mut Subscriber<RecordingStatus>, observer: &mut Observer) {
+/// Reads the reports of recorder and black box. One that cannot be read is one that did not come.
+fn note_recording(
+    recordings: &mut Subscriber<RecordingStatus>,
+    black_boxes: &mut Subscriber<BlackBoxStatus>,
+    observer: &mut Observer,
+) {
     match recordings.latest() {
         Ok(Some(status)) => observer.note_recording(&status),
+        Ok(None) => {}
+        Err(error) => tracing::debug!("{error}"),
+    }
+    match black_boxes.latest() {
+        Ok(Some(status)) => observer.note_black_box(&status),
         Ok(None) => {}
         Err(error) => tracing::debug!("{error}"),
     }
@@ -96,6 +109,8 @@ struct OutputTopics {
     alarm_event: Notifier<Alarm>,
     /// When an estimate was last published.
     last_published: Instant,
+    /// When late joiners were last admitted.
+    admitted: Instant,
 }
 
 impl OutputTopics {
@@ -107,6 +122,7 @@ impl OutputTopics {
             range: hub.publisher(role)?,
             alarm_event: hub.notifier(role)?,
             last_published: Instant::now(),
+            admitted: Instant::now(),
         })
     }
 
@@ -131,10 +147,16 @@ impl OutputTopics {
         Ok(())
     }
 
-    /// Shows that the estimator is alive, and delivers the last values of the rarely written topics to late joiners.
+    /// Shows that the estimator is alive.
     fn publish_heartbeat(&mut self, latest: &Estimate) -> Result<(), PublishError> {
         self.estimate.publish(latest)?;
         self.last_published = Instant::now();
+        Ok(())
+    }
+
+    /// Gives late joiners the last values of the topics that are rarely written.
+    fn admit_late_joiners(&mut self) -> Result<(), PublishError> {
+        self.admitted = Instant::now();
         self.cycle.idle()?;
         self.range.idle()?;
         self.alarm.idle()

@@ -32,7 +32,7 @@
 //! | `dynamixel-bus` | DYNAMIXEL Protocol 2.0: packets, the bus, serial ports, a fault injector | |
 //! | `worm-estimator` | configuration (one TOML file), messages (one plain type per topic), the estimator and its alarms | `worm-physics` |
 //! | `worm-log` | the topics as an MCAP log, its replay through the estimator, and tables of it (feature `tables`) | `worm-estimator` |
-//! | `worm-plan` | trips on a battery: what a route costs, where it fails, the best design for it | `worm-estimator` |
+//! | `worm-plan` | trips on a battery: what a route costs, where it fails, the best design for it; the decisions on the way, and where a silent worm is | `worm-estimator` |
 //! | `worm-analysis` | recordings in every format; gait and parameters from positions; the paper's experiment; the search for a missing effect; reports. The feature `analysis` | `worm-log`, `worm-plan` |
 //!
 //! # The modules, bottom up
@@ -45,16 +45,22 @@
 //! | [`control`] | the pure tick with its state machine and safety rules, and the loop that gives it deadlines | `link`, `topics`, `realtime`, `attendance` |
 //! | `estimator` | the process around the estimator | `topics`, `realtime` |
 //! | `recorder` | the process that logs the topics | `topics` |
+//! | `black_box` | the moments around alarms and faults, and a thin log of the rest; its files, for who lists and copies them | `recorder` |
 //! | [`latency`] | durations in histograms, where each tick's time went, the page about it | |
 //! | [`watch`] | telemetry of a running worm: gathered, as a live display fed by the relay, as a summary | `latency` |
+//! | `trip` | the process that makes a trip: the topics into the guide of `worm-plan`, its commands to the controller | `topics`, `supervisor` |
 //! | `relay` | one process that serves all watchers: history, frames, commands, one driver at a time | `topics`, `watch`, `supervisor` |
+//! | `dashboard` | the worm in a browser: an HTTP server between the relay and any number of pages. The feature `dashboard` | `relay`, `watch` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
 //! | `preflight` | the checks of `wormd check` | `control`, `topics`, `realtime` |
+//! | [`why`] | why a worm stopped: the first reason, the events before it, the remedy, from any log | `black_box` |
+//! | `bundle` | everything that support needs, in one archive | `black_box`, `preflight` |
 //! | [`command`] | one file per subcommand: arguments in, one library call, exit code out | all |
 //!
-//! `logging`, `print` and `failure` are small helpers: summed log messages, output that never panics, errors with an exit status.
+//! `logging`, `print`, `remedy`, `syslog` and `failure` are small helpers: summed log messages, output that never panics, what to do about an alarm,
+//! the computer's log, errors with an exit status.
 //!
 //! # Rules
 //! - The core is pure and takes time as an argument: [`control::Controller`], [`worm_estimator::estimate::Observer`],
@@ -67,8 +73,12 @@
 
 pub mod attendance;
 mod benchmark;
+mod black_box;
+mod bundle;
 pub mod command;
 pub mod control;
+#[cfg(feature = "dashboard")]
+mod dashboard;
 mod estimator;
 mod failure;
 pub mod latency;
@@ -79,7 +89,11 @@ mod print;
 pub mod realtime;
 mod recorder;
 mod relay;
+mod remedy;
 pub mod soak;
 mod supervisor;
+mod syslog;
 pub mod topics;
+mod trip;
 pub mod watch;
+pub mod why;

@@ -36,10 +36,19 @@ enum Subcommands {
     Command(command::send_command::SendCommandArgs),
     /// A running worm in a terminal, with keys to crawl, hold, stop and reset
     Watch(command::watch::WatchArgs),
+    /// A running worm in a browser, for anyone to watch and halt, and for one to drive
+    #[cfg(feature = "dashboard")]
+    Dashboard(command::dashboard::DashboardArgs),
     /// Serves the watchers of a worm; they start it by themselves
     Relay(command::relay::RelayArgs),
     /// The topics of a worm into a log (MCAP)
     Record(command::record::RecordArgs),
+    /// The topics of a worm and the messages on them, for programs in other languages
+    Topics(command::topics::TopicsArgs),
+    /// What the black box has kept: lists, and copies over a link that breaks
+    BlackBox(command::black_box::BlackBoxArgs),
+    /// Why a worm stopped: the first reason, what led there, and what to do, from a box or any other log
+    Why(command::why::WhyArgs),
     /// Run a log through the estimator again, and compare the results
     Replay(command::replay::ReplayArgs),
     /// A log as Parquet or CSV tables, or as a complete log of one that was cut off
@@ -48,6 +57,8 @@ enum Subcommands {
     Study(command::study::StudyArgs),
     /// A trip on the battery: energy, time, range, where it fails, and the best design for a route
     Plan(command::plan::PlanArgs),
+    /// Make a trip along a route on board: out and home, as far as battery and link allow
+    Trip(command::trip::TripArgs),
     /// The paper's experiment on a recording: tip deformations, slides, energy, figures
     #[cfg(feature = "analysis")]
     Analyze(command::analyze::AnalyzeArgs),
@@ -69,6 +80,8 @@ enum Subcommands {
     Soak(command::soak::SoakArgs),
     /// The worms that run on this computer, and how they stand
     Status(command::status::StatusArgs),
+    /// Everything that support needs of a worm, in one archive: configuration, versions, check, last box, logs
+    Bundle(command::bundle::BundleArgs),
     /// Man pages and shell completions, for a package
     #[command(hide = true)]
     Manual(command::manual::ManualArgs),
@@ -113,12 +126,18 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Fault(args) => command::fault::run(&args),
         Subcommands::Command(args) => command::send_command::run(&args),
         Subcommands::Watch(args) => command::watch::run(&args),
+        #[cfg(feature = "dashboard")]
+        Subcommands::Dashboard(args) => command::dashboard::run(&args),
         Subcommands::Relay(args) => command::relay::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
+        Subcommands::Topics(args) => command::topics::run(&args),
+        Subcommands::BlackBox(args) => command::black_box::run(&args),
+        Subcommands::Why(args) => command::why::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
         Subcommands::Plan(args) => command::plan::run(&args),
+        Subcommands::Trip(args) => command::trip::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Analyze(args) => command::analyze::run(&args),
         #[cfg(feature = "analysis")]
@@ -131,6 +150,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::LatencyFloor(args) => command::latency_floor::run(&args),
         Subcommands::Soak(args) => command::soak::run(&args),
         Subcommands::Status(args) => command::status::run(&args),
+        Subcommands::Bundle(args) => command::bundle::run(&args),
         Subcommands::Manual(args) => command::manual::run(&args, Arguments::command()),
         Subcommands::Check(args) => command::check::run(&args),
     }

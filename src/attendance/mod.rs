@@ -19,7 +19,7 @@ mod stop_socket;
 mod survey;
 
 pub(crate) use lock_watch::LockWatch;
-pub(crate) use orphan::end_after_controller;
+pub(crate) use orphan::{end_after_controller, end_with_parent};
 pub use parent_pipe::{Parent, ParentPipe};
 pub(crate) use service_manager::{ProcessStatus, RoundCounter, ServiceManager, announce_ready};
 pub use standing::Standing;

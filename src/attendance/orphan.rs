@@ -41,6 +41,25 @@ pub(crate) fn end_after_controller(instance: &Instance, end: &Arc<AtomicBool>) -
     Ok(())
 }
 
+/// Sets `end` when standard input ends: whoever started this process and holds the other end of the pipe is gone, or closed it.
+///
+/// # Errors
+/// [`Failure::Failed`] when there is no thread to be had.
+pub(crate) fn end_with_parent(end: &Arc<AtomicBool>) -> Result<(), Failure> {
+    let parent = ParentPipe::watch(NEVER, 0).map_err(no_thread)?;
+    let end = Arc::clone(end);
+    std::thread::Builder::new()
+        .name("parent-end".to_owned())
+        .spawn(move || {
+            while parent.state() != Parent::Gone {
+                std::thread::sleep(POLL);
+            }
+            end.store(true, Ordering::Relaxed);
+        })
+        .map_err(no_thread)?;
+    Ok(())
+}
+
 fn no_thread(error: std::io::Error) -> Failure {
     Failure::failed(format!("no thread can be started: {error}"))
 }

@@ -1,8 +1,7 @@
 //! `wormd explain`: where model and recordings disagree, which physical effect the model misses, and what to try next.
 //!
 //! It takes a campaign of recordings or of advances alone, one recording, the worm that is crawling now (`live`), or the campaign of a
-//! servo on a bench (`servo`). What is
-//! stated of them is checked first (`conditions`). The answer is kept in a folder (`folder`) and printed.
+//! servo on a bench (`servo`). What is stated of them is checked first (`conditions`). The answer is kept in a folder (`folder`) and printed.
 
 mod conditions;
 mod folder;
@@ -14,6 +13,7 @@ use super::progress::Progress;
 use super::{Failure, WormArgs, log_line, print};
 use clap::Args;
 use folder::Folder;
+use serde::Serialize;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use worm_analysis::bench::Plant;
@@ -99,19 +99,30 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
         folder.write_page(&answer, &title(&source))
     });
     drop(progress);
-    for warning in &answer.warnings {
-        log_line(format_args!("note: {warning}"));
-    }
-    if args.json {
-        print::line(serde_json::to_string(&answer).map_err(Failure::failed)?)?;
-    } else {
-        print::line(report::explain::text(&answer))?;
-    }
+    let text = || report::explain::text(&answer);
+    print_answer(args.json, &answer, &answer.warnings, text)?;
     written.transpose()?;
     if let Some(folder) = &folder {
         log_line(folder);
     }
     Ok(())
+}
+
+/// Prints an answer as JSON or as text, after the remarks on it.
+fn print_answer(
+    as_json: bool,
+    answer: &impl Serialize,
+    warnings: &[String],
+    text: impl FnOnce() -> String,
+) -> Result<(), Failure> {
+    for warning in warnings {
+        log_line(format_args!("note: {warning}"));
+    }
+    if as_json {
+        print::line(serde_json::to_string(answer).map_err(Failure::failed)?)
+    } else {
+        print::line(text())
+    }
 }
 
 /// A number in a range.

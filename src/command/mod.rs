@@ -2,8 +2,12 @@
 
 #[cfg(feature = "analysis")]
 pub mod analyze;
+pub mod black_box;
+pub mod bundle;
 pub mod check;
 pub mod control;
+#[cfg(feature = "dashboard")]
+pub mod dashboard;
 #[cfg(feature = "analysis")]
 mod dataset;
 pub mod estimate;
@@ -29,9 +33,12 @@ pub mod simulate;
 pub mod soak;
 pub mod status;
 pub mod study;
+pub mod topics;
+pub mod trip;
 pub mod up;
 pub mod virtual_worm;
 pub mod watch;
+pub mod why;
 
 pub use crate::failure::Failure;
 pub use crate::print::{LogOutput, finish_log, log_line};
@@ -86,13 +93,7 @@ impl WormArgs {
                 None => config.port = Some(worm_estimator::config::Port::at(path)),
             }
         }
-        let problems = config.problems();
-        if problems.is_empty() {
-            Ok((config, text))
-        } else {
-            let file = PathBuf::from("command line");
-            Err(ConfigError::Values { file, problems }.into())
-        }
+        Ok((checked(config)?, text))
     }
 
     /// The same worm as arguments for another process of it.
@@ -113,6 +114,16 @@ impl WormArgs {
         }
         arguments
     }
+}
+
+/// A configuration of which the command line has changed something.
+fn checked(config: Config) -> Result<Config, Failure> {
+    let problems = config.problems();
+    if problems.is_empty() {
+        return Ok(config);
+    }
+    let file = PathBuf::from("command line");
+    Err(ConfigError::Values { file, problems }.into())
 }
 
 /// Parses a duration in seconds.

@@ -1,17 +1,20 @@
-//! `wormd record`: the topics of a worm into a log.
+//! `wormd record`: the topics of a worm into a log, or its black box.
 
 use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
-use crate::attendance::{RoundCounter, ServiceManager, end_after_controller};
+use crate::attendance::{RoundCounter, ServiceManager, end_after_controller, end_with_parent};
+use crate::black_box::BlackBox;
 use crate::recorder::Recorder;
 use crate::topics::Instance;
 use clap::Args;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
+use worm_estimator::config::Config;
 use worm_log::Channel;
 
 /// What is recorded by default.
-pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range,command";
+pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range,command,trip";
 
 /// Arguments of `wormd record`.
 #[derive(Debug, Args)]
@@ -19,8 +22,12 @@ pub struct RecordArgs {
     #[command(flatten)]
     worm: WormArgs,
     /// The log, an MCAP file
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "black_box")]
+    out: Option<PathBuf>,
+    /// Instead of a log: the moments around each alarm and fault, as files in this folder, and a thin log of the rest. Without DIR, in
+    /// `black_box.folder` of the configuration
+    #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["out", "force", "duration", "topics", "max_size", "max_age", "keep", "max_total", "no_index"])]
+    black_box: Option<Option<PathBuf>>,
     #[command(flatten)]
     limits: RecordingLimits,
     /// Overwrite existing files
@@ -32,8 +39,11 @@ pub struct RecordArgs {
     /// Only these topics, and always the commands that the controller got
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',', value_parser = channel, default_value = ALL_TOPICS)]
     topics: Vec<Channel>,
+    /// End when standard input ends: for a program that starts the recorder, whose end then completes the log
+    #[arg(long)]
+    end_with_stdin: bool,
     /// Standard input is a pipe from the process that watches over the worm
-    #[arg(long, hide = true)]
+    #[arg(long, hide = true, conflicts_with = "end_with_stdin")]
     supervised: bool,
 }
 
@@ -57,6 +67,9 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     let (config, text) = args.worm.load_with_text()?;
     let options = args.limits.file_options().map_err(Failure::unusable)?;
     let end = end_on_signal()?;
+    if args.end_with_stdin {
+        end_with_parent(&end)?;
+    }
     let rounds = RoundCounter::default();
     let _service = if args.supervised {
         end_after_controller(&Instance::of(&config).map_err(Failure::unusable)?, &end)?;
@@ -64,12 +77,36 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     } else {
         Some(ServiceManager::inform_of_rounds(&end, &rounds)?)
     };
-    let mut recorder = Recorder::open(&config, text, &args.topics, &args.out, args.force, options)?;
-    let (worm, file) = (&config.worm.name, args.out.display());
+    let Some(out) = &args.out else {
+        return run_black_box(args, &config, text, &end, &rounds);
+    };
+    let mut recorder = Recorder::open(&config, text, &args.topics, out, args.force, options)?;
+    let (worm, file) = (&config.worm.name, out.display());
     print::log_line(format_args!("recording {worm} to {file}, from its first message on"));
     print::ready();
     let outcome = recorder.run(args.duration, &end, &rounds);
     // The log is completed whatever ended the recording.
     print::log_line(recorder.close()?);
+    outcome
+}
+
+fn run_black_box(
+    args: &RecordArgs,
+    config: &Config,
+    text: Option<String>,
+    end: &AtomicBool,
+    rounds: &RoundCounter,
+) -> Result<(), Failure> {
+    let given = args.black_box.clone().flatten();
+    let configured = || config.black_box.as_ref()?.folder.as_ref().map(PathBuf::from);
+    let folder = given.or_else(configured).ok_or_else(|| {
+        Failure::unusable("in which folder? Give --black-box DIR, or set black_box.folder in the configuration")
+    })?;
+    let mut black_box = BlackBox::open(config, text, &folder)?;
+    let (worm, folder) = (&config.worm.name, folder.display());
+    print::log_line(format_args!("black box of {worm} in {folder}"));
+    print::ready();
+    let outcome = black_box.run(end, rounds);
+    print::log_line(black_box.close()?);
     outcome
 }

@@ -63,6 +63,13 @@ pub fn run(args: &StatusArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The same as JSON, or why there is none.
+pub(super) fn as_json() -> Result<Vec<u8>, String> {
+    let controllers = running_controllers().map_err(|error| error.to_string())?;
+    let worms: Vec<_> = controllers.into_iter().map(WormStatus::of).collect();
+    serde_json::to_vec_pretty(&worms).map_err(|error| error.to_string())
+}
+
 impl WormStatus {
     fn of(found: RunningController) -> Self {
         let answer = found.answer.as_ref();

@@ -48,6 +48,10 @@ pub struct UpArgs {
     record: Option<PathBuf>,
     #[command(flatten)]
     record_limits: RecordingLimits,
+    /// Keep the moments around each alarm and fault in this folder, as `wormd record --black-box` does; without it, in `black_box.folder` of the
+    /// configuration, if that is set
+    #[arg(long, value_name = "DIR")]
+    black_box: Option<PathBuf>,
 }
 
 /// Runs `wormd up`.
@@ -83,6 +87,10 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
         allow_faults: args.allow_faults,
         record: args.record.clone(),
         record_limits: args.record_limits.forward(),
+        black_box: args.black_box.clone().or_else(|| {
+            let configured = config.black_box.as_ref()?.folder.as_ref();
+            configured.map(PathBuf::from)
+        }),
         verbose,
     };
     let mut processes = Processes::start(&launch, &config, &instance, &log, &end)?;

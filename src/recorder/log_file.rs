@@ -161,7 +161,7 @@ pub(super) fn creation_failure(path: &Path, error: &io::Error) -> Failure {
 }
 
 /// What kind of problem an error of the file system is.
-pub(super) fn problem_of(error: &io::Error) -> RecordingProblem {
+pub(crate) fn problem_of(error: &io::Error) -> RecordingProblem {
     match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
             RecordingProblem::DiskFull

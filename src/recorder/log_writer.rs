@@ -3,13 +3,13 @@
 use super::file_series::{FileOptions, FileSeries, SeriesError};
 use super::log_file::{LogFile, creation_failure};
 use super::progress::Progress;
+use super::recorded_topics::Batch;
 use crate::failure::Failure;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing};
 use worm_log::{Channel, Origin};
 
 /// Interval at which a chunk is finished and synchronised to disk: a killed recorder or a power loss costs at most this, and what is in the
@@ -18,26 +18,6 @@ const SYNC_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Batches that may wait for the disk: 10 s of them. Beyond that the topics are not read, and in time lose their oldest messages.
 const QUEUE: usize = 500;
-
-/// The new messages of one poll.
-#[derive(Debug, Default)]
-pub(super) struct Batch {
-    pub states: Vec<State>,
-    pub timings: Vec<Timing>,
-    pub estimates: Vec<Estimate>,
-    pub cycles: Vec<Cycle>,
-    pub alarms: Vec<Alarm>,
-    pub ranges: Vec<Range>,
-    pub commands: Vec<CommandRecord>,
-}
-
-impl Batch {
-    /// How many messages.
-    pub(super) fn len(&self) -> usize {
-        let by_tick = self.states.len() + self.timings.len() + self.estimates.len();
-        by_tick + self.cycles.len() + self.alarms.len() + self.ranges.len() + self.commands.len()
-    }
-}
 
 /// The writing thread.
 pub(super) struct LogWriter {
@@ -127,6 +107,7 @@ fn write_batches(mut series: FileSeries, batches: &Receiver<Batch>) -> Result<Co
                 series.write(&batch.alarms)?;
                 series.write(&batch.ranges)?;
                 series.write(&batch.commands)?;
+                series.write(&batch.trips)?;
                 unsynced_since.get_or_insert_with(Instant::now);
             }
             Err(RecvTimeoutError::Timeout) => {}

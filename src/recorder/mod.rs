@@ -9,15 +9,18 @@ mod file_series;
 mod log_file;
 mod log_writer;
 mod progress;
+mod recorded_topics;
 mod status_reporter;
 
 pub(crate) use file_series::FileOptions;
+pub(crate) use log_file::problem_of;
+pub(crate) use recorded_topics::{Batch, RecordedTopics};
 
 use crate::attendance::RoundCounter;
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
-use crate::topics::{Hub, Instance, Subscriber, Topic};
-use log_writer::{Batch, LogWriter};
+use crate::topics::{Hub, Instance};
+use log_writer::LogWriter;
 use progress::Progress;
 use status_reporter::{Figures, StatusReporter};
 use std::path::Path;
@@ -25,8 +28,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, RecordingProblem, State, Timing};
-use worm_log::{Channel, Logged, Origin};
+use worm_estimator::message::{RecordingProblem, State};
+use worm_log::{Channel, Origin};
 
 /// How often the topics are emptied. At 1 kHz even the fullest holds a second.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -174,72 +177,5 @@ impl Recorder {
             format!("{} {count}{lost}", channel.name())
         });
         Ok(format!("recorded: {}", counts.collect::<Vec<_>>().join(", ")))
-    }
-}
-
-/// A topic, if it is recorded.
-type Recorded<T> = Option<Subscriber<T>>;
-
-/// The topics that are recorded.
-struct RecordedTopics {
-    state: Recorded<State>,
-    timing: Recorded<Timing>,
-    estimate: Recorded<Estimate>,
-    cycle: Recorded<Cycle>,
-    alarm: Recorded<Alarm>,
-    range: Recorded<Range>,
-    command: Recorded<CommandRecord>,
-}
-
-impl RecordedTopics {
-    fn open(hub: &Hub, topics: &[Channel]) -> Result<Self, Failure> {
-        fn subscribe<T: Topic + Logged>(hub: &Hub, topics: &[Channel]) -> Result<Recorded<T>, Failure> {
-            let is_wanted = topics.contains(&T::CHANNEL);
-            is_wanted.then(|| hub.subscriber()).transpose().map_err(Failure::failed)
-        }
-        Ok(Self {
-            state: subscribe(hub, topics)?,
-            timing: subscribe(hub, topics)?,
-            estimate: subscribe(hub, topics)?,
-            cycle: subscribe(hub, topics)?,
-            alarm: subscribe(hub, topics)?,
-            range: subscribe(hub, topics)?,
-            // Part of every recording: nobody can tell from the rest why the worm began or ended to crawl.
-            command: subscribe(hub, &[Channel::CommandRecord])?,
-        })
-    }
-
-    fn read(&mut self) -> Result<Batch, Failure> {
-        fn take<T: Topic>(topic: &mut Recorded<T>) -> Result<Vec<T>, Failure> {
-            let mut messages = Vec::new();
-            if let Some(subscriber) = topic {
-                while let Some(message) = subscriber.next().map_err(Failure::failed)? {
-                    messages.push(*message);
-                }
-            }
-            Ok(messages)
-        }
-        Ok(Batch {
-            states: take(&mut self.state)?,
-            timings: take(&mut self.timing)?,
-            estimates: take(&mut self.estimate)?,
-            cycles: take(&mut self.cycle)?,
-            alarms: take(&mut self.alarm)?,
-            ranges: take(&mut self.range)?,
-            commands: take(&mut self.command)?,
-        })
-    }
-
-    /// How many messages of a topic were lost; none for a topic that is not recorded, or whose messages are not numbered.
-    fn lost(&self, channel: Channel) -> Option<u64> {
-        match channel {
-            Channel::State => self.state.as_ref().map(Subscriber::lost),
-            Channel::Timing => self.timing.as_ref().map(Subscriber::lost),
-            Channel::Estimate => None,
-            Channel::Cycle => self.cycle.as_ref().map(Subscriber::lost),
-            Channel::Alarm => self.alarm.as_ref().map(Subscriber::lost),
-            Channel::Range => self.range.as_ref().map(Subscriber::lost),
-            Channel::CommandRecord => self.command.as_ref().map(Subscriber::lost),
-        }
     }
 }

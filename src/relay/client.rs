@@ -52,7 +52,8 @@ pub(crate) struct RelayLink {
     problem: Option<String>,
 }
 
-struct Connection {
+/// A connection to a relay.
+pub(crate) struct Connection {
     stream: UnixStream,
     input: VecDeque<u8>,
     /// How much of the input has been searched for the end of a line.
@@ -157,6 +158,12 @@ impl RelayLink {
         }
     }
 
+    /// The connection's socket, which can be read when there is something to poll for.
+    #[cfg(feature = "dashboard")]
+    pub(crate) fn stream(&self) -> Option<&UnixStream> {
+        self.connection.as_ref().map(Connection::stream)
+    }
+
     /// Ends the connection, if there is one.
     pub(crate) fn close(&mut self) {
         self.connection = None;
@@ -238,7 +245,11 @@ impl RelayLink {
 }
 
 impl Connection {
-    fn open(instance: &Instance, name: &str) -> io::Result<Self> {
+    /// Connects to the relay of a worm, as the watcher `name`.
+    ///
+    /// # Errors
+    /// When there is no relay, or it does not take connections.
+    pub(crate) fn open(instance: &Instance, name: &str) -> io::Result<Self> {
         let stream = UnixStream::connect(instance.relay_socket())?;
         stream.set_nonblocking(true)?;
         let mut connection = Self {
@@ -254,7 +265,7 @@ impl Connection {
     }
 
     /// Queues a request; false when the relay does not read.
-    fn send(&mut self, id: Option<u64>, request: Request) -> bool {
+    pub(crate) fn send(&mut self, id: Option<u64>, request: Request) -> bool {
         let Ok(line) = to_bytes(&RequestLine { id, request }) else {
             return false;
         };
@@ -266,7 +277,7 @@ impl Connection {
     }
 
     /// Writes and reads what can be without waiting. The error has the lines before it, and why the connection is over.
-    fn exchange(&mut self) -> Result<Vec<Line>, (Vec<Line>, String)> {
+    pub(crate) fn exchange(&mut self) -> Result<Vec<Line>, (Vec<Line>, String)> {
         let mut lines = Vec::new();
         let outcome = self.write().and_then(|()| self.read());
         let over = loop {
@@ -288,6 +299,12 @@ impl Connection {
             None => Ok(lines),
             Some(reason) => Err((lines, reason)),
         }
+    }
+
+    /// Can be read when there is something to exchange.
+    #[cfg(feature = "dashboard")]
+    pub(crate) fn stream(&self) -> &UnixStream {
+        &self.stream
     }
 
     fn write(&mut self) -> io::Result<()> {

@@ -5,6 +5,7 @@ use super::wire::{Answer, Request};
 use crate::failure::Failure;
 use crate::supervisor::controller::{self, command};
 use crate::topics::{CommandClient, Hub};
+use crate::trip::{self, wire::Question};
 use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
@@ -141,7 +142,9 @@ fn carry_out(client: &CommandClient, config: &Config, job: Job) -> Option<Outcom
             request,
         } => {
             let command = controllers_command(&request, user, &name);
-            Some(Outcome::Answer(answer(client, config, watcher, id, &request, command)))
+            Some(Outcome::Answer(answer(
+                client, config, watcher, id, &request, &name, command,
+            )))
         }
         Job::Hold => {
             let refusal = match controller::send(client, command(CommandKind::Hold, SENDER)) {
@@ -171,9 +174,24 @@ fn answer(
     watcher: WatcherId,
     id: Option<u64>,
     request: &Request,
+    by: &str,
     command: Result<Command, String>,
 ) -> Answer {
     let refused = |verdict, refusal| Answer::own(watcher, id, request.name(), verdict, Some(refusal));
+    if let Request::Trip { action } = request {
+        let question = Question {
+            ask: *action,
+            by: by.to_owned(),
+        };
+        return match trip::wire::ask(client.instance(), &question) {
+            Ok(trip::wire::Answer { refusal: None, .. }) => {
+                let name = format!("trip {}", action.name());
+                Answer::own(watcher, id, &name, "accepted", None)
+            }
+            Ok(trip::wire::Answer { refusal, .. }) => refused("refused", refusal.unwrap_or_default()),
+            Err(failure) => refused("no-answer", failure.to_string()),
+        };
+    }
     let command = match command {
         Ok(command) => command,
         Err(refusal) => return refused("unusable", refusal),

@@ -7,6 +7,7 @@
 //! Pure: times are arguments, ns of one clock.
 
 use super::wire::{self, Request};
+use crate::trip::wire::Ask;
 use std::collections::BTreeMap;
 use worm_estimator::time::seconds;
 
@@ -58,6 +59,8 @@ pub(super) enum Effect {
 #[derive(Debug, Default)]
 pub(super) struct Drive {
     watchers: BTreeMap<WatcherId, Identity>,
+    /// When each was last heard; not those that never said that they are there.
+    heard_ns: BTreeMap<WatcherId, u64>,
     driver: Option<Driver>,
 }
 
@@ -78,6 +81,7 @@ impl Drive {
 
     /// A watcher has gone.
     pub(super) fn leave(&mut self, id: WatcherId) -> Option<Effect> {
+        self.heard_ns.remove(&id);
         let name = self.watchers.remove(&id)?.name;
         let driver = self.driver.take_if(|driver| driver.id == id)?;
         driver
@@ -87,9 +91,18 @@ impl Drive {
 
     /// A watcher was heard.
     pub(super) fn heard(&mut self, id: WatcherId, now_ns: u64) {
+        if self.watchers.contains_key(&id) {
+            self.heard_ns.insert(id, now_ns);
+        }
         if let Some(driver) = self.driver.as_mut().filter(|driver| driver.id == id) {
             driver.heard_ns = now_ns;
         }
+    }
+
+    /// Whether any watcher was heard of late, a driver or not: for a trip that is the link.
+    pub(super) fn is_attended(&self, now_ns: u64) -> bool {
+        let mut heard = self.heard_ns.values();
+        heard.any(|heard_ns| now_ns.saturating_sub(*heard_ns) < SILENCE_NS)
     }
 
     /// Decides on a request.
@@ -107,11 +120,19 @@ impl Drive {
             Request::Alive => Decision::Done(None),
             Request::TakeOver => self.take_over(id, now_ns),
             Request::Acknowledge { .. } => Decision::Send,
+            Request::Trip {
+                action: Ask::Alive | Ask::Status | Ask::Pause,
+            } => Decision::Send,
             Request::Hold => {
                 self.crawl_ended();
                 Decision::Send
             }
-            Request::Drive | Request::Arm | Request::Crawl { .. } | Request::Stop | Request::Reset => {
+            Request::Drive
+            | Request::Arm
+            | Request::Crawl { .. }
+            | Request::Stop
+            | Request::Reset
+            | Request::Trip { .. } => {
                 if let Some(refusal) = self.refusal(id, now_ns) {
                     return Decision::Refused(refusal);
                 }
@@ -428,6 +449,7 @@ mod tests {
             ],
         );
         assert_eq!(driver(&drive), None);
+        assert!(drive.is_attended(30 * MS + SILENCE_NS - 1) && !drive.is_attended(30 * MS + SILENCE_NS));
         assert_eq!(drive.who(2), "ann (user 1000, process 7)");
     }
 }

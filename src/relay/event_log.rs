@@ -2,15 +2,10 @@
 
 use super::source::Worm;
 use super::wire::Answer;
-use crate::print;
 use crate::realtime::monotonic_ns;
 use crate::supervisor::controller;
-use std::io;
-use std::os::unix::net::UnixDatagram;
+use crate::{print, syslog};
 use worm_estimator::message::CommandRecord;
-
-/// Where the computer's log takes lines.
-const SYSLOG: &str = "/dev/log";
 
 /// Puts what happens into words, each thing once.
 pub(super) struct EventLog {
@@ -66,20 +61,7 @@ impl EventLog {
     /// Writes a line to standard error, which may have no reader any more, and to the computer's log.
     fn log(&self, text: &str) {
         print::log_line(text);
-        if let Err(error) = self.write_syslog(text) {
-            tracing::debug!("{SYSLOG}: {error}");
-        }
-    }
-
-    /// Gives a line to the computer's log, where there is one. Does not wait.
-    fn write_syslog(&self, text: &str) -> io::Result<()> {
-        /// Facility user, severity notice (RFC 5424).
-        const PRIORITY: u32 = 8 + 5;
-        let socket = UnixDatagram::unbound()?;
-        socket.set_nonblocking(true)?;
-        let (worm, pid) = (&self.worm, std::process::id());
-        let line = format!("<{PRIORITY}>wormd-relay[{pid}]: {worm}: {text}");
-        socket.send_to(line.as_bytes(), SYSLOG).map(drop)
+        syslog::write("wormd-relay", &self.worm, text);
     }
 }
 

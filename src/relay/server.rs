@@ -11,6 +11,7 @@ use super::wire::{Answer, Line, Request, RequestLine, VERSION};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::topics::{Controller, Hub, Instance, Relay, RoleLock};
+use crate::trip::wire::Attendance;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::socket::{setsockopt, sockopt::SndBuf};
 use std::collections::BTreeMap;
@@ -30,6 +31,8 @@ const LINGER: Duration = Duration::from_secs(5);
 const STALL_LIMIT: Duration = Duration::from_secs(30);
 /// What the kernel keeps for one watcher beside that, bytes: a second of frames.
 const SEND_BUFFER: usize = 64 << 10;
+/// How often a trip is told that somebody watches, ns.
+const ATTENDANCE_NS: u64 = 250_000_000;
 /// Most watchers: bounds the relay's memory.
 const MAX_WATCHERS: usize = 256;
 
@@ -68,6 +71,8 @@ pub(crate) fn run(
         hello: None,
         deserted: Some(Instant::now()),
         had_watchers: false,
+        attendance: Attendance::open(instance, "relay").map_err(Failure::failed)?,
+        attendance_due_ns: 0,
     };
     ready();
     server.serve(end)
@@ -90,6 +95,9 @@ struct Server {
     /// Since when there has been no watcher.
     deserted: Option<Instant>,
     had_watchers: bool,
+    /// Tells a trip that somebody watches.
+    attendance: Attendance,
+    attendance_due_ns: u64,
 }
 
 impl Server {
@@ -350,6 +358,11 @@ impl Server {
         let now_ns = monotonic_ns();
         let effect = self.drive.due(now_ns);
         self.carry_out(effect);
+        if now_ns >= self.attendance_due_ns && self.drive.is_attended(now_ns) {
+            self.attendance_due_ns = now_ns + ATTENDANCE_NS;
+            // Where there is no trip, nobody hears it.
+            self.attendance.say();
+        }
         let watchers = self.watchers.iter();
         let stalled = watchers.filter(|(_, watcher)| watcher.took.elapsed() > STALL_LIMIT);
         let stalled: Vec<_> = stalled.map(|(id, _)| *id).collect();

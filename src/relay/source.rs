@@ -87,7 +87,7 @@ impl Worm {
     }
 
     /// Notes an event.
-    pub(super) fn note(&mut self, time_ns: u64, text: String) {
+    pub(crate) fn note(&mut self, time_ns: u64, text: String) {
         self.events.push(Event { time_ns, text });
     }
 
@@ -128,6 +128,7 @@ impl Worm {
                 estimate: age_ms(telemetry.estimate, now_ns),
                 timing: age_ms(telemetry.timing, now_ns),
                 recording: age_ms(telemetry.recording, now_ns),
+                trip: age_ms(telemetry.trip, now_ns),
             },
             state: telemetry.state.map(Json),
             estimate: telemetry.estimate.map(Json),
@@ -135,6 +136,7 @@ impl Worm {
             statistics: self.statistics,
             recording: telemetry.recording.map(Json),
             range: telemetry.ranges.last().copied().map(Json),
+            trip: telemetry.trip.map(Json),
             raised: telemetry.raised().into_iter().map(Json).collect(),
             cycles: telemetry.cycles.since(seen.cycles).copied().map(Json).collect(),
             alarms: telemetry.alarms.since(seen.alarms).copied().map(Json).collect(),

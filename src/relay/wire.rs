@@ -2,9 +2,10 @@
 
 use super::message_json::Json;
 use crate::latency::Percentiles;
+use crate::trip::wire::Ask;
 use serde::{Deserialize, Serialize};
 use worm_estimator::config::{Config, Direction};
-use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Range, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Range, RecordingStatus, State, Timing, TripStatus};
 
 /// Version of this language. A higher one may have taken fields away or changed what they mean; new fields need no new version,
 /// because both sides ignore what they do not know.
@@ -151,6 +152,9 @@ pub(crate) struct Frame {
     pub recording: Option<Json<RecordingStatus>>,
     /// How far and how long the battery lasts, after the newest gait cycle, if there is one.
     pub range: Option<Json<Range>>,
+    /// How the trip stands that is under way, or how the last one ended; none where there was none.
+    #[serde(default)]
+    pub trip: Option<Json<TripStatus>>,
     /// The alarms that are raised.
     pub raised: Vec<Json<Alarm>>,
     /// Gait cycles since the frame before.
@@ -170,6 +174,8 @@ pub(crate) struct Ages {
     pub estimate: Option<u64>,
     pub timing: Option<u64>,
     pub recording: Option<u64>,
+    #[serde(default)]
+    pub trip: Option<u64>,
 }
 
 /// Where the ticks' time went.
@@ -253,6 +259,11 @@ pub(crate) enum Request {
     Stop,
     /// Leave the fault, or permit motion despite alarms.
     Reset,
+    /// Tell the trip that is under way something. Anyone may make it wait.
+    Trip {
+        /// What.
+        action: Ask,
+    },
     /// Note that somebody has seen these alarms. Anyone may.
     Acknowledge {
         /// Names; without any, all alarms.
@@ -269,6 +280,7 @@ impl Request {
             Self::Alive => "alive",
             Self::Drive => "drive",
             Self::TakeOver => "take_over",
+            Self::Trip { .. } => "trip",
             Self::Arm | Self::Crawl { .. } | Self::Hold | Self::Stop | Self::Reset | Self::Acknowledge { .. } => {
                 self.kind().map_or("", CommandKind::name)
             }
@@ -278,7 +290,7 @@ impl Request {
     /// The controller's command behind it; none where the relay answers by itself.
     pub(crate) fn kind(&self) -> Option<CommandKind> {
         match self {
-            Self::Hello { .. } | Self::Alive | Self::Drive | Self::TakeOver => None,
+            Self::Hello { .. } | Self::Alive | Self::Drive | Self::TakeOver | Self::Trip { .. } => None,
             Self::Arm => Some(CommandKind::Arm),
             Self::Crawl { .. } => Some(CommandKind::Crawl),
             Self::Hold => Some(CommandKind::Hold),

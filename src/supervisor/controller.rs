@@ -188,6 +188,11 @@ impl Answer {
         self.reply.sequence
     }
 
+    /// The outcome.
+    pub(crate) fn outcome(&self) -> CommandOutcome {
+        self.outcome
+    }
+
     /// The outcome, by name.
     pub(crate) fn verdict(&self) -> &'static str {
         self.outcome.name()

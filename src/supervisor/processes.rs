@@ -25,6 +25,8 @@ pub(crate) struct Launch {
     pub record: Option<PathBuf>,
     /// The arguments that bound the recording.
     pub record_limits: Vec<OsString>,
+    /// The folder of the black box, if there is one.
+    pub black_box: Option<PathBuf>,
     /// How many `-v` the processes get.
     pub verbose: u8,
 }
@@ -40,12 +42,13 @@ impl Launch {
 }
 
 /// The running processes. [`end`](Self::end) ends them in order of importance: first the controller, which stops the motor,
-/// last the recorder, which records that.
+/// last the recorder and the black box, which record that.
 pub(crate) struct Processes {
     controller: Child,
     estimator: Child,
     virtual_worm: Option<Child>,
     recorder: Option<Child>,
+    black_box: Option<Child>,
 }
 
 impl Processes {
@@ -91,6 +94,15 @@ impl Processes {
             estimator.wait_until_ready(START_TIMEOUT, log, end)?;
             recorder = Some(child);
         }
+        let mut black_box = None;
+        if let Some(folder) = &launch.black_box {
+            let mut arguments = launch.worm.clone();
+            arguments.extend(["--black-box".into(), folder.clone().into()]);
+            let mut child = Child::start("record", &launch.arguments("record", &arguments), log)?;
+            // Before the controller, so that nothing happens before it listens.
+            child.wait_until_ready(START_TIMEOUT, log, end)?;
+            black_box = Some(child);
+        }
         let mut controller = Child::start("control", &launch.arguments("control", &worm), log)?;
         controller.extend_end_timeout(Duration::from_secs_f64(config.gait.ramp_s));
         controller.wait_until_ready(START_TIMEOUT, log, end)?;
@@ -102,6 +114,7 @@ impl Processes {
             estimator,
             virtual_worm,
             recorder,
+            black_box,
         })
     }
 
@@ -138,13 +151,17 @@ impl Processes {
         if let Some(virtual_worm) = &mut self.virtual_worm {
             virtual_worm.end();
         }
-        let status = self.recorder.as_mut()?.end();
-        match status {
-            Some(status) if status.success() => None,
-            Some(status) => Some(format!(
-                "the recording is incomplete: the record process ended, {status}"
-            )),
-            None => Some("the recording may be incomplete: the record process ended in an unknown way".to_owned()),
-        }
+        let recordings = [(&mut self.recorder, "recording"), (&mut self.black_box, "black box")];
+        let problems = recordings
+            .into_iter()
+            .filter_map(|(child, what)| match child.as_mut()?.end() {
+                Some(status) if status.success() => None,
+                Some(status) => Some(format!("the {what} is incomplete: the record process ended, {status}")),
+                None => Some(format!(
+                    "the {what} may be incomplete: the record process ended in an unknown way"
+                )),
+            });
+        // All of them end, also where the first had a problem.
+        problems.collect::<Vec<_>>().into_iter().next()
     }
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{
-    Alarm, CommandKind, CommandRecord, Cycle, Estimate, Mode, Range, RecordingStatus, State, Timing,
+    Alarm, CommandKind, CommandRecord, Cycle, Estimate, Mode, Range, RecordingStatus, State, Timing, TripStatus,
 };
 
 /// How long the worm may take to reach a commanded mode, beyond the time of the ramp.
@@ -24,6 +24,7 @@ pub(crate) struct TelemetryReceiver {
     range: Subscriber<Range>,
     command: Subscriber<CommandRecord>,
     recording: Subscriber<RecordingStatus>,
+    trip: Subscriber<TripStatus>,
 }
 
 impl TelemetryReceiver {
@@ -41,6 +42,7 @@ impl TelemetryReceiver {
             range: hub.subscriber().map_err(Failure::failed)?,
             command: hub.subscriber().map_err(Failure::failed)?,
             recording: hub.subscriber().map_err(Failure::failed)?,
+            trip: hub.subscriber().map_err(Failure::failed)?,
         })
     }
 
@@ -69,6 +71,9 @@ impl TelemetryReceiver {
         }
         while let Ok(Some(status)) = self.recording.next() {
             telemetry.take_recording(&status);
+        }
+        while let Ok(Some(trip)) = self.trip.next() {
+            telemetry.take_trip(&trip);
         }
     }
 

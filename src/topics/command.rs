@@ -198,7 +198,7 @@ impl CommandClient {
         }
     }
 
-    fn instance(&self) -> &Instance {
+    pub(crate) fn instance(&self) -> &Instance {
         self.presence.instance()
     }
 

@@ -107,6 +107,11 @@ impl Instance {
         self.folder.join("relay.sock")
     }
 
+    /// Where the trip of the worm listens.
+    pub(crate) fn trip_socket(&self) -> PathBuf {
+        self.folder.join("trip.sock")
+    }
+
     /// Removes the folder when nothing is in it any more: for the last process of a worm, and for who only looked whether it runs.
     pub(crate) fn remove_folder_if_empty(&self) {
         if let Err(error) = fs::remove_dir(&self.folder) {

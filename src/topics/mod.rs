@@ -14,7 +14,9 @@
 //! | `worm/<name>/cycle` | publish-subscribe | [`Estimator`] | 16 | 64 |
 //! | `worm/<name>/alarm` | publish-subscribe and event | [`Estimator`] | 32 | 64 |
 //! | `worm/<name>/range` | publish-subscribe | [`Estimator`] | 1 | 64 |
+//! | `worm/<name>/trip` | publish-subscribe | [`Trip`] | 1 | 32 |
 //! | `worm/<name>/recording` | publish-subscribe | [`Recorder`] | 1 | 16 |
+//! | `worm/<name>/black_box` | publish-subscribe | [`BlackBox`] | 1 | 16 |
 //! | `worm/<name>/command` | request-response | answered by [`Controller`] | | |
 //! | `worm/<name>/command` | publish-subscribe: each command with its answer | [`Controller`] | 32 | 256 |
 //!
@@ -68,7 +70,8 @@
 //!
 //! # Memory
 //! A publisher reserves `16 subscribers × (buffer + 2) + history + 2` samples: 5.3 MB for `state`, 1.9 MB for `timing`,
-//! 4.3 MB for `estimate`, 0.8 MB for `cycle`, 0.1 MB for `alarm`, 0.2 MB for `range`, 0.5 MB for `command`, 0.02 MB for `recording`. Only written pages use
+//! 4.3 MB for `estimate`, 0.8 MB for `cycle`, 0.1 MB for `alarm`, 0.2 MB for `range`, 0.5 MB for `command`, 0.4 MB for `trip`, 0.02 MB for
+//! `recording` and `black_box` each. Only written pages use
 //! memory, and the same few slots are reused (80 kB after 5000 ticks), unless the process locks its future memory: then
 //! all of it is resident. A subscriber takes 33 kB for each publisher.
 //!
@@ -109,8 +112,10 @@ pub use instance::Instance;
 pub use lock::LockError;
 pub(crate) use lock::LockPlace;
 pub use publisher::{PublishError, Publisher};
-pub use role::{AlreadyRunning, Controller, Estimator, Recorder, Relay, Role, RoleError, RoleLock, Supervisor};
+pub use role::{
+    AlreadyRunning, BlackBox, Controller, Estimator, Recorder, Relay, Role, RoleError, RoleLock, Supervisor, Trip,
+};
 pub use stale_resources::Peer;
 pub use start::StartError;
 pub use subscriber::{ReceiveError, Sample, Subscriber};
-pub use topic::{Announced, Topic};
+pub use topic::{Announced, Topic, TopicDescription, describe_topics};

@@ -42,6 +42,8 @@ pub(super) fn open(instance: &Instance) -> Result<Services, Refused> {
         alarm: open_topic(&node, instance)?,
         range: open_topic(&node, instance)?,
         recording: open_topic(&node, instance)?,
+        trip: open_topic(&node, instance)?,
+        black_box: open_topic(&node, instance)?,
         state_event: open_event(&node, instance, State::NAME)?,
         alarm_event: open_event(&node, instance, Alarm::NAME)?,
         command: open_topic(&node, instance)?,

@@ -38,10 +38,14 @@ roles! {
     Estimator = "estimator",
     /// The process that records the topics and reports how that goes: the first, if there are several.
     Recorder = "recorder",
+    /// The process that keeps the moments around alarms and faults.
+    BlackBox = "black-box",
     /// The process that starts and ends the others: `wormd up`.
     Supervisor = "supervisor",
     /// The process that serves the watchers.
     Relay = "relay",
+    /// The process that makes a trip.
+    Trip = "trip",
 }
 
 /// Another process has the role.

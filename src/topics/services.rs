@@ -3,7 +3,8 @@
 use iceoryx2::prelude::{Node, ipc};
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use worm_estimator::message::{
-    Alarm, Command, CommandRecord, Cycle, Estimate, Range, RecordingStatus, Reply, State, Timing,
+    Alarm, BlackBoxStatus, Command, CommandRecord, Cycle, Estimate, Range, RecordingStatus, Reply, State, Timing,
+    TripStatus,
 };
 
 /// The variant of iceoryx2 in use: between processes, ports bound to their thread.
@@ -30,6 +31,8 @@ pub struct Services {
     pub(super) alarm: TopicService<Alarm>,
     pub(super) range: TopicService<Range>,
     pub(super) recording: TopicService<RecordingStatus>,
+    pub(super) trip: TopicService<TripStatus>,
+    pub(super) black_box: TopicService<BlackBoxStatus>,
     pub(super) state_event: EventService,
     pub(super) alarm_event: EventService,
     pub(super) command: TopicService<CommandRecord>,

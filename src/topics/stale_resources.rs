@@ -127,6 +127,7 @@ fn or_empty<T>(result: io::Result<T>) -> io::Result<Option<T>> {
 pub(super) fn is_there(instance: &Instance) -> bool {
     ICEORYX_FOLDERS.iter().any(|name| instance.folder().join(name).exists())
         || instance.relay_socket().exists()
+        || instance.trip_socket().exists()
         || files(instance).is_ok_and(|files| !files.is_empty())
 }
 
@@ -139,6 +140,7 @@ pub(super) fn wipe(instance: &Instance) -> io::Result<()> {
         or_empty(fs::remove_dir_all(instance.folder().join(name)))?;
     }
     or_empty(fs::remove_file(instance.relay_socket()))?;
+    or_empty(fs::remove_file(instance.trip_socket()))?;
     Ok(())
 }
 

@@ -1,18 +1,25 @@
 //! The watch screen: keys become requests, lines of the relay become the picture. Pure: times are arguments, ns of one clock.
 
+use super::ghost;
 use super::picture::Picture;
 use super::view::{self, Panel, View};
+use crate::relay::message_json::Json;
 use crate::relay::wire::{Answer, Line as Received, Request, Subject};
+use crate::trip::wire::Ask;
 use ratatui::Frame;
 use ratatui::style::{Color, Style, Stylize};
 use ratatui::text::Line;
 use std::collections::VecDeque;
-use worm_estimator::message::Mode;
+use worm_estimator::message::{Mode, TripPhase};
 use worm_estimator::time::seconds;
 use worm_physics::MAX_CELLS;
+use worm_plan::Ghost;
+use worm_plan::ghost::SILENCE_NS;
 
 /// After this time values count as old, ns.
 const STALE_NS: u64 = 1_000_000_000;
+/// A trip says twice a second how it stands, ns.
+const TRIP_SILENCE_NS: u64 = 2_000_000_000;
 /// How long the question "once more?" stands, ns.
 const ASK_NS: u64 = 5_000_000_000;
 /// How long a message stands in the status line, ns.
@@ -33,6 +40,8 @@ pub(crate) enum Seat {
 pub(crate) struct App {
     seat: Seat,
     picture: Picture,
+    /// Where the worm is while nothing is heard of it.
+    ghost: Ghost,
     /// The number by which the relay knows this watcher.
     me: Option<u64>,
     panel: Panel,
@@ -54,6 +63,7 @@ impl App {
         Self {
             seat,
             picture: Picture::new(subject),
+            ghost: Ghost::default(),
             me: None,
             panel: Panel::Overview,
             asked: None,
@@ -70,19 +80,47 @@ impl App {
         self.heard_ns = Some(now_ns);
         self.problem = None;
         match line {
-            Received::Hello(hello) => self.picture.take_hello(*hello),
+            Received::Hello(hello) => {
+                hello.cycles.iter().for_each(|Json(cycle)| self.ghost.note_cycle(cycle));
+                self.picture.take_hello(*hello);
+            }
             Received::Frame(frame) => {
                 let frame = *frame;
                 for event in &frame.events {
                     self.note(event.text.clone());
                 }
+                frame.cycles.iter().for_each(|Json(cycle)| self.ghost.note_cycle(cycle));
                 self.picture.take_frame(frame);
+                self.hear(now_ns);
             }
             Received::Answer(answer) => self.take_answer(answer, now_ns),
             Received::Lost { frames } => {
                 self.note(format!("{frames} frames were left out: this screen did not take them"))
             }
             Received::Refused { reason } => self.say(reason, true, now_ns),
+        }
+    }
+
+    /// What has just come is of the worm as it is now, unless it waited on the way, or the worm is silent behind the relay.
+    fn hear(&mut self, now_ns: u64) {
+        let picture = &self.picture;
+        let frame_ns = now_ns.saturating_sub(picture.time_ns);
+        let age_ns = |age_ms: Option<u64>| age_ms.map(|ms| frame_ns.saturating_add(ms.saturating_mul(1_000_000)));
+        let is_fresh = [picture.ages.state, picture.ages.estimate]
+            .iter()
+            .all(|&age_ms| age_ns(age_ms).is_some_and(|age_ns| age_ns < SILENCE_NS));
+        let (Some(state), Some(estimate), true) = (&picture.state, &picture.estimate, is_fresh) else {
+            return;
+        };
+        let trip = picture
+            .trip
+            .as_ref()
+            .filter(|_| age_ns(picture.ages.trip).is_some_and(|age_ns| age_ns < TRIP_SILENCE_NS));
+        let is_attended = picture.driver.as_ref().is_some_and(|driver| driver.attends);
+        if let Some(score) = self.ghost.hear(state, estimate, trip, is_attended, now_ns) {
+            let text = ghost::score_text(&score);
+            self.note(text.clone());
+            self.say(text, false, now_ns);
         }
     }
 
@@ -134,13 +172,21 @@ impl App {
         let asked = self.asked.take().filter(|(_, until_ns)| now_ns < *until_ns);
         let is_confirmed = asked.is_some_and(|(asked, _)| asked == key);
         let request = match key {
-            'c' | 'r' if !is_confirmed => {
+            'c' | 'r' | 'b' if !is_confirmed => {
                 self.asked = Some((key, now_ns.saturating_add(ASK_NS)));
                 None
             }
             'c' if self.needs_arming() => Some(Request::Arm),
             'c' => Some(Request::Crawl { cycles_per_s: None }),
             'r' => Some(Request::Reset),
+            'b' => Some(Request::Trip { action: Ask::Return }),
+            'p' if self.trip_waits() && !is_confirmed => {
+                self.asked = Some((key, now_ns.saturating_add(ASK_NS)));
+                None
+            }
+            'p' => Some(Request::Trip {
+                action: if self.trip_waits() { Ask::Resume } else { Ask::Pause },
+            }),
             'h' | ' ' => Some(Request::Hold),
             's' => Some(Request::Stop),
             't' => Some(Request::TakeOver),
@@ -177,6 +223,11 @@ impl App {
         }
     }
 
+    fn trip_waits(&self) -> bool {
+        let holding = TripPhase::Holding.code();
+        self.picture.trip.is_some_and(|trip| trip.phase == holding)
+    }
+
     fn needs_arming(&self) -> bool {
         self.picture
             .state
@@ -205,6 +256,7 @@ impl App {
             &View {
                 picture: &self.picture,
                 status: self.status(now_ns),
+                ghost: self.stale(now_ns).and_then(|_| self.ghost.predict(now_ns)),
                 stale: self.stale(now_ns),
                 panel: self.panel,
                 leaving: match (self.seat, self.attends()) {
@@ -244,6 +296,8 @@ impl App {
         if let Some((key, _)) = self.asked.filter(|(_, until_ns)| now_ns < *until_ns) {
             let what = match key {
                 'r' => "reset the worm: torque on, motion permitted",
+                'b' => "let the trip go home",
+                'p' => "let the trip go on",
                 _ if self.needs_arming() => "arm the worm: torque on",
                 _ => "make the worm crawl, for as long as this screen is here",
             };

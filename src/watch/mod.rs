@@ -1,15 +1,18 @@
 //! A running worm for people to watch: its telemetry, a terminal view of it, and the summary at the end.
 //!
 //! [`Telemetry`] gathers the messages of the topics, and [`Summary`] sums it up as text and as the JSON that scripts read. The live
-//! display knows the worm from its relay: `picture` has what was sent, `app` is the screen with its keys, `view` paints it.
+//! display knows the worm from its relay: `picture` has what was sent, `ghost` where the worm is while nothing comes, `app` is the screen with
+//! its keys, `view` paints it. The dashboard uses the same `picture` and the same words.
 
+pub(crate) mod alarm_text;
 pub(crate) mod app;
+pub(crate) mod breakdown;
+mod ghost;
 pub(crate) mod mismatch;
-mod picture;
+pub(crate) mod picture;
 pub(crate) mod range;
 mod recent;
 pub(crate) mod recording;
-mod remedy;
 mod summary;
 mod telemetry;
 mod view;

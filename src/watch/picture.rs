@@ -4,7 +4,7 @@ use super::recent::Recent;
 use crate::relay::History;
 use crate::relay::message_json::Json;
 use crate::relay::wire::{Ages, Driver, Event, Frame, Hello, Statistics, Subject};
-use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State, Timing};
+use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State, Timing, TripStatus};
 
 /// Gait cycles that are kept: an hour and a half of the usual gait, 1.5 MB.
 const MAX_CYCLES: usize = 2048;
@@ -26,6 +26,7 @@ pub(crate) struct Picture {
     pub(crate) statistics: Option<Statistics>,
     pub(crate) recording: Option<RecordingStatus>,
     pub(crate) range: Option<Range>,
+    pub(crate) trip: Option<TripStatus>,
     pub(crate) raised: Vec<Alarm>,
     pub(crate) cycles: Recent<Cycle>,
     pub(crate) alarms: Recent<Alarm>,
@@ -48,6 +49,7 @@ impl Picture {
             statistics: None,
             recording: None,
             range: None,
+            trip: None,
             raised: Vec::new(),
             cycles: Recent::with_limit(MAX_CYCLES),
             alarms: Recent::with_limit(MAX_CHANGES),
@@ -86,6 +88,7 @@ impl Picture {
         self.statistics = frame.statistics;
         self.recording = frame.recording.map(|Json(status)| status);
         self.range = frame.range.map(|Json(range)| range);
+        self.trip = frame.trip.map(|Json(trip)| trip);
         self.raised = frame.raised.into_iter().map(|Json(alarm)| alarm).collect();
         frame.cycles.into_iter().for_each(|Json(cycle)| self.cycles.push(cycle));
         frame.alarms.into_iter().for_each(|Json(alarm)| self.alarms.push(alarm));

@@ -3,7 +3,7 @@
 use worm_estimator::message::{Alarm, AlarmKind, RecordingProblem, RecordingState, RecordingStatus};
 
 /// How far a recording is, or why it has stopped.
-pub(super) fn progress_text(status: &RecordingStatus) -> String {
+pub(crate) fn progress_text(status: &RecordingStatus) -> String {
     let size = format!("{:.1} MB", status.bytes as f64 * 1e-6);
     match RecordingState::try_from(status.state) {
         Ok(RecordingState::Recording) => {

@@ -3,7 +3,7 @@
 use super::recent::Recent;
 use crate::latency::TickStats;
 use worm_estimator::message::{
-    Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing,
+    Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing, TripStatus,
 };
 
 /// How many cycles are kept: nearly two days of the usual gait, 45 MB.
@@ -31,6 +31,8 @@ pub struct Telemetry {
     pub timing: Option<Timing>,
     /// The newest report of a recorder.
     pub recording: Option<RecordingStatus>,
+    /// How the newest trip stands, or stood at its end.
+    pub trip: Option<TripStatus>,
     /// The newest cycles.
     pub cycles: Recent<Cycle>,
     /// How far the battery lasts, after the newest cycles; empty without a battery.
@@ -60,6 +62,7 @@ impl Telemetry {
             estimate: None,
             timing: None,
             recording: None,
+            trip: None,
             cycles: Recent::with_limit(cycles),
             ranges: Recent::with_limit(cycles.min(MAX_RANGES)),
             alarms: Recent::with_limit(alarms),
@@ -114,6 +117,11 @@ impl Telemetry {
     /// Takes a recorder's report.
     pub fn take_recording(&mut self, status: &RecordingStatus) {
         self.recording = Some(*status);
+    }
+
+    /// Takes how a trip stands.
+    pub fn take_trip(&mut self, trip: &TripStatus) {
+        self.trip = Some(*trip);
     }
 
     /// Ticks that the controller ran.

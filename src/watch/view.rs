@@ -4,8 +4,9 @@ mod canal;
 mod panels;
 
 use super::picture::Picture;
-use super::{mismatch, recording};
+use super::{alarm_text, recording};
 use crate::relay::wire::Subject;
+use crate::trip::words;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -13,6 +14,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Cell as TableCell, Paragraph, Row, Table};
 use std::collections::VecDeque;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Fault, Mode, Severity};
+use worm_plan::ghost::Prediction;
 
 /// What is painted.
 pub(crate) struct View<'a> {
@@ -22,6 +24,8 @@ pub(crate) struct View<'a> {
     pub(crate) status: Line<'a>,
     /// What is silent, and for how long; then the values are grey.
     pub(crate) stale: Option<String>,
+    /// Where the worm is expected, while something is silent.
+    pub(crate) ghost: Option<Prediction>,
     /// What stands below the canal.
     pub(crate) panel: Panel,
     /// What leaving does, for the lower edge of the canal.
@@ -49,15 +53,27 @@ pub(crate) enum Panel {
 pub(crate) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
     let picture = view.picture;
     let cells = picture.subject.cells.min(worm_physics::MAX_CELLS) as u16;
-    let heights = Heights::of(frame.area().height, cells);
-    let [head, status, canal, below] = Layout::vertical([
+    let trip_lines = u16::from(picture.trip.is_some());
+    let heights = Heights::of(frame.area().height.saturating_sub(trip_lines), cells);
+    let [head, status, trip, canal, below] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(1),
+        Constraint::Length(trip_lines),
         Constraint::Length(heights.canal),
         Constraint::Min(0),
     ])
     .areas(frame.area());
-    canal::draw(frame, canal, view);
+    let trip_line = picture.trip.as_ref().map(|trip| {
+        let silent_s = picture.ages.trip.unwrap_or(0) / 1000;
+        if silent_s >= 2 && !words::is_over(trip) {
+            let text =
+                format!(" the trip has been silent for {silent_s} s: its process was ended, and nothing resumes it");
+            return Line::raw(text).fg(Color::Red);
+        }
+        let energy = words::energy(trip).map_or(String::new(), |energy| format!("  {energy}"));
+        Line::raw(format!(" {}{energy}", words::line(trip))).fg(Color::Blue)
+    });
+    frame.render_widget(trip_line.unwrap_or_default(), trip);
     match view.panel {
         Panel::Overview => draw_overview(frame, below, view, &heights),
         Panel::Cell(cell) => panels::draw_cell(frame, below, picture, cell),
@@ -66,10 +82,11 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
         Panel::Help => panels::draw_help(frame, below, view.leaving),
     }
     if view.stale.is_some() {
-        for area in [canal, below] {
+        for area in [trip, below] {
             frame.buffer_mut().set_style(area, Style::new().fg(Color::DarkGray));
         }
     }
+    canal::draw(frame, canal, view);
     frame.render_widget(headline(picture, view.stale.as_deref()), head);
     frame.render_widget(&view.status, status);
 }
@@ -316,23 +333,12 @@ fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
 }
 
 fn alarm_line(alarm: &Alarm, subject: &Subject) -> Line<'static> {
-    let name = AlarmKind::try_from(alarm.kind).map_or("?", AlarmKind::name);
-    let cell = if alarm.cell == u32::MAX {
-        String::new()
-    } else {
-        format!(" cell {}", alarm.cell + 1)
-    };
     let colour = if alarm.severity == Severity::Critical.code() {
         Color::Red
     } else {
         Color::Yellow
     };
-    let words = mismatch::text_of(alarm, &subject.step_order).or_else(|| recording::alarm_text(alarm));
-    let text = words.map_or_else(
-        || format!("{name}{cell}: {:.4} against {:.4}", alarm.value, alarm.threshold),
-        |what| format!("{name}: {what}"),
-    );
-    Line::from(text).fg(colour).bold()
+    Line::from(alarm_text::of(alarm, subject)).fg(colour).bold()
 }
 
 fn draw_cycles(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
@@ -424,12 +430,6 @@ fn draw_health(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
         .filter(|fraction| fraction.is_finite())
     {
         lines.push(Line::raw(format!("battery {:.0} %", fraction * 100.0)));
-    }
-    if let Some(range) = &picture.range {
-        lines.push(Line::raw(format!(
-            "range {:.1} to {:.1} m",
-            range.range_low_m, range.range_high_m
-        )));
     }
     frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(" loop ")), area);
 }

@@ -5,16 +5,19 @@
 
 mod any_order;
 mod attending;
+mod black_box;
 mod explaining;
 mod faulting;
 mod kills;
 mod latency;
 mod leaks;
 mod leaving;
+mod python_package;
 mod recording;
 mod recording_stops;
 mod service;
 mod stopping;
+mod trips;
 mod watching;
 mod worm;
 

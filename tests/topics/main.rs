@@ -1,5 +1,6 @@
-//! The topics in real shared memory: publishing, starting and leaving, readers in Python.
+//! The topics in real shared memory: publishing, starting and leaving, readers in Python and C.
 
+mod c_header;
 mod foreign;
 mod home;
 mod publishing;

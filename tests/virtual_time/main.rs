@@ -5,6 +5,7 @@
 //! - `stall`: a hard stall is reported and the goal is 0 within 100 ms; how close a healthy worm comes to the threshold.
 //! - `faults`: which alarms each fault of the virtual worm raises, and by when, and that it raises no others.
 //! - `fault_table`: every fault in every mode at several moments: what the worm does, how soon, and how it recovers.
+//! - `why`: what `wormd why` says of every fault: the first reason is the right one.
 //! - `soak`: a few segments of `wormd soak`.
 //! - `mismatch`: worms that the model does not explain are reported; the configured worm and those a few per cent off are not.
 //! - `pauses`: a pause of the computer, in whole or in part, is not a fault of the worm and does not distort the energies.
@@ -25,3 +26,4 @@ mod pauses;
 mod range;
 mod soak;
 mod stall;
+mod why;

@@ -7,8 +7,9 @@ use worm_analysis::recording::mcap;
 use worm_estimator::config::Config;
 use worm_estimator::message::{
     Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
+    TripStatus,
 };
-use worm_log::{Log, compare, messages_from, replay};
+use worm_log::{Log, compare, messages_from, outline, replay};
 
 /// A log: as its messages, as a recording, and through the estimator.
 pub(crate) fn mcap_log(data: &[u8]) {
@@ -16,6 +17,9 @@ pub(crate) fn mcap_log(data: &[u8]) {
     match messages_from(Cursor::new(data), path) {
         Ok(log) => check(&log),
         Err(error) => drop(readable(error)),
+    }
+    if let Ok(held) = outline(&mut Cursor::new(data)) {
+        assert!(held.metadata.len() <= data.len(), "a record takes room");
     }
     match mcap::read_from(Cursor::new(data), path) {
         Ok(read) => assert!(read.time_s.iter().all(|time_s| time_s.is_finite()), "a time"),
@@ -45,6 +49,7 @@ pub(crate) fn log_messages(data: &[u8]) {
         log.alarms.extend(read::<Alarm>(line));
         log.ranges.extend(read::<Range>(line));
         log.commands.extend(read::<CommandRecord>(line));
+        log.trips.extend(read::<TripStatus>(line));
         read::<Timing>(line);
     }
     check(&log);
@@ -62,6 +67,7 @@ pub(crate) fn protobuf_message(data: &[u8]) {
         3 => read_bytes::<Cycle>(bytes),
         4 => read_bytes::<Alarm>(bytes),
         5 => read_bytes::<CommandRecord>(bytes),
+        6 => read_bytes::<TripStatus>(bytes),
         _ => read_bytes::<RecordingStatus>(bytes),
     }
 }

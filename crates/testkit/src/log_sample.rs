@@ -8,7 +8,7 @@ use std::rc::Rc;
 use std::time::{Duration, UNIX_EPOCH};
 use worm_estimator::config::{Battery, Config};
 use worm_estimator::estimate::Observer;
-use worm_estimator::message::{Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, State, Timing};
+use worm_estimator::message::{Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, State, Timing, TripStatus};
 use worm_log::{Log, Logged, Origin, Writer};
 
 pub const ORIGIN_CONFIG: &str = "[worm]\nname = \"tester\"\n";
@@ -24,6 +24,7 @@ pub struct Telemetry {
     pub alarms: Vec<Alarm>,
     pub ranges: Vec<Range>,
     pub commands: Vec<CommandRecord>,
+    pub trips: Vec<TripStatus>,
 }
 
 impl Telemetry {
@@ -36,6 +37,7 @@ impl Telemetry {
             alarms: self.alarms,
             ranges: self.ranges,
             commands: self.commands,
+            trips: self.trips,
             ..Log::default()
         }
     }
@@ -140,6 +142,7 @@ pub fn write_log(path: &Path, telemetry: &Telemetry) {
     all(&mut writer, &telemetry.alarms);
     all(&mut writer, &telemetry.ranges);
     all(&mut writer, &telemetry.commands);
+    all(&mut writer, &telemetry.trips);
     writer.finish().expect("there is room");
 }
 

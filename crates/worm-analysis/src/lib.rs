@@ -8,7 +8,7 @@
 //! | module | what it holds | knows nothing of |
 //! |---|---|---|
 //! | [`recording`] | recordings of cell positions in every format | how they are analysed |
-//! | [`bench`] | recordings of a servo on a bench, their campaign, and the servo's model as a file | how they are analysed |
+//! | [`mod@bench`] | recordings of a servo on a bench, their campaign, and the servo's model as a file | how they are analysed |
 //! | [`identify`] | gait, largest tip deformations and mass from positions alone: section 3.2 of the paper | files |
 //! | [`experiment`] | section 3 on recordings: slides, forces, energy by two methods, theory beside them; recordings from the model | files |
 //! | [`explain`] | where model and recordings disagree, which effect is missing, and what to try next | files |

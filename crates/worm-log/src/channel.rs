@@ -1,7 +1,7 @@
 //! The channels of a log.
 
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, State, Timing,
+    Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, State, Timing, TripStatus,
 };
 
 /// Encoding of the messages that are written, and of their schemas, as MCAP names it.
@@ -66,6 +66,7 @@ channels! {
     Alarm = "alarm",
     Range = "range",
     CommandRecord = "command",
+    TripStatus = "trip",
 }
 
 impl Channel {

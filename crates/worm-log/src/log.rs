@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use worm_estimator::config::{Config, ConfigError};
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing};
+use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing, TripStatus};
 
 /// The messages of a log, by topic, each topic in the order in which it was recorded.
 #[derive(Debug, Clone, Default)]
@@ -29,6 +29,8 @@ pub struct Log {
     pub ranges: Vec<Range>,
     /// What the controller was told and made of it; none in logs of older versions.
     pub commands: Vec<CommandRecord>,
+    /// How trips stood; none where there was none, and in logs of older versions.
+    pub trips: Vec<TripStatus>,
     /// The text of the worm's configuration; none if it ran on defaults.
     pub config: Option<String>,
     /// Worm, cells, version, and when the log was begun.
@@ -85,6 +87,7 @@ fn gather(path: &Path, scan: impl FnOnce(Take<'_>) -> Result<Contents, ReadError
             Channel::Alarm => log.alarms.push(payload.read()?),
             Channel::Range => log.ranges.push(payload.read()?),
             Channel::CommandRecord => log.commands.push(payload.read()?),
+            Channel::TripStatus => log.trips.push(payload.read()?),
         }
         Ok(())
     })?;

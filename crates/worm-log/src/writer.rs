@@ -58,7 +58,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    fn contents(&self) -> Contents {
+    pub(super) fn contents(&self) -> Contents {
         // A clock before 1970 is not set.
         let unix = self.begun.duration_since(UNIX_EPOCH).unwrap_or_default();
         let entries = [
@@ -77,7 +77,7 @@ impl Origin {
 }
 
 /// The metadata with the time on `CLOCK_MONOTONIC` at which a log was begun.
-const BEGUN_NS: &str = "begun_monotonic_ns";
+pub(super) const BEGUN_NS: &str = "begun_monotonic_ns";
 
 /// Writes one log. [`Writer::finish`] adds the index; without it, the log is readable up to the last [`Writer::flush`].
 pub struct Writer<W: Write> {
@@ -192,6 +192,16 @@ impl<W: Write> Writer<W> {
         } else {
             Ok(())
         }
+    }
+
+    /// Appends a metadata record.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the output refuses.
+    pub(super) fn write_metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result<(), WriteError> {
+        let name = name.to_owned();
+        let written = self.mcap.write_metadata(&Metadata { name, metadata });
+        written.map_err(|error| refused(&self.file, error))
     }
 
     /// Finishes the chunk and writes it: everything so far can then be read, whatever happens later.

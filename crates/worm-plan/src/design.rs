@@ -101,6 +101,33 @@ impl fmt::Display for LegFailure {
     }
 }
 
+/// How a worm goes along its canal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Going {
+    /// With its first cell ahead.
+    Forward,
+    /// With its last cell ahead: the cam turns the other way.
+    Backward,
+}
+
+impl Going {
+    /// The other one.
+    pub const fn reversed(self) -> Self {
+        match self {
+            Self::Forward => Self::Backward,
+            Self::Backward => Self::Forward,
+        }
+    }
+
+    /// Sign of the cam's speed.
+    pub const fn sign(self) -> f64 {
+        match self {
+            Self::Forward => 1.0,
+            Self::Backward => -1.0,
+        }
+    }
+}
+
 /// What a steady gait cycle does and needs on one slope.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlopeCost {
@@ -219,8 +246,21 @@ impl Workbench {
     /// # Errors
     /// [`LegFailure`] where it does not progress.
     pub fn mechanics(&self, design: &Design, slope_deg: f64) -> Result<SlopeMechanics, LegFailure> {
+        self.mechanics_going(design, slope_deg, Going::Forward)
+    }
+
+    /// As [`mechanics`](Self::mechanics), also backward. The slope is positive where the way goes up.
+    ///
+    /// # Errors
+    /// As [`mechanics`](Self::mechanics).
+    pub fn mechanics_going(&self, design: &Design, slope_deg: f64, going: Going) -> Result<SlopeMechanics, LegFailure> {
+        let physics = match going {
+            Going::Forward => self.physics(design, slope_deg),
+            // A backward crawl is the forward crawl of the worm that is seen from the other end.
+            Going::Backward => self.physics(design, -slope_deg).map(Physics::mirrored),
+        };
         // Only a design of the search can lack the cell that an effect names, and there the reason does not show.
-        let physics = self.physics(design, slope_deg).ok_or(LegFailure::StandsStill)?;
+        let physics = physics.ok_or(LegFailure::StandsStill)?;
         let (cycle, load) = driven_cycle(&physics, design.cycle_s).map_err(|slides| LegFailure::CannotHold {
             pull_n: slides.pull_n,
             hold_n: slides.hold_n,

@@ -7,6 +7,10 @@
 //! - [`mod@search`]: [`search()`], every design of a grid on the route, on all processors; the best one and the trade-off.
 //! - [`mod@check`]: [`check()`], the worm with inertia against the exact motion that everything here rests on.
 //! - [`mod@plan`]: [`plan()`], all of it for one route.
+//! - [`itinerary`]: [`Itinerary`], a route with what its legs cost out and home, for a worm that is on the way.
+//! - `correction`: how far the worm on the way differs from the model; `energy_budget`: what is left against what the way home needs.
+//! - [`guide`]: [`Guide`], the decisions of a trip that is under way.
+//! - [`ghost`]: [`Ghost`], where a worm is expected of which nothing is heard.
 //!
 //! Everything is pure: files and terminals are the caller's.
 //!
@@ -16,14 +20,22 @@
 //! crawled: the constants of [`worm_estimator::estimate::range`], and the standard deviations of the battery in the configuration.
 
 pub mod check;
+mod correction;
 pub mod design;
+mod energy_budget;
+pub mod ghost;
+pub mod guide;
+pub mod itinerary;
 pub mod plan;
 pub mod route;
 pub mod search;
 pub mod trip;
 
 pub use check::{InertiaCheck, check};
-pub use design::{Design, LegFailure, SlopeCost, Workbench};
+pub use design::{Design, Going, LegFailure, SlopeCost, Workbench};
+pub use ghost::Ghost;
+pub use guide::{Action, Guide, Order};
+pub use itinerary::{Heading, Impassable, Itinerary};
 pub use plan::{BatteryUsed, Plan, plan};
 pub use route::{Leg, Route, RouteError};
 pub use search::{Bounds, BoundsError, Candidate, Search, search};

@@ -9,8 +9,12 @@ use worm_estimator::abridged::abridged;
 pub const MAX_LEGS: usize = 10_000;
 /// Longest leg, m.
 const MAX_LENGTH_M: f64 = 1e5;
-/// The columns.
+/// The columns that a route must have …
 const COLUMNS: [&str; 2] = ["length_m", "slope_deg"];
+/// … and the one that it may have.
+const CYCLE_COLUMN: &str = "cycle_s";
+/// Shortest and longest gait cycle, s, as in the configuration.
+const CYCLES_S: [f64; 2] = [0.5, 120.0];
 /// Longest foreign text in an error, bytes.
 const MAX_QUOTED: usize = 60;
 
@@ -21,6 +25,16 @@ pub struct Leg {
     pub length_m: f64,
     /// Slope, degrees, positive uphill; −90 to 90.
     pub slope_deg: f64,
+    /// Time of a gait cycle on this leg, s; none where it is that of the design.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cycle_s: Option<f64>,
+}
+
+impl Leg {
+    /// Time of a gait cycle on this leg, s, where one of `usual_s` is what has no other.
+    pub fn cycle_s(&self, usual_s: f64) -> f64 {
+        self.cycle_s.unwrap_or(usual_s)
+    }
 }
 
 /// The legs of a trip, in their order; at least one.
@@ -83,12 +97,13 @@ impl Route {
             .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
         let head = reader.headers().map_err(damaged)?.clone();
         let head_line = head.position().map_or(1, csv::Position::line);
-        if let Some(unknown) = head.iter().find(|name| !COLUMNS.contains(name)) {
+        let is_known = |name: &str| COLUMNS.contains(&name) || name == CYCLE_COLUMN;
+        if let Some(unknown) = head.iter().find(|name| !is_known(name)) {
             let problem = format!("unknown column `{}`", abridged(unknown.to_owned(), MAX_QUOTED));
             return Err(wrong(
                 Place::Line(head_line),
                 problem,
-                "the columns are length_m and slope_deg",
+                "the columns are length_m and slope_deg, and cycle_s where a leg has a speed of its own",
             ));
         }
         let mut columns = [0; COLUMNS.len()];
@@ -104,21 +119,32 @@ impl Route {
             };
             *column = place;
         }
+        let cycle_columns: Vec<usize> = (0..head.len()).filter(|&at| &head[at] == CYCLE_COLUMN).collect();
+        if cycle_columns.len() > 1 {
+            let problem = format!("column `{CYCLE_COLUMN}` is there {} times", cycle_columns.len());
+            return Err(wrong(Place::Line(head_line), problem, "give it once"));
+        }
         let mut legs = Vec::new();
         for record in reader.records() {
             let record = record.map_err(damaged)?;
             let line = Place::Line(record.position().map_or(0, csv::Position::line));
             let number = |column: usize, low: f64, high: f64, unit: &str| {
-                let text = record.get(columns[column]).unwrap_or_default();
+                let text = record.get(column).unwrap_or_default();
                 let value: Option<f64> = text.parse().ok();
                 value.filter(|value| (low..=high).contains(value)).ok_or_else(|| {
-                    let problem = format!("{} = '{}'", COLUMNS[column], abridged(text.to_owned(), MAX_QUOTED));
+                    let problem = format!("{} = '{}'", &head[column], abridged(text.to_owned(), MAX_QUOTED));
                     (problem, format!("give a number from {low} to {high} {unit}"))
                 })
             };
-            let leg = number(0, 1e-3, MAX_LENGTH_M, "m").and_then(|length_m| {
-                let slope_deg = number(1, -90.0, 90.0, "degrees")?;
-                Ok(Leg { length_m, slope_deg })
+            let cycle_column = cycle_columns.first().filter(|&&at| !record[at].is_empty());
+            let leg = number(columns[0], 1e-3, MAX_LENGTH_M, "m").and_then(|length_m| {
+                Ok(Leg {
+                    length_m,
+                    slope_deg: number(columns[1], -90.0, 90.0, "degrees")?,
+                    cycle_s: cycle_column
+                        .map(|&column| number(column, CYCLES_S[0], CYCLES_S[1], "s"))
+                        .transpose()?,
+                })
             });
             let leg = leg.map_err(|(problem, remedy)| wrong(line, problem, &remedy))?;
             if legs.len() == MAX_LEGS {
@@ -143,6 +169,17 @@ impl Route {
     /// Length of all legs, m.
     pub fn length_m(&self) -> f64 {
         self.legs.iter().map(|leg| leg.length_m).sum()
+    }
+
+    /// The same legs with slopes that are this many times theirs: −1 for the way back.
+    pub(crate) fn scaled_slopes(&self, factor: f64) -> Self {
+        let scaled = |leg: &Leg| Leg {
+            slope_deg: factor * leg.slope_deg,
+            ..*leg
+        };
+        Self {
+            legs: self.legs.iter().map(scaled).collect(),
+        }
     }
 
     /// Every slope of the route once, growing, and for each leg which of them it has.
@@ -171,6 +208,9 @@ mod tests {
         assert_eq!(legs, [(1.5, 0.0), (0.5, 30.0), (2.0, 0.0), (1.0, -10.0)]);
         assert_eq!(route.slopes(), (vec![-10.0, 0.0, 30.0], vec![1, 2, 1, 0]));
         assert!((route.length_m() - 5.0).abs() < 1e-12);
+        let route = read("length_m,cycle_s,slope_deg\n1,4,0\n1,,30\n").expect("a route");
+        assert_eq!(route.legs()[0].cycle_s(2.5), 4.0);
+        assert_eq!(route.legs()[1].cycle_s(2.5), 2.5);
     }
 
     #[test]
@@ -201,6 +241,14 @@ mod tests {
             (
                 "length_m,slope_deg\n1,91\n",
                 "route.csv:2: slope_deg = '91': give a number from -90 to 90 degrees",
+            ),
+            (
+                "length_m,slope_deg,cycle_s\n1,0,0\n",
+                "route.csv:2: cycle_s = '0': give a number from 0.5 to 120 s",
+            ),
+            (
+                "length_m,slope_deg,cycle_s,cycle_s\n1,0,2,2\n",
+                "route.csv:1: column `cycle_s` is there 2 times",
             ),
             ("length_m,slope_deg\n1,nan\n", "route.csv:2: slope_deg = 'nan'"),
         ] {

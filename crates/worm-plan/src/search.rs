@@ -11,7 +11,7 @@
 //! Its energy counts at the voltage of a half full battery; [`trip`](super::trip()) then is exact about the winner.
 
 use super::design::{Design, LegFailure, SlopeMechanics, Workbench};
-use super::route::Route;
+use super::route::{Leg, Route};
 use rayon::prelude::*;
 use serde::Serialize;
 use worm_physics::MAX_CELLS;
@@ -155,7 +155,7 @@ pub fn search(bench: &Workbench, route: &Route, bounds: &Bounds) -> Result<Searc
     if designs > MAX_DESIGNS {
         return Err(BoundsError::TooMany(designs));
     }
-    let legs = LegsBySlope::new(route);
+    let legs = joined(route);
     let tried: Vec<Vec<Candidate>> = mechanisms
         .par_iter()
         .map(|mechanism| candidates(bench, &legs, mechanism, &cycles_s))
@@ -179,28 +179,36 @@ pub fn search(bench: &Workbench, route: &Route, bounds: &Bounds) -> Result<Searc
     })
 }
 
-/// Length of the route on each of its slopes.
-struct LegsBySlope {
-    slopes_deg: Vec<f64>,
-    length_m: Vec<f64>,
-}
-
-impl LegsBySlope {
-    fn new(route: &Route) -> Self {
-        let (slopes_deg, slope_of_leg) = route.slopes();
-        let mut length_m = vec![0.0; slopes_deg.len()];
-        for (leg, slope) in route.legs().iter().zip(slope_of_leg) {
-            length_m[slope] += leg.length_m;
+/// Lengths of the route by slope and speed, each pair of them once.
+fn joined(route: &Route) -> Vec<Leg> {
+    let mut legs: Vec<Leg> = route.legs().to_vec();
+    let cycle_s = |leg: &Leg| leg.cycle_s.unwrap_or_default();
+    legs.sort_by(|a, b| {
+        a.slope_deg
+            .total_cmp(&b.slope_deg)
+            .then(cycle_s(a).total_cmp(&cycle_s(b)))
+    });
+    legs.dedup_by(|next, leg| {
+        let is_same = next.slope_deg == leg.slope_deg && next.cycle_s == leg.cycle_s;
+        if is_same {
+            leg.length_m += next.length_m;
         }
-        Self { slopes_deg, length_m }
-    }
+        is_same
+    });
+    legs
 }
 
 /// The designs of one mechanism that make the trip, one for each time of a gait cycle at most.
-fn candidates(bench: &Workbench, legs: &LegsBySlope, mechanism: &Design, cycles_s: &[f64]) -> Vec<Candidate> {
+fn candidates(bench: &Workbench, legs: &[Leg], mechanism: &Design, cycles_s: &[f64]) -> Vec<Candidate> {
     let mechanics = |design: &Design| -> Result<Vec<SlopeMechanics>, LegFailure> {
-        let slopes = legs.slopes_deg.iter();
-        slopes.map(|&slope_deg| bench.mechanics(design, slope_deg)).collect()
+        let on = |leg: &Leg| {
+            let design = Design {
+                cycle_s: leg.cycle_s(design.cycle_s),
+                ..design.clone()
+            };
+            bench.mechanics(&design, leg.slope_deg)
+        };
+        legs.iter().map(on).collect()
     };
     let at = |cycle_s: f64| Design {
         cycle_s,
@@ -208,11 +216,12 @@ fn candidates(bench: &Workbench, legs: &LegsBySlope, mechanism: &Design, cycles_
     };
     let candidate = |cycle_s: f64, mechanics: &[SlopeMechanics]| {
         let (mut energy_j, mut time_s) = (0.0, 0.0);
-        for (mechanics, length_m) in mechanics.iter().zip(&legs.length_m) {
+        for (mechanics, leg) in mechanics.iter().zip(legs) {
+            let cycle_s = leg.cycle_s(cycle_s);
             let cost = bench.cost(mechanics, cycle_s).ok()?;
             bench.battery_factor(&cost, cycle_s, bench.battery.reserve_share).ok()?;
             let factor = bench.battery_factor(&cost, cycle_s, COMPARED_AT_SHARE).ok()?;
-            let cycles = length_m / cost.advance_m;
+            let cycles = leg.length_m / cost.advance_m;
             energy_j += cycles * factor * bench.bus_j(&cost, cycle_s);
             time_s += cycles * cycle_s;
         }

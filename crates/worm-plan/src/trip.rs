@@ -5,9 +5,10 @@
 //! energy of the trip has one relative standard deviation, which does not shrink with the number of legs. The battery's capacity and its
 //! charge at the start add theirs. Bounds are those of 90 %.
 
-use super::design::{Design, LegFailure, SlopeCost, Workbench};
+use super::design::{Design, Going, LegFailure, SlopeCost, Workbench};
 use super::route::{Leg, Route};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use worm_estimator::estimate::range::{INTERVAL_SIGMAS, MODEL_ADVANCE_SIGMA, MODEL_ENERGY_SIGMA};
 
 /// Standard deviation of the charge at the start, as a share of the battery.
@@ -138,14 +139,7 @@ impl Sums {
 
 /// A design on a route, with a share of the battery's energy at the start.
 pub fn trip(bench: &Workbench, design: &Design, route: &Route, start_share: f64) -> Trip {
-    let (slopes_deg, slope_of_leg) = route.slopes();
-    let costs: Vec<Result<SlopeCost, LegFailure>> = slopes_deg
-        .iter()
-        .map(|&slope_deg| {
-            let mechanics = bench.mechanics(design, slope_deg)?;
-            bench.cost(&mechanics, design.cycle_s)
-        })
-        .collect();
+    let costs = leg_costs(bench, design, route, Going::Forward);
     let reserve = bench.battery.reserve_share;
     let arrival = |sums: &Sums| {
         let (left, sigma) = sums.left(bench, start_share);
@@ -157,10 +151,11 @@ pub fn trip(bench: &Workbench, design: &Design, route: &Route, start_share: f64)
     let mut is_possible = true;
     let mut failed: Option<(usize, LegFailure)> = None;
     let mut legs = Vec::with_capacity(route.legs().len());
-    for (index, (leg, &slope)) in route.legs().iter().zip(&slope_of_leg).enumerate() {
-        let crawled = match (failed, costs[slope]) {
+    for (index, (leg, &cost)) in route.legs().iter().zip(&costs).enumerate() {
+        let cycle_s = leg.cycle_s(design.cycle_s);
+        let crawled = match (failed, cost) {
             (Some((_, failure)), _) | (None, Err(failure)) => Err(failure),
-            (None, Ok(cost)) => crawl(bench, design.cycle_s, leg, &cost, start_share, &sums).map(|spent| (cost, spent)),
+            (None, Ok(cost)) => crawl(bench, cycle_s, leg, &cost, start_share, &sums).map(|spent| (cost, spent)),
         };
         let result = match crawled {
             Ok((cost, spent)) => {
@@ -182,10 +177,8 @@ pub fn trip(bench: &Workbench, design: &Design, route: &Route, start_share: f64)
             }
             Err(failure) => {
                 failed.get_or_insert((index, failure));
-                match (failure, costs[slope]) {
-                    (LegFailure::BatteryEmpty { .. }, Ok(cost)) => {
-                        needed.add(&on_bus(bench, design.cycle_s, leg, &cost))
-                    }
+                match (failure, cost) {
+                    (LegFailure::BatteryEmpty { .. }, Ok(cost)) => needed.add(&on_bus(bench, cycle_s, leg, &cost)),
                     _ => is_possible = false,
                 }
                 LegResult {
@@ -228,6 +221,28 @@ pub fn trip(bench: &Workbench, design: &Design, route: &Route, start_share: f64)
         range_m: arrives.then(|| Interval::new(range_m, range_sigma * range_m)),
         legs,
     }
+}
+
+/// What a steady cycle costs on each leg, or why the leg cannot be crawled. Each slope at each speed is computed once.
+pub(crate) fn leg_costs(
+    bench: &Workbench,
+    design: &Design,
+    route: &Route,
+    going: Going,
+) -> Vec<Result<SlopeCost, LegFailure>> {
+    let mut known: BTreeMap<(u64, u64), Result<SlopeCost, LegFailure>> = BTreeMap::new();
+    let cost_of = |leg: &Leg| {
+        let design = Design {
+            cycle_s: leg.cycle_s(design.cycle_s),
+            ..design.clone()
+        };
+        let key = (leg.slope_deg.to_bits(), design.cycle_s.to_bits());
+        *known.entry(key).or_insert_with(|| {
+            let mechanics = bench.mechanics_going(&design, leg.slope_deg, going)?;
+            bench.cost(&mechanics, design.cycle_s)
+        })
+    };
+    route.legs().iter().map(cost_of).collect()
 }
 
 /// What a leg takes from the bus.

@@ -1,9 +1,9 @@
 //! `wormd explain` for the campaign of a servo on a bench.
 
 use super::folder::Folder;
-use super::{ExplainArgs, title};
+use super::{ExplainArgs, print_answer, title};
 use crate::command::progress::Progress;
-use crate::command::{Failure, log_line, print};
+use crate::command::{Failure, log_line};
 use std::path::Path;
 use worm_analysis::bench::BenchCampaign;
 use worm_analysis::experiment::Progress as Step;
@@ -31,14 +31,8 @@ pub(super) fn run(args: &ExplainArgs, campaign: &Path) -> Result<(), Failure> {
         folder.write_servo_page(&answer, &title(&campaign.file))
     });
     drop(progress);
-    for warning in &answer.warnings {
-        log_line(format_args!("note: {warning}"));
-    }
-    if args.json {
-        print::line(serde_json::to_string(&answer).map_err(Failure::failed)?)?;
-    } else {
-        print::line(report::servo::text(&answer))?;
-    }
+    let text = || report::servo::text(&answer);
+    print_answer(args.json, &answer, &answer.warnings, text)?;
     written.transpose()?;
     if let Some(folder) = &folder {
         log_line(folder);

@@ -1,11 +1,15 @@
 //! The worm in its canal: cells, the points where their tips touch, and a ruler.
 
 use super::{View, cell_label, known_positions, tip_style};
+use crate::watch::ghost;
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::style::{Color, Modifier, Stylize};
+use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph};
+
+/// Colour of what is predicted.
+const GHOST: Color = Color::Magenta;
 
 /// Metres of canal that the picture shows beyond the worm, before and behind it.
 const MARGIN_M: f64 = 0.03;
@@ -20,13 +24,33 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
         " canal, {}° — mm, the worm crawls to the {direction} ",
         subject.slope_deg
     );
+    let title = match &view.ghost {
+        Some(ghost) => format!(" {} ", ghost::text(ghost)),
+        None => title,
+    };
+    let range = picture.range.as_ref().map(|range| {
+        let charge = 100.0 * range.charge_share;
+        format!(
+            " range {:.1} to {:.1} m, battery {charge:.0} % ",
+            range.range_low_m, range.range_high_m
+        )
+    });
     let block = Block::bordered()
         .title(title)
+        .title_bottom(Line::from(range.unwrap_or_default()).right_aligned())
         .title_bottom(format!(" {}, ? shows the keys ", view.leaving));
+    let block = match (&view.stale, &view.ghost) {
+        (_, Some(_)) => block.fg(GHOST),
+        (Some(_), None) => block.fg(Color::DarkGray),
+        (None, None) => block,
+    };
     let inner = block.inner(area);
     frame.render_widget(block, area);
     let Some(estimate) = picture.estimate else { return };
-    let positions = known_positions(&estimate);
+    // Of a worm of which nothing is heard, the ghost is shown where it is expected.
+    let moved_m = view.ghost.map_or(0.0, |ghost| ghost.moved_m.mean);
+    let mut positions = known_positions(&estimate);
+    positions.iter_mut().for_each(|cell| cell.1 += moved_m);
     let (Some(rear_m), Some(front_m)) = (
         positions.iter().map(|cell| cell.1).reduce(f64::min),
         positions.iter().map(|cell| cell.1).reduce(f64::max),
@@ -39,6 +63,14 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
     if columns < 20 || inner.height < 5 || !is_plausible {
         return;
     }
+    let places = view.ghost.map(|ghost| {
+        let of_ends = |end_m: f64| [ghost.moved_m.low, ghost.moved_m.high].map(|m| end_m - moved_m + m);
+        (of_ends(rear_m)[0], of_ends(front_m)[1])
+    });
+    let (rear_m, front_m, body_m) = match places {
+        Some((low_m, high_m)) => (rear_m.min(low_m), front_m.max(high_m), (rear_m, front_m)),
+        None => (rear_m, front_m, (rear_m, front_m)),
+    };
     // The window moves in whole steps of the ruler, so that the worm visibly crawls and the canal does not flicker.
     let label_mm = label_distance_mm(front_m - rear_m + 2.0 * MARGIN_M, columns);
     let step_m = label_mm as f64 * 1e-3 / 5.0;
@@ -48,13 +80,20 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
 
     let mut body = vec![Span::raw(" "); columns];
     let mut feet = vec![Span::raw(" "); columns];
-    let (tail, nose) = (column(rear_m), column(front_m));
+    let (tail, nose) = (column(body_m.0), column(body_m.1));
     for slot in &mut body[tail..=nose] {
-        *slot = Span::raw("═").fg(Color::DarkGray);
+        *slot = match view.ghost {
+            Some(_) => Span::raw("░").fg(GHOST),
+            None => Span::raw("═").fg(Color::DarkGray),
+        };
     }
     for &(cell, x_m) in &positions {
         let at = column(x_m);
-        let style = tip_style(&estimate, cell);
+        let style = match (&view.ghost, &view.stale) {
+            (Some(_), _) => Style::new().fg(GHOST).dim(),
+            (None, Some(_)) => Style::new().fg(Color::DarkGray),
+            (None, None) => tip_style(&estimate, cell),
+        };
         for (offset, text) in [(0, "▐"), (1, ""), (2, "▌")] {
             let Some(slot) = (at + offset).checked_sub(1).and_then(|index| body.get_mut(index)) else {
                 continue;
@@ -65,6 +104,9 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
                 Span::raw(text).style(style)
             };
         }
+        if view.ghost.is_some() {
+            continue;
+        }
         let contact_m = estimate.contact_m[cell];
         let foot = if contact_m.is_finite() { column(contact_m) } else { at };
         feet[foot] = Span::raw(match foot.cmp(&at) {
@@ -73,6 +115,15 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
             std::cmp::Ordering::Greater => "╲",
         })
         .style(style);
+    }
+    if let Some((low_m, high_m)) = places {
+        // From where its last cell may be to where its first may be.
+        let (low, high) = (column(low_m), column(high_m));
+        for slot in &mut feet[low..=high] {
+            *slot = Span::raw("┄").fg(GHOST);
+        }
+        feet[low] = Span::raw("├").fg(GHOST);
+        feet[high] = Span::raw("┤").fg(GHOST);
     }
     let ruler: String = (0..columns)
         .map(|index| {
@@ -92,7 +143,13 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
             Line::from(feet),
             Line::raw(ruler),
             Line::raw(labels),
-            legend(),
+            match view.ghost {
+                Some(_) => Line::raw(
+                    " predicted, not seen: the worm by model and trip; the dashes: where it may be, 9 times of 10",
+                )
+                .fg(GHOST),
+                None => legend(),
+            },
         ]),
         inner,
     );

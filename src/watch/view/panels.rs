@@ -1,8 +1,9 @@
 //! What can stand below the canal in the place of the overview: a cell, the energy, the alarms, the keys.
 
 use super::{TableCell, alarm_line, cell_number, fitting, number, table};
+use crate::remedy;
+use crate::watch::breakdown::Breakdown;
 use crate::watch::picture::Picture;
-use crate::watch::remedy;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -15,8 +16,6 @@ use worm_estimator::message::{AlarmKind, Cycle, Severity};
 const SPAN_S: f64 = 60.0;
 /// Least range of the position, mm: a worm at rest is a flat line, not enlarged noise.
 const MIN_RANGE_MM: f64 = 2.0;
-/// Acceleration of gravity, m/s².
-const GRAVITY_M_PER_S2: f64 = 9.81;
 
 /// Position and deformation of a cell over the last minute.
 pub(super) fn draw_cell(frame: &mut Frame<'_>, area: Rect, picture: &Picture, cell: usize) {
@@ -69,58 +68,28 @@ fn draw_chart(frame: &mut Frame<'_>, area: Rect, title: String, points: &[(f64, 
     frame.render_widget(chart, area);
 }
 
-/// Where the electrical energy of a cycle went, J.
-struct Breakdown {
-    electrical_j: f64,
-    copper_j: f64,
-    gears_j: f64,
-    sliding_j: f64,
-    weight_j: f64,
+/// The parts of a breakdown with their colours.
+fn parts(energy: &Breakdown) -> [(f64, Color); 4] {
+    [
+        (energy.copper_j, Color::Red),
+        (energy.gears_j, Color::Yellow),
+        (energy.sliding_j, Color::Green),
+        (energy.weight_j, Color::Blue),
+    ]
 }
 
-impl Breakdown {
-    /// Copper heat, friction inside, and what reaches the canal: there (11) has the sliding tips, and the weight that was lifted.
-    fn of(cycle: &Cycle, picture: &Picture) -> Self {
-        let subject = &picture.subject;
-        let forward = if subject.backward { -1.0 } else { 1.0 };
-        let rise_m = cycle.advance_m * f64::from(cycle.direction) * forward * subject.slope_deg.to_radians().sin();
-        let weight_j = subject.mass_kg * GRAVITY_M_PER_S2 * rise_m;
-        let is_known = cycle.energy_loss_sigma_j.is_finite();
-        Self {
-            electrical_j: cycle.energy_electrical_j,
-            copper_j: cycle.energy_copper_j,
-            gears_j: cycle.energy_friction_inside_j,
-            sliding_j: if is_known {
-                cycle.energy_loss_j - weight_j
-            } else {
-                f64::NAN
-            },
-            weight_j,
-        }
-    }
-
-    fn parts(&self) -> [(f64, Color); 4] {
-        [
-            (self.copper_j, Color::Red),
-            (self.gears_j, Color::Yellow),
-            (self.sliding_j, Color::Green),
-            (self.weight_j, Color::Blue),
-        ]
-    }
-
-    /// A bar of so many columns, the parts side by side.
-    fn bar(&self, columns: usize) -> Line<'static> {
-        let spans = self.parts().map(|(part_j, colour)| {
-            let fraction = (part_j / self.electrical_j).clamp(0.0, 1.0);
-            let width = if fraction.is_finite() {
-                (fraction * columns as f64).round() as usize
-            } else {
-                0
-            };
-            Span::from("█".repeat(width)).fg(colour)
-        });
-        Line::from(spans.to_vec())
-    }
+/// A bar of so many columns, the parts side by side.
+fn bar(energy: &Breakdown, columns: usize) -> Line<'static> {
+    let spans = parts(energy).map(|(part_j, colour)| {
+        let fraction = (part_j / energy.electrical_j).clamp(0.0, 1.0);
+        let width = if fraction.is_finite() {
+            (fraction * columns as f64).round() as usize
+        } else {
+            0
+        };
+        Span::from("█".repeat(width)).fg(colour)
+    });
+    Line::from(spans.to_vec())
 }
 
 /// Where the energy of the last cycles went.
@@ -145,17 +114,16 @@ pub(super) fn draw_energy(frame: &mut Frame<'_>, area: Rect, picture: &Picture) 
     let room = usize::from(list.height.saturating_sub(1));
     let newest = picture.cycles.iter().rev().take(room).rev();
     let row = |cycle: &Cycle| {
-        let energy = Breakdown::of(cycle, picture);
+        let energy = Breakdown::of(cycle, &picture.subject);
         let mut fields = vec![
             TableCell::from(format!("{:5}", cycle.index)),
             TableCell::from(number(energy.electrical_j * 1e3, 1)),
         ];
         fields.extend(
-            energy
-                .parts()
+            parts(&energy)
                 .map(|(part_j, colour)| TableCell::from(number(part_j * 1e3, 1)).style(Style::new().fg(colour))),
         );
-        fields.push(TableCell::from(energy.bar(bar_width)));
+        fields.push(TableCell::from(bar(&energy, bar_width)));
         fields.truncate(columns.len());
         Row::new(fields)
     };
@@ -203,7 +171,7 @@ pub(super) fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) 
 }
 
 /// The keys.
-const KEYS: [(&str, &str); 10] = [
+const KEYS: [(&str, &str); 12] = [
     ("c", "crawl, as long as this screen is here; asks once more"),
     ("h, space", "hold; anyone may"),
     ("s", "stop: torque goes off"),
@@ -212,6 +180,8 @@ const KEYS: [(&str, &str); 10] = [
         "reset: leave a fault, permit motion despite alarms; asks once more",
     ),
     ("t", "take over from whoever drives"),
+    ("p", "the trip waits; or, twice, goes on"),
+    ("b", "the trip goes home; asks once more"),
     ("1 … 9, n", "the last minute of a cell; the next cell"),
     ("e", "where the energy of each cycle went"),
     ("a", "alarms, and what to do; k acknowledges them"),

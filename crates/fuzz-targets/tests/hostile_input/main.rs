@@ -44,6 +44,8 @@ targets! {
     tracker_table: 50_000,
     config_toml: 4_000,
     campaign_toml: 20_000,
+    bench_toml: 20_000,
+    servo_csv: 6_000,
     recording_csv: 6_000,
     route_csv: 20_000,
     vicon_csv: 6_000,

@@ -65,6 +65,14 @@ impl Curves<'_> {
         })
     }
 
+    /// How often a clean worm is reported as outside the library, by the discrepancy put into it.
+    pub fn clean_outside_by_discrepancy(&self) -> Curve {
+        self.binned(&DISCREPANCY_M, |one| {
+            let outside = one.verdict == super::answer::Verdict::Outside;
+            (one.truth.kind == CampaignKind::Clean).then_some((one.truth.discrepancy_m, outside))
+        })
+    }
+
     /// How often an answer is right, by the probability that it states.
     pub fn calibration(&self) -> Curve {
         self.binned(&PROBABILITY, |one| one.stated)
@@ -106,6 +114,12 @@ impl fmt::Display for Curves<'_> {
             (
                 "clean: named, by discrepancy from",
                 self.clean_by_discrepancy(),
+                1e6,
+                "um",
+            ),
+            (
+                "clean: outside, by discrepancy from",
+                self.clean_outside_by_discrepancy(),
                 1e6,
                 "um",
             ),

@@ -20,7 +20,7 @@
 //!
 //! What is true of a campaign is a [`truth::Truth`], which every test bed writes as `truth.json`; the worm in MuJoCo
 //! (`crates/testkit/mujoco`) writes the same file. [`assessment`] compares an [`answer`] with it, [`table`] and [`curves`] sum up
-//! many. [`library`] calls the library's own search, [`folders`] any built `wormd` on campaigns in folders.
+//! many, [`curve_figure`] draws them. [`library`] calls the library's own search, [`folders`] any built `wormd` on campaigns in folders.
 
 pub mod answer;
 pub mod artefact;
@@ -29,6 +29,7 @@ pub mod body;
 pub mod cam_profile;
 pub mod campaign;
 pub mod crawling;
+pub mod curve_figure;
 pub mod curves;
 pub mod detectability;
 pub mod deviations;

@@ -116,7 +116,8 @@ impl ServoModel {
             ("viscous_n_m_s", servo.viscous_n_m_s, 10.0),
         ] {
             let may_be_zero = matches!(key, "dry_n_m" | "viscous_n_m_s");
-            if !(value <= max && (value > 1e-9 || may_be_zero && value >= 0.0)) {
+            let min = if may_be_zero { 0.0 } else { 1e-9 };
+            if !(min..=max).contains(&value) {
                 let from = if may_be_zero { "from 0" } else { "above 0, up" };
                 return Err(ReadError::whole(
                     path,
@@ -125,7 +126,7 @@ impl ServoModel {
                 ));
             }
         }
-        if !(servo.zero_rad.abs() <= 1.0) {
+        if !(-1.0..=1.0).contains(&servo.zero_rad) {
             return Err(ReadError::whole(
                 path,
                 format!("zero_rad = {}", servo.zero_rad),

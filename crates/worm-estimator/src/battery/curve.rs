@@ -1,9 +1,10 @@
 //! Voltage without load over the energy that is left.
 //!
-//! The curves of the chemistries are rested voltages of one cell at steps of a tenth of its *charge*, rounded means of what makers and users
-//! commonly publish, of no particular product; `full_v` and `empty_v` stretch them, so that they serve for any number of cells in series. They are
-//! good for some per cent of the charge where they are steep. On the plateau of lithium iron phosphate no voltage says how much is left.
-//! Whoever needs better measures the own battery and writes its table into the configuration.
+//! The curves of the chemistries are *typical*, without a citable source: rested voltages of one cell at steps of a tenth of its *charge*,
+//! rounded means of what makers and users commonly publish, of no particular product. `full_v` and `empty_v` stretch them, so that they
+//! serve for any number of cells in series. They are good for some per cent of the charge where they are steep. On the plateau of lithium
+//! iron phosphate no voltage says how much is left. Whoever needs better measures the own battery and writes its table into the
+//! configuration.
 
 use crate::config::{Battery, Chemistry};
 

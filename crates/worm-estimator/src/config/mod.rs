@@ -8,17 +8,20 @@
 mod advice;
 mod alarms;
 mod battery;
+mod black_box;
 mod check;
 mod drive;
 mod effect;
 mod machine;
 mod physics;
+mod trip;
 mod virtual_worm;
 mod worm;
 
 pub use advice::Advice;
 pub use alarms::{AlarmConfig, Alarms, Policy};
 pub use battery::{Battery, Chemistry, MAX_CURVE_POINTS};
+pub use black_box::BlackBox;
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use machine::{
@@ -26,6 +29,7 @@ pub use machine::{
     Realtime, Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;
+pub use trip::{OnLinkBack, OnLinkLoss, OnStuck, Trip};
 pub use virtual_worm::VirtualWorm;
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
 
@@ -64,6 +68,10 @@ pub struct Config {
     pub alarms: Alarms,
     /// The battery; absent: its charge is not estimated.
     pub battery: Option<Battery>,
+    /// What a trip does on its own.
+    pub trip: Trip,
+    /// The black box; absent: there is none, unless the command line asks for one.
+    pub black_box: Option<BlackBox>,
     /// What the loop requests from the operating system.
     pub realtime: Realtime,
     /// Where the shared-memory topics live.
@@ -154,6 +162,10 @@ impl Config {
         self.alarms.check(&mut checker);
         if let Some(battery) = &self.battery {
             battery.check(&mut checker);
+        }
+        self.trip.check(&mut checker);
+        if let Some(black_box) = &self.black_box {
+            black_box.check(&mut checker);
         }
         self.realtime.check(&mut checker);
         self.topics.check(&self.worm.name, &mut checker);

@@ -30,7 +30,7 @@ fn the_commented_out_keys_are_accepted() {
         config.port.as_ref().map(|port| port.path.as_str()),
         Some("/dev/ttyUSB0")
     );
-    assert!(config.battery.is_some() && config.realtime.cpu.is_some());
+    assert!(config.battery.is_some() && config.black_box.is_some() && config.realtime.cpu.is_some());
     assert!(config.virtual_worm.max_deformation_m.is_some());
     assert_eq!(config.effect.len(), 2);
 }
@@ -130,6 +130,14 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         (
             "[battery]\ngauge = \"BAT0\"\n",
             "worm.toml: battery.gauge = \"BAT0\": must be the absolute path",
+        ),
+        (
+            "[black_box]\nfolder = \"boxes\"\n",
+            "worm.toml: black_box.folder = \"boxes\": must be an absolute path",
+        ),
+        (
+            "[black_box]\nlongest_s = 70.0\n",
+            "worm.toml: black_box.longest_s = 70: must be at least before_s and after_s together, 80 s",
         ),
         (
             "[worm]\nname = \"../x\"\n",

@@ -3,7 +3,7 @@
 use super::alarm::{self, AlarmChanges, AlarmMonitor};
 use super::{Estimator, EstimatorError, RangeEstimator, ResidualMap};
 use crate::config::Config;
-use crate::message::{Cycle, Estimate, Range, RecordingStatus, State};
+use crate::message::{BlackBoxStatus, Cycle, Estimate, Range, RecordingStatus, State};
 
 /// What one state gave.
 #[derive(Debug, Clone)]
@@ -85,6 +85,11 @@ impl Observer {
     /// Takes what the worm's recorder reports, for the alarm `recording-stopped`.
     pub const fn note_recording(&mut self, status: &RecordingStatus) {
         self.monitor.note_recording(status);
+    }
+
+    /// Takes what the worm's black box reports, for the same alarm.
+    pub const fn note_black_box(&mut self, status: &BlackBoxStatus) {
+        self.monitor.note_black_box(status);
     }
 
     /// Takes the reading of the battery's gauge, 0 to 1, for the range. A range says which reading it used.

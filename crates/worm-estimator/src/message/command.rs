@@ -1,8 +1,10 @@
 //! The `command` service: requests to the controller, and its answers.
 
 use super::ZeroCopySend;
-use super::coded_enum;
+use super::json::Name;
 use super::short_text::ShortText;
+use super::state::{Fault, Mode};
+use super::{coded_enum, structure};
 
 coded_enum! {
     /// A kind of request to the controller.
@@ -48,26 +50,25 @@ coded_enum! {
     }
 }
 
-/// A request to the controller.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_command_v3")]
-#[repr(C)]
-pub struct Command {
-    /// Gait cycles per second for [`CommandKind::Crawl`], negative for backward; 0 means the configured gait.
-    pub cycles_per_s: f64,
-    /// For [`CommandKind::Crawl`] and [`CommandKind::Renew`], how long the worm may crawl before it holds, s. 0 leaves it to the controller:
-    /// as long as the lease of `wormd up` lasts, and where nobody holds one `control.crawl_limit_s`.
-    pub limit_s: f64,
-    /// [`CommandKind`] as a code.
-    pub kind: u32,
-    /// Bit k set: the command concerns the alarm with code k, for [`CommandKind::Acknowledge`].
-    pub alarm_mask: u32,
-    /// User ID of the sender, for the record.
-    pub user: u32,
-    /// Padding to a multiple of eight bytes; zero.
-    pub reserved: u32,
-    /// Who sends it, for the record: a program, or the person on whose behalf it sends.
-    pub sender: ShortText,
+structure! {
+    /// A request to the controller.
+    Command = "wormd_command_v3", {
+        /// Gait cycles per second for [`CommandKind::Crawl`], negative for backward; 0 means the configured gait.
+        cycles_per_s: f64,
+        /// For [`CommandKind::Crawl`] and [`CommandKind::Renew`], how long the worm may crawl before it holds, s. 0 leaves it to the controller:
+        /// as long as the lease of `wormd up` lasts, and where nobody holds one `control.crawl_limit_s`.
+        limit_s: f64,
+        /// [`CommandKind`] as a code.
+        kind: u32 as Name<CommandKind>,
+        /// Bit k set: the command concerns the alarm with code k, for [`CommandKind::Acknowledge`].
+        alarm_mask: u32,
+        /// User ID of the sender, for the record.
+        user: u32,
+        /// Padding to a multiple of eight bytes; zero.
+        reserved: u32,
+        /// Who sends it, for the record: a program, or the person on whose behalf it sends.
+        sender: ShortText,
+    }
 }
 
 impl Command {
@@ -85,19 +86,18 @@ impl Command {
     }
 }
 
-/// The controller's answer.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
-#[type_name("wormd_reply_v2")]
-#[repr(C)]
-pub struct Reply {
-    /// Tick in which the command was processed.
-    pub sequence: u64,
-    /// [`CommandOutcome`] as a code.
-    pub verdict: u32,
-    /// [`super::Mode`] after the command, as a code.
-    pub mode: u32,
-    /// [`super::Fault`] as a code.
-    pub fault: u32,
-    /// Bit k set: the alarm with code k stands in the way of the command.
-    pub alarm_mask: u32,
+structure! {
+    /// The controller's answer.
+    Reply = "wormd_reply_v2", {
+        /// Tick in which the command was processed.
+        sequence: u64,
+        /// [`CommandOutcome`] as a code.
+        verdict: u32 as Name<CommandOutcome>,
+        /// [`super::Mode`] after the command, as a code.
+        mode: u32 as Name<Mode>,
+        /// [`super::Fault`] as a code.
+        fault: u32 as Name<Fault>,
+        /// Bit k set: the alarm with code k stands in the way of the command.
+        alarm_mask: u32,
+    }
 }

@@ -24,15 +24,28 @@ pub enum FieldKind {
 pub struct Codes {
     /// The enumeration's name, as `HoldReason`.
     pub name: &'static str,
-    /// Each value's code and its name, as `lease-lapsed`.
-    pub values: &'static [(u32, &'static str)],
+    /// What it is about.
+    pub documentation: &'static str,
+    /// Its values, in the order of the codes.
+    pub values: &'static [CodeValue],
+}
+
+/// One value of an enumeration.
+#[derive(Debug)]
+pub struct CodeValue {
+    /// What crosses the topic.
+    pub code: u32,
+    /// Its name, as `lease-lapsed`.
+    pub name: &'static str,
+    /// Its meaning.
+    pub documentation: &'static str,
 }
 
 impl Codes {
     /// The name of a code; `None` where this version knows none.
     pub fn name_of(&self, code: u32) -> Option<&'static str> {
         let mut values = self.values.iter();
-        values.find(|(known, _)| *known == code).map(|&(_, name)| name)
+        values.find(|value| value.code == code).map(|value| value.name)
     }
 }
 
@@ -58,7 +71,7 @@ pub enum FieldValue<'m> {
 }
 
 /// Documentation without rustdoc markup, and without mention of codes, which are names in every form that people read.
-pub(super) fn prose(documentation: &str) -> String {
+pub fn prose(documentation: &str) -> String {
     ["[`", "`]", "`", "super::", "Self::", " as a code"]
         .iter()
         .fold(documentation.trim().to_owned(), |text, mark| text.replace(mark, ""))

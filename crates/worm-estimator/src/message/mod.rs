@@ -1,7 +1,8 @@
 //! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
 //! The controller fills [`State`], [`Timing`] and [`CommandRecord`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`],
-//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`]. Topics carry them all without a copy, and a log holds the
+//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`], the black box [`BlackBoxStatus`], and a trip [`TripStatus`].
+//! Topics carry them all without a copy, and a log holds the
 //! same values. The types are separate from the transport, so that nothing here depends on it.
 //!
 //! Layout rules, so that C and Python read the same bytes: only `f64`, `u64` and `u32` fields and arrays of them, and texts of 32 bytes
@@ -10,10 +11,11 @@
 //! paper is index 0. Times are nanoseconds of `CLOCK_MONOTONIC`.
 //!
 //! Each type of a topic is declared as one table. From it come the structure, its documentation, its JSON form with a schema
-//! ([`JsonMessage`]), its Protocol Buffers form with a descriptor ([`ProtobufMessage`]), and the columns of an exported table
-//! ([`FieldAccess`]).
+//! ([`JsonMessage`]), its Protocol Buffers form with a descriptor ([`ProtobufMessage`]), the columns of an exported table
+//! ([`FieldAccess`]), and its layout in memory ([`InMemory`]), from which the types of other languages are made.
 
 mod alarm;
+mod black_box;
 mod command;
 mod command_record;
 mod cycle;
@@ -27,14 +29,16 @@ mod recording;
 mod short_text;
 mod state;
 mod timing;
+mod trip;
 
 pub use alarm::{Alarm, AlarmKind, Severity};
+pub use black_box::BlackBoxStatus;
 pub use command::{Command, CommandKind, CommandOutcome, Reply};
 pub use command_record::CommandRecord;
 pub use cycle::Cycle;
 pub use estimate::Estimate;
-pub use field_kind::{Codes, FieldKind, FieldValue};
-pub use fields::{Field, FieldAccess};
+pub use field_kind::{CodeValue, Codes, FieldKind, FieldValue, prose};
+pub use fields::{Field, FieldAccess, InMemory, Layout};
 pub use json::JsonMessage;
 pub use protobuf::{ProtobufError, ProtobufMessage};
 pub use range::Range;
@@ -42,6 +46,7 @@ pub use recording::{RecordingProblem, RecordingState, RecordingStatus};
 pub use short_text::ShortText;
 pub use state::{Fault, HoldReason, Mode, State};
 pub use timing::{Culprit, Timing};
+pub use trip::{LinkLoss, TripPhase, TripReason, TripStatus};
 
 // The trait and its derive share a name, as in iceoryx2's own prelude. Taken from its parts, they do without shared memory.
 use iceoryx2_bb_derive_macros::ZeroCopySend;
@@ -54,11 +59,11 @@ pub struct UnknownCode(pub u32, pub &'static str);
 
 /// Declares an enumeration that crosses a topic as a `u32`, with a name for people and JSON.
 macro_rules! coded_enum {
-    ($(#[$meta:meta])* $name:ident, $what:literal { $($(#[$vmeta:meta])* $variant:ident = $code:literal => $text:literal,)+ }) => {
-        $(#[$meta])*
+    ($(#[doc = $doc:literal])+ $name:ident, $what:literal { $($(#[doc = $vdoc:literal])+ $variant:ident = $code:literal => $text:literal,)+ }) => {
+        $(#[doc = $doc])+
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[repr(u32)]
-        pub enum $name { $($(#[$vmeta])* $variant = $code,)+ }
+        pub enum $name { $($(#[doc = $vdoc])+ $variant = $code,)+ }
 
         impl $name {
             /// Every value, in the order of the codes.
@@ -90,7 +95,12 @@ macro_rules! coded_enum {
             const VALUES: &'static [Self] = Self::ALL;
             const CODES: &'static $crate::message::field_kind::Codes = &$crate::message::field_kind::Codes {
                 name: stringify!($name),
-                values: &[$(($code, $text)),+],
+                documentation: concat!($($doc),+),
+                values: &[$($crate::message::field_kind::CodeValue {
+                    code: $code,
+                    name: $text,
+                    documentation: concat!($($vdoc),+),
+                }),+],
             };
             fn name_of(self) -> &'static str { self.name() }
             fn code_of(self) -> u32 { self.code() }
@@ -103,14 +113,36 @@ macro_rules! coded_enum {
 }
 pub(crate) use coded_enum;
 
-/// Declares a message as one table: the structure that crosses the topic, its JSON form, and access to its fields one by one.
-///
-/// `made` names the field with the time, `cells` returns the number of cells in use. A field whose JSON form is not the usual one of its
-/// type names it after `as`.
-macro_rules! message {
+/// The fields of a structure, from the same rows as the structure itself.
+macro_rules! field_table {
+    ($name:ident, { $($(#[doc = $doc:literal])+ $field:ident: $type:ty $(as $form:ty)?,)+ }) => {{
+        use $crate::message::fields::Field;
+        use $crate::message::json::{Form, Plain};
+
+        macro_rules! form {
+            ($plain:ty) => { <$plain as Plain>::Form };
+            ($plain:ty, $other:ty) => { $other };
+        }
+
+        &[$(
+            Field {
+                name: stringify!($field),
+                documentation: concat!($($doc),+),
+                kind: <form!($type $(, $form)?) as Form<$type>>::KIND,
+                is_optional: <form!($type $(, $form)?) as Form<$type>>::IS_OPTIONAL,
+                offset: ::std::mem::offset_of!($name, $field),
+                size: ::std::mem::size_of::<$type>(),
+            },
+        )+]
+    }};
+}
+pub(crate) use field_table;
+
+/// Declares a structure that crosses a service as it lies in memory, and its layout.
+macro_rules! structure {
     (
         $(#[doc = $doc:literal])+
-        $name:ident = $type_name:tt, made: $made:ident, cells: $cells:expr, {
+        $name:ident = $type_name:tt, {
             $($(#[doc = $field_doc:literal])+ $field:ident: $type:ty $(as $form:ty)?,)+
         }
     ) => {
@@ -125,9 +157,39 @@ macro_rules! message {
             )+
         }
 
+        impl $crate::message::fields::InMemory for $name {
+            const LAYOUT: $crate::message::fields::Layout = $crate::message::fields::Layout {
+                name: stringify!($name),
+                type_name: $type_name,
+                documentation: concat!($($doc),+),
+                size: ::std::mem::size_of::<Self>(),
+                alignment: ::std::mem::align_of::<Self>(),
+                fields: $crate::message::field_table!($name, { $($(#[doc = $field_doc])+ $field: $type $(as $form)?,)+ }),
+            };
+        }
+    };
+}
+pub(crate) use structure;
+
+/// Declares a message as one table: the structure that crosses the topic, its JSON form, and access to its fields one by one.
+///
+/// `made` names the field with the time, `cells` returns the number of cells in use. A field whose JSON form is not the usual one of its
+/// type names it after `as`.
+macro_rules! message {
+    (
+        $(#[doc = $doc:literal])+
+        $name:ident = $type_name:tt, made: $made:ident, cells: $cells:expr, {
+            $($(#[doc = $field_doc:literal])+ $field:ident: $type:ty $(as $form:ty)?,)+
+        }
+    ) => {
+        $crate::message::structure! {
+            $(#[doc = $doc])+
+            $name = $type_name, { $($(#[doc = $field_doc])+ $field: $type $(as $form)?,)+ }
+        }
+
         const _: () = {
             use $crate::message::field_kind::{FieldValue, prose};
-            use $crate::message::fields::{Field, FieldAccess};
+            use $crate::message::fields::FieldAccess;
             use $crate::message::json::{self, Form, Plain};
 
             macro_rules! form {
@@ -188,7 +250,7 @@ macro_rules! message {
                         "title": $type_name,
                         "description": prose(concat!($($doc),+)),
                         "type": "object",
-                        "required": names,
+                        "required": names.as_slice(),
                         "properties": serde_json::Map::from_iter(fields.map(|(name, schema)| (name.to_owned(), schema))),
                     })
                 }
@@ -198,15 +260,6 @@ macro_rules! message {
             enum Place { $($field,)+ }
 
             impl FieldAccess for $name {
-                const FIELDS: &'static [Field] = &[$(
-                    Field {
-                        name: stringify!($field),
-                        documentation: concat!($($field_doc),+),
-                        kind: <form!($type $(, $form)?) as Form<$type>>::KIND,
-                        is_optional: <form!($type $(, $form)?) as Form<$type>>::IS_OPTIONAL,
-                    },
-                )+];
-                const DOCUMENTATION: &'static str = concat!($($doc),+);
                 const TIME_FIELD: usize = Place::$made as usize;
 
                 fn empty() -> Self {

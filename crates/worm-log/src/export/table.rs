@@ -16,7 +16,7 @@ use super::ExportError;
 use super::output::{Output, OutputError};
 use std::path::{Path, PathBuf};
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, FieldKind, FieldValue, Range, ShortText, State, Timing,
+    Alarm, CommandRecord, Cycle, Estimate, FieldKind, FieldValue, Range, ShortText, State, Timing, TripStatus,
 };
 
 /// Name of the column with the wall-clock time.
@@ -94,6 +94,7 @@ pub fn tables(
                 Channel::Alarm => table.add::<Alarm>(payload, clock),
                 Channel::Range => table.add::<Range>(payload, clock),
                 Channel::CommandRecord => table.add::<CommandRecord>(payload, clock),
+                Channel::TripStatus => table.add::<TripStatus>(payload, clock),
             }?;
         }
         Ok(())
@@ -124,6 +125,7 @@ fn cells(channel: Channel, payload: Payload<'_>) -> Result<usize, PayloadError> 
         Channel::Alarm => of::<Alarm>(payload),
         Channel::Range => of::<Range>(payload),
         Channel::CommandRecord => of::<CommandRecord>(payload),
+        Channel::TripStatus => of::<TripStatus>(payload),
     }
 }
 
@@ -264,6 +266,7 @@ impl OpenTable {
             Channel::Alarm => columns::<Alarm>(cells),
             Channel::Range => columns::<Range>(cells),
             Channel::CommandRecord => columns::<CommandRecord>(cells),
+            Channel::TripStatus => columns::<TripStatus>(cells),
         };
         let output = Output::create(&file, overwrite)?;
         let rows = match format {

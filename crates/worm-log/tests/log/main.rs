@@ -1,5 +1,6 @@
 //! Logs of a worm's topics: what is written is read back, whatever happens to the file, and replays to the same results.
 
+mod chunks;
 mod damage;
 mod export;
 mod replay;

@@ -48,7 +48,7 @@ pub use changes::AlarmChanges;
 
 use crate::config::Config;
 use crate::estimate::ResidualMap;
-use crate::message::{AlarmKind, Cycle, Estimate, RecordingStatus, State};
+use crate::message::{AlarmKind, BlackBoxStatus, Cycle, Estimate, RecordingStatus, State};
 use cam_motion::{CamMotion, Tick};
 use latch::{Delays, DetectorOutput, Latch};
 use sample::VisibleCells;
@@ -141,6 +141,11 @@ impl AlarmMonitor {
     /// Takes what the recorder reports. It counts from the next tick on.
     pub const fn note_recording(&mut self, status: &RecordingStatus) {
         self.recording.note(status);
+    }
+
+    /// Takes what the black box reports, for the same alarm.
+    pub const fn note_black_box(&mut self, status: &BlackBoxStatus) {
+        self.recording.note_black_box(status);
     }
 
     /// Processes one tick and returns the alarms that it raised or cleared.

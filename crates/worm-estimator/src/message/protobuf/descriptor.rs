@@ -4,7 +4,7 @@
 
 use super::wire::{self, Wire};
 use super::wire_of;
-use crate::message::field_kind::{Codes, FieldKind, prose};
+use crate::message::field_kind::{CodeValue, Codes, FieldKind, prose};
 use crate::message::fields::{Field, FieldAccess};
 
 /// A message of `descriptor.proto` while it is built.
@@ -117,7 +117,7 @@ fn enumeration(codes: &Codes) -> Builder {
     // EnumDescriptorProto
     let mut enumeration = Builder::default();
     enumeration.text(1, codes.name);
-    for &(code, name) in codes.values {
+    for &CodeValue { code, name, .. } in codes.values {
         // EnumValueDescriptorProto
         let mut value = Builder::default();
         value.text(1, &value_name(codes.name, name));

@@ -1,0 +1,259 @@
+"""``wormd analyze``: what a worm did and what it cost, by section 3 of the paper."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ._program import ProgressCallback, StrPath, call_json
+from ._result import Result
+
+
+@dataclass(frozen=True)
+class CycleFigures(Result):
+    """The figures of a gait cycle, or their means or standard deviations."""
+
+    advance_m: float
+    """Net displacement, m: mean over the cells."""
+    forward_slide_m: tuple[float, ...]
+    """Distance that each tip slid forward, m."""
+    backward_slide_m: tuple[float, ...]
+    """Distance that each tip slid backward, m, counted positive."""
+    energy_loss_j: float
+    """Energy by losses and weight, equation (11), J."""
+    energy_actuator_net_j: float
+    """Net actuator work, equation (13), J."""
+    energy_actuator_positive_j: float
+    """Positive part of the actuator work, J."""
+
+
+@dataclass(frozen=True)
+class AnalyzedCycle(CycleFigures):
+    """One whole gait cycle."""
+
+    index: int
+    """Number of the cycle in the recording, from 0."""
+    start_s: float
+    """When it began, s of the recording's time."""
+    duration_s: float
+    """How long it took, s."""
+    settled: bool
+    """Whether every tip's contact point was known from its start; only such cycles enter mean and standard deviation."""
+
+
+@dataclass(frozen=True)
+class TheoryCycle(CycleFigures):
+    """A steady cycle in theory."""
+
+    max_deformation_m: tuple[float, ...]
+    """Largest tip deformations that it is based on, m."""
+    rigid_energy_j: float
+    """Energy that the same worm on rigid contacts would take over the same advance, J."""
+
+
+@dataclass(frozen=True)
+class Theory(Result):
+    """What theory predicts for a steady cycle."""
+
+    identified: TheoryCycle | None
+    """The worm with the deformations and stroke found here; None where it slides down."""
+    nominal: TheoryCycle | None
+    """The configured worm; None where it slides down."""
+
+
+@dataclass(frozen=True)
+class Repair(Result):
+    """One repair of a recording, or one observation of what cannot be repaired (docs/experiment.md)."""
+
+    what: str
+    """What was seen, as ``swapped-label``."""
+    run: int
+    """The run, from 1."""
+    cell: int | None
+    """The cell, from 1; None for all."""
+    from_s: float
+    """First time concerned, s."""
+    to_s: float
+    """Last time concerned, s."""
+    samples: int
+    """Samples that were left out, relabelled, shifted or missing."""
+    shift_m: float | None
+    """The shift that was estimated, m."""
+    shift_sigma_m: float | None
+    """Its standard error, m."""
+    rate: float | None
+    """Speed of a drift: m/s of a camera, s/s of a clock."""
+
+
+@dataclass(frozen=True)
+class FirstEstimate(Result):
+    """Largest tip deformations by inspection, section 3.2.1 of the paper."""
+
+    max_deformation_m: tuple[float, ...]
+    """m."""
+
+
+@dataclass(frozen=True)
+class PaperSearch(Result):
+    """The exhaustive search of section 3.2.3 of the paper."""
+
+    max_deformation_m: tuple[float, ...]
+    """The best candidate, m."""
+    candidates: int
+    """How many were tried."""
+    mean_force_n: float
+    """Violation of the momentum balance (7) by the best: time mean of the total force, N."""
+    force_std_n: float
+    """Standard deviation of its total contact force, N."""
+
+
+@dataclass(frozen=True)
+class Analysis(Result):
+    """The result for one recording. Tuples over cells begin with cell 1."""
+
+    recording: str
+    """The recording, as it was named."""
+    slope_deg: float
+    """Slope of the canal, degrees."""
+    cells: int
+    """Number of cells."""
+    samples: int
+    """Number of samples."""
+    duration_s: float
+    """Time from the first to the last sample, s."""
+    cycle_s: float
+    """Mean time of a gait cycle, s."""
+    step_order: tuple[int, ...]
+    """The cells in the order in which they step, counted from 1."""
+    phase_source: str
+    """Where the gait phase comes from: ``recorded`` or ``positions``."""
+    stroke_m: float
+    """Stroke seen in the positions, m."""
+    noise_m: float
+    """Standard deviation of one measured position, m."""
+    first_estimate: FirstEstimate
+    """Largest tip deformations by inspection."""
+    paper_search: PaperSearch | None
+    """The exhaustive search around them; None for more cells than it can try."""
+    max_deformation_m: tuple[float, ...]
+    """Largest tip deformations by the continuous estimator, m."""
+    max_deformation_sigma_m: tuple[float, ...]
+    """Their standard errors, m."""
+    laid_down: bool
+    """Whether the tips were laid down unloaded at the start."""
+    mean_deformation_m: float
+    """Time mean of the sum of the deformations over whole cycles (8), m."""
+    mass_estimate_kg: float | None
+    """Mass by (9), kg; None on the level."""
+    mass_sigma_kg: float | None
+    """Its standard error, kg."""
+    momentum_violation_n: float
+    """Time mean of the total force (5) with the configured mass, N: 0 where momentum is balanced."""
+    damping_ratio: float
+    """Damping ratio of the body on its contacts."""
+    misfit_ratio: float
+    """Variance that theory leaves, over what noise and drift explain: 1 where theory holds."""
+    cycles: tuple[AnalyzedCycle, ...]
+    """Every whole gait cycle."""
+    mean: CycleFigures
+    """Mean over the settled cycles."""
+    std: CycleFigures
+    """Standard deviation over the settled cycles."""
+    theory: Theory
+    """What theory predicts."""
+    rigid_energy_j: float
+    """Energy that rigid contacts would take over the measured mean advance, J."""
+    warnings: tuple[str, ...]
+    """Limitations of these figures."""
+    repairs: tuple[Repair, ...]
+    """What was repaired in the recording."""
+    report: Path | None = None
+    """The page with figures, where a folder was given for it."""
+
+
+@dataclass(frozen=True)
+class CampaignAnalysis(Result):
+    """The result for several recordings of one worm."""
+
+    max_deformation_m: tuple[float, ...]
+    """Largest tip deformations by all recordings together, m."""
+    max_deformation_sigma_m: tuple[float, ...]
+    """Their standard errors, m."""
+    runs: tuple[Analysis, ...]
+    """Each recording."""
+    report: Path | None = None
+    """The page with figures, where a folder was given for it."""
+
+
+def analyze(
+    recording: StrPath,
+    *,
+    slope_deg: float,
+    out: StrPath | None = None,
+    config: StrPath | None = None,
+    payload_kg: float | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    max_gap_s: float | None = None,
+    axis: str | None = None,
+    progress: ProgressCallback | bool | None = None,
+    wormd: StrPath | None = None,
+) -> Analysis:
+    """Analyse one recording, of any format that ``wormd analyze`` reads: MCAP, CSV, C3D, Vicon CSV.
+
+    Args:
+        recording: the file.
+        slope_deg: slope of the canal, degrees, positive uphill.
+        out: a folder for the page with figures and a CSV of every series.
+        config: the worm; without it the one stored in the recording, or the worm of the paper.
+        payload_kg: known extra mass.
+        from_s: leave out what lies before.
+        to_s: leave out what lies after.
+        max_gap_s: longest time for which a cell may be out of sight.
+        axis: direction up the canal in the space of the markers.
+        progress: is told stage and fraction. Without it progress is shown on standard error; False shows nothing.
+        wormd: the program.
+
+    Raises:
+        ProgramFailed: with the program's message.
+    """
+    arguments: list[StrPath] = ["analyze", recording, "--json", f"--slope={slope_deg}"]
+    arguments += options(
+        out=out,
+        config=config,
+        payload=payload_kg,
+        **{"from": from_s, "to": to_s, "max-gap": max_gap_s, "axis": axis},
+    )
+    return Analysis.of(call_json(wormd, arguments, progress), report=page(out))
+
+
+def analyze_campaign(
+    campaign: StrPath,
+    *,
+    out: StrPath | None = None,
+    progress: ProgressCallback | bool | None = None,
+    wormd: StrPath | None = None,
+) -> CampaignAnalysis:
+    """Analyse several recordings of one worm together, listed in a campaign (docs/experiment.md).
+
+    Raises:
+        ProgramFailed: with the program's message.
+    """
+    arguments: list[StrPath] = ["analyze", campaign, "--json", *options(out=out)]
+    return CampaignAnalysis.of(call_json(wormd, arguments, progress), report=page(out))
+
+
+def options(**given: Any) -> list[str]:
+    """Arguments of the options that are not None."""
+    return [
+        f"--{name}={os.fspath(value) if isinstance(value, os.PathLike) else value}"
+        for name, value in given.items()
+        if value is not None
+    ]
+
+
+def page(out: StrPath | None) -> Path | None:
+    """Return the report in a folder."""
+    return None if out is None else Path(out) / "report.html"

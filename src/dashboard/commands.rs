@@ -1,0 +1,155 @@
+//! Commands of pages. Anyone may make the worm hold, with no more than a request; all else needs the token, and most of it the wheel.
+
+use super::access::bearer;
+use super::caller::Caller;
+use super::routes::{App, Peer, refused, to_json};
+use crate::relay::wire::{Answer, Request};
+use axum::body::Bytes;
+use axum::extract::{Extension, Path, State};
+use axum::http::header::{AUTHORIZATION, USER_AGENT, WWW_AUTHENTICATE};
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// Tells the pages of one browser apart.
+const CLIENT: &str = "x-wormd-client";
+/// The name of who uses the page, percent-encoded.
+const NAME: &str = "x-wormd-name";
+
+/// The commands that there are.
+const COMMANDS: &str = "hold, crawl, stop, reset, arm, drive, take_over, acknowledge";
+
+/// What may be in the body of a command.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Details {
+    /// For `crawl`: gait cycles per second, negative for backward.
+    cycles_per_s: Option<f64>,
+    /// For `acknowledge`: which alarms; without it all.
+    #[serde(default)]
+    alarms: Vec<String>,
+}
+
+/// `POST /api/command/{command}`.
+pub(super) async fn command(
+    State(app): State<Arc<App>>,
+    Extension(peer): Extension<Peer>,
+    Path(command): Path<String>,
+    headers: HeaderMap,
+    body: Bytes,
+) -> Response {
+    let caller = caller(peer, &headers);
+    // Whatever else is in the request: nothing keeps anybody from this.
+    if command == "hold" {
+        return answered(app.relay.anyone(caller, Request::Hold).await);
+    }
+    if let Some(refusal) = unauthorised(&app, &headers) {
+        return refusal;
+    }
+    let details = if body.is_empty() {
+        Details::default()
+    } else {
+        match serde_json::from_slice(&body) {
+            Ok(details) => details,
+            Err(error) => {
+                let why = format!("the body is no JSON object with cycles_per_s or alarms: {error}");
+                return refused(StatusCode::BAD_REQUEST, &why);
+            }
+        }
+    };
+    let Some(request) = request(&command, details) else {
+        return refused(
+            StatusCode::NOT_FOUND,
+            &format!("there is no such command: there are {COMMANDS}"),
+        );
+    };
+    let answer = match request {
+        Request::Acknowledge { .. } => app.relay.anyone(caller, request).await,
+        _ => app.relay.drive(caller, request).await,
+    };
+    answered(answer)
+}
+
+/// `POST /api/alive`: the page that drives is there.
+pub(super) async fn alive(
+    State(app): State<Arc<App>>,
+    Extension(peer): Extension<Peer>,
+    headers: HeaderMap,
+) -> Response {
+    if let Some(refusal) = unauthorised(&app, &headers) {
+        return refusal;
+    }
+    match app.relay.alive(caller(peer, &headers).key).await {
+        true => StatusCode::NO_CONTENT.into_response(),
+        false => refused(StatusCode::CONFLICT, "this page does not drive: give a command first"),
+    }
+}
+
+/// `GET /api/login`: whether the token is right. Changes nothing.
+pub(super) async fn login(State(app): State<Arc<App>>, headers: HeaderMap) -> Response {
+    match unauthorised(&app, &headers) {
+        Some(refusal) => refusal,
+        None => StatusCode::NO_CONTENT.into_response(),
+    }
+}
+
+fn request(command: &str, details: Details) -> Option<Request> {
+    Some(match command {
+        "crawl" => Request::Crawl {
+            cycles_per_s: details.cycles_per_s,
+        },
+        "stop" => Request::Stop,
+        "reset" => Request::Reset,
+        "arm" => Request::Arm,
+        "drive" => Request::Drive,
+        "take_over" | "take-over" => Request::TakeOver,
+        "acknowledge" => Request::Acknowledge { alarms: details.alarms },
+        _ => return None,
+    })
+}
+
+fn unauthorised(app: &App, headers: &HeaderMap) -> Option<Response> {
+    let token = headers
+        .get(AUTHORIZATION)
+        .and_then(|header| header.to_str().ok())
+        .and_then(bearer);
+    if token.is_some_and(|token| app.token.is(token)) {
+        return None;
+    }
+    let why = match token {
+        Some(_) => "the token is wrong: it is the one with which the dashboard was started",
+        None => "this needs the token, as Authorization: Bearer TOKEN (hold needs none)",
+    };
+    let mut refusal = refused(StatusCode::UNAUTHORIZED, why);
+    refusal
+        .headers_mut()
+        .insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+    Some(refusal)
+}
+
+fn caller(Peer(address): Peer, headers: &HeaderMap) -> Caller {
+    let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok());
+    Caller::new(address, text(CLIENT), text(NAME), text(USER_AGENT.as_str()))
+}
+
+/// The relay's answer, with the status that fits.
+fn answered(answer: Result<Answer, String>) -> Response {
+    let answer = match answer {
+        Ok(answer) => answer,
+        Err(problem) => return refused(StatusCode::SERVICE_UNAVAILABLE, &problem),
+    };
+    to_json(status_of(&answer), &answer)
+}
+
+fn status_of(answer: &Answer) -> StatusCode {
+    match answer.verdict.as_str() {
+        _ if answer.refusal.is_none() => StatusCode::OK,
+        "not-driver" => StatusCode::CONFLICT,
+        "unusable" => StatusCode::BAD_REQUEST,
+        "busy" => StatusCode::SERVICE_UNAVAILABLE,
+        "no-answer" => StatusCode::GATEWAY_TIMEOUT,
+        // The controller's own: the worm stands in the way of it, and not another driver.
+        _ => StatusCode::UNPROCESSABLE_ENTITY,
+    }
+}

@@ -1,0 +1,312 @@
+//! The thread between the relay and the pages: takes the relay's lines into the [`Feed`], and passes the pages' commands on.
+//!
+//! What anyone may do goes over the connection by which the worm is watched, under the name of who asks. What only the driver may do goes
+//! over a connection of that page alone ([`Seat`]).
+
+use super::caller::Caller;
+use super::feed::Feed;
+use super::seat::Seat;
+use crate::failure::Failure;
+use crate::realtime::monotonic_ns;
+use crate::relay::client::{Received, RelayLink};
+use crate::relay::wire::{Answer, Line, Request, VERSION};
+use crate::topics::Instance;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tokio::sync::{oneshot, watch};
+
+/// How long the thread waits at most: the connection is tried again that often.
+const POLL_MS: u16 = 100;
+/// Most pages that may want to drive at a time.
+const MAX_SEATS: usize = 16;
+/// How long a hold waits for a relay that is just starting.
+const HOLD_PATIENCE: Duration = Duration::from_secs(3);
+
+/// Takes the relay's answer, or why there is none.
+pub(super) type Reply = oneshot::Sender<Result<Answer, String>>;
+
+/// What pages want.
+enum Order {
+    /// What only the driver may do.
+    Drive(Caller, Request, Reply),
+    /// What anyone may do.
+    Anyone(Caller, Request, Reply),
+    /// The page with this key is there. True when it has a seat.
+    Alive(String, oneshot::Sender<bool>),
+    End,
+}
+
+/// What the worm is known by, shared with the pages.
+#[derive(Clone)]
+pub(super) struct Shared {
+    feed: Arc<Mutex<Feed>>,
+    /// Changes when there is something new.
+    changed: watch::Sender<()>,
+}
+
+impl Shared {
+    /// Around a feed.
+    pub(super) fn new(feed: Feed) -> Self {
+        Self {
+            feed: Arc::new(Mutex::new(feed)),
+            changed: watch::Sender::new(()),
+        }
+    }
+
+    /// The feed, for a moment.
+    pub(super) fn feed(&self) -> MutexGuard<'_, Feed> {
+        // Whoever panicked left it as consistent as a frame is.
+        self.feed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Is told when there is something new.
+    pub(super) fn subscribe(&self) -> watch::Receiver<()> {
+        self.changed.subscribe()
+    }
+}
+
+/// The way to the thread. Dropping it ends the thread, and with it the crawls of its pages.
+pub(super) struct RelayThread {
+    orders: Sender<Order>,
+    wake: UnixStream,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl RelayThread {
+    /// Starts the thread.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when there is no thread to be had.
+    pub(super) fn start(instance: &Instance, link: RelayLink, shared: Shared) -> Result<Self, Failure> {
+        let (orders, queue) = channel();
+        let (woken, wake) = UnixStream::pair().map_err(Failure::failed)?;
+        for end in [&woken, &wake] {
+            end.set_nonblocking(true).map_err(Failure::failed)?;
+        }
+        let mut exchange = Exchange {
+            instance: instance.clone(),
+            link,
+            shared,
+            orders: queue,
+            woken,
+            seats: BTreeMap::new(),
+            pending: BTreeMap::new(),
+            waiting: Vec::new(),
+            last_id: 0,
+        };
+        let thread = std::thread::Builder::new()
+            .name("relay".to_owned())
+            .spawn(move || while exchange.turn() {})
+            .map_err(|error| Failure::failed(format!("no thread can be started: {error}")))?;
+        Ok(Self {
+            orders,
+            wake,
+            thread: Some(thread),
+        })
+    }
+
+    /// Asks for what only the driver may do.
+    pub(super) async fn drive(&self, caller: Caller, request: Request) -> Result<Answer, String> {
+        self.ask(|reply| Order::Drive(caller, request, reply)).await
+    }
+
+    /// Asks for what anyone may do.
+    pub(super) async fn anyone(&self, caller: Caller, request: Request) -> Result<Answer, String> {
+        self.ask(|reply| Order::Anyone(caller, request, reply)).await
+    }
+
+    /// Says that a page is there; false where it does not drive.
+    pub(super) async fn alive(&self, key: String) -> bool {
+        let (reply, answer) = oneshot::channel();
+        self.order(Order::Alive(key, reply));
+        answer.await.unwrap_or(false)
+    }
+
+    async fn ask(&self, order: impl FnOnce(Reply) -> Order) -> Result<Answer, String> {
+        let (reply, answer) = oneshot::channel();
+        self.order(order(reply));
+        let ended = |_| Err("the dashboard is ending".to_owned());
+        answer.await.unwrap_or_else(ended)
+    }
+
+    fn order(&self, order: Order) {
+        // Where the thread has ended, so has what waits for the reply.
+        let _ = self.orders.send(order);
+        // One that is full wakes as well.
+        let _ = (&self.wake).write(&[0]);
+    }
+}
+
+impl Drop for RelayThread {
+    fn drop(&mut self) {
+        self.order(Order::End);
+        if let Some(thread) = self.thread.take() {
+            // It has nothing to say about how it ended.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What the thread has.
+struct Exchange {
+    instance: Instance,
+    link: RelayLink,
+    shared: Shared,
+    orders: Receiver<Order>,
+    woken: UnixStream,
+    seats: BTreeMap<String, Seat>,
+    /// Requests over the link that are not answered yet.
+    pending: BTreeMap<u64, Reply>,
+    /// Holds that wait for a connection, since when.
+    waiting: Vec<(Instant, Caller, Reply)>,
+    last_id: u64,
+}
+
+impl Exchange {
+    /// One turn: waits, reads, passes on. False at the end.
+    fn turn(&mut self) -> bool {
+        self.wait();
+        self.take_lines();
+        let orders: Vec<_> = self.orders.try_iter().collect();
+        for order in orders {
+            match order {
+                Order::Drive(caller, request, reply) => self.drive(&caller, request, reply),
+                Order::Anyone(caller, request, reply) => self.anyone(caller, request, reply),
+                Order::Alive(key, reply) => {
+                    let seat = self.seats.get_mut(&key);
+                    let _ = reply.send(seat.map(Seat::alive).is_some());
+                }
+                Order::End => return false,
+            }
+        }
+        self.send_waiting();
+        self.seats.retain(|_, seat| seat.exchange());
+        self.pending.retain(|_, reply| !reply.is_closed());
+        true
+    }
+
+    fn wait(&mut self) {
+        let streams = std::iter::once(&self.woken)
+            .chain(self.link.stream())
+            .chain(self.seats.values().map(Seat::stream));
+        let mut waiting: Vec<_> = streams
+            .map(|stream| PollFd::new(stream.as_fd(), PollFlags::POLLIN))
+            .collect();
+        if let Err(errno) = poll(&mut waiting, PollTimeout::from(POLL_MS)) {
+            tracing::debug!("the relay cannot be waited for: {errno}");
+        }
+        // Nothing to read is no error.
+        let _ = self.woken.read(&mut [0; 256]);
+    }
+
+    fn take_lines(&mut self) {
+        let received = self.link.poll();
+        let now_ns = monotonic_ns();
+        let mut feed = self.shared.feed();
+        let mut is_new = false;
+        for received in received {
+            match received {
+                Received::Line(Line::Hello(hello)) => {
+                    feed.take_hello(*hello);
+                    is_new = true;
+                }
+                Received::Line(Line::Frame(frame)) => {
+                    feed.take_frame(*frame, now_ns);
+                    is_new = true;
+                }
+                Received::Line(Line::Answer(answer)) => {
+                    if let Some(reply) = answer.id.and_then(|id| self.pending.remove(&id)) {
+                        // Who asked may have gone.
+                        let _ = reply.send(Ok(answer));
+                    }
+                }
+                Received::Line(Line::Lost { frames }) => tracing::debug!("{frames} frames of the relay were lost"),
+                Received::Line(Line::Refused { reason }) | Received::Lost(reason) => {
+                    tracing::info!("{reason}");
+                    for reply in std::mem::take(&mut self.pending).into_values() {
+                        let _ = reply.send(Err(reason.clone()));
+                    }
+                    is_new |= feed.lose(&reason, now_ns);
+                }
+                Received::Log(line) => tracing::info!("{line}"),
+            }
+        }
+        if let Some(problem) = self.link.problem() {
+            is_new |= feed.lose(problem, now_ns);
+        }
+        is_new |= feed.is_silent(now_ns);
+        drop(feed);
+        if is_new {
+            self.shared.changed.send_replace(());
+        }
+    }
+
+    fn drive(&mut self, caller: &Caller, request: Request, reply: Reply) {
+        let refuse = |reply: Reply, why: String| drop(reply.send(Err(why)));
+        if !self.seats.contains_key(&caller.key) {
+            if self.link.stream().is_none() {
+                return refuse(reply, self.problem());
+            }
+            if self.seats.len() >= MAX_SEATS {
+                return refuse(reply, format!("{MAX_SEATS} pages want to drive already: close some"));
+            }
+            match Seat::open(&self.instance, &caller.name) {
+                Ok(seat) => drop(self.seats.insert(caller.key.clone(), seat)),
+                Err(error) => return refuse(reply, format!("the relay takes no connection ({error})")),
+            }
+        }
+        self.last_id += 1;
+        if let Some(seat) = self.seats.get_mut(&caller.key) {
+            seat.ask(self.last_id, &caller.name, request, reply);
+        }
+    }
+
+    fn anyone(&mut self, caller: Caller, request: Request, reply: Reply) {
+        if self.link.stream().is_none() {
+            match request {
+                Request::Hold => self.waiting.push((Instant::now(), caller, reply)),
+                _ => drop(reply.send(Err(self.problem()))),
+            }
+            return;
+        }
+        self.last_id += 1;
+        let hello = Request::Hello {
+            version: VERSION,
+            name: caller.name,
+        };
+        // The name first: the relay records the request under it.
+        let is_sent = self.link.send(0, hello) && self.link.send(self.last_id, request);
+        match is_sent {
+            true => drop(self.pending.insert(self.last_id, reply)),
+            false => drop(reply.send(Err("the relay does not read: try again".to_owned()))),
+        }
+        // At once, and not at the next turn.
+        self.take_lines();
+    }
+
+    /// Sends the holds that waited for a connection, and gives up those that have waited for too long.
+    fn send_waiting(&mut self) {
+        let is_connected = self.link.stream().is_some();
+        for (since, caller, reply) in std::mem::take(&mut self.waiting) {
+            if is_connected {
+                self.anyone(caller, Request::Hold, reply);
+            } else if since.elapsed() > HOLD_PATIENCE {
+                let _ = reply.send(Err(self.problem()));
+            } else {
+                self.waiting.push((since, caller, reply));
+            }
+        }
+    }
+
+    fn problem(&self) -> String {
+        let problem = self.link.problem().unwrap_or("there is no connection to the relay");
+        problem.to_owned()
+    }
+}

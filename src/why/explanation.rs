@@ -1,0 +1,434 @@
+//! Why the worm stopped: one answer from all that the log holds. The JSON names are a contract.
+
+use super::stops::{Cause, Stop, standing, stops};
+use super::timeline::{Moment, MomentKind, command_in_words, figure, moments};
+use crate::remedy;
+use serde::Serialize;
+use worm_estimator::config::{Config, Policy};
+use worm_estimator::message::{Alarm, AlarmKind, CommandKind, Mode, Severity};
+use worm_estimator::time::seconds;
+use worm_log::Log;
+
+/// How much of a log is told of before the stop, and after it, ns.
+const BEFORE_NS: u64 = 60_000_000_000;
+const AFTER_NS: u64 = 20_000_000_000;
+/// An event and the box that was made of it may differ by this, ns.
+const NEAR_NS: u64 = 1_000_000_000;
+
+/// What a box was made of: its first event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Trigger {
+    /// When, ns of `CLOCK_MONOTONIC`.
+    pub time_ns: u64,
+    /// What, as `fault link-lost`.
+    pub event: String,
+}
+
+/// Why a worm stopped, or what else its log is about.
+#[derive(Debug, Clone, Serialize)]
+pub struct Explanation {
+    /// Name of the worm.
+    pub worm: String,
+    /// The log.
+    pub log: String,
+    /// Whether the worm stopped.
+    pub stopped: bool,
+    /// When, ns of `CLOCK_MONOTONIC`. All times in s count from it; where the worm did not stop, from the reason.
+    pub time_ns: u64,
+    /// The same by the wall clock, ns since 1970, as far as the log says.
+    pub unix_ns: Option<u64>,
+    /// Mode before and after; null after it where the controller was gone.
+    pub from: Option<&'static str>,
+    /// See `from`.
+    pub to: Option<&'static str>,
+    /// The first reason.
+    pub reason: Reason,
+    /// Alarms that stood already, the oldest first: early signs of the same trouble, or of another.
+    pub signs: Vec<Sign>,
+    /// What happened before and after, in the order of time.
+    pub events: Vec<Event>,
+    /// What to do.
+    pub remedy: String,
+    /// Which of how many stops of the log this is, from 1; 0 of 0 where there is none.
+    pub stop: usize,
+    /// See `stop`.
+    pub stops: usize,
+    /// What `wormd explain` makes of the gait cycles before it.
+    pub last_cycles: LastCycles,
+    /// What is missing in the log, and other remarks.
+    pub warnings: Vec<String>,
+}
+
+/// The first reason.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reason {
+    /// `alarm`, `fault`, `command`, `lease-lapsed`, `time-limit`, `controller-gone`, `unknown` or `none`.
+    pub kind: &'static str,
+    /// Its name: of the alarm, the fault or the command.
+    pub name: String,
+    /// When, s from the stop.
+    pub time_s: f64,
+    /// When its condition began, s from the stop, as far as known.
+    pub since_s: Option<f64>,
+    /// The cell concerned, from 1.
+    pub cell: Option<u32>,
+    /// The watched quantity, of an alarm.
+    pub value: Option<f64>,
+    /// Its threshold.
+    pub threshold: Option<f64>,
+    /// Who sent it, of a command.
+    pub sender: Option<String>,
+    /// The sender's user id.
+    pub user: Option<u32>,
+    /// In a sentence.
+    pub sentence: String,
+}
+
+/// An alarm that stood already.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sign {
+    /// The alarm.
+    pub alarm: &'static str,
+    /// How serious it is.
+    pub severity: &'static str,
+    /// When it was raised, s from the stop.
+    pub time_s: f64,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Event {
+    /// When, s from the stop.
+    pub time_s: f64,
+    /// What kind.
+    pub kind: MomentKind,
+    /// In words.
+    pub text: String,
+}
+
+/// What `wormd explain` makes of the last gait cycles.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct LastCycles {
+    /// Gait cycles that it looked at.
+    pub cycles: f64,
+    /// Its verdict in a sentence; null where it was not asked, or could not say.
+    pub verdict: Option<String>,
+    /// More of it.
+    pub details: Option<String>,
+    /// Why there is none.
+    pub why_not: Option<String>,
+}
+
+/// Explains the stop with this number, from 1; without one, that of the box's event, or else the last. `trigger` is what a box was
+/// made of.
+pub fn explain_stop(log: &Log, config: &Config, trigger: Option<&Trigger>, wanted: Option<usize>) -> Explanation {
+    let mut config = config.clone();
+    // The name may have been given on the command line.
+    if let Some(worm) = log.metadata.get("worm") {
+        config.worm.name.clone_from(worm);
+    }
+    let config = &config;
+    let mut all = stops(log, config);
+    if let Some(trigger) = trigger
+        && trigger.event == GONE
+        && let Some(last) = log.states.last()
+        && last.time_ns < trigger.time_ns
+    {
+        all.push(Stop {
+            time_ns: last.time_ns,
+            from: Mode::try_from(last.mode).unwrap_or(Mode::Disarmed),
+            to: None,
+            cause: Cause::ControllerGone,
+            alarm: None,
+        });
+    }
+    let chosen = match wanted {
+        Some(number) => number.checked_sub(1).filter(|place| *place < all.len()),
+        None => choose(&all, log, trigger),
+    };
+    let subject = match chosen.and_then(|place| all.get(place)) {
+        Some(stop) => Subject::Stop(stop.clone()),
+        None => match alarm_of(log, trigger) {
+            Some(alarm) => Subject::Alarm(alarm),
+            None => Subject::Nothing(log.states.last().map_or(0, |state| state.time_ns)),
+        },
+    };
+    let time_ns = subject.time_ns();
+    let reason = reason(&subject, config);
+    let (from, to) = match &subject {
+        Subject::Stop(stop) => (Some(stop.from.name()), stop.to.map(Mode::name)),
+        _ => (None, None),
+    };
+    let mut warnings = log.warnings.clone();
+    if log.commands.is_empty() {
+        warnings.push("the log holds no command: it is of an older version, or none was given".to_owned());
+    }
+    if log.alarms.is_empty() && log.estimates.is_empty() {
+        warnings
+            .push("the log holds neither alarms nor estimates: an alarm behind the stop would not be known".to_owned());
+    }
+    Explanation {
+        worm: config.worm.name.clone(),
+        log: log.file.display().to_string(),
+        stopped: matches!(subject, Subject::Stop(_)),
+        time_ns,
+        unix_ns: unix_ns(log, time_ns),
+        from,
+        to,
+        signs: signs(log, &subject, time_ns),
+        events: events(log, config, time_ns),
+        remedy: remedy_for(&subject, config),
+        stop: chosen.map_or(0, |place| place + 1),
+        stops: all.len(),
+        last_cycles: LastCycles::default(),
+        reason,
+        warnings,
+    }
+}
+
+/// How the black box calls a controller that fell silent.
+const GONE: &str = "controller-silent";
+
+/// What the explanation is of.
+enum Subject {
+    Stop(Stop),
+    /// One that stopped nothing.
+    Alarm(Alarm),
+    Nothing(u64),
+}
+
+impl Subject {
+    fn time_ns(&self) -> u64 {
+        match self {
+            Self::Stop(stop) => stop.time_ns,
+            Self::Alarm(alarm) => alarm.time_ns,
+            Self::Nothing(time_ns) => *time_ns,
+        }
+    }
+}
+
+/// The stop that a log is about. That somebody stops a worm after an alarm is not what the alarm's box is about.
+fn choose(stops: &[Stop], log: &Log, trigger: Option<&Trigger>) -> Option<usize> {
+    let last = stops.len().checked_sub(1);
+    let Some(trigger) = trigger else { return last };
+    let is_near = |stop: &Stop| stop.time_ns + NEAR_NS >= trigger.time_ns;
+    let unwanted = stops.iter().position(|stop| is_near(stop) && !stop.cause.is_wanted());
+    if unwanted.is_some() || alarm_of(log, Some(trigger)).is_some() {
+        return unwanted;
+    }
+    stops.iter().position(is_near).or(last)
+}
+
+/// The alarm that a log without a stop is about: that of the box's event, or else the last.
+fn alarm_of(log: &Log, trigger: Option<&Trigger>) -> Option<Alarm> {
+    let is_one = |alarm: &&Alarm| alarm.raised == 1 && alarm.kind != AlarmKind::RecordingStopped.code();
+    let mut raised = log.alarms.iter().filter(is_one);
+    match trigger {
+        Some(trigger) => raised.find(|alarm| alarm.time_ns == trigger.time_ns).copied(),
+        None => raised.next_back().copied(),
+    }
+}
+
+fn reason(subject: &Subject, config: &Config) -> Reason {
+    let plain = |kind, name: &str, sentence: String| Reason {
+        kind,
+        name: name.to_owned(),
+        time_s: 0.0,
+        since_s: None,
+        cell: None,
+        value: None,
+        threshold: None,
+        sender: None,
+        user: None,
+        sentence,
+    };
+    let stop = match subject {
+        Subject::Alarm(alarm) => return of_alarm(alarm, alarm.time_ns, false, config),
+        Subject::Nothing(_) => {
+            let sentence = "Nothing in this log stopped the worm, and no alarm was raised.".to_owned();
+            return plain("none", "none", sentence);
+        }
+        Subject::Stop(stop) => stop,
+    };
+    match &stop.cause {
+        Cause::Alarm(kind) => match &stop.alarm {
+            Some(alarm) => of_alarm(alarm, stop.time_ns, true, config),
+            None => plain(
+                "alarm",
+                kind.name(),
+                format!(
+                    "The alarm {kind} stopped the worm: {}. When it was raised is not in the log.",
+                    lower_first(&remedy::meaning(*kind))
+                ),
+            ),
+        },
+        Cause::Fault(fault) => {
+            let meaning = remedy::of_fault(*fault).map_or_else(String::new, |(meaning, _)| meaning);
+            plain(
+                "fault",
+                fault.name(),
+                format!("The controller latched the fault {fault}: {}", as_sentence(&meaning)),
+            )
+        }
+        Cause::Command(record) => Reason {
+            time_s: relative_s(record.time_ns, stop.time_ns),
+            sender: Some(record.sender.as_str().to_owned()),
+            user: Some(record.user),
+            ..plain(
+                "command",
+                CommandKind::try_from(record.kind).map_or("unknown", CommandKind::name),
+                format!("Somebody wanted it: {}.", command_in_words(record)),
+            )
+        },
+        Cause::LeaseLapsed => plain(
+            "lease-lapsed",
+            "lease-lapsed",
+            format!(
+                "Whoever made the worm crawl is gone, or was silent for control.lease_s ({} s).",
+                config.control.lease_s
+            ),
+        ),
+        Cause::TimeLimit => plain(
+            "time-limit",
+            "time-limit",
+            "The time for which the worm was to crawl was over.".to_owned(),
+        ),
+        Cause::ControllerGone => plain(
+            "controller-gone",
+            "controller-gone",
+            format!(
+                "The controller published no more while the motor had torque. It was killed, crashed or hung; the servo's watchdog stopped the \
+                 motor {} ms after its last request.",
+                config.servo.watchdog_ms
+            ),
+        ),
+        Cause::Unknown => plain("unknown", "unknown", "The log does not say why.".to_owned()),
+    }
+}
+
+fn of_alarm(alarm: &Alarm, time_ns: u64, stopped: bool, config: &Config) -> Reason {
+    let kind = AlarmKind::try_from(alarm.kind);
+    let name = kind.map_or("unknown", AlarmKind::name);
+    let cell = (alarm.cell != u32::MAX).then(|| alarm.cell + 1);
+    let since_s = relative_s(alarm.since_ns, time_ns);
+    let (meaning, policy) = match kind {
+        Ok(kind) => (lower_first(&remedy::meaning(kind)), config.alarms.of(kind).policy),
+        Err(_) => ("it is of another version".to_owned(), Policy::Warn),
+    };
+    let of_cell = cell.map_or_else(String::new, |cell| format!(" of cell {cell}"));
+    let did = match (stopped, policy) {
+        (true, Policy::Stop) => "its policy is to stop",
+        (true, Policy::BackOff) => "its policy is to go back and hold",
+        (true, _) => "its policy is to hold",
+        (false, Policy::Warn) => "its policy is to warn, so the worm went on",
+        (false, _) => "the worm did not crawl then",
+    };
+    let sentence = format!(
+        "The alarm {name}{of_cell}: {meaning}. {} against a threshold of {}, since {since_s:.3} s; {did}.",
+        figure(alarm.value),
+        figure(alarm.threshold)
+    );
+    Reason {
+        kind: "alarm",
+        name: name.to_owned(),
+        time_s: relative_s(alarm.time_ns, time_ns),
+        since_s: Some(since_s),
+        cell,
+        value: Some(alarm.value).filter(|value| value.is_finite()),
+        threshold: Some(alarm.threshold).filter(|threshold| threshold.is_finite()),
+        sender: None,
+        user: None,
+        sentence,
+    }
+}
+
+fn signs(log: &Log, subject: &Subject, time_ns: u64) -> Vec<Sign> {
+    let reason = match subject {
+        Subject::Stop(stop) => stop.alarm,
+        Subject::Alarm(alarm) => Some(*alarm),
+        Subject::Nothing(_) => None,
+    };
+    let is_other = |alarm: &Alarm| reason.is_none_or(|reason| reason.kind != alarm.kind);
+    let standing = standing(log, time_ns).into_iter().filter(is_other);
+    standing
+        .map(|alarm| Sign {
+            alarm: AlarmKind::try_from(alarm.kind).map_or("unknown", AlarmKind::name),
+            severity: Severity::try_from(alarm.severity).map_or("unknown", Severity::name),
+            time_s: relative_s(alarm.time_ns, time_ns),
+        })
+        .collect()
+}
+
+fn events(log: &Log, config: &Config, time_ns: u64) -> Vec<Event> {
+    let span = time_ns.saturating_sub(BEFORE_NS)..=time_ns.saturating_add(AFTER_NS);
+    let within = |moment: &Moment| span.contains(&moment.time_ns);
+    moments(log, config)
+        .into_iter()
+        .filter(within)
+        .map(|moment| Event {
+            time_s: relative_s(moment.time_ns, time_ns),
+            kind: moment.kind,
+            text: moment.text,
+        })
+        .collect()
+}
+
+fn remedy_for(subject: &Subject, config: &Config) -> String {
+    let cause = match subject {
+        Subject::Stop(stop) => stop.cause.clone(),
+        Subject::Alarm(alarm) => AlarmKind::try_from(alarm.kind).map_or(Cause::Unknown, Cause::Alarm),
+        Subject::Nothing(_) => return "Nothing.".to_owned(),
+    };
+    let name = &config.worm.name;
+    match cause {
+        Cause::Alarm(kind) => remedy::of(kind),
+        Cause::Fault(fault) => {
+            let todo = remedy::of_fault(fault).map_or_else(String::new, |(_, remedy)| as_sentence(&remedy));
+            format!("{todo} Nothing moves until `wormd command reset --name {name}`.")
+        }
+        Cause::Command(_) | Cause::TimeLimit => format!("Nothing is wrong: `wormd command crawl --name {name}` goes on."),
+        Cause::LeaseLapsed => format!(
+            "Find out why `wormd up`, the driving screen or the script ended; `wormd command crawl --name {name}` goes on. On board, crawl \
+             with --attend or --for."
+        ),
+        Cause::ControllerGone => "Look at the log of the controller (journalctl, or what `wormd up` printed) for a crash or a kill, and at the \
+             watchdog of systemd. On a slope secure the worm before a controller is started again: it begins by switching torque off."
+            .to_owned(),
+        Cause::Unknown => "Look at the events around it, and record all topics.".to_owned(),
+    }
+}
+
+/// The wall-clock time of a moment, by the clocks' comparison in the log.
+fn unix_ns(log: &Log, time_ns: u64) -> Option<u64> {
+    let number = |key: &str| log.metadata.get(key)?.parse::<i128>().ok();
+    let unix_ns = number("begun_unix_ns")? + i128::from(time_ns) - number("begun_monotonic_ns")?;
+    u64::try_from(unix_ns).ok()
+}
+
+/// From one moment to another, s; negative before it.
+fn relative_s(time_ns: u64, zero_ns: u64) -> f64 {
+    if time_ns < zero_ns {
+        -seconds(zero_ns - time_ns)
+    } else {
+        seconds(time_ns - zero_ns)
+    }
+}
+
+fn lower_first(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => first.to_lowercase().collect::<String>() + letters.as_str(),
+        None => String::new(),
+    }
+}
+
+fn as_sentence(text: &str) -> String {
+    let text = text.trim();
+    if text.is_empty() || text.ends_with(['.', '?']) {
+        return text.to_owned();
+    }
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().collect::<String>() + letters.as_str() + "."
+    })
+}

@@ -1,0 +1,21 @@
+//! Why a worm stopped: the first reason, what led there, and what to do, from any log or box.
+//!
+//! Everything is ordered and judged by `CLOCK_MONOTONIC`; the wall clock only says when it was.
+//!
+//! # Modules, in reading order
+//! - [`timeline`]: what happened in a log, event by event. Pure.
+//! - [`stops`]: where the worm stopped, and by what. Pure.
+//! - [`explanation`]: both together, with the remedy. Its JSON names are a contract.
+//! - `text`: for the terminal; `page`: for a browser, with the feature `analysis`.
+//! - `last_cycles`: what `explain` makes of the gait cycles before it, with the feature `analysis`.
+
+pub mod explanation;
+#[cfg(feature = "analysis")]
+pub(crate) mod last_cycles;
+#[cfg(feature = "analysis")]
+pub(crate) mod page;
+pub mod stops;
+pub(crate) mod text;
+pub mod timeline;
+
+pub use explanation::{Explanation, Trigger, explain_stop};

@@ -1,0 +1,494 @@
+//! `wormd dashboard` from outside: real processes, requests as bytes, and a real headless Chromium where there is one.
+
+mod http;
+#[path = "../processes/worm.rs"]
+#[allow(
+    dead_code,
+    reason = "the harness of another test binary, of which this one uses a part"
+)]
+mod worm;
+
+use http::{Browser, Reply, request};
+use nix::sys::signal::Signal;
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use worm::{Process, Worm, wait_for};
+
+const TOKEN: &str = "a-token-for-tests-0123";
+const BEARER: &str = "Authorization: Bearer a-token-for-tests-0123";
+const ANN: &str = "X-Wormd-Client: ann";
+const BEN: &str = "X-Wormd-Client: ben";
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A worm, at rest and disarmed, with a dashboard.
+struct Watched {
+    dashboard: Child,
+    address: SocketAddr,
+    controller: Process,
+    _estimator: Process,
+    _virtual_worm: Process,
+    worm: Worm,
+}
+
+impl Watched {
+    /// The dashboard is there before its worm.
+    fn start(name: &str) -> Self {
+        let worm = Worm::on_a_steady_computer(name);
+        let arguments = ["dashboard", "--listen", "127.0.0.1:0"];
+        let mut dashboard = worm
+            .wormd(&arguments)
+            .with_environment("WORMD_DASHBOARD_TOKEN", TOKEN)
+            .into_command()
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let mut line = String::new();
+        let stdout = dashboard.stdout.take().expect("is piped");
+        BufReader::new(stdout)
+            .read_line(&mut line)
+            .expect("it says where it is");
+        let address = line
+            .split_once("http://")
+            .and_then(|(_, rest)| rest.trim().trim_end_matches('/').parse().ok());
+        let address = address.unwrap_or_else(|| panic!("{line:?}"));
+        assert_eq!(request(address, "GET", "/api/health", &[], "").json()["worm"], "absent");
+        let virtual_worm = worm.virtual_worm(&["--allow-faults"]);
+        let estimator = worm.wormd(&["estimate"]).start();
+        let port = worm.port();
+        let controller = worm.wormd(&["control", "--port", &port]).start();
+        let watched = Self {
+            dashboard,
+            address,
+            controller,
+            _estimator: estimator,
+            _virtual_worm: virtual_worm,
+            worm,
+        };
+        watched.wait_for_health("live");
+        watched
+    }
+
+    fn get(&self, path: &str) -> Reply {
+        request(self.address, "GET", path, &[], "")
+    }
+
+    fn post(&self, command: &str, headers: &[&str]) -> Reply {
+        request(self.address, "POST", &format!("/api/command/{command}"), headers, "")
+    }
+
+    fn wait_for_health(&self, worm: &str) {
+        wait_for(worm, PATIENCE, || self.get("/api/health").json()["worm"] == worm);
+    }
+
+    fn mode(&self) -> String {
+        self.get("/api/state").json()["state"]["mode"]
+            .as_str()
+            .unwrap_or_default()
+            .to_owned()
+    }
+
+    fn wait_for_mode(&self, mode: &str) {
+        wait_for(mode, PATIENCE, || self.mode() == mode);
+    }
+
+    fn arm(&self, client: &str) {
+        assert_eq!(self.post("arm", &[BEARER, client]).status, 200);
+        self.wait_for_mode("armed");
+    }
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.dashboard.id() as i32), Signal::SIGTERM);
+        let _ = self.dashboard.wait();
+    }
+}
+
+/// Everything that was done, in words.
+fn events(state: &Watched) -> Vec<String> {
+    let hello = first_event(state.address);
+    let events = hello["events"].as_array().expect("a list");
+    events
+        .iter()
+        .filter_map(|event| event["text"].as_str().map(str::to_owned))
+        .collect()
+}
+
+/// The history, which comes first in the stream.
+fn first_event(address: SocketAddr) -> Value {
+    let mut stream = TcpStream::connect(address).expect("listens");
+    stream.set_read_timeout(Some(PATIENCE)).expect("can be set");
+    stream
+        .write_all(format!("GET /api/events HTTP/1.1\r\nHost: {address}\r\n\r\n").as_bytes())
+        .expect("reads");
+    let mut bytes = Vec::new();
+    let mut piece = [0; 65_536];
+    loop {
+        let count = stream.read(&mut piece).expect("events");
+        assert!(count > 0, "the stream goes on");
+        bytes.extend_from_slice(&piece[..count]);
+        let text = String::from_utf8_lossy(&bytes);
+        let Some((_, rest)) = text.split_once("event: hello\ndata: ") else {
+            continue;
+        };
+        // Each event is a chunk of its own.
+        if let Some((data, _)) = rest.split_once("\n\n") {
+            return serde_json::from_str(data).expect("JSON on one line");
+        }
+    }
+}
+
+#[test]
+fn one_drives_with_the_token_and_anyone_may_halt() {
+    let watched = Watched::start("d-rules");
+    for command in ["crawl", "stop", "reset", "arm", "take_over", "acknowledge"] {
+        let refused = watched.post(command, &[]);
+        assert_eq!(refused.status, 401, "{refused:?}");
+        assert!(
+            refused.head.to_lowercase().contains("www-authenticate: bearer"),
+            "{refused:?}"
+        );
+        assert_eq!(
+            watched
+                .post(command, &["Authorization: Bearer a-token-for-tests-0124"])
+                .status,
+            401
+        );
+    }
+    assert_eq!(watched.post("dance", &[BEARER]).status, 404);
+    watched.arm(ANN);
+    assert_eq!(watched.post("crawl", &[BEARER, ANN, "X-Wormd-Name: ann"]).status, 200);
+    let second = watched.post("crawl", &[BEARER, BEN]);
+    assert_eq!(second.status, 409, "{second:?}");
+    assert!(
+        second.json()["refusal"].as_str().is_some_and(|why| why.contains("ann")),
+        "{second:?}"
+    );
+    // Nobody renews it.
+    watched.wait_for_mode("holding");
+    assert_eq!(watched.post("crawl", &[BEARER, ANN]).status, 200);
+    assert_eq!(watched.post("take_over", &[BEARER, BEN]).status, 200);
+    assert_eq!(watched.post("crawl", &[BEARER, ANN]).status, 409);
+    let held = watched.post("hold", &["User-Agent: curl/8", "X-Wormd-Name: passer-by"]);
+    assert_eq!(held.status, 200, "{held:?}");
+    watched.wait_for_mode("holding");
+    // They come with the next frame.
+    for part in ["took over", "passer-by, curl (user", "hold accepted"] {
+        wait_for(part, PATIENCE, || {
+            events(&watched).iter().any(|text| text.contains(part))
+        });
+    }
+
+    // Strangers.
+    for (header, status) in [
+        ("Host: evil.example", 403),
+        ("Origin: http://evil.example", 403),
+        ("Origin: null", 403),
+        ("Sec-Fetch-Site: cross-site", 403),
+        ("X-Harmless: yes", 200),
+    ] {
+        assert_eq!(
+            request(watched.address, "GET", "/api/state", &[header], "").status,
+            status,
+            "{header}"
+        );
+        assert_eq!(watched.post("hold", &[header]).status == 403, status == 403, "{header}");
+    }
+    let page = watched.get("/");
+    for part in [
+        "default-src 'none'",
+        "x-content-type-options: nosniff",
+        "frame-ancestors 'none'",
+    ] {
+        assert!(
+            page.head.to_lowercase().contains(part),
+            "{part:?} is not in {}",
+            page.head
+        );
+    }
+    assert!(
+        watched
+            .get("/api/state")
+            .head
+            .to_lowercase()
+            .contains("cache-control: no-store")
+    );
+    let large = request(
+        watched.address,
+        "POST",
+        "/api/command/crawl",
+        &[BEARER],
+        &"x".repeat(5000),
+    );
+    assert_eq!(large.status, 413, "{large:?}");
+    for path in [
+        "/reports/../Cargo.toml",
+        "/assets/../../Cargo.toml",
+        "/assets/%2e%2e/Cargo.toml",
+        "/etc/passwd",
+    ] {
+        assert_eq!(watched.get(path).status, 404, "{path}");
+    }
+}
+
+#[test]
+fn metrics_pass_promtool_and_a_dead_worm_does_not_look_alive() {
+    let watched = Watched::start("d-prom");
+    let has = |text: &str, name: &str| text.lines().any(|line| line.starts_with(name));
+    // Percentiles come once a second.
+    wait_for("percentiles", PATIENCE, || {
+        watched.get("/metrics").body.contains("wormd_wake_lateness_seconds")
+    });
+    let metrics = watched.get("/metrics").body;
+    assert!(
+        has(&metrics, "wormd_up{worm=\"d-prom") && metrics.contains("wormd_position_meters"),
+        "{metrics}"
+    );
+    check_by_promtool(&metrics);
+    // What the Grafana dashboard shows is there, but what needs a battery, a recorder or a finished cycle.
+    let grafana = include_str!("../../config/grafana/wormd.json");
+    let parsed: Value = serde_json::from_str(grafana).expect("is JSON");
+    assert!(parsed["panels"].as_array().is_some_and(|panels| panels.len() > 6));
+    let later = [
+        "wormd_cycle",
+        "wormd_range",
+        "wormd_battery",
+        "wormd_time_left",
+        "wormd_recording",
+    ];
+    for name in grafana
+        .split(|it: char| !it.is_ascii_alphanumeric() && it != '_')
+        .filter(|word| word.starts_with("wormd_"))
+    {
+        assert!(
+            later.iter().any(|prefix| name.starts_with(prefix)) || has(&metrics, name),
+            "{name}"
+        );
+    }
+    watched.controller.signal(Signal::SIGSTOP);
+    watched.wait_for_health("stale");
+    let up = format!("wormd_up{{worm=\"{}\"}} 0", watched.worm.name());
+    wait_for("old values are left out", PATIENCE, || {
+        let metrics = watched.get("/metrics").body;
+        metrics.contains(&up)
+            && !metrics.contains("wormd_position_meters")
+            && metrics.contains("wormd_source_age_seconds")
+    });
+    watched.controller.signal(Signal::SIGCONT);
+}
+
+fn check_by_promtool(metrics: &str) {
+    let promtool = Command::new("promtool")
+        .args(["check", "metrics"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    let Ok(mut promtool) = promtool else {
+        println!("SKIPPED: no promtool (Debian: prometheus)");
+        return;
+    };
+    let mut stdin = promtool.stdin.take().expect("is piped");
+    stdin.write_all(metrics.as_bytes()).expect("it reads");
+    drop(stdin);
+    let output = promtool.wait_with_output().expect("it ends");
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+}
+
+#[test]
+fn a_reader_that_does_not_read_is_cut_off_and_delays_nobody() {
+    let watched = Watched::start("d-slow");
+    let mut stalled = TcpStream::connect(watched.address).expect("listens");
+    let ask = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\n\r\n", watched.address);
+    stalled.write_all(ask.as_bytes()).expect("reads");
+    wait_for("it is a page", PATIENCE, || {
+        watched.get("/api/health").json()["pages"] == 1
+    });
+    let begun = Instant::now();
+    wait_for("it is cut off", Duration::from_secs(120), || {
+        assert_eq!(watched.get("/api/state").status, 200);
+        std::thread::sleep(Duration::from_millis(200));
+        watched.get("/api/health").json()["pages"] == 0
+    });
+    println!("cut off after {:?}", begun.elapsed());
+}
+
+#[test]
+fn in_a_browser_nothing_moves_by_itself_and_old_values_are_grey() {
+    let Some(browser) = Browser::start(1280, 900) else {
+        return;
+    };
+    let watched = Watched::start("d-page");
+    let url = format!("http://{}/", watched.address);
+    browser.open(&url);
+    browser.wait_for("document.querySelectorAll('#worm .cell').length === 4");
+    browser.wait_for("!document.body.classList.contains('stale')");
+    assert!(
+        events(&watched).is_empty(),
+        "loading commands nothing: {:?}",
+        events(&watched)
+    );
+
+    // Logged in by the address, which forgets the token.
+    browser.open("about:blank");
+    browser.open(&format!("{url}#token={TOKEN}"));
+    browser.wait_for("!document.getElementById('drive').hidden");
+    assert_eq!(browser.run("return location.hash"), "");
+    assert!(events(&watched).is_empty(), "logging in commands nothing");
+    browser.run("document.getElementById('arm').click()");
+    watched.wait_for_mode("armed");
+    let position = "return Number(document.querySelector('#worm .cell').dataset.positionMm)";
+    let before = browser.run(position).as_f64().expect("a number");
+    let crawl = || {
+        wait_for("it crawls", PATIENCE, || {
+            browser.run("document.getElementById('crawl').click()");
+            std::thread::sleep(Duration::from_millis(300));
+            watched.mode() == "crawling"
+        });
+    };
+    crawl();
+    wait_for("positions move", PATIENCE, || {
+        (browser.run(position).as_f64().expect("a number") - before).abs() > 2.0
+    });
+    assert_eq!(watched.post("crawl", &[BEARER, BEN]).status, 409, "the page drives");
+    // Headless Chromium shows all its pages: it is told that this one is hidden.
+    let hide = |is_hidden: bool| {
+        browser.run(&format!(
+            "Object.defineProperty(document, 'hidden', {{ configurable: true, value: {is_hidden} }});
+             document.dispatchEvent(new Event('visibilitychange'))"
+        ));
+    };
+    hide(true);
+    watched.wait_for_mode("holding");
+    hide(false);
+    std::thread::sleep(Duration::from_secs(1));
+    assert_eq!(watched.mode(), "holding", "coming back moves nothing");
+    assert_eq!(
+        browser.run("return sessionStorage.length > 0"),
+        true,
+        "and is still logged in"
+    );
+
+    // Anyone may halt, by the button.
+    crawl();
+    browser.run("document.getElementById('log-out').click(); document.getElementById('hold').click()");
+    watched.wait_for_mode("holding");
+
+    watched.controller.signal(Signal::SIGSTOP);
+    browser.wait_for("document.body.classList.contains('stale')");
+    browser.wait_for("/no state for/.test(document.getElementById('banner').textContent)");
+    browser.wait_for("Number(getComputedStyle(document.getElementById('values')).opacity) < 0.6");
+    watched.controller.signal(Signal::SIGCONT);
+    browser.wait_for("!document.body.classList.contains('stale')");
+    let address = watched.address;
+    drop(watched);
+    // Nor does a page of a server that is gone look alive.
+    assert!(TcpStream::connect(address).is_err());
+    browser.wait_for("/nothing heard of the dashboard server/.test(document.getElementById('banner').textContent)");
+}
+
+#[test]
+fn on_a_phone_a_stall_is_shown_with_what_to_do() {
+    let Some(browser) = Browser::start(500, 844) else {
+        return;
+    };
+    let watched = Watched::start("d-phone");
+    let phone = json!({"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": true});
+    browser.control("Emulation.setDeviceMetricsOverride", phone);
+    for scheme in ["light", "dark"] {
+        let features = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+        browser.control("Emulation.setEmulatedMedia", features);
+        browser.open(&format!("http://{}/", watched.address));
+        browser.wait_for("document.querySelectorAll('#worm .cell').length === 4");
+        assert_eq!(
+            browser.run("return document.documentElement.scrollWidth"),
+            390,
+            "{scheme}"
+        );
+        browser.run("scrollTo(0, 1e6)");
+        let hold = browser.run("const box = document.getElementById('hold').getBoundingClientRect(); return [box.top, box.bottom, box.width]");
+        let of = |index: usize| hold[index].as_f64().expect("a number");
+        assert!(of(0) > 0.0 && of(1) <= 844.0 && of(2) > 300.0, "{scheme}: {hold}");
+    }
+    let unnamed = browser.run(
+        "return [...document.querySelectorAll('button, input, svg[role=img], [role=region]')].filter((it) => \
+         !it.hidden && !(it.ariaLabel || it.textContent.trim() || it.labels?.length || it.getAttribute('aria-labelledby'))).map((it) => it.outerHTML)",
+    );
+    assert_eq!(unnamed, json!([]), "everything has a name");
+
+    watched.arm(ANN);
+    assert_eq!(watched.post("crawl", &[BEARER, ANN]).status, 200);
+    let stalled = watched
+        .worm
+        .wormd(&["fault", "stall"])
+        .into_command()
+        .args(["--link", &watched.worm.port()])
+        .output();
+    let stalled = stalled.expect("the binary starts");
+    assert!(stalled.status.success(), "{stalled:?}");
+    wait_for("an alarm", PATIENCE, || {
+        request(watched.address, "POST", "/api/alive", &[BEARER, ANN], "");
+        browser.run("return document.getElementById('alarm-banner').textContent.includes('motor-stall')") == true
+    });
+    browser.wait_for("/Do: .*wormd command reset/.test(document.getElementById('alarm-banner').textContent)");
+    browser.wait_for("/motor-stall/.test(document.title)");
+    assert_eq!(watched.post("acknowledge", &[BEARER, ANN]).status, 200);
+    browser.wait_for("document.getElementById('alarm-banner').hidden");
+    assert!(
+        events(&watched)
+            .iter()
+            .any(|text| text.contains("acknowledge accepted"))
+    );
+}
+
+#[test]
+fn who_reads_only_the_first_line_of_its_output_does_not_end_it() {
+    let worm = Worm::on_a_steady_computer("d-line");
+    let mut dashboard = worm
+        .wormd(&["dashboard", "--listen", "127.0.0.1:0"])
+        .into_command()
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    let mut line = String::new();
+    BufReader::new(dashboard.stdout.take().expect("is piped"))
+        .read_line(&mut line)
+        .expect("it says where it is");
+    let (_, url) = line.split_once("http://").expect("an address");
+    let address: SocketAddr = url.trim().trim_end_matches('/').parse().expect("an address");
+    assert_eq!(
+        request(address, "POST", "/api/command/crawl", &[], "").status,
+        401,
+        "a token was made"
+    );
+    let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(dashboard.id() as i32), Signal::SIGTERM);
+    assert_eq!(dashboard.wait().expect("ends").code(), Some(0), "it ends in order");
+}
+
+#[test]
+fn what_cannot_be_used_ends_with_exit_status_2() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let short = folder.path().join("token");
+    std::fs::write(&short, "short\n").expect("can be written");
+    let short = short.to_string_lossy().into_owned();
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let taken = taken.local_addr().expect("is bound").to_string();
+    let worm = Worm::on_a_steady_computer("d-args");
+    for (arguments, part) in [
+        (vec!["--listen", &taken], "is in use"),
+        (vec!["--listen", "nonsense"], "is no address with a port"),
+        (vec!["--listen", "0.0.0.0:0"], "give a token"),
+        (vec!["--token-file", "/nonexistent/token"], "/nonexistent/token"),
+        (vec!["--token-file", &short], "a token has 16 to 256"),
+        (vec!["--reports", "/nonexistent/reports"], "/nonexistent/reports"),
+    ] {
+        let output = worm.wormd(&[&["dashboard"], arguments.as_slice()].concat()).output();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(part), "{arguments:?}: {said}");
+    }
+    assert_eq!(worm.stale_resources(), Vec::<String>::new());
+}
