@@ -51,6 +51,7 @@
 //! | `trip` | the process that makes a trip: the topics into the guide of `worm-plan`, its commands to the controller | `topics`, `supervisor` |
 //! | `relay` | one process that serves all watchers: history, frames, commands, one driver at a time | `topics`, `watch`, `supervisor` |
 //! | `dashboard` | the worm in a browser: an HTTP server between the relay and any number of pages. The feature `dashboard` | `relay`, `watch` |
+//! | `foxglove` | the topics live in Foxglove: what a recorder reads, over a WebSocket. The feature `foxglove` | `recorder` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
@@ -81,6 +82,8 @@ pub mod control;
 mod dashboard;
 mod estimator;
 mod failure;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 pub mod latency;
 pub mod link;
 mod logging;

@@ -39,6 +39,9 @@ enum Subcommands {
     /// A running worm in a browser, for anyone to watch and halt, and for one to drive
     #[cfg(feature = "dashboard")]
     Dashboard(command::dashboard::DashboardArgs),
+    /// The topics of a worm, live, for Foxglove to show
+    #[cfg(feature = "foxglove")]
+    Foxglove(command::foxglove::FoxgloveArgs),
     /// Serves the watchers of a worm; they start it by themselves
     Relay(command::relay::RelayArgs),
     /// The topics of a worm into a log (MCAP)
@@ -128,6 +131,8 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Watch(args) => command::watch::run(&args),
         #[cfg(feature = "dashboard")]
         Subcommands::Dashboard(args) => command::dashboard::run(&args),
+        #[cfg(feature = "foxglove")]
+        Subcommands::Foxglove(args) => command::foxglove::run(&args),
         Subcommands::Relay(args) => command::relay::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Topics(args) => command::topics::run(&args),

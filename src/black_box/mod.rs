@@ -23,7 +23,6 @@ mod part_file;
 mod ring;
 mod run;
 mod status;
-mod thin;
 pub(crate) mod utc;
 
 pub(crate) use run::BlackBox;

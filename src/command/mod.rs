@@ -15,6 +15,8 @@ pub mod estimate;
 pub mod explain;
 pub mod export;
 pub mod fault;
+#[cfg(feature = "foxglove")]
+pub mod foxglove;
 pub mod latency;
 pub mod latency_floor;
 mod live;

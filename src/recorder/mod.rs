@@ -11,10 +11,12 @@ mod log_writer;
 mod progress;
 mod recorded_topics;
 mod status_reporter;
+mod thin;
 
 pub(crate) use file_series::FileOptions;
 pub(crate) use log_file::problem_of;
 pub(crate) use recorded_topics::{Batch, RecordedTopics};
+pub(crate) use thin::Thinner;
 
 use crate::attendance::RoundCounter;
 use crate::failure::Failure;

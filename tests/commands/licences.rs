@@ -41,6 +41,7 @@ fn packages() -> Vec<Package> {
             "--format-version",
             "1",
             "--locked",
+            "--all-features",
             "--filter-platform",
             &platform,
         ])

@@ -3,9 +3,9 @@
 //! [`outline`] goes from record to record and reads little more than their heads. [`complete`] does the same, cuts off what is
 //! not whole at the end, and adds the index that the log's own writer would have added; no message is written anew.
 
-use crate::shape::is_whole;
+use crate::shape::{is_whole, records};
+use crate::unpack::unpacked;
 use mcap::MAGIC;
-use mcap::read::ChunkReader;
 use mcap::records::{AttachmentIndex, ChunkHeader, Record, op};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -287,8 +287,10 @@ fn schemas_and_channels(file: &mut File, outline: &Outline) -> io::Result<(Recor
         let mut data = vec![0; chunk.header.compressed_size as usize];
         file.read_exact(&mut data)?;
         let damaged = |error: mcap::McapError| io::Error::new(io::ErrorKind::InvalidData, error.to_string());
-        for record in ChunkReader::new(chunk.header.clone(), &data).map_err(damaged)? {
-            match record.map_err(damaged)? {
+        let unpacked = unpacked(&chunk.header.compression, &data, chunk.header.uncompressed_size).map_err(damaged)?;
+        for record in records(&unpacked) {
+            let (opcode, content) = record.ok_or_else(|| damaged(mcap::McapError::UnexpectedEof))?;
+            match mcap::parse_record(opcode, content).map_err(damaged)? {
                 Record::Schema { header, data } => {
                     let mut content = header.id.to_le_bytes().to_vec();
                     push_text(&mut content, &header.name);

@@ -31,23 +31,28 @@ pub(super) fn uncompressed_records(chunk: &[u8]) -> Option<&[u8]> {
 }
 
 /// Whether these bytes are whole records, one behind the other.
-pub(super) fn are_whole_records(mut bytes: &[u8]) -> bool {
-    while !bytes.is_empty() {
-        let Some((_, rest)) = bytes.split_first() else {
-            return false;
-        };
-        let Some((length, rest)) = rest.split_first_chunk::<8>() else {
-            return false;
-        };
-        let Some(rest) = usize::try_from(u64::from_le_bytes(*length))
-            .ok()
-            .and_then(|length| rest.get(length..))
-        else {
-            return false;
-        };
-        bytes = rest;
-    }
-    true
+pub(super) fn are_whole_records(bytes: &[u8]) -> bool {
+    heads(bytes).all(|record| record.is_some())
+}
+
+/// The records of these bytes, opcode and content, each as long as it says in all its parts; `None`, and no more, where one is not.
+pub(super) fn records(bytes: &[u8]) -> impl Iterator<Item = Option<(u8, &[u8])>> {
+    heads(bytes).map(|record| record.filter(|(opcode, content)| is_whole(*opcode, content)))
+}
+
+/// Opcodes and contents, without a look into them.
+fn heads(mut bytes: &[u8]) -> impl Iterator<Item = Option<(u8, &[u8])>> {
+    std::iter::from_fn(move || {
+        let (&opcode, rest) = std::mem::take(&mut bytes).split_first()?;
+        let record = rest.split_first_chunk::<8>().and_then(|(length, rest)| {
+            let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+            rest.split_at_checked(length)
+        });
+        Some(record.map(|(content, behind)| {
+            bytes = behind;
+            (opcode, content)
+        }))
+    })
 }
 
 fn fixed(bytes: &[u8], length: usize) -> Option<&[u8]> {

@@ -26,6 +26,36 @@ impl BoundedZstd {
     }
 }
 
+/// The bytes of a chunk that this version has written, which is compressed by zstd or not at all.
+///
+/// # Errors
+/// [`McapError`] when it is damaged, or claims to hold more than a chunk can.
+pub(super) fn unpacked(compression: &str, packed: &[u8], size: u64) -> McapResult<Vec<u8>> {
+    let refused = |problem: &str| McapError::DecompressionError(problem.to_owned());
+    if size > (packed.len() as u64).saturating_mul(MAX_RATIO) {
+        return Err(refused("the chunk claims to hold more than a chunk can"));
+    }
+    match compression {
+        "" => Ok(packed.to_vec()),
+        "zstd" => {
+            let mut bytes = vec![0; size as usize];
+            let (mut zstd, mut read, mut wrote) = (BoundedZstd::new()?, 0, 0);
+            while wrote < bytes.len() {
+                let step = zstd.decompress(&packed[read..], &mut bytes[wrote..])?;
+                if step.consumed == 0 && step.wrote == 0 {
+                    return Err(refused("the chunk holds less than it claims"));
+                }
+                read += step.consumed;
+                wrote += step.wrote;
+            }
+            Ok(bytes)
+        }
+        other => Err(refused(&format!(
+            "compression {other:?} is not one that is written here"
+        ))),
+    }
+}
+
 fn checked(result: SafeResult) -> McapResult<usize> {
     result.map_err(|code| McapError::DecompressionError(get_error_name(code).to_owned()))
 }

@@ -1,11 +1,11 @@
-//! What the thin log keeps: a few ticks a second, and everything that changes. Pure.
+//! A few ticks a second, and everything that changes: for logs and viewers that need no more. Pure.
 
-use crate::recorder::Batch;
+use super::recorded_topics::Batch;
 use worm_estimator::message::State;
 
-/// Picks what the thin log keeps.
+/// Picks what is kept.
 #[derive(Debug)]
-pub(super) struct Thinner {
+pub(crate) struct Thinner {
     interval_ns: u64,
     state: Option<State>,
     /// When a state, a timing and an estimate were kept last, ns.
@@ -16,7 +16,7 @@ pub(super) struct Thinner {
 
 impl Thinner {
     /// Keeps this many a second.
-    pub(super) fn new(rate_hz: f64) -> Self {
+    pub(crate) fn new(rate_hz: f64) -> Self {
         Self {
             interval_ns: (1e9 / rate_hz) as u64,
             state: None,
@@ -28,7 +28,7 @@ impl Thinner {
 
     /// The part of a batch that is kept: ticks and estimates at the rate, ticks of a pause of the computer or a new rate, and of the
     /// rest all.
-    pub(super) fn thin(&mut self, batch: &Batch) -> Batch {
+    pub(crate) fn thin(&mut self, batch: &Batch) -> Batch {
         let interval_ns = self.interval_ns;
         let is_due = |last_ns: &mut u64, now_ns: u64| {
             // A clock that goes back is that of another start.
