@@ -17,6 +17,7 @@ pub mod config;
 pub mod estimate;
 pub mod message;
 pub mod number;
+pub mod self_sensing;
 pub mod time;
 
 pub use worm_physics::MAX_CELLS;
