@@ -23,6 +23,8 @@ use super::profile::{BINS_PER_STEP, MAX_BINS};
 use std::f64::consts::{PI, TAU};
 use worm_physics::Worm;
 
+/// Damping of the pads makes the force of a loading cell lead by damping over stiffness, s: what is assumed, and its standard deviation.
+const LEAD_S: [f64; 2] = [0.005, 0.005];
 /// Gait-to-gait scatter of a cell's friction that is assumed before it is measured, as a share.
 const SCATTER_SHARE: f64 = 0.02;
 /// How many cycles of measured scatter that assumption is worth.
@@ -31,8 +33,9 @@ const SCATTER_CYCLES: f64 = 3.0;
 const MISFIT_BINS: f64 = 4.0;
 /// Torque that no profile is sure of, N m: rounding of the current, speed within a bin.
 const FLOOR_N_M: f64 = 1.5e-4;
-/// Weight of the first bins of each step, where the body swings and the servo's loop catches up.
-const FIRST_BIN_WEIGHTS: [f64; 3] = [0.02, 0.1, 0.5];
+/// Weight of the bins on either side of the jump from one step to the next: readings are a tick apart, the jump is not.
+const FIRST_BIN_WEIGHTS: [f64; 2] = [0.01, 0.3];
+const LAST_BIN_WEIGHT: f64 = 0.02;
 /// Finite differences: of a logarithm of friction, of stiffness, and of the pull, N.
 const STEPS: [f64; 3] = [0.01, 0.02, 0.03];
 /// Longest Gauss-Newton step: of a logarithm, and of the pull, N.
@@ -40,9 +43,11 @@ const LONGEST: [f64; 2] = [0.4, 0.8];
 /// Expected gain of a step, in units of its variance, below which the search ends.
 const CLOSE_ENOUGH: f64 = 1e-3;
 /// Pulls at which the first search begins, as shares of what all tips hold.
-const FIRST_PULLS: [f64; 7] = [0.0, 0.1, 0.2, 0.3, 0.45, 0.6, -0.15];
+const FIRST_PULLS: [f64; 9] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, -0.1];
 /// Gauss-Newton steps of the first search from each of them, then from the best, and in later cycles.
-const ROUNDS: [usize; 3] = [3, 12, 2];
+const ROUNDS: [usize; 3] = [5, 12, 2];
+/// Cycles in which everything is searched anew, because the mean profile has become much better.
+const SEARCHED_CYCLES: f64 = 3.5;
 
 /// The fit and everything that it keeps between cycles.
 #[derive(Debug, Clone)]
@@ -55,6 +60,8 @@ pub(super) struct Fit {
     ripples: usize,
     gear: GearModel,
     velocity_rad_per_s: f64,
+    bins_per_s: f64,
+    force_per_torque: f64, // of the stepping cell, 1/m
     prior: Vector,
     prior_information: Vector,
     at: Parameters,
@@ -90,25 +97,29 @@ impl Fit {
         sigma[gears] = gear.friction_sigma_n_m;
         sigma[gears + 1] = gear.torque_constant_sigma;
         sigma[gears + 2] = gear.load_friction_sigma;
+        at.values[gears + 3] = LEAD_S[0];
+        sigma[gears + 3] = LEAD_S[1];
         let mut waves = [0.0; MAX_RIPPLES];
         let mut ripples = 0;
         for term in gear.ripple.iter().filter(|term| term.waves != 0.0) {
             waves[ripples] = term.waves;
-            sigma[gears + 3 + 2 * ripples] = gear.ripple_sigma_n_m;
             sigma[gears + 4 + 2 * ripples] = gear.ripple_sigma_n_m;
+            sigma[gears + 5 + 2 * ripples] = gear.ripple_sigma_n_m;
             ripples += 1;
         }
         let mut model = CycleModel::new(worm);
         model.begin_at(&at);
         Self {
             bins: cells * BINS_PER_STEP,
-            unknowns: gears + 3 + 2 * ripples,
+            unknowns: gears + 4 + 2 * ripples,
             forgetting: 1.0 - 1.0 / config.memory_cycles.max(1.0),
             model,
             waves,
             ripples,
             gear: *gear,
             velocity_rad_per_s: TAU / config.cycle_s,
+            bins_per_s: (cells * BINS_PER_STEP) as f64 / config.cycle_s,
+            force_per_torque: TAU / (cells as f64 * worm.stroke_m()),
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
             at,
@@ -134,7 +145,6 @@ impl Fit {
 
     /// Takes a cycle's profile, and the variance of its means by the noise within bins.
     pub(super) fn take(&mut self, torque_n_m: &[f64], variance: f64) {
-        let is_first = self.cycles == 0.0;
         self.cycles = self.forgetting * self.cycles + 1.0;
         self.squared_cycles = self.forgetting * self.forgetting * self.squared_cycles + 1.0;
         let share = 1.0 / self.cycles;
@@ -142,7 +152,7 @@ impl Fit {
         for (mean, torque) in self.mean_n_m.iter_mut().zip(torque_n_m) {
             *mean += share * (torque - *mean);
         }
-        if is_first {
+        if self.cycles < SEARCHED_CYCLES {
             self.search_everywhere();
         } else {
             self.descend(ROUNDS[2]);
@@ -153,14 +163,21 @@ impl Fit {
 
     /// The first search: from several pulls, for the kinks of the profile make local minima.
     fn search_everywhere(&mut self) {
-        let hold_n: f64 = (0..self.at.cells).map(|cell| self.at.friction_n(cell)).sum();
+        let before = self.at;
+        self.begin_with_swings();
         let start = self.at;
+        let hold_n: f64 = (0..start.cells).map(|cell| start.friction_n(cell)).sum();
         let mut best: Option<(f64, Parameters)> = None;
-        let starts = FIRST_PULLS.iter().map(|share| share * hold_n).chain([start.pull_n()]);
-        for pull_n in starts {
-            self.at = start;
-            let pull_at = self.at.pull_at();
-            self.at.values[pull_at] = pull_n;
+        for share in FIRST_PULLS.iter().map(Some).chain([None]) {
+            self.at = match share {
+                Some(share) => {
+                    let mut at = start;
+                    at.values[start.pull_at()] = share * hold_n;
+                    at.values[start.gears_at()] -= share * hold_n / (start.cells as f64 * self.force_per_torque);
+                    at
+                }
+                None => before,
+            };
             self.descend(ROUNDS[0]);
             let at = self.at;
             if let Some(cost) = self.cost(&at).filter(|cost| best.is_none_or(|(least, _)| *cost < least)) {
@@ -171,13 +188,37 @@ impl Fit {
         self.descend(ROUNDS[1]);
     }
 
+    /// Begins at what is known before, with each cell's friction by the swing of the torque in its step: from −k·δmax to k·δmax.
+    fn begin_with_swings(&mut self) {
+        let cells = self.at.cells;
+        self.at.values = self.prior;
+        let mut offset_n_m = 0.0;
+        for place in 0..cells {
+            let step = &self.mean_n_m[place * BINS_PER_STEP..(place + 1) * BINS_PER_STEP];
+            let mean = |bins: &[f64]| bins.iter().sum::<f64>() / bins.len() as f64;
+            let (begin_n_m, end_n_m) = (mean(&step[1..3]), mean(&step[BINS_PER_STEP - 9..BINS_PER_STEP - 1]));
+            let friction_n = 0.5 * (end_n_m - begin_n_m) * self.force_per_torque;
+            let cell = self.model.cell_at(place);
+            let far = 2.5 / self.prior_information[cell].sqrt();
+            self.at.values[cell] += (friction_n.max(1e-6).ln() - self.prior[cell]).clamp(-far, far);
+            offset_n_m += 0.5 * (end_n_m + begin_n_m) / cells as f64;
+        }
+        let gears = self.at.gears_at();
+        self.at.values[gears] = offset_n_m;
+    }
+
     /// Weight of the data: that of the cycles, less what does not average out.
     fn weight(&self) -> f64 {
         self.cycles / (1.0 + self.cycles * self.misfit)
     }
 
     fn bin_weight(bin: usize) -> f64 {
-        FIRST_BIN_WEIGHTS.get(bin % BINS_PER_STEP).copied().unwrap_or(1.0)
+        let of_step = bin % BINS_PER_STEP;
+        match FIRST_BIN_WEIGHTS.get(of_step) {
+            Some(weight) => *weight,
+            None if of_step + 1 == BINS_PER_STEP => LAST_BIN_WEIGHT,
+            None => 1.0,
+        }
     }
 
     /// What the gears make of a profile of the worm.
@@ -185,12 +226,15 @@ impl Fit {
         let gears = parameters.gears_at();
         let values = &parameters.values;
         let (offset, gain, load) = (values[gears], 1.0 + values[gears + 1], values[gears + 2]);
+        let mut plain = [0.0; MAX_BINS];
+        plain[..bins.len()].copy_from_slice(bins);
         for (bin, torque_n_m) in bins.iter_mut().enumerate() {
-            let worm_n_m = *torque_n_m;
-            *torque_n_m = gain * worm_n_m + offset + load * self.load_on_gears_n_m(worm_n_m);
+            let worm_n_m = plain[bin];
+            let led_n_m = worm_n_m + values[gears + 3] * self.bins_per_s * rise(&plain, bin);
+            *torque_n_m = gain * led_n_m + offset + load * self.load_on_gears_n_m(worm_n_m);
             for ripple in 0..self.ripples {
                 let (sine, cosine) = self.ripple_of(ripple, bin);
-                *torque_n_m += values[gears + 3 + 2 * ripple] * sine + values[gears + 4 + 2 * ripple] * cosine;
+                *torque_n_m += values[gears + 4 + 2 * ripple] * sine + values[gears + 5 + 2 * ripple] * cosine;
             }
         }
     }
@@ -267,10 +311,11 @@ impl Fit {
             self.column[gears][bin] = 1.0;
             self.column[gears + 1][bin] = plain[bin];
             self.column[gears + 2][bin] = self.load_on_gears_n_m(plain[bin]);
+            self.column[gears + 3][bin] = gain * self.bins_per_s * rise(&plain, bin);
             for ripple in 0..self.ripples {
                 let (sine, cosine) = self.ripple_of(ripple, bin);
-                self.column[gears + 3 + 2 * ripple][bin] = sine;
-                self.column[gears + 4 + 2 * ripple][bin] = cosine;
+                self.column[gears + 4 + 2 * ripple][bin] = sine;
+                self.column[gears + 5 + 2 * ripple][bin] = cosine;
             }
         }
         let mut single = Matrix::zeros();
@@ -466,4 +511,11 @@ impl Fit {
         }
         Some((centre, CycleFigures::from_flat(&sigma)))
     }
+}
+
+/// By how much the torque rises from bin to bin, within its step.
+fn rise(bins: &[f64], at: usize) -> f64 {
+    let of_step = at % BINS_PER_STEP;
+    let (from, to) = (at - usize::from(of_step > 0), at + usize::from(of_step + 1 < BINS_PER_STEP));
+    (bins[to] - bins[from]) / (to - from) as f64
 }

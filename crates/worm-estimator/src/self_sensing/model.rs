@@ -75,6 +75,11 @@ impl CycleModel {
         }
     }
 
+    /// The cell that makes the step at a place in the cycle.
+    pub(super) fn cell_at(&self, place: usize) -> usize {
+        self.worm.step_order()[place]
+    }
+
     /// The worm of some parameters; `None` when no worm can have them.
     fn worm_of(&self, parameters: &Parameters) -> Option<Worm> {
         let mut worm = self.worm.clone().with_resisting_force_n(parameters.pull_n()).ok()?;

@@ -8,9 +8,10 @@
 //! | 1 | torque beyond the gear model's, N m: its error in dry and viscous friction at this temperature |
 //! | 1 | share by which the torque on the cam is wrong: the error of the torque constant |
 //! | 1 | friction per load on the gears beyond the gear model's |
+//! | 1 | lead of each step's rise, s: damping of the pads |
 //! | 2 for each | sine and cosine of each ripple beyond the gear model's, N m |
 //!
-//! The first 2n + 1 describe the worm, the others the gears: they are estimated with the worm, so that what the gears leave uncertain is
+//! The first 2n + 1 describe the worm of the exact cycle, the others the gears and the pads' damping: they are estimated with the worm, so that what the gears leave uncertain is
 //! uncertain in the worm.
 
 use super::gear::MAX_RIPPLES;
@@ -18,7 +19,7 @@ use nalgebra::{SMatrix, SVector};
 use worm_physics::MAX_CELLS;
 
 /// Most unknowns.
-pub const MAX_UNKNOWNS: usize = 2 * MAX_CELLS + 4 + 2 * MAX_RIPPLES;
+pub const MAX_UNKNOWNS: usize = 2 * MAX_CELLS + 5 + 2 * MAX_RIPPLES;
 
 /// A vector with an entry for every unknown; those not in use are 0.
 pub(super) type Vector = SVector<f64, MAX_UNKNOWNS>;
@@ -43,7 +44,7 @@ impl Parameters {
         2 * self.cells
     }
 
-    /// Where the gears' unknowns begin: offset, gain, load, ripples.
+    /// Where the gears' unknowns begin: offset, gain, load, then the lead, then the ripples.
     pub(super) fn gears_at(&self) -> usize {
         2 * self.cells + 1
     }

@@ -25,6 +25,8 @@ pub enum Unknown {
     TorqueConstant,
     /// Friction by the load on the gears.
     LoadFriction,
+    /// Damping of the pads.
+    Damping,
     /// A ripple of the torque, from 0, its sine or cosine.
     Ripple(usize),
 }
@@ -39,7 +41,8 @@ impl Unknown {
                 1 => Self::GearFriction,
                 2 => Self::TorqueConstant,
                 3 => Self::LoadFriction,
-                ripple => Self::Ripple((ripple - 4) / 2),
+                4 => Self::Damping,
+                ripple => Self::Ripple((ripple - 5) / 2),
             },
         }
     }
