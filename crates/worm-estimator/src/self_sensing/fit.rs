@@ -24,15 +24,15 @@ use std::f64::consts::{PI, TAU};
 use worm_physics::Worm;
 
 /// Damping of the pads makes the force of a loading cell lead by damping over stiffness, s: what is assumed, and its standard deviation.
-const LEAD_S: [f64; 2] = [0.005, 0.005];
+const LEAD_S: [f64; 2] = [0.008, 0.005];
 /// Gait-to-gait scatter of a cell's friction that is assumed before it is measured, as a share.
 const SCATTER_SHARE: f64 = 0.02;
 /// How many cycles of measured scatter that assumption is worth.
 const SCATTER_CYCLES: f64 = 3.0;
 /// Bins over which what the fit leaves hangs together.
-const MISFIT_BINS: f64 = 4.0;
+const MISFIT_BINS: f64 = 8.0;
 /// Torque that no profile is sure of, N m: rounding of the current, speed within a bin.
-const FLOOR_N_M: f64 = 1.5e-4;
+const FLOOR_N_M: f64 = 2e-4;
 /// Weight of the bins on either side of the jump from one step to the next: readings are a tick apart, the jump is not.
 const FIRST_BIN_WEIGHTS: [f64; 2] = [0.01, 0.3];
 const LAST_BIN_WEIGHT: f64 = 0.02;
@@ -43,11 +43,15 @@ const LONGEST: [f64; 2] = [0.4, 0.8];
 /// Expected gain of a step, in units of its variance, below which the search ends.
 const CLOSE_ENOUGH: f64 = 1e-3;
 /// Pulls at which the first search begins, as shares of what all tips hold.
-const FIRST_PULLS: [f64; 9] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, -0.1];
-/// Gauss-Newton steps of the first search from each of them, then from the best, and in later cycles.
-const ROUNDS: [usize; 3] = [5, 12, 2];
-/// Cycles in which everything is searched anew, because the mean profile has become much better.
-const SEARCHED_CYCLES: f64 = 3.5;
+const FIRST_PULLS: [f64; 16] = [
+    0.0, 0.02, 0.04, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.39, 0.45, 0.52, 0.6, -0.1,
+];
+/// The best of these searches go on.
+const BEST: usize = 3;
+/// Gauss-Newton steps from each first pull, then from each of the best, and in later cycles.
+const ROUNDS: [usize; 3] = [2, 12, 2];
+/// Cycles after which everything is searched anew, because the mean profile has become much better.
+const SEARCHED_ANEW: f64 = 3.0;
 
 /// The fit and everything that it keeps between cycles.
 #[derive(Debug, Clone)]
@@ -152,7 +156,7 @@ impl Fit {
         for (mean, torque) in self.mean_n_m.iter_mut().zip(torque_n_m) {
             *mean += share * (torque - *mean);
         }
-        if self.cycles < SEARCHED_CYCLES {
+        if self.cycles == 1.0 || (self.cycles - SEARCHED_ANEW).abs() < 0.5 {
             self.search_everywhere();
         } else {
             self.descend(ROUNDS[2]);
@@ -167,7 +171,7 @@ impl Fit {
         self.begin_with_swings();
         let start = self.at;
         let hold_n: f64 = (0..start.cells).map(|cell| start.friction_n(cell)).sum();
-        let mut best: Option<(f64, Parameters)> = None;
+        let mut best = [(f64::INFINITY, start); BEST];
         for share in FIRST_PULLS.iter().map(Some).chain([None]) {
             self.at = match share {
                 Some(share) => {
@@ -180,12 +184,23 @@ impl Fit {
             };
             self.descend(ROUNDS[0]);
             let at = self.at;
-            if let Some(cost) = self.cost(&at).filter(|cost| best.is_none_or(|(least, _)| *cost < least)) {
-                best = Some((cost, at));
+            if let Some(cost) = self.cost(&at)
+                && let Some(place) = best.iter().position(|(other, _)| cost < *other)
+            {
+                best[place..].rotate_right(1);
+                best[place] = (cost, at);
             }
         }
-        self.at = best.map_or(start, |(_, at)| at);
-        self.descend(ROUNDS[1]);
+        let mut least = (f64::INFINITY, before);
+        for (_, at) in best.into_iter().filter(|(cost, _)| cost.is_finite()) {
+            self.at = at;
+            self.descend(ROUNDS[1]);
+            let at = self.at;
+            if let Some(cost) = self.cost(&at).filter(|cost| *cost < least.0) {
+                least = (cost, at);
+            }
+        }
+        self.at = least.1;
     }
 
     /// Begins at what is known before, with each cell's friction by the swing of the torque in its step: from −k·δmax to k·δmax.
@@ -483,9 +498,16 @@ impl Fit {
         (&self.mean_n_m[..self.bins], &self.predicted_n_m[..self.bins])
     }
 
-    /// Figures of the steady cycle with their standard errors, of the crawl forward or backward.
+    /// Work that the damping of the pads adds to a cycle, J: the lead times what the force rises in each step.
+    fn damping_j(&self) -> f64 {
+        let rise_n_m: f64 = (0..self.at.cells).map(|cell| 2.0 * self.at.friction_n(cell) / self.force_per_torque).sum();
+        self.at.values[self.at.gears_at() + 3] * self.velocity_rad_per_s * rise_n_m
+    }
+
+    /// Figures of the steady cycle with their standard errors, of the crawl forward or backward. The work of the actuator includes that of
+    /// the pads' damping, the losses (11) do not.
     pub(super) fn figures(&self, backward: bool) -> Option<(CycleFigures, CycleFigures)> {
-        let centre = self.model.figures(&self.at, backward)?;
+        let mut centre = self.model.figures(&self.at, backward)?;
         let mut slopes = [[0.0; FIGURES]; 2 * worm_physics::MAX_CELLS + 1];
         for (unknown, slope) in slopes[..self.at.of_worm()].iter_mut().enumerate() {
             let step = STEPS[(unknown / self.at.cells).min(2)];
@@ -509,7 +531,15 @@ impl Fit {
             }
             *sigma = variance.max(0.0).sqrt();
         }
-        Some((centre, CycleFigures::from_flat(&sigma)))
+        let damping_j = self.damping_j();
+        centre.energy_net_j += damping_j;
+        centre.energy_positive_j += damping_j;
+        let mut sigma = CycleFigures::from_flat(&sigma);
+        let lead = self.at.gears_at() + 3;
+        let damping_sigma_j = (damping_j / self.at.values[lead]).abs() * self.covariance[(lead, lead)].max(0.0).sqrt();
+        sigma.energy_net_j = sigma.energy_net_j.hypot(damping_sigma_j);
+        sigma.energy_positive_j = sigma.energy_positive_j.hypot(damping_sigma_j);
+        Some((centre, sigma))
     }
 }
 
