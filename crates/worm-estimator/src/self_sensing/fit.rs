@@ -13,6 +13,7 @@
 //! - what the fit leaves in the mean profile beyond that scatter does not average out. Taken to hang together over
 //!   [`MISFIT_BINS`] bins, it counts fully, and it limits the weight W = N/(1 + N·misfit) that any number of cycles can have.
 //!
+//! Another answer with another pull that the search found and the profile does not exclude adds how far it is, by its probability.
 //! What the prior leaves uncertain (torque constant, friction of the gears) is in A⁻¹ Λ A⁻¹.
 
 use super::SelfSensingConfig;
@@ -42,10 +43,13 @@ const STEPS: [f64; 3] = [0.01, 0.02, 0.03];
 const LONGEST: [f64; 2] = [0.4, 0.8];
 /// Expected gain of a step, in units of its variance, below which the search ends.
 const CLOSE_ENOUGH: f64 = 1e-3;
-/// Pulls at which the first search begins, as shares of what all tips hold.
-const FIRST_PULLS: [f64; 16] = [
-    0.0, 0.02, 0.04, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.39, 0.45, 0.52, 0.6, -0.1,
-];
+/// Where the first search begins: pulls as shares of what all tips hold, and changes of every ln stiffness.
+const FIRST_PULLS: [f64; 12] = [0.0, 0.03, 0.07, 0.11, 0.16, 0.21, 0.27, 0.34, 0.42, 0.5, 0.6, -0.1];
+const FIRST_STIFFNESSES: [f64; 2] = [-0.2, 0.1];
+/// Difference of two pulls, N, that makes another answer of them.
+const OTHER_PULL_N: f64 = 0.25;
+/// Difference of what is minimised up to which another answer still counts.
+const OTHER_COUNTS: f64 = 12.0;
 /// The best of these searches go on.
 const BEST: usize = 3;
 /// Gauss-Newton steps from each first pull, then from each of the best, and in later cycles.
@@ -69,6 +73,8 @@ pub(super) struct Fit {
     prior: Vector,
     prior_information: Vector,
     at: Parameters,
+    other: Option<Parameters>, // another answer, with another pull
+    other_odds: f64,           // its odds to the best
     mean_n_m: Box<[f64; MAX_BINS]>,
     cycles: f64,         // effective number, forgotten ones left out
     squared_cycles: f64, // Σ of the squared weights
@@ -127,6 +133,8 @@ impl Fit {
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
             at,
+            other: None,
+            other_odds: 0.0,
             mean_n_m: Box::new([0.0; MAX_BINS]),
             cycles: 0.0,
             squared_cycles: 0.0,
@@ -161,6 +169,7 @@ impl Fit {
         } else {
             self.descend(ROUNDS[2]);
         }
+        self.weigh_other();
         self.model.begin_at(&self.at);
         self.assess(torque_n_m);
     }
@@ -172,15 +181,17 @@ impl Fit {
         let start = self.at;
         let hold_n: f64 = (0..start.cells).map(|cell| start.friction_n(cell)).sum();
         let mut best = [(f64::INFINITY, start); BEST];
-        for share in FIRST_PULLS.iter().map(Some).chain([None]) {
-            self.at = match share {
-                Some(share) => {
-                    let mut at = start;
-                    at.values[start.pull_at()] = share * hold_n;
-                    at.values[start.gears_at()] -= share * hold_n / (start.cells as f64 * self.force_per_torque);
-                    at
-                }
-                None => before,
+        let starts = FIRST_PULLS.iter().flat_map(|share| FIRST_STIFFNESSES.map(|stiffness| Some((share, stiffness))));
+        for (pull_share, stiffness) in starts.chain([None]).map(|start| start.unwrap_or((&f64::NAN, 0.0))) {
+            self.at = if pull_share.is_nan() {
+                before
+            } else {
+                let mut at = start;
+                let pull_n = pull_share * hold_n;
+                at.values[start.pull_at()] = pull_n;
+                at.values[start.gears_at()] -= pull_n / (start.cells as f64 * self.force_per_torque);
+                (0..start.cells).for_each(|cell| at.values[start.cells + cell] += stiffness);
+                at
             };
             self.descend(ROUNDS[0]);
             let at = self.at;
@@ -191,16 +202,43 @@ impl Fit {
                 best[place] = (cost, at);
             }
         }
-        let mut least = (f64::INFINITY, before);
+        (self.at, self.other) = (before, None);
+        let mut least = f64::INFINITY;
         for (_, at) in best.into_iter().filter(|(cost, _)| cost.is_finite()) {
-            self.at = at;
+            let settled = std::mem::replace(&mut self.at, at);
             self.descend(ROUNDS[1]);
             let at = self.at;
-            if let Some(cost) = self.cost(&at).filter(|cost| *cost < least.0) {
-                least = (cost, at);
+            let Some(cost) = self.cost(&at) else { continue };
+            let is_other = (at.pull_n() - settled.pull_n()).abs() > OTHER_PULL_N;
+            if cost < least {
+                self.other = if is_other && least.is_finite() { Some(settled) } else { self.other };
+                least = cost;
+            } else {
+                self.at = settled;
+                if is_other && self.other.is_none() {
+                    self.other = Some(at);
+                }
             }
         }
-        self.at = least.1;
+    }
+
+    /// Follows the other answer, too, and takes it where it has become the better one.
+    fn weigh_other(&mut self) {
+        self.other_odds = 0.0;
+        let Some(other) = self.other else { return };
+        let best = std::mem::replace(&mut self.at, other);
+        self.descend(1);
+        let other = std::mem::replace(&mut self.at, best);
+        let (Some(cost), Some(other_cost)) = (self.cost(&best), self.cost(&other)) else {
+            self.other = None;
+            return;
+        };
+        if (best.pull_n() - other.pull_n()).abs() < OTHER_PULL_N || other_cost - cost > OTHER_COUNTS {
+            self.other = None;
+            return;
+        }
+        (self.at, self.other) = if other_cost < cost { (other, Some(best)) } else { (best, Some(other)) };
+        self.other_odds = (-0.5 * (other_cost - cost).abs()).exp();
     }
 
     /// Begins at what is known before, with each cell's friction by the swing of the torque in its step: from −k·δmax to k·δmax.
@@ -447,6 +485,11 @@ impl Fit {
         if let Some(inverse) = self.information().cholesky().map(|cholesky| cholesky.inverse()) {
             self.covariance = inverse * meat * inverse;
         }
+        if let Some(other) = &self.other {
+            // Of two answers, at the better one: its covariance, and how far the other is, as probably as it is true.
+            let apart = other.values - self.at.values;
+            self.covariance += apart * apart.transpose() * (self.other_odds / (1.0 + self.other_odds));
+        }
     }
 
     /// One cycle's difference to the mean of all, by a step from the present parameters in which each unknown may change by about
@@ -476,6 +519,11 @@ impl Fit {
 
     pub(super) fn unknowns(&self) -> usize {
         self.unknowns
+    }
+
+    /// Another answer, which the profile does not exclude: its pull, N, and its probability.
+    pub(super) fn other(&self) -> Option<(f64, f64)> {
+        self.other.map(|other| (other.pull_n(), self.other_odds / (1.0 + self.other_odds)))
     }
 
     /// Standard deviation of what was known of an unknown before.

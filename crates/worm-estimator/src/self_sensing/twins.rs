@@ -68,6 +68,8 @@ pub struct Blind {
     pub twins: [Option<Twin>; MAX_TWINS],
     /// Bit i: unknown i, in the order of [`Unknown`] with all cells of one kind after another, is hardly better known than before.
     pub unlearned: u64,
+    /// Another answer that the profile does not exclude: its pull, N, and its probability. More pull looks like less friction in the gears.
+    pub other_pull: Option<(f64, f64)>,
     cells: usize,
 }
 
@@ -77,6 +79,7 @@ impl Blind {
         let mut blind = Self {
             twins: [None; MAX_TWINS],
             unlearned: 0,
+            other_pull: fit.other(),
             cells,
         };
         for a in 0..fit.unknowns() {
