@@ -6,7 +6,7 @@
 
 use super::parameters::{Parameters, Vector};
 use super::profile::BINS_PER_STEP;
-use worm_physics::MAX_CELLS;
+use worm_physics::{MAX_CELLS, Worm};
 
 /// Cycles that must be known before a cycle can differ from them.
 const KNOWN_CYCLES: f64 = 3.0;
@@ -67,6 +67,8 @@ pub struct Armed {
 #[derive(Debug, Clone)]
 pub(super) struct ChangeDetector {
     cells: usize,
+    step_order: [usize; MAX_CELLS],
+    gear_friction_n_m: f64,
     in_a_row: u32,
     reference: Option<Reference>,
     changes: Changes,
@@ -82,6 +84,20 @@ struct Reference {
     gear_n_m: f64,
 }
 
+/// A cycle beside those before.
+pub(super) struct ComparedCycle<'a> {
+    /// The worm and the gears before.
+    pub(super) usual: &'a Parameters,
+    /// How many cycles that was.
+    pub(super) cycles: f64,
+    /// By how much the unknowns differ in this cycle, and the standard errors.
+    pub(super) change: (Vector, Vector),
+    /// Torque profile of this cycle.
+    pub(super) torque_n_m: &'a [f64],
+    /// Mean profile of those before.
+    pub(super) mean_n_m: &'a [f64],
+}
+
 /// What a cycle is, for the detector.
 pub(super) enum Seen {
     /// Like the others.
@@ -93,9 +109,15 @@ pub(super) enum Seen {
 }
 
 impl ChangeDetector {
-    pub(super) fn new(cells: usize) -> Self {
+    /// `gear_friction_n_m` is the usual friction of the gears without load.
+    pub(super) fn new(worm: &Worm, gear_friction_n_m: f64) -> Self {
+        let cells = worm.cells();
+        let mut step_order = [0; MAX_CELLS];
+        step_order[..cells].copy_from_slice(worm.step_order());
         Self {
             cells,
+            step_order,
+            gear_friction_n_m,
             in_a_row: 0,
             reference: None,
             changes: Changes::default(),
@@ -122,35 +144,37 @@ impl ChangeDetector {
         &self.armed
     }
 
-    /// Compares a cycle: its difference to the mean of `cycles` and its standard errors, its profile and the mean one.
-    pub(super) fn compare(
-        &mut self,
-        usual: &Parameters,
-        cycles: f64,
-        (change, sigma): &(Vector, Vector),
-        torque_n_m: &[f64],
-        mean_n_m: &[f64],
-        gear_friction_n_m: f64,
-    ) -> Seen {
+    /// Compares a cycle with those before.
+    pub(super) fn compare(&mut self, cycle: &ComparedCycle) -> Seen {
+        let ComparedCycle {
+            usual,
+            cycles,
+            change: (change, sigma),
+            torque_n_m,
+            mean_n_m,
+        } = cycle;
+        let gear_friction_n_m = self.gear_friction_n_m;
+        let step_order = self.step_order;
+        let step_order = &step_order[..self.cells];
         let sigma_of = |index: usize, scatter: f64| (sigma[index].powi(2) + scatter * scatter).sqrt();
         let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
         self.armed = Armed {
             pull_sigma_n: sigma_of(pull_at, PULL_SCATTER_N),
             ..Armed::default()
         };
-        if cycles < KNOWN_CYCLES {
+        if *cycles < KNOWN_CYCLES {
             return Seen::Usual;
         }
-        let mut now = Reference::of(usual, mean_n_m);
+        let mut now = Reference::of(usual, mean_n_m, step_order);
         let before = now;
         let mut odd = false;
-        for cell in 0..self.cells {
+        for (place, &cell) in step_order.iter().enumerate() {
             let sigma = sigma_of(cell, SCATTER);
             self.armed.friction_sigma = self.armed.friction_sigma.max(sigma);
             self.armed.friction |= u16::from(SIGMAS * sigma < 0.35) << cell;
             odd |= change[cell].abs() > FRICTION_CHANGE.max(SIGMAS * sigma);
             now.ln_friction[cell] += change[cell];
-            now.swing_n_m[cell] = swing_n_m(torque_n_m, cell);
+            now.swing_n_m[cell] = swing_n_m(torque_n_m, place);
             let share = now.swing_n_m[cell] / before.swing_n_m[cell];
             odd |= !(JAMMED_SHARE..1.0 / JAMMED_SHARE).contains(&share);
             self.armed.jammed |= 1 << cell;
@@ -180,16 +204,16 @@ impl ChangeDetector {
 }
 
 impl Reference {
-    fn of(parameters: &Parameters, mean_n_m: &[f64]) -> Self {
+    fn of(parameters: &Parameters, mean_n_m: &[f64], step_order: &[usize]) -> Self {
         let mut reference = Self {
             ln_friction: [0.0; MAX_CELLS],
             swing_n_m: [0.0; MAX_CELLS],
             pull_n: parameters.pull_n(),
             gear_n_m: parameters.values[parameters.gears_at()],
         };
-        for cell in 0..parameters.cells {
+        for (place, &cell) in step_order.iter().enumerate() {
             reference.ln_friction[cell] = parameters.friction_n(cell).ln();
-            reference.swing_n_m[cell] = swing_n_m(mean_n_m, cell);
+            reference.swing_n_m[cell] = swing_n_m(mean_n_m, place);
         }
         reference
     }
@@ -216,7 +240,7 @@ impl Reference {
     }
 }
 
-/// Torque at the end of a cell's step less that near its beginning, N m. Cells are counted in the order in which they step.
+/// Torque at the end of a step less that near its beginning, N m.
 fn swing_n_m(torque_n_m: &[f64], place: usize) -> f64 {
     let step = &torque_n_m[place * BINS_PER_STEP..(place + 1) * BINS_PER_STEP];
     let mean = |bins: &[f64]| bins.iter().sum::<f64>() / bins.len() as f64;

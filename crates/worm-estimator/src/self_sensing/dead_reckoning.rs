@@ -2,7 +2,8 @@
 //!
 //! State: the position, and the bias of the inferred advance per cycle. The bias is the same in every cycle, so its error grows in
 //! proportion to the distance; what scatters from cycle to cycle adds up as a random walk. A mark (a known place, or a tracker sample)
-//! corrects both by Kalman's equations: after two marks the bias is known as well as they allow.
+//! corrects both by Kalman's equations: after two marks the bias is known as well as they allow. An advance that becomes better known
+//! corrects what was reckoned with the worse one.
 
 /// A known position of the worm's mean cell along the canal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,9 +23,13 @@ pub struct Reckoned {
     pub sigma_m: f64,
 }
 
+/// Least variance of an advance, m²: below it nothing is known.
+const MIN_VARIANCE_M2: f64 = 1e-16;
+
 /// The dead reckoning.
 #[derive(Debug, Clone)]
 pub struct DeadReckoning {
+    advance_m: f64, // of a forward cycle, by the fit
     position_m: f64,
     bias_m: f64, // of the advance per cycle
     position_variance: f64,
@@ -35,10 +40,11 @@ pub struct DeadReckoning {
 }
 
 impl DeadReckoning {
-    /// At position 0, where an advance per cycle has this standard error, m.
-    pub fn new(advance_sigma_m: f64) -> Self {
-        let variance = advance_sigma_m * advance_sigma_m;
+    /// At position 0, where the worm advances by so much a cycle, m, with this standard error.
+    pub fn new(advance_m: f64, advance_sigma_m: f64) -> Self {
+        let variance = (advance_sigma_m * advance_sigma_m).max(MIN_VARIANCE_M2);
         Self {
+            advance_m,
             position_m: 0.0,
             bias_m: 0.0,
             position_variance: 0.0,
@@ -49,18 +55,33 @@ impl DeadReckoning {
         }
     }
 
-    /// The advance per cycle is known better now, or less well.
-    pub fn set_advance_sigma(&mut self, advance_sigma_m: f64) {
-        self.fit_variance = (advance_sigma_m * advance_sigma_m).max(1e-16);
-        let variance = 1.0 / (1.0 / self.fit_variance + self.mark_information);
-        if self.bias_variance > 0.0 {
-            self.covariance *= (variance / self.bias_variance).sqrt();
-        }
+    /// The advance of a forward cycle is better known now, m.
+    pub fn know_advance(&mut self, advance_m: f64, advance_sigma_m: f64) {
+        let change_m = advance_m - self.advance_m;
+        self.advance_m = advance_m;
+        self.fit_variance = (advance_sigma_m * advance_sigma_m).max(MIN_VARIANCE_M2);
+        let information = 1.0 / self.fit_variance + self.mark_information;
+        // What marks taught about the sum of advance and bias stays, whatever the fit says of the advance.
+        let by_marks = self.mark_information / information;
+        self.bias_m -= by_marks * change_m;
+        let gain = self.covariance / self.bias_variance;
+        self.position_m += gain * (1.0 - by_marks) * change_m;
+        let variance = 1.0 / information;
+        self.position_variance = (self.position_variance - gain * gain * (self.bias_variance - variance)).max(0.0);
+        self.covariance = gain * variance;
         self.bias_variance = variance;
     }
 
-    /// The cam turned by `turned` cycles, in which the worm advances by `advance_m` a cycle, with `scatter_m` from cycle to cycle.
-    pub fn turn(&mut self, turned: f64, advance_m: f64, scatter_m: f64) {
+    /// The worm is another from now on: what is learned of its advance does not correct what is behind.
+    pub fn begin_anew(&mut self) {
+        self.covariance = 0.0;
+        (self.bias_m, self.mark_information) = (0.0, 0.0);
+        self.bias_variance = self.fit_variance;
+    }
+
+    /// The cam turned by `turned` cycles; one backward takes the worm back by `backward_m`. `scatter_m` is from cycle to cycle.
+    pub fn turn(&mut self, turned: f64, backward_m: f64, scatter_m: f64) {
+        let advance_m = if turned > 0.0 { self.advance_m } else { backward_m };
         self.position_m += turned * (advance_m + self.bias_m);
         self.position_variance +=
             turned * (2.0 * self.covariance + turned * self.bias_variance) + turned.abs() * scatter_m * scatter_m;
@@ -77,7 +98,7 @@ impl DeadReckoning {
         let (gain, bias_gain) = (self.position_variance / variance, self.covariance / variance);
         self.position_m += gain * innovation_m;
         self.bias_m += bias_gain * innovation_m;
-        self.bias_variance = (self.bias_variance - bias_gain * self.covariance).max(1e-16);
+        self.bias_variance = (self.bias_variance - bias_gain * self.covariance).max(MIN_VARIANCE_M2);
         self.covariance *= 1.0 - gain;
         self.position_variance *= 1.0 - gain;
         self.mark_information = (1.0 / self.bias_variance - 1.0 / self.fit_variance).max(0.0);
@@ -96,33 +117,53 @@ impl DeadReckoning {
 mod tests {
     use super::*;
 
+    fn crawled(cycles: u32) -> DeadReckoning {
+        let mut reckoning = DeadReckoning::new(5e-3, 1e-4);
+        (0..cycles).for_each(|_| reckoning.turn(1.0, 5e-3, 0.0));
+        reckoning
+    }
+
     #[test]
     fn a_bias_grows_with_the_distance_and_a_mark_corrects_it() {
-        let mut reckoning = DeadReckoning::new(1e-4);
-        for _ in 0..100 {
-            reckoning.turn(1.0, 5e-3, 0.0);
-        }
+        let mut reckoning = crawled(100);
         let before = reckoning.reckoned();
         assert!((before.position_m - 0.5).abs() < 1e-12 && (before.sigma_m - 0.01).abs() < 1e-12);
         // The worm really made 4.9 mm a cycle.
-        reckoning.mark(&Mark { position_m: 0.49, sigma_m: 1e-4 });
+        reckoning.mark(&Mark {
+            position_m: 0.49,
+            sigma_m: 1e-4,
+        });
         let after = reckoning.reckoned();
         assert!((after.position_m - 0.49).abs() < 1e-5 && after.sigma_m < 1.1e-4);
         for _ in 0..100 {
             reckoning.turn(1.0, 5e-3, 0.0);
+            // The fit, which is surer by far than it should be, does not overrule the mark.
+            reckoning.know_advance(5e-3, 1e-4);
         }
         let end = reckoning.reckoned();
-        assert!((end.position_m - 0.98).abs() < 2e-5, "{end:?}");
-        assert!(end.sigma_m < 3e-4, "{end:?}");
+        assert!((end.position_m - 0.98).abs() < 2e-5 && end.sigma_m < 3e-4, "{end:?}");
     }
 
     #[test]
     fn there_and_back_the_bias_cancels_and_the_scatter_does_not() {
-        let mut reckoning = DeadReckoning::new(1e-4);
+        let mut reckoning = DeadReckoning::new(5e-3, 1e-4);
         for turned in [1.0; 50].into_iter().chain([-1.0; 50]) {
             reckoning.turn(turned, 5e-3, 2e-5);
         }
         let end = reckoning.reckoned();
         assert!(end.position_m.abs() < 1e-12 && (end.sigma_m - 2e-4).abs() < 1e-6, "{end:?}");
+    }
+
+    #[test]
+    fn a_better_advance_corrects_what_is_behind_unless_the_worm_is_another() {
+        let mut reckoning = crawled(10);
+        reckoning.know_advance(4.8e-3, 1e-5);
+        let end = reckoning.reckoned();
+        assert!((end.position_m - 0.048).abs() < 1e-9 && (end.sigma_m - 1e-4).abs() < 1e-9, "{end:?}");
+        let mut reckoning = crawled(10);
+        reckoning.begin_anew();
+        reckoning.know_advance(4.8e-3, 1e-5);
+        let end = reckoning.reckoned();
+        assert!((end.position_m - 0.05).abs() < 1e-9 && (end.sigma_m - 1e-3).abs() < 1e-9, "{end:?}");
     }
 }

@@ -37,7 +37,7 @@ pub use parameters::Parameters;
 pub use profile::{BINS_PER_STEP, MAX_BINS};
 pub use twins::{Blind, Twin, Unknown};
 
-use change::{ChangeDetector, Seen};
+use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
 use fit::Fit;
 use parameters::Vector;
@@ -153,7 +153,6 @@ pub struct SelfSensing {
     gear: GearModel,
     weight_n: f64,
     stroke_m: f64,
-    cycle_s: f64,
     profile: Profile,
     fit: Fit,
     detector: ChangeDetector,
@@ -185,16 +184,17 @@ impl SelfSensing {
     /// of `config`.
     pub fn new(worm: &Worm, config: &SelfSensingConfig) -> Self {
         let fit = Fit::new(worm, config);
-        let detector = ChangeDetector::new(worm.cells());
+        let gear = &config.gear;
+        let gear_friction_n_m = gear.dry_n_m + gear.viscous_n_m_s_per_rad * TAU / config.cycle_s;
+        let detector = ChangeDetector::new(worm, gear_friction_n_m);
         let mut sensing = Self {
             gear: config.gear,
             weight_n: worm.weight_n(),
             stroke_m: worm.stroke_m(),
-            cycle_s: config.cycle_s,
             profile: Profile::new(worm.cells()),
             allowed: detector.allowed(),
             detector,
-            reckoning: DeadReckoning::new(0.0),
+            reckoning: DeadReckoning::new(0.0, 0.0),
             advance_m: [0.0; 2],
             fit,
             last: None,
@@ -204,6 +204,9 @@ impl SelfSensing {
             sensed: None,
         };
         sensing.follow();
+        if let Some(sensed) = sensing.sensed.take() {
+            sensing.reckoning = DeadReckoning::new(sensed.figures.advance_m, sensed.figures_sigma.advance_m);
+        }
         sensing
     }
 
@@ -272,7 +275,7 @@ impl SelfSensing {
     fn reckon(&mut self, turned: f64) {
         let advance_m = if turned > 0.0 { self.advance_m[0] } else { self.advance_m[1] };
         let scatter_m = ADVANCE_SCATTER_SHARE * (self.stroke_m - advance_m).abs();
-        self.reckoning.turn(turned, advance_m, scatter_m);
+        self.reckoning.turn(turned, self.advance_m[1], scatter_m);
     }
 
     fn add_energy(&mut self, from: &MotorSample, to: &MotorSample) {
@@ -300,16 +303,20 @@ impl SelfSensing {
             return false;
         }
         let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
-        let friction_n_m = self.gear.dry_n_m + self.gear.viscous_n_m_s_per_rad * TAU / self.cycle_s;
         let seen = self.fit.change(torque_n_m, &self.allowed).map_or(Seen::Usual, |change| {
-            let (parameters, cycles) = (self.fit.parameters(), self.fit.cycles());
-            let mean_n_m = self.fit.profiles_n_m().0;
-            self.detector.compare(parameters, cycles, &change, torque_n_m, mean_n_m, friction_n_m)
+            self.detector.compare(&ComparedCycle {
+                usual: self.fit.parameters(),
+                cycles: self.fit.cycles(),
+                change,
+                torque_n_m,
+                mean_n_m: self.fit.profiles_n_m().0,
+            })
         });
         match seen {
             Seen::Usual => self.fit.take(torque_n_m, variance),
             Seen::Odd => {}
             Seen::Changed => {
+                self.reckoning.begin_anew();
                 self.fit.forget();
                 self.fit.take(torque_n_m, variance);
             }
@@ -323,7 +330,7 @@ impl SelfSensing {
         let Some((figures, figures_sigma)) = self.fit.figures(false) else { return };
         let backward_m = self.fit.figures(true).map_or(figures.advance_m, |(backward, _)| backward.advance_m);
         self.advance_m = [figures.advance_m, backward_m];
-        self.reckoning.set_advance_sigma(figures_sigma.advance_m);
+        self.reckoning.know_advance(figures.advance_m, figures_sigma.advance_m);
         let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());
         let cells = parameters.cells;
         let sigma = |unknown: usize| covariance[(unknown, unknown)].max(0.0).sqrt();

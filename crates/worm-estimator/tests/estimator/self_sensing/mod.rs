@@ -3,11 +3,30 @@
 mod plant;
 
 use plant::{Drawn, Plant};
-use worm_estimator::self_sensing::{SelfSensed, SelfSensing};
+use worm_estimator::self_sensing::{Changes, SelfSensed, SelfSensing};
+use worm_physics::{Worm, steady_cycle};
 
-/// Number of worms.
-fn seeds(few: u64) -> u64 {
-    std::env::var("WORMD_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(few)
+/// Seeds of the worms: `few` from 1 on, or as many as `WORMD_SEEDS` says from `WORMD_FIRST_SEED` on.
+fn seeds(few: u64) -> std::ops::Range<u64> {
+    let from_environment = |name, otherwise| {
+        let text = std::env::var(name).ok();
+        text.and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+    };
+    let first = from_environment("WORMD_FIRST_SEED", 1);
+    first..first + from_environment("WORMD_SEEDS", few)
+}
+
+/// A drawn worm, its plant, and what senses it.
+fn worm_of(seed: u64) -> (Drawn, Plant, SelfSensing) {
+    let drawn = Drawn::new(seed);
+    let plant = Plant::new(&drawn);
+    let sensing = SelfSensing::new(&drawn.told, &drawn.config());
+    (drawn, plant, sensing)
+}
+
+/// A cell of a worm, by its seed.
+fn any_cell(drawn: &Drawn) -> usize {
+    drawn.seed as usize % drawn.worm.cells()
 }
 
 /// Errors of a quantity, and what was said of them.
@@ -67,10 +86,9 @@ fn crawl(plant: &mut Plant, sensing: &mut SelfSensing, cycles: usize, mut each: 
 fn ten_cycles_of_drawn_worms() {
     let [mut friction, mut stiffness, mut slope, mut energy, mut net, mut electrical, mut advance] =
         std::array::from_fn(|_| Errors::default());
-    for seed in 1..=seeds(12) {
-        let drawn = Drawn::new(seed);
-        let mut plant = Plant::new(&drawn);
-        let mut sensing = SelfSensing::new(&drawn.told, &drawn.config());
+    let seeds = seeds(12);
+    for seed in seeds.clone() {
+        let (drawn, mut plant, mut sensing) = worm_of(seed);
         crawl(&mut plant, &mut sensing, 12, |plant, sensed| {
             let [.., before, after] = &plant.milestones[..] else { return };
             let truth_j = after.electrical_j - before.electrical_j;
@@ -109,7 +127,7 @@ fn ten_cycles_of_drawn_worms() {
             );
         }
     }
-    println!("{} worms, seeds 1 to {}, ten cycles", slope.relative.len(), seeds(12));
+    println!("{} worms from seed {}, ten cycles", seeds.end - seeds.start, seeds.start);
     friction.line("friction, %", 100.0);
     stiffness.line("stiffness, %", 100.0);
     slope.line("slope, degrees", 1.0);
@@ -119,4 +137,139 @@ fn ten_cycles_of_drawn_worms() {
     advance.line("advance, %", 100.0);
     println!("slope within 2 degrees: {:.0} %", 100.0 * slope.within(2.0));
     println!("advance within 5 %: {:.0} %", 100.0 * advance.within(0.05));
+}
+
+#[test]
+fn distance_after_fifty_cycles() {
+    let mut distance = Errors::default();
+    let seeds = seeds(6);
+    for seed in seeds.clone() {
+        let (_, mut plant, mut sensing) = worm_of(seed);
+        crawl(&mut plant, &mut sensing, 50, |_, _| {});
+        let truth_m = plant.milestones[50].position_m;
+        let reckoned = sensing.reckoned();
+        distance.add(reckoned.position_m - truth_m, truth_m, reckoned.sigma_m);
+    }
+    println!("{} worms from seed {}, fifty cycles", seeds.end - seeds.start, seeds.start);
+    distance.line("distance, %", 100.0);
+    println!("distance within 5 %: {:.0} %", 100.0 * distance.within(0.05));
+}
+
+/// Cycles after a change until something is reported, at most `cycles`; and what is reported then.
+fn reported(plant: &mut Plant, sensing: &mut SelfSensing, cycles: usize) -> Option<(usize, Changes)> {
+    let from = plant.cycles();
+    let mut first = None;
+    crawl(plant, sensing, cycles, |plant, sensed| {
+        if sensed.changes.any() && first.is_none() {
+            first = Some((plant.cycles() - from, sensed.changes));
+        }
+    });
+    first
+}
+
+#[test]
+fn a_changed_worm_is_reported() {
+    let [mut lost, mut right_cell, mut all_lost, mut jammed, mut loaded] = [0; 5];
+    let seeds = seeds(6);
+    let count = (seeds.end - seeds.start) as f64;
+    let sliding = |worm: &Worm| worm.check_hold().is_err() || steady_cycle(worm).cycle().is_none();
+    let mut all_can = 0.0;
+    for seed in seeds.clone() {
+        let (drawn, plant, mut sensing) = worm_of(seed);
+        let cell = any_cell(&drawn);
+        let mut usual = plant;
+        crawl(&mut usual, &mut sensing, 10, |_, sensed| assert!(!sensed.changes.any(), "seed {seed}"));
+        let mut try_out = |worm: Worm| {
+            let (mut plant, mut sensing) = (usual.clone(), sensing.clone());
+            plant.change(worm);
+            reported(&mut plant, &mut sensing, 3).map(|(_, changes)| changes)
+        };
+        let mut wet = drawn.worm.clone();
+        wet.scale_friction(Some(cell), 0.7);
+        if let Some(changes) = try_out(wet) {
+            lost += u32::from(changes.friction_lost != 0);
+            right_cell += u32::from(changes.friction_lost == 1 << cell);
+        }
+        let mut wet = drawn.worm.clone();
+        wet.scale_friction(None, 0.7);
+        if !sliding(&wet) {
+            all_can += 1.0;
+            all_lost += u32::from(try_out(wet).is_some_and(|changes| changes.friction_lost != 0));
+        }
+        let stuck = drawn.worm.clone().with_stroke_scale(cell, 0.0).expect("a stroke in range");
+        jammed += u32::from(try_out(stuck).is_some_and(|changes| changes.jammed == 1 << cell));
+        let dragged = drawn.worm.clone().with_resisting_force_n(0.8).expect("a force in range");
+        if !sliding(&dragged) {
+            loaded += u32::from(try_out(dragged).is_some_and(|changes| changes.any()));
+        }
+    }
+    let percent = |part: u32, of: f64| 100.0 * f64::from(part) / of;
+    println!("{count} worms from seed {}, a change after ten cycles, reported within three", seeds.start);
+    println!("30 % of a cell's friction lost: {:.0} %, that cell {:.0} %", percent(lost, count), percent(right_cell, count));
+    println!("30 % of all friction lost: {:.0} %", percent(all_lost, all_can));
+    println!("jammed, that cell: {:.0} %; drag of 0.8 N: {:.0} %", percent(jammed, count), percent(loaded, count));
+}
+
+#[test]
+fn a_sound_worm_raises_nothing() {
+    let mut hours = 0.0;
+    let seeds = seeds(4);
+    for seed in seeds.clone() {
+        let (_, mut plant, mut sensing) = worm_of(seed);
+        crawl(&mut plant, &mut sensing, 100, |plant, sensed| {
+            assert!(!sensed.changes.any(), "seed {seed}, cycle {}: {:?}", plant.cycles(), sensed.changes);
+        });
+        hours += 100.0 * 2.5 / 3600.0;
+    }
+    println!("{hours:.1} simulated hours from seed {} without an alarm", seeds.start);
+}
+
+/// Estimates before and after a change, and which of two changes of the same advance explains the difference.
+#[test]
+fn payload_or_softer_pads() {
+    let seeds = seeds(4);
+    let [mut right, mut count] = [0.0, 0.0];
+    for seed in seeds.clone() {
+        let (drawn, mut plant, mut sensing) = worm_of(seed);
+        if drawn.slope_deg() < 15.0 {
+            continue;
+        }
+        let payload_kg = 0.03;
+        let mut laden = drawn.worm.clone();
+        laden.add_mass_kg(payload_kg);
+        let softened = |factor: f64| {
+            let mut worm = drawn.worm.clone();
+            worm.scale_stiffness(None, factor);
+            worm
+        };
+        let advance_m = |worm: &Worm| steady_cycle(worm).cycle().map_or(-1.0, |cycle| cycle.advance_m);
+        let (mut low, mut high) = (0.3, 1.0);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if advance_m(&softened(middle)) < advance_m(&laden) { low = middle } else { high = middle }
+        }
+        if advance_m(&laden) < 1e-3 || low < 0.31 {
+            continue;
+        }
+        crawl(&mut plant, &mut sensing, 11, |_, _| {});
+        let before = *sensing.sensed().expect("cycles were seen");
+        let pull_n = payload_kg * 9.81 * drawn.worm.slope_rad().sin();
+        for (worm, is_payload) in [(laden, true), (softened(low), false)] {
+            let mut plant = plant.clone();
+            plant.change(worm);
+            let mut sensing = SelfSensing::new(&drawn.told, &drawn.config());
+            crawl(&mut plant, &mut sensing, 12, |_, _| {});
+            let after = sensing.sensed().expect("cycles were seen");
+            let stiffness = |sensed: &SelfSensed| {
+                let logs = sensed.stiffness_n_per_m[..sensed.cells].iter().map(|stiffness| stiffness.ln());
+                logs.sum::<f64>() / sensed.cells as f64
+            };
+            let pulled = (after.pull_n - before.pull_n) / pull_n;
+            let softer = (stiffness(after) - stiffness(&before)) / low.ln();
+            // In units of either hypothesis: payload is (1, 0), softer pads are (0, 1).
+            right += f64::from(u8::from((pulled > softer) == is_payload));
+            count += 1.0;
+        }
+    }
+    println!("payload of 30 g or softer pads: {right} of {count} told apart, from seed {}", seeds.start);
 }

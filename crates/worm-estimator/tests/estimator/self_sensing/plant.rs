@@ -139,6 +139,7 @@ pub struct Milestone {
 }
 
 /// The worm in motion.
+#[derive(Clone)]
 pub struct Plant {
     drawn: Drawn,
     mechanics: Mechanics,
