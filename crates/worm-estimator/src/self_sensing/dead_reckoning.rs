@@ -151,7 +151,10 @@ mod tests {
             reckoning.turn(turned, 5e-3, 2e-5);
         }
         let end = reckoning.reckoned();
-        assert!(end.position_m.abs() < 1e-12 && (end.sigma_m - 2e-4).abs() < 1e-6, "{end:?}");
+        assert!(
+            end.position_m.abs() < 1e-12 && (end.sigma_m - 2e-4).abs() < 1e-6,
+            "{end:?}"
+        );
     }
 
     #[test]
@@ -159,11 +162,17 @@ mod tests {
         let mut reckoning = crawled(10);
         reckoning.know_advance(4.8e-3, 1e-5);
         let end = reckoning.reckoned();
-        assert!((end.position_m - 0.048).abs() < 1e-9 && (end.sigma_m - 1e-4).abs() < 1e-9, "{end:?}");
+        assert!(
+            (end.position_m - 0.048).abs() < 1e-9 && (end.sigma_m - 1e-4).abs() < 1e-9,
+            "{end:?}"
+        );
         let mut reckoning = crawled(10);
         reckoning.begin_anew();
         reckoning.know_advance(4.8e-3, 1e-5);
         let end = reckoning.reckoned();
-        assert!((end.position_m - 0.05).abs() < 1e-9 && (end.sigma_m - 1e-3).abs() < 1e-9, "{end:?}");
+        assert!(
+            (end.position_m - 0.05).abs() < 1e-9 && (end.sigma_m - 1e-3).abs() < 1e-9,
+            "{end:?}"
+        );
     }
 }

@@ -82,7 +82,7 @@ pub(super) struct Fit {
     misfit: f64,         // MISFIT_BINS · variance of the misfit / R
     scatter: Matrix,     // Σ of squared scores about the mean
     scatter_count: f64,
-    single: Matrix,      // M
+    single: Matrix, // M
     covariance: Matrix,
     column: Box<[[f64; MAX_BINS]; MAX_UNKNOWNS]>,
     predicted_n_m: Box<[f64; MAX_BINS]>,
@@ -92,7 +92,10 @@ impl Fit {
     pub(super) fn new(worm: &Worm, config: &SelfSensingConfig) -> Self {
         let cells = worm.cells();
         let gear = &config.gear;
-        let mut at = Parameters { cells, values: Vector::zeros() };
+        let mut at = Parameters {
+            cells,
+            values: Vector::zeros(),
+        };
         let mut sigma = Vector::repeat(1.0);
         for (cell, contact) in worm.contacts().iter().enumerate() {
             at.values[cell] = (contact.stiffness_n_per_m * contact.forward_bound_m).max(1e-3).ln();
@@ -181,7 +184,9 @@ impl Fit {
         let start = self.at;
         let hold_n: f64 = (0..start.cells).map(|cell| start.friction_n(cell)).sum();
         let mut best = [(f64::INFINITY, start); BEST];
-        let starts = FIRST_PULLS.iter().flat_map(|share| FIRST_STIFFNESSES.map(|stiffness| Some((share, stiffness))));
+        let starts = FIRST_PULLS
+            .iter()
+            .flat_map(|share| FIRST_STIFFNESSES.map(|stiffness| Some((share, stiffness))));
         for (pull_share, stiffness) in starts.chain([None]).map(|start| start.unwrap_or((&f64::NAN, 0.0))) {
             self.at = if pull_share.is_nan() {
                 before
@@ -211,7 +216,11 @@ impl Fit {
             let Some(cost) = self.cost(&at) else { continue };
             let is_other = (at.pull_n() - settled.pull_n()).abs() > OTHER_PULL_N;
             if cost < least {
-                self.other = if is_other && least.is_finite() { Some(settled) } else { self.other };
+                self.other = if is_other && least.is_finite() {
+                    Some(settled)
+                } else {
+                    self.other
+                };
                 least = cost;
             } else {
                 self.at = settled;
@@ -237,7 +246,11 @@ impl Fit {
             self.other = None;
             return;
         }
-        (self.at, self.other) = if other_cost < cost { (other, Some(best)) } else { (best, Some(other)) };
+        (self.at, self.other) = if other_cost < cost {
+            (other, Some(best))
+        } else {
+            (best, Some(other))
+        };
         self.other_odds = (-0.5 * (other_cost - cost).abs()).exp();
     }
 
@@ -523,7 +536,8 @@ impl Fit {
 
     /// Another answer, which the profile does not exclude: its pull, N, and its probability.
     pub(super) fn other(&self) -> Option<(f64, f64)> {
-        self.other.map(|other| (other.pull_n(), self.other_odds / (1.0 + self.other_odds)))
+        self.other
+            .map(|other| (other.pull_n(), self.other_odds / (1.0 + self.other_odds)))
     }
 
     /// Standard deviation of what was known of an unknown before.
@@ -548,7 +562,9 @@ impl Fit {
 
     /// Work that the damping of the pads adds to a cycle, J: the lead times what the force rises in each step.
     fn damping_j(&self) -> f64 {
-        let rise_n_m: f64 = (0..self.at.cells).map(|cell| 2.0 * self.at.friction_n(cell) / self.force_per_torque).sum();
+        let rise_n_m: f64 = (0..self.at.cells)
+            .map(|cell| 2.0 * self.at.friction_n(cell) / self.force_per_torque)
+            .sum();
         self.at.values[self.at.gears_at() + 3] * self.velocity_rad_per_s * rise_n_m
     }
 
@@ -562,7 +578,10 @@ impl Fit {
             let moved = |by: f64| {
                 let mut moved = self.at;
                 moved.values[unknown] += by;
-                self.model.figures(&moved, backward).map_or(centre, |figures| figures).flat()
+                self.model
+                    .figures(&moved, backward)
+                    .map_or(centre, |figures| figures)
+                    .flat()
             };
             let (up, down) = (moved(step), moved(-step));
             for figure in 0..FIGURES {
@@ -594,6 +613,9 @@ impl Fit {
 /// By how much the torque rises from bin to bin, within its step.
 fn rise(bins: &[f64], at: usize) -> f64 {
     let of_step = at % BINS_PER_STEP;
-    let (from, to) = (at - usize::from(of_step > 0), at + usize::from(of_step + 1 < BINS_PER_STEP));
+    let (from, to) = (
+        at - usize::from(of_step > 0),
+        at + usize::from(of_step + 1 < BINS_PER_STEP),
+    );
     (bins[to] - bins[from]) / (to - from) as f64
 }

@@ -153,7 +153,11 @@ impl GearModel {
     #[inline]
     pub fn ripple_n_m(&self, angle_rad: f64) -> f64 {
         let mut ripple_n_m = 0.0;
-        for term in self.ripple.iter().filter(|term| term.waves != 0.0 && (term.sine_n_m, term.cosine_n_m) != (0.0, 0.0)) {
+        for term in self
+            .ripple
+            .iter()
+            .filter(|term| term.waves != 0.0 && (term.sine_n_m, term.cosine_n_m) != (0.0, 0.0))
+        {
             let (sine, cosine) = (term.waves * angle_rad.rem_euclid(TAU)).sin_cos();
             ripple_n_m += term.sine_n_m * sine + term.cosine_n_m * cosine;
         }
@@ -173,7 +177,11 @@ mod tests {
             viscous_n_m_s_per_rad: 4e-3,
             load_friction: 0.2,
             load_squared_per_n_m: 0.5,
-            ripple: [Ripple { waves: 7.0, sine_n_m: 1e-3, cosine_n_m: -2e-3 }; MAX_RIPPLES],
+            ripple: [Ripple {
+                waves: 7.0,
+                sine_n_m: 1e-3,
+                cosine_n_m: -2e-3,
+            }; MAX_RIPPLES],
             ..GearModel::plain(0.39, 3.4, 2e-4)
         };
         for (current_a, velocity) in [(0.15, 2.5), (0.09, 2.5), (0.6, 2.5), (-0.15, -2.5), (0.09, 0.5)] {
@@ -187,7 +195,10 @@ mod tests {
 
     #[test]
     fn a_duty_for_a_current_needs_the_warm_resistance() {
-        let gear = GearModel { source: CurrentSource::Duty, ..GearModel::plain(0.39, 3.4, 2e-4) };
+        let gear = GearModel {
+            source: CurrentSource::Duty,
+            ..GearModel::plain(0.39, 3.4, 2e-4)
+        };
         let current = |celsius| gear.winding_current_a(9.9, 1.5, 2.0, celsius);
         assert!((current(25.0) - 0.72 / 3.4).abs() < 1e-12 && (current(f64::NAN) - 0.72 / 3.4).abs() < 1e-12);
         assert!((current(45.0) * 1.0786 - 0.72 / 3.4).abs() < 1e-12);

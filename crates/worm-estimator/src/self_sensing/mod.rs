@@ -160,8 +160,7 @@ pub struct SelfSensing {
     reckoning: DeadReckoning,
     advance_m: [f64; 2], // a cycle, forward and backward, along the crawl
     last: Option<Reading>,
-    whole: bool, // the open cycle was seen from its beginning
-    skip: u32,   // cycles that do not count yet
+    whole: bool, // the open cycle was seen from its beginning; never the first, in which the tips load up
     energy: Energy,
     sensed: Option<SelfSensed>,
 }
@@ -199,7 +198,6 @@ impl SelfSensing {
             fit,
             last: None,
             whole: false,
-            skip: 1,
             energy: Energy::default(),
             sensed: None,
         };
@@ -218,11 +216,16 @@ impl SelfSensing {
             sample.velocity_rad_per_s,
             sample.temperature_c,
         );
-        let torque_n_m = self.gear.cam_torque_n_m(winding_a, sample.velocity_rad_per_s, sample.angle_rad);
+        let torque_n_m = self
+            .gear
+            .cam_torque_n_m(winding_a, sample.velocity_rad_per_s, sample.angle_rad);
         if !(torque_n_m.is_finite() && sample.phase.is_finite() && sample.time_s.is_finite()) {
             return None;
         }
-        let reading = Reading { sample: *sample, torque_n_m };
+        let reading = Reading {
+            sample: *sample,
+            torque_n_m,
+        };
         let last = self.last.replace(reading)?;
         let turned = sample.phase - last.sample.phase;
         if turned == 0.0 {
@@ -273,7 +276,11 @@ impl SelfSensing {
     }
 
     fn reckon(&mut self, turned: f64) {
-        let advance_m = if turned > 0.0 { self.advance_m[0] } else { self.advance_m[1] };
+        let advance_m = if turned > 0.0 {
+            self.advance_m[0]
+        } else {
+            self.advance_m[1]
+        };
         let scatter_m = ADVANCE_SCATTER_SHARE * (self.stroke_m - advance_m).abs();
         self.reckoning.turn(turned, self.advance_m[1], scatter_m);
     }
@@ -298,20 +305,19 @@ impl SelfSensing {
         if !self.profile.close(self.gear.inertia_kg_m2) {
             return false;
         }
-        if self.skip > 0 {
-            self.skip -= 1;
-            return false;
-        }
         let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
-        let seen = self.fit.change(torque_n_m, &self.allowed).map_or(Seen::Usual, |change| {
-            self.detector.compare(&ComparedCycle {
-                usual: self.fit.parameters(),
-                cycles: self.fit.cycles(),
-                change,
-                torque_n_m,
-                mean_n_m: self.fit.profiles_n_m().0,
-            })
-        });
+        let seen = self
+            .fit
+            .change(torque_n_m, &self.allowed)
+            .map_or(Seen::Usual, |change| {
+                self.detector.compare(&ComparedCycle {
+                    usual: self.fit.parameters(),
+                    cycles: self.fit.cycles(),
+                    change,
+                    torque_n_m,
+                    mean_n_m: self.fit.profiles_n_m().0,
+                })
+            });
         match seen {
             Seen::Usual => self.fit.take(torque_n_m, variance),
             Seen::Odd => {}
@@ -327,8 +333,13 @@ impl SelfSensing {
 
     /// Brings everything that follows from the fit up to date.
     fn follow(&mut self) {
-        let Some((figures, figures_sigma)) = self.fit.figures(false) else { return };
-        let backward_m = self.fit.figures(true).map_or(figures.advance_m, |(backward, _)| backward.advance_m);
+        let Some((figures, figures_sigma)) = self.fit.figures(false) else {
+            return;
+        };
+        let backward_m = self
+            .fit
+            .figures(true)
+            .map_or(figures.advance_m, |(backward, _)| backward.advance_m);
         self.advance_m = [figures.advance_m, backward_m];
         self.reckoning.know_advance(figures.advance_m, figures_sigma.advance_m);
         let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());

@@ -4,8 +4,8 @@
 //! exact whatever happens in it.
 
 use super::parameters::Parameters;
-use worm_physics::{Contact, MAX_CELLS, Motion, Worm};
 use std::f64::consts::TAU;
+use worm_physics::{Contact, MAX_CELLS, Motion, Worm};
 
 /// Change of a deformation over a cycle, as a share of the stroke, below which the crawl counts as periodic.
 const PERIODIC_SHARE: f64 = 1e-7;
@@ -68,7 +68,10 @@ pub(super) struct CycleModel {
 impl CycleModel {
     /// `worm` gives cells, strokes and step order.
     pub(super) fn new(worm: &Worm) -> Self {
-        let level = worm.clone().with_slope_rad(0.0).and_then(|worm| worm.with_resisting_force_n(0.0));
+        let level = worm
+            .clone()
+            .with_slope_rad(0.0)
+            .and_then(|worm| worm.with_resisting_force_n(0.0));
         Self {
             worm: level.unwrap_or_else(|_| worm.clone()),
             deformation_m: [0.0; MAX_CELLS],
@@ -99,12 +102,21 @@ impl CycleModel {
             let mut before_m = [0.0; MAX_CELLS];
             before_m[..cells].copy_from_slice(motion.deformations_m());
             motion.advance_to(worm, f64::from(cycle + 1)).ok()?;
-            let apart_m = before_m.iter().zip(motion.deformations_m()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let apart_m = before_m
+                .iter()
+                .zip(motion.deformations_m())
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             if apart_m < PERIODIC_SHARE * worm.stroke_m() {
                 break;
             }
         }
-        Some(Motion::under_way(worm, 0.0, &[0.0; MAX_CELLS][..cells], motion.deformations_m()))
+        Some(Motion::under_way(
+            worm,
+            0.0,
+            &[0.0; MAX_CELLS][..cells],
+            motion.deformations_m(),
+        ))
     }
 
     /// Mean torque of every bin, N m. `None` when the tips could not hold such a worm.
@@ -135,7 +147,10 @@ impl CycleModel {
         let mut worm = self.worm_of(parameters)?;
         let mut motion = if backward {
             worm = worm.mirrored();
-            let from_rest = Self { deformation_m: [0.0; MAX_CELLS], ..self.clone() };
+            let from_rest = Self {
+                deformation_m: [0.0; MAX_CELLS],
+                ..self.clone()
+            };
             from_rest.settle(&worm)?
         } else {
             self.settle(&worm)?

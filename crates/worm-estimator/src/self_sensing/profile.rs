@@ -104,7 +104,11 @@ impl Profile {
     /// Velocity at the edge before a bin.
     fn velocity_at(&self, edge: usize) -> Option<f64> {
         let before = edge.checked_sub(1).map_or(Edge::default(), |at| self.bin[at].late);
-        let after = if edge < self.bins { self.bin[edge].early } else { Edge::default() };
+        let after = if edge < self.bins {
+            self.bin[edge].early
+        } else {
+            Edge::default()
+        };
         let count = before.count + after.count;
         (count > 0.0).then(|| (before.velocity + after.velocity) / count)
     }
@@ -135,7 +139,11 @@ mod tests {
             profile.add(fraction, 1.0 / f64::from(ticks), 0.01 + 1e-3 * acceleration, velocity);
         }
         assert!(profile.close(1e-3));
-        let furthest = profile.torque_n_m().iter().map(|torque| (torque - 0.01).abs()).fold(0.0, f64::max);
+        let furthest = profile
+            .torque_n_m()
+            .iter()
+            .map(|torque| (torque - 0.01).abs())
+            .fold(0.0, f64::max);
         assert!(furthest < 3e-5, "{furthest}");
         profile.clear();
         assert!(!profile.close(1e-3));

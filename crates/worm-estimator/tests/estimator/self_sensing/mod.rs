@@ -3,7 +3,7 @@
 mod plant;
 
 use plant::{Drawn, Plant};
-use worm_estimator::self_sensing::{Changes, SelfSensed, SelfSensing};
+use worm_estimator::self_sensing::{Changes, MotorSample, SelfSensed, SelfSensing};
 use worm_physics::{Worm, steady_cycle};
 
 /// Seeds of the worms: `few` from 1 on, or as many as `WORMD_SEEDS` says from `WORMD_FIRST_SEED` on.
@@ -84,13 +84,22 @@ fn crawl(plant: &mut Plant, sensing: &mut SelfSensing, cycles: usize, mut each: 
 
 #[test]
 fn ten_cycles_of_drawn_worms() {
-    let [mut friction, mut stiffness, mut slope, mut energy, mut net, mut electrical, mut advance] =
-        std::array::from_fn(|_| Errors::default());
+    let [
+        mut friction,
+        mut stiffness,
+        mut slope,
+        mut energy,
+        mut net,
+        mut electrical,
+        mut advance,
+    ] = std::array::from_fn(|_| Errors::default());
     let seeds = seeds(12);
     for seed in seeds.clone() {
         let (drawn, mut plant, mut sensing) = worm_of(seed);
         crawl(&mut plant, &mut sensing, 12, |plant, sensed| {
-            let [.., before, after] = &plant.milestones[..] else { return };
+            let [.., before, after] = &plant.milestones[..] else {
+                return;
+            };
             let truth_j = after.electrical_j - before.electrical_j;
             electrical.add(sensed.electrical_j - truth_j, truth_j, sensed.electrical_sigma_j);
         });
@@ -98,17 +107,37 @@ fn ten_cycles_of_drawn_worms() {
         let (first, last) = (&plant.milestones[2], &plant.milestones[12]);
         let ledger = last.ledger.since(&first.ledger);
         let loss_j = ledger.loss_j() / 10.0;
-        energy.add(sensed.figures.energy_loss_j - loss_j, loss_j, sensed.figures_sigma.energy_loss_j);
+        energy.add(
+            sensed.figures.energy_loss_j - loss_j,
+            loss_j,
+            sensed.figures_sigma.energy_loss_j,
+        );
         let net_j = ledger.actuator_net_j / 10.0;
-        net.add(sensed.figures.energy_net_j - net_j, net_j, sensed.figures_sigma.energy_net_j);
+        net.add(
+            sensed.figures.energy_net_j - net_j,
+            net_j,
+            sensed.figures_sigma.energy_net_j,
+        );
         let advance_m = (last.position_m - first.position_m) / 10.0;
-        advance.add(sensed.figures.advance_m - advance_m, advance_m, sensed.figures_sigma.advance_m);
-        slope.add(sensed.slope_rad.to_degrees() - drawn.slope_deg(), 1.0, sensed.slope_sigma_rad.to_degrees());
+        advance.add(
+            sensed.figures.advance_m - advance_m,
+            advance_m,
+            sensed.figures_sigma.advance_m,
+        );
+        slope.add(
+            sensed.slope_rad.to_degrees() - drawn.slope_deg(),
+            1.0,
+            sensed.slope_sigma_rad.to_degrees(),
+        );
         for cell in 0..sensed.cells {
             let truth = drawn.friction_n(cell);
             friction.add(sensed.friction_n[cell] - truth, truth, sensed.friction_sigma_n[cell]);
             let truth = drawn.worm.contact(cell).stiffness_n_per_m;
-            stiffness.add(sensed.stiffness_n_per_m[cell] - truth, truth, sensed.stiffness_sigma_n_per_m[cell]);
+            stiffness.add(
+                sensed.stiffness_n_per_m[cell] - truth,
+                truth,
+                sensed.stiffness_sigma_n_per_m[cell],
+            );
         }
         if std::env::var("WORMD_EACH").is_ok() {
             println!(
@@ -127,7 +156,11 @@ fn ten_cycles_of_drawn_worms() {
             );
         }
     }
-    println!("{} worms from seed {}, ten cycles", seeds.end - seeds.start, seeds.start);
+    println!(
+        "{} worms from seed {}, ten cycles",
+        seeds.end - seeds.start,
+        seeds.start
+    );
     friction.line("friction, %", 100.0);
     stiffness.line("stiffness, %", 100.0);
     slope.line("slope, degrees", 1.0);
@@ -137,6 +170,20 @@ fn ten_cycles_of_drawn_worms() {
     advance.line("advance, %", 100.0);
     println!("slope within 2 degrees: {:.0} %", 100.0 * slope.within(2.0));
     println!("advance within 5 %: {:.0} %", 100.0 * advance.within(0.05));
+    for (name, errors, rms, coverage) in [
+        ("friction", &friction, 0.07, 0.7),
+        ("stiffness", &stiffness, 0.1, 0.65),
+        ("slope", &slope, 6.0, 0.6),
+        ("losses", &energy, 0.09, 0.6),
+        ("net work", &net, 0.09, 0.6),
+        ("electrical", &electrical, 0.01, 0.9),
+        ("advance", &advance, 0.12, 0.7),
+    ] {
+        assert!(
+            errors.rms() < rms && errors.coverage() > coverage,
+            "{name} is worse than it was"
+        );
+    }
 }
 
 #[test]
@@ -150,9 +197,14 @@ fn distance_after_fifty_cycles() {
         let reckoned = sensing.reckoned();
         distance.add(reckoned.position_m - truth_m, truth_m, reckoned.sigma_m);
     }
-    println!("{} worms from seed {}, fifty cycles", seeds.end - seeds.start, seeds.start);
+    println!(
+        "{} worms from seed {}, fifty cycles",
+        seeds.end - seeds.start,
+        seeds.start
+    );
     distance.line("distance, %", 100.0);
     println!("distance within 5 %: {:.0} %", 100.0 * distance.within(0.05));
+    assert!(distance.rms() < 0.1 && distance.coverage() > 0.6);
 }
 
 /// Cycles after a change until something is reported, at most `cycles`; and what is reported then.
@@ -178,8 +230,10 @@ fn a_changed_worm_is_reported() {
         let (drawn, plant, mut sensing) = worm_of(seed);
         let cell = any_cell(&drawn);
         let mut usual = plant;
-        crawl(&mut usual, &mut sensing, 10, |_, sensed| assert!(!sensed.changes.any(), "seed {seed}"));
-        let mut try_out = |worm: Worm| {
+        crawl(&mut usual, &mut sensing, 10, |_, sensed| {
+            assert!(!sensed.changes.any(), "seed {seed}")
+        });
+        let try_out = |worm: Worm| {
             let (mut plant, mut sensing) = (usual.clone(), sensing.clone());
             plant.change(worm);
             reported(&mut plant, &mut sensing, 3).map(|(_, changes)| changes)
@@ -196,18 +250,38 @@ fn a_changed_worm_is_reported() {
             all_can += 1.0;
             all_lost += u32::from(try_out(wet).is_some_and(|changes| changes.friction_lost != 0));
         }
-        let stuck = drawn.worm.clone().with_stroke_scale(cell, 0.0).expect("a stroke in range");
+        let stuck = drawn
+            .worm
+            .clone()
+            .with_stroke_scale(cell, 0.0)
+            .expect("a stroke in range");
         jammed += u32::from(try_out(stuck).is_some_and(|changes| changes.jammed == 1 << cell));
-        let dragged = drawn.worm.clone().with_resisting_force_n(0.8).expect("a force in range");
+        let dragged = drawn
+            .worm
+            .clone()
+            .with_resisting_force_n(0.8)
+            .expect("a force in range");
         if !sliding(&dragged) {
             loaded += u32::from(try_out(dragged).is_some_and(|changes| changes.any()));
         }
     }
     let percent = |part: u32, of: f64| 100.0 * f64::from(part) / of;
-    println!("{count} worms from seed {}, a change after ten cycles, reported within three", seeds.start);
-    println!("30 % of a cell's friction lost: {:.0} %, that cell {:.0} %", percent(lost, count), percent(right_cell, count));
+    println!(
+        "{count} worms from seed {}, a change after ten cycles, reported within three",
+        seeds.start
+    );
+    println!(
+        "30 % of a cell's friction lost: {:.0} %, that cell {:.0} %",
+        percent(lost, count),
+        percent(right_cell, count)
+    );
     println!("30 % of all friction lost: {:.0} %", percent(all_lost, all_can));
-    println!("jammed, that cell: {:.0} %; drag of 0.8 N: {:.0} %", percent(jammed, count), percent(loaded, count));
+    println!(
+        "jammed, that cell: {:.0} %; drag of 0.8 N: {:.0} %",
+        percent(jammed, count),
+        percent(loaded, count)
+    );
+    assert!(percent(right_cell, count) > 80.0 && percent(jammed, count) > 80.0);
 }
 
 #[test]
@@ -217,7 +291,12 @@ fn a_sound_worm_raises_nothing() {
     for seed in seeds.clone() {
         let (_, mut plant, mut sensing) = worm_of(seed);
         crawl(&mut plant, &mut sensing, 100, |plant, sensed| {
-            assert!(!sensed.changes.any(), "seed {seed}, cycle {}: {:?}", plant.cycles(), sensed.changes);
+            assert!(
+                !sensed.changes.any(),
+                "seed {seed}, cycle {}: {:?}",
+                plant.cycles(),
+                sensed.changes
+            );
         });
         hours += 100.0 * 2.5 / 3600.0;
     }
@@ -246,7 +325,11 @@ fn payload_or_softer_pads() {
         let (mut low, mut high) = (0.3, 1.0);
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            if advance_m(&softened(middle)) < advance_m(&laden) { low = middle } else { high = middle }
+            if advance_m(&softened(middle)) < advance_m(&laden) {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         if advance_m(&laden) < 1e-3 || low < 0.31 {
             continue;
@@ -261,7 +344,9 @@ fn payload_or_softer_pads() {
             crawl(&mut plant, &mut sensing, 12, |_, _| {});
             let after = sensing.sensed().expect("cycles were seen");
             let stiffness = |sensed: &SelfSensed| {
-                let logs = sensed.stiffness_n_per_m[..sensed.cells].iter().map(|stiffness| stiffness.ln());
+                let logs = sensed.stiffness_n_per_m[..sensed.cells]
+                    .iter()
+                    .map(|stiffness| stiffness.ln());
                 logs.sum::<f64>() / sensed.cells as f64
             };
             let pulled = (after.pull_n - before.pull_n) / pull_n;
@@ -271,5 +356,69 @@ fn payload_or_softer_pads() {
             count += 1.0;
         }
     }
-    println!("payload of 30 g or softer pads: {right} of {count} told apart, from seed {}", seeds.start);
+    println!(
+        "payload of 30 g or softer pads: {right} of {count} told apart, from seed {}",
+        seeds.start
+    );
+    assert!(right > 0.8 * count);
+}
+
+#[test]
+fn nothing_is_allocated() {
+    let (_, mut plant, mut sensing) = worm_of(1);
+    let samples: Vec<_> = (0..9_000).map(|_| plant.tick()).collect();
+    let mut cycles = 0;
+    let info = allocation_counter::measure(|| {
+        for sample in &samples {
+            cycles += usize::from(sensing.update(sample).is_some());
+        }
+    });
+    assert_eq!((info.count_total, cycles), (0, 2), "allocations, cycles");
+}
+
+/// Readings that are missing or make no sense cost a cycle at most, and readings that were lost cost nothing.
+#[test]
+fn bad_readings_do_no_harm() {
+    let (drawn, mut plant, mut sensing) = worm_of(4);
+    let mut tick = 0;
+    while plant.cycles() < 8 {
+        let mut sample = plant.tick();
+        tick += 1;
+        match tick % 1013 {
+            7 => sample.current_a = f64::NAN,
+            400 => sample.phase = f64::INFINITY,
+            500..515 => continue,
+            800 => sample.temperature_c = f64::NAN,
+            _ => {}
+        }
+        sensing.update(&sample);
+    }
+    let sensed = sensing.sensed().expect("cycles were seen");
+    assert!(sensed.cycles > 5.0, "{} cycles", sensed.cycles);
+    for cell in 0..sensed.cells {
+        let error = sensed.friction_n[cell] / drawn.friction_n(cell) - 1.0;
+        assert!(error.abs() < 0.1, "friction of cell {cell} is {error} off");
+    }
+}
+
+#[test]
+fn a_backward_crawl_counts_for_the_distance() {
+    let (_, mut plant, mut sensing) = worm_of(9);
+    crawl(&mut plant, &mut sensing, 5, |_, _| {});
+    let (before, last) = (sensing.reckoned(), plant.tick());
+    for tick in 0..5000 {
+        let back = f64::from(tick) / 2500.0;
+        let sample = MotorSample {
+            time_s: last.time_s + 1e-3 * f64::from(tick),
+            phase: last.phase - back,
+            angle_rad: last.angle_rad - back * std::f64::consts::TAU,
+            velocity_rad_per_s: -last.velocity_rad_per_s,
+            ..last
+        };
+        assert!(sensing.update(&sample).is_none(), "a cycle backward is not fitted");
+    }
+    let after = sensing.reckoned();
+    // Six cells on the level: 6.7 mm a cycle, either way.
+    let back_m = before.position_m - after.position_m;
+    assert!((0.012..0.0145).contains(&back_m), "{back_m} m");
 }

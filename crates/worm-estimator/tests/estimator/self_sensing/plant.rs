@@ -46,7 +46,7 @@ pub fn identified_gear() -> GearModel {
     GearModel {
         dry_n_m: 0.0092,
         viscous_n_m_s_per_rad: 0.0064,
-        friction_sigma_n_m: 0.006,
+        friction_sigma_n_m: 0.0045,
         torque_constant_sigma: 0.02,
         load_friction: 0.316,
         load_friction_sigma: 0.02,
@@ -91,9 +91,18 @@ impl Drawn {
         let winding_ohm = 3.32 * (1.0 + normal(0.1));
         let scales: Vec<(f64, f64)> = (0..6).map(|_| (normal(0.2).exp(), normal(0.15).exp())).collect();
         let cells = rng.random_range(3..=6);
-        let told = Worm::uniform(cells, Contact::symmetric(980.0, 1.75e-3), 0.08325 * cells as f64, 11.5e-3)
-            .expect("the figures of the paper are in range");
-        let slope_rad = if rng.random_bool(0.25) { 0.0 } else { rng.random_range(0.0..40f64).to_radians() };
+        let told = Worm::uniform(
+            cells,
+            Contact::symmetric(980.0, 1.75e-3),
+            0.08325 * cells as f64,
+            11.5e-3,
+        )
+        .expect("the figures of the paper are in range");
+        let slope_rad = if rng.random_bool(0.25) {
+            0.0
+        } else {
+            rng.random_range(0.0..40f64).to_radians()
+        };
         let mut worm = told.clone().with_slope_rad(slope_rad).expect("a slope within range");
         for (cell, (friction, stiffness)) in scales[..cells].iter().enumerate() {
             let (friction_n, stiffness) = (1.715 * friction, 980.0 * stiffness);
@@ -248,7 +257,11 @@ impl Plant {
         let damped = 1.0 + STEP_S / gear.inertia_kg_m2 * damping;
         let most = STEP_S / gear.inertia_kg_m2 * against_n_m;
         let before = self.velocity;
-        self.velocity = if driven.abs() <= most { 0.0 } else { (driven - most.copysign(driven)) / damped };
+        self.velocity = if driven.abs() <= most {
+            0.0
+        } else {
+            (driven - most.copysign(driven)) / damped
+        };
         let mean_a = (self.duty * bus_v - constant * 0.5 * (before + self.velocity)) / winding_ohm;
         self.electrical_j += bus_v * self.duty * mean_a * STEP_S;
         self.time_s += STEP_S;
