@@ -15,6 +15,7 @@ pub mod estimate;
 pub mod explain;
 pub mod export;
 pub mod fault;
+pub mod infer;
 pub mod latency;
 pub mod latency_floor;
 mod live;

@@ -33,7 +33,7 @@ const SCATTER_CYCLES: f64 = 3.0;
 /// Bins over which what the fit leaves hangs together.
 const MISFIT_BINS: f64 = 8.0;
 /// Torque that no profile is sure of, N m: rounding of the current, speed within a bin.
-const FLOOR_N_M: f64 = 2e-4;
+const FLOOR_N_M: f64 = 3e-4;
 /// Weight of the bins on either side of the jump from one step to the next: readings are a tick apart, the jump is not.
 const FIRST_BIN_WEIGHTS: [f64; 2] = [0.01, 0.3];
 const LAST_BIN_WEIGHT: f64 = 0.02;
@@ -69,6 +69,7 @@ pub(super) struct Fit {
     gear: GearModel,
     velocity_rad_per_s: f64,
     bins_per_s: f64,
+    stroke_m: f64,
     force_per_torque: f64, // of the stepping cell, 1/m
     prior: Vector,
     prior_information: Vector,
@@ -132,6 +133,7 @@ impl Fit {
             gear: *gear,
             velocity_rad_per_s: TAU / config.cycle_s,
             bins_per_s: (cells * BINS_PER_STEP) as f64 / config.cycle_s,
+            stroke_m: worm.stroke_m(),
             force_per_torque: TAU / (cells as f64 * worm.stroke_m()),
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
@@ -602,6 +604,8 @@ impl Fit {
         centre.energy_net_j += damping_j;
         centre.energy_positive_j += damping_j;
         let mut sigma = CycleFigures::from_flat(&sigma);
+        // Near a leap of the steady cycle the derivative says nothing, but a worm cannot be further off than this.
+        sigma.advance_m = sigma.advance_m.min(self.stroke_m);
         let lead = self.at.gears_at() + 3;
         let damping_sigma_j = (damping_j / self.at.values[lead]).abs() * self.covariance[(lead, lead)].max(0.0).sqrt();
         sigma.energy_net_j = sigma.energy_net_j.hypot(damping_sigma_j);

@@ -37,6 +37,7 @@ pub use parameters::Parameters;
 pub use profile::{BINS_PER_STEP, MAX_BINS};
 pub use twins::{Blind, Twin, Unknown};
 
+use crate::message::State;
 use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
 use fit::Fit;
@@ -104,6 +105,22 @@ pub struct MotorSample {
     pub duty: f64,
     /// Temperature of the servo, °C; `NaN` where unknown.
     pub temperature_c: f64,
+}
+
+impl From<&State> for MotorSample {
+    /// The motor's part of a state; its time is that of the motor's own clock.
+    fn from(state: &State) -> Self {
+        Self {
+            time_s: state.motor_time_s,
+            phase: state.phase,
+            angle_rad: state.motor_angle_rad,
+            velocity_rad_per_s: state.motor_velocity_rad_s,
+            current_a: state.motor_current_a,
+            bus_voltage_v: state.bus_voltage_v,
+            duty: state.motor_duty,
+            temperature_c: state.motor_temperature_c,
+        }
+    }
 }
 
 /// What the current says after a cycle.

@@ -2,6 +2,7 @@
 
 use super::fit::Fit;
 use super::parameters::MAX_UNKNOWNS;
+use std::fmt::{self, Display};
 
 /// Correlation of two estimates from which on they count as twins.
 const TWIN_CORRELATION: f64 = 0.9;
@@ -29,6 +30,22 @@ pub enum Unknown {
     Damping,
     /// A ripple of the torque, from 0, its sine or cosine.
     Ripple(usize),
+}
+
+impl Display for Unknown {
+    /// In words; cells count from 1.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Friction(cell) => write!(f, "friction of cell {}", cell + 1),
+            Self::Stiffness(cell) => write!(f, "stiffness of cell {}", cell + 1),
+            Self::Pull => f.write_str("pull on the body"),
+            Self::GearFriction => f.write_str("friction of the gears"),
+            Self::TorqueConstant => f.write_str("torque constant"),
+            Self::LoadFriction => f.write_str("friction by the load on the gears"),
+            Self::Damping => f.write_str("damping of the pads"),
+            Self::Ripple(ripple) => write!(f, "ripple {}", ripple + 1),
+        }
+    }
 }
 
 impl Unknown {

