@@ -5,20 +5,14 @@
 //! W Σ_b w_b (ȳ_b − h_b)²/R + (θ − θ₀)ᵀ Λ (θ − θ₀), by Gauss-Newton steps with damping. It runs on from where the last cycle left it, so
 //! a cycle needs one or two steps.
 //!
-//! # How the standard errors come about
-//! With M = Hᵀ diag(w) H/R and A = W M + Λ the covariance is A⁻¹ (B + Λ) A⁻¹. B is the covariance of the score W·Hᵀ(ȳ − h)/R:
-//!
-//! - the scatter of whole cycles about their mean, whatever its cause (noise, gait-to-gait scatter, drift), measured; while there are
-//!   few cycles, mixed with what noise and [`SCATTER_SHARE`] of friction would give;
-//! - what the fit leaves in the mean profile beyond that scatter does not average out. Taken to hang together over
-//!   [`MISFIT_BINS`] bins, it counts fully, and it limits the weight W = N/(1 + N·misfit) that any number of cycles can have.
-//!
-//! Another answer with another pull that the search found and the profile does not exclude adds how far it is, by its probability.
-//! What the prior leaves uncertain (torque constant, friction of the gears) is in A⁻¹ Λ A⁻¹.
+//! [`search`] finds the place where this begins, [`uncertainty`] the standard errors.
+
+mod search;
+mod uncertainty;
 
 use super::SelfSensingConfig;
 use super::gear::{GearModel, MAX_RIPPLES};
-use super::model::{CycleFigures, CycleModel, FIGURES};
+use super::model::CycleModel;
 use super::parameters::{MAX_UNKNOWNS, Matrix, Parameters, Vector};
 use super::profile::{BINS_PER_STEP, MAX_BINS};
 use std::f64::consts::{PI, TAU};
@@ -26,12 +20,6 @@ use worm_physics::Worm;
 
 /// Damping of the pads makes the force of a loading cell lead by damping over stiffness, s: what is assumed, and its standard deviation.
 const LEAD_S: [f64; 2] = [0.008, 0.005];
-/// Gait-to-gait scatter of a cell's friction that is assumed before it is measured, as a share.
-const SCATTER_SHARE: f64 = 0.02;
-/// How many cycles of measured scatter that assumption is worth.
-const SCATTER_CYCLES: f64 = 3.0;
-/// Bins over which what the fit leaves hangs together.
-const MISFIT_BINS: f64 = 8.0;
 /// Torque that no profile is sure of, N m: rounding of the current, speed within a bin.
 const FLOOR_N_M: f64 = 3e-4;
 /// Weight of the bins on either side of the jump from one step to the next: readings are a tick apart, the jump is not.
@@ -43,17 +31,8 @@ const STEPS: [f64; 3] = [0.01, 0.02, 0.03];
 const LONGEST: [f64; 2] = [0.4, 0.8];
 /// Expected gain of a step, in units of its variance, below which the search ends.
 const CLOSE_ENOUGH: f64 = 1e-3;
-/// Where the first search begins: pulls as shares of what all tips hold, and changes of every ln stiffness.
-const FIRST_PULLS: [f64; 12] = [0.0, 0.03, 0.07, 0.11, 0.16, 0.21, 0.27, 0.34, 0.42, 0.5, 0.6, -0.1];
-const FIRST_STIFFNESSES: [f64; 2] = [-0.2, 0.1];
-/// Difference of two pulls, N, that makes another answer of them.
-const OTHER_PULL_N: f64 = 0.25;
-/// Difference of what is minimised up to which another answer still counts.
-const OTHER_COUNTS: f64 = 12.0;
-/// The best of these searches go on.
-const BEST: usize = 3;
-/// Gauss-Newton steps from each first pull, then from each of the best, and in later cycles.
-const ROUNDS: [usize; 3] = [2, 12, 2];
+/// Gauss-Newton steps in a cycle without a search.
+const ROUNDS: usize = 2;
 /// Cycles after which everything is searched anew, because the mean profile has become much better.
 const SEARCHED_ANEW: f64 = 3.0;
 
@@ -172,107 +151,11 @@ impl Fit {
         if self.cycles == 1.0 || (self.cycles - SEARCHED_ANEW).abs() < 0.5 {
             self.search_everywhere();
         } else {
-            self.descend(ROUNDS[2]);
+            self.descend(ROUNDS);
         }
         self.weigh_other();
         self.model.begin_at(&self.at);
         self.assess(torque_n_m);
-    }
-
-    /// The first search: from several pulls, for the kinks of the profile make local minima.
-    fn search_everywhere(&mut self) {
-        let before = self.at;
-        self.begin_with_swings();
-        let start = self.at;
-        let hold_n: f64 = (0..start.cells).map(|cell| start.friction_n(cell)).sum();
-        let mut best = [(f64::INFINITY, start); BEST];
-        let starts = FIRST_PULLS
-            .iter()
-            .flat_map(|share| FIRST_STIFFNESSES.map(|stiffness| Some((share, stiffness))));
-        for (pull_share, stiffness) in starts.chain([None]).map(|start| start.unwrap_or((&f64::NAN, 0.0))) {
-            self.at = if pull_share.is_nan() {
-                before
-            } else {
-                let mut at = start;
-                let pull_n = pull_share * hold_n;
-                at.values[start.pull_at()] = pull_n;
-                at.values[start.gears_at()] -= pull_n / (start.cells as f64 * self.force_per_torque);
-                (0..start.cells).for_each(|cell| at.values[start.cells + cell] += stiffness);
-                at
-            };
-            self.descend(ROUNDS[0]);
-            let at = self.at;
-            if let Some(cost) = self.cost(&at)
-                && let Some(place) = best.iter().position(|(other, _)| cost < *other)
-            {
-                best[place..].rotate_right(1);
-                best[place] = (cost, at);
-            }
-        }
-        (self.at, self.other) = (before, None);
-        let mut least = f64::INFINITY;
-        for (_, at) in best.into_iter().filter(|(cost, _)| cost.is_finite()) {
-            let settled = std::mem::replace(&mut self.at, at);
-            self.descend(ROUNDS[1]);
-            let at = self.at;
-            let Some(cost) = self.cost(&at) else { continue };
-            let is_other = (at.pull_n() - settled.pull_n()).abs() > OTHER_PULL_N;
-            if cost < least {
-                self.other = if is_other && least.is_finite() {
-                    Some(settled)
-                } else {
-                    self.other
-                };
-                least = cost;
-            } else {
-                self.at = settled;
-                if is_other && self.other.is_none() {
-                    self.other = Some(at);
-                }
-            }
-        }
-    }
-
-    /// Follows the other answer, too, and takes it where it has become the better one.
-    fn weigh_other(&mut self) {
-        self.other_odds = 0.0;
-        let Some(other) = self.other else { return };
-        let best = std::mem::replace(&mut self.at, other);
-        self.descend(1);
-        let other = std::mem::replace(&mut self.at, best);
-        let (Some(cost), Some(other_cost)) = (self.cost(&best), self.cost(&other)) else {
-            self.other = None;
-            return;
-        };
-        if (best.pull_n() - other.pull_n()).abs() < OTHER_PULL_N || other_cost - cost > OTHER_COUNTS {
-            self.other = None;
-            return;
-        }
-        (self.at, self.other) = if other_cost < cost {
-            (other, Some(best))
-        } else {
-            (best, Some(other))
-        };
-        self.other_odds = (-0.5 * (other_cost - cost).abs()).exp();
-    }
-
-    /// Begins at what is known before, with each cell's friction by the swing of the torque in its step: from −k·δmax to k·δmax.
-    fn begin_with_swings(&mut self) {
-        let cells = self.at.cells;
-        self.at.values = self.prior;
-        let mut offset_n_m = 0.0;
-        for place in 0..cells {
-            let step = &self.mean_n_m[place * BINS_PER_STEP..(place + 1) * BINS_PER_STEP];
-            let mean = |bins: &[f64]| bins.iter().sum::<f64>() / bins.len() as f64;
-            let (begin_n_m, end_n_m) = (mean(&step[1..3]), mean(&step[BINS_PER_STEP - 9..BINS_PER_STEP - 1]));
-            let friction_n = 0.5 * (end_n_m - begin_n_m) * self.force_per_torque;
-            let cell = self.model.cell_at(place);
-            let far = 2.5 / self.prior_information[cell].sqrt();
-            self.at.values[cell] += (friction_n.max(1e-6).ln() - self.prior[cell]).clamp(-far, far);
-            offset_n_m += 0.5 * (end_n_m + begin_n_m) / cells as f64;
-        }
-        let gears = self.at.gears_at();
-        self.at.values[gears] = offset_n_m;
     }
 
     /// Weight of the data: that of the cycles, less what does not average out.
@@ -465,48 +348,6 @@ impl Fit {
         }
     }
 
-    /// Scatter, misfit and covariance, at the present parameters.
-    fn assess(&mut self, torque_n_m: &[f64]) {
-        if self.linearise().is_none() {
-            return;
-        }
-        let squared = self.forgetting * self.forgetting;
-        self.scatter *= squared;
-        self.scatter_count *= squared;
-        if self.cycles > 1.0 {
-            // Welford's: about the mean that already contains this cycle.
-            let score = self.score(torque_n_m, &self.mean_n_m[..]);
-            self.scatter += score * score.transpose() * (self.cycles / (self.cycles - 1.0));
-            self.scatter_count += 1.0;
-        }
-        let mut by_friction = Matrix::zeros();
-        for cell in 0..self.at.cells {
-            by_friction[(cell, cell)] = SCATTER_SHARE * SCATTER_SHARE;
-        }
-        let assumed = self.single + self.single * by_friction * self.single;
-        let scatter = (self.scatter + assumed * SCATTER_CYCLES) / (self.scatter_count + SCATTER_CYCLES);
-        let (mut squares, mut weights) = (0.0, 0.0);
-        for bin in 0..self.bins {
-            let weight = Self::bin_weight(bin);
-            squares += weight * (self.mean_n_m[bin] - self.predicted_n_m[bin]).powi(2);
-            weights += weight;
-        }
-        let left = (squares / weights - self.variance / self.cycles).max(FLOOR_N_M * FLOOR_N_M);
-        self.misfit = MISFIT_BINS * left / self.variance;
-        let reduced = self.weight() / self.cycles;
-        let meat = scatter * (self.squared_cycles * reduced * reduced)
-            + self.single * (self.weight() * self.weight() * self.misfit)
-            + Matrix::from_diagonal(&self.prior_information);
-        if let Some(inverse) = self.information().cholesky().map(|cholesky| cholesky.inverse()) {
-            self.covariance = inverse * meat * inverse;
-        }
-        if let Some(other) = &self.other {
-            // Of two answers, at the better one: its covariance, and how far the other is, as probably as it is true.
-            let apart = other.values - self.at.values;
-            self.covariance += apart * apart.transpose() * (self.other_odds / (1.0 + self.other_odds));
-        }
-    }
-
     /// One cycle's difference to the mean of all, by a step from the present parameters in which each unknown may change by about
     /// `sigma` (0: not at all), and its standard errors.
     pub(super) fn change(&self, torque_n_m: &[f64], sigma: &Vector) -> Option<(Vector, Vector)> {
@@ -554,63 +395,12 @@ impl Fit {
 
     /// Root mean square of what the fit leaves in the mean profile, N m.
     pub(super) fn residual_n_m(&self) -> f64 {
-        (self.misfit * self.variance / MISFIT_BINS).sqrt()
+        (self.misfit * self.variance / uncertainty::MISFIT_BINS).sqrt()
     }
 
     /// The mean profile and the fitted one, N m at the cam.
     pub(super) fn profiles_n_m(&self) -> (&[f64], &[f64]) {
         (&self.mean_n_m[..self.bins], &self.predicted_n_m[..self.bins])
-    }
-
-    /// Work that the damping of the pads adds to a cycle, J: the lead times what the force rises in each step.
-    fn damping_j(&self) -> f64 {
-        let rise_n_m: f64 = (0..self.at.cells)
-            .map(|cell| 2.0 * self.at.friction_n(cell) / self.force_per_torque)
-            .sum();
-        self.at.values[self.at.gears_at() + 3] * self.velocity_rad_per_s * rise_n_m
-    }
-
-    /// Figures of the steady cycle with their standard errors, of the crawl forward or backward. The work of the actuator includes that of
-    /// the pads' damping, the losses (11) do not.
-    pub(super) fn figures(&self, backward: bool) -> Option<(CycleFigures, CycleFigures)> {
-        let mut centre = self.model.figures(&self.at, backward)?;
-        let mut slopes = [[0.0; FIGURES]; 2 * worm_physics::MAX_CELLS + 1];
-        for (unknown, slope) in slopes[..self.at.of_worm()].iter_mut().enumerate() {
-            let step = STEPS[(unknown / self.at.cells).min(2)];
-            let moved = |by: f64| {
-                let mut moved = self.at;
-                moved.values[unknown] += by;
-                self.model
-                    .figures(&moved, backward)
-                    .map_or(centre, |figures| figures)
-                    .flat()
-            };
-            let (up, down) = (moved(step), moved(-step));
-            for figure in 0..FIGURES {
-                slope[figure] = (up[figure] - down[figure]) / (2.0 * step);
-            }
-        }
-        let mut sigma = [0.0; FIGURES];
-        for (figure, sigma) in sigma.iter_mut().enumerate() {
-            let mut variance = 0.0;
-            for a in 0..self.at.of_worm() {
-                for b in 0..self.at.of_worm() {
-                    variance += slopes[a][figure] * self.covariance[(a, b)] * slopes[b][figure];
-                }
-            }
-            *sigma = variance.max(0.0).sqrt();
-        }
-        let damping_j = self.damping_j();
-        centre.energy_net_j += damping_j;
-        centre.energy_positive_j += damping_j;
-        let mut sigma = CycleFigures::from_flat(&sigma);
-        // Near a leap of the steady cycle the derivative says nothing, but a worm cannot be further off than this.
-        sigma.advance_m = sigma.advance_m.min(self.stroke_m);
-        let lead = self.at.gears_at() + 3;
-        let damping_sigma_j = (damping_j / self.at.values[lead]).abs() * self.covariance[(lead, lead)].max(0.0).sqrt();
-        sigma.energy_net_j = sigma.energy_net_j.hypot(damping_sigma_j);
-        sigma.energy_positive_j = sigma.energy_positive_j.hypot(damping_sigma_j);
-        Some((centre, sigma))
     }
 }
 

@@ -5,7 +5,7 @@
 //! in the repository). That torque lies between the motor's and the cam's, so the balance is implicit in τ; a few fixed-point iterations
 //! solve it, because friction grows by less than the load.
 //!
-//! The inertia's part is left to the [profile](super::profile): averaged over a bin it is a difference of two velocities.
+//! The inertia's part is left to `profile`: averaged over a bin it is a difference of two velocities.
 
 use std::f64::consts::TAU;
 

@@ -33,7 +33,6 @@ pub use change::{Armed, Changes};
 pub use dead_reckoning::{Mark, Reckoned};
 pub use gear::{CurrentSource, GearModel, Ripple};
 pub use model::CycleFigures;
-pub use parameters::Parameters;
 pub use profile::{BINS_PER_STEP, MAX_BINS};
 pub use twins::{Blind, Twin, Unknown};
 

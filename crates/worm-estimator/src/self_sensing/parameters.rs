@@ -19,7 +19,7 @@ use nalgebra::{SMatrix, SVector};
 use worm_physics::MAX_CELLS;
 
 /// Most unknowns.
-pub const MAX_UNKNOWNS: usize = 2 * MAX_CELLS + 5 + 2 * MAX_RIPPLES;
+pub(super) const MAX_UNKNOWNS: usize = 2 * MAX_CELLS + 5 + 2 * MAX_RIPPLES;
 
 /// A vector with an entry for every unknown; those not in use are 0.
 pub(super) type Vector = SVector<f64, MAX_UNKNOWNS>;
@@ -28,7 +28,7 @@ pub(super) type Matrix = SMatrix<f64, MAX_UNKNOWNS, MAX_UNKNOWNS>;
 
 /// The unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameters {
+pub(super) struct Parameters {
     pub(super) cells: usize,
     pub(super) values: Vector,
 }
@@ -50,17 +50,17 @@ impl Parameters {
     }
 
     /// Friction force of a cell, k·δmax, N.
-    pub fn friction_n(&self, cell: usize) -> f64 {
+    pub(super) fn friction_n(&self, cell: usize) -> f64 {
         self.values[cell].exp()
     }
 
     /// Stiffness of a cell, N/m.
-    pub fn stiffness_n_per_m(&self, cell: usize) -> f64 {
+    pub(super) fn stiffness_n_per_m(&self, cell: usize) -> f64 {
         self.values[self.cells + cell].exp()
     }
 
     /// Pull on the body, N.
-    pub fn pull_n(&self) -> f64 {
+    pub(super) fn pull_n(&self) -> f64 {
         self.values[self.pull_at()]
     }
 }
