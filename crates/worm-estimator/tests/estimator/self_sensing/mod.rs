@@ -350,10 +350,14 @@ fn payload_or_softer_pads() {
                     .map(|stiffness| stiffness.ln());
                 logs.sum::<f64>() / sensed.cells as f64
             };
-            let pulled = (after.pull_n - before.pull_n) / pull_n;
-            let softer = (stiffness(after) - stiffness(&before)) / low.ln();
-            // In units of either hypothesis: payload is (1, 0), softer pads are (0, 1).
-            right += f64::from(u8::from((pulled > softer) == is_payload));
+            let (pulled_n, softer) = (after.pull_n - before.pull_n, stiffness(after) - stiffness(&before));
+            let pull_sigma_n = after.pull_sigma_n.hypot(before.pull_sigma_n);
+            let softer_sigma = after.stiffness_sigma_n_per_m[0] / after.stiffness_n_per_m[0];
+            let misfit = |expected_n: f64, expected: f64| {
+                ((pulled_n - expected_n) / pull_sigma_n).powi(2) + ((softer - expected) / softer_sigma).powi(2)
+            };
+            let says_payload = misfit(pull_n, 0.0) < misfit(0.0, low.ln());
+            right += f64::from(u8::from(says_payload == is_payload));
             count += 1.0;
         }
     }
