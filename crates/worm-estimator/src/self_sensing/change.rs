@@ -2,7 +2,7 @@
 //!
 //! Every cycle is compared with the mean of those before: by how much would friction of single cells, the pull and the friction of the
 //! gears have to differ? One cycle may be an accident (a lost reading, a bump), so two in a row count. Then the fit begins anew, because
-//! the worm is another now, and the alarms stand until cycles are again like those before.
+//! the worm is another now. What it finds is compared with the worm before, and the alarms stand until cycles are again like those.
 
 use super::parameters::{Parameters, Vector};
 use super::profile::BINS_PER_STEP;
@@ -23,8 +23,9 @@ const SIGMAS: f64 = 3.5;
 /// Gait-to-gait scatter of ln friction, and of the pull, N, beyond the noise of one cycle.
 const SCATTER: f64 = 0.025;
 const PULL_SCATTER_N: f64 = 0.04;
-/// Share of the usual swing of a step's torque below which its cell does not move.
-const JAMMED_SHARE: f64 = 0.25;
+/// Share of the usual torque late in a step below which its cell does not move. Ripple leaves some of it; a cell that has lost
+/// most of its friction leaves more.
+const JAMMED_SHARE: f64 = 0.12;
 /// Standard deviation that is allowed for a change of ln friction, of the pull, N, and of the gears' friction, N m.
 const ALLOWED: [f64; 3] = [0.5, 0.7, 0.02];
 
@@ -79,7 +80,7 @@ pub(super) struct ChangeDetector {
 #[derive(Debug, Clone, Copy)]
 struct Reference {
     ln_friction: [f64; MAX_CELLS],
-    swing_n_m: [f64; MAX_CELLS],
+    reach_n_m: [f64; MAX_CELLS],
     pull_n: f64,
     gear_n_m: f64,
 }
@@ -165,17 +166,14 @@ impl ChangeDetector {
         if *cycles < KNOWN_CYCLES {
             return Seen::Usual;
         }
-        let mut now = Reference::of(usual, mean_n_m, step_order);
-        let before = now;
+        let before = Reference::of(usual, mean_n_m, usual.values[usual.gears_at()], step_order);
         let mut odd = false;
         for (place, &cell) in step_order.iter().enumerate() {
             let sigma = sigma_of(cell, SCATTER);
             self.armed.friction_sigma = self.armed.friction_sigma.max(sigma);
             self.armed.friction |= u16::from(SIGMAS * sigma < 0.35) << cell;
             odd |= change[cell].abs() > FRICTION_CHANGE.max(SIGMAS * sigma);
-            now.ln_friction[cell] += change[cell];
-            now.swing_n_m[cell] = swing_n_m(torque_n_m, place);
-            let share = now.swing_n_m[cell] / before.swing_n_m[cell];
+            let share = reach_n_m(torque_n_m, place, before.gear_n_m) / before.reach_n_m[cell];
             odd |= !(JAMMED_SHARE..1.0 / JAMMED_SHARE).contains(&share);
             self.armed.jammed |= 1 << cell;
         }
@@ -183,8 +181,6 @@ impl ChangeDetector {
         odd |= change[pull_at].abs() > PULL_CHANGE_N.max(SIGMAS * self.armed.pull_sigma_n);
         odd |= change[gear_at].abs() > (GEAR_CHANGE * gear_friction_n_m).max(SIGMAS * gear_sigma);
         self.armed.load = SIGMAS * self.armed.pull_sigma_n < 1.0;
-        now.pull_n += change[pull_at];
-        now.gear_n_m += change[gear_at];
         if !odd {
             self.in_a_row = 0;
             return Seen::Usual;
@@ -194,26 +190,32 @@ impl ChangeDetector {
             return Seen::Odd;
         }
         self.in_a_row = 0;
-        let reference = *self.reference.get_or_insert(before);
-        self.changes = reference.compare(&now, self.cells, gear_friction_n_m);
+        self.reference.get_or_insert(before);
+        Seen::Changed
+    }
+
+    /// Says in what a changed worm differs from the one before, once it is fitted anew.
+    pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64]) {
+        let Some(reference) = self.reference else { return };
+        let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
+        self.changes = reference.compare(&now, self.cells, self.gear_friction_n_m);
         if !self.changes.any() {
             self.reference = None;
         }
-        Seen::Changed
     }
 }
 
 impl Reference {
-    fn of(parameters: &Parameters, mean_n_m: &[f64], step_order: &[usize]) -> Self {
+    fn of(parameters: &Parameters, mean_n_m: &[f64], idle_n_m: f64, step_order: &[usize]) -> Self {
         let mut reference = Self {
             ln_friction: [0.0; MAX_CELLS],
-            swing_n_m: [0.0; MAX_CELLS],
+            reach_n_m: [0.0; MAX_CELLS],
             pull_n: parameters.pull_n(),
             gear_n_m: parameters.values[parameters.gears_at()],
         };
         for (place, &cell) in step_order.iter().enumerate() {
             reference.ln_friction[cell] = parameters.friction_n(cell).ln();
-            reference.swing_n_m[cell] = swing_n_m(mean_n_m, place);
+            reference.reach_n_m[cell] = reach_n_m(mean_n_m, place, idle_n_m);
         }
         reference
     }
@@ -221,7 +223,7 @@ impl Reference {
     fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64) -> Changes {
         let mut changes = Changes::default();
         for cell in 0..cells {
-            if now.swing_n_m[cell] < JAMMED_SHARE * self.swing_n_m[cell] {
+            if now.reach_n_m[cell] < JAMMED_SHARE * self.reach_n_m[cell] {
                 changes.jammed |= 1 << cell;
             } else if now.ln_friction[cell] - self.ln_friction[cell] < -FRICTION_CHANGE {
                 changes.friction_lost |= 1 << cell;
@@ -240,9 +242,9 @@ impl Reference {
     }
 }
 
-/// Torque at the end of a step less that near its beginning, N m.
-fn swing_n_m(torque_n_m: &[f64], place: usize) -> f64 {
-    let step = &torque_n_m[place * BINS_PER_STEP..(place + 1) * BINS_PER_STEP];
-    let mean = |bins: &[f64]| bins.iter().sum::<f64>() / bins.len() as f64;
-    (mean(&step[BINS_PER_STEP - 8..]) - mean(&step[2..5])).max(0.0)
+/// Torque late in a step, N m, beyond `idle_n_m`, what turning the cam takes while no cell moves.
+fn reach_n_m(torque_n_m: &[f64], place: usize, idle_n_m: f64) -> f64 {
+    let end = (place + 1) * BINS_PER_STEP - 1;
+    let late = &torque_n_m[end - 8..end];
+    late.iter().sum::<f64>() / late.len() as f64 - idle_n_m
 }

@@ -341,6 +341,7 @@ impl SelfSensing {
                 self.reckoning.begin_anew();
                 self.fit.forget();
                 self.fit.take(torque_n_m, variance);
+                self.detector.judge(self.fit.parameters(), torque_n_m);
             }
         }
         self.follow();

@@ -222,11 +222,18 @@ fn reported(plant: &mut Plant, sensing: &mut SelfSensing, cycles: usize) -> Opti
 
 #[test]
 fn a_changed_worm_is_reported() {
-    let [mut lost, mut right_cell, mut all_lost, mut jammed, mut loaded] = [0; 5];
+    let [
+        mut lost,
+        mut right_cell,
+        mut nearly_all_lost,
+        mut all_lost,
+        mut jammed,
+        mut loaded,
+    ] = [0; 6];
     let seeds = seeds(6);
     let count = (seeds.end - seeds.start) as f64;
     let sliding = |worm: &Worm| worm.check_hold().is_err() || steady_cycle(worm).cycle().is_none();
-    let mut all_can = 0.0;
+    let [mut nearly_all_can, mut all_can] = [0.0; 2];
     for seed in seeds.clone() {
         let (drawn, plant, mut sensing) = worm_of(seed);
         let cell = any_cell(&drawn);
@@ -244,6 +251,12 @@ fn a_changed_worm_is_reported() {
         if let Some(changes) = try_out(wet) {
             lost += u32::from(changes.friction_lost != 0);
             right_cell += u32::from(changes.friction_lost == 1 << cell);
+        }
+        let mut wet = drawn.worm.clone();
+        wet.scale_friction(Some(cell), 0.3);
+        if !sliding(&wet) {
+            nearly_all_can += 1.0;
+            nearly_all_lost += u32::from(try_out(wet).is_some_and(|changes| changes.friction_lost == 1 << cell));
         }
         let mut wet = drawn.worm.clone();
         wet.scale_friction(None, 0.7);
@@ -275,6 +288,10 @@ fn a_changed_worm_is_reported() {
         "30 % of a cell's friction lost: {:.0} %, that cell {:.0} %",
         percent(lost, count),
         percent(right_cell, count)
+    );
+    println!(
+        "70 % of a cell's friction lost, that cell: {:.0} %",
+        percent(nearly_all_lost, nearly_all_can)
     );
     println!("30 % of all friction lost: {:.0} %", percent(all_lost, all_can));
     println!(
