@@ -1,11 +1,15 @@
-//! Time of the estimator: a tick without a sample, a tick with one, a tick in which a cycle ends.
+//! Time of the estimator: a tick without a sample, a tick with one, a tick in which a cycle ends; and of self-sensing: a tick, and the
+//! end of a cycle, later than the first ones, in which it searches everywhere.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use std::f64::consts::TAU;
 use std::hint::black_box;
 use testkit::crawl::{Crawl, Scene, config_of, paper_worm};
+use worm_estimator::config::Config;
 use worm_estimator::estimate::Estimator;
 use worm_estimator::message::State;
-use worm_physics::{Contact, Worm};
+use worm_estimator::self_sensing::{GearModel, MotorSample, SelfSensing};
+use worm_physics::{Contact, Motion, Worm};
 
 /// States of a crawl of some cycles, and an estimator that has seen the first of them.
 fn prepared(worm: Worm, cycles: usize) -> (Estimator, Vec<State>) {
@@ -61,5 +65,73 @@ fn benches(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(estimate, benches);
+/// Readings of a motor that crawls through some cycles of 2.5 s.
+fn motor_samples(worm: &Worm, gear: &GearModel, cycles: usize) -> Vec<MotorSample> {
+    let velocity_rad_per_s = TAU / 2.5;
+    let mut motion = Motion::at_rest(worm, &vec![0.0; worm.cells()]);
+    let per_force = worm.cells() as f64 * worm.stroke_m() / TAU;
+    let ticks = 0..2_500 * cycles;
+    ticks
+        .map(|tick| {
+            let phase = tick as f64 / 2_500.0;
+            motion.advance_to(worm, phase).expect("the worm holds");
+            let cam_n_m = motion.actuator_force_n(worm) * per_force;
+            let current_a = gear.motor_torque_n_m(cam_n_m, velocity_rad_per_s) / gear.torque_constant_n_m_per_a;
+            MotorSample {
+                time_s: tick as f64 * 1e-3,
+                phase,
+                angle_rad: TAU * phase,
+                velocity_rad_per_s,
+                current_a: (1e3 * current_a).round() * 1e-3,
+                bus_voltage_v: 5.0,
+                duty: 0.3,
+                temperature_c: 25.0,
+            }
+        })
+        .collect()
+}
+
+fn self_sensing(criterion: &mut Criterion) {
+    let config = Config::default().self_sensing();
+    let sixteen = Worm::uniform(16, Contact::symmetric(980.0, 1e-4), 1.0, 11.5e-3).expect("a worm");
+    for (cells, worm) in [(4, paper_worm(30.0, true)), (16, sixteen)] {
+        let samples = motor_samples(&worm, &config.gear, 8);
+        let mut sensing = SelfSensing::new(&worm, &config);
+        let mut ends = Vec::new();
+        for (tick, sample) in samples.iter().enumerate() {
+            if sensing.update(sample).is_some() {
+                ends.push(tick);
+            }
+            if ends.len() == 5 {
+                break;
+            }
+        }
+        let after = ends[4] + 1;
+        criterion.bench_function(&format!("{cells} cells, self-sensing, 200 ticks"), |bencher| {
+            bencher.iter_batched_ref(
+                || sensing.clone(),
+                |sensing| {
+                    for sample in &samples[after..after + 200] {
+                        black_box(sensing.update(sample));
+                    }
+                },
+                BatchSize::LargeInput,
+            );
+        });
+        for sample in &samples[after..after + 2_499] {
+            sensing.update(sample);
+        }
+        let end = &samples[after + 2_499];
+        assert!(sensing.clone().update(end).is_some(), "a cycle ends");
+        criterion.bench_function(&format!("{cells} cells, self-sensing, the end of a cycle"), |bencher| {
+            bencher.iter_batched_ref(
+                || sensing.clone(),
+                |sensing| black_box(sensing.update(end).is_some()),
+                BatchSize::LargeInput,
+            );
+        });
+    }
+}
+
+criterion_group!(estimate, benches, self_sensing);
 criterion_main!(estimate);

@@ -54,6 +54,8 @@ enum Subcommands {
     Why(command::why::WhyArgs),
     /// Run a log through the estimator again, and compare the results
     Replay(command::replay::ReplayArgs),
+    /// Friction, stiffness, advance and energy from the motor's current in a log, without looking at positions
+    Infer(command::infer::InferArgs),
     /// A log as Parquet or CSV tables, or as a complete log of one that was cut off
     Export(command::export::ExportArgs),
     /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
@@ -139,6 +141,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::BlackBox(args) => command::black_box::run(&args),
         Subcommands::Why(args) => command::why::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
+        Subcommands::Infer(args) => command::infer::run(&args),
         Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
         Subcommands::Plan(args) => command::plan::run(&args),

@@ -17,6 +17,7 @@ pub mod export;
 pub mod fault;
 #[cfg(feature = "foxglove")]
 pub mod foxglove;
+pub mod infer;
 pub mod latency;
 pub mod latency_floor;
 mod live;

@@ -62,6 +62,10 @@ fn unusable_input_is_named_and_ends_with_status_2() {
         (&["study", "--cells", "1"], &["1 cells", "2 to 16"]),
         (&["study", "--slopes", "steep"], &["steep"]),
         (&["study", "--battery=-5"], &["-5", "above 0"]),
+        (
+            &["infer", "no/such.mcap"],
+            &["no/such.mcap: cannot be read", "check that the file is there"],
+        ),
         (&["export", "no/such.mcap"], &["--mcap", "--parquet"]),
         (
             &["export", "no/such.mcap", "--mcap", "copy.mcap"],

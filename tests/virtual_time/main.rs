@@ -10,6 +10,7 @@
 //! - `mismatch`: worms that the model does not explain are reported; the configured worm and those a few per cent off are not.
 //! - `pauses`: a pause of the computer, in whole or in part, is not a fault of the worm and does not distort the energies.
 //! - `range`: how far the battery lasts, against worms that crawl until it does not.
+//! - `self_sensing`: what the current of the motor says of the virtual worm, against its ledger.
 //! - `hours`: healthy worms on many kinds of journeys raise no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
 //!   With it, `mismatch` tries all of its healthy worms, otherwise half of them.
 //!
@@ -24,6 +25,7 @@ mod hours;
 mod mismatch;
 mod pauses;
 mod range;
+mod self_sensing;
 mod soak;
 mod stall;
 mod why;

@@ -14,6 +14,7 @@ mod drive;
 mod effect;
 mod machine;
 mod physics;
+mod self_sensing;
 mod trip;
 mod virtual_worm;
 mod worm;
@@ -29,6 +30,7 @@ pub use machine::{
     Realtime, Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;
+pub use self_sensing::{ReportedCurrent, SelfSensing};
 pub use trip::{OnLinkBack, OnLinkLoss, OnStuck, Trip};
 pub use virtual_worm::VirtualWorm;
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
@@ -64,6 +66,8 @@ pub struct Config {
     pub limits: Limits,
     /// The estimator.
     pub estimator: Estimator,
+    /// What is known of the gears, for what follows from the motor's current.
+    pub self_sensing: SelfSensing,
     /// The threshold of each alarm, and the controller's reaction to it.
     pub alarms: Alarms,
     /// The battery; absent: its charge is not estimated.
@@ -159,6 +163,7 @@ impl Config {
         self.control.check(&mut checker);
         self.limits.check(&mut checker);
         self.estimator.check(&mut checker);
+        self.self_sensing.check(&mut checker);
         self.alarms.check(&mut checker);
         if let Some(battery) = &self.battery {
             battery.check(&mut checker);

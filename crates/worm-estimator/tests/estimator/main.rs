@@ -2,3 +2,4 @@
 
 mod accuracy;
 mod behaviour;
+mod self_sensing;

@@ -1,0 +1,161 @@
+//! What self-sensing knows of the gears, and how well.
+
+use super::Config;
+use super::check::Checker;
+use crate::self_sensing::gear::MAX_RIPPLES;
+use crate::self_sensing::{CurrentSource, GearModel, Ripple, SelfSensingConfig};
+use serde::Deserialize;
+
+/// What the servo reports as its current.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReportedCurrent {
+    /// The current in the winding.
+    Winding,
+    /// The duty of its bridge.
+    Duty,
+}
+
+/// The gears between motor and cam, for what follows from the motor's current. The torque constant and the winding are the servo's.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SelfSensing {
+    /// What the servo reports as its current.
+    pub current: ReportedCurrent,
+    /// Standard deviation of `servo.torque_constant_n_m_per_a`, as a share.
+    pub torque_constant_sigma_share: f64,
+    /// Inertia of rotor and cam, at the cam, kg m².
+    pub inertia_kg_m2: f64,
+    /// Dry friction, N m.
+    pub dry_friction_n_m: f64,
+    /// Friction that grows with speed, N m s/rad.
+    pub viscous_friction_n_m_s_per_rad: f64,
+    /// Standard deviation of those two together, N m.
+    pub friction_sigma_n_m: f64,
+    /// Friction for each torque on the gears.
+    pub load_friction: f64,
+    /// Its standard deviation.
+    pub load_friction_sigma: f64,
+    /// Which end of the gear train that torque is: 1 the motor's, 0 the cam's.
+    pub load_motor_share: f64,
+    /// Friction for each square of the torque on the gears, 1/(N m).
+    pub load_squared_friction_per_n_m: f64,
+    /// As `load_motor_share`, for the square.
+    pub load_squared_motor_share: f64,
+    /// How often in a turn each ripple of the torque returns.
+    pub ripple_waves: Vec<u32>,
+    /// Standard deviation of each ripple's sine and cosine, N m.
+    pub ripple_sigma_n_m: f64,
+    /// Standard deviation of each cell's friction and stiffness about those of `[worm]`, as shares.
+    pub worm_sigma_share: f64,
+    /// Standard deviation of the pull about that of `canal.slope_deg`, N.
+    pub pull_sigma_n: f64,
+    /// Gait cycles over which the torque profile is averaged.
+    pub memory_cycles: f64,
+}
+
+impl Default for SelfSensing {
+    fn default() -> Self {
+        Self {
+            current: ReportedCurrent::Winding,
+            torque_constant_sigma_share: 0.02,
+            inertia_kg_m2: 2e-4,
+            dry_friction_n_m: 0.05,
+            viscous_friction_n_m_s_per_rad: 0.003,
+            friction_sigma_n_m: 0.005,
+            load_friction: 0.0,
+            load_friction_sigma: 0.02,
+            load_motor_share: 0.8,
+            load_squared_friction_per_n_m: 0.0,
+            load_squared_motor_share: 1.0,
+            ripple_waves: Vec::new(),
+            ripple_sigma_n_m: 0.001,
+            worm_sigma_share: 0.35,
+            pull_sigma_n: 2.5,
+            memory_cycles: 40.0,
+        }
+    }
+}
+
+impl SelfSensing {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        for (key, value, range, unit) in [
+            (
+                "torque_constant_sigma_share",
+                self.torque_constant_sigma_share,
+                1e-4..=0.5,
+                "",
+            ),
+            ("inertia_kg_m2", self.inertia_kg_m2, 0.0..=1.0, "kg m^2"),
+            ("dry_friction_n_m", self.dry_friction_n_m, 0.0..=10.0, "N m"),
+            (
+                "viscous_friction_n_m_s_per_rad",
+                self.viscous_friction_n_m_s_per_rad,
+                0.0..=10.0,
+                "N m s/rad",
+            ),
+            ("friction_sigma_n_m", self.friction_sigma_n_m, 1e-6..=10.0, "N m"),
+            ("load_friction", self.load_friction, 0.0..=0.8, ""),
+            ("load_friction_sigma", self.load_friction_sigma, 1e-4..=0.5, ""),
+            ("load_motor_share", self.load_motor_share, 0.0..=1.0, ""),
+            (
+                "load_squared_friction_per_n_m",
+                self.load_squared_friction_per_n_m,
+                0.0..=10.0,
+                "1/(N m)",
+            ),
+            ("load_squared_motor_share", self.load_squared_motor_share, 0.0..=1.0, ""),
+            ("ripple_sigma_n_m", self.ripple_sigma_n_m, 1e-6..=1.0, "N m"),
+            ("worm_sigma_share", self.worm_sigma_share, 0.01..=1.0, ""),
+            ("pull_sigma_n", self.pull_sigma_n, 0.01..=100.0, "N"),
+            ("memory_cycles", self.memory_cycles, 5.0..=1e4, "cycles"),
+        ] {
+            checker.range(&format!("self_sensing.{key}"), value, range, unit);
+        }
+        checker.require(
+            self.ripple_waves.len() <= MAX_RIPPLES && self.ripple_waves.iter().all(|waves| (1..=200).contains(waves)),
+            "self_sensing.ripple_waves",
+            format!("{:?}", self.ripple_waves),
+            format!("must be at most {MAX_RIPPLES} numbers from 1 to 200"),
+        );
+    }
+}
+
+impl Config {
+    /// What self-sensing is told of this worm.
+    pub fn self_sensing(&self) -> SelfSensingConfig {
+        let known = &self.self_sensing;
+        let mut ripple = [Ripple::default(); MAX_RIPPLES];
+        for (term, &waves) in ripple.iter_mut().zip(&known.ripple_waves) {
+            term.waves = f64::from(waves);
+        }
+        let gear = GearModel {
+            source: match known.current {
+                ReportedCurrent::Winding => CurrentSource::Winding,
+                ReportedCurrent::Duty => CurrentSource::Duty,
+            },
+            torque_constant_n_m_per_a: self.servo.torque_constant_n_m_per_a,
+            torque_constant_sigma: known.torque_constant_sigma_share,
+            winding_resistance_ohm: self.servo.winding_resistance_ohm,
+            inertia_kg_m2: known.inertia_kg_m2,
+            dry_n_m: known.dry_friction_n_m,
+            friction_sigma_n_m: known.friction_sigma_n_m,
+            viscous_n_m_s_per_rad: known.viscous_friction_n_m_s_per_rad,
+            load_friction: known.load_friction,
+            load_friction_sigma: known.load_friction_sigma,
+            load_share: known.load_motor_share,
+            load_squared_per_n_m: known.load_squared_friction_per_n_m,
+            load_squared_share: known.load_squared_motor_share,
+            ripple,
+            ripple_sigma_n_m: known.ripple_sigma_n_m,
+        };
+        SelfSensingConfig {
+            friction_sigma: known.worm_sigma_share,
+            stiffness_sigma: known.worm_sigma_share,
+            pull_sigma_n: known.pull_sigma_n,
+            cycle_s: self.gait.cycle_s,
+            memory_cycles: known.memory_cycles,
+            ..SelfSensingConfig::new(gear)
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! Alarms from the current alone: a cycle whose profile is not like the others'.
+//!
+//! Every cycle is compared with the mean of those before: by how much would friction of single cells, the pull and the friction of the
+//! gears have to differ? One cycle may be an accident (a lost reading, a bump), so two in a row count. Then the fit begins anew, because
+//! the worm is another now. What it finds is compared with the worm before, and the alarms stand until cycles are again like those.
+
+use super::parameters::{Parameters, Vector};
+use super::profile::BINS_PER_STEP;
+use worm_physics::{MAX_CELLS, Worm};
+
+/// Cycles that must be known before a cycle can differ from them.
+const KNOWN_CYCLES: f64 = 3.0;
+/// Cycles in a row that must differ.
+const IN_A_ROW: u32 = 2;
+/// Change of ln friction that counts: a loss of 16 %.
+const FRICTION_CHANGE: f64 = 0.175;
+/// Change of the torque of a whole cycle that counts, as pull on the body, N …
+const PULL_CHANGE_N: f64 = 0.3;
+/// … or in the gears, as a share of their friction.
+const GEAR_CHANGE: f64 = 0.15;
+/// Standard errors by which a change must be known.
+const SIGMAS: f64 = 3.5;
+/// Gait-to-gait scatter of ln friction, and of the pull, N, beyond the noise of one cycle.
+const SCATTER: f64 = 0.025;
+const PULL_SCATTER_N: f64 = 0.04;
+/// Share of the usual torque late in a step below which its cell does not move. Ripple leaves some of it; a cell that has lost
+/// most of its friction leaves more.
+const JAMMED_SHARE: f64 = 0.12;
+/// Standard deviation that is allowed for a change of ln friction, of the pull, N, and of the gears' friction, N m.
+const ALLOWED: [f64; 3] = [0.5, 0.7, 0.02];
+
+/// What differs.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Changes {
+    /// Bit i: friction of cell i is lost.
+    pub friction_lost: u16,
+    /// Friction of every cell is lost.
+    pub all_friction_lost: bool,
+    /// Bit i: cell i does not move.
+    pub jammed: u16,
+    /// The load is larger than usual: a pull on the body or friction of the gears. The current alone hardly says which.
+    pub more_load: bool,
+}
+
+impl Changes {
+    /// Whether anything differs.
+    pub fn any(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+/// Which changes could be seen now.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Armed {
+    /// Bit i: a loss of 30 % of cell i's friction.
+    pub friction: u16,
+    /// Bit i: cell i jammed.
+    pub jammed: u16,
+    /// More load.
+    pub load: bool,
+    /// Standard error of one cycle's ln friction, the worst cell's.
+    pub friction_sigma: f64,
+    /// Standard error of one cycle's pull, N.
+    pub pull_sigma_n: f64,
+}
+
+/// The comparison, cycle by cycle.
+#[derive(Debug, Clone)]
+pub(super) struct ChangeDetector {
+    cells: usize,
+    step_order: [usize; MAX_CELLS],
+    gear_friction_n_m: f64,
+    in_a_row: u32,
+    reference: Option<Reference>,
+    changes: Changes,
+    armed: Armed,
+}
+
+/// The worm before it changed.
+#[derive(Debug, Clone, Copy)]
+struct Reference {
+    ln_friction: [f64; MAX_CELLS],
+    reach_n_m: [f64; MAX_CELLS],
+    pull_n: f64,
+    gear_n_m: f64,
+}
+
+/// A cycle beside those before.
+pub(super) struct ComparedCycle<'a> {
+    /// The worm and the gears before.
+    pub(super) usual: &'a Parameters,
+    /// How many cycles that was.
+    pub(super) cycles: f64,
+    /// By how much the unknowns differ in this cycle, and the standard errors.
+    pub(super) change: (Vector, Vector),
+    /// Torque profile of this cycle.
+    pub(super) torque_n_m: &'a [f64],
+    /// Mean profile of those before.
+    pub(super) mean_n_m: &'a [f64],
+}
+
+/// What a cycle is, for the detector.
+pub(super) enum Seen {
+    /// Like the others.
+    Usual,
+    /// Not like them; it may be an accident.
+    Odd,
+    /// Like the odd one before it: the worm has changed.
+    Changed,
+}
+
+impl ChangeDetector {
+    /// `gear_friction_n_m` is the usual friction of the gears without load.
+    pub(super) fn new(worm: &Worm, gear_friction_n_m: f64) -> Self {
+        let cells = worm.cells();
+        let mut step_order = [0; MAX_CELLS];
+        step_order[..cells].copy_from_slice(worm.step_order());
+        Self {
+            cells,
+            step_order,
+            gear_friction_n_m,
+            in_a_row: 0,
+            reference: None,
+            changes: Changes::default(),
+            armed: Armed::default(),
+        }
+    }
+
+    /// By how much each unknown may differ.
+    pub(super) fn allowed(&self) -> Vector {
+        let mut allowed = Vector::zeros();
+        for cell in 0..self.cells {
+            allowed[cell] = ALLOWED[0];
+        }
+        allowed[2 * self.cells] = ALLOWED[1];
+        allowed[2 * self.cells + 1] = ALLOWED[2];
+        allowed
+    }
+
+    pub(super) fn changes(&self) -> &Changes {
+        &self.changes
+    }
+
+    pub(super) fn armed(&self) -> &Armed {
+        &self.armed
+    }
+
+    /// Compares a cycle with those before.
+    pub(super) fn compare(&mut self, cycle: &ComparedCycle) -> Seen {
+        let ComparedCycle {
+            usual,
+            cycles,
+            change: (change, sigma),
+            torque_n_m,
+            mean_n_m,
+        } = cycle;
+        let gear_friction_n_m = self.gear_friction_n_m;
+        let step_order = self.step_order;
+        let step_order = &step_order[..self.cells];
+        let sigma_of = |index: usize, scatter: f64| (sigma[index].powi(2) + scatter * scatter).sqrt();
+        let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
+        self.armed = Armed {
+            pull_sigma_n: sigma_of(pull_at, PULL_SCATTER_N),
+            ..Armed::default()
+        };
+        if *cycles < KNOWN_CYCLES {
+            return Seen::Usual;
+        }
+        let before = Reference::of(usual, mean_n_m, usual.values[usual.gears_at()], step_order);
+        let mut odd = false;
+        for (place, &cell) in step_order.iter().enumerate() {
+            let sigma = sigma_of(cell, SCATTER);
+            self.armed.friction_sigma = self.armed.friction_sigma.max(sigma);
+            self.armed.friction |= u16::from(SIGMAS * sigma < 0.35) << cell;
+            odd |= change[cell].abs() > FRICTION_CHANGE.max(SIGMAS * sigma);
+            let share = reach_n_m(torque_n_m, place, before.gear_n_m) / before.reach_n_m[cell];
+            odd |= !(JAMMED_SHARE..1.0 / JAMMED_SHARE).contains(&share);
+            self.armed.jammed |= 1 << cell;
+        }
+        let gear_sigma = sigma_of(gear_at, 0.02 * gear_friction_n_m);
+        odd |= change[pull_at].abs() > PULL_CHANGE_N.max(SIGMAS * self.armed.pull_sigma_n);
+        odd |= change[gear_at].abs() > (GEAR_CHANGE * gear_friction_n_m).max(SIGMAS * gear_sigma);
+        self.armed.load = SIGMAS * self.armed.pull_sigma_n < 1.0;
+        if !odd {
+            self.in_a_row = 0;
+            return Seen::Usual;
+        }
+        self.in_a_row += 1;
+        if self.in_a_row < IN_A_ROW {
+            return Seen::Odd;
+        }
+        self.in_a_row = 0;
+        self.reference.get_or_insert(before);
+        Seen::Changed
+    }
+
+    /// Says in what a changed worm differs from the one before, once it is fitted anew.
+    pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64]) {
+        let Some(reference) = self.reference else { return };
+        let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
+        self.changes = reference.compare(&now, self.cells, self.gear_friction_n_m);
+        if !self.changes.any() {
+            self.reference = None;
+        }
+    }
+}
+
+impl Reference {
+    fn of(parameters: &Parameters, mean_n_m: &[f64], idle_n_m: f64, step_order: &[usize]) -> Self {
+        let mut reference = Self {
+            ln_friction: [0.0; MAX_CELLS],
+            reach_n_m: [0.0; MAX_CELLS],
+            pull_n: parameters.pull_n(),
+            gear_n_m: parameters.values[parameters.gears_at()],
+        };
+        for (place, &cell) in step_order.iter().enumerate() {
+            reference.ln_friction[cell] = parameters.friction_n(cell).ln();
+            reference.reach_n_m[cell] = reach_n_m(mean_n_m, place, idle_n_m);
+        }
+        reference
+    }
+
+    fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64) -> Changes {
+        let mut changes = Changes::default();
+        for cell in 0..cells {
+            if now.reach_n_m[cell] < JAMMED_SHARE * self.reach_n_m[cell] {
+                changes.jammed |= 1 << cell;
+            } else if now.ln_friction[cell] - self.ln_friction[cell] < -FRICTION_CHANGE {
+                changes.friction_lost |= 1 << cell;
+            }
+        }
+        if changes.jammed != 0 {
+            // The others push a jammed cell along, so their frictions look different, too.
+            changes.friction_lost = 0;
+        }
+        changes.all_friction_lost = changes.friction_lost.count_ones() as usize == cells;
+        changes.more_load = changes.jammed == 0
+            && changes.friction_lost == 0
+            && (now.pull_n - self.pull_n > PULL_CHANGE_N
+                || now.gear_n_m - self.gear_n_m > GEAR_CHANGE * gear_friction_n_m);
+        changes
+    }
+}
+
+/// Torque late in a step, N m, beyond `idle_n_m`, what turning the cam takes while no cell moves.
+fn reach_n_m(torque_n_m: &[f64], place: usize, idle_n_m: f64) -> f64 {
+    let end = (place + 1) * BINS_PER_STEP - 1;
+    let late = &torque_n_m[end - 8..end];
+    late.iter().sum::<f64>() / late.len() as f64 - idle_n_m
+}

@@ -1,0 +1,395 @@
+//! Friction, stiffness, pull, advance and energy of a worm that nobody sees, from the current of its motor.
+//!
+//! # How it works
+//! 1. [`gear`]: what the motor's current leaves for the cam, after the gears' friction, which depends on the load on them.
+//! 2. `profile`: that torque over the gait phase. The cam moves one cell at a time by the stroke Ls, so a torque τ is the force
+//!    2π τ/(n Ls) of the stepping cell's actuator.
+//! 3. `model`: the profile that the exact quasi-static cycle gives. A stepping cell's force rises from −k·δmax to k·δmax: how far says
+//!    its friction, how steeply the stiffness, and where the rise bends (a cell behind begins to slide) the pull on the body.
+//! 4. `fit`: worm and gears that explain the mean profile best, with their covariance, and by the exact model what follows from
+//!    them: advance, slides, energies.
+//! 5. [`dead_reckoning`]: the distance. [`twins`]: what the current cannot tell. [`change`]: alarms.
+//!
+//! # What it cannot tell
+//! - Slope, payload on a slope and constant drag are one pull. On the level a payload does nothing at all.
+//! - An error of the torque constant scales every force: friction is never known better than that constant.
+//! - An advance follows from the model. A worm that slides as a whole, tips and all, does not turn its cam any differently.
+//! - Cycles crawled backward count for the distance, by the model, but are not fitted.
+//!
+//! # Cost
+//! A tick takes some tens of nanoseconds, the end of a cycle about a millisecond for four cells, the first one some ten. Nothing is
+//! allocated after construction.
+
+pub mod change;
+pub mod dead_reckoning;
+mod fit;
+pub mod gear;
+mod model;
+mod parameters;
+mod profile;
+pub mod twins;
+
+pub use change::{Armed, Changes};
+pub use dead_reckoning::{Mark, Reckoned};
+pub use gear::{CurrentSource, GearModel, Ripple};
+pub use model::CycleFigures;
+pub use profile::{BINS_PER_STEP, MAX_BINS};
+pub use twins::{Blind, Twin, Unknown};
+
+use crate::message::State;
+use change::{ChangeDetector, ComparedCycle, Seen};
+use dead_reckoning::DeadReckoning;
+use fit::Fit;
+use parameters::Vector;
+use profile::Profile;
+use std::f64::consts::TAU;
+use worm_physics::{MAX_CELLS, Worm};
+
+/// Longest turn of the cam between two readings that is still bridged, cycles.
+const LONGEST_TURN: f64 = 0.02;
+/// Longest time between two readings over which power is taken to be linear, s.
+const LONGEST_GAP_S: f64 = 0.1;
+/// Standard deviation of a voltage read in steps of 0.1 V, V, and of a current read in steps of 1 mA, A.
+const ROUNDING: [f64; 2] = [0.029, 0.29e-3];
+/// Gait-to-gait scatter of the advance, as a share of what compliance takes of the stroke.
+const ADVANCE_SCATTER_SHARE: f64 = 0.02;
+
+/// What is known before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SelfSensingConfig {
+    /// The motor with its gears.
+    pub gear: GearModel,
+    /// Standard deviation of each cell's ln friction about the stated worm's.
+    pub friction_sigma: f64,
+    /// Standard deviation of each cell's ln stiffness about the stated worm's.
+    pub stiffness_sigma: f64,
+    /// Standard deviation of the pull about that of the stated slope, N.
+    pub pull_sigma_n: f64,
+    /// Usual time of a gait cycle, s.
+    pub cycle_s: f64,
+    /// Cycles over which the mean profile is taken; older ones fade.
+    pub memory_cycles: f64,
+}
+
+impl SelfSensingConfig {
+    /// Friction within a half of what is stated, stiffness within a quarter, any slope.
+    pub fn new(gear: GearModel) -> Self {
+        Self {
+            gear,
+            friction_sigma: 0.4,
+            stiffness_sigma: 0.25,
+            pull_sigma_n: 2.5,
+            cycle_s: 2.5,
+            memory_cycles: 40.0,
+        }
+    }
+}
+
+/// A reading of the motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorSample {
+    /// When it was taken, s, by any clock that runs evenly.
+    pub time_s: f64,
+    /// Gait phase, cycles, unwrapped.
+    pub phase: f64,
+    /// Angle of the servo's shaft, rad: what ripple returns with.
+    pub angle_rad: f64,
+    /// Velocity of the cam, rad/s.
+    pub velocity_rad_per_s: f64,
+    /// Reported current, A.
+    pub current_a: f64,
+    /// Voltage on the bus, V.
+    pub bus_voltage_v: f64,
+    /// Duty of the bridge, −1 to 1.
+    pub duty: f64,
+    /// Temperature of the servo, °C; `NaN` where unknown.
+    pub temperature_c: f64,
+}
+
+impl From<&State> for MotorSample {
+    /// The motor's part of a state; its time is that of the motor's own clock.
+    fn from(state: &State) -> Self {
+        Self {
+            time_s: state.motor_time_s,
+            phase: state.phase,
+            angle_rad: state.motor_angle_rad,
+            velocity_rad_per_s: state.motor_velocity_rad_s,
+            current_a: state.motor_current_a,
+            bus_voltage_v: state.bus_voltage_v,
+            duty: state.motor_duty,
+            temperature_c: state.motor_temperature_c,
+        }
+    }
+}
+
+/// What the current says after a cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SelfSensed {
+    /// Number of cells.
+    pub cells: usize,
+    /// Cycles that were fitted together, forgotten ones counted less.
+    pub cycles: f64,
+    /// Friction force k·δmax of each cell, N.
+    pub friction_n: [f64; MAX_CELLS],
+    /// Its standard error, N.
+    pub friction_sigma_n: [f64; MAX_CELLS],
+    /// Stiffness of each cell, N/m.
+    pub stiffness_n_per_m: [f64; MAX_CELLS],
+    /// Its standard error, N/m.
+    pub stiffness_sigma_n_per_m: [f64; MAX_CELLS],
+    /// Pull on the body down the canal, N: weight and constant drag together.
+    pub pull_n: f64,
+    /// Its standard error, N.
+    pub pull_sigma_n: f64,
+    /// The slope, if all the pull is the stated mass's weight, rad.
+    pub slope_rad: f64,
+    /// Its standard error, rad.
+    pub slope_sigma_rad: f64,
+    /// Figures of the cycle by the model.
+    pub figures: CycleFigures,
+    /// Their standard errors.
+    pub figures_sigma: CycleFigures,
+    /// Electrical energy of the last cycle, measured, J.
+    pub electrical_j: f64,
+    /// Its standard error, J.
+    pub electrical_sigma_j: f64,
+    /// Root mean square of what the model leaves unexplained in the mean profile, N m at the cam.
+    pub residual_n_m: f64,
+    /// What the current cannot tell.
+    pub blind: Blind,
+    /// What differs from the usual.
+    pub changes: Changes,
+    /// What could be seen to differ.
+    pub armed: Armed,
+}
+
+/// Senses a worm by its motor's current.
+#[derive(Debug, Clone)]
+pub struct SelfSensing {
+    gear: GearModel,
+    weight_n: f64,
+    stroke_m: f64,
+    profile: Profile,
+    fit: Fit,
+    detector: ChangeDetector,
+    allowed: Vector,
+    reckoning: DeadReckoning,
+    advance_m: [f64; 2], // a cycle, forward and backward, along the crawl
+    last: Option<Reading>,
+    whole: bool, // the open cycle was seen from its beginning; never the first, in which the tips load up
+    energy: Energy,
+    sensed: Option<SelfSensed>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Reading {
+    sample: MotorSample,
+    torque_n_m: f64,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Energy {
+    electrical_j: f64,
+    by_voltage: f64,
+    by_current: f64,
+}
+
+impl SelfSensing {
+    /// `worm` is what is known of it: cells, stroke, mass, step order, and friction, stiffness and slope within the standard deviations
+    /// of `config`.
+    pub fn new(worm: &Worm, config: &SelfSensingConfig) -> Self {
+        let fit = Fit::new(worm, config);
+        let gear = &config.gear;
+        let gear_friction_n_m = gear.dry_n_m + gear.viscous_n_m_s_per_rad * TAU / config.cycle_s;
+        let detector = ChangeDetector::new(worm, gear_friction_n_m);
+        let mut sensing = Self {
+            gear: config.gear,
+            weight_n: worm.weight_n(),
+            stroke_m: worm.stroke_m(),
+            profile: Profile::new(worm.cells()),
+            allowed: detector.allowed(),
+            detector,
+            reckoning: DeadReckoning::new(0.0, 0.0),
+            advance_m: [0.0; 2],
+            fit,
+            last: None,
+            whole: false,
+            energy: Energy::default(),
+            sensed: None,
+        };
+        sensing.follow();
+        if let Some(sensed) = sensing.sensed.take() {
+            sensing.reckoning = DeadReckoning::new(sensed.figures.advance_m, sensed.figures_sigma.advance_m);
+        }
+        sensing
+    }
+
+    /// Takes a reading; readings of which a value is missing are left out. Returns what is known after a cycle, at its end.
+    pub fn update(&mut self, sample: &MotorSample) -> Option<&SelfSensed> {
+        let winding_a = self.gear.winding_current_a(
+            sample.current_a,
+            sample.bus_voltage_v * sample.duty,
+            sample.velocity_rad_per_s,
+            sample.temperature_c,
+        );
+        let torque_n_m = self
+            .gear
+            .cam_torque_n_m(winding_a, sample.velocity_rad_per_s, sample.angle_rad);
+        if !(torque_n_m.is_finite() && sample.phase.is_finite() && sample.time_s.is_finite()) {
+            return None;
+        }
+        let reading = Reading {
+            sample: *sample,
+            torque_n_m,
+        };
+        let last = self.last.replace(reading)?;
+        let turned = sample.phase - last.sample.phase;
+        if turned == 0.0 {
+            return None;
+        }
+        self.reckon(turned);
+        self.add_energy(&last.sample, sample);
+        if !(0.0..=LONGEST_TURN).contains(&turned) {
+            self.whole = false;
+            return None;
+        }
+        let middle = 0.5 * (sample.phase + last.sample.phase);
+        let mut closed = false;
+        if sample.phase.floor() != last.sample.phase.floor() {
+            closed = self.whole && self.close();
+            self.profile.clear();
+            self.energy = Energy::default();
+            self.whole = true;
+        }
+        let mean = |now: f64, before: f64| 0.5 * (now + before);
+        self.profile.add(
+            middle - middle.floor(),
+            turned,
+            mean(torque_n_m, last.torque_n_m),
+            mean(sample.velocity_rad_per_s, last.sample.velocity_rad_per_s),
+        );
+        if closed { self.sensed.as_ref() } else { None }
+    }
+
+    /// Corrects the distance by a known position.
+    pub fn mark(&mut self, mark: &Mark) {
+        self.reckoning.mark(mark);
+    }
+
+    /// Where the worm is by dead reckoning, along the canal from where it began.
+    pub fn reckoned(&self) -> Reckoned {
+        self.reckoning.reckoned()
+    }
+
+    /// What was known after the last cycle.
+    pub fn sensed(&self) -> Option<&SelfSensed> {
+        self.sensed.as_ref()
+    }
+
+    /// Mean torque at the cam over the phase, and the model's, N m, [`BINS_PER_STEP`] for each step.
+    pub fn profiles_n_m(&self) -> (&[f64], &[f64]) {
+        self.fit.profiles_n_m()
+    }
+
+    fn reckon(&mut self, turned: f64) {
+        let advance_m = if turned > 0.0 {
+            self.advance_m[0]
+        } else {
+            self.advance_m[1]
+        };
+        let scatter_m = ADVANCE_SCATTER_SHARE * (self.stroke_m - advance_m).abs();
+        self.reckoning.turn(turned, self.advance_m[1], scatter_m);
+    }
+
+    fn add_energy(&mut self, from: &MotorSample, to: &MotorSample) {
+        let dt_s = to.time_s - from.time_s;
+        if !(0.0..=LONGEST_GAP_S).contains(&dt_s) {
+            self.whole = false;
+            return;
+        }
+        let mean = |of: fn(&MotorSample) -> f64| 0.5 * dt_s * (of(from) + of(to));
+        let electrical_j = mean(|sample| sample.bus_voltage_v * sample.duty * sample.current_a);
+        if electrical_j.is_finite() {
+            self.energy.electrical_j += electrical_j;
+            self.energy.by_voltage += mean(|sample| sample.duty * sample.current_a);
+            self.energy.by_current += mean(|sample| (sample.bus_voltage_v * sample.duty).abs());
+        }
+    }
+
+    /// Takes the closed cycle, if it counts.
+    fn close(&mut self) -> bool {
+        if !self.profile.close(self.gear.inertia_kg_m2) {
+            return false;
+        }
+        let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
+        let seen = self
+            .fit
+            .change(torque_n_m, &self.allowed)
+            .map_or(Seen::Usual, |change| {
+                self.detector.compare(&ComparedCycle {
+                    usual: self.fit.parameters(),
+                    cycles: self.fit.cycles(),
+                    change,
+                    torque_n_m,
+                    mean_n_m: self.fit.profiles_n_m().0,
+                })
+            });
+        match seen {
+            Seen::Usual => self.fit.take(torque_n_m, variance),
+            Seen::Odd => {}
+            Seen::Changed => {
+                self.reckoning.begin_anew();
+                self.fit.forget();
+                self.fit.take(torque_n_m, variance);
+                self.detector.judge(self.fit.parameters(), torque_n_m);
+            }
+        }
+        self.follow();
+        true
+    }
+
+    /// Brings everything that follows from the fit up to date.
+    fn follow(&mut self) {
+        let Some((figures, figures_sigma)) = self.fit.figures(false) else {
+            return;
+        };
+        let backward_m = self
+            .fit
+            .figures(true)
+            .map_or(figures.advance_m, |(backward, _)| backward.advance_m);
+        self.advance_m = [figures.advance_m, backward_m];
+        self.reckoning.know_advance(figures.advance_m, figures_sigma.advance_m);
+        let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());
+        let cells = parameters.cells;
+        let sigma = |unknown: usize| covariance[(unknown, unknown)].max(0.0).sqrt();
+        let of_cells = |of: &dyn Fn(usize) -> f64| {
+            let mut values = [0.0; MAX_CELLS];
+            (0..cells).for_each(|cell| values[cell] = of(cell));
+            values
+        };
+        let pull_n = parameters.pull_n();
+        let pull_sigma_n = sigma(parameters.pull_at());
+        let sine = (pull_n / self.weight_n).clamp(-1.0, 1.0);
+        let slope_rad = sine.asin();
+        self.sensed = Some(SelfSensed {
+            cells,
+            cycles: self.fit.cycles(),
+            friction_n: of_cells(&|cell| parameters.friction_n(cell)),
+            friction_sigma_n: of_cells(&|cell| parameters.friction_n(cell) * sigma(cell)),
+            stiffness_n_per_m: of_cells(&|cell| parameters.stiffness_n_per_m(cell)),
+            stiffness_sigma_n_per_m: of_cells(&|cell| parameters.stiffness_n_per_m(cell) * sigma(cells + cell)),
+            pull_n,
+            pull_sigma_n,
+            slope_rad,
+            slope_sigma_rad: pull_sigma_n / (self.weight_n * slope_rad.cos().max(0.05)),
+            figures,
+            figures_sigma,
+            electrical_j: self.energy.electrical_j,
+            electrical_sigma_j: (self.energy.by_voltage * ROUNDING[0]).hypot(self.energy.by_current * ROUNDING[1]),
+            residual_n_m: self.fit.residual_n_m(),
+            blind: Blind::of(&self.fit),
+            changes: *self.detector.changes(),
+            armed: *self.detector.armed(),
+        });
+    }
+}

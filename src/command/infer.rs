@@ -1,0 +1,304 @@
+//! `wormd infer`: what the motor's current in a log says of the worm, without looking at positions.
+
+use super::{Failure, print};
+use clap::Args;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+use worm_estimator::config::Config;
+use worm_estimator::message::Cycle;
+use worm_estimator::self_sensing::{MotorSample, Reckoned, SelfSensed, SelfSensing, Unknown};
+use worm_log::messages;
+use worm_physics::Worm;
+
+/// Most time between a cycle's end here and the end that the estimator measured, ns.
+const SAME_END_NS: u64 = 200_000_000;
+
+/// Arguments of `wormd infer`.
+#[derive(Debug, Args)]
+pub struct InferArgs {
+    /// The log, as `wormd record` or `wormd up --record` wrote it
+    #[arg(value_name = "FILE")]
+    log: PathBuf,
+    /// Configuration file, instead of the one in the log: `[self_sensing]` says what is known of the gears
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs `wormd infer`.
+///
+/// # Errors
+/// [`Failure::Unusable`] for a log or configuration that cannot be used, and for a log without a whole gait cycle.
+pub fn run(args: &InferArgs) -> Result<(), Failure> {
+    let log = messages(&args.log).map_err(Failure::unusable)?;
+    let config = match &args.config {
+        Some(file) => Config::load(file)?,
+        None => log.config()?,
+    };
+    let worm = Worm::try_from(&config).map_err(Failure::unusable)?;
+    let mut sensing = SelfSensing::new(&worm, &config.self_sensing());
+    let mut cycles = Vec::new();
+    let mut last = None;
+    for state in log.states.iter().filter(|state| state.motor_is_new == 1) {
+        if let Some(sensed) = sensing.update(&MotorSample::from(state)).copied() {
+            let measured = log
+                .cycles
+                .iter()
+                .find(|cycle| cycle.end_ns.abs_diff(state.time_ns) < SAME_END_NS);
+            cycles.push(InferredCycle::new(state.phase, &sensed, sensing.reckoned(), measured));
+            last = Some(sensed);
+        }
+    }
+    let Some(sensed) = last else {
+        let file = args.log.display();
+        return Err(Failure::unusable(format!(
+            "{file}: holds no whole gait cycle crawled forward after the first: record for longer, or give a log with the topic `state`"
+        )));
+    };
+    let inferred = Inferred {
+        cells: sensed.cells,
+        worm: InferredWorm::new(&sensed),
+        cannot_tell: CannotTell::new(&sensed),
+        cycles,
+        warnings: log.warnings,
+    };
+    if args.json {
+        print::line(serde_json::to_string(&inferred).map_err(Failure::failed)?)?;
+    } else {
+        print::line(in_words(&inferred))?;
+    }
+    Ok(())
+}
+
+/// What `--json` prints. Cells count from 1.
+#[derive(Debug, Serialize)]
+struct Inferred {
+    cells: usize,
+    worm: InferredWorm,
+    cannot_tell: CannotTell,
+    cycles: Vec<InferredCycle>,
+    warnings: Vec<String>,
+}
+
+/// The worm after the last cycle.
+#[derive(Debug, Serialize)]
+struct InferredWorm {
+    friction_n: Vec<f64>,
+    friction_sigma_n: Vec<f64>,
+    stiffness_n_per_m: Vec<f64>,
+    stiffness_sigma_n_per_m: Vec<f64>,
+    pull_n: f64,
+    pull_sigma_n: f64,
+    slope_deg: f64,
+    slope_sigma_deg: f64,
+    residual_n_m: f64,
+}
+
+/// One gait cycle.
+#[derive(Debug, Serialize)]
+struct InferredCycle {
+    phase: f64,
+    advance_m: f64,
+    advance_sigma_m: f64,
+    energy_loss_j: f64,
+    energy_loss_sigma_j: f64,
+    energy_actuator_net_j: f64,
+    energy_actuator_net_sigma_j: f64,
+    energy_electrical_j: f64,
+    energy_electrical_sigma_j: f64,
+    position_m: f64,
+    position_sigma_m: f64,
+    friction_lost: Vec<usize>,
+    jammed: Vec<usize>,
+    more_load: bool,
+    measured: Option<MeasuredCycle>,
+}
+
+/// The same cycle by the tracker, where the log has it.
+#[derive(Debug, Serialize)]
+struct MeasuredCycle {
+    advance_m: f64,
+    energy_loss_j: f64,
+    energy_actuator_net_j: f64,
+    energy_electrical_j: f64,
+}
+
+/// What the current does not say.
+#[derive(Debug, Serialize)]
+struct CannotTell {
+    twins: Vec<TwinPair>,
+    not_learned: Vec<String>,
+    other_pull: Option<OtherPull>,
+}
+
+#[derive(Debug, Serialize)]
+struct TwinPair {
+    one: String,
+    other: String,
+    correlation: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct OtherPull {
+    pull_n: f64,
+    probability: f64,
+}
+
+impl InferredWorm {
+    fn new(sensed: &SelfSensed) -> Self {
+        let of_cells = |values: &[f64]| values[..sensed.cells].to_vec();
+        Self {
+            friction_n: of_cells(&sensed.friction_n),
+            friction_sigma_n: of_cells(&sensed.friction_sigma_n),
+            stiffness_n_per_m: of_cells(&sensed.stiffness_n_per_m),
+            stiffness_sigma_n_per_m: of_cells(&sensed.stiffness_sigma_n_per_m),
+            pull_n: sensed.pull_n,
+            pull_sigma_n: sensed.pull_sigma_n,
+            slope_deg: sensed.slope_rad.to_degrees(),
+            slope_sigma_deg: sensed.slope_sigma_rad.to_degrees(),
+            residual_n_m: sensed.residual_n_m,
+        }
+    }
+}
+
+impl InferredCycle {
+    fn new(phase: f64, sensed: &SelfSensed, reckoned: Reckoned, measured: Option<&Cycle>) -> Self {
+        let cells_of = |mask: u16| {
+            (0..sensed.cells)
+                .filter(|cell| mask >> cell & 1 == 1)
+                .map(|cell| cell + 1)
+                .collect()
+        };
+        let (figures, sigma, changes) = (&sensed.figures, &sensed.figures_sigma, &sensed.changes);
+        Self {
+            phase: phase.floor(),
+            advance_m: figures.advance_m,
+            advance_sigma_m: sigma.advance_m,
+            energy_loss_j: figures.energy_loss_j,
+            energy_loss_sigma_j: sigma.energy_loss_j,
+            energy_actuator_net_j: figures.energy_net_j,
+            energy_actuator_net_sigma_j: sigma.energy_net_j,
+            energy_electrical_j: sensed.electrical_j,
+            energy_electrical_sigma_j: sensed.electrical_sigma_j,
+            position_m: reckoned.position_m,
+            position_sigma_m: reckoned.sigma_m,
+            friction_lost: cells_of(changes.friction_lost),
+            jammed: cells_of(changes.jammed),
+            more_load: changes.more_load,
+            measured: measured.map(|cycle| MeasuredCycle {
+                advance_m: cycle.advance_m,
+                energy_loss_j: cycle.energy_loss_j,
+                energy_actuator_net_j: cycle.energy_actuator_net_j,
+                energy_electrical_j: cycle.energy_electrical_j,
+            }),
+        }
+    }
+}
+
+impl CannotTell {
+    fn new(sensed: &SelfSensed) -> Self {
+        let blind = &sensed.blind;
+        Self {
+            twins: blind
+                .twins
+                .iter()
+                .flatten()
+                .map(|twin| TwinPair {
+                    one: twin.one.to_string(),
+                    other: twin.other.to_string(),
+                    correlation: twin.correlation,
+                })
+                .collect(),
+            not_learned: not_learned(blind.unlearned()),
+            other_pull: blind
+                .other_pull
+                .map(|(pull_n, probability)| OtherPull { pull_n, probability }),
+        }
+    }
+}
+
+/// Each unknown once: a ripple is two.
+fn not_learned(unknowns: impl Iterator<Item = Unknown>) -> Vec<String> {
+    let mut names: Vec<String> = unknowns.map(|unknown| unknown.to_string()).collect();
+    names.dedup();
+    names
+}
+
+fn in_words(inferred: &Inferred) -> String {
+    let mut text = String::from(
+        "cycle   advance mm          losses mJ           electrical mJ    position mm      measured: advance, losses, electrical",
+    );
+    for cycle in &inferred.cycles {
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "\n{:5}  {:6.2} ± {:<6.2}  {:8.1} ± {:<6.1}  {:8.0} ± {:<5.0}  {:7.1} ± {:<5.1}",
+            cycle.phase,
+            1e3 * cycle.advance_m,
+            1e3 * cycle.advance_sigma_m,
+            1e3 * cycle.energy_loss_j,
+            1e3 * cycle.energy_loss_sigma_j,
+            1e3 * cycle.energy_electrical_j,
+            1e3 * cycle.energy_electrical_sigma_j,
+            1e3 * cycle.position_m,
+            1e3 * cycle.position_sigma_m,
+        );
+        if let Some(measured) = &cycle.measured {
+            let _ = write!(
+                text,
+                "  {:6.2} {:8.1} {:8.0}",
+                1e3 * measured.advance_m,
+                1e3 * measured.energy_loss_j,
+                1e3 * measured.energy_electrical_j,
+            );
+        }
+        for (name, cells) in [("friction lost", &cycle.friction_lost), ("jammed", &cycle.jammed)] {
+            if !cells.is_empty() {
+                let _ = write!(text, "  {name}: {cells:?}");
+            }
+        }
+        text += if cycle.more_load { "  more load" } else { "" };
+    }
+    let worm = &inferred.worm;
+    for cell in 0..inferred.cells {
+        let _ = write!(
+            text,
+            "\ncell {}: friction {:.2} ± {:.2} N, stiffness {:.0} ± {:.0} N/m",
+            cell + 1,
+            worm.friction_n[cell],
+            worm.friction_sigma_n[cell],
+            worm.stiffness_n_per_m[cell],
+            worm.stiffness_sigma_n_per_m[cell],
+        );
+    }
+    let _ = write!(
+        text,
+        "\npull {:.2} ± {:.2} N; a slope of {:.1} ± {:.1} degrees if all of it is the worm's own weight: a payload or a drag looks the same",
+        worm.pull_n, worm.pull_sigma_n, worm.slope_deg, worm.slope_sigma_deg,
+    );
+    if let Some(other) = &inferred.cannot_tell.other_pull {
+        let _ = write!(
+            text,
+            "\nor a pull of {:.2} N, with a probability of {:.0} %",
+            other.pull_n,
+            100.0 * other.probability
+        );
+    }
+    for twin in &inferred.cannot_tell.twins {
+        let _ = write!(
+            text,
+            "\nhardly told apart: {}, {} ({:+.2})",
+            twin.one, twin.other, twin.correlation
+        );
+    }
+    if !inferred.cannot_tell.not_learned.is_empty() {
+        let _ = write!(text, "\nnot learned: {}", inferred.cannot_tell.not_learned.join(", "));
+    }
+    for warning in &inferred.warnings {
+        let _ = write!(text, "\nnote: {warning}");
+    }
+    text
+}
