@@ -6,9 +6,11 @@ use crate::control::{Service, ServiceOutcome};
 use worm_estimator::config::Config;
 use worm_estimator::message::{Cycle, Fault, Mode, State};
 
-/// After the motor's last reason to turn, it may take this long to stand, s: the servo's own deceleration.
-const DECELERATION_S: f64 = 0.06;
-/// Cam velocity below which the motor stands, rad/s. A worm on a slope may creep against the friction of its gears.
+/// After its last reason to turn, a motor with torque may take this long to stand, s: the servo's velocity loop brakes its inertia J with
+/// b = k (P V + k)/R + c, so that the velocity falls at least as e^(−b t/2J). From the fastest crawl to standing that is
+/// 2 · 0.0023/0.075 · ln(6.3/0.06) = 0.29 s for the heaviest rotor that is drawn.
+const DECELERATION_S: f64 = 0.3;
+/// Cam velocity below which the motor stands, rad/s.
 const STANDING_RAD_S: f64 = 0.06;
 /// How far the phase that is published may be from the true one, cycles: a count of the encoder, and the motion since the
 /// reading.
@@ -309,7 +311,8 @@ impl Invariants {
     }
 
     /// Without a torque command, and in a fault, the motor stands: two ticks, the servo's deceleration and, if the servo cannot be
-    /// reached, its own watchdog after the last reason to turn.
+    /// reached, its own watchdog after the last reason to turn. A motor without torque runs out, and the worm itself may turn it: its
+    /// tips push the cam with up to 13 mN m, and the gears hold 9. So this holds for a motor with torque.
     fn rest(&mut self, state: &State, truth: &Truth) -> Option<Broken> {
         let now_s = (state.time_ns - truth.stood_ns.min(state.time_ns)) as f64 * 1e-9;
         let may_turn = [Mode::Crawling.code(), Mode::Holding.code(), Mode::Stopping.code()].contains(&state.mode);
@@ -334,7 +337,7 @@ impl Invariants {
                 now_s
             }
         };
-        let moves = truth.velocity_rad_s.abs() > STANDING_RAD_S;
+        let moves = truth.torque_is_on && truth.velocity_rad_s.abs() > STANDING_RAD_S;
         (moves && now_s - since_s > self.may_turn_s).then(|| Broken {
             rule: "the motor stands when nothing commands it",
             text: format!(
