@@ -151,14 +151,14 @@ fn the_energy_budget_agrees_with_the_ledger() {
         let cycle = &plant.ledger().cycles()[3];
         let needs = budget(&config);
         println!("{servo} {slope_deg}: {needs:?} {cycle:?}");
-        for (predicted_j, true_j) in [
-            (needs.energy_j, cycle.electrical_j),
-            (needs.copper_j, cycle.copper_j),
-            (needs.friction_j, cycle.friction_inside_j),
+        // The budget's winding has 25 °C, and the crawling one is warmer by some kelvin, the more so the more copper heat there is.
+        for (predicted_j, true_j, within) in [
+            (needs.energy_j, cycle.electrical_j, 0.015),
+            (needs.copper_j, cycle.copper_j, 0.03),
+            (needs.friction_j, cycle.friction_inside_j, 0.01),
         ] {
-            // The budget's winding has 25 °C; the crawling one is some kelvin warmer.
             assert!(
-                (predicted_j / true_j - 1.0).abs() < 0.02,
+                (predicted_j / true_j - 1.0).abs() < within,
                 "{servo}: {predicted_j} J against {true_j} J"
             );
         }
