@@ -14,7 +14,7 @@ fn plant(criterion: &mut Criterion) {
     let gains = Gains {
         velocity_p: 0.0663,
         velocity_i: 11.5,
-        position_p: 20.0,
+        position_p: 1.15,
         duty_limit: 1.0,
     };
     let mut plant = Plant::new(&Config::default(), Some(1)).expect("the paper's worm");

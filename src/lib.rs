@@ -54,6 +54,7 @@
 //! | `foxglove` | the topics live in Foxglove: what a recorder reads, over a WebSocket. The feature `foxglove` | `recorder` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
+//! | [`servo_bench`] | recordings of a servo that moves an arm on a bench, through the link | `link` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
 //! | `preflight` | the checks of `wormd check` | `control`, `topics`, `realtime` |
 //! | [`why`] | why a worm stopped: the first reason, the events before it, the remedy, from any log | `black_box` |
@@ -93,6 +94,7 @@ pub mod realtime;
 mod recorder;
 mod relay;
 mod remedy;
+pub mod servo_bench;
 pub mod soak;
 mod supervisor;
 mod syslog;

@@ -73,6 +73,8 @@ enum Subcommands {
     /// Predict recordings by a model that was not fitted to them, and say how far off it is
     #[cfg(feature = "analysis")]
     Predict(command::predict::PredictArgs),
+    /// A servo that moves an arm on a bench: recordings of it for `wormd explain`
+    ServoBench(command::servo_bench::ServoBenchArgs),
     /// A recording from the model: what motion capture would have seen
     #[cfg(feature = "analysis")]
     Simulate(command::simulate::SimulateArgs),
@@ -152,6 +154,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Explain(args) => command::explain::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Predict(args) => command::predict::run(&args),
+        Subcommands::ServoBench(args) => command::servo_bench::run(&args),
         #[cfg(feature = "analysis")]
         Subcommands::Simulate(args) => command::simulate::run(&args),
         Subcommands::Latency(args) => command::latency::run(&args, verbose),

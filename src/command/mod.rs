@@ -31,6 +31,7 @@ mod recording_limits;
 pub mod relay;
 pub mod replay;
 pub mod send_command;
+pub mod servo_bench;
 #[cfg(feature = "analysis")]
 pub mod simulate;
 pub mod soak;

@@ -9,9 +9,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use worm_estimator::config::Config;
+use worm_physics::servo::Pendulum;
 
 /// The devices' priority lies this far below the loop's: a real servo answers however busy the computer is, and so must this one.
 const PRIORITY_BELOW_LOOP: u8 = 10;
+/// Least inertia of an arm, kg m²: less is no arm.
+const MIN_ARM_KG_M2: f64 = 1e-7;
 
 /// Runs the simulated servo and tracker behind a pseudo-terminal until SIGTERM or SIGINT.
 ///
@@ -31,6 +34,10 @@ pub struct VirtualWormArgs {
     /// Take faults from `wormd fault` while it runs
     #[arg(long)]
     pub allow_faults: bool,
+    /// An arm with a mass on the servo's horn in place of the cam, for `wormd servo-bench`: mass_kg=M,length_m=L[,arm_mass_kg=A]. The worm rests, and
+    /// the arm hangs at 2048 counts
+    #[arg(long, value_name = "ARM", value_parser = parse_arm)]
+    pub arm: Option<Pendulum>,
     /// Set the servo to this baud rate, and answer only a peer that uses the servo's; without it any rate is understood
     #[arg(long, value_name = "BAUD", value_parser = parse_baud)]
     pub baud: Option<u32>,
@@ -50,6 +57,29 @@ fn parse_baud(text: &str) -> Result<u32, String> {
     baud.ok_or_else(|| format!("must be one of {BAUD_RATES:?}"))
 }
 
+fn parse_arm(text: &str) -> Result<Pendulum, String> {
+    let mut arm = Pendulum::NONE;
+    for part in text.split(',') {
+        let (name, value) = part.split_once('=').unwrap_or((part, ""));
+        let (value_of, max) = match name {
+            "mass_kg" => (&mut arm.mass_kg, 100.0),
+            "length_m" => (&mut arm.length_m, 10.0),
+            "arm_mass_kg" => (&mut arm.arm_mass_kg, 100.0),
+            _ => {
+                return Err(format!(
+                    "'{name}' is nothing of an arm: give mass_kg, length_m and arm_mass_kg"
+                ));
+            }
+        };
+        let number = value.parse().ok().filter(|number| (0.0..=max).contains(number));
+        *value_of = number.ok_or_else(|| format!("{name} = '{value}': give a number from 0 to {max}"))?;
+    }
+    if arm.inertia_kg_m2() < MIN_ARM_KG_M2 {
+        return Err("an arm needs mass_kg and length_m above 0".to_owned());
+    }
+    Ok(arm)
+}
+
 /// Runs `wormd virtual-worm` until a signal ends it.
 ///
 /// # Errors
@@ -65,6 +95,7 @@ pub fn run(args: &VirtualWormArgs) -> Result<(), Failure> {
         faults: args.faults.clone(),
         seed: args.seed,
         baud: args.baud,
+        arm: args.arm,
         ..Options::default()
     };
     let end = end_on_signal()?;

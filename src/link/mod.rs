@@ -68,6 +68,7 @@ pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPla
 pub use operations::OperationError;
 pub use servo::ServoReading;
 pub use startup::{LinkSettings, Prepared, StartupError, prepare};
+pub(crate) use startup::{find_servo, limit_duty_to};
 pub use stop_inputs::StopInputs;
 pub use tracker::{NoTrackerBlock, TrackerReading};
 pub use trial::{MotionTrial, TrialError, WatchdogTrial};

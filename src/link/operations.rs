@@ -111,13 +111,13 @@ impl<P: Port> WormBus<P> {
     }
 
     /// Reads a register, asking again when the answer is lost.
-    pub(super) fn register(&mut self, id: DeviceId, register: Register) -> Result<u32, OperationError> {
+    pub(crate) fn register(&mut self, id: DeviceId, register: Register) -> Result<u32, OperationError> {
         self.ask_again(|bus, deadline| bus.read_register(id, register, deadline))
             .map_err(|error| OperationError::Transaction { register, error })
     }
 
     /// Writes a register and reads it back.
-    pub(super) fn set_register(&mut self, id: DeviceId, register: Register, wanted: u32) -> Result<(), OperationError> {
+    pub(crate) fn set_register(&mut self, id: DeviceId, register: Register, wanted: u32) -> Result<(), OperationError> {
         let mut found = None;
         for _ in 0..ATTEMPTS {
             let written = self.ask_again(|bus, deadline| bus.write_register(id, register, wanted, deadline));

@@ -41,6 +41,10 @@ pub mod register {
     pub const CURRENT_LIMIT: Register = Register::new(38, 2, "current limit");
     /// Greatest goal velocity, in 0.229 rev/min.
     pub const VELOCITY_LIMIT: Register = Register::new(44, 4, "velocity limit");
+    /// Greatest goal position in position mode, 0 to 4095.
+    pub const MAX_POSITION_LIMIT: Register = Register::new(48, 4, "max position limit");
+    /// Least goal position in position mode, 0 to 4095.
+    pub const MIN_POSITION_LIMIT: Register = Register::new(52, 4, "min position limit");
     /// What the servo does when it gets power; bit 0: torque on, bit 1: gains and profile from a backup. Servos with an older firmware do
     /// not have it.
     pub const STARTUP_CONFIGURATION: Register = Register::new(60, 1, "startup configuration");
@@ -56,6 +60,16 @@ pub mod register {
     pub const VELOCITY_I_GAIN: Register = Register::new(76, 2, "velocity I gain");
     /// Proportional gain of the velocity loop, in 1/128 of the servo's own unit.
     pub const VELOCITY_P_GAIN: Register = Register::new(78, 2, "velocity P gain");
+    /// Derivative gain of the position loop.
+    pub const POSITION_D_GAIN: Register = Register::new(80, 2, "position D gain");
+    /// Integral gain of the position loop.
+    pub const POSITION_I_GAIN: Register = Register::new(82, 2, "position I gain");
+    /// Proportional gain of the position loop: PWM counts for 256 counts of error.
+    pub const POSITION_P_GAIN: Register = Register::new(84, 2, "position P gain");
+    /// Gain of the goal's acceleration.
+    pub const FEEDFORWARD_2ND_GAIN: Register = Register::new(88, 2, "feedforward 2nd gain");
+    /// Gain of the goal's velocity.
+    pub const FEEDFORWARD_1ST_GAIN: Register = Register::new(90, 2, "feedforward 1st gain");
     /// Silence after which the motor stops by itself, in 20 ms; 0 is never, 0xFF says that it has happened.
     pub const BUS_WATCHDOG: Register = Register::new(98, 1, "bus watchdog");
     /// Limit of the duty in all modes but PWM mode, in 0.113 %; the PWM limit after a start and a change of mode.
@@ -66,6 +80,8 @@ pub mod register {
     pub const PROFILE_ACCELERATION: Register = Register::new(108, 4, "profile acceleration");
     /// Velocity on the way to a goal position, in 0.229 rev/min; 0 is the velocity limit.
     pub const PROFILE_VELOCITY: Register = Register::new(112, 4, "profile velocity");
+    /// Where the motor shall turn to in the position modes, 4096 to a turn, signed.
+    pub const GOAL_POSITION: Register = Register::new(116, 4, "goal position");
     /// Milliseconds, 0 to 32767 and over again. Read-only.
     pub const REALTIME_TICK: Register = Register::new(120, 2, "realtime tick");
     /// 1 while the velocity is above a threshold. Read-only.
@@ -137,6 +153,9 @@ pub const FULL_PWM: u16 = 885;
 
 /// Operating mode in which the goal is a velocity.
 pub const VELOCITY_MODE: u8 = 1;
+
+/// Operating mode in which the goal is a position within one turn.
+pub const POSITION_MODE: u8 = 3;
 
 /// Value of the bus watchdog after it has stopped the motor; the goal is then read-only until 0 is written to it.
 pub const WATCHDOG_LATCHED: u8 = 0xFF;

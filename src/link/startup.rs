@@ -20,6 +20,7 @@ use super::operations::{OperationError, REPLY_TIME};
 use super::packet::DeviceId;
 use super::servo::{HardwareErrors, WATCHDOG_LATCHED, register};
 use identify::{identify, identify_servo};
+pub(crate) use set_up::limit_duty_to;
 use set_up::{LEAST_VOLTAGE_V, limit_duty, set_up};
 
 use super::{
@@ -211,22 +212,7 @@ pub fn prepare<P: Port>(
     findings: &mut Vec<Finding>,
 ) -> Result<Prepared, StartupError> {
     let (servo_id, tracker_id) = (settings.servo_id, settings.tracker_id);
-    let servo = identify_servo(bus, settings);
-    // The motor comes to rest first, whatever else is wrong.
-    let had_torque = match &servo {
-        Ok(_) => bring_to_rest(bus, servo_id),
-        Err(StartupError::WrongModel { found, .. }) if X_SERIES.contains(found) => bring_to_rest(bus, servo_id),
-        Err(_) => false,
-    };
-    let servo = servo?;
-    set_status_level(bus, servo_id, ANSWER_ALL)?;
-    unlock(bus, servo_id, had_torque, findings)?;
-    let errors = bus.hardware_errors(servo_id)?;
-    if !errors.is_none() {
-        return Err(StartupError::HardwareError(errors));
-    }
-    check_watchdog(servo, settings.accept_unsafe_watchdog, findings)?;
-
+    let servo = find_servo(bus, settings, findings)?;
     let tracker = identify(bus, settings, "tracker", tracker_id, settings.tracker_model)?;
     let tracker_cells = bus.register(tracker_id, tracker::register::CELL_COUNT)? as u8;
     if usize::from(tracker_cells) < settings.cells {
@@ -261,6 +247,34 @@ pub fn prepare<P: Port>(
         servo_reading,
         tracker_reading,
     })
+}
+
+/// Finds the configured servo and brings it to rest: torque off and verified, everything answered, no hardware error, a watchdog that works.
+///
+/// # Errors
+/// [`StartupError`]: torque must not come on.
+pub(crate) fn find_servo<P: Port>(
+    bus: &mut WormBus<P>,
+    settings: &LinkSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<Identity, StartupError> {
+    let servo_id = settings.servo_id;
+    let servo = identify_servo(bus, settings);
+    // The motor comes to rest first, whatever else is wrong.
+    let had_torque = match &servo {
+        Ok(_) => bring_to_rest(bus, servo_id),
+        Err(StartupError::WrongModel { found, .. }) if X_SERIES.contains(found) => bring_to_rest(bus, servo_id),
+        Err(_) => false,
+    };
+    let servo = servo?;
+    set_status_level(bus, servo_id, ANSWER_ALL)?;
+    unlock(bus, servo_id, had_torque, findings)?;
+    let errors = bus.hardware_errors(servo_id)?;
+    if !errors.is_none() {
+        return Err(StartupError::HardwareError(errors));
+    }
+    check_watchdog(servo, settings.accept_unsafe_watchdog, findings)?;
+    Ok(servo)
 }
 
 /// Whether a servo is known to turn on when its bus watchdog has acted.

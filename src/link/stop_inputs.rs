@@ -56,7 +56,8 @@ impl<'a> StopInputs<'a> {
         }
     }
 
-    fn check_silently(&mut self) -> Result<(), TrialError> {
+    /// Looks at what can be read without a packet on the bus.
+    pub(crate) fn check_silently(&mut self) -> Result<(), TrialError> {
         let now_ns = self.now_ns();
         self.judge(|input| input.is_pressed_at_line(now_ns))
     }

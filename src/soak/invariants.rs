@@ -6,9 +6,11 @@ use crate::control::{Service, ServiceOutcome};
 use worm_estimator::config::Config;
 use worm_estimator::message::{Cycle, Fault, Mode, State};
 
-/// After the motor's last reason to turn, it may take this long to stand, s: the servo's own deceleration.
-const DECELERATION_S: f64 = 0.06;
-/// Cam velocity below which the motor stands, rad/s. A worm on a slope may creep against the friction of its gears.
+/// After its last reason to turn, a motor with torque may take this long to stand, s: the servo's velocity loop brakes its inertia J with
+/// b = k (P V + k)/R + c, so that the velocity falls at least as e^(−b t/2J). From the fastest crawl to standing that is
+/// 2 · 0.0023/0.075 · ln(6.3/0.06) = 0.29 s for the heaviest rotor that is drawn.
+const DECELERATION_S: f64 = 0.3;
+/// Cam velocity below which the motor stands, rad/s.
 const STANDING_RAD_S: f64 = 0.06;
 /// How far the phase that is published may be from the true one, cycles: a count of the encoder, and the motion since the
 /// reading.
@@ -73,6 +75,8 @@ pub struct Invariants {
     resting_since_s: Option<f64>,
     /// How long it may turn after that, s.
     may_turn_s: f64,
+    /// Since when torque is on, s: it may come on while the worm turns the cam.
+    powered_since_s: Option<f64>,
     stood_ns: u64,
     /// Ticks in a row in which torque was on though a fault is latched.
     torque_ticks: u32,
@@ -116,6 +120,7 @@ impl Invariants {
             last: None,
             resting_since_s: None,
             may_turn_s: 0.0,
+            powered_since_s: None,
             stood_ns: 0,
             torque_ticks: 0,
             max_torque_ticks: TWO_TICKS,
@@ -152,7 +157,7 @@ impl Invariants {
             .or_else(|| self.stopping(state))
             .or_else(|| self.torque(tick, truth))
             .or_else(|| self.hold(state, truth))
-            .or_else(|| self.rest(state, truth))
+            .or_else(|| self.rest(tick, truth))
             .or_else(|| self.phase(state, truth));
         if state.mode != Mode::Fault.code() || self.last.is_some_and(|last| reason(&last) != reason(state)) {
             self.was_reset = false;
@@ -309,9 +314,17 @@ impl Invariants {
     }
 
     /// Without a torque command, and in a fault, the motor stands: two ticks, the servo's deceleration and, if the servo cannot be
-    /// reached, its own watchdog after the last reason to turn.
-    fn rest(&mut self, state: &State, truth: &Truth) -> Option<Broken> {
+    /// reached, its own watchdog after the last reason to turn. A motor without torque runs out, and the worm itself may turn it: its
+    /// tips push the cam with up to 13 mN m, and the gears hold 9. So this holds for a motor with torque.
+    fn rest(&mut self, tick: &Tick, truth: &Truth) -> Option<Broken> {
+        let state = &tick.state;
         let now_s = (state.time_ns - truth.stood_ns.min(state.time_ns)) as f64 * 1e-9;
+        let powered_since_s = match self.powered_since_s {
+            // Arming switches torque off, and on again.
+            Some(since_s) if truth.torque_is_on && tick.service.is_none() => since_s,
+            _ => now_s,
+        };
+        self.powered_since_s = truth.torque_is_on.then_some(powered_since_s);
         let may_turn = [Mode::Crawling.code(), Mode::Holding.code(), Mode::Stopping.code()].contains(&state.mode);
         if may_turn {
             self.resting_since_s = None;
@@ -334,8 +347,8 @@ impl Invariants {
                 now_s
             }
         };
-        let moves = truth.velocity_rad_s.abs() > STANDING_RAD_S;
-        (moves && now_s - since_s > self.may_turn_s).then(|| Broken {
+        let moves = truth.torque_is_on && truth.velocity_rad_s.abs() > STANDING_RAD_S;
+        (moves && now_s - since_s.max(powered_since_s) > self.may_turn_s).then(|| Broken {
             rule: "the motor stands when nothing commands it",
             text: format!(
                 "{:.3} rad/s in mode {} (fault {}) after {:.3} s",

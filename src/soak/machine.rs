@@ -2,10 +2,10 @@
 
 use crate::control::{DriveError, Service, ServiceOutcome, link_settings};
 use crate::link::servo::scale;
-use crate::link::virtual_worm::{Devices, DevicesError, Fault, Options, Plant};
+use crate::link::virtual_worm::{Devices, DevicesError, Fault, Options, Plant, VirtualPort};
 use crate::link::{
-    ArmError, EmergencyStopError, EmergencyStopInput, ExchangePlan, FaultInjector, Faults, LinkSettings, Port,
-    PortError, ServoReading, StartupError, TrackerReading, WormBus, arm, disarm, prepare,
+    ArmError, EmergencyStopError, EmergencyStopInput, ExchangePlan, FaultInjector, Faults, LinkSettings, ServoReading,
+    StartupError, TrackerReading, WormBus, arm, disarm, prepare,
 };
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
@@ -66,73 +66,9 @@ pub(super) const SERVICE_TIMEOUT_S: f64 = 0.06;
 /// The codec's own deadlines are on the real clock, which means nothing here.
 const NEVER: Duration = Duration::from_secs(3600);
 
-/// A port in memory with the virtual worm's devices at its other end. Its time runs only while the link waits, and then for at most
-/// `timeout_s`.
-struct Wire {
-    devices: Devices,
-    /// Time 0.
-    began: Instant,
-    now_s: f64,
-    timeout_s: f64,
-    give_up_s: f64,
-    line: Vec<u8>,
-}
-
-/// The physics refuse only a configuration that was not checked.
-fn simulated<E>(result: Result<(), E>) -> Result<(), PortError> {
-    result.map_err(|_| PortError::Os {
-        doing: "simulate the worm",
-        kind: std::io::ErrorKind::InvalidInput,
-    })
-}
-
-impl Port for Wire {
-    fn now(&self) -> Instant {
-        self.began + Duration::from_secs_f64(self.now_s)
-    }
-
-    fn pass_time(&mut self, time: Duration) -> Result<(), PortError> {
-        self.now_s += time.as_secs_f64();
-        simulated(self.devices.advance_to(self.now_s))
-    }
-
-    fn send(&mut self, bytes: &[u8], _: Instant) -> Result<(), PortError> {
-        simulated(self.devices.receive(bytes, self.now_s))?;
-        self.give_up_s = self.now_s + self.timeout_s;
-        Ok(())
-    }
-
-    fn receive(&mut self, into: &mut [u8], _: Instant) -> Result<usize, PortError> {
-        if self.line.is_empty() {
-            self.devices.take_due(self.now_s, &mut self.line);
-        }
-        if self.line.is_empty() {
-            let due_s = self.devices.next_due_s().unwrap_or(f64::INFINITY);
-            self.now_s = due_s.min(self.give_up_s).max(self.now_s);
-            simulated(self.devices.advance_to(self.now_s))?;
-            self.devices.take_due(self.now_s, &mut self.line);
-        }
-        let count = into.len().min(self.line.len());
-        into[..count].copy_from_slice(&self.line[..count]);
-        self.line.drain(..count);
-        Ok(count)
-    }
-
-    fn discard_input(&mut self) -> Result<usize, PortError> {
-        self.devices.take_due(self.now_s, &mut self.line);
-        let count = self.line.len();
-        self.line.clear();
-        Ok(count)
-    }
-
-    fn set_baud_rate(&mut self, _: u32) -> Result<(), PortError> {
-        Ok(())
-    }
-}
-
 /// The virtual worm behind the real codec: every goal and every reading are packets.
 pub struct Wired {
-    bus: WormBus<FaultInjector<Wire>>,
+    bus: WormBus<FaultInjector<VirtualPort>>,
     settings: LinkSettings,
     plan: ExchangePlan,
     emergency_stop: Option<EmergencyStopInput>,
@@ -148,14 +84,7 @@ impl Wired {
     /// # Errors
     /// [`MachineError`] when there is nothing to simulate, or the devices fail the checks.
     pub fn new(config: &Config, options: &Options) -> Result<Self, MachineError> {
-        let wire = Wire {
-            devices: Devices::new(config, options)?,
-            began: Instant::now(),
-            now_s: 0.0,
-            timeout_s: SERVICE_TIMEOUT_S,
-            give_up_s: 0.0,
-            line: Vec::new(),
-        };
+        let wire = VirtualPort::new(Devices::new(config, options)?, SERVICE_TIMEOUT_S);
         let seed = options.seed.unwrap_or(config.virtual_worm.seed);
         let mut bus = WormBus::new(FaultInjector::new(wire, Faults::NONE, seed));
         let settings = link_settings(config, 4_000_000)?;
@@ -170,7 +99,7 @@ impl Wired {
         })
     }
 
-    fn wire(&mut self) -> &mut Wire {
+    fn wire(&mut self) -> &mut VirtualPort {
         self.bus.port_mut().port_mut()
     }
 

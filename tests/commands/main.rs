@@ -13,5 +13,6 @@ mod manual;
 mod mcap_python;
 mod plan;
 mod servo_bench;
+mod servo_bench_record;
 mod simulate;
 mod workspace;

@@ -19,7 +19,7 @@ pub struct Bare {
 const FACTORY_GAINS: Gains = Gains {
     velocity_p: 0.0663,
     velocity_i: 11.5,
-    position_p: 20.0,
+    position_p: 1.15,
     duty_limit: 1.0,
 };
 

@@ -263,7 +263,7 @@ slope, fault: alarms and how long after it they came, how it ended
  0° stall                      motor-stall 0.03 s, fault (alarm)
  0° jam:cell=2                 jammed-cell 2.16 s, fault (alarm)
 30° jam:cell=4,share=0.4       jammed-cell 0.91 s, fault (alarm)
- 0° jam:cell=1,share=0.8       model-mismatch 13.83 s, crawling
+ 0° jam:cell=1,share=0.8       model-mismatch 11.33 s, crawling
 30° slip:friction=0.4          sliding-down 0.34 s, no-progress 0.41 s, holding
 45° slip:friction=0.3          sliding-down 0.14 s, no-progress 0.16 s, holding
  0° slide:speed=0.003          no-progress 1.73 s, sliding-down 3.27 s, holding

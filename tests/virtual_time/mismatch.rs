@@ -5,11 +5,14 @@
 use super::harness::{self, Obeying, config, wired};
 use std::fmt::Write;
 use worm_estimator::message::{Alarm, AlarmKind, CommandKind};
+use worm_physics::{Physics, steady_cycle_of};
 use wormd::link::virtual_worm::Options;
 use wormd::soak::{Session, Wired};
 
 const RATE_HZ: f64 = 250.0;
 const CYCLE_S: f64 = 2.5;
+/// `alarms.model_mismatch.threshold` as it is by default, m.
+const THRESHOLD_M: f64 = 0.00016;
 /// Cycles within which a mismatch from the start must be reported.
 const SOON_CYCLES: f64 = 8.5;
 /// The same for one that is just above the threshold.
@@ -118,7 +121,14 @@ fn seeds(otherwise: u64) -> u64 {
     }
 }
 
-/// Half of the worms; with the environment variable `WORMD_HOURS` all of them.
+/// What the model says that a world advances in a cycle, m.
+fn advance_m(world: &World) -> f64 {
+    let physics = Physics::try_from(&config(&world.toml())).expect("a worm");
+    steady_cycle_of(&physics, CYCLE_S).cycle().expect("it holds").advance_m
+}
+
+/// Half of the worms; with the environment variable `WORMD_HOURS` all of them. Where the model's own advance is off by more than the
+/// threshold, an alarm is true: 3 % of the stiffness are 0.19 mm at 15 degrees.
 #[test]
 fn a_sound_worm_raises_no_mismatch() {
     let mut wrongs = String::new();
@@ -150,7 +160,8 @@ fn a_sound_worm_raises_no_mismatch() {
             for seed in 1..=seeds(1) {
                 let mut session = crawling(&file, &world, faults, index as u64 + seed);
                 session.run_s(LONG_CYCLES * CYCLE_S, |_| {});
-                if !session.raised.is_empty() {
+                let off_m = advance_m(&world) - advance_m(&file);
+                if !session.raised.is_empty() && off_m.abs() < THRESHOLD_M {
                     let raised = &session.raised;
                     writeln!(wrongs, "{bounds_mm:?} at {slope_deg}°, {what}, seed {seed}: {raised:?}")
                         .expect("text has room");

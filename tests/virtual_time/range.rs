@@ -14,8 +14,8 @@ const CONFIGURED: &str = "battery.capacity_j = 80.0\n";
 fn after_three_cycles_the_range_is_within_its_interval() {
     for (seed, hidden) in [
         "battery.capacity_j = 80.0\n",
-        "battery.capacity_j = 84.0\nvirtual_worm.inner_friction_n_m = 0.03\n",
-        "battery.capacity_j = 77.0\nvirtual_worm.inner_friction_n_m = 0.08\n",
+        "battery.capacity_j = 84.0\nvirtual_worm.inner_friction_n_m = 0.0005\n",
+        "battery.capacity_j = 77.0\nvirtual_worm.inner_friction_n_m = 0.025\n",
         "battery = { capacity_j = 78.0, hotel_power_w = 0.55 }\nvirtual_worm.max_deformation_m = 0.0019\n",
         "battery = { capacity_j = 82.0, hotel_power_w = 0.46 }\nvirtual_worm.max_deformation_m = 0.0016\n",
     ]

@@ -179,7 +179,7 @@ impl Workbench {
         Ok(Self {
             base: Worm::try_from(config)?,
             effects: config.effect_settings()?,
-            motor: config.motor(),
+            motor: config.motor()?,
             current_limit_a: config.limits.current_a.min(config.servo.current_limit_a),
             velocity_limit_rev_per_min: config.servo.velocity_limit_rev_per_min,
             cycle_s: config.gait.cycle_s,

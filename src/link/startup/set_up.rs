@@ -115,12 +115,21 @@ fn describe_setting(register: Register, found: u32) -> String {
 ///
 /// A warm winding has more resistance, but it cools: the resistance is taken to be no more than that at the reference temperature.
 pub(super) fn limit_duty<P: Port>(bus: &mut WormBus<P>, settings: &LinkSettings) -> Result<f64, StartupError> {
+    limit_duty_to(bus, settings, servo::FULL_PWM)
+}
+
+/// As [`limit_duty`], with another greatest goal PWM: the servo refuses one beyond its PWM limit.
+pub(crate) fn limit_duty_to<P: Port>(
+    bus: &mut WormBus<P>,
+    settings: &LinkSettings,
+    most: u16,
+) -> Result<f64, StartupError> {
     let servo_id = settings.servo_id;
     let voltage_v = supply_voltage_v(bus, servo_id)?;
     let temperature_c = f64::from(bus.register(servo_id, register::PRESENT_TEMPERATURE)?).min(RESISTANCE_AT_C);
     let resistance_ohm = settings.winding_resistance_ohm * (1.0 + COPPER_PER_K * (temperature_c - RESISTANCE_AT_C));
     let share = settings.current_limit_a * resistance_ohm / voltage_v;
-    let counts = (share / scale::DUTY).floor().clamp(1.0, f64::from(servo::FULL_PWM));
+    let counts = (share / scale::DUTY).floor().clamp(1.0, f64::from(most));
     bus.set_register(servo_id, register::GOAL_PWM, counts as u32)?;
     Ok((counts * scale::DUTY).min(1.0))
 }

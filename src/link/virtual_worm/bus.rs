@@ -54,6 +54,10 @@ impl Bus {
             tracker: Tracker::new(config),
             line: Line::new(derived_seed(options.seed.unwrap_or(config.virtual_worm.seed))),
         };
+        if let Some(arm) = options.arm {
+            bus.plant.carry(arm);
+            bus.servo.carry_arm();
+        }
         bus.look_at_faults()?;
         Ok(bus)
     }

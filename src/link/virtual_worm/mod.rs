@@ -17,6 +17,8 @@
 //! Of the effects, `sensor-latency` cannot be negative here, because a real-time simulation does not know the future. `motor-droop` reduces
 //! the velocity that the servo is commanded to keep.
 //!
+//! The servo may carry an arm instead of the cam ([`Options::arm`]), for recordings on a bench; the worm rests then.
+//!
 //! Not modelled: the winding's inductance, the backlash of the gears and the time of bytes on a real wire. The servo's EEPROM lives
 //! as long as the process. Positions, currents and voltages are quantised as the registers are; currents and
 //! voltages carry no noise.
@@ -42,6 +44,7 @@ mod servo;
 mod servo_table;
 pub mod supply;
 mod tracker;
+mod virtual_port;
 
 #[cfg(test)]
 mod behaviour_tests;
@@ -59,3 +62,4 @@ pub use plant::{DEFAULT_STEP_S, Plant};
 pub use pty::{PortLink, PtyError};
 pub use report::VirtualWormReport;
 pub use server::{Server, ServerError, VirtualWorm};
+pub use virtual_port::VirtualPort;

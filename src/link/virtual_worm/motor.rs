@@ -1,29 +1,29 @@
-//! The motor with its gears: winding, bridge, friction, inertia, the servo's own velocity loop, and heat.
+//! The motor with its gears: winding, bridge, friction, inertia, the servo's own loops, and heat.
 //!
 //! All at the output shaft, with forward positive (the cam's frame; the servo's registers may count the other way):
 //!
 //! - current I = (D·V − k·ω)/R, with duty D in [−1, 1] of the bus voltage V. The winding's inductance is left out: its time
 //!   constant is a fraction of a step.
-//! - J·dω/dt = k·I − c·ω − sign(ω)·(dry friction) − load.
-//! - D = integral + P·(goal − ω) in velocity mode, the integral growing with I·(goal − ω).
+//! - J·dω/dt = k·I − c·ω − sign(ω)·friction + ripple − load. Friction and ripple are those of a servo on a bench
+//!   ([`ServoLaws`]): friction may depend on what motor and load put on the gears, and on ω.
+//! - In velocity mode D = integral + P·(goal − ω), the integral growing with I·(goal − ω); in position mode D = P·(goal − angle). Both may
+//!   act on what was some time ago, and the bridge may do nothing below some duty.
 //!
-//! Within a step this is linear in ω and is **solved exactly**, not stepped: ω relaxes exponentially, and the means of ω
-//! and ω² over the step are known in closed form. So electrical energy = copper heat + friction + load work + change of
-//! kinetic energy holds to rounding, at any step length and any inertia, and a motor that comes to rest within a step
-//! stays at rest until its torque exceeds the dry friction.
+//! Friction and ripple are held over a step, of a quarter of a millisecond. Then everything is linear in ω within it and is **solved
+//! exactly**, not stepped: ω relaxes exponentially, and the means of ω and ω² over the step are known in closed form. So electrical
+//! energy = copper heat + friction + load work + change of kinetic energy holds to rounding, at any step length and any inertia, and
+//! a motor that comes to rest within a step stays at rest until its torque exceeds the friction.
 
 use super::supply::Supply;
 use worm_estimator::config::Config;
+use worm_physics::effect::SettingError;
+use worm_physics::servo::delay::DelayLine;
+use worm_physics::servo::physics::{COPPER_PER_K, RESISTANCE_AT_C};
+use worm_physics::servo::{ServoLaws, ServoMotor};
 
 /// What the servo's bridge limits the current to, A: the largest that its registers can say (XL330-M288, register 38).
 /// The register itself bounds the current in current modes only.
 const BRIDGE_LIMIT_A: f64 = 1.75;
-
-/// Resistance of copper grows by this share per kelvin.
-const COPPER_PER_K: f64 = 0.00393;
-
-/// Temperature at which the configured resistance holds, °C.
-const RESISTANCE_AT_C: f64 = 25.0;
 
 /// Heat capacities and resistances of an 18 g servo. The maker gives none; these make a stalled motor reach 70 °C in a
 /// minute or two, and a crawling worm end a few kelvin above its surroundings.
@@ -45,13 +45,8 @@ pub enum Drive {
     Duty(f64),
     /// Turn at this velocity, rad/s.
     Velocity(f64),
-    /// Turn to this angle, at no more than this velocity.
-    Position {
-        /// Where to, rad.
-        goal_rad: f64,
-        /// Greatest velocity on the way, rad/s.
-        max_velocity_rad_per_s: f64,
-    },
+    /// Turn to this angle, rad.
+    Position(f64),
 }
 
 /// Gains of the servo's own loops, and the duty that they may use.
@@ -61,7 +56,7 @@ pub struct Gains {
     pub velocity_p: f64,
     /// Duty per second and velocity error, 1/rad.
     pub velocity_i: f64,
-    /// Velocity per angle error, 1/s.
+    /// Duty per angle error, 1/rad.
     pub position_p: f64,
     /// Greatest duty, in [0, 1].
     pub duty_limit: f64,
@@ -74,7 +69,7 @@ pub struct StepEnergy {
     pub electrical_j: f64,
     /// ∫ I²·R dt.
     pub copper_j: f64,
-    /// Into dry and viscous friction.
+    /// Into friction, and into the gears' ripple, which gives it back within a wave.
     pub friction_j: f64,
     /// Against the load torque that the step was solved with.
     pub load_j: f64,
@@ -85,16 +80,18 @@ pub struct StepEnergy {
 /// The motor's state and constants.
 #[derive(Debug, Clone)]
 pub struct Motor {
-    resistance_ohm: f64,
-    torque_constant: f64, // N m/A and V s/rad
-    inertia_kg_m2: f64,
-    dry_n_m: f64,
-    viscous: f64, // N m s/rad
-    dry_scale: f64,
+    servo: ServoMotor,
+    laws: ServoLaws,
+    inertia_kg_m2: f64, // of the rotor behind the gears, and of what the horn carries
+    winding_j_per_k: f64,
+    winding_to_case_k_per_w: f64,
+    friction_scale: f64,
     ambient_c: f64,
     heated_to_c: Option<f64>,
     angle_rad: f64,
     velocity_rad_per_s: f64,
+    delayed_angle: DelayLine,
+    delayed_velocity: DelayLine,
     integral: f64, // duty, in [-1, 1]
     duty: f64,     // in [-1, 1]
     current_a: f64,
@@ -120,26 +117,42 @@ struct Means {
 
 impl Motor {
     /// At rest, at angle 0, at the temperature around it.
-    pub fn new(config: &Config) -> Self {
-        let virtual_worm = &config.virtual_worm;
-        Self {
-            resistance_ohm: config.servo.winding_resistance_ohm,
-            torque_constant: config.servo.torque_constant_n_m_per_a,
-            inertia_kg_m2: virtual_worm.inertia_kg_m2,
-            dry_n_m: virtual_worm.inner_friction_n_m,
-            viscous: virtual_worm.inner_viscous_n_m_s_per_rad,
-            dry_scale: 1.0,
-            ambient_c: virtual_worm.ambient_c,
+    ///
+    /// # Errors
+    /// [`SettingError`] when the configuration was not checked and has no such servo effect.
+    pub fn new(config: &Config) -> Result<Self, SettingError> {
+        let worm_physics::Motor { servo, laws } = config.motor()?;
+        let ambient_c = config.virtual_worm.ambient_c;
+        let (winding_j_per_k, winding_to_case_k_per_w) = if laws.heat_k_per_j > 0.0 {
+            (1.0 / laws.heat_k_per_j, laws.cooling_s * laws.heat_k_per_j)
+        } else {
+            (heat::WINDING_J_PER_K, heat::WINDING_TO_CASE_K_PER_W)
+        };
+        Ok(Self {
+            inertia_kg_m2: servo.rotor_inertia_kg_m2,
+            servo,
+            laws,
+            winding_j_per_k,
+            winding_to_case_k_per_w,
+            friction_scale: 1.0,
+            ambient_c,
             heated_to_c: None,
             angle_rad: 0.0,
             velocity_rad_per_s: 0.0,
+            delayed_angle: DelayLine::default(),
+            delayed_velocity: DelayLine::default(),
             integral: 0.0,
             duty: 0.0,
             current_a: 0.0,
             bus_v: Supply::new(config).open_circuit_v(),
-            winding_c: virtual_worm.ambient_c,
-            case_c: virtual_worm.ambient_c,
-        }
+            winding_c: ambient_c,
+            case_c: ambient_c,
+        })
+    }
+
+    /// Puts something on the horn that turns with it.
+    pub fn carry(&mut self, inertia_kg_m2: f64) {
+        self.inertia_kg_m2 = self.servo.rotor_inertia_kg_m2 + inertia_kg_m2;
     }
 
     /// Angle of the cam, rad, counting whole turns.
@@ -172,9 +185,9 @@ impl Motor {
         self.case_c
     }
 
-    /// Scales dry and viscous friction inside.
+    /// Scales dry and viscous friction inside. What grows with the load stays: scaled, it would soon lock the gears.
     pub fn set_friction_scale(&mut self, scale: f64) {
-        self.dry_scale = scale;
+        self.friction_scale = scale;
     }
 
     /// Heats the case from outside to this temperature; `None` leaves it to itself.
@@ -209,21 +222,30 @@ impl Motor {
 
     /// One step of `dt_s` against `load_n_m` (positive: resists turning forward).
     pub fn step(&mut self, drive: Drive, gains: &Gains, load_n_m: f64, supply: &mut Supply, dt_s: f64) -> StepEnergy {
-        let resistance_ohm = self.resistance_ohm * (1.0 + COPPER_PER_K * (self.winding_c - RESISTANCE_AT_C));
-        let k = self.torque_constant;
+        let resistance_ohm = self.servo.winding_ohm * (1.0 + COPPER_PER_K * (self.winding_c - RESISTANCE_AT_C));
+        let k = self.servo.torque_constant;
         let start = self.velocity_rad_per_s;
         self.bus_v = supply.bus_v(
             self.duty * self.duty / resistance_ohm,
             self.duty * k * start / resistance_ohm,
             self.bus_v,
         );
-        let (goal, balance) = self.balance(drive, gains, load_n_m, resistance_ohm);
-        let dry_n_m = self.dry_n_m * self.dry_scale;
-        let driving = balance.a - balance.b * start; // without dry friction
+        let ripple_n_m = self.laws.ripple_at_n_m(self.angle_rad + 0.5 * dt_s * start);
+        let (goal, balance) = self.balance(drive, gains, load_n_m - ripple_n_m, resistance_ohm, dt_s);
+        let driving = balance.a - balance.b * start; // without the friction that does not grow with ω
+        let motor_n_m = k * (balance.i0 - balance.i1 * start) + ripple_n_m;
+        // A motor at rest would go the way it is driven.
+        let towards = if start == 0.0 {
+            f64::EPSILON.copysign(driving)
+        } else {
+            start
+        };
+        let dry_n_m = self.servo.dry_n_m * self.friction_scale;
+        let friction_n_m = self.laws.friction_n_m(dry_n_m, motor_n_m, load_n_m, towards);
         let moving_s;
         let means;
         let direction;
-        if start == 0.0 && driving.abs() <= dry_n_m {
+        if start == 0.0 && driving.abs() <= friction_n_m {
             (moving_s, direction) = (0.0, 0.0);
             means = Means {
                 end: 0.0,
@@ -232,7 +254,7 @@ impl Motor {
             };
         } else {
             direction = if start == 0.0 { driving.signum() } else { start.signum() };
-            let a = balance.a - direction * dry_n_m;
+            let a = balance.a - direction * friction_n_m;
             let full = relax(start, a, balance.b, self.inertia_kg_m2, dt_s);
             if start != 0.0 && full.end * start < 0.0 {
                 moving_s = time_to_rest(start, a, balance.b, self.inertia_kg_m2).min(dt_s);
@@ -249,13 +271,13 @@ impl Motor {
         let square_integral = means.mean_square * moving_s;
         let current_square = i0 * i0 * dt_s - 2.0 * i0 * i1 * angle_rad + i1 * i1 * square_integral;
         let copper_j = resistance_ohm * current_square;
-        let viscous = self.viscous * self.dry_scale;
+        let viscous = self.servo.viscous_n_m_s * self.friction_scale;
         let before_j = self.kinetic_j();
         self.velocity_rad_per_s = means.end;
         let energy = StepEnergy {
             electrical_j: copper_j + k * (i0 * angle_rad - i1 * square_integral),
             copper_j,
-            friction_j: direction * dry_n_m * angle_rad + viscous * square_integral,
+            friction_j: (direction * friction_n_m - ripple_n_m) * angle_rad + viscous * square_integral,
             load_j: load_n_m * angle_rad,
             kinetic_j: self.kinetic_j() - before_j,
         };
@@ -274,12 +296,25 @@ impl Motor {
         energy
     }
 
-    /// The torque balance of this step but for dry friction, and the velocity goal where there is one. Sets the duty.
-    fn balance(&mut self, drive: Drive, gains: &Gains, load_n_m: f64, resistance_ohm: f64) -> (Option<f64>, Balance) {
-        let k = self.torque_constant;
-        let viscous = self.viscous * self.dry_scale;
+    /// The torque balance of this step but for the friction that does not grow with ω, and the velocity goal where there is one. Sets
+    /// the duty.
+    fn balance(
+        &mut self,
+        drive: Drive,
+        gains: &Gains,
+        load_n_m: f64,
+        resistance_ohm: f64,
+        dt_s: f64,
+    ) -> (Option<f64>, Balance) {
+        let k = self.servo.torque_constant;
+        let viscous = self.servo.viscous_n_m_s * self.friction_scale;
         let now = self.velocity_rad_per_s;
-        let velocity_goal = match drive {
+        let delay_s = self.laws.delay_s;
+        let middle_rad = self.angle_rad + 0.5 * dt_s * now;
+        let seen_rad = self.delayed_angle.pass(middle_rad, delay_s, dt_s);
+        let seen_rad_per_s = self.delayed_velocity.pass(now, delay_s, dt_s);
+        // D = d0 − d1·ω
+        let (velocity_goal, mut d0, mut d1) = match drive {
             Drive::Off => {
                 self.duty = 0.0;
                 let free = Balance {
@@ -290,25 +325,19 @@ impl Motor {
                 };
                 return (None, free);
             }
-            Drive::Duty(_) => None,
-            Drive::Velocity(goal) => Some(goal),
-            Drive::Position {
-                goal_rad,
-                max_velocity_rad_per_s,
-            } => {
-                let wanted = gains.position_p * (goal_rad - self.angle_rad);
-                Some(wanted.clamp(-max_velocity_rad_per_s, max_velocity_rad_per_s))
+            Drive::Duty(duty) => (None, duty, 0.0),
+            Drive::Position(goal_rad) => (None, gains.position_p * (goal_rad - seen_rad), 0.0),
+            Drive::Velocity(goal) if delay_s > 0.0 => {
+                let duty = self.integral + gains.velocity_p * (goal - seen_rad_per_s);
+                (Some(goal), duty, 0.0)
             }
-        };
-        // D = d0 − d1·ω
-        let (mut d0, mut d1) = match (drive, velocity_goal) {
-            (_, Some(goal)) => (self.integral + gains.velocity_p * goal, gains.velocity_p),
-            (Drive::Duty(duty), None) => (duty, 0.0),
-            (_, None) => (0.0, 0.0),
+            Drive::Velocity(goal) => (Some(goal), self.integral + gains.velocity_p * goal, gains.velocity_p),
         };
         let wanted = d0 - d1 * now;
         if wanted.abs() > gains.duty_limit {
             (d0, d1) = (gains.duty_limit.copysign(wanted), 0.0);
+        } else if self.laws.duty(wanted) != wanted {
+            (d0, d1) = (0.0, 0.0);
         }
         self.duty = d0 - d1 * now;
         let mut i0 = d0 * self.bus_v / resistance_ohm;
@@ -330,9 +359,9 @@ impl Motor {
     }
 
     fn warm(&mut self, copper_j: f64, friction_j: f64, dt_s: f64) {
-        let into_case_w = (self.winding_c - self.case_c) / heat::WINDING_TO_CASE_K_PER_W;
+        let into_case_w = (self.winding_c - self.case_c) / self.winding_to_case_k_per_w;
         let into_air_w = (self.case_c - self.ambient_c) / heat::CASE_TO_AIR_K_PER_W;
-        self.winding_c += (copper_j - into_case_w * dt_s) / heat::WINDING_J_PER_K;
+        self.winding_c += (copper_j - into_case_w * dt_s) / self.winding_j_per_k;
         self.case_c += (friction_j + (into_case_w - into_air_w) * dt_s) / heat::CASE_J_PER_K;
         if let Some(celsius) = self.heated_to_c {
             self.case_c += (celsius - self.case_c) * dt_s / heat::HEATED_S;
@@ -382,10 +411,21 @@ mod tests {
     const GAINS: Gains = Gains {
         velocity_p: 0.066,
         velocity_i: 11.5,
-        position_p: 20.0,
+        position_p: 1.15,
         duty_limit: 1.0,
     };
     const GAIT: f64 = 2.513;
+
+    /// The servo of a configuration that adds lines to `[virtual_worm]`.
+    fn motor_with(lines: &str) -> Motor {
+        let text = format!("[virtual_worm]\n{lines}");
+        let config = Config::from_toml(&text, std::path::Path::new("worm.toml")).expect("a valid configuration");
+        Motor::new(&config).expect("a servo")
+    }
+
+    fn motor() -> Motor {
+        motor_with("")
+    }
 
     fn run(motor: &mut Motor, drive: Drive, load_n_m: f64, seconds: f64, dt_s: f64) -> StepEnergy {
         let mut supply = Supply::new(&Config::default());
@@ -403,19 +443,25 @@ mod tests {
 
     #[test]
     fn reaches_the_commanded_velocity_and_keeps_it_under_load() {
-        let mut motor = Motor::new(&Config::default());
-        run(&mut motor, Drive::Velocity(GAIT), 0.0, 0.1, 2.5e-4);
+        let mut motor = motor();
+        run(&mut motor, Drive::Velocity(GAIT), 0.0, 0.3, 2.5e-4);
         assert!((motor.velocity_rad_per_s() - GAIT).abs() < 0.01 * GAIT);
-        run(&mut motor, Drive::Velocity(GAIT), 0.1, 0.3, 2.5e-4);
+        run(&mut motor, Drive::Velocity(GAIT), 0.1, 0.5, 2.5e-4);
         assert!((motor.velocity_rad_per_s() - GAIT).abs() < 1e-3 * GAIT);
-        let expected_a = (0.05 + 0.003 * GAIT + 0.1) / 0.39; // the torque balance at steady speed
-        assert!((motor.current_a() - expected_a).abs() < 1e-3);
+        // The torque balance at steady speed, with the energy budget's friction.
+        let budget = Config::default().motor().expect("a servo");
+        let expected_a = (0.1 + budget.friction_n_m(0.1, GAIT)) / 0.372;
+        assert!(
+            (motor.current_a() - expected_a).abs() < 5e-4,
+            "{} {expected_a}",
+            motor.current_a()
+        );
     }
 
     #[test]
     fn energy_closes_to_rounding_at_any_step_and_inertia() {
         for (dt_s, inertia) in [(1e-4, 2e-4), (1e-3, 2e-4), (1e-3, 1e-6), (1e-3, 1.0)] {
-            let mut motor = Motor::new(&Config::default());
+            let mut motor = motor();
             motor.inertia_kg_m2 = inertia;
             for drive in [
                 Drive::Velocity(GAIT),
@@ -437,7 +483,7 @@ mod tests {
     #[test]
     fn step_length_hardly_matters() {
         let angle = |dt_s| {
-            let mut motor = Motor::new(&Config::default());
+            let mut motor = motor();
             run(&mut motor, Drive::Velocity(GAIT), 0.02, 1.0, dt_s);
             motor.angle_rad()
         };
@@ -446,23 +492,76 @@ mod tests {
 
     #[test]
     fn dry_friction_holds_a_small_torque() {
-        let mut motor = Motor::new(&Config::default());
-        run(&mut motor, Drive::Duty(0.05), 0.0, 0.5, 2.5e-4); // 0.25 V make 29 mN m, friction is 50
+        let mut motor = motor();
+        // 0.1 V make 11.2 mN m, which press the gears; friction is 9.2 + 0.81 · 0.316 · 11.2 = 12.1.
+        run(&mut motor, Drive::Duty(0.02), 0.0, 0.5, 2.5e-4);
         assert_eq!((motor.velocity_rad_per_s(), motor.angle_rad()), (0.0, 0.0));
-        assert!((motor.current_a() - 0.25 / 3.4).abs() < 1e-3);
+        assert!((motor.current_a() - 0.1 / 3.32).abs() < 1e-3);
+        run(&mut motor, Drive::Duty(0.024), 0.0, 0.5, 2.5e-4); // 13.4 mN m against 12.6
+        assert!(motor.velocity_rad_per_s() > 0.0);
+    }
+
+    /// Effects that only a servo with them has: energy closes with each, and each does what it says.
+    #[test]
+    fn servo_effects_act_and_the_energy_closes() {
+        let effect = |text: &str| motor_with(&format!("servo_effect = [{{ {text} }}]"));
+        let mean_a = |mut motor: Motor, load_n_m: f64, velocity: f64| {
+            run(&mut motor, Drive::Velocity(velocity), load_n_m, 0.6, 2.5e-4);
+            let mut before = motor.clone();
+            let energy = run(&mut before, Drive::Velocity(velocity), load_n_m, 5.0, 2.5e-4);
+            let gone = energy.copper_j + energy.friction_j + energy.load_j + energy.kinetic_j;
+            assert!((energy.electrical_j - gone).abs() < 1e-9, "{gone}");
+            energy.copper_j
+        };
+        let bare_j = |load_n_m, velocity| mean_a(motor_with("servo_effect = []"), load_n_m, velocity);
+        let usual_j = bare_j(0.05, GAIT);
+        for text in [
+            "name = \"load-friction\", coefficient = 0.4, motor_share = 0.5",
+            "name = \"load-squared-friction\", coefficient_per_n_m = 3.0, motor_share = 0.5",
+            "name = \"gear-ripple\", amplitude_n_m = 0.05, waves_per_turn = 12.0, phase = 0.0",
+            "name = \"stribeck-friction\", extra_n_m = 0.1, speed_rad_s = 5.0",
+        ] {
+            let copper_j = mean_a(effect(text), 0.05, GAIT);
+            assert!(copper_j > 1.2 * usual_j, "{text}: {copper_j} J, {usual_j} J without");
+        }
+        // The arm drives: half of the dry friction is missing there, so the motor brakes more.
+        let back = "name = \"back-driving-friction\", ratio = 0.0";
+        assert!(mean_a(effect(back), -0.15, GAIT) > 1.05 * bare_j(-0.15, GAIT));
+        // Where the motor drives, nothing changes, but for the moment in which the load turned it back before it started.
+        assert!((mean_a(effect(back), 0.15, GAIT) / bare_j(0.15, GAIT) - 1.0).abs() < 1e-3);
+        let mut dead = effect("name = \"duty-dead-band\", dead_duty = 0.1");
+        run(&mut dead, Drive::Duty(0.09), 0.0, 0.5, 2.5e-4);
+        assert_eq!(dead.angle_rad(), 0.0);
+        let overshoot = |mut motor: Motor| {
+            let mut supply = Supply::new(&Config::default());
+            let steps = (0..2000).map(|_| {
+                motor.step(Drive::Velocity(GAIT), &GAINS, 0.0, &mut supply, 2.5e-4);
+                motor.velocity_rad_per_s()
+            });
+            steps.fold(0.0, f64::max)
+        };
+        let prompt = overshoot(motor_with("servo_effect = []"));
+        assert!(overshoot(effect("name = \"loop-delay\", delay_s = 0.03")) > 1.02 * prompt);
+        let mut hot = effect("name = \"winding-heat\", heat_k_per_j = 5.0, cooling_s = 50.0");
+        let mut cool = motor_with("servo_effect = []");
+        for motor in [&mut hot, &mut cool] {
+            motor.set_friction_scale(1e5);
+            run(motor, Drive::Duty(0.5), 0.0, 5.0, 1e-3);
+        }
+        assert!(hot.current_a() < 0.95 * cool.current_a());
     }
 
     #[test]
     fn off_motor_coasts_to_rest_and_stays() {
-        let mut motor = Motor::new(&Config::default());
+        let mut motor = motor();
         run(&mut motor, Drive::Velocity(GAIT), 0.0, 0.3, 2.5e-4);
-        run(&mut motor, Drive::Off, 0.0, 0.1, 2.5e-4);
+        run(&mut motor, Drive::Off, 0.0, 0.4, 2.5e-4); // J/c · ln(1 + c ω/dry) = 0.3 s
         assert_eq!((motor.velocity_rad_per_s(), motor.current_a()), (0.0, 0.0));
     }
 
     #[test]
     fn blocked_motor_draws_stall_current_and_heats_up() {
-        let mut motor = Motor::new(&Config::default());
+        let mut motor = motor();
         motor.set_friction_scale(1e5);
         let e = run(&mut motor, Drive::Velocity(GAIT), 0.0, 30.0, 1e-3);
         assert!((1.1..1.5).contains(&motor.current_a()), "{}", motor.current_a());
@@ -473,12 +572,10 @@ mod tests {
 
     #[test]
     fn position_drive_arrives() {
-        let mut motor = Motor::new(&Config::default());
-        let drive = Drive::Position {
-            goal_rad: 1.0,
-            max_velocity_rad_per_s: 5.0,
-        };
-        run(&mut motor, drive, 0.02, 1.5, 2.5e-4);
-        assert!((motor.angle_rad() - 1.0).abs() < 0.01, "{}", motor.angle_rad());
+        let mut motor = motor();
+        run(&mut motor, Drive::Position(1.0), 0.02, 1.5, 2.5e-4);
+        // What holds it off the goal is friction at rest, on either side of the load: 9.2 mN m and what the load adds, over P k V/R.
+        let off_n_m = GAINS.position_p * (1.0 - motor.angle_rad()) * 0.372 * motor.bus_v() / 3.32;
+        assert!(off_n_m > -1e-3 && off_n_m < 0.042, "{off_n_m} N m");
     }
 }

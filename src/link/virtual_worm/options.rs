@@ -1,6 +1,7 @@
 //! What is simulated beyond the configuration.
 
 use super::fault::Fault;
+use worm_physics::servo::Pendulum;
 
 /// What to simulate beyond the configuration.
 #[derive(Debug, Clone, Default)]
@@ -14,4 +15,6 @@ pub struct Options {
     /// Length of the plant's steps, s, in place of [`DEFAULT_STEP_S`](super::DEFAULT_STEP_S). Simulations of many hours
     /// take 1 ms, and four times less time.
     pub step_s: Option<f64>,
+    /// An arm on the servo's horn in place of the cam; the worm rests.
+    pub arm: Option<Pendulum>,
 }

@@ -17,6 +17,7 @@ use rand_xoshiro::rand_core::SeedableRng;
 use std::f64::consts::TAU;
 use worm_estimator::config::Config;
 use worm_physics::WormError;
+use worm_physics::servo::Pendulum;
 
 /// Length of a step unless asked otherwise, s. An answer is at most this old, and the cam turns by less than a count of
 /// the servo's encoder in it.
@@ -32,6 +33,8 @@ pub struct Plant {
     supply: Supply,
     motor: Motor,
     body: Body,
+    /// What the horn carries instead of the cam.
+    arm: Option<Pendulum>,
     camera: Camera,
     conditions: PlantConditions,
     cycle_began_at: f64, // phase, a whole number
@@ -70,8 +73,9 @@ impl Plant {
                 duty_limit: 1.0,
             },
             supply: Supply::new(config),
-            motor: Motor::new(config),
+            motor: Motor::new(config)?,
             body,
+            arm: None,
             camera,
             conditions: PlantConditions::default(),
             cycle_began_at: 0.0,
@@ -79,6 +83,12 @@ impl Plant {
             ledger,
             rng,
         })
+    }
+
+    /// Puts an arm on the horn, which hangs down at angle 0; the worm rests beside it.
+    pub fn carry(&mut self, arm: Pendulum) {
+        self.motor.carry(arm.inertia_kg_m2());
+        self.arm = Some(arm);
     }
 
     /// Sets what the servo commands its bridge from now on.
@@ -134,6 +144,10 @@ impl Plant {
     /// # Errors
     /// [`WormError`] never for a checked configuration.
     pub fn step(&mut self) -> Result<(), WormError> {
+        if let Some(arm) = self.arm {
+            self.step_with(&arm);
+            return Ok(());
+        }
         let load_n_m = self.body.torque_n_m();
         let drive = match self.drive {
             Drive::Velocity(rad_per_s) => Drive::Velocity(rad_per_s * self.body.speed_fraction(rad_per_s.signum())),
@@ -163,13 +177,36 @@ impl Plant {
         }
         energy.kinetic_j = self.motor.kinetic_j() - before_j;
         self.ledger.add(&energy);
+        self.film();
+        Ok(())
+    }
+
+    /// One step of the servo with an arm on its horn. What it lifts is the load's work.
+    fn step_with(&mut self, arm: &Pendulum) {
+        let (before_rad, before_j) = (self.motor.angle_rad(), self.motor.kinetic_j());
+        let load_n_m = arm.torque_n_m(before_rad);
+        let mut energy = self
+            .motor
+            .step(self.drive, &self.gains, load_n_m, &mut self.supply, self.step_s);
+        self.steps += 1;
+        let lifted_j = arm.potential_j(self.motor.angle_rad()) - arm.potential_j(before_rad);
+        let missing_j = energy.load_j - lifted_j + self.owed_j;
+        if missing_j != 0.0 {
+            self.owed_j = self.motor.give_kinetic(missing_j);
+        }
+        energy.kinetic_j = self.motor.kinetic_j() - before_j;
+        self.ledger.add(&energy);
+        self.film();
+    }
+
+    /// Lets the camera look, if it is time.
+    fn film(&mut self) {
         if self.time_s() >= self.camera.due_s() {
             let view = self.body.view();
             let mut seen_m = self.body.positions_m();
             seen_m.iter_mut().for_each(|position_m| *position_m *= view.scale);
             self.camera.capture(&seen_m, view.latency_s, &mut self.rng);
         }
-        Ok(())
     }
 
     /// Time of the plant, s: the last step's end.

@@ -4,8 +4,9 @@
 //! are the manual's. Where the manual is silent:
 //! - The unit of the velocity gains' time is open; the loop settles in about 20 ms with the factory's gains.
 //! - Switching torque on, and the watchdog, set the velocity goal to 0, so that nothing moves without a new command.
-//! - A position goal is pursued by a velocity goal in proportion to the error, bounded by the profile velocity. The profile
-//!   acceleration ramps velocity mode; profiles by time are not followed.
+//! - In the position modes the duty is the error in counts times the P gain over 256 · 885, as recordings of a real one show. A profile
+//!   velocity moves the goal; I and D gain are kept and not used. The profile acceleration ramps velocity mode; profiles by time are
+//!   not followed.
 //! - An overload is a motor that stands at its greatest duty for 2 s; an input voltage error is one that lasts 0.1 s.
 //! - A backup holds the EEPROM, gains and profiles; the startup configuration brings back the latter two.
 //! - Below 2.8 V it does not run, and comes up as after a reboot.
@@ -18,10 +19,12 @@ use super::plant::Plant;
 use super::servo_table::*;
 use crate::link::Register;
 use crate::link::servo::register::*;
-use crate::link::servo::{BAUD_RATES, HardwareErrors, VELOCITY_MODE, WATCHDOG_LATCHED, scale};
+use crate::link::servo::{BAUD_RATES, HardwareErrors, POSITION_MODE, VELOCITY_MODE, WATCHDOG_LATCHED, scale};
 use dynamixel_bus::packet::{BackupAction, DeviceId, ResetScope, StatusError};
 use std::f64::consts::TAU;
-use worm_estimator::config::Config;
+use worm_estimator::config::{Config, PresentCurrent};
+use worm_physics::servo::COUNT_RAD;
+use worm_physics::servo::physics::FULL_DUTY;
 
 /// Silence of a servo that starts, s.
 const BOOT_S: f64 = 0.1;
@@ -35,8 +38,10 @@ const BROWNOUT_V: f64 = 2.8;
 const STANDING_RAD_PER_S: f64 = 0.05;
 /// Time unit of the velocity I gain, s.
 const INTEGRAL_TICK_S: f64 = 1e-4;
-/// Velocity per angle error and count of the position P gain, 1/s: 20 1/s with the factory's 400.
-const POSITION_P_PER_S: f64 = 0.05;
+/// Duty per angle error and count of the position P gain, 1/rad.
+const POSITION_P_PER_RAD: f64 = 1.0 / (FULL_DUTY * COUNT_RAD);
+/// Position at which an arm hangs, counts: in the middle of the turn that position mode has.
+const HANGING_COUNTS: f64 = 2048.0;
 /// Counts of a turn.
 const TURN: f64 = 4096.0;
 
@@ -64,7 +69,9 @@ pub(super) struct Servo {
     home_counts: f64,
     turn_base_counts: f64, // whole turns that were forgotten at a start
     ramped_goal: f64,      // the velocity goal behind the profile acceleration, counts
-    duty_limit: f64,       // the smaller of PWM limit and goal PWM
+    moved_goal: f64,       // the position goal behind the profile velocity, counts
+    present_current: PresentCurrent,
+    duty_limit: f64, // the smaller of PWM limit and goal PWM
     conditions: ServoConditions,
     starved: bool, // below the brownout voltage
     boots_until_s: f64,
@@ -93,6 +100,8 @@ impl Servo {
             home_counts: f64::from(config.servo.home_position),
             turn_base_counts: 0.0,
             ramped_goal: 0.0,
+            moved_goal: 0.0,
+            present_current: config.virtual_worm.present_current,
             duty_limit: 1.0,
             conditions: ServoConditions::default(),
             starved: false,
@@ -106,6 +115,12 @@ impl Servo {
         };
         servo.forget_turns(0.0);
         servo
+    }
+
+    /// Its horn carries an arm, which hangs in the middle of the turn.
+    pub(super) fn carry_arm(&mut self) {
+        self.home_counts = HANGING_COUNTS;
+        self.forget_turns(0.0);
     }
 
     pub(super) fn id(&self) -> DeviceId {
@@ -220,6 +235,13 @@ impl Servo {
     /// Moves the velocity goal on by the profile acceleration, since it was last called.
     fn follow_profile(&mut self, plant: &mut Plant, now_s: f64) {
         let elapsed_s = now_s - std::mem::replace(&mut self.supervised_s, now_s);
+        let profile = f64::from(self.table.get(PROFILE_VELOCITY).min(self.table.get(VELOCITY_LIMIT)));
+        let goal = f64::from(self.table.signed(GOAL_POSITION));
+        if profile > 0.0 && self.moved_goal != goal && self.torque_on() {
+            let step = profile * scale::VELOCITY_RAD_S / scale::POSITION_RAD * elapsed_s;
+            self.moved_goal += (goal - self.moved_goal).clamp(-step, step);
+            self.drive(plant);
+        }
         let goal = f64::from(self.table.signed(GOAL_VELOCITY));
         let acceleration = f64::from(self.table.get(PROFILE_ACCELERATION));
         if acceleration == 0.0 || self.ramped_goal == goal || !self.torque_on() {
@@ -236,6 +258,7 @@ impl Servo {
         self.ramped_goal = 0.0;
         let position = self.position_counts(plant);
         self.table.set(GOAL_POSITION, i64::from(position));
+        self.moved_goal = f64::from(position);
         if self.table.get(OPERATING_MODE) as u8 == PWM_MODE {
             self.table.set(GOAL_PWM, 0);
         }
@@ -314,10 +337,13 @@ impl Servo {
         if self.table.get(PROFILE_ACCELERATION) == 0 {
             self.ramped_goal = f64::from(self.table.signed(GOAL_VELOCITY));
         }
+        if self.table.get(PROFILE_VELOCITY) == 0 {
+            self.moved_goal = f64::from(self.table.signed(GOAL_POSITION));
+        }
         let gains = Gains {
             velocity_p: gain(VELOCITY_P_GAIN, per_count / 128.0),
             velocity_i: gain(VELOCITY_I_GAIN, per_count / 65_536.0 / INTEGRAL_TICK_S),
-            position_p: gain(POSITION_P_GAIN, POSITION_P_PER_S),
+            position_p: gain(POSITION_P_GAIN, POSITION_P_PER_RAD),
             duty_limit,
         };
         let drive = if !self.torque_on() {
@@ -327,21 +353,12 @@ impl Servo {
         } else if mode == PWM_MODE {
             Drive::Duty((self.sign() * goal_duty).clamp(-duty_limit, duty_limit))
         } else {
-            let profile = match self.table.get(PROFILE_VELOCITY) {
-                0 => self.table.get(VELOCITY_LIMIT),
-                profile => profile.min(self.table.get(VELOCITY_LIMIT)),
-            };
-            Drive::Position {
-                goal_rad: self.cam_angle_rad(f64::from(self.table.signed(GOAL_POSITION))),
-                max_velocity_rad_per_s: f64::from(profile) * scale::VELOCITY_RAD_S,
-            }
+            Drive::Position(self.cam_angle_rad(self.moved_goal))
         };
         self.moved_once |= match drive {
             Drive::Off => false,
             Drive::Velocity(goal) | Drive::Duty(goal) => goal != 0.0,
-            Drive::Position { goal_rad, .. } => {
-                (goal_rad - plant.motor().angle_rad()).abs() > 2.0 * scale::POSITION_RAD
-            }
+            Drive::Position(goal_rad) => (goal_rad - plant.motor().angle_rad()).abs() > 2.0 * scale::POSITION_RAD,
         };
         plant.set_drive(drive, gains);
     }
@@ -360,15 +377,21 @@ impl Servo {
         let moving = velocity.unsigned_abs() > self.table.get(MOVING_THRESHOLD);
         let position = i64::from(self.position_counts(plant));
         let ramped_goal = self.ramped_goal.round() as i64;
+        let moved_goal = self.moved_goal.round() as i64;
+        let current = match self.present_current {
+            PresentCurrent::Winding => counts(sign * motor.current_a(), scale::CURRENT_A),
+            PresentCurrent::Supply => counts(sign * motor.duty().abs() * motor.current_a(), scale::CURRENT_A),
+            PresentCurrent::Duty => counts(sign * motor.duty(), scale::DUTY),
+        };
         for (register, value) in [
             (REALTIME_TICK, (now_s * 1e3) as i64 % 32_768),
             (MOVING, i64::from(moving)),
             (PRESENT_PWM, counts(sign * motor.duty(), scale::DUTY)),
-            (PRESENT_CURRENT, counts(sign * motor.current_a(), scale::CURRENT_A)),
+            (PRESENT_CURRENT, current),
             (PRESENT_VELOCITY, i64::from(velocity)),
             (PRESENT_POSITION, position),
             (VELOCITY_TRAJECTORY, ramped_goal),
-            (POSITION_TRAJECTORY, i64::from(self.table.signed(GOAL_POSITION))),
+            (POSITION_TRAJECTORY, moved_goal),
             (PRESENT_INPUT_VOLTAGE, counts(motor.bus_v(), scale::VOLTAGE_V)),
             (PRESENT_TEMPERATURE, counts(motor.case_c().clamp(0.0, 255.0), 1.0)),
         ] {

@@ -6,15 +6,13 @@
 use super::control_table::{ControlTable, Entry, eeprom, ram, read_only};
 use crate::link::Register;
 use crate::link::servo::register::*;
-use crate::link::servo::{VELOCITY_MODE, XL330_M288_MODEL};
+use crate::link::servo::{POSITION_MODE, VELOCITY_MODE, XL330_M288_MODEL};
 
 /// Firmware version: one whose bus watchdog stops the motor.
 pub(super) const FIRMWARE: i64 = 53;
 
 /// Full duty in counts of 0.113 %.
 const FULL_PWM: i64 = crate::link::servo::FULL_PWM as i64;
-/// Position within one turn, and the turn's angle in counts.
-pub(super) const POSITION_MODE: u8 = 3;
 /// Position over many turns.
 pub(super) const EXTENDED_POSITION_MODE: u8 = 4;
 /// The goal is the bridge's duty.
@@ -26,18 +24,10 @@ pub(super) const SECONDARY_ID: Register = Register::new(12, 1, "secondary ID");
 const MODEL_INFORMATION: Register = Register::new(2, 4, "model information");
 const PROTOCOL_TYPE: Register = Register::new(13, 1, "protocol type");
 pub(super) const MOVING_THRESHOLD: Register = Register::new(24, 4, "moving threshold");
-pub(super) const MAX_POSITION_LIMIT: Register = Register::new(48, 4, "max position limit");
-pub(super) const MIN_POSITION_LIMIT: Register = Register::new(52, 4, "min position limit");
 const PWM_SLOPE: Register = Register::new(62, 1, "PWM slope");
 const LED: Register = Register::new(65, 1, "LED");
 pub(super) const REGISTERED_INSTRUCTION: Register = Register::new(69, 1, "registered instruction");
-const POSITION_D_GAIN: Register = Register::new(80, 2, "position D gain");
-const POSITION_I_GAIN: Register = Register::new(82, 2, "position I gain");
-pub(super) const POSITION_P_GAIN: Register = Register::new(84, 2, "position P gain");
-const FEEDFORWARD_2ND_GAIN: Register = Register::new(88, 2, "feedforward 2nd gain");
-const FEEDFORWARD_1ST_GAIN: Register = Register::new(90, 2, "feedforward 1st gain");
 pub(super) const GOAL_CURRENT: Register = Register::new(102, 2, "goal current");
-pub(super) const GOAL_POSITION: Register = Register::new(116, 4, "goal position");
 pub(super) const VELOCITY_TRAJECTORY: Register = Register::new(136, 4, "velocity trajectory");
 pub(super) const POSITION_TRAJECTORY: Register = Register::new(140, 4, "position trajectory");
 pub(super) const BACKUP_READY: Register = Register::new(147, 1, "backup ready");

@@ -99,14 +99,26 @@ fn every_rule_can_be_broken() {
     );
     let turning = Truth {
         velocity_rad_s: 2.5,
-        ..REST
+        ..POWERED
     };
-    let turns = |tick| (fault(tick, Fault::Alarm).0, 0, turning);
-    let while_allowed: Vec<_> = (1..=17).map(turns).collect();
+    let turns = |tick| (state(tick, |_| {}), 0, turning);
+    let while_allowed: Vec<_> = (1..=77).map(turns).collect();
     assert_eq!(broken(&while_allowed), None, "while the servo decelerates");
-    let mut for_long: Vec<_> = (1..=18).map(turns).collect();
-    for_long[17].0.time_ns += 1_000_000; // off the bound itself
+    let mut for_long: Vec<_> = (1..=78).map(turns).collect();
+    for_long[77].0.time_ns += 1_000_000; // off the bound itself
     assert_eq!(broken(&for_long), Some("the motor stands when nothing commands it"));
+    let runs_out = |tick| {
+        let truth = Truth {
+            torque_is_on: false,
+            ..turning
+        };
+        (fault(tick, Fault::Alarm).0, 0, truth)
+    };
+    assert_eq!(
+        broken(&(1..=100).map(runs_out).collect::<Vec<_>>()),
+        None,
+        "nothing brakes a motor without torque"
+    );
     let elsewhere = Truth { phase: 0.3, ..REST };
     let mut ticks: Vec<_> = (1..=4).map(rest).collect();
     ticks.push((state(5, |_| {}), 0, elsewhere));

@@ -8,6 +8,7 @@
 //! length_m = 0.100
 //! arm_mass_kg = 0.0
 //! supply_v = 7.4
+//! duty_limit = 0.66               # 1 unless given
 //! servo = "xl330-m288-t"          # or the file of a model, relative to this one
 //!
 //! [[run]]
@@ -30,6 +31,7 @@ const MASSES_KG: RangeInclusive<f64> = 1e-4..=100.0;
 const LENGTHS_M: RangeInclusive<f64> = 1e-3..=10.0;
 const ARM_MASSES_KG: RangeInclusive<f64> = 0.0..=100.0;
 const SUPPLIES_V: RangeInclusive<f64> = 1.0..=60.0;
+const DUTY_LIMITS: RangeInclusive<f64> = 0.01..=1.0;
 /// Position P gain of the control table.
 const GAINS: RangeInclusive<f64> = 1.0..=16_383.0;
 /// Most runs.
@@ -55,6 +57,8 @@ pub struct BenchCampaign {
     pub pendulum: Pendulum,
     /// Voltage of the supply without load, V.
     pub supply_v: f64,
+    /// Greatest duty of the servo, in (0, 1].
+    pub duty_limit: f64,
     /// The nominal servo.
     pub model: ServoModel,
     /// The text of the nominal servo's file; none for one that is known by name.
@@ -90,6 +94,7 @@ struct Bench {
     length_m: Option<Spanned<f64>>,
     arm_mass_kg: Option<Spanned<f64>>,
     supply_v: Option<Spanned<f64>>,
+    duty_limit: Option<Spanned<f64>>,
     servo: Option<Spanned<String>>,
 }
 
@@ -188,6 +193,10 @@ impl BenchCampaign {
             "V",
             "the voltage of the supply without load",
         )?;
+        let duty_limit = match &bench.duty_limit {
+            Some(limit) => reader.within("duty_limit", limit, DUTY_LIMITS, "(goal PWM over 885)")?,
+            None => 1.0,
+        };
         let (model, model_text) = reader.servo(bench.servo.as_ref())?;
         if file.run.is_empty() || file.run.len() > MAX_RUNS {
             let problem = format!("{} runs", file.run.len());
@@ -215,6 +224,7 @@ impl BenchCampaign {
             file: path.to_path_buf(),
             pendulum,
             supply_v,
+            duty_limit,
             model,
             model_text,
             runs,

@@ -183,13 +183,17 @@ impl ServoModel {
         text
     }
 
-    /// The physics of this servo on a bench.
-    pub fn on(&self, pendulum: Pendulum, supply_v: f64) -> ServoPhysics {
+    /// The physics of this servo on a bench, with its duty limited.
+    pub fn on(&self, pendulum: Pendulum, supply_v: f64, duty_limit: f64) -> ServoPhysics {
         let pendulum = Pendulum {
             zero_rad: self.zero_rad,
             ..pendulum
         };
-        ServoPhysics::new(self.motor, pendulum, supply_v).with(&self.effects)
+        let physics = ServoPhysics {
+            duty_limit,
+            ..ServoPhysics::new(self.motor, pendulum, supply_v)
+        };
+        physics.with(&self.effects)
     }
 }
 

@@ -108,7 +108,9 @@ fn off_nominal(campaign: &BenchCampaign, seed: u64) -> ServoPhysics {
         let normal: f64 = StandardNormal.sample(&mut rng);
         (sigma * normal).exp()
     };
-    let mut physics = campaign.model.on(campaign.pendulum, campaign.supply_v);
+    let mut physics = campaign
+        .model
+        .on(campaign.pendulum, campaign.supply_v, campaign.duty_limit);
     physics.motor.torque_constant *= factor(0.05);
     physics.motor.winding_ohm *= factor(0.1);
     physics.motor.rotor_inertia_kg_m2 *= factor(0.2);

@@ -2,6 +2,7 @@
 
 use super::check::Checker;
 use serde::Deserialize;
+use worm_physics::servo::identified::XL330_IDENTIFIED;
 
 /// How both devices are read in one exchange.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -104,8 +105,8 @@ impl Default for Servo {
             model_number: 1200,
             home_position: 0,
             positive_is_forward: true,
-            winding_resistance_ohm: 3.4,
-            torque_constant_n_m_per_a: 0.39,
+            winding_resistance_ohm: XL330_IDENTIFIED.winding_ohm,
+            torque_constant_n_m_per_a: XL330_IDENTIFIED.torque_constant,
             current_limit_a: 1.0,
             velocity_limit_rev_per_min: 60.0,
             temperature_limit_c: 70,

@@ -32,7 +32,7 @@ pub use machine::{
 pub use physics::PhysicsError;
 pub use self_sensing::{ReportedCurrent, SelfSensing};
 pub use trip::{OnLinkBack, OnLinkLoss, OnStuck, Trip};
-pub use virtual_worm::VirtualWorm;
+pub use virtual_worm::{PresentCurrent, ServoEffect, VirtualWorm};
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};
 
 use serde::Deserialize;

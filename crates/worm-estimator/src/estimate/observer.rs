@@ -36,7 +36,7 @@ impl Observer {
         Ok(Self {
             estimator: Estimator::new(config)?,
             monitor: AlarmMonitor::new(config),
-            range: RangeEstimator::new(config),
+            range: RangeEstimator::new(config)?,
         })
     }
 

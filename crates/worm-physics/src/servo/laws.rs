@@ -1,4 +1,7 @@
-//! What a plain model of a servo leaves out; neutral by default.
+//! What a plain model of a servo leaves out; neutral by default. The bench, the virtual worm's motor and the energy of a gait cycle all take
+//! their friction from here.
+
+use std::f64::consts::TAU;
 
 /// Laws beyond dry and viscous friction, a winding and a stiff supply.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,6 +63,46 @@ impl Default for ServoLaws {
             dead_duty: 0.0,
             table: None,
         }
+    }
+}
+
+impl ServoLaws {
+    /// Friction against the motion, N m, but for the viscous part: the torque on the gears presses their teeth together. At rest it is the
+    /// most that friction can hold. `dry_n_m` is the friction without load, `motor_n_m` what the motor gives, `load_n_m` what holds the
+    /// output, positive against positive angles.
+    pub fn friction_n_m(&self, dry_n_m: f64, motor_n_m: f64, load_n_m: f64, velocity_rad_s: f64) -> f64 {
+        let on_gears = |share: f64| (share * motor_n_m + (1.0 - share) * load_n_m).abs();
+        let mut friction = dry_n_m;
+        if self.load_friction != 0.0 {
+            friction += self.load_friction * on_gears(self.load_share);
+        }
+        if self.load_squared_per_n_m != 0.0 {
+            friction += self.load_squared_per_n_m * on_gears(self.load_squared_share).powi(2);
+        }
+        if self.stribeck_n_m != 0.0 {
+            friction += self.stribeck_n_m * (-(velocity_rad_s / self.stribeck_rad_s).powi(2)).exp();
+        }
+        if let Some(table) = &self.table {
+            friction += table.friction_n_m(velocity_rad_s.abs(), on_gears(0.5));
+        }
+        if self.back_driving != 1.0 && load_n_m * velocity_rad_s < 0.0 {
+            friction *= self.back_driving;
+        }
+        friction.max(0.0)
+    }
+
+    /// The torque that returns with the angle, N m, in the direction of the motor's.
+    pub fn ripple_at_n_m(&self, angle_rad: f64) -> f64 {
+        if self.ripple_n_m == 0.0 {
+            return 0.0;
+        }
+        let wave = self.ripple_waves * angle_rad / TAU + self.ripple_phase;
+        self.ripple_n_m * (TAU * wave).sin()
+    }
+
+    /// The duty that the bridge makes of one that is asked for.
+    pub fn duty(&self, wanted: f64) -> f64 {
+        if wanted.abs() < self.dead_duty { 0.0 } else { wanted }
     }
 }
 

@@ -14,7 +14,10 @@
 //!
 //! - [`physics`]: what a servo and its bench are; [`laws`]: what may be missing.
 //! - [`motion`]: the motion under a goal, step by step.
+//! - [`identified`]: a real servo. [`delay`]: what the loop acts on.
 
+pub mod delay;
+pub mod identified;
 pub mod laws;
 pub mod motion;
 pub mod physics;

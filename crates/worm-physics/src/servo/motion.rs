@@ -5,8 +5,8 @@
 //! the friction. Where there is play, rotor and arm are two bodies while the play is open, and lose the energy of their impact when
 //! it closes.
 
+use super::delay::DelayLine;
 use super::physics::ServoPhysics;
-use std::collections::VecDeque;
 
 /// The longest step that [`ServoMotion::advance`] takes, s. Against steps of a hundredth of it, positions of an arm that swings fast differ by
 /// less than a count (1.5 mrad) on average.
@@ -44,8 +44,8 @@ pub struct ServoMotion {
     case_c: f64,
     duty: f64,
     energy: Energy,
-    /// Positions of the last steps with their ages at the newest, s; empty without a delay.
-    seen: VecDeque<(f64, f64)>,
+    /// Positions on their way to the loop.
+    delayed: DelayLine,
 }
 
 /// Everything in a step that friction acts against.
@@ -68,7 +68,7 @@ impl ServoMotion {
             case_c,
             duty: 0.0,
             energy: Energy::default(),
-            seen: VecDeque::new(),
+            delayed: DelayLine::default(),
         }
     }
 
@@ -116,7 +116,7 @@ impl ServoMotion {
         let k = motor.torque_constant;
         // At the middle of the step, where the arm will be.
         let middle_rad = self.angle_rad + 0.5 * dt_s * self.velocity_rad_s;
-        let acts_on_rad = self.position_of_loop(middle_rad, laws.delay_s, dt_s);
+        let acts_on_rad = self.delayed.pass(middle_rad, laws.delay_s, dt_s);
         self.duty = if command.torque_enabled {
             physics.duty(command.gain, command.goal_rad, acts_on_rad)
         } else {
@@ -135,10 +135,7 @@ impl ServoMotion {
             motor: torque_of_motor,
             arm_n_m: physics.pendulum.torque_n_m(middle_rad),
         };
-        if laws.ripple_n_m != 0.0 {
-            let wave = laws.ripple_waves * middle_rad / std::f64::consts::TAU + laws.ripple_phase;
-            torques.motor.0 += laws.ripple_n_m * (std::f64::consts::TAU * wave).sin();
-        }
+        torques.motor.0 += laws.ripple_at_n_m(middle_rad);
         if laws.play_rad > 0.0 {
             self.move_with_play(physics, &torques, dt_s);
         } else {
@@ -157,28 +154,6 @@ impl ServoMotion {
         }
         if laws.heat_k_per_j > 0.0 {
             self.winding_c -= (self.winding_c - self.case_c) * (dt_s / laws.cooling_s).min(1.0);
-        }
-    }
-
-    /// The position that the loop acts on: of some time ago.
-    fn position_of_loop(&mut self, now_rad: f64, delay_s: f64, dt_s: f64) -> f64 {
-        if delay_s <= 0.0 {
-            return now_rad;
-        }
-        for (_, age_s) in &mut self.seen {
-            *age_s += dt_s;
-        }
-        self.seen.push_back((now_rad, 0.0));
-        // All but one that is old enough may go; between that and the next the position is a straight line.
-        while self.seen.len() > 1 && self.seen[1].1 >= delay_s {
-            self.seen.pop_front();
-        }
-        let (older_rad, older_s) = self.seen[0];
-        match self.seen.get(1) {
-            Some(&(newer_rad, newer_s)) if older_s > delay_s => {
-                older_rad + (newer_rad - older_rad) * (older_s - delay_s) / (older_s - newer_s)
-            }
-            _ => older_rad,
         }
     }
 

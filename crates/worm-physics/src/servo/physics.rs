@@ -15,9 +15,9 @@ pub const PWM_STEPS: f64 = 885.0;
 /// Acceleration of free fall, m/s².
 const GRAVITY: f64 = 9.81;
 /// Resistance of copper grows by this fraction per kelvin, from [`RESISTANCE_AT_C`] on.
-pub(super) const COPPER_PER_K: f64 = 0.00393;
+pub const COPPER_PER_K: f64 = 0.00393;
 /// Temperature at which the winding has its stated resistance, °C.
-pub(super) const RESISTANCE_AT_C: f64 = 25.0;
+pub const RESISTANCE_AT_C: f64 = 25.0;
 
 /// A motor with its gears, at the output shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +60,14 @@ pub struct Pendulum {
 }
 
 impl Pendulum {
+    /// Nothing at all.
+    pub const NONE: Self = Self {
+        mass_kg: 0.0,
+        length_m: 0.0,
+        arm_mass_kg: 0.0,
+        zero_rad: 0.0,
+    };
+
     /// Inertia about the shaft, kg m².
     pub fn inertia_kg_m2(&self) -> f64 {
         (self.mass_kg + self.arm_mass_kg / 3.0) * self.length_m * self.length_m
@@ -68,6 +76,11 @@ impl Pendulum {
     /// Torque that holds the arm level, N m.
     pub fn level_torque_n_m(&self) -> f64 {
         GRAVITY * (self.mass_kg + 0.5 * self.arm_mass_kg) * self.length_m
+    }
+
+    /// Energy that the arm has at an angle beyond that of hanging down, J.
+    pub fn potential_j(&self, angle_rad: f64) -> f64 {
+        self.level_torque_n_m() * (1.0 - (angle_rad - self.zero_rad).cos())
     }
 
     /// Torque that holds the arm at an angle, N m.
@@ -87,6 +100,8 @@ pub struct ServoPhysics {
     pub pendulum: Pendulum,
     /// Voltage of the supply without load, V.
     pub supply_v: f64,
+    /// Greatest duty, in (0, 1]: the servo's goal PWM over its largest.
+    pub duty_limit: f64,
 }
 
 impl ServoPhysics {
@@ -97,13 +112,14 @@ impl ServoPhysics {
             laws: ServoLaws::default(),
             pendulum,
             supply_v,
+            duty_limit: 1.0,
         }
     }
 
     /// The duty that the position loop asks for: `gain` in the servo's own unit, position P gain of the control table.
     pub fn duty(&self, gain: f64, goal_rad: f64, angle_rad: f64) -> f64 {
-        let duty = (gain * (goal_rad - angle_rad) / COUNT_RAD / FULL_DUTY).clamp(-1.0, 1.0);
-        if duty.abs() < self.laws.dead_duty { 0.0 } else { duty }
+        let duty = (gain * (goal_rad - angle_rad) / COUNT_RAD / FULL_DUTY).clamp(-self.duty_limit, self.duty_limit);
+        self.laws.duty(duty)
     }
 
     /// Current in the winding, A, at a duty, a velocity, and a temperature of the winding.
@@ -117,27 +133,9 @@ impl ServoPhysics {
         self.motor.winding_ohm * (1.0 + COPPER_PER_K * (winding_c - RESISTANCE_AT_C))
     }
 
-    /// Friction against the motion, N m, but for the viscous part: the torque on the gears presses their teeth together. Of a resting arm
-    /// it is the most that friction can hold. `motor_n_m` is what the motor gives, `arm_n_m` what holds the arm.
+    /// Friction against the motion, N m, but for the viscous part; see [`ServoLaws::friction_n_m`]. `arm_n_m` holds the arm.
     pub fn friction_n_m(&self, motor_n_m: f64, arm_n_m: f64, velocity_rad_s: f64) -> f64 {
-        let laws = &self.laws;
-        let on_gears = |share: f64| (share * motor_n_m + (1.0 - share) * arm_n_m).abs();
-        let mut friction = self.motor.dry_n_m;
-        if laws.load_friction != 0.0 {
-            friction += laws.load_friction * on_gears(laws.load_share);
-        }
-        if laws.load_squared_per_n_m != 0.0 {
-            friction += laws.load_squared_per_n_m * on_gears(laws.load_squared_share).powi(2);
-        }
-        if laws.stribeck_n_m != 0.0 {
-            friction += laws.stribeck_n_m * (-(velocity_rad_s / laws.stribeck_rad_s).powi(2)).exp();
-        }
-        if let Some(table) = &laws.table {
-            friction += table.friction_n_m(velocity_rad_s.abs(), on_gears(0.5));
-        }
-        if laws.back_driving != 1.0 && arm_n_m * velocity_rad_s < 0.0 {
-            friction *= laws.back_driving;
-        }
-        friction.max(0.0)
+        self.laws
+            .friction_n_m(self.motor.dry_n_m, motor_n_m, arm_n_m, velocity_rad_s)
     }
 }

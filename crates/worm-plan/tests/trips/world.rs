@@ -138,6 +138,7 @@ impl World {
         let mut truly = config.clone();
         let friction = (1.0 + FRICTION_SIGMA * rng.normal()).clamp(0.2, 2.2);
         truly.virtual_worm.inner_friction_n_m *= friction;
+        truly.virtual_worm.inner_viscous_n_m_s_per_rad *= friction;
         let deformation = (1.0 + DEFORMATION_SIGMA * rng.normal()).clamp(0.6, 1.4);
         let bounds_m = config.worm.max_deformation_m.to_vec(config.worm.cells);
         truly.worm.max_deformation_m = PerCell::Each(bounds_m.iter().map(|bound_m| bound_m * deformation).collect());
@@ -152,7 +153,7 @@ impl World {
             is_dead: false,
             link: true,
             cycles: Vec::new(),
-            range: RangeEstimator::new(&config),
+            range: RangeEstimator::new(&config).expect("a servo"),
             truth,
             curve: OpenCircuit::new(&battery),
             offset_v: battery.open_circuit_sigma_v * rng.normal(),

@@ -43,6 +43,8 @@ pub struct Bench<'a> {
     pub pendulum: Pendulum,
     /// Voltage without load, V.
     pub supply_v: f64,
+    /// Greatest duty of the servo, in (0, 1].
+    pub duty_limit: f64,
     /// The nominal servo.
     pub model: &'a ServoModel,
     /// Recordings with the gain and, where it has one, the name of the trajectory.
@@ -56,6 +58,7 @@ impl<'a> Bench<'a> {
         Self {
             pendulum: campaign.pendulum,
             supply_v: campaign.supply_v,
+            duty_limit: campaign.duty_limit,
             model: &campaign.model,
             runs: runs
                 .map(|(run, recording)| (recording, run.gain, run.trajectory.as_deref()))
@@ -119,7 +122,7 @@ pub fn explain_servo(
     }
     let mut report = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
     report("recalibration", 0.02);
-    let nominal = bench.model.on(bench.pendulum, bench.supply_v);
+    let nominal = bench.model.on(bench.pendulum, bench.supply_v, bench.duty_limit);
     let mut servo = RecordedServo::new(bench.observed(), nominal);
     let base = Hypothesis::new(&servo.nuisances(), &[]);
     let at = measure_noise(&mut servo, &base)?;

@@ -34,7 +34,7 @@ const VELOCITY_LAG_S: f64 = 0.02;
 
 /// Predicts every run of a bench by a model; the current is what the model says that it measures.
 pub fn prediction_errors(bench: &Bench<'_>, model: &ServoModel) -> Vec<ServoPredictionError> {
-    let physics = model.on(bench.pendulum, bench.supply_v);
+    let physics = model.on(bench.pendulum, bench.supply_v, bench.duty_limit);
     let of_run = |observed: &super::observed::Observed<'_>| {
         let recording = observed.recording;
         let predicted = predict(observed, &physics);

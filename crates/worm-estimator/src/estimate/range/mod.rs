@@ -17,7 +17,7 @@ mod running_mean;
 mod tests;
 
 use crate::battery::{ChargeEstimate, Spread};
-use crate::config::{Battery, Config};
+use crate::config::{Battery, Config, PhysicsError};
 use crate::message::{Cycle, Range, State};
 use crate::time::seconds;
 use running_mean::RunningMean;
@@ -74,23 +74,23 @@ struct Window {
 
 impl RangeEstimator {
     /// An estimator for a checked configuration; none without a battery.
-    pub fn new(config: &Config) -> Option<Self> {
-        let battery = config.battery.clone()?;
-        let motor = config.motor();
+    ///
+    /// # Errors
+    /// [`PhysicsError`] for values that a checked configuration cannot have.
+    pub fn new(config: &Config) -> Result<Option<Self>, PhysicsError> {
+        let Some(battery) = config.battery.clone() else {
+            return Ok(None);
+        };
+        let motor = config.motor()?;
         let cycle_s = config.gait.cycle_s;
         // What share of the cost the hotel power has decides how much its error counts.
         let hotel_j = battery.hotel_power_w * cycle_s;
-        let idle = DriveLoad {
-            work_j: 0.0,
-            mean_square_n2_m2: 0.0,
-            max_torque_n_m: 0.0,
-            min_torque_n_m: 0.0,
-        };
+        let idle = DriveLoad::constant(0.0);
         let hotel_share = hotel_j / (hotel_j + motor.cycle(&idle, cycle_s).energy_j).max(f64::MIN_POSITIVE);
         let factor_sigma = battery
             .capacity_sigma_share
             .hypot(hotel_share * battery.hotel_power_sigma_share);
-        Some(Self {
+        Ok(Some(Self {
             charge: ChargeEstimate::new(&battery, factor_sigma),
             lowest_bus_v: battery.lowest_bus_v(&config.limits),
             battery,
@@ -104,7 +104,7 @@ impl RangeEstimator {
             gauge_share: f64::NAN,
             energy_j: None,
             advance_m: None,
-        })
+        }))
     }
 
     /// Takes a state: counts what the battery gives, and reads its voltage.
@@ -254,13 +254,7 @@ impl RangeEstimator {
 
     /// Energy of the motor for the work that the model predicts, J, with the torque taken as even; `NaN` where it predicts none.
     fn predicted_energy_j(&self, cycle: &Cycle) -> f64 {
-        let torque_n_m = cycle.predicted_energy_loss_j / TAU;
-        let load = DriveLoad {
-            work_j: cycle.predicted_energy_loss_j,
-            mean_square_n2_m2: torque_n_m * torque_n_m,
-            max_torque_n_m: torque_n_m,
-            min_torque_n_m: torque_n_m,
-        };
+        let load = DriveLoad::constant(cycle.predicted_energy_loss_j / TAU);
         self.motor.cycle(&load, cycle.duration_s).energy_j
     }
 }

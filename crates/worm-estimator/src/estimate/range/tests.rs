@@ -67,7 +67,7 @@ impl Truth {
             ..Config::default()
         };
         let cycle_s = config.gait.cycle_s;
-        let nominal = RangeEstimator::new(&config).expect("a battery");
+        let nominal = RangeEstimator::new(&config).expect("a servo").expect("a battery");
         let cycle = Cycle {
             predicted_energy_loss_j: PREDICTED_LOSS_J,
             duration_s: cycle_s,
@@ -151,7 +151,7 @@ fn coverage(seed: u64) -> Vec<(String, f64, f64)> {
     let mut widths = vec![Vec::new(); inside.len()];
     for _ in 0..WORMS {
         let mut truth = Truth::draw(&mut rng);
-        let mut estimator = RangeEstimator::new(&truth.config).expect("a battery");
+        let mut estimator = RangeEstimator::new(&truth.config).expect("a servo").expect("a battery");
         let (mut at_m, mut said) = (0.0, Vec::new());
         for index in 0.. {
             let Some(cycle) = truth.crawl(&mut estimator, index, &mut rng) else {
