@@ -90,6 +90,10 @@ impl FromStr for Effect {
                 return Err(EffectTextError::Twice(parameter.to_owned()));
             }
         }
+        if effect.is_table() {
+            // Refused: its lists have no place in such a text.
+            Setting::by_names(&effect.name, None, &effect.parameters, MAX_CELLS)?;
+        }
         // The number of cells is not known yet; a cell that no worm can have is refused here.
         effect.setting(MAX_CELLS)?;
         Ok(effect)
