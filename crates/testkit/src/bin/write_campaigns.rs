@@ -57,6 +57,11 @@ fn write_between(campaign: &HiddenCampaign, path: &Path) -> Result<(), String> {
     };
     let condition = campaign.usual(0.5 * (gentler_deg + steepest_deg));
     let run = campaign.follow_up(condition, 1);
-    let run = run.map_err(|_| format!("{}: the worm does not crawl between the steepest two slopes", path.display()))?;
+    let run = run.map_err(|_| {
+        format!(
+            "{}: the worm does not crawl between the steepest two slopes",
+            path.display()
+        )
+    })?;
     write_unseen(&run, path)
 }

@@ -184,11 +184,15 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
         return hidden.map(|hidden| case(hidden, split.base())).to_vec();
     }
     if split == Split::Laws {
-        let singles = Effect::ALL.iter().map(|&effect| Hidden::Single(effect, SeverityRange::UPPER_HALF));
+        let singles = Effect::ALL
+            .iter()
+            .map(|&effect| Hidden::Single(effect, SeverityRange::UPPER_HALF));
         let strangers = split.stranger_kinds().into_iter().map(Hidden::Outside);
         let clean = std::iter::repeat_n(Hidden::Clean, LAWS_CLEAN);
         let all = singles.chain(strangers).chain(clean).enumerate();
-        return all.map(|(number, hidden)| case(hidden, split.base() + number as u64)).collect();
+        return all
+            .map(|(number, hidden)| case(hidden, split.base() + number as u64))
+            .collect();
     }
     let counts = split.counts();
     let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);

@@ -42,7 +42,12 @@ fn a_law_takes_the_place_of_an_effect_that_the_search_may_not_know() {
     let campaign = draw_sized(hidden, SEED, SIZE);
     let answer = answer(&campaign, &["viscous-drag"]);
     assert_eq!(answer.verdict, Verdict::OutsideLibrary);
-    assert!(answer.warnings.iter().any(|warning| warning == "left out of the search: viscous-drag"));
+    assert!(
+        answer
+            .warnings
+            .iter()
+            .any(|warning| warning == "left out of the search: viscous-drag")
+    );
     let law = answer.law.as_ref().expect("a law");
     let axes: Vec<&str> = std::iter::once(&law.over)
         .chain(&law.rivals)
@@ -58,7 +63,10 @@ fn a_law_takes_the_place_of_an_effect_that_the_search_may_not_know() {
     let table = settings[0].table().expect("a table");
     assert_eq!(table.acts_on().name(), law.over.acts_on);
     for (written, found) in table.value().iter().zip(&law.value) {
-        assert!((written - found).abs() <= 1e-5 * found.abs().max(1e-3), "{written} of {found}");
+        assert!(
+            (written - found).abs() <= 1e-5 * found.abs().max(1e-3),
+            "{written} of {found}"
+        );
     }
 }
 

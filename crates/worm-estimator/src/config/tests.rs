@@ -259,10 +259,16 @@ fn a_table_is_read_and_no_fifth_one() {
     let settings = config.effect_settings().expect("it was checked");
     let table = settings[0].table().expect("it has a law");
     assert_eq!((settings[0].cell(), table.period()), (Some(1), Some(0.041)));
-    assert_eq!((table.grid(1), table.value()), (&[0.0, 30.0][..], &[1.0, 0.9, 1.1, 1.0][..]));
+    assert_eq!(
+        (table.grid(1), table.value()),
+        (&[0.0, 30.0][..], &[1.0, 0.9, 1.1, 1.0][..])
+    );
     let error = Config::from_toml(&one.repeat(5), file()).expect_err("five").to_string();
     assert!(error.contains("5 tables: give at most 4"), "{error}");
-    let error = "table:value=1".parse::<Effect>().expect_err("on the command line").to_string();
+    let error = "table:value=1"
+        .parse::<Effect>()
+        .expect_err("on the command line")
+        .to_string();
     assert!(error.contains("in an [[effect]] of a configuration file"), "{error}");
 }
 

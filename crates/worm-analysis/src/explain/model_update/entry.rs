@@ -59,7 +59,13 @@ fn table(law: &FoundLaw) -> String {
         several => format!("[{}]", several.join(", ")),
     };
     let grids = law.grid.all();
-    let names = law.over.axis.all().into_iter().map(|name| format!("\"{name}\"")).collect();
+    let names = law
+        .over
+        .axis
+        .all()
+        .into_iter()
+        .map(|name| format!("\"{name}\""))
+        .collect();
     let width = grids.get(1).map_or(law.value.len(), |second| second.len());
     let rows: Vec<String> = law.value.chunks(width).map(list).collect();
     let mut text = format!(

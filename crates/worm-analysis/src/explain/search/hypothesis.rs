@@ -71,7 +71,10 @@ impl Hypothesis {
         }
         let effects = self.hypothesised.iter().zip(values);
         let acting = effects.filter(|(hypothesised, _)| acts(hypothesised));
-        let law = self.law.iter().filter_map(|law| law.setting(&self.law_coefficients(at)));
+        let law = self
+            .law
+            .iter()
+            .filter_map(|law| law.setting(&self.law_coefficients(at)));
         acting
             .map(|(hypothesised, values)| Setting::within(hypothesised.effect, hypothesised.cell, &values))
             .chain(law)

@@ -81,11 +81,17 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
     let force = ActsOn::ContactForce;
     let friction = ActsOn::FrictionFactor;
     let evenly_of = |seen: &[f64], points: usize| ends(seen).map(|(from, to)| evenly(from, to, points));
-    for (axis, seen) in [(Axis::Deformation, &visited.deformation_m), (Axis::Load, &visited.load_n)] {
+    for (axis, seen) in [
+        (Axis::Deformation, &visited.deformation_m),
+        (Axis::Load, &visited.load_n),
+    ] {
         let grid = evenly_of(seen, POINTS);
         offers.extend(grid.map(|grid| offer(force, axis, None, grid, seen)));
     }
-    for (axis, seen) in [(Axis::DeformationRate, &visited.rate_m_s), (Axis::Speed, &visited.speed_m_s)] {
+    for (axis, seen) in [
+        (Axis::DeformationRate, &visited.rate_m_s),
+        (Axis::Speed, &visited.speed_m_s),
+    ] {
         let grid = ends(seen).map(|(from, to)| about_rest(from, to));
         offers.extend(grid.map(|grid| offer(force, axis, None, grid, seen)));
     }

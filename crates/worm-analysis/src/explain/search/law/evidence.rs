@@ -8,13 +8,13 @@
 //! ```
 //! The directions in which LᵀGL is large are those that the data determine: they are the columns with which the law is fitted.
 
-use super::kernel::Prior;
 use super::super::directions::Projector;
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
 use super::super::hypothesis::Hypothesis;
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;
+use super::kernel::Prior;
 use super::shape::LawShape;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;

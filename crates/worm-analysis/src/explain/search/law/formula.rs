@@ -14,6 +14,8 @@ use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 use worm_physics::Axis;
 
+/// Part of the largest term below which a term is left out of the text.
+const NEGLIGIBLE: f64 = 0.02;
 /// Most terms.
 const TERMS: usize = 3;
 /// Logarithm of the Bayes factor that a further term must bring.
@@ -73,7 +75,11 @@ impl Term {
     fn text(self, by: &[f64], scale: f64, axis: Axis, unit: &str) -> String {
         let symbol = axis.name().replace('-', " ");
         let with = |value: f64, unit: String, rest: &str| {
-            let unit = if unit.starts_with('/') { format!("1{unit}") } else { unit };
+            let unit = if unit.starts_with('/') {
+                format!("1{unit}")
+            } else {
+                unit
+            };
             let space = if unit.is_empty() { "" } else { " " };
             format!("{}{space}{unit}{rest}", figure(value))
         };
@@ -170,7 +176,9 @@ pub(super) fn nearest<P: Plant>(
     let sigma = offer.sigmas[2];
     let dictionary = terms(*axis, grid, law.shape.period);
     let columns = |terms: &[Term]| -> Vec<Vec<f64>> {
-        let parts = terms.iter().flat_map(|term| (0..term.count()).map(move |part| (term, part)));
+        let parts = terms
+            .iter()
+            .flat_map(|term| (0..term.count()).map(move |part| (term, part)));
         let of = |(term, part): (&Term, usize)| grid.iter().map(|at| sigma * term.parts(*at, scale)[part]).collect();
         parts.map(of).collect()
     };
@@ -212,10 +220,22 @@ pub(super) fn nearest<P: Plant>(
     let by = fitted.fit.hypothesis.law_coefficients(&fitted.fit.at);
     let mut from = 0;
     let mut text = String::new();
+    let largest = |by: &[f64], term: &Term| {
+        let at = |at: &f64| -> f64 { term.parts(*at, scale).iter().zip(by).map(|(part, by)| part * by).sum() };
+        grid.iter().map(|here| at(here).abs()).fold(0.0, f64::max)
+    };
+    let mut of_terms: Vec<(Term, Vec<f64>, f64)> = Vec::new();
     for term in &chosen {
         let by: Vec<f64> = by[from..from + term.count()].iter().map(|by| sigma * by).collect();
         from += term.count();
-        let part = term.text(&by, scale, *axis, law.shape.acts_on.unit());
+        let most = largest(&by, term);
+        of_terms.push((*term, by, most));
+    }
+    let most = of_terms.iter().map(|(_, _, most)| *most).fold(0.0, f64::max);
+    // What the fit to the end leaves nothing of is not written.
+    of_terms.retain(|(_, _, of_term)| *of_term > NEGLIGIBLE * most);
+    for (term, by, _) in &of_terms {
+        let part = term.text(by, scale, *axis, law.shape.acts_on.unit());
         text += &match (text.is_empty(), part.strip_prefix('−')) {
             (true, _) => part,
             (false, Some(rest)) => format!(" − {rest}"),

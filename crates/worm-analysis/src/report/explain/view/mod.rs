@@ -136,7 +136,8 @@ impl View {
             ],
         };
         if let Some(blocks) = law::blocks(answer) {
-            view.sections.insert(AFTER_EFFECTS, section("A law that nobody listed", blocks));
+            view.sections
+                .insert(AFTER_EFFECTS, section("A law that nobody listed", blocks));
         }
         view
     }
