@@ -32,7 +32,7 @@ fn the_commented_out_keys_are_accepted() {
     );
     assert!(config.battery.is_some() && config.black_box.is_some() && config.realtime.cpu.is_some());
     assert!(config.virtual_worm.max_deformation_m.is_some());
-    assert_eq!(config.effect.len(), 2);
+    assert_eq!(config.effect.len(), 3);
 }
 
 /// A line of the commented file for each effect of the library, with its parameters and what they may be.
