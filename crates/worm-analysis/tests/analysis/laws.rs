@@ -1,12 +1,13 @@
 //! A law where the library does not explain the data: on a stranger, on a worm whose effect the search may not know, and on neither.
 
-use testkit::hidden_effects::campaign::{HiddenCampaign, draw_sized};
+use testkit::hidden_effects::campaign::{HiddenCampaign, draw, draw_sized};
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::hidden::Hidden;
 use testkit::hidden_effects::setting::CampaignSize;
 use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain::{Answer, Options, Verdict, explain, model_update};
 use worm_estimator::config::Config;
+use worm_physics::effect::LIBRARY;
 
 /// In no range of the splits.
 const SEED: u64 = 901;
@@ -70,14 +71,20 @@ fn a_law_takes_the_place_of_an_effect_that_the_search_may_not_know() {
     }
 }
 
-/// A corrugated canal.
+/// Friction that swings slowly, as `write_campaigns laws` writes it; the library is left out, to be quick.
 #[test]
 fn a_law_is_found_for_what_nobody_listed() {
-    let campaign = draw_sized(Hidden::Outside(0), SEED, SIZE);
-    let answer = answer(&campaign, &[]);
+    let campaign = draw(Hidden::Outside(1), 57_300_023);
+    let library: Vec<&'static str> = LIBRARY.iter().map(|effect| effect.name).collect();
+    let answer = answer(&campaign, &library);
     assert_eq!(answer.verdict, Verdict::OutsideLibrary);
     let law = answer.law.expect("a law");
-    assert!(law.closure_interval[0] > 0.0, "{law:?}");
+    assert_eq!((law.over.acts_on, *law.over.axis.first()), ("friction-factor", "time"));
+    assert!(
+        law.over.period.is_some_and(|cycles| (3.0..3.2).contains(&cycles)),
+        "{law:?}"
+    );
+    assert!(law.closure_interval[0] > 0.8, "{law:?}");
     assert_eq!(law.value.len(), law.band.len());
 }
 

@@ -11,8 +11,8 @@ pub(super) fn blocks(answer: &Answer) -> Option<Vec<Block>> {
     }
     let Some(law) = &answer.law else {
         return Some(vec![Block::paragraph(
-            "None was found: no smooth law over deformation, its rate, speed, load, place, phase, slope or time predicts cycles that it \
-             was not fitted to.",
+            "There is no law to report: nothing smooth over deformation, its rate, speed, load, place, phase, slope or time predicts cycles \
+             that it was not fitted to.",
         )]);
     };
     let [low, high] = law.closure_interval.map(percent);
