@@ -21,6 +21,7 @@ use worm_analysis::experiment::Progress as Step;
 use worm_analysis::explain::{Answer, Options, explain, explain_advances, model_update};
 use worm_analysis::report;
 use worm_estimator::config::Config;
+use worm_physics::effect::{named, named_of_servo};
 
 /// Arguments of `wormd explain`.
 #[derive(Debug, Args)]
@@ -50,6 +51,9 @@ pub struct ExplainArgs {
     /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; 0.01 to 0.5
     #[arg(long, value_name = "FRACTION", default_value_t = Options::default().expected_impact, value_parser = |text: &str| fraction(text, 0.01..=0.5))]
     expected_impact: f64,
+    /// Leave an effect of the library out of the search, to see what it would say without; may be given several times
+    #[arg(long, value_name = "EFFECT", value_parser = effect_name)]
+    without: Vec<&'static str>,
     /// Record the worm that is crawling now, into DIR/live.mcap, and explain that; at its configured slope unless --slope is
     /// given
     #[arg(long, conflicts_with = "recording", requires = "out")]
@@ -125,6 +129,12 @@ fn print_answer(
     }
 }
 
+/// The name of an effect of either library.
+fn effect_name(text: &str) -> Result<&'static str, String> {
+    let effect = named(text).or_else(|error| named_of_servo(text).map_err(|_| error));
+    effect.map(|effect| effect.name).map_err(|error| error.to_string())
+}
+
 /// A number in a range.
 fn fraction(text: &str, range: RangeInclusive<f64>) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -141,6 +151,7 @@ impl ExplainArgs {
             discrepancy: self.discrepancy.unwrap_or(usual.discrepancy),
             matters: self.matters.unwrap_or(usual.matters),
             expected_impact: self.expected_impact,
+            without: self.without.clone(),
         }
     }
 

@@ -20,6 +20,7 @@ mod tests;
 use super::ledger::Ledger;
 use super::mechanics::Mechanics;
 use super::pad::{Hold, Loaded, Pad, Rate};
+use super::table::Whereabouts;
 use super::worm::SlidesDown;
 use crate::MAX_CELLS;
 
@@ -62,7 +63,10 @@ pub struct Crawl {
 struct Cell {
     pad: Pad,
     drive_m: f64,
-    drag_n: f64, // on the cell, in the last increment
+    drag_n: f64,   // on the cell, in the last increment
+    pushed_n: f64, // by tables
+    speed_m_s: f64,
+    strain_m_s: f64, // of its pad
     trial: Trial,
 }
 
@@ -74,6 +78,11 @@ struct Trial {
     hold: Hold,
     shift_m: f64,
     loaded: Loaded,
+    /// At the increment's start, for tables.
+    here: Whereabouts,
+    /// Force of tables that does not change within the increment, and of all, N.
+    standing_n: f64,
+    pushed_n: f64,
 }
 
 /// The constants of one increment's equation.
@@ -284,7 +293,8 @@ impl Crawl {
 
     /// Force on a cell besides its contact, its weight and its part of the constant force, N.
     fn passing_force_n(&self, mechanics: &Mechanics, cell: usize) -> f64 {
-        self.cell[cell].drag_n + self.shared_force_n(mechanics) / self.cells as f64
+        let cell = &self.cell[cell];
+        cell.drag_n + cell.pushed_n + self.shared_force_n(mechanics) / self.cells as f64
     }
 
     /// Force of tether and inertia on the whole worm, N.
@@ -306,6 +316,8 @@ impl Crawl {
     fn prepare(&mut self, mechanics: &Mechanics, phase: f64, step_s: f64) -> Increment {
         let laws = &mechanics.laws;
         let even = mechanics.has_even_friction();
+        let tables = (!mechanics.tables.is_empty()).then_some(&mechanics.tables);
+        let slope_deg = mechanics.worm.slope_rad().to_degrees();
         let cam = mechanics.cam(phase);
         for (index, cell) in self.cell[..self.cells].iter_mut().enumerate() {
             cell.trial.driven_m = mechanics.drive_at_m(index, &cam) - cell.drive_m;
@@ -315,6 +327,20 @@ impl Crawl {
                 let tip_m = self.position_m[index] - cell.pad.deformation_m;
                 mechanics.friction(tip_m, phase - self.first_phase)
             };
+            if let Some(tables) = tables {
+                cell.trial.here = Whereabouts {
+                    deformation_m: cell.pad.deformation_m,
+                    deformation_rate_m_s: cell.strain_m_s,
+                    speed_m_s: cell.speed_m_s,
+                    load_n: cell.pad.force_n + mechanics.standing_n[index],
+                    place_m: self.position_m[index] - cell.pad.deformation_m,
+                    phase: mechanics.own_phase(index, &cam),
+                    slope_deg,
+                    cycles: (phase - self.first_phase).abs(),
+                };
+                cell.trial.friction *= tables.friction(index, &cell.trial.here);
+                cell.trial.standing_n = tables.standing_n(index, &cell.trial.here);
+            }
             cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction, step_s);
         }
         let (damping_n_s_per_m, mass_kg) = match self.damping_ratio {
@@ -361,13 +387,14 @@ impl Crawl {
                 driven_m,
                 shift_m,
                 loaded,
+                pushed_n,
                 ..
             } = cell.trial;
             let (law, standing_n) = (&mechanics.pad[index], mechanics.standing_n[index]);
             let (before_m, before_n) = (cell.pad.deformation_m, cell.pad.force_n);
             let lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.rate);
             let drag_n = increment.drag_n_per_m * shift_m;
-            let dragged_j = 0.5 * (cell.drag_n + drag_n) * shift_m;
+            let dragged_j = 0.5 * (cell.drag_n + cell.pushed_n + drag_n + pushed_n) * shift_m;
             let ledger = &mut self.ledger;
             if loaded.slide_m != 0.0 {
                 ledger.slide(index, loaded.slide_m, loaded.force_n * loaded.slide_m);
@@ -375,8 +402,8 @@ impl Crawl {
             ledger.weight_work_j += mechanics.worm.cell_weight_n(index) * shift_m;
             ledger.resisting_work_j += resisting_n * shift_m + dragged_j;
             ledger.settling_loss_j += lost_j;
-            let passing_before_n = cell.drag_n + shared_before_n;
-            let passing_after_n = drag_n + shared_after_n;
+            let passing_before_n = cell.drag_n + cell.pushed_n + shared_before_n;
+            let passing_after_n = drag_n + pushed_n + shared_after_n;
             if driven_m != 0.0 {
                 ledger.add_actuator_work(
                     before_n + standing_n + passing_before_n,
@@ -389,7 +416,9 @@ impl Crawl {
             ledger.actuator_net_j += 0.5 * (passing_before_n + passing_after_n) * (shift_m - translation_m - driven_m);
             deformation_m += 0.5 * (before_m + loaded.deformation_m);
             self.position_m[index] += shift_m;
-            cell.drag_n = drag_n;
+            (cell.drag_n, cell.pushed_n) = (drag_n, pushed_n);
+            cell.speed_m_s = shift_m / increment.step_s;
+            cell.strain_m_s = (loaded.deformation_m - before_m) / increment.step_s;
         }
         self.ledger.deformation_integral_m += deformation_m * (phase - self.phase).abs();
         self.phase = phase;

@@ -141,7 +141,7 @@ pub fn steady_cycle_of(physics: &Physics, cycle_s: f64) -> Outcome {
 pub(super) fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<(Cycle, Locomotion), SlidesDown> {
     let worm = &physics.worm;
     let mut motion = Locomotion::at_rest(physics, &[0.0; MAX_CELLS][..worm.cells()])?;
-    let (fraction, max_cycles) = match (motion.is_exact(), physics.laws.are_periodic()) {
+    let (fraction, max_cycles) = match (motion.is_exact(), physics.is_periodic()) {
         (true, _) => (PERIODIC_FRACTION, MAX_CYCLES),
         (false, true) => (NEARLY_PERIODIC_FRACTION, MAX_INCREMENTAL_CYCLES),
         (false, false) => (0.0, CYCLES_BEFORE),
@@ -153,7 +153,7 @@ pub(super) fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<(C
         let closure_m = (0..worm.cells())
             .map(|cell| (motion.deformation_m(cell) - before.deformation_m(cell)).abs())
             .fold(0.0, f64::max);
-        let is_closed = physics.laws.are_periodic() && closure_m <= fraction * worm.stroke_m();
+        let is_closed = physics.is_periodic() && closure_m <= fraction * worm.stroke_m();
         if is_closed || cycles == max_cycles {
             let advance_m = motion.mean_position_m() - before.mean_position_m();
             let ledger = motion.ledger().since(before.ledger());

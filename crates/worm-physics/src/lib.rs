@@ -15,6 +15,7 @@
 //! - [`motion`]: [`Motion`], the streaming state. Between two events (a tip starting or ceasing to slide) everything is linear in the gait
 //!   phase, so it runs from event to event and is exact for every increment.
 //! - [`effect`]: a library of effects that the theory leaves out; [`Physics`] is a worm with any of them.
+//! - [`Table`]: a law given at the points of a grid, for what no effect describes.
 //! - [`Crawl`]: the motion increment by increment, under every law of [`Laws`] and with inertia. [`Locomotion`] selects the motion that the
 //!   physics need.
 //! - [`ledger`]: [`Ledger`], where the energy goes, with a balance that closes at every instant.
@@ -47,6 +48,7 @@ mod pad;
 mod physics;
 pub mod servo;
 pub mod study;
+mod table;
 pub mod worm;
 
 pub use crawl::{Crawl, longest_increment_s};
@@ -57,4 +59,5 @@ pub use locomotion::Locomotion;
 pub use mechanics::Mechanics;
 pub use motion::Motion;
 pub use physics::{Laws, Patch, Physics, View};
+pub use table::{ActsOn, Axis, MAX_POINTS, MAX_TABLES, Table, TableError, Tables};
 pub use worm::{Contact, SlidesDown, Worm, WormError};

@@ -2,6 +2,7 @@
 
 use super::pad::{ELEMENTS, PadLaw};
 use super::physics::{Laws, Physics};
+use super::table::Tables;
 use super::worm::Worm;
 use crate::MAX_CELLS;
 
@@ -20,6 +21,7 @@ pub(super) struct Cam {
 pub struct Mechanics {
     pub(super) worm: Worm, // with the effect of the slope on its clamps
     pub(super) laws: Laws,
+    pub(super) tables: Tables,
     pub(super) pad: [PadLaw; MAX_CELLS],
     pub(super) pull_n: f64,
     pub(super) mass_kg: f64,
@@ -71,7 +73,9 @@ impl Mechanics {
             critical_n_s_per_m: 2.0 * (whole_n_per_m * worm.mass_kg()).sqrt() / worm.cells() as f64,
             pull_n: worm.pull_n(),
             mass_kg: worm.mass_kg(),
-            full_force_n: pad.iter().map(|law| law.forward_n.max(law.backward_n)).sum(),
+            full_force_n: pad.iter().map(|law| law.forward_n.max(law.backward_n)).sum::<f64>()
+                + physics.tables.full_force_n(worm.cells()),
+            tables: physics.tables.clone(),
             laws,
             pad,
             place_of,
@@ -160,6 +164,12 @@ impl Mechanics {
         }
     }
 
+    /// Part of a gait cycle since a cell's own step began, 0 to 1.
+    pub(super) fn own_phase(&self, cell: usize, cam: &Cam) -> f64 {
+        let cells = self.worm.cells() as f64;
+        (cam.steps - self.place_of[cell] as f64).rem_euclid(cells) / cells
+    }
+
     /// Friction of a tip at a place after some cycles, in either direction, relative to its initial friction.
     pub(super) fn friction(&self, tip_m: f64, cycles: f64) -> f64 {
         let laws = &self.laws;
@@ -176,7 +186,7 @@ impl Mechanics {
         friction
     }
 
-    /// Whether friction does not depend on place and time.
+    /// Whether friction does not depend on place and time, tables apart.
     pub(super) fn has_even_friction(&self) -> bool {
         self.laws.wear_per_cycle == 0.0 && self.laws.patch.friction_factor == 1.0
     }

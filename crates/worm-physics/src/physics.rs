@@ -1,5 +1,6 @@
 //! A worm with everything that happens to it: the paper's theory, and what effects add to it.
 
+use super::table::Tables;
 use super::worm::Worm;
 
 /// Laws beside the paper's theory: what only the incremental motion knows. The default is none of them.
@@ -132,6 +133,8 @@ pub struct Physics {
     pub worm: Worm,
     /// What the theory leaves out.
     pub laws: Laws,
+    /// Laws that nobody derived, each at the points of a grid.
+    pub tables: Tables,
     /// How the friction falls with the slope: by the factor 1 − s (1 − cos λ).
     pub slope_clamping: f64,
     /// Share of its speed that the motor loses for each newton that its cell exerts, 1/N: speed over 1 + d F.
@@ -143,7 +146,7 @@ pub struct Physics {
 impl Physics {
     /// Whether the crawl becomes periodic: no law depends on the place, the distance or the number of cycles.
     pub fn is_periodic(&self) -> bool {
-        self.laws.are_periodic()
+        self.laws.are_periodic() && self.tables.are_periodic()
     }
 
     /// The paper's theory and nothing else.
@@ -151,6 +154,7 @@ impl Physics {
         Self {
             worm,
             laws: Laws::default(),
+            tables: Tables::default(),
             slope_clamping: 0.0,
             slowdown_per_n: 0.0,
             view: View::default(),
@@ -172,12 +176,13 @@ impl Physics {
     pub fn mirrored(mut self) -> Self {
         self.worm = self.worm.mirrored();
         self.laws.patch.from_m = -(self.laws.patch.from_m + self.laws.patch.length_m);
+        self.tables = self.tables.mirrored();
         self
     }
 
     /// Whether the exact motion serves: no law but the paper's.
     pub fn is_piecewise_linear(&self) -> bool {
-        self.laws.are_piecewise_linear()
+        self.laws.are_piecewise_linear() && self.tables.is_empty()
     }
 
     /// The motor's speed against a force of the stepping cell, as a share of its speed without.

@@ -290,7 +290,7 @@ impl Worm {
     }
 
     /// A cell's part of the resisting force, N.
-    pub(super) fn cell_resistance_n(&self) -> f64 {
+    pub fn cell_resistance_n(&self) -> f64 {
         self.resisting_force_n / self.cells as f64
     }
 

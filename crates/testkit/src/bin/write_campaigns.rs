@@ -4,14 +4,15 @@
 //! cargo run --release -p testkit --bin write_campaigns -- development FOLDER [WHAT ...]
 //! ```
 //! With WHAT (clean, discrepant, outside, pair, triple, twin, onset or the name of an effect) only such cases are written. Campaigns
-//! that are there already are left as they are. `WORMD_CASES` scales how many there are of each kind.
+//! that are there already are left as they are. Those of the split `laws` have a further run, on a slope between the steepest two. `WORMD_CASES` scales how many there are of each kind.
 
 use std::path::Path;
 use std::process::ExitCode;
-use testkit::hidden_effects::folders::{is_written, write};
+use testkit::hidden_effects::campaign::HiddenCampaign;
+use testkit::hidden_effects::folders::{is_written, write, write_unseen};
 use testkit::hidden_effects::split::{Case, Split, scale_from_environment, split};
 
-const USAGE: &str = "usage: write_campaigns development|test|search|sample FOLDER [WHAT ...]";
+const USAGE: &str = "usage: write_campaigns development|test|search|sample|laws FOLDER [WHAT ...]";
 
 fn main() -> ExitCode {
     match run(&std::env::args().skip(1).collect::<Vec<String>>()) {
@@ -41,7 +42,26 @@ fn run(arguments: &[String]) -> Result<(), String> {
         let campaign = case.draw();
         let truth = &campaign.truth;
         write(&campaign, &path)?;
+        if which == Split::Laws {
+            write_between(&campaign, &path)?;
+        }
         println!("{name}: {:.1} sigma, {:.1} %", truth.sigma, 100.0 * truth.impact());
     }
     Ok(())
+}
+
+/// Writes a run of the same worm on a slope between the steepest two; it crawls on both.
+fn write_between(campaign: &HiddenCampaign, path: &Path) -> Result<(), String> {
+    let [.., gentler_deg, steepest_deg] = campaign.slopes_deg[..] else {
+        return Err("a campaign of one slope has none between".to_owned());
+    };
+    let condition = campaign.usual(0.5 * (gentler_deg + steepest_deg));
+    let run = campaign.follow_up(condition, 1);
+    let run = run.map_err(|_| {
+        format!(
+            "{}: the worm does not crawl between the steepest two slopes",
+            path.display()
+        )
+    })?;
+    write_unseen(&run, path)
 }

@@ -4,6 +4,7 @@
 use super::answer::Answer;
 use super::assessment::{Assessment, compare};
 use super::campaign::HiddenCampaign;
+use super::follow_up::ExtraRun;
 use super::truth::Truth;
 use serde_json::{Value, json};
 use std::fs;
@@ -136,4 +137,23 @@ pub fn write(campaign: &HiddenCampaign, path: &Path) -> Result<(), String> {
     written("campaign.toml", runs.as_bytes())?;
     let truth = serde_json::to_vec_pretty(&campaign.truth).map_err(|error| error.to_string())?;
     written(TRUTH, &truth)
+}
+
+/// Writes a further run of a campaign's worm beside the campaign, as a campaign of its own: `unseen.toml`.
+///
+/// # Errors
+/// When a file cannot be written; the text names it.
+pub fn write_unseen(run: &ExtraRun, path: &Path) -> Result<(), String> {
+    let mut text = Vec::new();
+    write_csv(&run.recording, &mut text).map_err(|error| format!("unseen.csv: {error}"))?;
+    let condition = run.condition;
+    let campaign = format!(
+        "worm = \"worm.toml\"\n\n[[run]]\nrecording = \"unseen.csv\"\nslope_deg = {:?}\ncycle_s = {:?}\n",
+        condition.slope_deg, condition.cycle_s
+    );
+    for (name, content) in [("unseen.csv", &text[..]), ("unseen.toml", campaign.as_bytes())] {
+        let file = path.join(name);
+        fs::write(&file, content).map_err(|error| format!("{}: {error}", file.display()))?;
+    }
+    Ok(())
 }

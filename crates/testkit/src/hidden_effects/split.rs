@@ -17,12 +17,17 @@ pub enum Split {
     Search,
     /// One of each kind, as varied as in the splits but recorded for a short time: what `tests/analysis/own_sample.rs` runs.
     Sample,
+    /// One of each effect, the strangers of the development split and clean worms, of the usual size and with a further run on a slope
+    /// between: for the laws that are found where the library does not explain the data.
+    Laws,
 }
 
 /// The seed of every case of [`Split::Search`]: in no range of the others.
 pub const SEARCH_SEED: u64 = 501;
 /// The seed of every case of [`Split::Sample`].
 const SAMPLE_SEED: u64 = 701;
+/// Clean worms of [`Split::Laws`].
+const LAWS_CLEAN: usize = 20;
 
 impl Split {
     /// Below the first seed.
@@ -32,6 +37,7 @@ impl Split {
             Self::Test => 88_400_000,
             Self::Search => SEARCH_SEED,
             Self::Sample => SAMPLE_SEED,
+            Self::Laws => 57_300_000,
         }
     }
 
@@ -41,6 +47,7 @@ impl Split {
             Self::Test => "test",
             Self::Search => "search",
             Self::Sample => "sample",
+            Self::Laws => "laws",
         }
     }
 
@@ -56,7 +63,7 @@ impl Split {
                 twins: 6,
                 onsets: 16,
             },
-            Self::Test | Self::Search | Self::Sample => Counts {
+            Self::Test | Self::Search | Self::Sample | Self::Laws => Counts {
                 severities: 10,
                 clean: 132,
                 discrepant: 48,
@@ -72,14 +79,14 @@ impl Split {
     /// The kinds of strangers in it.
     fn stranger_kinds(self) -> [u64; 9] {
         match self {
-            Self::Development | Self::Sample => DEVELOPMENT_KINDS,
+            Self::Development | Self::Sample | Self::Laws => DEVELOPMENT_KINDS,
             Self::Test | Self::Search => TEST_KINDS,
         }
     }
 
     /// The split of a name.
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Development, Self::Test, Self::Search, Self::Sample]
+        [Self::Development, Self::Test, Self::Search, Self::Sample, Self::Laws]
             .into_iter()
             .find(|split| split.name() == name)
     }
@@ -117,7 +124,7 @@ impl Case {
     /// Makes the campaign; it takes a second or a few.
     pub fn draw(self) -> HiddenCampaign {
         let mut campaign = match self.split {
-            Split::Search => draw(self.hidden, self.seed),
+            Split::Search | Split::Laws => draw(self.hidden, self.seed),
             Split::Sample => draw_varied_short(self.hidden, self.seed),
             Split::Development | Split::Test => draw_varied(self.hidden, self.seed),
         };
@@ -175,6 +182,17 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
             Hidden::Outside(5),
         ];
         return hidden.map(|hidden| case(hidden, split.base())).to_vec();
+    }
+    if split == Split::Laws {
+        let singles = Effect::ALL
+            .iter()
+            .map(|&effect| Hidden::Single(effect, SeverityRange::UPPER_HALF));
+        let strangers = split.stranger_kinds().into_iter().map(Hidden::Outside);
+        let clean = std::iter::repeat_n(Hidden::Clean, LAWS_CLEAN);
+        let all = singles.chain(strangers).chain(clean).enumerate();
+        return all
+            .map(|(number, hidden)| case(hidden, split.base() + number as u64))
+            .collect();
     }
     let counts = split.counts();
     let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);

@@ -2,9 +2,11 @@
 //!
 //! Cells count from 1 here. Phases are fractions of a gait cycle, 0 to 1.
 
+mod law;
 mod onset;
 
 use crate::recording::Repair;
+pub use law::{FoundLaw, LawAxes, LawOver};
 pub use onset::FoundOnset;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -41,6 +43,8 @@ pub struct Answer {
     pub stages: Vec<Stage>,
     /// What is left, where nothing explains it.
     pub remainder: Option<Remainder>,
+    /// A law that nobody listed, where no effect of the library explains the data and one predicts what it was not fitted to.
+    pub law: Option<FoundLaw>,
     /// The experiment that would best decide between what is left open.
     pub next_experiment: Option<NextExperiment>,
     /// The recalibrated model: what was free within its prior, and the values found.

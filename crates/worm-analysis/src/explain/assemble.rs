@@ -2,6 +2,7 @@
 
 mod calibration;
 mod effects;
+mod law;
 mod runs;
 mod screening;
 mod stages;
@@ -14,6 +15,7 @@ use super::worm::gap::cycles;
 use crate::explain::search::find::Found;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::search::law::find::FoundLaw;
 use crate::explain::search::parameter::{Free, Onset, What};
 use crate::explain::worm::noise::RunNoise;
 use crate::explain::worm::nuisance::Nuisance;
@@ -41,6 +43,8 @@ pub(super) struct Parts {
     pub speed_droop: Option<SpeedDroop>,
     /// Standard deviation of the discrepancy, m.
     pub discrepancy_m: f64,
+    /// Where no effect explains the data.
+    pub law: Option<FoundLaw>,
 }
 
 /// Puts the answer together.
@@ -120,6 +124,15 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         _ => None,
     };
     let runs = runs::runs(worm, parts, named.first());
+    let with_law = parts.law.as_ref().filter(|_| verdict == Verdict::OutsideLibrary);
+    let with_law = with_law.and_then(|law| {
+        let found = law::law(worm, &parts.recalibrated, &parts.found.recalibrated_held_out, law)?;
+        Some((found, as_written(problem, &law.law.fit)))
+    });
+    let written_back = match &with_law {
+        Some((_, fit)) => calibration(fit, config),
+        None => calibration(&as_written(problem, final_fit), config),
+    };
     Answer {
         verdict,
         sentence: words::sentence(
@@ -138,7 +151,8 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         remainder,
         next_experiment,
         calibration: calibration(final_fit, config),
-        written_back: calibration(&as_written(problem, final_fit), config),
+        written_back,
+        law: with_law.map(|(law, _)| law),
         screening: screening::of_worm(&found.screened, selected, speed_droop.is_some()),
         threshold: found.threshold,
         doubt: Doubt {
@@ -178,7 +192,7 @@ fn as_written(problem: &WormProblem<'_, '_>, fit: &Fit) -> Fit {
         .filter(|(free, _)| is_written(free))
     {
         let mut free = *free;
-        if matches!(free.what, What::Effect { .. }) {
+        if matches!(free.what, What::Effect { .. } | What::Law(_)) {
             (free.quantity.centre, free.quantity.sigma) = (value, HELD * free.quantity.step);
         }
         hypothesis.free.push(free);

@@ -1,10 +1,11 @@
 //! The search on recordings of a worm.
 
-use super::answer::Answer;
+use super::answer::{Answer, Verdict};
 use super::assemble::{Parts, assemble};
 use super::error::ExplainError;
 use super::search::find::{Options, find};
 use super::search::hypothesis::Hypothesis;
+use super::search::law;
 use super::search::plant::Plant;
 use super::search::recalibrate::{measure_noise, recalibrate};
 use super::worm::prepare::prepare;
@@ -31,6 +32,11 @@ pub fn explain(
     let at = measure_noise(&mut worm, &base)?;
     let (problem, discrepancy, recalibrated) = recalibrate(&worm, &base, at, options.discrepancy);
     let found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
+    let law = (found.selected.verdict == Verdict::OutsideLibrary).then(|| {
+        let mut part = |fraction: f64| report("law", 0.92 + 0.05 * fraction);
+        let without = &found.recalibrated_held_out;
+        law::find::find(&problem, &discrepancy, &recalibrated, without, &mut part)
+    });
     let cycles_s: Vec<f64> = runs
         .iter()
         .map(|run| run.cycle_s.unwrap_or(config.gait.cycle_s))
@@ -38,12 +44,21 @@ pub fn explain(
     let best = found.selected.candidates.first();
     let best = best.map_or(&recalibrated, |candidate| &candidate.fit);
     let speed_droop = speed_droop(&worm.scene, best, &cycles_s);
-    report("localisation", 0.93);
+    report("localisation", 0.97);
     let parts = Parts {
         recalibrated,
         found,
         speed_droop,
         discrepancy_m: discrepancy.scale_m,
+        law: law.flatten(),
     };
-    Ok(assemble(&problem, config, &parts))
+    let mut answer = assemble(&problem, config, &parts);
+    answer.warnings.extend(left_out(options));
+    Ok(answer)
+}
+
+/// What the search was not to know, in words.
+pub(super) fn left_out(options: &Options) -> Option<String> {
+    let names = options.without.join(", ");
+    (!names.is_empty()).then(|| format!("left out of the search: {names}"))
 }

@@ -254,6 +254,7 @@ fn assemble(
         r#where: Vec::new(),
         stages,
         remainder: selected.remainder(table, recalibrated),
+        law: None,
         next_experiment: next_experiment::propose(table, recalibrated, selected),
         calibration: calibration(kept, config),
         written_back: calibration(kept, config),

@@ -14,6 +14,7 @@ fn recorded(effect: Option<(&str, &str, f64)>) -> Recording {
     config.effect.extend(effect.map(|(name, parameter, value)| Effect {
         name: name.to_owned(),
         cell: None,
+        table: worm_estimator::config::TableFields::default(),
         parameters: BTreeMap::from([(parameter.to_owned(), value)]),
     }));
     let simulation = Simulation {

@@ -7,6 +7,7 @@ mod effects_recorded;
 mod hidden_effects;
 mod identify;
 mod independent_worm;
+mod laws;
 mod log_samples;
 mod own_sample;
 mod recording;

@@ -1,11 +1,12 @@
 //! Effects beyond the paper's theory: `[[effect]]`.
 
 use super::check::Checker;
+use super::effect_table::TableFields;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 use worm_physics::MAX_CELLS;
-use worm_physics::effect::{Setting, SettingError};
+use worm_physics::effect::{Setting, SettingError, TABLE};
 
 /// An effect that is switched on, as in the file.
 ///
@@ -18,6 +19,9 @@ pub struct Effect {
     /// The cell concerned, from 1, if it is a single one.
     #[serde(default)]
     pub cell: Option<usize>,
+    /// Its law, where it is a table.
+    #[serde(flatten)]
+    pub table: TableFields,
     /// Its parameters by name.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, f64>,
@@ -66,6 +70,7 @@ impl FromStr for Effect {
         let mut effect = Self {
             name: name.trim().to_owned(),
             cell: None,
+            table: TableFields::default(),
             parameters: BTreeMap::new(),
         };
         for part in rest.split(',').filter(|_| !rest.trim().is_empty()) {
@@ -85,6 +90,10 @@ impl FromStr for Effect {
                 return Err(EffectTextError::Twice(parameter.to_owned()));
             }
         }
+        if effect.is_table() {
+            // Refused: its lists have no place in such a text.
+            Setting::by_names(&effect.name, None, &effect.parameters, MAX_CELLS)?;
+        }
         // The number of cells is not known yet; a cell that no worm can have is refused here.
         effect.setting(MAX_CELLS)?;
         Ok(effect)
@@ -99,7 +108,23 @@ impl Effect {
     pub fn setting(&self, cells: usize) -> Result<Setting, SettingError> {
         // Cell 0 becomes one beyond the last, which is refused.
         let cell = self.cell.map(|cell| cell.wrapping_sub(1));
+        if TableFields::is_of(&self.name) {
+            if let Some(parameter) = self.parameters.keys().next() {
+                return Err(SettingError::NoParameter {
+                    effect: TABLE.name,
+                    parameter: parameter.clone(),
+                    names: "acts_on, axis, grid, value, period and cell".to_owned(),
+                });
+            }
+            return self.table.setting(cell, cells);
+        }
+        self.table.refuse_in(&self.name)?;
         Setting::by_names(&self.name, cell, &self.parameters, cells)
+    }
+
+    /// Whether it is a law at the points of a grid.
+    pub(super) fn is_table(&self) -> bool {
+        TableFields::is_of(&self.name)
     }
 
     pub(super) fn check(&self, cells: usize, checker: &mut Checker) {

@@ -12,6 +12,7 @@ mod black_box;
 mod check;
 mod drive;
 mod effect;
+mod effect_table;
 mod machine;
 mod physics;
 mod self_sensing;
@@ -25,6 +26,7 @@ pub use battery::{Battery, Chemistry, MAX_CURVE_POINTS};
 pub use black_box::BlackBox;
 pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
+pub use effect_table::{OneOrTwo, Rows, TableFields};
 pub use machine::{
     Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode,
     Realtime, Servo, Topics, Tracker,
@@ -39,6 +41,7 @@ use serde::Deserialize;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use worm_physics::MAX_TABLES;
 
 /// The whole configuration. Values from [`Config::load`] and [`Config::from_toml`] are checked.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -150,6 +153,13 @@ impl Config {
         for effect in &self.effect {
             effect.check(self.worm.cells, &mut checker);
         }
+        let tables = self.effect.iter().filter(|effect| effect.is_table()).count();
+        checker.require(
+            tables <= MAX_TABLES,
+            "effect",
+            format!("{tables} tables"),
+            format!("give at most {MAX_TABLES}: add up those over the same axis"),
+        );
         self.canal.check(&mut checker);
         self.gait.check(&mut checker);
         if let Some(port) = &self.port {

@@ -32,7 +32,7 @@ fn the_commented_out_keys_are_accepted() {
     );
     assert!(config.battery.is_some() && config.black_box.is_some() && config.realtime.cpu.is_some());
     assert!(config.virtual_worm.max_deformation_m.is_some());
-    assert_eq!(config.effect.len(), 2);
+    assert_eq!(config.effect.len(), 3);
 }
 
 /// A line of the commented file for each effect of the library, with its parameters and what they may be.
@@ -213,6 +213,34 @@ fn bad_values_are_named_with_file_place_and_remedy() {
             "[[effect]]\nname = \"unequal-clamping\"\nfriction_factor = 0.7\ncell = 0\n",
             "effect `unequal-clamping`: cell 0 of 4: give 1 to 4",
         ),
+        (
+            "[[effect]]\nname = \"table\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\n",
+            "worm.toml: effect = \"table\": effect `table` needs `acts_on`: \"contact-force\" or \"friction-factor\"",
+        ),
+        (
+            "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"colour\"\ngrid = [0.0]\nvalue = [1.0]\n",
+            "effect `table`: axis \"colour\": give one of deformation, deformation-rate, speed, load, place, phase, slope, time",
+        ),
+        (
+            "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.1, 0.0]\nvalue = [1.0, 2.0]\n",
+            "effect `table`: grid of place: 0 comes after 0.1: give the points in ascending order",
+        ),
+        (
+            "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = [\"place\", \"slope\"]\ngrid = [[0.0, 0.1], [0.0]]\nvalue = [[1.0], [2.0, 3.0]]\n",
+            "effect `table`: value: 2 values for 1 points of the grid: give one for each, a list for each point of the first axis",
+        ),
+        (
+            "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = \"fine\"\nvalue = [1.0]\n",
+            "expected a list of numbers, or with two axes a list of such lists",
+        ),
+        (
+            "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\nforce_n = 1.0\n",
+            "effect `table` has no parameter `force_n`: it has acts_on, axis, grid, value, period and cell",
+        ),
+        (
+            "[[effect]]\nname = \"wear\"\nloss_per_cycle = 0.01\ngrid = [0.0]\n",
+            "effect `wear` has no `grid`: only `table` has, the library's effects have parameters",
+        ),
     ];
     for (text, expected) in table {
         let error = Config::from_toml(text, file()).expect_err(text).to_string();
@@ -221,6 +249,27 @@ fn bad_values_are_named_with_file_place_and_remedy() {
             "for {text:?}\n  expected … {expected}\n  got      {error}"
         );
     }
+}
+
+#[test]
+fn a_table_is_read_and_no_fifth_one() {
+    let one = "[[effect]]\nname = \"table\"\nacts_on = \"friction-factor\"\naxis = [\"place\", \"slope\"]\nperiod = 0.041\n\
+               grid = [[0, 0.02], [0.0, 30.0]]\nvalue = [[1, 0.9], [1.1, 1.0]]\ncell = 2\n";
+    let config = Config::from_toml(one, file()).expect("a table");
+    let settings = config.effect_settings().expect("it was checked");
+    let table = settings[0].table().expect("it has a law");
+    assert_eq!((settings[0].cell(), table.period()), (Some(1), Some(0.041)));
+    assert_eq!(
+        (table.grid(1), table.value()),
+        (&[0.0, 30.0][..], &[1.0, 0.9, 1.1, 1.0][..])
+    );
+    let error = Config::from_toml(&one.repeat(5), file()).expect_err("five").to_string();
+    assert!(error.contains("5 tables: give at most 4"), "{error}");
+    let error = "table:value=1"
+        .parse::<Effect>()
+        .expect_err("on the command line")
+        .to_string();
+    assert!(error.contains("in an [[effect]] of a configuration file"), "{error}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{Crawl, Increment};
 use crate::mechanics::Mechanics;
 use crate::pad::{Hold, Loaded, Pad, PadLaw, Rate};
+use crate::table::{Slopes, Whereabouts};
 use crate::worm::SlidesDown;
 
 /// Tolerance of the balance, as a fraction of what the tips can hold.
@@ -87,7 +88,8 @@ impl Crawl {
         let (mut excess_n, mut slope_n_per_m) = (mechanics.pull_n, 0.0);
         // The displacement of the cells' mean, and its derivative by the translation of the body.
         let (mut mean_shift_m, mut yields) = (0.0, 0.0);
-        for (cell, law) in self.cell[..self.cells].iter_mut().zip(&mechanics.pad) {
+        let tables = mechanics.tables.have_force().then_some(&mechanics.tables);
+        for (index, (cell, law)) in self.cell[..self.cells].iter_mut().zip(&mechanics.pad).enumerate() {
             let trial = &mut cell.trial;
             let way = Way {
                 law,
@@ -99,6 +101,24 @@ impl Crawl {
             (trial.shift_m, trial.loaded) = (shift_m, loaded);
             excess_n += loaded.force_n + drag * shift_m;
             slope_n_per_m += (loaded.tangent_n_per_m + drag) * gives;
+            if let Some(tables) = tables {
+                let here = Whereabouts {
+                    deformation_m: loaded.deformation_m,
+                    deformation_rate_m_s: (loaded.deformation_m - cell.pad.deformation_m) / increment.step_s,
+                    speed_m_s: shift_m / increment.step_s,
+                    load_n: loaded.force_n + mechanics.standing_n[index],
+                    ..trial.here
+                };
+                let slopes = Slopes {
+                    deformation: (loaded.tangent_n_per_m / law.stiffness_n_per_m).clamp(0.0, 1.0),
+                    load_n_per_m: loaded.tangent_n_per_m,
+                    per_s: increment.step_s.recip(),
+                };
+                let (moving_n, moving_slope) = tables.moving_n(index, &here, &slopes);
+                trial.pushed_n = trial.standing_n + moving_n;
+                excess_n += trial.pushed_n;
+                slope_n_per_m += moving_slope * gives;
+            }
             mean_shift_m += shift_m;
             yields += gives;
         }

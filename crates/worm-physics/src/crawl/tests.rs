@@ -5,6 +5,7 @@ mod compliance;
 mod convergence;
 mod damper;
 mod energy_balance;
+mod tables;
 
 use crate::Worm;
 use crate::effect::{Effect, LIBRARY, Parameter, Setting, named};

@@ -113,7 +113,7 @@ pub struct Effect {
     pub scope: Scope,
     /// Which measurement shows it.
     pub visible: Visible,
-    /// Its parameters, the severity first; from 1 to [`MAX_PARAMETERS`].
+    /// Its parameters, the severity first; from 1 to [`MAX_PARAMETERS`], none of a table.
     pub parameters: &'static [Parameter],
     /// Where a search starts in the parameters after the severity.
     pub shape_starts: ShapeStarts,

@@ -1,5 +1,6 @@
 //! Why an effect cannot be switched on.
 
+use crate::table::TableError;
 use thiserror::Error;
 
 /// Why an effect cannot be switched on as requested.
@@ -50,6 +51,20 @@ pub enum SettingError {
         max: f64,
         /// Its unit.
         unit: &'static str,
+    },
+    /// A table that is none.
+    #[error("effect `table`: {0}")]
+    Table(#[from] TableError),
+    /// A table by parameters, or with something left out.
+    #[error("effect `table` needs {0}")]
+    TableMissing(&'static str),
+    /// A grid for an effect that has none.
+    #[error("effect `{effect}` has no `{field}`: only `table` has, the library's effects have parameters")]
+    NoTable {
+        /// The effect.
+        effect: String,
+        /// What was given.
+        field: &'static str,
     },
     /// A cell too many, too few, or one that the worm does not have.
     #[error("effect `{effect}`: {problem}")]

@@ -15,6 +15,7 @@
 //! | `drive` | motor, cam and transmission |
 //! | `canal` | slope and surface of the canal |
 //! | `sensor` | the measurement, not the worm |
+//! | `table` | none: a law that was found and not derived |
 //! | `servo` | a servo on a bench: a library of its own, [`SERVO_LIBRARY`] |
 
 mod canal;
@@ -30,9 +31,11 @@ mod sensor;
 mod servo;
 mod servo_library;
 mod setting;
+mod table;
 
 pub use definition::{Effect, MAX_PARAMETERS, Parameter, Scope, Sense, ShapeStarts, Visible};
 pub use error::SettingError;
 pub use library::{LIBRARY, MOTOR_DROOP, named};
 pub use servo_library::{SERVO_LIBRARY, named_of_servo};
 pub use setting::Setting;
+pub use table::TABLE;

@@ -4,21 +4,31 @@ use super::definition::{Apply, Effect, MAX_PARAMETERS};
 use super::error::SettingError;
 use super::library::named;
 use super::servo_library::named_of_servo;
+use super::table::TABLE;
 use crate::physics::Physics;
 use crate::servo::ServoPhysics;
+use crate::table::Table;
 use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What a table is given by.
+const TABLE_NEEDS: &str = "acts_on, axis, grid and value, in an [[effect]] of a configuration file";
 
 /// An effect switched on.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Setting {
     effect: &'static Effect,
     cell: Option<usize>,
     values: [f64; MAX_PARAMETERS], // the first `parameters.len()` count
+    table: Option<Arc<Table>>,     // of a table alone
 }
 
 impl PartialEq for Setting {
     fn eq(&self, other: &Self) -> bool {
-        self.effect.name == other.effect.name && self.cell == other.cell && self.values() == other.values()
+        self.effect.name == other.effect.name
+            && self.cell == other.cell
+            && self.values() == other.values()
+            && self.table == other.table
     }
 }
 
@@ -63,6 +73,9 @@ impl Setting {
         parameters: &BTreeMap<String, f64>,
         cells: usize,
     ) -> Result<Self, SettingError> {
+        if name == TABLE.name {
+            return Err(SettingError::TableMissing(TABLE_NEEDS));
+        }
         Self::of_values(named(name)?, cell, parameters, cells)
     }
 
@@ -112,7 +125,20 @@ impl Setting {
             effect,
             cell,
             values: kept,
+            table: None,
         }
+    }
+
+    /// A law at the points of a grid, on one cell (from 0) of a worm of `cells` or on all of them.
+    ///
+    /// # Errors
+    /// [`SettingError::Cell`].
+    pub fn of_table(table: Table, cell: Option<usize>, cells: usize) -> Result<Self, SettingError> {
+        TABLE.check_cell(cell, cells)?;
+        Ok(Self {
+            table: Some(Arc::new(table)),
+            ..Self::within(&TABLE, cell, &[])
+        })
     }
 
     /// Checks that a worm of `cells` has the cell it acts on.
@@ -138,7 +164,15 @@ impl Setting {
         &self.values[..self.effect.parameters.len()]
     }
 
+    /// Its law, where it is a table.
+    pub fn table(&self) -> Option<&Table> {
+        self.table.as_deref()
+    }
+
     fn apply(&self, physics: &mut Physics) {
+        if let Some(table) = &self.table {
+            physics.tables.push(table, self.cell);
+        }
         if let Apply::Worm(apply) = self.effect.apply {
             apply(physics, self.cell, self.values());
         }

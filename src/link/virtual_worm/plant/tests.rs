@@ -266,6 +266,7 @@ fn effects_act_on_the_body() {
         config.effect.push(worm_estimator::config::Effect {
             name: name.to_owned(),
             cell: (name == "unequal-clamping").then_some(2),
+            table: worm_estimator::config::TableFields::default(),
             parameters: parameters
                 .iter()
                 .map(|&(name, value)| (name.to_owned(), value))
@@ -297,6 +298,7 @@ fn a_body_worn_down_slides() {
     config.effect.push(worm_estimator::config::Effect {
         name: "wear".to_owned(),
         cell: None,
+        table: worm_estimator::config::TableFields::default(),
         parameters: [("loss_per_cycle".to_owned(), 0.15)].into(),
     });
     let plant = crawl(&config, GAIT_RAD_PER_S, 40.0);
@@ -345,6 +347,7 @@ fn a_late_camera_shows_what_was() {
         config.effect.push(worm_estimator::config::Effect {
             name: "sensor-latency".to_owned(),
             cell: None,
+            table: worm_estimator::config::TableFields::default(),
             parameters: [(
                 "latency_s".to_owned(),
                 captures_late / (config.tracker.rate_hz * (1.0 + CLOCK_DRIFT)),

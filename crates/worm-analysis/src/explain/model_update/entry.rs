@@ -1,7 +1,7 @@
 //! Named effects as `[[effect]]` entries.
 
 use super::figure::Figure;
-use crate::explain::answer::{Answer, FoundParameter, NamedEffect, Verdict};
+use crate::explain::answer::{Answer, FoundLaw, FoundParameter, NamedEffect, Verdict};
 use worm_physics::effect::{self, Effect};
 
 /// The entries that an answer adds to the end of a model; empty where nothing was named.
@@ -10,7 +10,7 @@ pub(super) fn entries(answer: &Answer) -> String {
         return undecided(answer);
     }
     let (heading, rivals) = match answer.verdict {
-        Verdict::Agrees | Verdict::OutsideLibrary => return String::new(),
+        Verdict::Agrees | Verdict::OutsideLibrary => return answer.law.as_ref().map_or_else(String::new, table),
         Verdict::Explained if answer.effects.len() > 1 => ("Found by `wormd explain`; these act together.", &[][..]),
         Verdict::Explained => ("Found by `wormd explain`.", &[][..]),
         Verdict::Ambiguous if answer.rivals.is_empty() => (
@@ -46,6 +46,50 @@ fn undecided(answer: &Answer) -> String {
     let heading = "\n# Found by `wormd explain`: the advances do not decide between these, and each was fitted with a recalibration of its\n\
                    # own. To try one, take its comment signs away.\n";
     heading.to_owned() + &entries.collect::<String>()
+}
+
+/// A law that nobody listed.
+fn table(law: &FoundLaw) -> String {
+    let list = |values: &[f64]| {
+        let digits = values.iter().map(|&value| without_error(value));
+        format!("[{}]", digits.collect::<Vec<_>>().join(", "))
+    };
+    let lists = |lists: Vec<String>| match &lists[..] {
+        [one] => one.clone(),
+        several => format!("[{}]", several.join(", ")),
+    };
+    let grids = law.grid.all();
+    let names = law
+        .over
+        .axis
+        .all()
+        .into_iter()
+        .map(|name| format!("\"{name}\""))
+        .collect();
+    let width = grids.get(1).map_or(law.value.len(), |second| second.len());
+    let rows: Vec<String> = law.value.chunks(width).map(list).collect();
+    let mut text = format!(
+        "\n# Found by `wormd explain` where no effect of the library explains the data: a law at the points of a grid.\n# {}\n",
+        law.sentence
+    );
+    if let Some(formula) = &law.formula {
+        text += &format!("# Nearest formula: {formula}.\n");
+    }
+    text += &format!("[[effect]]\nname = \"table\"\nacts_on = \"{}\"\n", law.over.acts_on);
+    if let Some(cell) = law.over.cell {
+        text += &format!("cell = {cell}\n");
+    }
+    text += &format!("axis = {}\n", lists(names));
+    if let Some(period) = law.over.period.filter(|_| *law.over.axis.first() != "phase") {
+        text += &format!("period = {}\n", without_error(period));
+    }
+    text += &format!("grid = {}\n", lists(grids.into_iter().map(|grid| list(grid)).collect()));
+    text + &format!("value = {}\n", lists(rows))
+}
+
+/// A number in the digits that it needs.
+fn without_error(value: f64) -> String {
+    Figure { value, sigma: 0.0 }.digits()
 }
 
 fn commented_out(line: &str) -> String {

@@ -47,6 +47,7 @@ fn answer(verdict: Verdict, calibration: &[Calibrated], effects: &[NamedEffect],
         r#where: Vec::new(),
         stages: Vec::new(),
         remainder: None,
+        law: None,
         next_experiment: None,
         calibration: calibration.to_vec(),
         written_back: calibration.to_vec(),
@@ -301,4 +302,56 @@ fn what_cannot_be_written_is_refused() {
         .expect_err("no TOML")
         .to_string();
     assert!(error.contains("TOML"), "{error}");
+}
+
+#[test]
+fn a_law_is_written_as_a_table_and_read_back() {
+    use crate::explain::answer::{FoundLaw, LawAxes, LawOver};
+    let over = LawOver {
+        acts_on: "friction-factor",
+        axis: LawAxes::One("place"),
+        cell: Some(2),
+        period: Some(0.041),
+    };
+    let one = FoundLaw {
+        rivals: Vec::new(),
+        sentence: "The friction of cell 2 depends on the place in the canal, repeats every 41.0 mm.".to_owned(),
+        grid: LawAxes::One(vec![-0.02, 0.0, 0.0123456]),
+        value: vec![1.0, 0.8123456, 1.2],
+        band: vec![[0.9, 1.1]; 3],
+        formula: Some("1 + 0.2 · sin(2π place / 0.041 m)".to_owned()),
+        closure: 0.8,
+        closure_interval: [0.7, 0.9],
+        improvement: 200.0,
+        seen: Vec::new(),
+        over,
+    };
+    let two = FoundLaw {
+        over: LawOver {
+            acts_on: "contact-force",
+            axis: LawAxes::Two(["phase", "slope"]),
+            cell: None,
+            period: Some(1.0),
+        },
+        grid: LawAxes::Two([vec![0.0, 0.5], vec![0.0, 20.0, 40.0]]),
+        value: vec![0.0, 0.1, 0.2, -0.3, 0.0, 0.5],
+        ..one.clone()
+    };
+    for law in [one, two] {
+        let answer = Answer {
+            law: Some(law.clone()),
+            ..answer(Verdict::OutsideLibrary, &[], &[], &[])
+        };
+        let (model, config) = written("[worm]\ncells = 4\n", &answer);
+        assert!(model.text.contains(&law.sentence), "{}", model.text);
+        let settings = config.effect_settings().expect("it was checked");
+        let table = settings[0].table().expect("a table");
+        assert_eq!(settings[0].cell().map(|cell| cell + 1), law.over.cell);
+        assert_eq!(table.period(), law.over.period);
+        let axes: Vec<&str> = table.axes().map(worm_physics::Axis::name).collect();
+        assert_eq!(axes, law.over.axis.all().into_iter().copied().collect::<Vec<_>>());
+        let values = table.value().iter().zip(&law.value);
+        assert!(values.clone().all(|(written, found)| (written - found).abs() < 1e-6));
+        assert_eq!(table.grid(0).len(), law.grid.first().len());
+    }
 }

@@ -19,7 +19,7 @@ use super::score_test::{self, Expected, Screening};
 const PAIR_SEEDS: usize = 2;
 
 /// Options of the search.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Seed of everything drawn: the same input and seed give the same answer.
     pub seed: u64,
@@ -30,6 +30,8 @@ pub struct Options {
     pub matters: f64,
     /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; above 0.
     pub expected_impact: f64,
+    /// Names of effects that are left out of the search: what would it say if it did not know them?
+    pub without: Vec<&'static str>,
 }
 
 impl Default for Options {
@@ -39,6 +41,7 @@ impl Default for Options {
             discrepancy: 0.004,
             matters: 0.02,
             expected_impact: 0.06,
+            without: Vec::new(),
         }
     }
 }
@@ -68,7 +71,8 @@ pub(in crate::explain) fn find<P: Plant>(
 ) -> Found {
     report("screening", 0.15);
     let plant = problem.plant;
-    let hypothesised = plant.hypotheses();
+    let mut hypothesised = plant.hypotheses();
+    hypothesised.retain(|one| !options.without.contains(&one.effect.name));
     let in_time = plant.has_cycles().then(|| InTime::new(plant, discrepancy));
     let judge = Judge {
         problem,

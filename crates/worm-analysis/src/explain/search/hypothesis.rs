@@ -1,7 +1,9 @@
 //! A hypothesis about a plant: which effects act on it, and which quantities are free.
 
+use super::law::shape::LawShape;
 use super::parameter::{Free, Hypothesised, What};
 use crate::least_squares::Quantity;
+use std::sync::Arc;
 use worm_physics::effect::Setting;
 
 /// Nuisances and effects, and which quantities are free.
@@ -9,6 +11,8 @@ use worm_physics::effect::Setting;
 pub(in crate::explain) struct Hypothesis {
     pub hypothesised: Vec<Hypothesised>,
     pub free: Vec<Free>,
+    /// A law that no effect describes, beside the effects.
+    pub law: Option<Arc<LawShape>>,
     /// All of a run is predicted, even where it repeats.
     pub throughout: bool,
 }
@@ -24,6 +28,7 @@ impl Hypothesis {
         Self {
             hypothesised: hypothesised.to_vec(),
             free,
+            law: None,
             throughout: false,
         }
     }
@@ -66,9 +71,21 @@ impl Hypothesis {
         }
         let effects = self.hypothesised.iter().zip(values);
         let acting = effects.filter(|(hypothesised, _)| acts(hypothesised));
+        let law = self
+            .law
+            .iter()
+            .filter_map(|law| law.setting(&self.law_coefficients(at)));
         acting
             .map(|(hypothesised, values)| Setting::within(hypothesised.effect, hypothesised.cell, &values))
+            .chain(law)
             .collect()
+    }
+
+    /// The coefficients of the law.
+    pub fn law_coefficients(&self, at: &[f64]) -> Vec<f64> {
+        let with_value = self.free.iter().zip(at);
+        let of_law = with_value.filter(|(free, _)| matches!(free.what, What::Law(_)));
+        of_law.map(|(_, &value)| value).collect()
     }
 
     /// Where an effect of a run begins or ends after its start, cycles since then: the first of several.

@@ -13,6 +13,7 @@
 //! - `judge`: priors, evidence, chance and the verdict; `judgement`: weighs the candidates by them; `cross_validation`: held-out data,
 //!   which may veto; `squares`: what
 //!   fraction of a gap is closed there.
+//! - `law`: a law that nobody listed, where no effect of the library explains the data.
 
 pub(in crate::explain) mod bins;
 pub(in crate::explain) mod cross_validation;
@@ -24,6 +25,7 @@ pub(in crate::explain) mod hypothesis;
 pub(in crate::explain) mod impact;
 pub(in crate::explain) mod judge;
 pub(in crate::explain) mod judgement;
+pub(in crate::explain) mod law;
 pub(in crate::explain) mod local_restart;
 pub(in crate::explain) mod normal_probability;
 pub(in crate::explain) mod onset;

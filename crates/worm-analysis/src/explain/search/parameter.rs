@@ -11,6 +11,9 @@ use worm_physics::effect::{Effect, Parameter};
 /// friction.
 const SEVERE: f64 = 20.0;
 
+/// Limit of a law's coefficient, in standard deviations.
+const MOST_OF_LAW: f64 = 12.0;
+
 /// A quantity that is free in a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::explain) struct Free {
@@ -24,11 +27,27 @@ pub(in crate::explain) struct Free {
 pub(in crate::explain) enum What {
     /// The plant's nuisance of this number: not known exactly, and no effect is about it.
     Nuisance(usize),
+    /// A coefficient of the law, of this number.
+    Law(usize),
     /// A parameter of the effect in this place of the hypothesis.
     Effect { place: usize, parameter: usize },
 }
 
 impl Free {
+    /// A coefficient of a law: normal, of unit variance.
+    pub fn of_law(number: usize, step: f64) -> Self {
+        Self {
+            what: What::Law(number),
+            quantity: Quantity {
+                centre: 0.0,
+                sigma: 1.0,
+                min: -MOST_OF_LAW,
+                max: MOST_OF_LAW,
+                step,
+            },
+        }
+    }
+
     /// A parameter of an effect. Shape parameters have no prior but their range. The severity has a weak one about neutral, so that it
     /// returns there when the data that show it are left out.
     pub fn of_effect(place: usize, number: usize, parameter: &Parameter) -> Self {

@@ -9,6 +9,7 @@ use super::discrepancy;
 use super::fit::{Fit, FitWithout};
 use super::hypothesis::Hypothesis;
 use super::impact::Impact;
+use super::law::offer::Offer;
 use super::parameter::{Free, Hypothesised};
 use crate::explain::error::ExplainError;
 use nalgebra::DMatrix;
@@ -109,6 +110,10 @@ pub(in crate::explain) trait Plant: Recorded {
     fn another_start(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64>;
     /// Values from which every fit is tried again, about those at which it ended: for residuals with many minima. They lie within the limits.
     fn other_starts(&self, _hypothesis: &Hypothesis, _at: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+    /// What a law may depend on where the library does not explain the data; nothing unless the plant says so.
+    fn laws(&self, _recalibrated: &Fit) -> Vec<Offer> {
         Vec::new()
     }
     /// What the discrepancy's scale is a fraction of: for a worm, the mean largest deformation of its tips, m.

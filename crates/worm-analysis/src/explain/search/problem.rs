@@ -160,7 +160,7 @@ impl<'p, P: Plant> FitProblem<'p, P> {
     }
 
     /// How the residuals change with some quantities, by differences towards the inside of their limits.
-    fn derivatives(&self, hypothesis: &Hypothesis, at: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
+    pub fn derivatives(&self, hypothesis: &Hypothesis, at: &[f64], quantities: &[usize]) -> Vec<Vec<f64>> {
         if quantities.is_empty() {
             return Vec::new();
         }

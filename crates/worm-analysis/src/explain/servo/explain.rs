@@ -7,6 +7,7 @@ use super::recorded_servo::RecordedServo;
 use crate::bench::{BenchCampaign, ServoModel, ServoRecording};
 use crate::experiment::Progress;
 use crate::explain::error::ExplainError;
+use crate::explain::recorded::left_out;
 use crate::explain::search::find::{Options, find};
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::plant::{Plant, Recorded};
@@ -135,5 +136,7 @@ pub fn explain_servo(
         found,
         discrepancy_rad: discrepancy.scale_m,
     };
-    Ok(assemble(&problem, bench.model, &parts))
+    let mut answer = assemble(&problem, bench.model, &parts);
+    answer.warnings.extend(left_out(options));
+    Ok(answer)
 }

@@ -9,12 +9,14 @@
 //! - `gap`: how far a model is off, from the nominal one down to the noise floor.
 //! - `energy`: what cycles cost, over the `settled_cycles`; `matters`: whether an effect changes what anybody asks.
 //! - `period`: whether the residual repeats from cycle to cycle, `sway`: within the cycles, `wave`: how probable that is.
+//! - `laws`: what a law that nobody listed may depend on.
 //! - `whole_effects`: what nuisances have of an effect's law, given to the effect; `speed_droop`: the one effect that shows in time alone.
 
 pub(in crate::explain) mod binning;
 pub(in crate::explain) mod clock;
 pub(in crate::explain) mod energy;
 pub(in crate::explain) mod gap;
+mod laws;
 pub(in crate::explain) mod matters;
 pub(in crate::explain) mod noise;
 pub(in crate::explain) mod nuisance;

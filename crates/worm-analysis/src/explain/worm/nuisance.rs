@@ -119,7 +119,7 @@ impl Nuisance {
     pub fn of(what: What) -> Option<Self> {
         match what {
             What::Nuisance(number) => Some(Self::of_number(number)),
-            What::Effect { .. } => None,
+            What::Effect { .. } | What::Law(_) => None,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::binning::bins;
 use super::gap::closed;
+use super::laws::laws;
 use super::matters::impact;
 use super::noise::RunNoise;
 use super::nuisance::Nuisance;
@@ -15,6 +16,7 @@ use crate::explain::error::ExplainError;
 use crate::explain::search::fit::{Fit, FitWithout};
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::impact::Impact;
+use crate::explain::search::law::offer::Offer;
 use crate::explain::search::parameter::{Free, Hypothesised};
 use crate::explain::search::plant::{Plant, PredictedRun, Recorded};
 use worm_physics::effect::{LIBRARY, Scope};
@@ -154,6 +156,10 @@ impl Plant for RecordedWorm<'_> {
             _ => value,
         })
         .collect()
+    }
+
+    fn laws(&self, recalibrated: &Fit) -> Vec<Offer> {
+        laws(self, recalibrated)
     }
 
     /// The mean largest deformation of the tips, m: friction over stiffness.

@@ -96,6 +96,7 @@ pub fn drawn(seed: u64) -> (String, Recording, Config) {
             config.effect.push(config::Effect {
                 name: effect.name.to_owned(),
                 cell: one_cell.then(|| rng.random_range(1..=cells)),
+                table: config::TableFields::default(),
                 parameters,
             });
         }

@@ -316,6 +316,7 @@ pub fn explained(cells: usize) -> Answer {
         r#where: places(&figures.maps_before),
         stages: stages(Some("unequal-clamping"), Some("unequal-stiffness")),
         remainder: None,
+        law: None,
         next_experiment: Some(NextExperiment {
             change: ExperimentChange::Measurement("pull test of one cell"),
             value: None,
@@ -461,6 +462,7 @@ pub fn empty() -> Answer {
         r#where: Vec::new(),
         stages: Vec::new(),
         remainder: None,
+        law: None,
         next_experiment: None,
         calibration: Vec::new(),
         written_back: Vec::new(),

@@ -1,7 +1,8 @@
 //! The energy balance closes under every law, at every instant.
 
 use super::{CYCLE_S, paper, strong};
-use crate::{Crawl, Mechanics, Physics};
+use crate::effect::Setting;
+use crate::{ActsOn, Axis, Crawl, Mechanics, Physics, Table};
 
 /// Largest error of the balance, J, of some 0.1 J.
 const GAP_J: f64 = 1e-9;
@@ -35,5 +36,34 @@ fn the_energy_balance_closes_for_every_effect_and_for_all_together() {
             all = all.with([&setting]);
         }
         assert_closes("all together", &all, damping_ratio);
+    }
+}
+
+#[test]
+fn the_energy_balance_closes_for_tables_over_every_axis() {
+    for axis in Axis::ALL {
+        let width = match axis {
+            Axis::Deformation => 1e-3,
+            Axis::DeformationRate | Axis::Speed | Axis::Place => 1e-2,
+            Axis::Phase => 0.3,
+            Axis::Load | Axis::Time => 1.0,
+            Axis::Slope => 30.0,
+        };
+        for acts_on in ActsOn::ALL {
+            let neutral = acts_on.neutral();
+            let grid = [(axis, vec![-width, 0.0, 0.5 * width, width])];
+            let value = [-0.1, 0.02, 0.1, 0.2].map(|value| neutral + value).to_vec();
+            let grid = if axis == Axis::Phase {
+                [(axis, vec![0.0, 0.2, 0.3, 0.6])]
+            } else {
+                grid
+            };
+            let table = Table::new(acts_on, &grid, value, None).expect("a table");
+            let name = table.to_string();
+            let setting = Setting::of_table(table, None, 4).expect("of all cells");
+            for damping_ratio in [None, Some(0.1)] {
+                assert_closes(&name, &Physics::of(paper(15.0)).with([&setting]), damping_ratio);
+            }
+        }
     }
 }

@@ -52,7 +52,7 @@ impl Candidate {
         let sigma_of = |wanted: usize| {
             let mut severities = quantities.iter().zip(&sigmas).filter(|(free, _)| match free.what {
                 What::Effect { place, parameter } => (place, parameter) == (wanted, 0),
-                What::Nuisance(_) => false,
+                What::Nuisance(_) | What::Law(_) => false,
             });
             severities.next().map_or(0.0, |(_, sigma)| *sigma)
         };
@@ -74,7 +74,7 @@ impl Candidate {
                 let is_fraction = || self.hypothesised[place].effect.parameters[parameter].is_fraction();
                 parameter > 0 && self.trace != Some(place) && !is_fraction()
             }
-            What::Nuisance(_) => false,
+            What::Nuisance(_) | What::Law(_) => false,
         });
         is_strong && shapes.all(|(quantity, _)| !self.fit.at_limit(quantity))
     }

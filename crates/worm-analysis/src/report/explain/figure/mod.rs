@@ -2,6 +2,7 @@
 
 mod cycle;
 mod gap;
+mod law;
 mod map;
 mod screening;
 
@@ -16,5 +17,6 @@ pub(super) fn draw(kind: FigureKind, answer: &Answer) -> Result<Figure, DrawErro
         FigureKind::Screening => screening::figure(answer),
         FigureKind::Cycle => cycle::figure(answer),
         FigureKind::Gap => gap::figure(answer),
+        FigureKind::Law => law::figure(answer),
     }
 }

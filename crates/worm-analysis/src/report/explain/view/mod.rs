@@ -3,6 +3,7 @@
 mod changes;
 mod effects;
 mod gap;
+mod law;
 mod next_experiment;
 mod place;
 mod quantity;
@@ -15,6 +16,9 @@ pub(super) use quantity::{cells, mm};
 
 use crate::explain::Answer;
 use crate::report::page::{Table, TileRow};
+
+/// Sections before that of a law: it follows the effects.
+const AFTER_EFFECTS: usize = 2;
 
 /// The whole answer in words.
 #[derive(Debug, Clone)]
@@ -78,6 +82,8 @@ pub enum FigureKind {
     Cycle,
     /// The gap, stage by stage.
     Gap,
+    /// A law that nobody listed, over the data that carry it.
+    Law,
 }
 
 /// A line of a unified difference.
@@ -107,7 +113,7 @@ impl View {
     pub fn of(answer: &Answer) -> Self {
         let (class, badge) = verdict::badge(answer.verdict);
         let section = |heading, blocks| Section { heading, blocks };
-        Self {
+        let mut view = Self {
             lead: verdict::lead(answer),
             class,
             badge,
@@ -128,6 +134,11 @@ impl View {
                 section("What to try next", next_experiment::blocks(answer)),
                 section("What the answer is based on", runs::blocks(answer)),
             ],
+        };
+        if let Some(blocks) = law::blocks(answer) {
+            view.sections
+                .insert(AFTER_EFFECTS, section("A law that nobody listed", blocks));
         }
+        view
     }
 }

@@ -1,0 +1,159 @@
+#!/usr/bin/env python3
+"""Scores the laws that `wormd explain` finds where its library does not explain the data.
+
+    target/release/write_campaigns laws FOLDER
+    python3 crates/testkit/laws/score_laws.py FOLDER --wormd target/release/wormd [--only NAME ...]
+
+Of a worm with an effect of the library, that effect and its twins are left out of the search: the law should depend on what the
+effect depends on (AXES), and predict the run between the slopes as well as the effect itself does, by the full search's model. The closure
+on that run is the fraction of the squared error of the recalibrated model (the law taken away, calibration kept) that is closed, down
+to the squared noise. A worm with a stranger should be detected as outside; a clean one should have no law.
+"""
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+# What each effect depends on, decided before any law was fitted. "cell" is the cell that it concerns. None: what moves the cells in the
+# body, or only the picture of them, is neither a force nor friction, so no axis is right; such an effect counts as missed.
+AXES = {
+    "unequal-clamping": {"cell"},
+    "unequal-stiffness": {"cell"},
+    "directional-friction": {"speed", "deformation", "load", "deformation-rate"},
+    "breakaway-friction": {"speed", "deformation-rate"},
+    "pad-hardening": {"deformation", "load"},
+    "pad-creep": {"deformation-rate", "deformation", "load"},
+    "pad-hysteresis": {"deformation", "load", "deformation-rate"},
+    "viscous-drag": {"speed"},
+    "constant-drag": {"constant"},
+    "payload": {"slope"},
+    "slope-error": {"slope"},
+    "tether-drag": {"place", "time"},
+    "lost-stroke": set(),
+    "actuator-compliance": {"load", "deformation"},
+    "backlash": {"phase"},
+    "step-overlap": {"phase"},
+    "slick-patch": {"place"},
+    "wear": {"time"},
+    "sensor-scale": set(),
+    "sensor-latency": {"phase", "speed"},
+    "slope-clamping": {"slope"},
+}
+TWINS = {
+    "constant-drag": ["directional-friction"],
+    "directional-friction": ["constant-drag"],
+    "lost-stroke": ["sensor-scale"],
+    "sensor-scale": ["lost-stroke"],
+}
+STRANGERS = {}
+
+
+def run(args):
+    done = subprocess.run([str(arg) for arg in args], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip()[-300:])
+    return json.loads(done.stdout)
+
+
+def explain(wormd, folder, out, without=()):
+    flags = [flag for name in without for flag in ("--without", name)]
+    return run([wormd, "explain", folder / "campaign.toml", "--out", out, "--json", *flags])
+
+
+def unseen_m2(wormd, folder, model):
+    """Mean square error of the run between the slopes, m²."""
+    found = run([wormd, "predict", folder / "unseen.toml", "--config", model, "--json"])
+    return found["runs"][0]["root_mean_square_error_m"] ** 2
+
+
+def without_law(model):
+    """A model's text with its table taken away."""
+    return re.sub(r"\n# Found by `wormd explain` where.*", "\n", model, flags=re.S)
+
+
+def recalibrated(folder, answer, out):
+    """The recalibrated model without anything else, by the calibration of an answer."""
+    worm = tomllib.loads((folder / "worm.toml").read_text())
+    cells, values = worm["worm"]["cells"], {one["name"]: one["found"] for one in answer["calibration"]}
+    factor = lambda name, cell: values.get(name, 1.0) * values.get(f"{name} of cell {cell + 1}", 1.0)
+    stiffness = [980.0 * factor("stiffness", cell) for cell in range(cells)]
+    bound = [0.00175 * factor("friction", cell) / factor("stiffness", cell) for cell in range(cells)]
+    text = (folder / "worm.toml").read_text()
+    more = f"stroke_m = {values.get('stroke', 0.0115)}\nstiffness_n_per_m = {stiffness}\nmax_deformation_m = {bound}\n"
+    path = out / "recalibrated.toml"
+    path.write_text(text.replace("\n[gait]", more + "\n[gait]", 1))
+    return path
+
+
+def axes(law):
+    names = law["axis"] if isinstance(law["axis"], list) else [law["axis"]]
+    found = {"cell"} if law["cell"] else set(names)
+    values = law.get("value")
+    if values and max(values) - min(values) < 0.1 * max(abs(value) for value in values):
+        found.add("constant")
+    return found
+
+
+def score(wormd, folder, known):
+    truth = json.loads((folder / "truth.json").read_text())
+    name = folder.name.rsplit("-", 1)[0]
+    row = {"case": folder.name, "sigma": truth["sigma"], "stranger": truth["stranger"]}
+    single = name in AXES
+    out = folder / "found"
+    answer = explain(wormd, folder, out, [name, *TWINS.get(name, [])] if single else [])
+    law = answer.get("law")
+    row |= {"verdict": answer["verdict"], "named": [one["name"] for one in answer["effects"]], "law": law and {
+        key: law[key] for key in ("acts_on", "axis", "cell", "period", "formula", "closure", "closure_interval", "improvement", "rivals", "sentence")
+    }}
+    if law:
+        noise_m2 = truth["noise_m"] ** 2
+        base = recalibrated(folder, answer, out)
+        row["unseen_um"] = {
+            "nominal": 1e6 * unseen_m2(wormd, folder, folder / "worm.toml") ** 0.5,
+            "recalibrated": 1e6 * unseen_m2(wormd, folder, base) ** 0.5,
+            "law": 1e6 * unseen_m2(wormd, folder, out / "model.toml") ** 0.5,
+        }
+        gap = lambda rms_um: max((1e-6 * rms_um) ** 2 - noise_m2, 0.0)
+        open_m2 = gap(row["unseen_um"]["recalibrated"])
+        row["closure_unseen"] = 1 - gap(row["unseen_um"]["law"]) / open_m2 if open_m2 else None
+        if single:
+            found = axes(law)
+            row["axis_right"] = bool(found & AXES[name])
+            row["axis_among"] = row["axis_right"] or any(axes(other) & AXES[name] for other in law["rivals"])
+            full = explain(wormd, folder, folder / "full")
+            row["full"] = [one["name"] for one in full["effects"]]
+            if name in row["full"] or set(TWINS.get(name, [])) & set(row["full"]):
+                true_um = 1e6 * unseen_m2(wormd, folder, folder / "full" / "model.toml") ** 0.5
+                row["unseen_um"]["true"] = true_um
+                row["closure_true"] = 1 - gap(true_um) / open_m2 if open_m2 else None
+    (folder / "score.json").write_text(json.dumps(row, indent=1))
+    return row
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--wormd", type=Path, default=Path("target/release/wormd"))
+    parser.add_argument("--only", nargs="*", help="beginnings of the names of cases")
+    parser.add_argument("--again", action="store_true", help="also cases that have a score already")
+    args = parser.parse_args()
+    for folder in sorted(args.folder.iterdir()):
+        if not (folder / "truth.json").is_file() or args.only and not folder.name.startswith(tuple(args.only)):
+            continue
+        if (folder / "score.json").is_file() and not args.again:
+            row = json.loads((folder / "score.json").read_text())
+        else:
+            try:
+                row = score(args.wormd, folder, AXES)
+            except (RuntimeError, KeyError) as problem:
+                row = {"case": folder.name, "error": repr(problem)}
+        print(json.dumps(row), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

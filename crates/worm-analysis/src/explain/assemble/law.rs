@@ -1,0 +1,129 @@
+//! A law that nobody listed, as people read it.
+
+use crate::explain::answer::{FoundLaw, LawAxes, LawOver};
+use crate::explain::search::fit::Fit;
+use crate::explain::search::law::find;
+use crate::explain::search::law::shape::LawShape;
+use crate::explain::worm::gap::{Measured, clusters};
+use crate::explain::worm::recorded_worm::RecordedWorm;
+use worm_estimator::number::percent;
+use worm_physics::{ActsOn, Axis};
+
+/// Fraction of the gap that a law must close on data held out.
+const CLOSES: f64 = 0.25;
+
+/// A law that was found; none where it closes too little of the gap to be one.
+pub(super) fn law(
+    worm: &RecordedWorm<'_>,
+    recalibrated: &Fit,
+    without: &crate::explain::search::cross_validation::HeldOut,
+    found: &find::FoundLaw,
+) -> Option<FoundLaw> {
+    let law = &found.law;
+    let (left, open) = law.held_out.determined_beside(without);
+    let floor_m = Measured::new(worm, &law.fit).floor_stage().held_out_rms_m;
+    let left = clusters(worm, &law.fit, &left);
+    let (closure, closure_interval) = clusters(worm, recalibrated, &open).closure(&left, floor_m);
+    if closure.is_nan() || closure < CLOSES || closure_interval[0] <= 0.0 {
+        return None;
+    }
+    let over = over(&law.shape);
+    let rivals: Vec<LawOver> = found.rivals.iter().map(|shape| self::over(shape)).collect();
+    Some(FoundLaw {
+        sentence: sentence(&over, &rivals, closure),
+        grid: axes(&law.shape, |(_, grid)| grid.clone()),
+        value: law.value.clone(),
+        band: law.band.clone(),
+        formula: found.formula.as_ref().map(|formula| formula.text.clone()),
+        closure,
+        closure_interval,
+        improvement: law.gain,
+        rivals,
+        seen: law.seen.clone(),
+        over,
+    })
+}
+
+fn over(shape: &LawShape) -> LawOver {
+    LawOver {
+        acts_on: shape.acts_on.name(),
+        axis: axes(shape, |(axis, _)| axis.name()),
+        cell: shape.cell.map(|cell| cell + 1),
+        period: shape.period,
+    }
+}
+
+fn axes<T>(shape: &LawShape, of: impl Fn(&(Axis, Vec<f64>)) -> T) -> LawAxes<T> {
+    match &shape.axes[..] {
+        [first, second, ..] => LawAxes::Two([of(first), of(second)]),
+        all => LawAxes::One(of(&all[0])),
+    }
+}
+
+/// What a law says, in a sentence.
+fn sentence(over: &LawOver, rivals: &[LawOver], closure: f64) -> String {
+    let mut text = format!(
+        "{}{}: it closes {} of the gap on cycles that it was not fitted to.",
+        capitalised(&subject(over)),
+        dependence(over),
+        percent(closure)
+    );
+    if !rivals.is_empty() {
+        let others: Vec<String> = rivals
+            .iter()
+            .map(|rival| format!("{}{}", subject(rival), dependence(rival)))
+            .collect();
+        text += &format!(" As well does {}.", others.join("; or "));
+    }
+    text
+}
+
+fn subject(over: &LawOver) -> String {
+    let what = match ActsOn::named(over.acts_on) {
+        Ok(ActsOn::FrictionFactor) => "the friction",
+        _ => "a force on",
+    };
+    let whom = match (over.cell, what) {
+        (Some(cell), "the friction") => format!(" of cell {cell}"),
+        (Some(cell), _) => format!(" cell {cell}"),
+        (None, "the friction") => " of every tip".to_owned(),
+        (None, _) => " each cell".to_owned(),
+    };
+    format!("{what}{whom}")
+}
+
+fn dependence(over: &LawOver) -> String {
+    let names = over.axis.all().into_iter().map(|name| axis_in_words(name));
+    let mut text = format!(" depends on {}", names.collect::<Vec<_>>().join(" and on "));
+    let first = *over.axis.first();
+    if let Some(period) = over.period.filter(|_| first != Axis::Phase.name()) {
+        text += &match Axis::named(first) {
+            Ok(Axis::Place) => format!(", repeats every {:.1} mm", 1e3 * period),
+            Ok(axis) => format!(", repeats every {period:.2} {}", axis.unit()),
+            Err(_) => String::new(),
+        };
+    }
+    text
+}
+
+/// What an axis is called in a sentence.
+fn axis_in_words(name: &str) -> &str {
+    match Axis::named(name) {
+        Ok(Axis::Deformation) => "the deformation of the pad",
+        Ok(Axis::DeformationRate) => "the rate at which the pad is deformed",
+        Ok(Axis::Speed) => "the speed of the cell",
+        Ok(Axis::Load) => "the load on the cell",
+        Ok(Axis::Place) => "the place in the canal",
+        Ok(Axis::Phase) => "the phase of the gait",
+        Ok(Axis::Slope) => "the slope",
+        Ok(Axis::Time) => "the time since the start of the run",
+        Err(_) => name,
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters
+        .next()
+        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}

@@ -1,0 +1,231 @@
+//! The search for a law: over which quantity, of what form, and whether it predicts what it was not fitted to.
+
+use super::super::cross_validation::{Folds, HeldOut};
+use super::super::discrepancy::Discrepancy;
+use super::super::fit::Fit;
+use super::super::judge::ln_sum::ln_mean;
+use super::super::judgement::held_out;
+use super::super::parameter::What;
+use super::super::plant::Plant;
+use super::super::problem::FitProblem;
+use super::evidence::Scores;
+use super::formula::{Formula, nearest};
+use super::kernel::{Prior, priors};
+use super::offer::Offer;
+use super::shape::LawShape;
+use crate::least_squares::{standard_errors, submatrix};
+use std::sync::Arc;
+
+/// Laws that are fitted to the end: those of most evidence.
+const FITTED: usize = 5;
+/// Logarithm of the Bayes factor from which a law is fitted at all, and below the best of all up to which.
+const WORTH: f64 = 2.0;
+const NEAR: f64 = 60.0;
+/// Fall of the score on data held out from which there is a law.
+const CLAIMS: f64 = 12.0;
+/// Fall of that score by which the best law must exceed another for the other not to be named beside it.
+const RIVAL: f64 = 4.0;
+/// Step of the derivatives by a coefficient.
+const STEP: f64 = 0.1;
+/// Standard errors to either end of a 90 % interval.
+const NINETY: f64 = 1.645;
+
+/// A law that was fitted.
+#[derive(Debug, Clone)]
+pub(in crate::explain) struct FittedLaw {
+    /// With derivatives.
+    pub fit: Fit,
+    pub held_out: HeldOut,
+    /// Fall of the score on data held out.
+    pub gain: f64,
+    pub shape: Arc<LawShape>,
+    pub value: Vec<f64>,
+    /// 90 % band at every point.
+    pub band: Vec<[f64; 2]>,
+    /// Where the data are on the first axis.
+    pub seen: Vec<f64>,
+}
+
+/// The law that explains most, and what is nearly as good.
+pub(in crate::explain) struct FoundLaw {
+    pub law: FittedLaw,
+    /// Others that predict about as well.
+    pub rivals: Vec<Arc<LawShape>>,
+    /// The nearest formula of few terms, where it predicts as well.
+    pub formula: Option<Formula>,
+}
+
+/// Candidates: an offer with what the data say of it, its most probable form, and the logarithm of its Bayes factor.
+struct Weighed<'o> {
+    offer: &'o Offer,
+    scores: Scores,
+    prior: Prior,
+    ln_bayes: f64,
+}
+
+/// Searches for a law that closes the gap of a recalibrated plant; none where nothing predicts better than no law.
+pub(in crate::explain) fn find<P: Plant>(
+    problem: &FitProblem<'_, P>,
+    discrepancy: &Discrepancy,
+    recalibrated: &Fit,
+    without: &HeldOut,
+    report: &mut dyn FnMut(f64),
+) -> Option<FoundLaw> {
+    let offers = problem.plant.laws(recalibrated);
+    let count = offers.len() as f64;
+    let mut weighed: Vec<Weighed<'_>> = Vec::new();
+    for (done, offer) in offers.iter().enumerate() {
+        report(0.5 * done as f64 / count);
+        weighed.extend(weigh(problem, discrepancy, recalibrated, offer));
+    }
+    weighed.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
+    let best = weighed.first()?.ln_bayes;
+    weighed.retain(|one| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
+    weighed.truncate(FITTED);
+    let folds = problem.plant.folds();
+    let mut fitted: Vec<(FittedLaw, &Weighed<'_>)> = Vec::new();
+    for (done, one) in weighed.iter().enumerate() {
+        report(0.5 + 0.4 * done as f64 / weighed.len() as f64);
+        fitted.push((fit(problem, recalibrated, without, &folds, one), one));
+    }
+    fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+    let (law, of) = fitted.first()?;
+    if law.gain < CLAIMS {
+        return None;
+    }
+    let law = law.clone();
+    let near = fitted[1..].iter().filter(|(other, _)| other.gain > law.gain - RIVAL);
+    let rivals = near.map(|(other, _)| Arc::clone(&other.shape)).collect();
+    report(0.95);
+    let formula = nearest(problem, recalibrated, without, &folds, &law, (of.offer, &of.scores));
+    Some(FoundLaw { law, rivals, formula })
+}
+
+/// What the data say of an offer, to first order.
+fn weigh<'o, P: Plant>(
+    problem: &FitProblem<'_, P>,
+    discrepancy: &Discrepancy,
+    recalibrated: &Fit,
+    offer: &'o Offer,
+) -> Option<Weighed<'o>> {
+    let scores = Scores::of(problem, discrepancy, recalibrated, &offer.shape)?;
+    let kinds = priors(offer).map(|priors| {
+        let each: Vec<f64> = priors.iter().map(|prior| scores.ln_bayes(&prior.on_grid)).collect();
+        let best = (0..each.len()).max_by(|&a, &b| each[a].total_cmp(&each[b]));
+        Some((priors.into_iter().nth(best?)?, ln_mean(&each)?))
+    });
+    let (prior, ln_bayes) = kinds.into_iter().flatten().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(Weighed {
+        offer,
+        scores,
+        prior,
+        ln_bayes,
+    })
+}
+
+/// Fits a law to the end, and holds data out.
+fn fit<P: Plant>(
+    problem: &FitProblem<'_, P>,
+    recalibrated: &Fit,
+    without: &HeldOut,
+    folds: &Folds,
+    weighed: &Weighed<'_>,
+) -> FittedLaw {
+    let determined = weighed.scores.determined(&weighed.prior);
+    let mut shape = weighed.offer.shape.clone();
+    if let Some((period, within)) = &weighed.prior.period {
+        shape.period = Some(*period);
+        shape.axes[0].1.clone_from(within);
+        shape.centre = vec![shape.acts_on.neutral(); within.len()];
+    }
+    shape.columns.clone_from(&determined.columns);
+    let known = weighed.scores.by_columns(&determined.on_grid);
+    fit_shape(
+        problem,
+        recalibrated,
+        without,
+        folds,
+        Start {
+            shape,
+            at: determined.at,
+            known,
+            left: determined.left,
+            seen: weighed.offer.seen.clone(),
+        },
+    )
+}
+
+/// Where a fit of a law starts.
+pub(super) struct Start {
+    pub shape: LawShape,
+    /// Coefficients to first order.
+    pub at: Vec<f64>,
+    /// Derivatives of the residuals by them.
+    pub known: Vec<Vec<f64>>,
+    /// Variance of the values that no column has.
+    pub left: Vec<f64>,
+    pub seen: Vec<f64>,
+}
+
+/// Fits a law from a start.
+pub(super) fn fit_shape<P: Plant>(
+    problem: &FitProblem<'_, P>,
+    recalibrated: &Fit,
+    without: &HeldOut,
+    folds: &Folds,
+    start: Start,
+) -> FittedLaw {
+    let shape = Arc::new(start.shape);
+    let hypothesis = recalibrated.hypothesis.with_law(Arc::clone(&shape), STEP);
+    let from = [&recalibrated.at[..], &start.at].concat();
+    let mut known = recalibrated.clone();
+    known.jacobian.extend(start.known);
+    let mut fit = problem.fit(&hypothesis, from, Some(&known));
+    problem.compute_jacobian(&mut fit);
+    let held_out = held_out(problem, &fit, folds);
+    let gain = without.chi_squared - held_out.chi_squared - problem.excess_of_repeating(recalibrated, &fit);
+    let (value, band) = with_band(&fit, &shape, &start.left);
+    FittedLaw {
+        fit,
+        held_out,
+        gain,
+        shape,
+        value,
+        band,
+        seen: start.seen,
+    }
+}
+
+/// The values of a fitted law and their 90 % band.
+fn with_band(fit: &Fit, shape: &LawShape, left: &[f64]) -> (Vec<f64>, Vec<[f64; 2]>) {
+    let open: Vec<usize> = (0..fit.at.len()).filter(|&at| !fit.at_limit(at)).collect();
+    let normal = submatrix(&fit.normal(None), &open);
+    let covariance = normal.clone().cholesky().map(|factor| factor.inverse());
+    let of_law: Vec<(usize, usize)> = open
+        .iter()
+        .enumerate()
+        .filter_map(|(place, &at)| match fit.hypothesis.free[at].what {
+            What::Law(number) => Some((place, number)),
+            _ => None,
+        })
+        .collect();
+    let value = shape.value(fit.hypothesis.law_coefficients(&fit.at).as_slice());
+    let sigmas = standard_errors(normal);
+    let band = value.iter().enumerate().map(|(point, value)| {
+        let mut variance = left.get(point).copied().unwrap_or(0.0);
+        for &(row, one) in &of_law {
+            for &(column, other) in &of_law {
+                let covariance = match &covariance {
+                    Some(covariance) => covariance[(row, column)],
+                    None if row == column => sigmas[row].powi(2),
+                    None => 0.0,
+                };
+                variance += shape.columns[one][point] * covariance * shape.columns[other][point];
+            }
+        }
+        let half = NINETY * variance.max(0.0).sqrt();
+        [value - half, value + half]
+    });
+    let band = band.collect();
+    (value, band)
+}

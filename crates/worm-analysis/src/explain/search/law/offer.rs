@@ -1,0 +1,20 @@
+//! What a plant offers as a law.
+
+use super::shape::LawShape;
+
+/// A quantity on which a law may depend.
+#[derive(Debug, Clone)]
+pub(in crate::explain) struct Offer {
+    /// A coefficient for each point of its grid.
+    pub shape: LawShape,
+    /// Where the points are on the scale on which the law is smooth, for each axis: about 0 to 1.
+    pub scaled: Vec<Vec<f64>>,
+    /// Period of the law on that scale, where it is known.
+    pub period: Option<f64>,
+    /// Shortest and longest period that it may have besides, in the axis's unit.
+    pub periods: Option<[f64; 2]>,
+    /// What is typical of the values beyond the neutral one: four scales.
+    pub sigmas: [f64; 4],
+    /// Where the data are on the first axis.
+    pub seen: Vec<f64>,
+}

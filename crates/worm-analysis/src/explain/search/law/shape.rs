@@ -1,0 +1,75 @@
+//! The form of a law of which some coefficients are open.
+
+use worm_physics::effect::Setting;
+use worm_physics::{ActsOn, Axis, MAX_CELLS, Table};
+
+/// Least factor on friction: a tip without any cannot be solved for.
+const MIN_FACTOR: f64 = 0.05;
+
+/// A law at the points of a grid: its values are a centre and a sum of columns, each with a coefficient.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::explain) struct LawShape {
+    pub acts_on: ActsOn,
+    /// One axis or two, each with the points of its grid.
+    pub axes: Vec<(Axis, Vec<f64>)>,
+    /// Of the first axis.
+    pub period: Option<f64>,
+    /// The cell that it is about, from 0; all for none.
+    pub cell: Option<usize>,
+    /// Values with all coefficients 0.
+    pub centre: Vec<f64>,
+    /// `[coefficient][point]`.
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl LawShape {
+    /// A law that changes nothing, with a coefficient for the value at each point.
+    pub fn of_points(acts_on: ActsOn, axes: Vec<(Axis, Vec<f64>)>, cell: Option<usize>) -> Self {
+        let points: usize = axes.iter().map(|(_, grid)| grid.len()).product();
+        Self {
+            acts_on,
+            axes,
+            period: None,
+            cell,
+            centre: vec![acts_on.neutral(); points],
+            columns: Vec::new(),
+        }
+        .with_each_point()
+    }
+
+    /// The same with a coefficient for the value at each point.
+    pub fn with_each_point(mut self) -> Self {
+        let points = self.centre.len();
+        let hat = |point: usize| (0..points).map(|other| f64::from(u8::from(other == point))).collect();
+        self.columns = (0..points).map(hat).collect();
+        self
+    }
+
+    /// Values at all points, within what the physics allow.
+    pub fn value(&self, coefficients: &[f64]) -> Vec<f64> {
+        let [min, max] = self.acts_on.range();
+        let min = if self.acts_on == ActsOn::FrictionFactor {
+            MIN_FACTOR
+        } else {
+            min
+        };
+        let mut value = self.centre.clone();
+        for (column, coefficient) in self.columns.iter().zip(coefficients) {
+            for (value, by) in value.iter_mut().zip(column) {
+                *value += coefficient * by;
+            }
+        }
+        value.iter_mut().for_each(|value| *value = value.clamp(min, max));
+        value
+    }
+
+    /// The law with some coefficients; none where that is no table.
+    pub fn table(&self, coefficients: &[f64]) -> Option<Table> {
+        Table::new(self.acts_on, &self.axes, self.value(coefficients), self.period).ok()
+    }
+
+    /// The law as a setting of the physics.
+    pub fn setting(&self, coefficients: &[f64]) -> Option<Setting> {
+        Setting::of_table(self.table(coefficients)?, self.cell, MAX_CELLS).ok()
+    }
+}

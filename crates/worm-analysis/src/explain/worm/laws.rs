@@ -1,0 +1,240 @@
+//! What a law of a worm may depend on: the quantities of its cells, over the ranges that they go through.
+//!
+//! The ranges are those of a crawl of the recalibrated model in every run, and for the place those of the recordings. Speeds crowd about
+//! rest and about that of a step, so there a law may change within a fraction of the largest.
+
+use super::recorded_worm::RecordedWorm;
+use crate::explain::search::fit::Fit;
+use crate::explain::search::law::offer::Offer;
+use crate::explain::search::law::shape::LawShape;
+use crate::explain::search::plant::{Plant, Recorded};
+use worm_physics::{ActsOn, Axis, Crawl, Mechanics};
+
+/// Cycles that are run before a crawl is looked at, and the parts of the one that is.
+const LEAD_CYCLES: f64 = 3.0;
+const PARTS: usize = 240;
+/// Points along an axis; along a place and a time the most, and what lies between them at least: m, and cycles.
+const POINTS: usize = 9;
+const POINTS_OF_CELL: usize = 5;
+const POINTS_OF_PHASE: usize = 16;
+const MOST_POINTS: usize = 80;
+const SPACING_M: f64 = 3.5e-3;
+const SPACING_CYCLES: f64 = 0.5;
+/// Speeds about which there are points, as a fraction of the largest, and that within which a law over a speed may turn.
+const NEAR_REST: [f64; 3] = [0.02, 0.07, 0.2];
+const TURN: f64 = 0.05;
+/// Shortest periods, in points of a grid.
+const OF_PERIOD: f64 = 2.2;
+/// Scales of a force, as a fraction of the friction of a tip, and of a factor on friction.
+const FORCES: [f64; 4] = [0.02, 0.06, 0.2, 0.5];
+const FACTORS: [f64; 4] = [0.04, 0.1, 0.25, 0.5];
+/// Most coordinates that are kept of where the data are.
+const SEEN: usize = 600;
+
+/// Where the cells of a worm are on the axes that a crawl shows.
+#[derive(Default)]
+struct Visited {
+    deformation_m: Vec<f64>,
+    rate_m_s: Vec<f64>,
+    speed_m_s: Vec<f64>,
+    load_n: Vec<f64>,
+}
+
+/// Every law that is tried.
+pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
+    let mut visited = Visited::default();
+    for run in 0..worm.runs() {
+        visit(worm, run, recalibrated, &mut visited);
+    }
+    let friction_n = friction_n(worm);
+    let offer = |acts_on: ActsOn, axis: Axis, cell: Option<usize>, grid: Vec<f64>, seen: &[f64]| {
+        let scaled = scaled(axis, &grid);
+        let sigmas = match acts_on {
+            ActsOn::ContactForce => FORCES.map(|fraction| fraction * friction_n),
+            ActsOn::FrictionFactor => FACTORS,
+        };
+        let spacing = grid.get(1).map_or(0.0, |second| second - grid[0]);
+        let width = grid[grid.len() - 1] - grid[0];
+        let may_repeat = matches!(axis, Axis::Place | Axis::Time) && grid.len() > 3 * POINTS_OF_CELL;
+        Offer {
+            scaled: vec![scaled],
+            period: (axis == Axis::Phase).then_some(1.0),
+            periods: may_repeat.then_some([OF_PERIOD * spacing, 0.7 * width]),
+            sigmas,
+            seen: thinned(seen),
+            shape: LawShape::of_points(acts_on, vec![(axis, grid)], cell),
+        }
+    };
+    let mut offers = Vec::new();
+    let place_m = worm.stretch_m();
+    let places_m: Vec<f64> = seen_places_m(worm);
+    let cycles = worm.scene.observed.iter().map(|observed| {
+        let phase = &observed.phase;
+        phase[phase.len() - 1] - phase[0]
+    });
+    let cycles = cycles.fold(0.0, f64::max);
+    let times: Vec<f64> = (0..SEEN).map(|at| cycles * at as f64 / SEEN as f64).collect();
+    let slopes_deg = slopes_deg(worm);
+    let phases: Vec<f64> = (0..POINTS_OF_PHASE)
+        .map(|point| point as f64 / POINTS_OF_PHASE as f64)
+        .collect();
+    let force = ActsOn::ContactForce;
+    let friction = ActsOn::FrictionFactor;
+    let evenly_of = |seen: &[f64], points: usize| ends(seen).map(|(from, to)| evenly(from, to, points));
+    for (axis, seen) in [
+        (Axis::Deformation, &visited.deformation_m),
+        (Axis::Load, &visited.load_n),
+    ] {
+        let grid = evenly_of(seen, POINTS);
+        offers.extend(grid.map(|grid| offer(force, axis, None, grid, seen)));
+    }
+    for (axis, seen) in [
+        (Axis::DeformationRate, &visited.rate_m_s),
+        (Axis::Speed, &visited.speed_m_s),
+    ] {
+        let grid = ends(seen).map(|(from, to)| about_rest(from, to));
+        offers.extend(grid.map(|grid| offer(force, axis, None, grid, seen)));
+    }
+    let grid = ends(&visited.speed_m_s).map(|(from, to)| about_rest(from, to));
+    offers.extend(grid.map(|grid| offer(friction, Axis::Speed, None, grid, &visited.speed_m_s)));
+    let grid = evenly_of(&visited.load_n, POINTS);
+    offers.extend(grid.map(|grid| offer(friction, Axis::Load, None, grid, &visited.load_n)));
+    for acts_on in [force, friction] {
+        let place_grid = with_spacing(place_m.0, place_m.1, SPACING_M);
+        offers.push(offer(acts_on, Axis::Place, None, place_grid, &places_m));
+        offers.push(offer(acts_on, Axis::Phase, None, phases.clone(), &phases));
+        offers.push(offer(
+            acts_on,
+            Axis::Time,
+            None,
+            with_spacing(0.0, cycles, SPACING_CYCLES),
+            &times,
+        ));
+        if slopes_deg.len() > 1 {
+            offers.push(offer(acts_on, Axis::Slope, None, slopes_deg.clone(), &slopes_deg));
+        }
+        for cell in 0..worm.channels() {
+            let grid = evenly_of(&visited.deformation_m, POINTS_OF_CELL);
+            offers.extend(grid.map(|grid| offer(acts_on, Axis::Deformation, Some(cell), grid, &visited.deformation_m)));
+        }
+    }
+    offers
+}
+
+/// One cycle of the recalibrated crawl of a run.
+fn visit(worm: &RecordedWorm<'_>, run: usize, fit: &Fit, visited: &mut Visited) {
+    let observed = &worm.scene.observed[run];
+    let (physics, damping) = worm.scene.physics(run, &fit.hypothesis, &fit.at);
+    let mechanics = Mechanics::new(&physics);
+    let Ok(mut crawl) = Crawl::at_rest(&mechanics, 0.0, &observed.first_m, Some(damping)) else {
+        return;
+    };
+    if crawl
+        .advance_to(&mechanics, LEAD_CYCLES, LEAD_CYCLES * observed.cycle_s)
+        .is_err()
+    {
+        return;
+    }
+    let step_s = observed.cycle_s / PARTS as f64;
+    for part in 1..=PARTS {
+        let before = crawl.clone();
+        let phase = LEAD_CYCLES + part as f64 / PARTS as f64;
+        if crawl.advance_to(&mechanics, phase, step_s).is_err() {
+            return;
+        }
+        for cell in 0..observed.cells() {
+            let deformation_m = crawl.deformation_m(cell);
+            visited.deformation_m.push(deformation_m);
+            visited
+                .rate_m_s
+                .push((deformation_m - before.deformation_m(cell)) / step_s);
+            visited
+                .speed_m_s
+                .push((crawl.positions_m()[cell] - before.positions_m()[cell]) / step_s);
+            let worm = mechanics.worm();
+            visited
+                .load_n
+                .push(crawl.contact_force_n(cell) + worm.cell_weight_n(cell) + worm.cell_resistance_n());
+        }
+    }
+}
+
+/// Mean friction of a tip, N.
+fn friction_n(worm: &RecordedWorm<'_>) -> f64 {
+    let worms = worm.scene.nominal.iter().map(|physics| &physics.worm);
+    let all: Vec<f64> = worms
+        .flat_map(|worm| worm.contacts())
+        .map(|contact| contact.stiffness_n_per_m * contact.forward_bound_m)
+        .collect();
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+/// The slopes of the runs, each once, ascending, degrees.
+fn slopes_deg(worm: &RecordedWorm<'_>) -> Vec<f64> {
+    let mut all: Vec<f64> = worm
+        .scene
+        .observed
+        .iter()
+        .map(|observed| observed.run.slope_deg)
+        .collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    all
+}
+
+fn seen_places_m(worm: &RecordedWorm<'_>) -> Vec<f64> {
+    let all = worm.scene.observed.iter().flat_map(|observed| &observed.position_m);
+    all.flatten().copied().filter(|at_m| at_m.is_finite()).collect()
+}
+
+/// The ends of what was gone through; none where that is a single place.
+fn ends(seen: &[f64]) -> Option<(f64, f64)> {
+    let (min, max) = seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), &at| {
+        (f64::min(min, at), f64::max(max, at))
+    });
+    (max > min).then_some((min, max))
+}
+
+fn evenly(from: f64, to: f64, points: usize) -> Vec<f64> {
+    (0..points)
+        .map(|point| from + (to - from) * point as f64 / (points - 1) as f64)
+        .collect()
+}
+
+/// Points with a spacing, or a larger one where there would be too many.
+fn with_spacing(from: f64, to: f64, spacing: f64) -> Vec<f64> {
+    let points = ((to - from) / spacing).ceil() as usize + 1;
+    evenly(from, to, points.clamp(2, MOST_POINTS))
+}
+
+/// Points that lie close about rest.
+fn about_rest(from: f64, to: f64) -> Vec<f64> {
+    let largest = from.abs().max(to.abs());
+    let near = NEAR_REST.iter().flat_map(|part| [-part * largest, part * largest]);
+    let mut points: Vec<f64> = near.chain([0.0, from, to, 0.45 * to, 0.75 * to]).collect();
+    points.retain(|at| (from..=to).contains(at));
+    points.sort_by(f64::total_cmp);
+    points.dedup_by(|a, b| (*a - *b).abs() < 5e-3 * largest);
+    points
+}
+
+/// The scale on which a law is smooth.
+fn scaled(axis: Axis, grid: &[f64]) -> Vec<f64> {
+    let (first, last) = (grid[0], grid[grid.len() - 1]);
+    let width = if grid.len() > 1 { last - first } else { 1.0 };
+    match axis {
+        Axis::Phase => grid.to_vec(),
+        Axis::DeformationRate | Axis::Speed => {
+            let turn = TURN * first.abs().max(last.abs());
+            let bent = |at: f64| (at / turn).asinh();
+            let width = bent(last) - bent(first);
+            grid.iter().map(|at| (bent(*at) - bent(first)) / width).collect()
+        }
+        _ => grid.iter().map(|at| (at - first) / width).collect(),
+    }
+}
+
+/// At most so many, evenly.
+fn thinned(seen: &[f64]) -> Vec<f64> {
+    seen.iter().copied().step_by(seen.len().div_ceil(SEEN).max(1)).collect()
+}

@@ -1,0 +1,112 @@
+//! A law that nobody listed, with its band, over the data that carry it.
+
+use crate::explain::Answer;
+use crate::explain::answer::FoundLaw;
+use crate::report::page::{Figure, Key, Mark, Panel};
+use crate::report::plot::{ACCENT, Axis, DrawError, INK, MID, MUTED, Row, Sheet, Stroke, Svg, draw};
+use worm_physics::{ActsOn, Axis as Over};
+
+const HEIGHT: f64 = 230.0;
+const DATA_HEIGHT: f64 = 60.0;
+/// Opacity of the band and of the data.
+const BAND: f64 = 0.35;
+const DATA: f64 = 0.7;
+/// Classes of the histogram of the data.
+const CLASSES: usize = 60;
+
+/// The scale on which an axis is drawn, with its unit.
+fn drawn(axis: &str) -> (f64, String) {
+    match Over::named(axis) {
+        Ok(Over::Deformation) => (1e3, "deformation of the pad, mm".to_owned()),
+        Ok(Over::Place) => (1e3, "place of the tip along the canal, mm".to_owned()),
+        Ok(Over::DeformationRate) => (1e3, "rate of the deformation, mm/s".to_owned()),
+        Ok(Over::Speed) => (1e3, "speed of the cell, mm/s".to_owned()),
+        Ok(Over::Load) => (1.0, "load on the cell, N".to_owned()),
+        Ok(Over::Phase) => (1.0, "part of a cycle since the cell's own step began".to_owned()),
+        Ok(Over::Slope) => (1.0, "slope, degrees".to_owned()),
+        Ok(Over::Time) => (1.0, "gait cycles since the start of the run".to_owned()),
+        Err(_) => (1.0, axis.to_owned()),
+    }
+}
+
+pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
+    let laws = answer.law.iter().filter(|law| law.grid.all().len() == 1);
+    let panels: Result<Vec<Panel>, DrawError> = laws
+        .map(|law| {
+            let (name, quantity) = match ActsOn::named(law.over.acts_on) {
+                Ok(ActsOn::FrictionFactor) => ("the friction", "friction over that of the model"),
+                _ => ("the force", "force on each cell towards smaller positions, N"),
+            };
+            let name = match law.over.cell {
+                Some(cell) => format!("{name}, cell {cell}"),
+                None => name.to_owned(),
+            };
+            Ok(Panel::new(name, quantity, picture(law)?))
+        })
+        .collect();
+    Ok(Figure {
+        id: "law",
+        title: "The law, over the data that carry it",
+        keys: vec![
+            Key::new(Mark::Line, ACCENT, "the law"),
+            Key::new(Mark::Band, MUTED, "its 90 % band"),
+            Key::new(Mark::Dashed, INK, "no law"),
+            Key::new(Mark::Band, MID, "below: how much of the data is there"),
+        ],
+        panels: panels?,
+        caption: "The law is linear between its points. Where there are no data it is what the prior of a smooth law makes of it.".to_owned(),
+    })
+}
+
+fn picture(law: &FoundLaw) -> Result<Svg, DrawError> {
+    let (scale, label) = drawn(law.over.axis.first());
+    let grid = law.grid.first();
+    let mut points: Vec<(f64, f64, [f64; 2])> = grid
+        .iter()
+        .zip(&law.value)
+        .zip(&law.band)
+        .map(|((at, value), band)| (*at, *value, *band))
+        .collect();
+    // A law that repeats is drawn over one period, its end followed by its beginning.
+    if let (Some(period), Some(&(first, value, band))) = (law.over.period, points.first()) {
+        points.push((first + period, value, band));
+    }
+    let (from, to) = (points[0].0, points[points.len() - 1].0);
+    let width = (to - from).max(1e-9);
+    let seen = law.seen.iter().map(|at| match law.over.period {
+        Some(period) => from + (at - from).rem_euclid(period),
+        None => *at,
+    });
+    let mut classes = vec![0.0_f64; CLASSES];
+    for at in seen {
+        let class = ((at - from) / width * CLASSES as f64).clamp(0.0, CLASSES as f64 - 1.0);
+        classes[class as usize] += 1.0;
+    }
+    let most = classes.iter().fold(1.0, |most: f64, count| most.max(*count));
+    let neutral = ActsOn::named(law.over.acts_on).map_or(0.0, ActsOn::neutral);
+    let ends = points.iter().flat_map(|(_, value, [low, high])| [*value, *low, *high]);
+    let sheet = Sheet {
+        description: format!("The law over the {}", law.over.axis.first()),
+        x_label: Some(label),
+        x: Axis::between(from * scale, to * scale, 6),
+        rows: vec![
+            Row::new(Axis::around(ends.chain([neutral]), 5), HEIGHT),
+            Row::new(Axis::between(0.0, 1.0, 1), DATA_HEIGHT),
+        ],
+    };
+    draw(&sheet, |row, plot| {
+        if row == 1 {
+            for (class, count) in classes.iter().enumerate().filter(|(_, count)| **count > 0.0) {
+                let at = |class: usize| (from + width * class as f64 / CLASSES as f64) * scale;
+                plot.fill([at(class), at(class + 1)], [0.0, count / most], MID, DATA)?;
+            }
+            return Ok(());
+        }
+        plot.ribbon(points.iter().map(|(at, _, band)| (at * scale, *band)), MUTED, BAND)?;
+        plot.horizontal_line(neutral, Stroke::new(INK, 1.0).dashed())?;
+        plot.line(
+            points.iter().map(|(at, value, _)| (at * scale, *value)),
+            Stroke::new(ACCENT, 2.2),
+        )
+    })
+}

@@ -1,0 +1,96 @@
+//! A law where the library does not explain the data: on a stranger, on a worm whose effect the search may not know, and on neither.
+
+use testkit::hidden_effects::campaign::{HiddenCampaign, draw, draw_sized};
+use testkit::hidden_effects::effect::{Effect, SeverityRange};
+use testkit::hidden_effects::hidden::Hidden;
+use testkit::hidden_effects::setting::CampaignSize;
+use worm_analysis::experiment::RecordedRun;
+use worm_analysis::explain::{Answer, Options, Verdict, explain, model_update};
+use worm_estimator::config::Config;
+use worm_physics::effect::LIBRARY;
+
+/// In no range of the splits.
+const SEED: u64 = 901;
+const SIZE: CampaignSize = CampaignSize {
+    runs: 2,
+    cycles: 8.0,
+    rate_hz: 60.0,
+};
+
+fn answer(campaign: &HiddenCampaign, without: &[&'static str]) -> Answer {
+    let options = Options {
+        without: without.to_vec(),
+        ..Options::default()
+    };
+    let runs = campaign.recordings.iter().zip(&campaign.slopes_deg);
+    let runs: Vec<RecordedRun<'_>> = runs
+        .map(|(recording, &slope_deg)| RecordedRun {
+            recording,
+            slope_deg,
+            payload_kg: 0.0,
+            cycle_s: Some(campaign.cycle_s),
+        })
+        .collect();
+    let answer = explain(&runs, &campaign.config, &options, &mut |_| ()).expect("an answer");
+    println!("{}: {}", campaign.truth.case, answer.sentence);
+    println!("{:?}", answer.law.as_ref().map(|law| &law.sentence));
+    answer
+}
+
+#[test]
+fn a_law_takes_the_place_of_an_effect_that_the_search_may_not_know() {
+    let hidden = Hidden::Single(Effect::ViscousDrag, SeverityRange { from: 0.85, to: 1.0 });
+    let campaign = draw_sized(hidden, SEED, SIZE);
+    let answer = answer(&campaign, &["viscous-drag"]);
+    assert_eq!(answer.verdict, Verdict::OutsideLibrary);
+    assert!(
+        answer
+            .warnings
+            .iter()
+            .any(|warning| warning == "left out of the search: viscous-drag")
+    );
+    let law = answer.law.as_ref().expect("a law");
+    let axes: Vec<&str> = std::iter::once(&law.over)
+        .chain(&law.rivals)
+        .flat_map(|over| over.axis.all())
+        .copied()
+        .collect();
+    assert!(axes.contains(&"speed"), "{axes:?}");
+    assert!(law.closure > 0.6, "{}", law.closure);
+    // What is written back is the law, to the digits of the file.
+    let model = model_update::model(Config::COMMENTED, &campaign.config, &answer).expect("a model");
+    let config = Config::from_toml(&model.text, std::path::Path::new("model.toml")).expect("it is accepted");
+    let settings = config.effect_settings().expect("it was checked");
+    let table = settings[0].table().expect("a table");
+    assert_eq!(table.acts_on().name(), law.over.acts_on);
+    for (written, found) in table.value().iter().zip(&law.value) {
+        assert!(
+            (written - found).abs() <= 1e-5 * found.abs().max(1e-3),
+            "{written} of {found}"
+        );
+    }
+}
+
+/// Friction that swings slowly, as `write_campaigns laws` writes it; the library is left out, to be quick.
+#[test]
+fn a_law_is_found_for_what_nobody_listed() {
+    let campaign = draw(Hidden::Outside(1), 57_300_023);
+    let library: Vec<&'static str> = LIBRARY.iter().map(|effect| effect.name).collect();
+    let answer = answer(&campaign, &library);
+    assert_eq!(answer.verdict, Verdict::OutsideLibrary);
+    let law = answer.law.expect("a law");
+    assert_eq!((law.over.acts_on, *law.over.axis.first()), ("friction-factor", "time"));
+    assert!(
+        law.over.period.is_some_and(|cycles| (3.0..3.2).contains(&cycles)),
+        "{law:?}"
+    );
+    assert!(law.closure_interval[0] > 0.8, "{law:?}");
+    assert_eq!(law.value.len(), law.band.len());
+}
+
+#[test]
+fn there_is_no_law_on_a_clean_worm() {
+    let answer = answer(&draw_sized(Hidden::Clean, SEED, SIZE), &[]);
+    assert_eq!(answer.verdict, Verdict::Agrees);
+    assert!(answer.law.is_none());
+}

@@ -1,0 +1,129 @@
+//! The law of an `[[effect]]` with `name = "table"`.
+
+use serde::Deserialize;
+use worm_physics::effect::{Setting, SettingError, TABLE};
+use worm_physics::{ActsOn, Axis, Table, TableError};
+
+/// A law at the points of a grid, as in the file; all fields are none for an effect of the library.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+pub struct TableFields {
+    /// What it gives: a `contact-force` in N, or a `friction-factor`.
+    #[serde(default)]
+    pub acts_on: Option<String>,
+    /// What it depends on.
+    #[serde(default)]
+    pub axis: Option<OneOrTwo<String>>,
+    /// The points of its grid, in ascending order.
+    #[serde(default)]
+    pub grid: Option<Rows>,
+    /// The value at each.
+    #[serde(default)]
+    pub value: Option<Rows>,
+    /// Width after which it repeats along its first axis, in the unit of that.
+    #[serde(default)]
+    pub period: Option<f64>,
+}
+
+/// One thing, or a list of them.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged, expecting = "expected one name, or a list of two")]
+pub enum OneOrTwo<T> {
+    /// One.
+    One(T),
+    /// A list.
+    List(Vec<T>),
+}
+
+/// One list of numbers, or a list of such lists.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a list of numbers, or with two axes a list of such lists"
+)]
+pub enum Rows {
+    /// One list.
+    One(Vec<f64>),
+    /// A list of lists.
+    Several(Vec<Vec<f64>>),
+}
+
+impl TableFields {
+    /// The first field that is given.
+    fn first_given(&self) -> Option<&'static str> {
+        let given = [
+            ("acts_on", self.acts_on.is_some()),
+            ("axis", self.axis.is_some()),
+            ("grid", self.grid.is_some()),
+            ("value", self.value.is_some()),
+            ("period", self.period.is_some()),
+        ];
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name)
+    }
+
+    /// Refuses the fields of a table in an effect of the library.
+    pub(super) fn refuse_in(&self, effect: &str) -> Result<(), SettingError> {
+        let refuse = |field| SettingError::NoTable {
+            effect: effect.to_owned(),
+            field,
+        };
+        self.first_given().map_or(Ok(()), |field| Err(refuse(field)))
+    }
+
+    /// The law as a setting of the physics, on one cell (from 0) or all.
+    pub(super) fn setting(&self, cell: Option<usize>, cells: usize) -> Result<Setting, SettingError> {
+        let missing = SettingError::TableMissing;
+        let acts_on = self
+            .acts_on
+            .as_deref()
+            .ok_or(missing("`acts_on`: \"contact-force\" or \"friction-factor\""))?;
+        let axes = match self.axis.as_ref().ok_or(missing("`axis`: what it depends on"))? {
+            OneOrTwo::One(axis) => vec![axis.clone()],
+            OneOrTwo::List(axes) => axes.clone(),
+        };
+        let grids = match self
+            .grid
+            .as_ref()
+            .ok_or(missing("`grid`: points of the axis, in ascending order"))?
+        {
+            Rows::One(grid) => vec![grid.clone()],
+            Rows::Several(grids) => grids.clone(),
+        };
+        let value = match self
+            .value
+            .as_ref()
+            .ok_or(missing("`value`: one for each point of the grid"))?
+        {
+            Rows::One(value) => value.clone(),
+            Rows::Several(rows) => {
+                let width = grids.last().map_or(0, Vec::len);
+                if let Some(row) = rows.iter().find(|row| row.len() != width) {
+                    return Err(TableError::Count {
+                        given: row.len(),
+                        expected: width,
+                        two_axes: true,
+                    }
+                    .into());
+                }
+                rows.concat()
+            }
+        };
+        if grids.len() != axes.len() {
+            let problem = format!(
+                "{} lists of points for {} axes: give one for each axis",
+                grids.len(),
+                axes.len()
+            );
+            let axis = "the table";
+            return Err(TableError::Grid { axis, problem }.into());
+        }
+        let axes: Result<Vec<Axis>, TableError> = axes.iter().map(|name| Axis::named(name)).collect();
+        let with_grids: Vec<(Axis, Vec<f64>)> = axes?.into_iter().zip(grids).collect();
+        let table = Table::new(ActsOn::named(acts_on)?, &with_grids, value, self.period)?;
+        Setting::of_table(table, cell, cells)
+    }
+
+    /// Whether an effect is a table.
+    pub(super) fn is_of(name: &str) -> bool {
+        name == TABLE.name
+    }
+}
