@@ -51,6 +51,7 @@
 //! | `trip` | the process that makes a trip: the topics into the guide of `worm-plan`, its commands to the controller | `topics`, `supervisor` |
 //! | `relay` | one process that serves all watchers: history, frames, commands, one driver at a time | `topics`, `watch`, `supervisor` |
 //! | `dashboard` | the worm in a browser: an HTTP server between the relay and any number of pages. The feature `dashboard` | `relay`, `watch` |
+//! | `bridge` | worms over a network: the relay's language by Zenoh. The feature `bridge` | `relay`, `watch` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
@@ -74,6 +75,8 @@
 pub mod attendance;
 mod benchmark;
 mod black_box;
+#[cfg(feature = "bridge")]
+mod bridge;
 mod bundle;
 pub mod command;
 pub mod control;

@@ -3,6 +3,8 @@
 #[cfg(feature = "analysis")]
 pub mod analyze;
 pub mod black_box;
+#[cfg(feature = "bridge")]
+pub mod bridge;
 pub mod bundle;
 pub mod check;
 pub mod control;
@@ -15,6 +17,8 @@ pub mod estimate;
 pub mod explain;
 pub mod export;
 pub mod fault;
+#[cfg(feature = "bridge")]
+pub mod fleet;
 pub mod latency;
 pub mod latency_floor;
 mod live;
