@@ -52,6 +52,7 @@
 //! | `relay` | one process that serves all watchers: history, frames, commands, one driver at a time | `topics`, `watch`, `supervisor` |
 //! | `dashboard` | the worm in a browser: an HTTP server between the relay and any number of pages. The feature `dashboard` | `relay`, `watch` |
 //! | `foxglove` | the topics live in Foxglove: what a recorder reads, over a WebSocket. The feature `foxglove` | `recorder` |
+//! | `bridge` | worms over a network: the relay's language by Zenoh. The feature `bridge` | `relay`, `watch` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`servo_bench`] | recordings of a servo that moves an arm on a bench, through the link | `link` |
@@ -76,6 +77,8 @@
 pub mod attendance;
 mod benchmark;
 mod black_box;
+#[cfg(feature = "bridge")]
+mod bridge;
 mod bundle;
 pub mod command;
 pub mod control;

@@ -42,6 +42,12 @@ enum Subcommands {
     /// The topics of a worm, live, for Foxglove to show
     #[cfg(feature = "foxglove")]
     Foxglove(command::foxglove::FoxgloveArgs),
+    /// Worms of this computer for laptops elsewhere
+    #[cfg(feature = "bridge")]
+    Bridge(command::bridge::BridgeArgs),
+    /// Worms of robots elsewhere, offered here to watch, dashboard and programs
+    #[cfg(feature = "bridge")]
+    Fleet(command::fleet::FleetArgs),
     /// Serves the watchers of a worm; they start it by themselves
     Relay(command::relay::RelayArgs),
     /// The topics of a worm into a log (MCAP)
@@ -98,13 +104,14 @@ enum Subcommands {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let level = match arguments.verbose {
+    let verbose = arguments.verbose;
+    let level = match verbose {
         0 => tracing::Level::WARN,
         1 => tracing::Level::INFO,
         2 => tracing::Level::DEBUG,
         _ => tracing::Level::TRACE,
     };
-    tracing_subscriber::fmt()
+    let subscriber = tracing_subscriber::fmt()
         .with_max_level(level)
         .with_writer(|| command::LogOutput)
         .with_ansi(std::io::stderr().is_terminal())
@@ -112,8 +119,18 @@ fn main() -> ExitCode {
         // It would panic when standard error is closed: the parent was killed, or the terminal closed.
         .log_internal_errors(false)
         .compact()
-        .init();
-    let code = match run(arguments.command, arguments.verbose) {
+        .finish();
+    #[cfg(feature = "bridge")]
+    let subscriber = {
+        use tracing_subscriber::layer::SubscriberExt;
+        // Zenoh also warns of what is meant to be so, as that gossip is off.
+        let is_of_interest = move |metadata: &tracing::Metadata<'_>| {
+            !metadata.target().starts_with("zenoh") || verbose > 1 || *metadata.level() == tracing::Level::ERROR
+        };
+        subscriber.with(tracing_subscriber::filter::filter_fn(is_of_interest))
+    };
+    tracing_subscriber::util::SubscriberInitExt::init(subscriber);
+    let code = match run(arguments.command, verbose) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             command::log_line(format_args!("wormd: {failure}"));
@@ -137,6 +154,10 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Dashboard(args) => command::dashboard::run(&args),
         #[cfg(feature = "foxglove")]
         Subcommands::Foxglove(args) => command::foxglove::run(&args),
+        #[cfg(feature = "bridge")]
+        Subcommands::Bridge(args) => command::bridge::run(&args),
+        #[cfg(feature = "bridge")]
+        Subcommands::Fleet(args) => command::fleet::run(&args),
         Subcommands::Relay(args) => command::relay::run(&args),
         Subcommands::Record(args) => command::record::run(&args),
         Subcommands::Topics(args) => command::topics::run(&args),

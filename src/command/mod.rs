@@ -3,6 +3,8 @@
 #[cfg(feature = "analysis")]
 pub mod analyze;
 pub mod black_box;
+#[cfg(feature = "bridge")]
+pub mod bridge;
 pub mod bundle;
 pub mod check;
 pub mod control;
@@ -18,6 +20,8 @@ pub mod fault;
 #[cfg(feature = "foxglove")]
 pub mod foxglove;
 pub mod infer;
+#[cfg(feature = "bridge")]
+pub mod fleet;
 pub mod latency;
 pub mod latency_floor;
 mod live;

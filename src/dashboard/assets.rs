@@ -25,6 +25,13 @@ pub(super) const INDEX: Asset = Asset {
     text: include_str!("assets/index.html"),
 };
 
+/// The page about all worms.
+pub(super) const FLEET: Asset = Asset {
+    path: "",
+    content_type: "text/html; charset=utf-8",
+    text: include_str!("assets/fleet.html"),
+};
+
 macro_rules! assets {
     ($($path:literal: $content_type:expr),+ $(,)?) => {
         &[$(Asset { path: $path, content_type: $content_type, text: include_str!(concat!("assets/", $path)) }),+]
@@ -43,6 +50,7 @@ pub(super) const ASSETS: &[Asset] = assets! {
     "panels.js": JS,
     "charts.js": JS,
     "reports.js": JS,
+    "fleet.js": JS,
     "dom.js": JS,
     "uplot/uPlot.iife.min.js": JS,
     "uplot/uPlot.min.css": CSS,

@@ -2,6 +2,7 @@
 
 use super::access::bearer;
 use super::caller::Caller;
+use super::fleet::Held;
 use super::routes::{App, Peer, refused, to_json};
 use crate::relay::wire::{Answer, Request};
 use axum::body::Bytes;
@@ -69,6 +70,20 @@ pub(super) async fn command(
         _ => app.relay.drive(caller, request).await,
     };
     answered(answer)
+}
+
+/// `POST /api/fleet/hold`: all worms hold. As for one of them, nothing is needed for it.
+pub(super) async fn hold_fleet(
+    State(app): State<Arc<App>>,
+    Extension(peer): Extension<Peer>,
+    headers: HeaderMap,
+) -> Response {
+    let held = app.fleet.hold(caller(peer, &headers)).await;
+    let status = match held.iter().all(Held::is_answered) {
+        true => StatusCode::OK,
+        false => StatusCode::SERVICE_UNAVAILABLE,
+    };
+    to_json(status, &serde_json::json!({ "worms": held }))
 }
 
 /// `POST /api/alive`: the page that drives is there.

@@ -14,6 +14,7 @@
 //! - [`server`]: connections and their limits; [`paced_stream`] cuts off who does not read.
 //! - [`routes`]: what can be asked for; [`commands`]: the commands among it; [`caller`]: who commands.
 //! - [`events`]: the stream of events.
+//! - [`fleet`]: all worms that there are here, and one hold for all of them.
 //! - [`metrics`]: the same for Prometheus.
 //! - [`reports`]: reports of finished runs.
 //! - [`assets`]: the page.
@@ -24,6 +25,7 @@ mod caller;
 mod commands;
 mod events;
 mod feed;
+mod fleet;
 mod listen;
 mod metrics;
 mod paced_stream;

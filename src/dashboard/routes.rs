@@ -2,6 +2,7 @@
 
 use super::access::{Hosts, Source};
 use super::assets::{self, Asset};
+use super::fleet::FleetThread;
 use super::relay_thread::{RelayThread, Shared};
 use super::{Token, commands, events, metrics, reports};
 use crate::realtime::monotonic_ns;
@@ -52,6 +53,7 @@ pub(super) struct Peer(pub(super) IpAddr);
 pub(super) struct App {
     pub(super) shared: Shared,
     pub(super) relay: RelayThread,
+    pub(super) fleet: FleetThread,
     pub(super) token: Token,
     pub(super) hosts: Hosts,
     pub(super) reports: Option<PathBuf>,
@@ -63,6 +65,10 @@ pub(super) struct App {
 pub(super) fn router(app: Arc<App>) -> Router {
     Router::new()
         .route("/", get(async |headers: HeaderMap| asset(&assets::INDEX, &headers)))
+        .route(
+            "/fleet",
+            get(async |headers: HeaderMap| asset(&assets::FLEET, &headers)),
+        )
         .route("/assets/{*path}", get(asset_of))
         .route("/api/events", get(event_stream))
         .route("/api/state", get(state))
@@ -70,6 +76,8 @@ pub(super) fn router(app: Arc<App>) -> Router {
         .route("/api/login", get(commands::login))
         .route("/api/reports", get(list_reports))
         .route("/api/command/{command}", post(commands::command))
+        .route("/api/fleet", get(fleet))
+        .route("/api/fleet/hold", post(commands::hold_fleet))
         .route("/api/alive", post(commands::alive))
         .route("/reports/{*path}", get(open_report))
         .route("/metrics", get(metrics_text))
@@ -202,6 +210,10 @@ async fn health(State(app): State<Arc<App>>) -> Response {
         "pages": MAX_PAGES - app.pages.available_permits(),
     });
     to_json(StatusCode::OK, &health)
+}
+
+async fn fleet(State(app): State<Arc<App>>) -> Response {
+    to_json(StatusCode::OK, &json!({ "worms": app.fleet.look().await }))
 }
 
 async fn metrics_text(State(app): State<Arc<App>>) -> Response {

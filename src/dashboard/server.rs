@@ -3,6 +3,7 @@
 use super::Token;
 use super::access::Hosts;
 use super::feed::Feed;
+use super::fleet::FleetThread;
 use super::paced_stream::PacedStream;
 use super::relay_thread::{RelayThread, Shared};
 use super::routes::{App, MAX_PAGES, Peer, router};
@@ -70,6 +71,7 @@ pub(crate) fn run(settings: Settings, end: std::os::unix::net::UnixStream) -> Re
     let address = settings.listener.local_addr().map_err(Failure::failed)?;
     let app = Arc::new(App {
         relay: RelayThread::start(&settings.instance, link, shared.clone())?,
+        fleet: FleetThread::start(&settings.instance, &settings.config.topics.root)?,
         shared,
         token: settings.token,
         hosts: Hosts::new(address.ip(), settings.hosts),

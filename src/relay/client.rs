@@ -50,6 +50,8 @@ pub(crate) struct RelayLink {
     tried: Option<Instant>,
     start_not_before: Instant,
     problem: Option<String>,
+    /// Whether this watcher says by itself that it is there.
+    is_attending: bool,
 }
 
 /// A connection to a relay.
@@ -84,7 +86,14 @@ impl RelayLink {
             tried: None,
             start_not_before: Instant::now(),
             problem: None,
+            is_attending: true,
         }
+    }
+
+    /// Whether somebody is behind this watcher. Until it is told otherwise, it says so all the time.
+    #[cfg(feature = "bridge")]
+    pub(crate) fn set_attending(&mut self, is_attending: bool) {
+        self.is_attending = is_attending;
     }
 
     /// Connects, and starts a relay if there is none; waits until that has succeeded.
@@ -131,7 +140,7 @@ impl RelayLink {
         let Some(connection) = &mut self.connection else {
             return received;
         };
-        if connection.alive_said.elapsed() >= ALIVE_INTERVAL {
+        if self.is_attending && connection.alive_said.elapsed() >= ALIVE_INTERVAL {
             connection.alive_said = Instant::now();
             connection.send(None, Request::Alive);
         }
@@ -159,7 +168,7 @@ impl RelayLink {
     }
 
     /// The connection's socket, which can be read when there is something to poll for.
-    #[cfg(feature = "dashboard")]
+    #[cfg(any(feature = "bridge", feature = "dashboard"))]
     pub(crate) fn stream(&self) -> Option<&UnixStream> {
         self.connection.as_ref().map(Connection::stream)
     }
@@ -302,7 +311,7 @@ impl Connection {
     }
 
     /// Can be read when there is something to exchange.
-    #[cfg(feature = "dashboard")]
+    #[cfg(any(feature = "bridge", feature = "dashboard"))]
     pub(crate) fn stream(&self) -> &UnixStream {
         &self.stream
     }

@@ -22,11 +22,11 @@ mod drive;
 mod event_log;
 mod history;
 pub(crate) mod message_json;
-mod outbox;
+pub(crate) mod outbox;
 pub(crate) mod server;
-mod socket;
+pub(crate) mod socket;
 pub(crate) mod source;
-mod watcher;
+pub(crate) mod watcher;
 pub(crate) mod wire;
 
 pub(crate) use history::History;

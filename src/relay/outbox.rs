@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::sync::Arc;
 
 /// A line that is ready to be sent, shared by all who get it.
-pub(super) type SharedLine = Arc<Vec<u8>>;
+pub(crate) type SharedLine = Arc<Vec<u8>>;
 
 /// Frames that may wait for one watcher: two seconds of them.
 const MAX_FRAMES: usize = 40;
@@ -14,7 +14,7 @@ const MAX_ANSWERS: usize = 16;
 
 /// Lines on their way to one watcher.
 #[derive(Debug, Default)]
-pub(super) struct Outbox {
+pub(crate) struct Outbox {
     lines: VecDeque<SharedLine>,
     /// How much of the first line is sent.
     sent: usize,
@@ -23,11 +23,11 @@ pub(super) struct Outbox {
 
 /// A watcher takes nothing, and asks for ever more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Overflow;
+pub(crate) struct Overflow;
 
 impl Outbox {
     /// Adds a frame, unless too much waits: then it is lost, and so is every further one until all that waits is sent.
-    pub(super) fn add_frame(&mut self, line: &SharedLine) {
+    pub(crate) fn add_frame(&mut self, line: &SharedLine) {
         if self.lost > 0 || self.lines.len() >= MAX_FRAMES {
             self.lost += 1;
         } else {
@@ -36,7 +36,7 @@ impl Outbox {
     }
 
     /// Adds a line that must not get lost.
-    pub(super) fn add(&mut self, line: SharedLine) -> Result<(), Overflow> {
+    pub(crate) fn add(&mut self, line: SharedLine) -> Result<(), Overflow> {
         if self.lines.len() >= MAX_FRAMES + MAX_ANSWERS {
             return Err(Overflow);
         }
@@ -45,21 +45,21 @@ impl Outbox {
     }
 
     /// How many frames were lost, once everything else is sent and there can be new ones.
-    pub(super) fn take_lost(&mut self) -> Option<u64> {
+    pub(crate) fn take_lost(&mut self) -> Option<u64> {
         (self.lost > 0 && self.lines.is_empty()).then(|| std::mem::take(&mut self.lost))
     }
 
     /// Whether frames are being lost.
-    pub(super) fn is_losing(&self) -> bool {
+    pub(crate) fn is_losing(&self) -> bool {
         self.lost > 0
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.lines.is_empty()
     }
 
     /// Writes what the stream takes without waiting; returns whether it took anything.
-    pub(super) fn write(&mut self, stream: &mut impl Write) -> io::Result<bool> {
+    pub(crate) fn write(&mut self, stream: &mut impl Write) -> io::Result<bool> {
         let mut progress = false;
         while let Some(line) = self.lines.front() {
             match stream.write(&line[self.sent..]) {

@@ -9,14 +9,14 @@ use std::path::PathBuf;
 
 /// The bound socket; its name goes when it is dropped.
 #[derive(Debug)]
-pub(super) struct Listener {
-    pub(super) socket: UnixListener,
+pub(crate) struct Listener {
+    pub(crate) socket: UnixListener,
     path: PathBuf,
 }
 
 impl Listener {
     /// Binds the socket, in the place of one that a killed relay has left. Only for who has the role of the relay.
-    pub(super) fn bind(instance: &Instance) -> io::Result<Self> {
+    pub(crate) fn bind(instance: &Instance) -> io::Result<Self> {
         let path = instance.relay_socket();
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
@@ -38,7 +38,7 @@ impl Drop for Listener {
 }
 
 /// User and process at the other end, by the kernel.
-pub(super) fn peer_of(stream: &UnixStream) -> io::Result<(u32, i32)> {
+pub(crate) fn peer_of(stream: &UnixStream) -> io::Result<(u32, i32)> {
     let peer = getsockopt(stream, PeerCredentials)?;
     Ok((peer.uid(), peer.pid()))
 }

@@ -23,9 +23,9 @@ const STATISTICS_INTERVAL_NS: u64 = 1_000_000_000;
 /// What there was of a worm when a watcher got its last frame: the next one has the rest.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Seen {
-    cycles: u64,
-    alarms: u64,
-    events: u64,
+    pub(crate) cycles: u64,
+    pub(crate) alarms: u64,
+    pub(crate) events: u64,
 }
 
 /// The worm as the relay knows it.
@@ -142,6 +142,7 @@ impl Worm {
             alarms: telemetry.alarms.since(seen.alarms).copied().map(Json).collect(),
             events: self.events.since(seen.events).cloned().collect(),
             driver,
+            network: None,
         }
     }
 }

@@ -10,22 +10,22 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// One connection.
-pub(super) struct Watcher {
-    pub(super) stream: UnixStream,
+pub(crate) struct Watcher {
+    pub(crate) stream: UnixStream,
     /// Its user, by the kernel.
-    pub(super) user: u32,
-    pub(super) input: Vec<u8>,
-    pub(super) outbox: Outbox,
+    pub(crate) user: u32,
+    pub(crate) input: Vec<u8>,
+    pub(crate) outbox: Outbox,
     /// What there was of the worm in the last line that it was sent about it.
-    pub(super) seen: Seen,
+    pub(crate) seen: Seen,
     /// When it last took something, or nothing waited for it.
-    pub(super) took: Instant,
+    pub(crate) took: Instant,
     /// Once everything is sent, it is closed.
-    pub(super) is_refused: bool,
+    pub(crate) is_refused: bool,
 }
 
 /// A connection that is over, and why, where that is of interest.
-pub(super) struct Gone(pub(super) Option<String>);
+pub(crate) struct Gone(pub(crate) Option<String>);
 
 impl From<Overflow> for Gone {
     fn from(_: Overflow) -> Self {
@@ -35,7 +35,7 @@ impl From<Overflow> for Gone {
 
 impl Watcher {
     /// Reads what is there; returns its whole lines.
-    pub(super) fn read(&mut self) -> Result<Vec<Vec<u8>>, Gone> {
+    pub(crate) fn read(&mut self) -> Result<Vec<Vec<u8>>, Gone> {
         let mut bytes = [0; MAX_REQUEST];
         // Once: who sends more gets its next turn after the others.
         match self.stream.read(&mut bytes) {
@@ -60,13 +60,13 @@ impl Watcher {
     }
 
     /// Sends an answer, once there is room for it.
-    pub(super) fn answer(&mut self, answer: Answer) -> Result<(), Gone> {
+    pub(crate) fn answer(&mut self, answer: Answer) -> Result<(), Gone> {
         let line = shared(&Line::Answer(answer)).map_err(|failure| Gone(Some(failure.to_string())))?;
         Ok(self.outbox.add(line)?)
     }
 
     /// Says why, and closes the connection after that.
-    pub(super) fn refuse(&mut self, reason: String) {
+    pub(crate) fn refuse(&mut self, reason: String) {
         self.is_refused = true;
         if let Ok(line) = shared(&Line::Refused { reason }) {
             // It is the first line, or one of few.
@@ -76,6 +76,6 @@ impl Watcher {
 }
 
 /// A line for several watchers.
-pub(super) fn shared(line: &Line) -> Result<SharedLine, Failure> {
+pub(crate) fn shared(line: &Line) -> Result<SharedLine, Failure> {
     to_bytes(line).map(Arc::new).map_err(Failure::failed)
 }

@@ -165,6 +165,28 @@ pub(crate) struct Frame {
     pub events: Vec<Event>,
     /// Who drives, if anybody does.
     pub driver: Option<Driver>,
+    /// The network between the relay and this watcher, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network: Option<Network>,
+}
+
+/// What is between a relay and its watchers when the worm is on another computer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Network {
+    /// The robot, by its certificate.
+    pub robot: String,
+    /// Whether this computer's certificate permits to drive.
+    pub may_drive: bool,
+    /// Frames that were lost on the way since the link began.
+    pub frames_lost: u64,
+    /// How long a piece and its confirmation take together, ms; none where that is not known.
+    pub round_trip_ms: Option<u64>,
+    /// The kernel's name for this run of the robot's computer.
+    pub boot_id: String,
+    /// Whether the robot's kernel counts its wall time as synchronised; none where it does not say.
+    pub synchronised: Option<bool>,
+    /// The robot's wall time (Unix) less its `CLOCK_MONOTONIC`, ns.
+    pub wall_offset_ns: i64,
 }
 
 /// Ages of the newest messages, ms; none where none ever came.

@@ -104,7 +104,11 @@ impl App {
     /// What has just come is of the worm as it is now, unless it waited on the way, or the worm is silent behind the relay.
     fn hear(&mut self, now_ns: u64) {
         let picture = &self.picture;
-        let frame_ns = now_ns.saturating_sub(picture.time_ns);
+        let frame_ns = match &picture.network {
+            None => now_ns.saturating_sub(picture.time_ns),
+            // Of another computer's clock: what was on the way for longer than a round trip is not known here.
+            Some(network) => network.round_trip_ms.unwrap_or(0).saturating_mul(1_000_000),
+        };
         let age_ns = |age_ms: Option<u64>| age_ms.map(|ms| frame_ns.saturating_add(ms.saturating_mul(1_000_000)));
         let is_fresh = [picture.ages.state, picture.ages.estimate]
             .iter()

@@ -3,7 +3,7 @@
 use super::recent::Recent;
 use crate::relay::History;
 use crate::relay::message_json::Json;
-use crate::relay::wire::{Ages, Driver, Event, Frame, Hello, Statistics, Subject};
+use crate::relay::wire::{Ages, Driver, Event, Frame, Hello, Network, Statistics, Subject};
 use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State, Timing, TripStatus};
 
 /// Gait cycles that are kept: an hour and a half of the usual gait, 1.5 MB.
@@ -34,6 +34,8 @@ pub(crate) struct Picture {
     pub(crate) history: History,
     pub(crate) driver: Option<Driver>,
     pub(crate) watchers: usize,
+    /// The network between the worm and here, if there is one.
+    pub(crate) network: Option<Network>,
 }
 
 impl Picture {
@@ -57,6 +59,7 @@ impl Picture {
             history: History::default(),
             driver: None,
             watchers: 0,
+            network: None,
         }
     }
 
@@ -95,6 +98,7 @@ impl Picture {
         frame.events.into_iter().for_each(|event| self.events.push(event));
         self.driver = frame.driver;
         self.watchers = frame.watchers;
+        self.network = frame.network;
         if let (Some(state), Some(estimate)) = (&self.state, &self.estimate) {
             self.history.take(state, estimate);
         }

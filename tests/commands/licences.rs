@@ -69,8 +69,9 @@ impl Licences {
             .chain(exceptions.flat_map(|exception| &exception.allow))
             .collect();
         licence.evaluate(|required| {
-            let id = required.license.id();
-            id.is_some_and(|id| required.addition.is_none() && names.iter().any(|name| *name == id.name))
+            // With its exception, where it has one.
+            let required = required.to_string();
+            names.iter().any(|name| **name == required)
         })
     }
 }
@@ -100,6 +101,7 @@ fn licences_are_judged_by_their_operators() {
         ("any", Some("GPL-3.0-only AND MIT"), false),
         ("any", Some("MPL-2.0"), false),
         ("serialport", Some("MPL-2.0"), true),
+        ("any", Some("Apache-2.0 WITH LLVM-exception"), false),
         ("any", Some("no licence"), false),
         ("any", None, false),
     ] {

@@ -85,6 +85,11 @@ impl Worm {
         path.to_string_lossy().into_owned()
     }
 
+    /// `wormd` with these arguments alone.
+    pub fn plain_wormd(&self, arguments: &[&str]) -> Invocation {
+        Invocation::new(arguments, self.pauses.clone())
+    }
+
     /// `wormd` with these arguments and this worm's name.
     pub fn wormd(&self, arguments: &[&str]) -> Invocation {
         let named = [arguments, &["--name", &self.name]].concat();
@@ -227,6 +232,18 @@ impl Invocation {
     /// Gives it a variable of the environment.
     pub fn with_environment(mut self, name: &str, value: &str) -> Self {
         self.command.env(name, value);
+        self
+    }
+
+    /// Runs it in a network of its own.
+    pub fn in_network(mut self, namespace: &std::fs::File) -> Self {
+        let namespace = namespace.try_clone().expect("a descriptor is free");
+        // SAFETY: setns is async-signal-safe, and nothing is allocated between fork and exec.
+        unsafe {
+            self.command.pre_exec(move || {
+                nix::sched::setns(&namespace, nix::sched::CloneFlags::CLONE_NEWNET).map_err(std::io::Error::from)
+            });
+        }
         self
     }
 

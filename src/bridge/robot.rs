@@ -1,0 +1,233 @@
+//! The process on the robot, `wormd bridge`: between the relays of its worms and the laptops.
+//!
+//! One thread, which waits for neither. It is a watcher of each relay for each laptop, and one more for every watcher behind a laptop that
+//! commands, so that driving is decided where it always is.
+
+use super::clock::ClockWatch;
+use super::network::{End, Network, Party, Way};
+use super::remote::{Remote, Served};
+use super::settings::BridgeSettings;
+use super::wire::{Beat, MAX_UP, Up, VERSION};
+use crate::failure::Failure;
+use crate::realtime::monotonic_ns;
+use crate::syslog;
+use crate::topics::Instance;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use std::collections::{BTreeMap, BTreeSet};
+use std::os::fd::AsFd;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// How long the thread waits at most, ms.
+const POLL_MS: u16 = 50;
+/// How long a turn waits for more after the first thing has come.
+const GATHER: Duration = Duration::from_millis(4);
+/// How often a laptop hears that the bridge is there.
+const BEAT: Duration = Duration::from_millis(200);
+/// How often the clocks are looked at.
+const CLOCK: Duration = Duration::from_secs(1);
+/// A laptop that was not heard for so long has gone.
+const GONE: Duration = Duration::from_secs(5);
+/// Most processes on laptops, and most of one certificate.
+const MAX_REMOTES: usize = 32;
+const MAX_OF_ONE: usize = 8;
+
+/// Serves until `end` is set. Calls `ready` once laptops can connect, and `round` at each turn.
+///
+/// # Errors
+/// [`Failure::Unusable`] when a worm's folder or an address cannot be used.
+pub(crate) fn run(
+    settings: BridgeSettings,
+    end: &AtomicBool,
+    ready: impl FnOnce(),
+    round: impl Fn(),
+) -> Result<(), Failure> {
+    let mut worms = Vec::new();
+    for (config, arguments) in settings.worms {
+        let instance = Instance::of(&config).map_err(Failure::unusable)?;
+        let name = config.worm.name;
+        worms.push(Served {
+            name,
+            instance,
+            arguments,
+        });
+    }
+    let network = Network::open(&End {
+        credentials: &settings.credentials,
+        others: &settings.all,
+        laptops: &settings.all,
+        listen: &settings.listen,
+        connect: &[],
+        way: Way::Down,
+        session: None,
+    });
+    let network = network.map_err(|why| {
+        Failure::unusable(format!(
+            "listening at {}: {why}: another bridge may run there; give another address",
+            settings.listen.join(", ")
+        ))
+    })?;
+    let mut bridge = Bridge {
+        robot: settings.credentials.name,
+        drive: settings.drive,
+        worms,
+        network,
+        remotes: BTreeMap::new(),
+        clock: ClockWatch::new(),
+        looked: Instant::now(),
+        beaten: Instant::now(),
+        next_stream: monotonic_ns(),
+    };
+    ready();
+    while !end.load(Ordering::Relaxed) {
+        bridge.turn()?;
+        round();
+    }
+    for worm in &bridge.worms {
+        worm.instance.remove_folder_if_empty();
+    }
+    Ok(())
+}
+
+struct Bridge {
+    /// Common name of its certificate.
+    robot: String,
+    /// Certificates that may drive.
+    drive: BTreeSet<String>,
+    worms: Vec<Served>,
+    network: Network,
+    remotes: BTreeMap<Party, Remote>,
+    clock: ClockWatch,
+    looked: Instant,
+    beaten: Instant,
+    /// Begins elsewhere at each start, so that no stream has the number of another.
+    next_stream: u64,
+}
+
+impl Bridge {
+    fn turn(&mut self) -> Result<(), Failure> {
+        self.wait()?;
+        // What comes within this time is one turn: twenty relays do not tick together.
+        std::thread::sleep(GATHER);
+        let now_ns = monotonic_ns();
+        let messages: Vec<_> = self.network.messages().collect();
+        for (party, bytes) in messages {
+            self.take(party, &bytes, now_ns);
+        }
+        self.look_at_clocks();
+        let is_beat = self.beaten.elapsed() >= BEAT;
+        if is_beat {
+            self.beaten = Instant::now();
+        }
+        let beat = self.standing();
+        let network = &self.network;
+        let robot = &self.robot;
+        self.remotes.retain(|party, remote| {
+            if remote.silence() >= GONE {
+                note(robot, &format!("{} has gone", party.certificate));
+                return false;
+            }
+            remote.exchange();
+            if is_beat {
+                remote.beat(beat.clone());
+            }
+            loop {
+                match remote.backlog.next(monotonic_ns()) {
+                    Ok(Some(piece)) => network.send(party, piece),
+                    Ok(None) => return true,
+                    Err(error) => tracing::error!("a message cannot be written: {error}"),
+                }
+            }
+        });
+        Ok(())
+    }
+
+    fn wait(&self) -> Result<(), Failure> {
+        let streams = self.remotes.values().flat_map(Remote::streams);
+        let mut waiting: Vec<_> = std::iter::once(self.network.woken())
+            .chain(streams)
+            .map(|stream| PollFd::new(stream.as_fd(), PollFlags::POLLIN))
+            .collect();
+        match poll(&mut waiting, PollTimeout::from(POLL_MS)) {
+            Ok(_) | Err(nix::errno::Errno::EINTR) => Ok(()),
+            Err(errno) => Err(Failure::failed(format!(
+                "the bridge cannot wait for its relays: {errno}"
+            ))),
+        }
+    }
+
+    fn take(&mut self, party: Party, bytes: &[u8], now_ns: u64) {
+        if bytes.len() > MAX_UP {
+            return tracing::warn!("{} sends too much at once", party.certificate);
+        }
+        let up: Up = match serde_json::from_slice(bytes) {
+            Ok(up) => up,
+            Err(error) => return tracing::warn!("{} sends what cannot be read: {error}", party.certificate),
+        };
+        if up.version > VERSION {
+            return tracing::warn!(
+                "{} speaks version {} and this bridge {VERSION}: use the same wormd on both ends",
+                party.certificate,
+                up.version
+            );
+        }
+        if !self.remotes.contains_key(&party) {
+            let of_one = self
+                .remotes
+                .keys()
+                .filter(|other| other.certificate == party.certificate)
+                .count();
+            if self.remotes.len() >= MAX_REMOTES || of_one >= MAX_OF_ONE {
+                return tracing::warn!("{}: too many are connected", party.certificate);
+            }
+            let may_drive = self.drive.contains(&party.certificate);
+            let what = if may_drive { "may drive" } else { "may watch and hold" };
+            note(&self.robot, &format!("{} has come, and {what}", party.certificate));
+            let stream = self.stream();
+            let mut remote = Remote::new(party.clone(), may_drive, stream, &self.worms);
+            // Before anything else: the laptop is to know which worms there are.
+            remote.beat(self.standing());
+            self.remotes.insert(party.clone(), remote);
+        }
+        let stream = self.stream();
+        if let Some(remote) = self.remotes.get_mut(&party)
+            && remote.take(up, &self.worms, now_ns)
+        {
+            remote.restart(stream, &self.worms);
+        }
+    }
+
+    /// How the bridge stands.
+    fn standing(&self) -> Beat {
+        Beat {
+            version: VERSION,
+            wormd: env!("CARGO_PKG_VERSION").to_owned(),
+            worms: self.worms.iter().map(|worm| worm.name.clone()).collect(),
+            may_drive: false,
+            round_trip_ms: None,
+            clock: self.clock.status().clone(),
+        }
+    }
+
+    fn stream(&mut self) -> u64 {
+        self.next_stream += 1;
+        self.next_stream
+    }
+
+    fn look_at_clocks(&mut self) {
+        if self.looked.elapsed() < CLOCK {
+            return;
+        }
+        self.looked = Instant::now();
+        if let Some(step) = self.clock.look() {
+            let text = format!("wall time was set by {:+.3} s", step.step_ns as f64 * 1e-9);
+            note(&self.robot, &text);
+        }
+    }
+}
+
+/// Puts a line into the computer's log and on standard error.
+fn note(robot: &str, text: &str) {
+    tracing::info!("{text}");
+    syslog::write("wormd-bridge", robot, text);
+}
