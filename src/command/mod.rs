@@ -17,11 +17,11 @@ pub mod estimate;
 pub mod explain;
 pub mod export;
 pub mod fault;
+#[cfg(feature = "bridge")]
+pub mod fleet;
 #[cfg(feature = "foxglove")]
 pub mod foxglove;
 pub mod infer;
-#[cfg(feature = "bridge")]
-pub mod fleet;
 pub mod latency;
 pub mod latency_floor;
 mod live;

@@ -5,6 +5,7 @@ use super::check::Checker;
 use crate::self_sensing::gear::MAX_RIPPLES;
 use crate::self_sensing::{CurrentSource, GearModel, Ripple, SelfSensingConfig};
 use serde::Deserialize;
+use worm_physics::servo::identified::{XL330_EFFECTS, XL330_IDENTIFIED};
 
 /// What the servo reports as its current.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -55,19 +56,25 @@ pub struct SelfSensing {
 }
 
 impl Default for SelfSensing {
+    /// An XL330-M288-T as it was identified on recordings of a real one.
     fn default() -> Self {
+        let motor = XL330_IDENTIFIED;
+        let [
+            (_, [load_friction, load_motor_share]),
+            (_, [load_squared, load_squared_motor_share]),
+        ] = XL330_EFFECTS;
         Self {
             current: ReportedCurrent::Winding,
             torque_constant_sigma_share: 0.02,
-            inertia_kg_m2: 2e-4,
-            dry_friction_n_m: 0.05,
-            viscous_friction_n_m_s_per_rad: 0.003,
+            inertia_kg_m2: motor.rotor_inertia_kg_m2,
+            dry_friction_n_m: motor.dry_n_m,
+            viscous_friction_n_m_s_per_rad: motor.viscous_n_m_s,
             friction_sigma_n_m: 0.005,
-            load_friction: 0.0,
+            load_friction,
             load_friction_sigma: 0.02,
-            load_motor_share: 0.8,
-            load_squared_friction_per_n_m: 0.0,
-            load_squared_motor_share: 1.0,
+            load_motor_share,
+            load_squared_friction_per_n_m: load_squared,
+            load_squared_motor_share,
             ripple_waves: Vec::new(),
             ripple_sigma_n_m: 0.001,
             worm_sigma_share: 0.35,
