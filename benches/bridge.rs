@@ -137,6 +137,7 @@ fn main() {
     let bridge = Process::start(&["bridge", "--config", &at("bridge.toml")]);
     let (_, alone_mb) = usage(bridge.id());
     let fleet = Process::start(&["fleet", "--config", &at("fleet.toml")]);
+    let watched = Instant::now();
     let watchers: Vec<UnixStream> = names
         .iter()
         .map(|name| watch(&folder.path().join("laptop").join(name)))
@@ -183,7 +184,7 @@ fn main() {
         .fold((0, 0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
     println!(
         "frames: {:.1} a second for each worm since the start, {lost} lost",
-        frames as f64 / begun.elapsed().as_secs_f64() / worms
+        frames as f64 / watched.elapsed().as_secs_f64() / worms
     );
 }
 
