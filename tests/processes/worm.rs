@@ -86,6 +86,10 @@ impl Worm {
     }
 
     /// `wormd` with these arguments alone.
+    #[allow(
+        dead_code,
+        reason = "the tests of dashboard and bridge, which share this harness, need it"
+    )]
     pub fn plain_wormd(&self, arguments: &[&str]) -> Invocation {
         Invocation::new(arguments, self.pauses.clone())
     }
@@ -236,6 +240,10 @@ impl Invocation {
     }
 
     /// Runs it in a network of its own.
+    #[allow(
+        dead_code,
+        reason = "the tests of dashboard and bridge, which share this harness, need it"
+    )]
     pub fn in_network(mut self, namespace: &std::fs::File) -> Self {
         let namespace = namespace.try_clone().expect("a descriptor is free");
         // SAFETY: setns is async-signal-safe, and nothing is allocated between fork and exec.
