@@ -73,7 +73,7 @@ fn assert_main_job(worm: &Worm) {
         );
         let electrical_mj = number(&cycle["energy_electrical_j"]) * 1e3;
         assert!(
-            (electrical_mj / 650.0 - 1.0).abs() < 0.03,
+            (electrical_mj / 419.0 - 1.0).abs() < 0.03,
             "electrical {electrical_mj} mJ"
         );
         let parts = ["energy_copper_j", "energy_friction_inside_j", "energy_actuator_net_j"];

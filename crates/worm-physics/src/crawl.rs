@@ -63,8 +63,8 @@ pub struct Crawl {
 struct Cell {
     pad: Pad,
     drive_m: f64,
-    drag_n: f64,   // on the cell, in the last increment
-    pushed_n: f64, // by tables
+    drag_n: f64, // on the cell, in the last increment, and the push of tables
+    // Both only where there are tables.
     speed_m_s: f64,
     strain_m_s: f64, // of its pad
     trial: Trial,
@@ -130,8 +130,9 @@ impl Crawl {
         let mut untethered = mechanics.clone();
         untethered.laws.tether_n_per_m = 0.0;
         crawl.increment(&untethered, phase, SETTLING_S)?;
+        // At rest nothing drags, but tables push.
         for cell in &mut crawl.cell {
-            cell.drag_n = 0.0;
+            cell.drag_n = cell.trial.pushed_n;
         }
         Ok(Self {
             position_m,
@@ -294,7 +295,7 @@ impl Crawl {
     /// Force on a cell besides its contact, its weight and its part of the constant force, N.
     fn passing_force_n(&self, mechanics: &Mechanics, cell: usize) -> f64 {
         let cell = &self.cell[cell];
-        cell.drag_n + cell.pushed_n + self.shared_force_n(mechanics) / self.cells as f64
+        cell.drag_n + self.shared_force_n(mechanics) / self.cells as f64
     }
 
     /// Force of tether and inertia on the whole worm, N.
@@ -381,6 +382,7 @@ impl Crawl {
         let shared_after_n = self.shared_force_n(mechanics) / cells;
         let tether_n = mechanics.laws.tether_n_per_m * 0.5 * (tether_before_m + self.travelled_m) / cells;
         let resisting_n = mechanics.worm.cell_resistance_n() + tether_n;
+        let has_tables = !mechanics.tables.is_empty();
         let mut deformation_m = 0.0;
         for (index, cell) in self.cell[..self.cells].iter_mut().enumerate() {
             let Trial {
@@ -393,8 +395,8 @@ impl Crawl {
             let (law, standing_n) = (&mechanics.pad[index], mechanics.standing_n[index]);
             let (before_m, before_n) = (cell.pad.deformation_m, cell.pad.force_n);
             let lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.rate);
-            let drag_n = increment.drag_n_per_m * shift_m;
-            let dragged_j = 0.5 * (cell.drag_n + cell.pushed_n + drag_n + pushed_n) * shift_m;
+            let drag_n = increment.drag_n_per_m * shift_m + pushed_n;
+            let dragged_j = 0.5 * (cell.drag_n + drag_n) * shift_m;
             let ledger = &mut self.ledger;
             if loaded.slide_m != 0.0 {
                 ledger.slide(index, loaded.slide_m, loaded.force_n * loaded.slide_m);
@@ -402,8 +404,8 @@ impl Crawl {
             ledger.weight_work_j += mechanics.worm.cell_weight_n(index) * shift_m;
             ledger.resisting_work_j += resisting_n * shift_m + dragged_j;
             ledger.settling_loss_j += lost_j;
-            let passing_before_n = cell.drag_n + cell.pushed_n + shared_before_n;
-            let passing_after_n = drag_n + pushed_n + shared_after_n;
+            let passing_before_n = cell.drag_n + shared_before_n;
+            let passing_after_n = drag_n + shared_after_n;
             if driven_m != 0.0 {
                 ledger.add_actuator_work(
                     before_n + standing_n + passing_before_n,
@@ -416,9 +418,11 @@ impl Crawl {
             ledger.actuator_net_j += 0.5 * (passing_before_n + passing_after_n) * (shift_m - translation_m - driven_m);
             deformation_m += 0.5 * (before_m + loaded.deformation_m);
             self.position_m[index] += shift_m;
-            (cell.drag_n, cell.pushed_n) = (drag_n, pushed_n);
-            cell.speed_m_s = shift_m / increment.step_s;
-            cell.strain_m_s = (loaded.deformation_m - before_m) / increment.step_s;
+            cell.drag_n = drag_n;
+            if has_tables {
+                cell.speed_m_s = shift_m / increment.step_s;
+                cell.strain_m_s = (loaded.deformation_m - before_m) / increment.step_s;
+            }
         }
         self.ledger.deformation_integral_m += deformation_m * (phase - self.phase).abs();
         self.phase = phase;

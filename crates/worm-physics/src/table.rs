@@ -531,6 +531,7 @@ impl Tables {
     }
 
     /// Whether some table is a force.
+    #[inline]
     pub(super) fn have_force(&self) -> bool {
         self.iter().any(|(table, _)| table.acts_on == ActsOn::ContactForce)
     }

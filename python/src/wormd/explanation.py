@@ -228,6 +228,44 @@ class ExplainedRun(Result):
 
 
 @dataclass(frozen=True)
+class LawOver(Result):
+    """What a law is about."""
+
+    acts_on: str
+    """``contact-force``, N, or ``friction-factor``."""
+    axis: str | list[str]
+    """What it depends on; two as a list."""
+    cell: int | None
+    """The cell that it is about, from 1; None for all."""
+    period: float | None
+    """Width after which it repeats, in the unit of its first axis."""
+
+
+@dataclass(frozen=True)
+class Law(LawOver):
+    """A law that no effect of the library is, at the points of a grid."""
+
+    sentence: str
+    """The law in a sentence."""
+    grid: list[float] | list[list[float]]
+    """The points; of two axes those of each."""
+    value: tuple[float, ...]
+    """The value at each point; of two axes those of the second for each point of the first, one after the other."""
+    band: tuple[tuple[float, ...], ...]
+    """90 % band of each."""
+    formula: str | None
+    """The nearest formula of few terms, in SI units, where one predicts as well."""
+    closure: float
+    """Fraction of the squared gap that it closes on cycles that it was not fitted to."""
+    closure_interval: tuple[float, ...]
+    """90 % interval of that."""
+    improvement: float
+    """Rise of twice the log likelihood of these cycles."""
+    rivals: tuple[LawOver, ...]
+    """Other laws that predict about as well."""
+
+
+@dataclass(frozen=True)
 class Explanation(Result):
     """The answer. Cells count from 1; `docs/explain.md` says how it is found and how far to trust it."""
 
@@ -245,6 +283,8 @@ class Explanation(Result):
     """The gap, stage by stage."""
     remainder: Remainder | None
     """What is left, where nothing explains it."""
+    law: Law | None
+    """The law that describes it, where one does."""
     next_experiment: NextExperiment | None
     """The experiment that would best decide what is left open."""
     calibration: tuple[Calibrated, ...]

@@ -136,7 +136,7 @@ fn a_pause_belongs_to_the_cycle_in_which_it_falls() {
     assert_eq!((cycles[0].index, cycles[0].settled), (2, 1));
     assert!((cycles[0].duration_s - 5.5).abs() < 0.2);
     assert!((cycles[0].energy_electrical_j - 0.5 * cycles[0].duration_s).abs() < 2e-3);
-    assert!((cycles[0].energy_copper_j - 0.04 * 3.4 * cycles[0].duration_s).abs() < 1e-3);
+    assert!((cycles[0].energy_copper_j - 0.04 * 3.32 * cycles[0].duration_s).abs() < 1e-3);
     assert!((cycles[0].energy_loss_j / truth.loss_j() - 1.0).abs() < 0.02);
 }
 

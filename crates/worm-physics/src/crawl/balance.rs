@@ -1,9 +1,9 @@
 //! The balance of the body within one increment.
 
-use super::{Crawl, Increment};
+use super::{Crawl, Increment, Trial};
 use crate::mechanics::Mechanics;
 use crate::pad::{Hold, Loaded, Pad, PadLaw, Rate};
-use crate::table::{Slopes, Whereabouts};
+use crate::table::{Slopes, Tables, Whereabouts};
 use crate::worm::SlidesDown;
 
 /// Tolerance of the balance, as a fraction of what the tips can hold.
@@ -102,21 +102,9 @@ impl Crawl {
             excess_n += loaded.force_n + drag * shift_m;
             slope_n_per_m += (loaded.tangent_n_per_m + drag) * gives;
             if let Some(tables) = tables {
-                let here = Whereabouts {
-                    deformation_m: loaded.deformation_m,
-                    deformation_rate_m_s: (loaded.deformation_m - cell.pad.deformation_m) / increment.step_s,
-                    speed_m_s: shift_m / increment.step_s,
-                    load_n: loaded.force_n + mechanics.standing_n[index],
-                    ..trial.here
-                };
-                let slopes = Slopes {
-                    deformation: (loaded.tangent_n_per_m / law.stiffness_n_per_m).clamp(0.0, 1.0),
-                    load_n_per_m: loaded.tangent_n_per_m,
-                    per_s: increment.step_s.recip(),
-                };
-                let (moving_n, moving_slope) = tables.moving_n(index, &here, &slopes);
-                trial.pushed_n = trial.standing_n + moving_n;
-                excess_n += trial.pushed_n;
+                let (pushed_n, moving_slope) = push(tables, mechanics, index, &cell.pad, trial, increment);
+                trial.pushed_n = pushed_n;
+                excess_n += pushed_n;
                 slope_n_per_m += moving_slope * gives;
             }
             mean_shift_m += shift_m;
@@ -142,6 +130,35 @@ impl Crawl {
         let step_s = increment.step_s;
         4.0 / (step_s * step_s) * (mean_shift_m - self.velocity_m_s * step_s) - self.acceleration_m_s2
     }
+}
+
+/// Force of tables on a cell at what is tried out, N, and its derivative by the cell's displacement, N/m. Apart from the loop over cells, so
+/// that worms without tables do not pay for it.
+#[cold]
+#[inline(never)]
+fn push(
+    tables: &Tables,
+    mechanics: &Mechanics,
+    index: usize,
+    pad: &Pad,
+    trial: &Trial,
+    increment: &Increment,
+) -> (f64, f64) {
+    let (loaded, step_s) = (&trial.loaded, increment.step_s);
+    let here = Whereabouts {
+        deformation_m: loaded.deformation_m,
+        deformation_rate_m_s: (loaded.deformation_m - pad.deformation_m) / step_s,
+        speed_m_s: trial.shift_m / step_s,
+        load_n: loaded.force_n + mechanics.standing_n[index],
+        ..trial.here
+    };
+    let slopes = Slopes {
+        deformation: (loaded.tangent_n_per_m / mechanics.pad[index].stiffness_n_per_m).clamp(0.0, 1.0),
+        load_n_per_m: loaded.tangent_n_per_m,
+        per_s: step_s.recip(),
+    };
+    let (moving_n, moving_slope) = tables.moving_n(index, &here, &slopes);
+    (trial.standing_n + moving_n, moving_slope)
 }
 
 /// A cell, between its drive and its tip.
