@@ -100,7 +100,7 @@ impl ServoLaws {
         self.ripple_n_m * (TAU * wave).sin()
     }
 
-    /// The duty that the bridge makes of one that is asked for.
+    /// The duty that the bridge applies when this one is commanded.
     pub fn duty(&self, wanted: f64) -> f64 {
         if wanted.abs() < self.dead_duty { 0.0 } else { wanted }
     }
