@@ -6,23 +6,18 @@
 use crate::failure::Failure;
 use crate::relay::message_json::Json;
 use crate::relay::outbox::SharedLine;
-use crate::relay::socket::{Listener, peer_of};
+use crate::relay::socket::Listener;
 use crate::relay::source::Seen;
 use crate::relay::watcher::{Gone, Watcher, shared};
 use crate::relay::wire::{Answer, Event, Frame, Hello, Line, Network, Request, RequestLine, VERSION};
 use crate::topics::{Controller, Instance, Relay, RoleLock};
 use crate::watch::picture::Picture;
-use nix::sys::socket::{setsockopt, sockopt::SndBuf};
 use std::collections::BTreeMap;
 use std::io;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What the kernel keeps for one watcher, bytes; as at the relay.
-const SEND_BUFFER: usize = 64 << 10;
-/// Most watchers; as at the relay.
-const MAX_WATCHERS: usize = 256;
 /// How long a watcher may take nothing; as at the relay.
 const STALL_LIMIT: Duration = Duration::from_secs(30);
 /// A watcher that was not heard for so long is not counted as there.
@@ -220,26 +215,7 @@ impl Offer {
     }
 
     fn welcome(&mut self, stream: UnixStream) -> io::Result<()> {
-        stream.set_nonblocking(true)?;
-        setsockopt(&stream, SndBuf, &SEND_BUFFER)?;
-        let (user, _) = peer_of(&stream)?;
-        let mut inner = Watcher {
-            stream,
-            user,
-            input: Vec::new(),
-            outbox: Default::default(),
-            seen: Seen::default(),
-            took: Instant::now(),
-            is_refused: false,
-        };
-        let own = nix::unistd::geteuid().as_raw();
-        if user != own && user != 0 {
-            inner.refuse(format!(
-                "this fleet belongs to user {own}: only that user and root may watch it"
-            ));
-        } else if self.watchers.len() >= MAX_WATCHERS {
-            inner.refuse(format!("{MAX_WATCHERS} watchers are connected already: close some"));
-        }
+        let (inner, _) = Watcher::admit(stream, "fleet", self.watchers.len())?;
         let watcher = LocalWatcher {
             inner,
             name: None,

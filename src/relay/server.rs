@@ -4,7 +4,7 @@ use super::commander::{Commander, Job, Outcome};
 use super::drive::{Decision, Drive, Effect, Identity, WatcherId};
 use super::event_log::EventLog;
 use super::outbox::{Outbox, SharedLine};
-use super::socket::{Listener, peer_of};
+use super::socket::Listener;
 use super::source::{Seen, Source};
 use super::watcher::{Gone, Watcher, shared};
 use super::wire::{Answer, Line, Request, RequestLine, VERSION};
@@ -13,7 +13,6 @@ use crate::realtime::monotonic_ns;
 use crate::topics::{Controller, Hub, Instance, Relay, RoleLock};
 use crate::trip::wire::Attendance;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use nix::sys::socket::{setsockopt, sockopt::SndBuf};
 use std::collections::BTreeMap;
 use std::io;
 use std::os::fd::AsFd;
@@ -29,12 +28,8 @@ pub(crate) const FRAME: Duration = Duration::from_millis(50);
 const LINGER: Duration = Duration::from_secs(5);
 /// How long a watcher may take nothing before it is cut off.
 const STALL_LIMIT: Duration = Duration::from_secs(30);
-/// What the kernel keeps for one watcher beside that, bytes: a second of frames.
-const SEND_BUFFER: usize = 64 << 10;
 /// How often a trip is told that somebody watches, ns.
 const ATTENDANCE_NS: u64 = 250_000_000;
-/// Most watchers: bounds the relay's memory.
-const MAX_WATCHERS: usize = 256;
 
 /// Serves until `end` is set, or nobody has watched for a while. Calls `ready` once watchers can connect.
 ///
@@ -185,33 +180,13 @@ impl Server {
     }
 
     fn welcome(&mut self, stream: UnixStream) -> io::Result<()> {
-        stream.set_nonblocking(true)?;
-        // What is old by the time it is read is of no use.
-        setsockopt(&stream, SndBuf, &SEND_BUFFER)?;
-        let (user, pid) = peer_of(&stream)?;
-        let mut watcher = Watcher {
-            stream,
-            user,
-            input: Vec::new(),
-            outbox: Outbox::default(),
-            seen: Seen::default(),
-            took: Instant::now(),
-            is_refused: false,
-        };
-        let own = nix::unistd::geteuid().as_raw();
-        if user != own && user != 0 {
-            watcher.refuse(format!(
-                "this worm belongs to user {own}: only that user and root may watch it"
-            ));
-        } else if self.watchers.len() >= MAX_WATCHERS {
-            watcher.refuse(format!("{MAX_WATCHERS} watchers are connected already: close some"));
-        }
+        let (mut watcher, pid) = Watcher::admit(stream, "worm", self.watchers.len())?;
         let id = self.next_id;
         self.next_id += 1;
         if !watcher.is_refused {
             // Nothing comes before it.
             watcher.seen = self.greet(&mut watcher.outbox)?;
-            let name = format!("process {pid}");
+            let (name, user) = (format!("process {pid}"), watcher.user);
             self.drive.join(id, Identity { name, user, pid });
             self.had_watchers = true;
         }

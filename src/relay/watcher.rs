@@ -1,13 +1,20 @@
 //! One watcher's connection.
 
 use super::outbox::{Outbox, Overflow, SharedLine};
+use super::socket::peer_of;
 use super::source::Seen;
 use super::wire::{Answer, Line, MAX_REQUEST, to_bytes};
 use crate::failure::Failure;
+use nix::sys::socket::{setsockopt, sockopt::SndBuf};
 use std::io::{self, Read};
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// What the kernel keeps for one watcher, bytes: what is old by the time it is read is of no use.
+const SEND_BUFFER: usize = 64 << 10;
+/// Most watchers of one socket.
+const MAX_WATCHERS: usize = 256;
 
 /// One connection.
 pub(crate) struct Watcher {
@@ -34,6 +41,35 @@ impl From<Overflow> for Gone {
 }
 
 impl Watcher {
+    /// Takes a connection, with its process. It is refused where its user is neither this one nor root, or `connected` are as many as there may be;
+    /// `offered` is what it wants to watch.
+    ///
+    /// # Errors
+    /// From the operating system, when the connection has ended.
+    pub(crate) fn admit(stream: UnixStream, offered: &str, connected: usize) -> io::Result<(Self, i32)> {
+        stream.set_nonblocking(true)?;
+        setsockopt(&stream, SndBuf, &SEND_BUFFER)?;
+        let (user, pid) = peer_of(&stream)?;
+        let mut watcher = Self {
+            stream,
+            user,
+            input: Vec::new(),
+            outbox: Outbox::default(),
+            seen: Seen::default(),
+            took: Instant::now(),
+            is_refused: false,
+        };
+        let own = nix::unistd::geteuid().as_raw();
+        if user != own && user != 0 {
+            watcher.refuse(format!(
+                "this {offered} belongs to user {own}: only that user and root may watch it"
+            ));
+        } else if connected >= MAX_WATCHERS {
+            watcher.refuse(format!("{MAX_WATCHERS} watchers are connected already: close some"));
+        }
+        Ok((watcher, pid))
+    }
+
     /// Reads what is there; returns its whole lines.
     pub(crate) fn read(&mut self) -> Result<Vec<Vec<u8>>, Gone> {
         let mut bytes = [0; MAX_REQUEST];
