@@ -1,9 +1,10 @@
 //! Commands of pages. Anyone may make the worm hold, with no more than a request; all else needs the token, and most of it the wheel.
 
 use super::access::bearer;
+use super::app::{App, Peer};
 use super::caller::Caller;
 use super::fleet::Held;
-use super::routes::{App, Peer, refused, to_json};
+use super::response::{refused, to_json};
 use crate::relay::wire::{Answer, Request};
 use axum::body::Bytes;
 use axum::extract::{Extension, Path, State};

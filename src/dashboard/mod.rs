@@ -12,7 +12,8 @@
 //! - [`feed`]: what is known of the worm, as events for pages. Pure.
 //! - [`relay_thread`]: the thread between relay and feed; [`seat`]: the connection of a page that drives.
 //! - [`server`]: connections and their limits; [`paced_stream`] cuts off who does not read.
-//! - [`routes`]: what can be asked for; [`commands`]: the commands among it; [`caller`]: who commands.
+//! - [`routes`]: what can be asked for; [`commands`]: the commands among it; [`caller`]: who commands; [`app`]: what answers are made of;
+//!   [`response`]: how they are written.
 //! - [`events`]: the stream of events.
 //! - [`fleet`]: all worms that there are here, and one hold for all of them.
 //! - [`metrics`]: the same for Prometheus.
@@ -20,6 +21,7 @@
 //! - [`assets`]: the page.
 
 mod access;
+mod app;
 mod assets;
 mod caller;
 mod commands;
@@ -31,6 +33,7 @@ mod metrics;
 mod paced_stream;
 mod relay_thread;
 mod reports;
+mod response;
 mod routes;
 mod seat;
 pub(crate) mod server;

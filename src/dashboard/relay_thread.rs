@@ -5,7 +5,7 @@
 
 use super::caller::Caller;
 use super::feed::Feed;
-use super::seat::Seat;
+use super::seat::{Reply, Seat};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::relay::client::{Received, RelayLink};
@@ -28,9 +28,6 @@ const POLL_MS: u16 = 100;
 const MAX_SEATS: usize = 16;
 /// How long a hold waits for a relay that is just starting.
 const HOLD_PATIENCE: Duration = Duration::from_secs(3);
-
-/// Takes the relay's answer, or why there is none.
-pub(super) type Reply = oneshot::Sender<Result<Answer, String>>;
 
 /// What pages want.
 enum Order {

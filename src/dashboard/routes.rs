@@ -1,10 +1,10 @@
 //! What can be asked for, and the rules that hold for all of it.
 
-use super::access::{Hosts, Source};
+use super::access::Source;
+use super::app::{App, MAX_PAGES};
 use super::assets::{self, Asset};
-use super::fleet::FleetThread;
-use super::relay_thread::{RelayThread, Shared};
-use super::{Token, commands, events, metrics, reports};
+use super::response::{refused, to_json};
+use super::{commands, events, metrics, reports};
 use crate::realtime::monotonic_ns;
 use axum::Router;
 use axum::body::Body;
@@ -17,21 +17,15 @@ use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
-use serde::Serialize;
 use serde_json::json;
-use std::net::IpAddr;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
 /// Largest body of a request, bytes.
 const MAX_BODY: usize = 4096;
 /// How long an answer may take, apart from a stream of events.
 const MAX_TIME: Duration = Duration::from_secs(10);
-/// Most streams of events at a time.
-pub(super) const MAX_PAGES: usize = 64;
 
 /// What the page may do: load its own files, and talk to this server.
 const POLICY: HeaderValue = HeaderValue::from_static(
@@ -44,22 +38,6 @@ const REPORT_POLICY: HeaderValue = HeaderValue::from_static(
      frame-ancestors 'none'",
 );
 const NO_STORE: HeaderValue = HeaderValue::from_static("no-store");
-
-/// The address of who asks.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Peer(pub(super) IpAddr);
-
-/// What all answers are made of.
-pub(super) struct App {
-    pub(super) shared: Shared,
-    pub(super) relay: RelayThread,
-    pub(super) fleet: FleetThread,
-    pub(super) token: Token,
-    pub(super) hosts: Hosts,
-    pub(super) reports: Option<PathBuf>,
-    /// Places for streams of events.
-    pub(super) pages: Arc<Semaphore>,
-}
 
 /// All routes.
 pub(super) fn router(app: Arc<App>) -> Router {
@@ -124,22 +102,6 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
     );
     headers.insert(HeaderName::from_static("cross-origin-opener-policy"), same_origin);
     response
-}
-
-/// An object in JSON.
-pub(super) fn to_json(status: StatusCode, value: &impl Serialize) -> Response {
-    match serde_json::to_string(value) {
-        Ok(text) => (status, [(CONTENT_TYPE, "application/json")], text).into_response(),
-        Err(error) => {
-            tracing::error!("an answer cannot be written: {error}");
-            StatusCode::INTERNAL_SERVER_ERROR.into_response()
-        }
-    }
-}
-
-/// A refusal, with what is wrong in `error`.
-pub(super) fn refused(status: StatusCode, why: &str) -> Response {
-    to_json(status, &json!({ "error": why }))
 }
 
 async fn asset_of(Path(path): Path<String>, headers: HeaderMap) -> Response {

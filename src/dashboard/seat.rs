@@ -1,16 +1,19 @@
 //! The connection of a page that drives: a watcher of its own, which is heard when the page is.
 
-use super::relay_thread::Reply;
 use crate::relay::client::Connection;
-use crate::relay::wire::{Line, Request, VERSION};
+use crate::relay::wire::{Answer, Line, Request, VERSION};
 use crate::topics::Instance;
 use std::collections::BTreeMap;
 use std::io;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
+use tokio::sync::oneshot;
 
 /// How long a page may say nothing before its connection is closed. The relay takes the wheel from it much earlier.
 const IDLE: Duration = Duration::from_secs(10);
+
+/// Takes the relay's answer, or why there is none.
+pub(super) type Reply = oneshot::Sender<Result<Answer, String>>;
 
 /// The seat of one page.
 pub(super) struct Seat {

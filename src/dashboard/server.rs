@@ -2,11 +2,12 @@
 
 use super::Token;
 use super::access::Hosts;
+use super::app::{App, MAX_PAGES, Peer};
 use super::feed::Feed;
 use super::fleet::FleetThread;
 use super::paced_stream::PacedStream;
 use super::relay_thread::{RelayThread, Shared};
-use super::routes::{App, MAX_PAGES, Peer, router};
+use super::routes::router;
 use crate::failure::Failure;
 use crate::relay::client::RelayLink;
 use crate::relay::wire::Subject;

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use testkit::hidden_effects::camera::Camera;
 use testkit::hidden_effects::detectability::{ComparedRun, Detector};
 use testkit::hidden_effects::folders::campaigns;
@@ -43,17 +43,7 @@ for difference in (
 ";
 
 fn python() -> Option<Command> {
-    let interpreter = std::env::var("WORMD_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let works = Command::new(&interpreter)
-        .args(["-c", "import mujoco, numpy"])
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success());
-    if !works {
-        println!("SKIPPED: {interpreter} cannot run `import mujoco, numpy`; set WORMD_PYTHON to one that can");
-        return None;
-    }
-    let mut command = Command::new(interpreter);
+    let mut command = testkit::python::python("import mujoco, numpy")?;
     command.env("PYTHONDONTWRITEBYTECODE", "1").current_dir(bed());
     Some(command)
 }

@@ -4,7 +4,7 @@
 //! say so and pass.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::UNIX_EPOCH;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, JsonMessage, Mode, Range, State, Timing, TripStatus};
 use worm_log::{Origin, Writer};
@@ -45,18 +45,8 @@ print(json.dumps(dict(columns=columns, rows=rows, facts=facts)))
 
 /// What the script prints about the file; nothing where the interpreter does not have the packages.
 fn python(packages: &str, script: &str, file: &Path) -> Option<serde_json::Value> {
-    let interpreter = std::env::var("WORMD_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let probe = format!("import {packages}");
-    let works = Command::new(&interpreter)
-        .args(["-c", &probe])
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success());
-    if !works {
-        println!("SKIPPED: {interpreter} cannot run `{probe}`; set WORMD_PYTHON to one that can");
-        return None;
-    }
-    let output = Command::new(interpreter).args(["-c", script]).arg(file).output();
+    let mut python = testkit::python::python(&format!("import {packages}"))?;
+    let output = python.args(["-c", script]).arg(file).output();
     let output = output.expect("python");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     Some(serde_json::from_slice(&output.stdout).expect("JSON"))

@@ -40,34 +40,16 @@ fn terminate(process: &mut Process) {
     assert!(status.success(), "{status}");
 }
 
-/// The interpreter that has the SDK, if there is one.
-fn python() -> Option<String> {
-    let python = std::env::var("WORMD_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let has_sdk = Command::new(&python)
-        .args(["-c", "import dynamixel_sdk"])
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success());
-    has_sdk.then_some(python)
-}
-
 #[test]
 fn the_official_sdk_is_satisfied() {
-    let Some(python) = python() else {
-        println!(
-            "SKIPPED: no Python with dynamixel_sdk; `pip install dynamixel-sdk`, and name the interpreter in WORMD_PYTHON"
-        );
+    let Some(mut python) = testkit::python::python("import dynamixel_sdk") else {
         return;
     };
     let folder = tempfile::tempdir().expect("a folder");
     let link = folder.path().join("worm");
     let mut process = virtual_worm(&link, &[]);
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/official_sdk.py");
-    let output = Command::new(python)
-        .arg(script)
-        .arg(&link)
-        .output()
-        .expect("Python runs");
+    let output = python.arg(script).arg(&link).output().expect("Python runs");
     print!("{}", String::from_utf8_lossy(&output.stdout));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     terminate(&mut process);

@@ -14,31 +14,18 @@ use nix::sys::signal::Signal;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{SystemTime, UNIX_EPOCH};
+use testkit::python::python;
 use worm::Worm;
 
 const CLIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/foxglove/client.py");
 
-/// The interpreter, if it has the packages.
-fn python() -> Option<Command> {
-    let interpreter = std::env::var("WORMD_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let probe = "import google.protobuf, websockets";
-    let works = Command::new(&interpreter)
-        .args(["-c", probe])
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success());
-    if !works {
-        println!("SKIPPED: {interpreter} cannot run `{probe}`; set WORMD_PYTHON to one that can");
-        return None;
-    }
-    Some(Command::new(interpreter))
-}
-
 #[test]
 fn a_client_decodes_every_state_and_learns_that_the_worm_is_silent() {
-    let Some(mut python) = python() else { return };
+    let Some(mut python) = python("import google.protobuf, websockets") else {
+        return;
+    };
     const STATES: usize = 500;
     let worm = Worm::on_a_steady_computer("foxglove");
     let mut stream = worm

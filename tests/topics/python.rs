@@ -16,17 +16,7 @@ const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 
 /// The interpreter with the package, if it can run `probe`.
 fn python(probe: &str) -> Option<Command> {
-    let interpreter = std::env::var("WORMD_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let works = Command::new(&interpreter)
-        .args(["-c", probe])
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success());
-    if !works {
-        println!("SKIPPED: {interpreter} cannot run `{probe}`; set WORMD_PYTHON to one that can");
-        return None;
-    }
-    let mut command = Command::new(interpreter);
+    let mut command = testkit::python::python(probe)?;
     command.current_dir(FOLDER).env("PYTHONPATH", "python/src");
     Some(command)
 }

@@ -11,6 +11,7 @@
 //! - [`process_pauses`]: stops and continues real processes, as a busy computer does.
 //! - [`pseudo_terminal`]: a terminal that ends with its test.
 //! - [`html`]: what every page must satisfy.
+//! - [`python`]: the interpreter of the tests that need one.
 
 #![allow(
     missing_docs,
@@ -25,5 +26,6 @@ pub mod log_sample;
 pub mod nominal;
 pub mod process_pauses;
 pub mod pseudo_terminal;
+pub mod python;
 pub mod random;
 pub mod recording_files;

@@ -8,7 +8,7 @@ use super::super::fit::Fit;
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;
 use super::evidence::Scores;
-use super::find::{FittedLaw, Start, fit_shape};
+use super::fitted_law::{FittedLaw, Start, fit_shape};
 use super::offer::Offer;
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;

@@ -1,0 +1,29 @@
+//! What all answers are made of.
+
+use super::Token;
+use super::access::Hosts;
+use super::fleet::FleetThread;
+use super::relay_thread::{RelayThread, Shared};
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use tokio::sync::Semaphore;
+
+/// Most streams of events at a time.
+pub(super) const MAX_PAGES: usize = 64;
+
+/// The address of who asks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Peer(pub(super) IpAddr);
+
+/// What all answers are made of.
+pub(super) struct App {
+    pub(super) shared: Shared,
+    pub(super) relay: RelayThread,
+    pub(super) fleet: FleetThread,
+    pub(super) token: Token,
+    pub(super) hosts: Hosts,
+    pub(super) reports: Option<PathBuf>,
+    /// Places for streams of events.
+    pub(super) pages: Arc<Semaphore>,
+}
