@@ -8,9 +8,10 @@ use super::{BOX_RECORD, END_RECORD, utc};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
+use worm_estimator::config::Config;
 use worm_log::{Outline, outline};
 
 /// The lock of whoever writes to a folder.
@@ -113,6 +114,19 @@ impl Folder {
         Self { path: path.to_owned() }
     }
 
+    /// The one that the configuration names, or else the place where the installed service keeps it.
+    pub(crate) fn configured(config: &Config) -> Self {
+        let configured = config
+            .black_box
+            .as_ref()
+            .and_then(|black_box| black_box.folder.as_ref());
+        let path = configured.map_or_else(
+            || PathBuf::from(format!("/var/lib/wormd/{}/black-box", config.worm.name)),
+            PathBuf::from,
+        );
+        Self { path }
+    }
+
     /// Its path.
     pub(crate) fn path(&self) -> &Path {
         &self.path
@@ -123,6 +137,20 @@ impl Folder {
     /// # Errors
     /// [`FolderError::Folder`] when the folder cannot be read.
     pub(crate) fn list(&self) -> Result<Vec<Entry>, FolderError> {
+        Ok(self.entries(&self.files()?))
+    }
+
+    /// The boxes in it, the oldest first; otherwise as [`list`](Self::list).
+    ///
+    /// # Errors
+    /// As [`list`](Self::list).
+    pub(crate) fn boxes(&self) -> Result<Vec<Entry>, FolderError> {
+        let mut files = self.files()?;
+        files.retain(|file| file.kind == FileKind::Box);
+        Ok(self.entries(&files))
+    }
+
+    fn entries(&self, files: &[Named]) -> Vec<Entry> {
         let entry = |named: &Named| match self.entry(named) {
             Ok(entry) => Some(entry),
             Err(error) => {
@@ -130,7 +158,7 @@ impl Folder {
                 None
             }
         };
-        Ok(self.files()?.iter().filter_map(entry).collect())
+        files.iter().filter_map(entry).collect()
     }
 
     /// The newest box that is complete, or else the newest there is.
@@ -138,8 +166,7 @@ impl Folder {
     /// # Errors
     /// As [`list`](Self::list).
     pub(crate) fn newest_box(&self) -> Result<Option<Entry>, FolderError> {
-        let mut boxes = self.list()?;
-        boxes.retain(|entry| entry.kind == FileKind::Box);
+        let mut boxes = self.boxes()?;
         Ok(match boxes.iter().rposition(|entry| !entry.under_way) {
             Some(place) => Some(boxes.swap_remove(place)),
             None => boxes.pop(),
@@ -371,7 +398,7 @@ fn parse(name: &str) -> Option<(FileKind, u64, bool)> {
 ///
 /// # Errors
 /// From the operating system, and when it has fewer bytes.
-pub(crate) fn open_from(path: &Path, offset: u64) -> io::Result<impl Read> {
+pub(crate) fn open_from(path: &Path, offset: u64) -> io::Result<File> {
     let mut file = File::open(path)?;
     let length = file.seek(SeekFrom::End(0))?;
     if offset > length {

@@ -101,13 +101,7 @@ impl PlaceArgs {
         if let Some(folder) = &self.folder {
             return Ok(Folder::new(folder));
         }
-        let config = self.worm.load()?;
-        let configured = config.black_box.and_then(|black_box| black_box.folder);
-        let folder = configured.map_or_else(
-            || PathBuf::from(format!("/var/lib/wormd/{}/black-box", config.worm.name)),
-            PathBuf::from,
-        );
-        Ok(Folder::new(&folder))
+        Ok(Folder::configured(&self.worm.load()?))
     }
 
     /// The file of a box, by name, number or "last".
@@ -132,8 +126,8 @@ impl PlaceArgs {
 
 fn list(args: &ListArgs) -> Result<(), Failure> {
     let folder = args.place.folder()?;
-    let mut entries = folder.list().map_err(Failure::unusable)?;
-    entries.retain(|entry| args.thin || entry.kind == FileKind::Box);
+    let entries = if args.thin { folder.list() } else { folder.boxes() };
+    let entries = entries.map_err(Failure::unusable)?;
     if args.json {
         return print::line(serde_json::to_string(&entries).map_err(Failure::failed)?);
     }

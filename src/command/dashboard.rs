@@ -1,6 +1,7 @@
 //! `wormd dashboard`: a running worm in a browser.
 
 use super::{Failure, WormArgs, ending_signals, print};
+use crate::black_box::folder::Folder;
 use crate::dashboard::server::{self, Settings};
 use crate::dashboard::{Token, listen};
 use crate::supervisor::controller::refuse_foreign;
@@ -30,6 +31,9 @@ pub struct DashboardArgs {
     /// Folder with reports of finished runs: folders that have a report.html
     #[arg(long, value_name = "DIR")]
     reports: Option<PathBuf>,
+    /// Folder of the black box, where it is another one than the configuration's
+    #[arg(long, value_name = "DIR")]
+    black_box: Option<PathBuf>,
 }
 
 /// Runs `wormd dashboard` until a signal ends it. Prints its address once browsers can come; the worm may come later, and go.
@@ -54,6 +58,9 @@ fn serve(args: &DashboardArgs, config: worm_estimator::config::Config, instance:
                 folder.display()
             ))
         })?;
+    }
+    if let Some(folder) = &args.black_box {
+        Folder::new(folder).boxes().map_err(Failure::unusable)?;
     }
     let configured = Token::configured(args.token_file.as_deref())?;
     let listener = listen(&args.listen, configured.as_ref())?;
@@ -82,7 +89,12 @@ fn serve(args: &DashboardArgs, config: worm_estimator::config::Config, instance:
     print::announce(text);
     let mut hosts = args.host.clone();
     hosts.extend(own_names());
+    let boxes = match &args.black_box {
+        Some(folder) => Folder::new(folder),
+        None => Folder::configured(&config),
+    };
     let settings = Settings {
+        boxes,
         config,
         instance: instance.clone(),
         arguments: args.worm.forward(),

@@ -4,6 +4,7 @@ use super::Token;
 use super::access::Hosts;
 use super::fleet::FleetThread;
 use super::relay_thread::{RelayThread, Shared};
+use crate::black_box::folder::Folder;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -24,6 +25,7 @@ pub(super) struct App {
     pub(super) token: Token,
     pub(super) hosts: Hosts,
     pub(super) reports: Option<PathBuf>,
+    pub(super) boxes: Folder,
     /// Places for streams of events.
     pub(super) pages: Arc<Semaphore>,
 }

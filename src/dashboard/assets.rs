@@ -50,6 +50,8 @@ pub(super) const ASSETS: &[Asset] = assets! {
     "panels.js": JS,
     "charts.js": JS,
     "reports.js": JS,
+    "boxes.js": JS,
+    "listing.js": JS,
     "fleet.js": JS,
     "dom.js": JS,
     "uplot/uPlot.iife.min.js": JS,

@@ -6,6 +6,7 @@ use super::caller::Caller;
 use super::fleet::Held;
 use super::response::{refused, to_json};
 use crate::relay::wire::{Answer, Request};
+use crate::trip::wire::Ask;
 use axum::body::Bytes;
 use axum::extract::{Extension, Path, State};
 use axum::http::header::{AUTHORIZATION, USER_AGENT, WWW_AUTHENTICATE};
@@ -20,7 +21,8 @@ const CLIENT: &str = "x-wormd-client";
 const NAME: &str = "x-wormd-name";
 
 /// The commands that there are.
-const COMMANDS: &str = "hold, crawl, stop, reset, arm, drive, take_over, acknowledge";
+const COMMANDS: &str =
+    "hold, crawl, stop, reset, arm, drive, take_over, acknowledge, trip_pause, trip_resume, trip_return";
 
 /// What may be in the body of a command.
 #[derive(Debug, Default, Deserialize)]
@@ -121,6 +123,9 @@ fn request(command: &str, details: Details) -> Option<Request> {
         "drive" => Request::Drive,
         "take_over" | "take-over" => Request::TakeOver,
         "acknowledge" => Request::Acknowledge { alarms: details.alarms },
+        "trip_pause" => Request::Trip { action: Ask::Pause },
+        "trip_resume" => Request::Trip { action: Ask::Resume },
+        "trip_return" => Request::Trip { action: Ask::Return },
         _ => return None,
     })
 }

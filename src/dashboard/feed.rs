@@ -7,6 +7,7 @@ use crate::relay::History;
 use crate::relay::message_json::Json;
 use crate::relay::wire::{Ages, Event, Frame, Hello, Sample, Subject};
 use crate::remedy;
+use crate::trip::words;
 use crate::watch::breakdown::Breakdown;
 use crate::watch::picture::Picture;
 use crate::watch::{alarm_text, recording};
@@ -94,6 +95,8 @@ struct Extra {
     energy: Vec<Breakdown>,
     raised_text: Vec<String>,
     recording_text: Option<String>,
+    trip_text: Option<String>,
+    trip_energy_text: Option<String>,
 }
 
 /// What the server says about itself beside the relay's frame.
@@ -329,6 +332,8 @@ impl Feed {
                 .map(|alarm| alarm_text::of(alarm, &picture.subject))
                 .collect(),
             recording_text: picture.recording.as_ref().map(recording::progress_text),
+            trip_text: picture.trip.as_ref().map(words::line),
+            trip_energy_text: picture.trip.as_ref().and_then(words::energy),
         };
         let frame = Frame {
             cycles: cycles.into_iter().map(Json).collect(),

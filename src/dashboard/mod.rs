@@ -17,12 +17,14 @@
 //! - [`events`]: the stream of events.
 //! - [`fleet`]: all worms that there are here, and one hold for all of them.
 //! - [`metrics`]: the same for Prometheus.
-//! - [`reports`]: reports of finished runs.
+//! - [`reports`]: reports of finished runs; [`boxes`]: files of the black box, whose downloads resume by [`byte_range`].
 //! - [`assets`]: the page.
 
 mod access;
 mod app;
 mod assets;
+mod boxes;
+mod byte_range;
 mod caller;
 mod commands;
 mod events;

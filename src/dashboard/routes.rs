@@ -4,7 +4,7 @@ use super::access::Source;
 use super::app::{App, MAX_PAGES};
 use super::assets::{self, Asset};
 use super::response::{refused, to_json};
-use super::{commands, events, metrics, reports};
+use super::{boxes, commands, events, metrics, reports};
 use crate::realtime::monotonic_ns;
 use axum::Router;
 use axum::body::Body;
@@ -53,6 +53,8 @@ pub(super) fn router(app: Arc<App>) -> Router {
         .route("/api/health", get(health))
         .route("/api/login", get(commands::login))
         .route("/api/reports", get(list_reports))
+        .route("/api/boxes", get(list_boxes))
+        .route("/boxes/{name}", get(download_box))
         .route("/api/command/{command}", post(commands::command))
         .route("/api/fleet", get(fleet))
         .route("/api/fleet/hold", post(commands::hold_fleet))
@@ -206,6 +208,31 @@ async fn open_report(State(app): State<Arc<App>>, Path(wanted): Path<String>) ->
             response
         }
         Ok(None) => refused(StatusCode::NOT_FOUND, "there is no such report"),
+        Err(why) => refused(StatusCode::INTERNAL_SERVER_ERROR, &why),
+    }
+}
+
+async fn list_boxes(State(app): State<Arc<App>>) -> Response {
+    let folder = app.boxes.clone();
+    let path = folder.path().display().to_string();
+    // Where no black box has ever been there is no folder, which is no error of the page.
+    if !folder.path().exists() {
+        return to_json(StatusCode::OK, &json!({ "folder": path, "boxes": [] }));
+    }
+    match in_background(move || folder.boxes().map_err(std::io::Error::other)).await {
+        Ok(boxes) => to_json(StatusCode::OK, &json!({ "folder": path, "boxes": boxes })),
+        Err(why) => refused(StatusCode::INTERNAL_SERVER_ERROR, &why),
+    }
+}
+
+async fn download_box(State(app): State<Arc<App>>, Path(wanted): Path<String>, headers: HeaderMap) -> Response {
+    let folder = app.boxes.clone();
+    match in_background(move || boxes::open(&folder, &wanted)).await {
+        Ok(Some(file)) => file.answer(&headers),
+        Ok(None) => refused(
+            StatusCode::NOT_FOUND,
+            "there is no such box, or it is still being written",
+        ),
         Err(why) => refused(StatusCode::INTERNAL_SERVER_ERROR, &why),
     }
 }

@@ -8,6 +8,7 @@ use super::fleet::FleetThread;
 use super::paced_stream::PacedStream;
 use super::relay_thread::{RelayThread, Shared};
 use super::routes::router;
+use crate::black_box::folder::Folder;
 use crate::failure::Failure;
 use crate::relay::client::RelayLink;
 use crate::relay::wire::Subject;
@@ -55,6 +56,8 @@ pub(crate) struct Settings {
     pub(crate) hosts: Vec<String>,
     /// Where reports are.
     pub(crate) reports: Option<PathBuf>,
+    /// The black box's.
+    pub(crate) boxes: Folder,
 }
 
 /// Serves until a byte can be read from `end`.
@@ -77,6 +80,7 @@ pub(crate) fn run(settings: Settings, end: std::os::unix::net::UnixStream) -> Re
         token: settings.token,
         hosts: Hosts::new(address.ip(), settings.hosts),
         reports: settings.reports,
+        boxes: settings.boxes,
         pages: Arc::new(Semaphore::new(MAX_PAGES)),
     });
     runtime.block_on(async {

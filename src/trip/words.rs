@@ -99,9 +99,6 @@ pub(crate) fn line(trip: &TripStatus) -> String {
         }
         _ => text += &format!(", {}", reason(trip)),
     }
-    if trip.needs_operator == 1 {
-        text += "; p twice: go on";
-    }
     if trip.link_is_lost == 1 {
         let policy = LinkLoss::try_from(trip.link_loss).map_or("?", LinkLoss::name);
         text += &format!("; link lost ({policy})");

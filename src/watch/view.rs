@@ -71,7 +71,12 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
             return Line::raw(text).fg(Color::Red);
         }
         let energy = words::energy(trip).map_or(String::new(), |energy| format!("  {energy}"));
-        Line::raw(format!(" {}{energy}", words::line(trip))).fg(Color::Blue)
+        let key = if trip.needs_operator == 1 {
+            "; p twice: go on"
+        } else {
+            ""
+        };
+        Line::raw(format!(" {}{key}{energy}", words::line(trip))).fg(Color::Blue)
     });
     frame.render_widget(trip_line.unwrap_or_default(), trip);
     match view.panel {

@@ -1,5 +1,6 @@
 // The page: listens, draws, and gives commands when somebody presses a button. Loading it, or its connecting again, sends nothing.
 
+import { loadBoxes } from "./boxes.js";
 import { Charts } from "./charts.js";
 import { byId, setText, show } from "./dom.js";
 import { Driver } from "./drive.js";
@@ -66,6 +67,7 @@ function draw() {
     panels.drawAlarms(store, (alarm) => command("acknowledge", { alarms: [alarm] }));
     panels.drawCycles(store);
     panels.drawRange(store);
+    panels.drawTrip(store, driver);
     panels.drawTiming(store);
     panels.drawRecording(store);
     panels.drawEvents(store);
@@ -101,7 +103,7 @@ async function command(name, details = null) {
     return;
   }
   const answer = await driver.command(name, details);
-  const what = name.replace("_", " ");
+  const what = name.replaceAll("_", " ");
   if (answer.ok) say(`${what}: ${answer.body.verdict}`, false);
   else say(`${what}: ${answer.text}`, true);
 }
@@ -124,7 +126,7 @@ async function logIn(event) {
   say("logged in: nothing has moved yet", false);
 }
 
-for (const name of ["hold", "arm", "crawl", "stop", "reset", "take_over"]) {
+for (const name of ["hold", "arm", "crawl", "stop", "reset", "take_over", "trip_pause", "trip_resume", "trip_return"]) {
   byId(name).addEventListener("click", () => command(name));
 }
 byId("log-in").addEventListener("click", openLogin);
@@ -132,6 +134,7 @@ byId("log-out").addEventListener("click", () => driver.logOut());
 byId("login-form").addEventListener("submit", logIn);
 byId("login-cancel").addEventListener("click", () => byId("login").close());
 byId("reports-again").addEventListener("click", loadReports);
+byId("boxes-again").addEventListener("click", loadBoxes);
 document.addEventListener("keydown", (event) => {
   const isTyping = event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey || event.altKey;
   if (event.key === "h" && !isTyping && !event.repeat) command("hold");
@@ -143,3 +146,4 @@ drawControls();
 drawOld();
 setInterval(drawOld, AGE_MS);
 loadReports();
+loadBoxes();

@@ -219,6 +219,20 @@ export function drawRange({ frame }) {
   ]);
 }
 
+/** A trip under way, or how the last one ended; its buttons for who is logged in. */
+export function drawTrip({ frame }, driver) {
+  const { trip } = frame;
+  show(byId("trip-panel"), Boolean(trip));
+  if (!trip) return;
+  const isOver = trip.phase === "done" || trip.phase === "aborted";
+  const question = !isOver && trip.needs_operator ? "; it waits for you" : "";
+  setText(byId("trip"), `${frame.trip_text}${question}`);
+  setText(byId("trip-energy"), frame.trip_energy_text ?? "");
+  show(byId("trip-drive"), driver.isLoggedIn && !isOver);
+  show(byId("trip_pause"), trip.phase !== "holding");
+  show(byId("trip_resume"), trip.phase === "holding");
+}
+
 export function drawTiming({ frame, worm }) {
   const { timing, statistics, state } = frame;
   if (timing) {
