@@ -86,6 +86,7 @@ fn motor_samples(worm: &Worm, gear: &GearModel, cycles: usize) -> Vec<MotorSampl
                 bus_voltage_v: 5.0,
                 duty: 0.3,
                 temperature_c: 25.0,
+                stamp_ns: 0,
             }
         })
         .collect()
