@@ -15,6 +15,7 @@ const hasBit = (mask, code) => Math.floor((mask ?? 0) / 2 ** code) % 2 === 1;
 const ALARMS = [
   "motor-stall", "jammed-cell", "no-progress", "sliding-down", "energy-over-budget", "battery-low", "link-fault", "tracker-fault",
   "device-fault", "model-mismatch", "recording-stopped",
+  "friction-loss", "inferred-jam", "more-load",
 ];
 
 /** Why what is shown is old, or null. */

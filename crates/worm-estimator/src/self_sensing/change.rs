@@ -6,6 +6,7 @@
 
 use super::parameters::{Parameters, Vector};
 use super::profile::BINS_PER_STEP;
+use std::f64::consts::TAU;
 use worm_physics::{MAX_CELLS, Worm};
 
 /// Cycles that must be known before a cycle can differ from them.
@@ -40,12 +41,18 @@ pub struct Changes {
     pub jammed: u16,
     /// The load is larger than usual: a pull on the body or friction of the gears. The current alone hardly says which.
     pub more_load: bool,
+    /// Largest share of a cell's friction that is lost.
+    pub loss_share: f64,
+    /// By how much the load is larger, as a pull on the body, N.
+    pub load_rise_n: f64,
+    /// Torque late in the step of the cell that moves least, as a share of the usual.
+    pub reach_share: f64,
 }
 
 impl Changes {
     /// Whether anything differs.
     pub fn any(&self) -> bool {
-        *self != Self::default()
+        self.friction_lost != 0 || self.jammed != 0 || self.more_load
     }
 }
 
@@ -70,6 +77,7 @@ pub(super) struct ChangeDetector {
     cells: usize,
     step_order: [usize; MAX_CELLS],
     gear_friction_n_m: f64,
+    pull_per_torque: f64, // 1/m: a pull on the body that raises the mean torque as much as friction in the gears
     in_a_row: u32,
     reference: Option<Reference>,
     changes: Changes,
@@ -119,6 +127,7 @@ impl ChangeDetector {
             cells,
             step_order,
             gear_friction_n_m,
+            pull_per_torque: TAU / worm.stroke_m(),
             in_a_row: 0,
             reference: None,
             changes: Changes::default(),
@@ -157,13 +166,16 @@ impl ChangeDetector {
         let gear_friction_n_m = self.gear_friction_n_m;
         let step_order = self.step_order;
         let step_order = &step_order[..self.cells];
-        let sigma_of = |index: usize, scatter: f64| (sigma[index].powi(2) + scatter * scatter).sqrt();
+        // While a change stands, one cycle of the changed worm is enough to see that it is over; that one scatters as well.
+        let is_enough = *cycles >= KNOWN_CYCLES || self.reference.is_some();
+        let widened = if *cycles < KNOWN_CYCLES { 2f64.sqrt() } else { 1.0 };
+        let sigma_of = |index: usize, scatter: f64| widened * (sigma[index].powi(2) + scatter * scatter).sqrt();
         let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
         self.armed = Armed {
             pull_sigma_n: sigma_of(pull_at, PULL_SCATTER_N),
             ..Armed::default()
         };
-        if *cycles < KNOWN_CYCLES {
+        if !is_enough {
             return Seen::Usual;
         }
         let before = Reference::of(usual, mean_n_m, usual.values[usual.gears_at()], step_order);
@@ -198,7 +210,7 @@ impl ChangeDetector {
     pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64]) {
         let Some(reference) = self.reference else { return };
         let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
-        self.changes = reference.compare(&now, self.cells, self.gear_friction_n_m);
+        self.changes = reference.compare(&now, self.cells, self.gear_friction_n_m, self.pull_per_torque);
         if !self.changes.any() {
             self.reference = None;
         }
@@ -220,9 +232,16 @@ impl Reference {
         reference
     }
 
-    fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64) -> Changes {
-        let mut changes = Changes::default();
+    fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64, pull_per_torque: f64) -> Changes {
+        let mut changes = Changes {
+            reach_share: f64::INFINITY,
+            load_rise_n: now.pull_n - self.pull_n + (now.gear_n_m - self.gear_n_m) * pull_per_torque,
+            ..Changes::default()
+        };
         for cell in 0..cells {
+            changes.reach_share = changes.reach_share.min(now.reach_n_m[cell] / self.reach_n_m[cell]);
+            let lost_share = 1.0 - (now.ln_friction[cell] - self.ln_friction[cell]).exp();
+            changes.loss_share = changes.loss_share.max(lost_share);
             if now.reach_n_m[cell] < JAMMED_SHARE * self.reach_n_m[cell] {
                 changes.jammed |= 1 << cell;
             } else if now.ln_friction[cell] - self.ln_friction[cell] < -FRICTION_CHANGE {

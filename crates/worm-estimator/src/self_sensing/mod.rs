@@ -49,6 +49,8 @@ use worm_physics::{MAX_CELLS, Worm};
 
 /// Longest turn of the cam between two readings that is still bridged, cycles.
 const LONGEST_TURN: f64 = 0.02;
+/// Longest time that the cam may stand in a cycle that is fitted, s: tips give way meanwhile, and it then starts with a ramp.
+const LONGEST_REST_S: f64 = 0.1;
 /// Longest time between two readings over which power is taken to be linear, s.
 const LONGEST_GAP_S: f64 = 0.1;
 /// Standard deviation of a voltage read in steps of 0.1 V, V, and of a current read in steps of 1 mA, A.
@@ -205,6 +207,7 @@ pub struct SelfSensing {
     reckoning: DeadReckoning,
     advance_m: [f64; 2], // a cycle, forward and backward, along the crawl
     last: Option<Reading>,
+    turned_s: f64, // when the cam was last seen to turn
     whole: bool, // the open cycle was seen from its beginning; never the first, in which the tips load up
     energy: Energy,
     evaluations: u32,            // with each reading
@@ -257,6 +260,7 @@ impl SelfSensing {
             advance_m: [advance_m, fit.backward_advance_m().unwrap_or(advance_m)],
             fit,
             last: None,
+            turned_s: f64::INFINITY,
             whole: false,
             energy: Energy::default(),
             evaluations: config.evaluations_per_reading.max(1),
@@ -313,8 +317,12 @@ impl SelfSensing {
         let Some(last) = self.last.replace(reading) else { return };
         let turned = sample.phase - last.sample.phase;
         if turned == 0.0 {
+            if sample.time_s - self.turned_s > LONGEST_REST_S {
+                self.whole = false;
+            }
             return;
         }
+        self.turned_s = sample.time_s;
         self.reckon(turned);
         self.add_energy(&last.sample, sample);
         if !(0.0..=LONGEST_TURN).contains(&turned) {
@@ -346,6 +354,16 @@ impl SelfSensing {
     /// Corrects the distance by a known position.
     pub fn mark(&mut self, mark: &Mark) {
         self.reckoning.mark(mark);
+    }
+
+    /// The worm is here, whatever was reckoned before: nothing is learned from the difference.
+    pub fn place(&mut self, mark: &Mark) {
+        self.reckoning.place(mark);
+    }
+
+    /// How far the worm advances while the cam turns by so many cycles, negative backward, m.
+    pub fn crawled_m(&self, turned: f64) -> f64 {
+        turned * self.advance_m[usize::from(turned < 0.0)]
     }
 
     /// Where the worm is by dead reckoning, along the canal from where it began.
@@ -431,7 +449,8 @@ impl SelfSensing {
 
     /// Brings everything that follows from the fit up to date.
     fn follow(&mut self, cycle: &ClosedCycle) {
-        if self.has_changed {
+        // While a change stands, every cycle says anew in what the worm differs, and whether it still does.
+        if self.has_changed || self.detector.changes().any() {
             self.detector.judge(self.fit.parameters(), self.fit.cycle_n_m());
         }
         if let Some((figures, sigma)) = self.fit.figures() {

@@ -134,7 +134,7 @@ fn with_gaps() -> Telemetry {
         fault: 0,
         alarm_mask: 1 << AlarmKind::JammedCell.code(),
     };
-    telemetry.commands = vec![CommandRecord::new(3, 1_000_000_001, true, &crawl, &reply)];
+    telemetry.commands = vec![CommandRecord::new(3, (1_000_000_001, 2.5), true, &crawl, &reply)];
     telemetry
 }
 
