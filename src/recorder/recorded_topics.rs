@@ -23,7 +23,13 @@ impl Batch {
     /// How many messages.
     pub(crate) fn len(&self) -> usize {
         let by_tick = self.states.len() + self.timings.len() + self.estimates.len();
-        by_tick + self.cycles.len() + self.alarms.len() + self.ranges.len() + self.commands.len() + self.trips.len() + self.inferred.len()
+        by_tick
+            + self.cycles.len()
+            + self.alarms.len()
+            + self.ranges.len()
+            + self.commands.len()
+            + self.trips.len()
+            + self.inferred.len()
     }
 }
 

@@ -3,8 +3,8 @@
 use iceoryx2::prelude::{Node, ipc};
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use worm_estimator::message::{
-    Alarm, BlackBoxStatus, Command, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, Reply, State, Timing,
-    TripStatus,
+    Alarm, BlackBoxStatus, Command, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, Reply, State,
+    Timing, TripStatus,
 };
 
 /// The variant of iceoryx2 in use: between processes, ports bound to their thread.

@@ -5,8 +5,8 @@ use super::services::{EventService, Services, TopicService};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
 use worm_estimator::message::{
-    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldValue, Inferred, Layout, Range, RecordingStatus,
-    State, Timing, TripStatus,
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldValue, Inferred, Layout, Range,
+    RecordingStatus, State, Timing, TripStatus,
 };
 
 /// A message that is published on a topic of its own.

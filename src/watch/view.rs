@@ -248,7 +248,10 @@ fn draw_tips(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
     let block = Block::bordered()
         .title(" tips ")
         .title_bottom(Line::from(summary.and_then(|it| it.text()).unwrap_or_default()).fg(Color::Blue));
-    let Some(estimate) = picture.estimate.filter(|_| picture.has_positions() || inferred.is_none()) else {
+    let Some(estimate) = picture
+        .estimate
+        .filter(|_| picture.has_positions() || inferred.is_none())
+    else {
         draw_inferred_tips(frame, area, block, picture);
         return;
     };
@@ -297,7 +300,12 @@ fn draw_inferred_tips(frame: &mut Frame<'_>, area: Rect, block: Block<'_>, pictu
         return;
     };
     let columns = fitting(
-        &[("cell", 4), ("friction N", 12), ("stiffness N/m", 13), ("slides fwd/back mm", 18)],
+        &[
+            ("cell", 4),
+            ("friction N", 12),
+            ("stiffness N/m", 13),
+            ("slides fwd/back mm", 18),
+        ],
         block.inner(area).width,
     );
     let row = |cell: usize| {
@@ -306,15 +314,23 @@ fn draw_inferred_tips(frame: &mut Frame<'_>, area: Rect, block: Block<'_>, pictu
         let fields = [
             cell_number(cell),
             inferred::friction_text(&inferred, cell).unwrap_or_else(|| "–".to_owned()),
-            if is_known { format!("~{stiffness:.0}±{sigma:.0}") } else { "–".to_owned() },
+            if is_known {
+                format!("~{stiffness:.0}±{sigma:.0}")
+            } else {
+                "–".to_owned()
+            },
             format!(
                 "~{:.1}/{:.1}",
                 inferred.forward_slide_m[cell] * 1e3,
                 inferred.backward_slide_m[cell] * 1e3
             ),
         ];
-        Row::new(fields.into_iter().take(if is_known { columns.len() } else { 3.min(columns.len()) }))
-            .style(Style::new().fg(Color::Blue))
+        Row::new(
+            fields
+                .into_iter()
+                .take(if is_known { columns.len() } else { 3.min(columns.len()) }),
+        )
+        .style(Style::new().fg(Color::Blue))
     };
     let cells = (inferred.cell_count as usize).min(worm_physics::MAX_CELLS);
     let rows = (0..cells).map(row).collect();

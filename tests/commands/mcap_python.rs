@@ -6,7 +6,9 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::UNIX_EPOCH;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Inferred, JsonMessage, Mode, Range, State, Timing, TripStatus};
+use worm_estimator::message::{
+    Alarm, AlarmKind, Cycle, Estimate, Inferred, JsonMessage, Mode, Range, State, Timing, TripStatus,
+};
 use worm_log::{Origin, Writer};
 
 /// Prints what the readers find, by topic: schema, and time and content of each message.

@@ -26,16 +26,24 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
     let config = worm.config(FAST);
     let fault = format!("slip:friction=0.6,cell=2@{WET_FROM_S}");
     let up = [
-        "up", "--json", "--duration", "32", "--config", &config, "--record", &file, "--fault", &fault,
+        "up",
+        "--json",
+        "--duration",
+        "32",
+        "--config",
+        &config,
+        "--record",
+        &file,
+        "--fault",
+        &fault,
     ];
-    let summary = std::thread::scope(|scope| {
-        let running = scope.spawn(|| json(&worm.wormd(&up).output()));
-        wait_for("the mark is taken", PATIENCE, || {
-            let mark = ["command", "mark", "--position", "0.5", "--sigma", "0.002"];
-            worm.wormd(&mark).output().status.success()
-        });
-        running.join().expect("the main job ends")
+    let main_job = worm.wormd(&up);
+    let running = std::thread::spawn(move || main_job.output());
+    wait_for("the mark is taken", PATIENCE, || {
+        let mark = ["command", "mark", "--position", "0.5", "--sigma", "0.002"];
+        worm.wormd(&mark).output().status.success()
     });
+    let summary = json(&running.join().expect("the main job ends"));
     let inferred = &summary["inferred"];
     println!("{inferred:#}");
     for name in ["friction", "stiffness"] {
@@ -60,18 +68,33 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
 
     let replay = json(&worm.replay(&file));
     for what in ["estimates", "alarms", "inferred"] {
-        assert_eq!(replay[format!("{what}_identical")], replay[format!("{what}_compared")], "{replay}");
+        assert_eq!(
+            replay[format!("{what}_identical")],
+            replay[format!("{what}_compared")],
+            "{replay}"
+        );
     }
     assert!(replay["inferred_compared"].as_u64() > Some(5), "{replay}");
 
     // Without a look at positions, `infer` finds the same worm.
     let log = messages(file.as_ref()).expect("a log");
-    let mark = log.commands.iter().find(|record| record.position_m == 0.5).expect("the mark");
+    let mark = log
+        .commands
+        .iter()
+        .find(|record| record.position_m == 0.5)
+        .expect("the mark");
     assert_eq!(mark.sender.as_str(), "wormd command");
     let answer = json(&worm.plain_wormd(&["infer", "--json", &file]).output());
-    let live = log.inferred.iter().rfind(|inferred| inferred.end_ns != 0).expect("cycles");
+    let live = log
+        .inferred
+        .iter()
+        .rfind(|inferred| inferred.end_ns != 0)
+        .expect("cycles");
     let cycles = answer["cycles"].as_array().expect("a list");
-    let same = cycles.iter().find(|cycle| cycle["phase"] == live.end_phase).expect("that cycle");
+    let same = cycles
+        .iter()
+        .find(|cycle| cycle["phase"] == live.end_phase)
+        .expect("that cycle");
     assert_eq!(same["advance_m"], live.advance_m);
     assert_eq!(same["energy_loss_sigma_j"], live.energy_loss_sigma_j);
 }
@@ -80,8 +103,14 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
 fn a_mark_must_make_sense() {
     let crawling = Crawling::start("mark");
     let mark = |arguments: &[&str]| {
-        let output = crawling.worm.wormd(&[&["command", "mark"], arguments].concat()).output();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        let output = crawling
+            .worm
+            .wormd(&[&["command", "mark"], arguments].concat())
+            .output();
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        )
     };
     for (arguments, named) in [
         (&[][..], "--position"),

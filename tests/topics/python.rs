@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use worm_estimator::message::{
-    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldKind, FieldValue, Inferred, Range, RecordingStatus,
-    State, Timing, TripStatus,
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldKind, FieldValue, Inferred, Range,
+    RecordingStatus, State, Timing, TripStatus,
 };
 use wormd::topics::{BlackBox, Controller, Estimator, Hub, Recorder, RoleLock, Trip, describe_topics};
 

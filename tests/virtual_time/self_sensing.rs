@@ -92,6 +92,19 @@ fn the_running_estimator_infers_what_the_current_alone_says() {
     };
     let live = observe(0);
     assert_eq!(text(&live), text(&observe(90)));
+    // Once the model's prediction is made, nothing of it allocates: not the search of the third cycle either.
+    let mut observer = Observer::new(&config).expect("a valid configuration");
+    let (before, after) = states.split_at(6_000);
+    before.iter().for_each(|state| drop(observer.update(state)));
+    let mut messages = 0;
+    let allocated = allocation_counter::measure(|| {
+        for state in after {
+            messages += usize::from(observer.update(state).inferred.is_some());
+        }
+    });
+    assert_eq!(allocated.count_total, 0);
+    assert!(messages >= 3, "{messages} messages");
+
     let mut alone = Inference::by_current_alone(&config).expect("a valid configuration");
     let mut blind = Vec::new();
     for state in &states {
@@ -104,7 +117,9 @@ fn the_running_estimator_infers_what_the_current_alone_says() {
     }
     let ends = |messages: &[Inferred]| -> Vec<Inferred> {
         let mut last_ns = 0;
-        let fitted = messages.iter().filter(|message| message.end_ns != std::mem::replace(&mut last_ns, message.end_ns));
+        let fitted = messages
+            .iter()
+            .filter(|message| message.end_ns != std::mem::replace(&mut last_ns, message.end_ns));
         fitted
             .map(|message| Inferred {
                 sequence: 0,
@@ -125,8 +140,18 @@ fn the_running_estimator_infers_what_the_current_alone_says() {
         last.position_m, last.position_sigma_m, unseen.position_m, unseen.position_sigma_m
     );
     assert!(last.position_sigma_m < 1e-3 && unseen.position_sigma_m > 1e-3);
-    let travelled_m: f64 = session.machine.plant().ledger().cycles().iter().map(|cycle| cycle.advance_m).sum();
-    assert!((unseen.position_at_m(last.end_phase) / travelled_m - 1.0).abs() < 0.1, "of {travelled_m} m");
+    let travelled_m: f64 = session
+        .machine
+        .plant()
+        .ledger()
+        .cycles()
+        .iter()
+        .map(|cycle| cycle.advance_m)
+        .sum();
+    assert!(
+        (unseen.position_at_m(last.end_phase) / travelled_m - 1.0).abs() < 0.1,
+        "of {travelled_m} m"
+    );
 }
 
 fn text(messages: &[Inferred]) -> Vec<u8> {
@@ -148,14 +173,19 @@ fn lost_friction_raises_its_alarm() {
         let fault = format!("slip:friction=0.65,cell={cell}").parse().expect("a fault");
         session.machine.switch_on(fault).expect("it can be switched on");
         let from_s = session.now_s();
-        session.run_s(7.5 + 0.2, |_| {});
-        let alarm = session.raised.iter().find(|alarm| alarm.kind == AlarmKind::FrictionLoss.code());
+        // Three cycles; one more where the cell had already stepped when it lost its friction.
+        session.run_s(4.0 * config.gait.cycle_s, |_| {});
+        let alarm = session
+            .raised
+            .iter()
+            .find(|alarm| alarm.kind == AlarmKind::FrictionLoss.code());
         let alarm = alarm.unwrap_or_else(|| panic!("cell {cell}, {slope_deg}°: {:?}", session.raised));
+        let cycles = (alarm.time_ns as f64 * 1e-9 - from_s) / config.gait.cycle_s;
         println!(
-            "cell {cell}, {slope_deg}°: {:.1} cycles after the loss, share {:.2}",
-            (alarm.time_ns as f64 * 1e-9 - from_s) / config.gait.cycle_s,
+            "cell {cell}, {slope_deg}°: {cycles:.1} cycles after the loss, share {:.2}",
             alarm.value
         );
+        assert!(cycles < 3.2);
         assert_eq!(alarm.cell + 1, cell);
     }
 }

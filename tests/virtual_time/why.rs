@@ -152,7 +152,13 @@ fn explained((done, lasts_s, toml, ..): &Case) -> Explanation {
                 fault: tick.state.fault,
                 alarm_mask: 0,
             };
-            commands.push(CommandRecord::new(0, (tick.state.time_ns, tick.state.phase), false, &told, &reply));
+            commands.push(CommandRecord::new(
+                0,
+                (tick.state.time_ns, tick.state.phase),
+                false,
+                &told,
+                &reply,
+            ));
             states.push(tick.state);
         }
     }

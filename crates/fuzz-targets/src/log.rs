@@ -6,8 +6,8 @@ use std::path::Path;
 use worm_analysis::recording::mcap;
 use worm_estimator::config::Config;
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, Inferred, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
-    TripStatus,
+    Alarm, CommandRecord, Cycle, Estimate, Inferred, JsonMessage, ProtobufMessage, Range, RecordingStatus, State,
+    Timing, TripStatus,
 };
 use worm_log::{Log, compare, messages_from, outline, replay};
 

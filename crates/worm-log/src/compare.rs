@@ -76,9 +76,12 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
         (range.index, range.end_ns)
     });
     let replayed: &[_] = if log.inferred.is_empty() { &[] } else { &replay.inferred };
-    let inferred = span.agreement("messages of self-sensing", log.inferred.iter().copied(), replayed, |inferred| {
-        (inferred.sequence, inferred.time_ns)
-    });
+    let inferred = span.agreement(
+        "messages of self-sensing",
+        log.inferred.iter().copied(),
+        replayed,
+        |inferred| (inferred.sequence, inferred.time_ns),
+    );
 
     let mut gaps = Vec::new();
     if !replay.first_is_known {

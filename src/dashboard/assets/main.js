@@ -66,6 +66,7 @@ function draw() {
     panels.drawAlarms(store, (alarm) => command("acknowledge", { alarms: [alarm] }));
     panels.drawCycles(store);
     panels.drawRange(store);
+    panels.drawInferred(store);
     panels.drawTiming(store);
     panels.drawRecording(store);
     panels.drawEvents(store);

@@ -116,7 +116,11 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
             },
         };
         // What is inferred is hollow.
-        let sides = if by_current.is_some() { ["[", "]"] } else { ["▐", "▌"] };
+        let sides = if by_current.is_some() {
+            ["[", "]"]
+        } else {
+            ["▐", "▌"]
+        };
         for (offset, text) in [(0, sides[0]), (1, ""), (2, sides[1])] {
             let Some(slot) = (at + offset).checked_sub(1).and_then(|index| body.get_mut(index)) else {
                 continue;

@@ -39,9 +39,9 @@ pub struct Inference {
     noise_m: f64,
     uses_positions: bool,
     first_sequence: Option<u64>,
-    last: Option<(u64, f64)>, // sequence and phase of the last state
+    last: Option<(u64, f64)>,   // sequence and phase of the last state
     sample: Option<(u64, f64)>, // time, ns, and mean position, m, of the newest tracker sample with all cells
-    is_placed: bool,          // a sample has said where the worm begins
+    is_placed: bool,            // a sample has said where the worm begins
     waiting: [Option<WaitingMark>; MAX_WAITING],
     made: u64,
     marks: u32,

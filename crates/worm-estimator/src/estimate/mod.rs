@@ -30,7 +30,7 @@
 //!
 //! # Cost
 //! A tick without a sample takes some tens of nanoseconds, one with a sample less than a microsecond for four cells, and the end of a
-//! cycle some 200 µs, with a battery twice that. Nothing is allocated after construction, except in the model's prediction, once for each set of bounds.
+//! cycle some 200 µs, with a battery twice that. Self-sensing takes a few microseconds more in each tick while it fits a cycle. Nothing is allocated after construction, except in the model's prediction, once for each set of bounds.
 
 pub mod alarm;
 

@@ -129,7 +129,11 @@ message! {
 impl Inferred {
     /// The distance by dead reckoning at a later phase, m, where the worm crawls on as it did.
     pub fn position_at_m(&self, phase: f64) -> f64 {
-        let advance_m = if self.advance_m.is_finite() { self.advance_m } else { 0.0 };
+        let advance_m = if self.advance_m.is_finite() {
+            self.advance_m
+        } else {
+            0.0
+        };
         self.position_m + (phase - self.phase) * advance_m
     }
 }

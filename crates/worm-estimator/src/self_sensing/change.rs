@@ -5,7 +5,7 @@
 //! the worm is another now. What it finds is compared with the worm before, and the alarms stand until cycles are again like those.
 
 use super::parameters::{Parameters, Vector};
-use super::profile::BINS_PER_STEP;
+use super::profile::{BINS_PER_STEP, MAX_BINS};
 use std::f64::consts::TAU;
 use worm_physics::{MAX_CELLS, Worm};
 
@@ -19,6 +19,8 @@ const FRICTION_CHANGE: f64 = 0.175;
 const PULL_CHANGE_N: f64 = 0.3;
 /// … or in the gears, as a share of their friction.
 const GEAR_CHANGE: f64 = 0.15;
+/// Share of a change that the profile must show directly: one step from the fit shows less than there is.
+const SHOWN_SHARE: f64 = 0.5;
 /// Standard errors by which a change must be known.
 const SIGMAS: f64 = 3.5;
 /// Gait-to-gait scatter of ln friction, and of the pull, N, beyond the noise of one cycle.
@@ -80,6 +82,7 @@ pub(super) struct ChangeDetector {
     pull_per_torque: f64, // 1/m: a pull on the body that raises the mean torque as much as friction in the gears
     in_a_row: u32,
     reference: Option<Reference>,
+    reference_n_m: Box<[f64; MAX_BINS]>, // its mean profile
     changes: Changes,
     armed: Armed,
 }
@@ -130,6 +133,7 @@ impl ChangeDetector {
             pull_per_torque: TAU / worm.stroke_m(),
             in_a_row: 0,
             reference: None,
+            reference_n_m: Box::new([0.0; MAX_BINS]),
             changes: Changes::default(),
             armed: Armed::default(),
         }
@@ -202,18 +206,61 @@ impl ChangeDetector {
             return Seen::Odd;
         }
         self.in_a_row = 0;
-        self.reference.get_or_insert(before);
+        if self.reference.is_none() {
+            self.reference = Some(before);
+            self.reference_n_m[..mean_n_m.len()].copy_from_slice(mean_n_m);
+        }
         Seen::Changed
     }
 
+    /// Mean profile of the worm before it changed, while it is another.
+    pub(super) fn reference_n_m(&self) -> Option<&[f64]> {
+        self.reference
+            .map(|_| &self.reference_n_m[..self.cells * BINS_PER_STEP])
+    }
+
     /// Says in what a changed worm differs from the one before, once it is fitted anew.
-    pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64]) {
-        let Some(reference) = self.reference else { return };
-        let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
-        self.changes = reference.compare(&now, self.cells, self.gear_friction_n_m, self.pull_per_torque);
-        if !self.changes.any() {
+    ///
+    /// `difference` is what the cycle's profile says directly, by one step from the fit. Where a profile has two answers, the fits before and
+    /// after may be at different ones, and differ although the profiles do not.
+    pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64], difference: Option<&Vector>) {
+        let Some(changes) = self.changes_of(changed, torque_n_m, difference) else {
+            return;
+        };
+        self.changes = changes;
+        if !changes.any() {
             self.reference = None;
         }
+    }
+
+    /// The same by a first answer, which only counts where it shows a change. True when it does.
+    pub(super) fn judge_early(
+        &mut self,
+        changed: &Parameters,
+        torque_n_m: &[f64],
+        difference: Option<&Vector>,
+    ) -> bool {
+        let changes = self.changes_of(changed, torque_n_m, difference).filter(Changes::any);
+        if let Some(changes) = changes {
+            self.changes = changes;
+        }
+        changes.is_some()
+    }
+
+    fn changes_of(&self, changed: &Parameters, torque_n_m: &[f64], difference: Option<&Vector>) -> Option<Changes> {
+        let reference = self.reference?;
+        let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
+        let mut changes = reference.compare(&now, self.cells, self.gear_friction_n_m, self.pull_per_torque);
+        if let Some(difference) = difference {
+            for cell in (0..self.cells).filter(|&cell| difference[cell] > -SHOWN_SHARE * FRICTION_CHANGE) {
+                changes.friction_lost &= !(1 << cell);
+            }
+            changes.all_friction_lost &= changes.friction_lost.count_ones() as usize == self.cells;
+            let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
+            changes.more_load &= difference[pull_at] > SHOWN_SHARE * PULL_CHANGE_N
+                || difference[gear_at] > SHOWN_SHARE * GEAR_CHANGE * self.gear_friction_n_m;
+        }
+        Some(changes)
     }
 }
 

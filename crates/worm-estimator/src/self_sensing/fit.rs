@@ -59,8 +59,9 @@ pub(super) struct Fit {
     prior: Vector,
     prior_information: Vector,
     at: Parameters,
-    other: Option<Parameters>, // another answer, with another pull
-    other_odds: f64,           // its odds to the best
+    first_answer: Option<Parameters>, // of a search under way, from where the fit was
+    other: Option<Parameters>,        // another answer, with another pull
+    other_odds: f64,                  // its odds to the best
     mean_n_m: Box<[f64; MAX_BINS]>,
     cycles: f64,         // effective number, forgotten ones left out
     squared_cycles: f64, // Σ of the squared weights
@@ -131,6 +132,7 @@ impl Fit {
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
             at,
+            first_answer: None,
             other: None,
             other_odds: 0.0,
             mean_n_m: Box::new([0.0; MAX_BINS]),
@@ -260,10 +262,10 @@ impl Fit {
         score
     }
 
-    /// One cycle's difference to the mean of all, by a step from the present parameters in which each unknown may change by about
+    /// One cycle's difference to another profile, by a step from the present parameters in which each unknown may change by about
     /// `sigma` (0: not at all), and its standard errors.
-    pub(super) fn change(&self, torque_n_m: &[f64], sigma: &Vector) -> Option<(Vector, Vector)> {
-        let gradient = self.score(torque_n_m, &self.mean_n_m[..]);
+    pub(super) fn change(&self, torque_n_m: &[f64], from_n_m: &[f64], sigma: &Vector) -> Option<(Vector, Vector)> {
+        let gradient = self.score(torque_n_m, from_n_m);
         let mut information = self.single;
         for unknown in 0..self.unknowns {
             information[(unknown, unknown)] += if sigma[unknown] > 0.0 {
@@ -303,6 +305,11 @@ impl Fit {
     pub(super) fn other(&self) -> Option<(f64, f64)> {
         self.other
             .map(|other| (other.pull_n(), self.other_odds / (1.0 + self.other_odds)))
+    }
+
+    /// The first answer of a search under way, once.
+    pub(super) fn take_first_answer(&mut self) -> Option<Parameters> {
+        self.first_answer.take()
     }
 
     /// The profile of the cycle that was taken last, N m at the cam.

@@ -46,7 +46,11 @@ pub(super) fn solve(factor: &Matrix, size: usize, x: &mut Vector) {
     }
     for at in (0..size).rev() {
         let known = column(factor, at, size);
-        let below: f64 = x[at + 1..].iter().zip(&known[at + 1..]).map(|(x, known)| x * known).sum();
+        let below: f64 = x[at + 1..]
+            .iter()
+            .zip(&known[at + 1..])
+            .map(|(x, known)| x * known)
+            .sum();
         x[at] = (x[at] - below) / known[at];
     }
 }

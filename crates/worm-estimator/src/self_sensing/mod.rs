@@ -42,7 +42,7 @@ use crate::message::State;
 use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
 use fit::Fit;
-use parameters::Vector;
+use parameters::{Parameters, Vector};
 use profile::Profile;
 use std::f64::consts::TAU;
 use worm_physics::{MAX_CELLS, Worm};
@@ -208,9 +208,9 @@ pub struct SelfSensing {
     advance_m: [f64; 2], // a cycle, forward and backward, along the crawl
     last: Option<Reading>,
     turned_s: f64, // when the cam was last seen to turn
-    whole: bool, // the open cycle was seen from its beginning; never the first, in which the tips load up
+    whole: bool,   // the open cycle was seen from its beginning; never the first, in which the tips load up
     energy: Energy,
-    evaluations: u32,            // with each reading
+    evaluations: u32,             // with each reading
     waiting: Option<ClosedCycle>, // its profile is in `profile`
     fitting: Option<ClosedCycle>,
     has_changed: bool, // the worm that is being fitted is another than before
@@ -410,7 +410,8 @@ impl SelfSensing {
     fn work(&mut self) -> bool {
         if let Some(cycle) = self.fitting {
             if !self.fit.step() {
-                return false;
+                let first = self.fit.take_first_answer().filter(|_| self.has_changed);
+                return first.is_some_and(|first| self.judge_early(&cycle, &first));
             }
             self.fitting = None;
             self.follow(&cycle);
@@ -420,7 +421,7 @@ impl SelfSensing {
         let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
         let seen = self
             .fit
-            .change(torque_n_m, &self.allowed)
+            .change(torque_n_m, self.fit.profiles_n_m().0, &self.allowed)
             .map_or(Seen::Usual, |change| {
                 self.detector.compare(&ComparedCycle {
                     usual: self.fit.parameters(),
@@ -447,11 +448,32 @@ impl SelfSensing {
         false
     }
 
+    /// By how much the unknowns of the newest cycle differ from those of the worm before it changed.
+    fn difference(&self) -> Option<Vector> {
+        let usual_n_m = self.detector.reference_n_m()?;
+        let (difference, _) = self.fit.change(self.fit.cycle_n_m(), usual_n_m, &self.allowed)?;
+        Some(difference)
+    }
+
+    /// Says in what a changed worm differs before everything is searched. True when it does.
+    fn judge_early(&mut self, cycle: &ClosedCycle, first: &Parameters) -> bool {
+        let difference = self.difference();
+        let has_changed = self
+            .detector
+            .judge_early(first, self.fit.cycle_n_m(), difference.as_ref());
+        if has_changed {
+            self.show(cycle, Standing::Changed);
+        }
+        has_changed
+    }
+
     /// Brings everything that follows from the fit up to date.
     fn follow(&mut self, cycle: &ClosedCycle) {
         // While a change stands, every cycle says anew in what the worm differs, and whether it still does.
         if self.has_changed || self.detector.changes().any() {
-            self.detector.judge(self.fit.parameters(), self.fit.cycle_n_m());
+            let difference = self.difference();
+            self.detector
+                .judge(self.fit.parameters(), self.fit.cycle_n_m(), difference.as_ref());
         }
         if let Some((figures, sigma)) = self.fit.figures() {
             let backward_m = self.fit.backward_advance_m().unwrap_or(figures.advance_m);

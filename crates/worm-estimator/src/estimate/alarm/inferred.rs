@@ -6,8 +6,10 @@
 //! `friction-loss`: the value is the largest share of a cell's friction that was lost, the cell the one that lost it, none where several did.
 //! `inferred-jam`: the cell whose step takes no torque. The value is the share of the usual torque late in the step that is left at most.
 //! `more-load`: the value is the rise of the load as a pull on the body, N; the current hardly says whether it is that or friction in the
-//! gears. Each clears when cycles are again like those before the change. A raised one stays while the worm warms up anew or a cycle is odd.
+//! gears. Each clears when cycles are again like those before the change. A raised one stays while a cycle is
+//! odd, and while the worm crawls backward: those cycles are not fitted, so nothing is armed.
 
+use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Inferred, InferredStanding, Severity};
@@ -29,10 +31,10 @@ impl ByCurrent {
     }
 
     /// Friction loss, jam, load.
-    pub(super) fn update(&self, inferred: Option<&Inferred>) -> [DetectorOutput; 3] {
-        let unknown = [DetectorOutput::Unknown; 3];
-        let Some(inferred) = inferred.filter(|inferred| inferred.standing != InferredStanding::WarmingUp.code()) else {
-            return unknown;
+    pub(super) fn update(&self, tick: &Tick, inferred: Option<&Inferred>) -> [DetectorOutput; 3] {
+        let is_warm = |inferred: &&Inferred| inferred.standing != InferredStanding::WarmingUp.code();
+        let Some(inferred) = inferred.filter(is_warm).filter(|_| tick.direction > 0.0) else {
+            return [DetectorOutput::Unknown; 3];
         };
         let reading = |is_armed: bool, is_changed: bool, value: f64, threshold: f64, mask: u32| {
             if !(is_armed || is_changed) {

@@ -248,7 +248,7 @@ impl AlarmMonitor {
             }
         }
         let [jam, progress, sliding] = detectors.by_position;
-        let [friction_loss, inferred_jam, more_load] = self.by_current.update(inferred);
+        let [friction_loss, inferred_jam, more_load] = self.by_current.update(tick, inferred);
         [
             detectors.stall.update(tick, state),
             jam,

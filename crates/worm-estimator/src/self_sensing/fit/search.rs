@@ -11,11 +11,12 @@ use super::work::Work;
 /// Where the first search begins: pulls as shares of what all tips hold, and changes of every ln stiffness.
 const FIRST_PULLS: [f64; 12] = [0.0, 0.03, 0.07, 0.11, 0.16, 0.21, 0.27, 0.34, 0.42, 0.5, 0.6, -0.1];
 const FIRST_STIFFNESSES: [f64; 2] = [-0.2, 0.1];
-/// How many places that makes; the last is where the fit was.
-const PLACES: usize = FIRST_PULLS.len() * FIRST_STIFFNESSES.len() + 1;
+/// How many places that makes; the first is where the fit was.
+const PLACES: usize = 1 + FIRST_PULLS.len() * FIRST_STIFFNESSES.len();
 /// The best of these searches go on.
 const BEST: usize = 3;
-/// Gauss-Newton steps from each first place, then from each of the best.
+/// Gauss-Newton steps from each first place, then from each of the best. From where the fit was at once as many as these: for a worm that has
+/// changed it is mostly the answer, and a first one that others can wait for no longer.
 const ROUNDS: [usize; 2] = [2, 12];
 /// Difference of two pulls, N, that makes another answer of them.
 const OTHER_PULL_N: f64 = 0.25;
@@ -42,6 +43,9 @@ impl Search {
         match self.settling {
             None => {
                 self.sort_in();
+                if self.place == 0 {
+                    fit.first_answer = self.descent.cost.map(|_| self.descent.at);
+                }
                 self.place += 1;
                 if self.place < PLACES {
                     self.descent = Descent::new(self.place(fit), ROUNDS[0]);
@@ -58,16 +62,17 @@ impl Search {
     }
 
     fn place(&self, fit: &Fit) -> Parameters {
-        let Some(share) = FIRST_PULLS.get(self.place / FIRST_STIFFNESSES.len()) else {
+        let Some(start) = self.place.checked_sub(1) else {
             return fit.at;
         };
+        let share = FIRST_PULLS[start / FIRST_STIFFNESSES.len()];
         let mut at = self.start;
         let hold_n: f64 = (0..at.cells).map(|cell| at.friction_n(cell)).sum();
         let pull_n = share * hold_n;
         let (pull_at, gears) = (at.pull_at(), at.gears_at());
         at.values[pull_at] = pull_n;
         at.values[gears] -= pull_n / (at.cells as f64 * fit.force_per_torque);
-        let stiffness = FIRST_STIFFNESSES[self.place % FIRST_STIFFNESSES.len()];
+        let stiffness = FIRST_STIFFNESSES[start % FIRST_STIFFNESSES.len()];
         (0..at.cells).for_each(|cell| at.values[at.cells + cell] += stiffness);
         at
     }
@@ -110,16 +115,14 @@ impl Fit {
     /// The first search: from several pulls.
     pub(super) fn search_everywhere(&self) -> Work {
         let start = self.by_swings();
-        let mut search = Search {
+        Work::Search(Search {
             start,
             place: 0,
             best: [(f64::INFINITY, start); BEST],
             settling: None,
             least: f64::INFINITY,
-            descent: Descent::new(start, ROUNDS[0]),
-        };
-        search.descent = Descent::new(search.place(self), ROUNDS[0]);
-        Work::Search(search)
+            descent: Descent::new(self.at, ROUNDS[1]),
+        })
     }
 
     /// Takes the other answer where it has become the better one. Both at the end of their descents, with what is minimised.

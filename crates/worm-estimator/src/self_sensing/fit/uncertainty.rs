@@ -233,8 +233,7 @@ impl FigureDerivatives {
         // Near a leap of the steady cycle the derivative says nothing, but a worm cannot be further off than this.
         sigma.advance_m = sigma.advance_m.min(fit.stroke_m);
         let lead = fit.at.gears_at() + 3;
-        let damping_sigma_j =
-            (damping_j / fit.at.values[lead]).abs() * fit.covariance[(lead, lead)].max(0.0).sqrt();
+        let damping_sigma_j = (damping_j / fit.at.values[lead]).abs() * fit.covariance[(lead, lead)].max(0.0).sqrt();
         sigma.energy_net_j = sigma.energy_net_j.hypot(damping_sigma_j);
         sigma.energy_positive_j = sigma.energy_positive_j.hypot(damping_sigma_j);
         (centre, sigma)

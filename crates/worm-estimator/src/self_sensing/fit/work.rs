@@ -1,11 +1,11 @@
 //! What is to be done for a cycle, in pieces of one evaluation of the model each.
 
 use super::super::parameters::Parameters;
+use super::Fit;
 use super::descent::Descent;
 use super::linearise::Linearised;
 use super::search::Search;
 use super::uncertainty::{Assessment, FigureDerivatives};
-use super::Fit;
 
 /// Gauss-Newton steps in a cycle without a search, and of the other answer.
 const ROUNDS: [usize; 2] = [2, 1];
