@@ -78,15 +78,15 @@ impl InferredSummary {
         };
         self.advance_m.is_finite().then(|| {
             format!(
-                "by current{standing}: advance ~{:.1}±{:.1} mm, losses ~{:.0}±{:.0} mJ, pull ~{:.1}±{:.1} N, at ~{:.0}±{:.0} mm",
+                "at ~{:.0}±{:.0} mm, ~{:.1}±{:.1} mm and ~{:.0}±{:.0} mJ a cycle, pull ~{:.1}±{:.1} N{standing}",
+                1e3 * self.position_m,
+                1e3 * self.position_sigma_m,
                 1e3 * self.advance_m,
                 1e3 * self.advance_sigma_m,
                 1e3 * self.energy_loss_j,
                 1e3 * self.energy_loss_sigma_j,
                 self.pull_n,
                 self.pull_sigma_n,
-                1e3 * self.position_m,
-                1e3 * self.position_sigma_m,
             )
         })
     }

@@ -396,7 +396,7 @@ impl fmt::Display for Summary {
             writeln!(f, "{}", range::text(range))?;
         }
         if let Some(text) = self.inferred.as_ref().and_then(InferredSummary::text) {
-            writeln!(f, "{text}")?;
+            writeln!(f, "by current  {text}")?;
         }
         for alarm in &self.alarms {
             let cell = match (alarm.cell, &alarm.place) {

@@ -242,8 +242,7 @@ fn a_worm_that_nobody_sees_is_drawn_hollow_where_it_should_be() {
         "[4]",
         "~1.71±0.06",
         "~972±31",
-        "advance ~6.7±0.2 mm",
-        "at ~64±4 mm",
+        "at ~64±4 mm, ~6.7±0.2 mm and ~47±2 mJ a cycle",
         "not seen",
     ] {
         assert!(unseen.contains(part), "{part:?} is missing in\n{unseen}");
@@ -256,7 +255,7 @@ fn a_worm_that_nobody_sees_is_drawn_hollow_where_it_should_be() {
         ..estimate
     });
     let seen = painted(130, 34, &telemetry);
-    for part in ["▐1▌", "~1.71±0.06", "advance ~6.7±0.2 mm"] {
+    for part in ["▐1▌", "~1.71±0.06", "at ~64±4 mm"] {
         assert!(seen.contains(part), "{part:?} is missing in\n{seen}");
     }
     let summary = serde_json::to_value(Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling)).expect("JSON");

@@ -39,10 +39,16 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
     ];
     let main_job = worm.wormd(&up);
     let running = std::thread::spawn(move || main_job.output());
-    wait_for("the mark is taken", PATIENCE, || {
-        let mark = ["command", "mark", "--position", "0.5", "--sigma", "0.002"];
+    let mark = ["command", "mark", "--position", "0.5", "--sigma", "0.002"];
+    wait_for("a mark is accepted", PATIENCE, || {
         worm.wormd(&mark).output().status.success()
     });
+    // One that came before the estimator listened says nothing to it.
+    wait_for("it crawls", PATIENCE, || {
+        worm.state().is_some_and(|state| state.phase > 2.0)
+    });
+    assert!(worm.wormd(&mark).output().status.success());
+    worm.forget_topics();
     let summary = json(&running.join().expect("the main job ends"));
     let inferred = &summary["inferred"];
     println!("{inferred:#}");
@@ -78,11 +84,8 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
 
     // Without a look at positions, `infer` finds the same worm.
     let log = messages(file.as_ref()).expect("a log");
-    let mark = log
-        .commands
-        .iter()
-        .find(|record| record.position_m == 0.5)
-        .expect("the mark");
+    let mut commands = log.commands.iter();
+    let mark = commands.find(|record| record.position_m == 0.5).expect("the mark");
     assert_eq!(mark.sender.as_str(), "wormd command");
     let answer = json(&worm.plain_wormd(&["infer", "--json", &file]).output());
     let live = log
