@@ -36,9 +36,9 @@ pub struct Replay {
 
 /// Feeds a log's states to the estimator, in their order.
 ///
-/// An estimator that was started after the controller has not seen the first states. Its sums depend on where it started, and no
-/// message says where. So every start that the first recorded estimate allows is tried, and the one that reproduces the first
-/// estimates is used; if there is none, the first state.
+/// An estimator that was started after the controller has not seen the first states, and its sums depend on where it started. The first message
+/// of self-sensing says where, for it is made with the estimator's first state. Without it every start that the first recorded estimate allows
+/// is tried, and the one that reproduces the first estimates is used; if there is none, the first state.
 ///
 /// # Errors
 /// [`EstimatorError`] for a configuration that is not valid, or is of a worm with another number of cells.
@@ -49,7 +49,11 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
         .take(FIRST_ESTIMATES)
         .map(recorder_alarm::without)
         .collect();
-    for first in possible_starts(&log.states, recorded.first()) {
+    let starts = match first_by_message(log) {
+        Some(first) => first..first + 1,
+        None => possible_starts(&log.states, recorded.first()),
+    };
+    for first in starts {
         let (mut found, fed) = run(log, first, config, recorded.len())?;
         let is_same = found.estimates.len() == recorded.len()
             && found
@@ -84,6 +88,15 @@ fn as_recorded<'c>(log: &Log, config: &'c Config) -> Cow<'c, Config> {
         config.to_mut().self_sensing.enabled = false;
     }
     config
+}
+
+/// Index of the estimator's first state, where the log has the message that was made with it.
+fn first_by_message(log: &Log) -> Option<usize> {
+    let first = log.inferred.iter().find(|inferred| inferred.sequence == 0)?;
+    let key = (first.time_ns, first.state_sequence);
+    log.states
+        .iter()
+        .position(|state| (state.time_ns, state.sequence) == key)
 }
 
 /// Indices of the states at which an estimator with this first estimate can have started.

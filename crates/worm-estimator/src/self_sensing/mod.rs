@@ -49,6 +49,8 @@ use worm_physics::{MAX_CELLS, Worm};
 
 /// Longest turn of the cam between two readings that is still bridged, cycles.
 const LONGEST_TURN: f64 = 0.02;
+/// How far the cam turns after a rest or a reversal until the tips are loaded as in a steady crawl, cycles.
+const LOADING_CYCLES: f64 = 0.9;
 /// Longest time that the cam may stand in a cycle that is fitted, s: tips give way meanwhile, and it then starts with a ramp.
 const LONGEST_REST_S: f64 = 0.1;
 /// Longest time between two readings over which power is taken to be linear, s.
@@ -208,6 +210,7 @@ pub struct SelfSensing {
     advance_m: [f64; 2], // a cycle, forward and backward, along the crawl
     last: Option<Reading>,
     turned_s: f64, // when the cam was last seen to turn
+    loaded_cycles: f64, // how far the cam has turned since it last stood or turned back
     whole: bool,   // the open cycle was seen from its beginning; never the first, in which the tips load up
     energy: Energy,
     evaluations: u32,             // with each reading
@@ -261,6 +264,7 @@ impl SelfSensing {
             fit,
             last: None,
             turned_s: f64::INFINITY,
+            loaded_cycles: 0.0,
             whole: false,
             energy: Energy::default(),
             evaluations: config.evaluations_per_reading.max(1),
@@ -294,7 +298,7 @@ impl SelfSensing {
     /// The readings that follow are not those after the last: the controller has started anew. What is known of the worm stays.
     pub fn interrupt(&mut self) {
         self.last = None;
-        self.whole = false;
+        (self.whole, self.loaded_cycles) = (false, 0.0);
     }
 
     fn take(&mut self, sample: &MotorSample) {
@@ -318,11 +322,12 @@ impl SelfSensing {
         let turned = sample.phase - last.sample.phase;
         if turned == 0.0 {
             if sample.time_s - self.turned_s > LONGEST_REST_S {
-                self.whole = false;
+                (self.whole, self.loaded_cycles) = (false, 0.0);
             }
             return;
         }
         self.turned_s = sample.time_s;
+        self.loaded_cycles = if turned > 0.0 { self.loaded_cycles + turned } else { 0.0 };
         self.reckon(turned);
         self.add_energy(&last.sample, sample);
         if !(0.0..=LONGEST_TURN).contains(&turned) {
@@ -340,7 +345,7 @@ impl SelfSensing {
             }
             self.profile.clear();
             self.energy = Energy::default();
-            self.whole = true;
+            self.whole = self.loaded_cycles >= LOADING_CYCLES;
         }
         let mean = |now: f64, before: f64| 0.5 * (now + before);
         self.profile.add(
