@@ -82,7 +82,7 @@ impl Default for Alarms {
             recording_stopped: alarm(Policy::Warn, 5.0),
             friction_loss: alarm(Policy::Warn, 0.16),
             inferred_jam: alarm(Policy::Warn, 0.12),
-            more_load: alarm(Policy::Warn, 0.3),
+            more_load: alarm(Policy::Warn, 0.6),
         }
     }
 }

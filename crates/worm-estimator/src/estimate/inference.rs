@@ -17,8 +17,8 @@ use worm_physics::Worm;
 
 /// Ticks between a command and the state with which its mark counts: longer than a record is on its way.
 const MARK_DELAY_TICKS: u64 = 100;
-/// Marks that may wait.
-const MAX_WAITING: usize = 8;
+/// Marks that may wait: as many commands as a late joiner gets.
+const MAX_WAITING: usize = 32;
 /// Age of a tracker sample up to which it says where the worm is, s.
 const FRESH_S: f64 = 0.1;
 /// Standard error of a tracker's mean position as the end of a cycle, m: its age, and cells that have not come to rest.
@@ -86,7 +86,7 @@ impl Inference {
     /// Takes a command that the controller answered. All but marks are ignored, and those from before the first state.
     pub fn note_command(&mut self, record: &CommandRecord) {
         let is_mark = record.kind == CommandKind::Mark.code() && record.outcome == CommandOutcome::Accepted.code();
-        let is_known = self.first_sequence.is_some_and(|first| record.state_sequence >= first);
+        let is_known = self.first_sequence.is_none_or(|first| record.state_sequence >= first);
         let is_finite = [record.phase, record.position_m, record.position_sigma_m]
             .iter()
             .all(|value| value.is_finite());
@@ -113,6 +113,9 @@ impl Inference {
         let has_restarted = self.last.is_some_and(|(sequence, _)| state.sequence <= sequence);
         if is_first || has_restarted {
             self.first_sequence = Some(state.sequence);
+            for place in &mut self.waiting {
+                place.take_if(|waiting| waiting.state_sequence < state.sequence);
+            }
         }
         if has_restarted {
             self.sensing.interrupt();

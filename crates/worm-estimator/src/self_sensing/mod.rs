@@ -209,9 +209,9 @@ pub struct SelfSensing {
     reckoning: DeadReckoning,
     advance_m: [f64; 2], // a cycle, forward and backward, along the crawl
     last: Option<Reading>,
-    turned_s: f64, // when the cam was last seen to turn
+    turned_s: f64,      // when the cam was last seen to turn
     loaded_cycles: f64, // how far the cam has turned since it last stood or turned back
-    whole: bool,   // the open cycle was seen from its beginning; never the first, in which the tips load up
+    whole: bool,        // the open cycle was seen from its beginning; never the first, in which the tips load up
     energy: Energy,
     evaluations: u32,             // with each reading
     waiting: Option<ClosedCycle>, // its profile is in `profile`
