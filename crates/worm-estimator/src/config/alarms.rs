@@ -80,9 +80,9 @@ impl Default for Alarms {
             device_fault: alarm(Policy::Warn, 60.0),
             model_mismatch: alarm(Policy::Warn, 1.6e-4),
             recording_stopped: alarm(Policy::Warn, 5.0),
-            friction_loss: alarm(Policy::Warn, 0.16),
+            friction_loss: alarm(Policy::Warn, 0.25),
             inferred_jam: alarm(Policy::Warn, 0.12),
-            more_load: alarm(Policy::Warn, 0.6),
+            more_load: alarm(Policy::Warn, 2.0),
         }
     }
 }

@@ -124,11 +124,11 @@ impl Inference {
             self.last = None;
         }
         let mut is_new = is_first;
-        if state.motor_is_new == 1 {
-            if let Some(sensed) = self.sensing.update(&MotorSample::from(state)) {
-                fill(&mut self.inferred, sensed);
-                is_new = true;
-            }
+        if state.motor_is_new == 1
+            && let Some(sensed) = self.sensing.update(&MotorSample::from(state))
+        {
+            fill(&mut self.inferred, sensed);
+            is_new = true;
         }
         if self.uses_positions {
             self.take_position(state);
