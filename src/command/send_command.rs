@@ -140,13 +140,14 @@ impl SendCommandArgs {
                 return Err(Failure::unusable(format!("{flag} goes with `wormd command crawl`")));
             }
         }
+        let is_place = |position_m: f64| position_m.abs() <= Command::MAX_POSITION_M;
         match (self.order, self.position) {
             (Order::Mark, None) => {
                 return Err(Failure::unusable(
                     "`wormd command mark` needs --position, in metres along the canal",
                 ));
             }
-            (Order::Mark, Some(position_m)) if !(position_m.abs() <= Command::MAX_POSITION_M) => {
+            (Order::Mark, Some(position_m)) if !is_place(position_m) => {
                 return Err(Failure::unusable(format!(
                     "--position must be a number of metres, at most {} either way",
                     Command::MAX_POSITION_M
