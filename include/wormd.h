@@ -47,7 +47,7 @@
 #define WORMD_RANGE_HISTORY 1
 
 #define WORMD_COMMAND_TOPIC "command"
-#define WORMD_COMMAND_TYPE "wormd_command_record_v1"
+#define WORMD_COMMAND_TYPE "wormd_command_record_v2"
 #define WORMD_COMMAND_BUFFER 256
 #define WORMD_COMMAND_HISTORY 32
 
@@ -61,13 +61,18 @@
 #define WORMD_RECORDING_BUFFER 16
 #define WORMD_RECORDING_HISTORY 1
 
+#define WORMD_INFERRED_TOPIC "inferred"
+#define WORMD_INFERRED_TYPE "wormd_inferred_v1"
+#define WORMD_INFERRED_BUFFER 64
+#define WORMD_INFERRED_HISTORY 1
+
 #define WORMD_BLACK_BOX_TOPIC "black_box"
 #define WORMD_BLACK_BOX_TYPE "wormd_black_box_v1"
 #define WORMD_BLACK_BOX_BUFFER 16
 #define WORMD_BLACK_BOX_HISTORY 1
 
 /* Request and response on the service worm/NAME/command. */
-#define WORMD_COMMAND_REQUEST_TYPE "wormd_command_v3"
+#define WORMD_COMMAND_REQUEST_TYPE "wormd_command_v4"
 #define WORMD_COMMAND_RESPONSE_TYPE "wormd_reply_v2"
 
 /* The state of the controller's state machine. */
@@ -173,6 +178,13 @@ enum wormd_alarm_kind {
   WORMD_ALARM_KIND_MODEL_MISMATCH = 9,
   /* The recorder could not go on, or was killed. */
   WORMD_ALARM_KIND_RECORDING_STOPPED = 10,
+  /* By the motor's current, a cell or all of them have lost friction: a wet canal, a worn pad. */
+  WORMD_ALARM_KIND_FRICTION_LOSS = 11,
+  /* By the motor's current, a cell does not move in its step. */
+  WORMD_ALARM_KIND_INFERRED_JAM = 12,
+  /* By the motor's current, the cam's load is larger than it was: a pull on the body, or friction in the
+     gears. */
+  WORMD_ALARM_KIND_MORE_LOAD = 13,
 };
 
 /* The name, as in logs; "unknown" for a code of a newer version. */
@@ -189,6 +201,9 @@ static inline const char *wormd_alarm_kind_name(uint32_t code) {
     case WORMD_ALARM_KIND_DEVICE_FAULT: return "device-fault";
     case WORMD_ALARM_KIND_MODEL_MISMATCH: return "model-mismatch";
     case WORMD_ALARM_KIND_RECORDING_STOPPED: return "recording-stopped";
+    case WORMD_ALARM_KIND_FRICTION_LOSS: return "friction-loss";
+    case WORMD_ALARM_KIND_INFERRED_JAM: return "inferred-jam";
+    case WORMD_ALARM_KIND_MORE_LOAD: return "more-load";
     default: return "unknown";
   }
 }
@@ -290,6 +305,8 @@ enum wormd_command_kind {
   /* Go on crawling for Command::limit_s from now on. Never begins a crawl, and changes neither speed nor
      direction: whoever attends to a crawl must not overrule a hold. */
   WORMD_COMMAND_KIND_RENEW = 6,
+  /* Note that the worm is at Command::position_m, for the dead reckoning. Moves and permits nothing. */
+  WORMD_COMMAND_KIND_MARK = 7,
 };
 
 /* The name, as in logs; "unknown" for a code of a newer version. */
@@ -302,6 +319,7 @@ static inline const char *wormd_command_kind_name(uint32_t code) {
     case WORMD_COMMAND_KIND_RESET: return "reset";
     case WORMD_COMMAND_KIND_ACKNOWLEDGE: return "acknowledge";
     case WORMD_COMMAND_KIND_RENEW: return "renew";
+    case WORMD_COMMAND_KIND_MARK: return "mark";
     default: return "unknown";
   }
 }
@@ -324,6 +342,8 @@ enum wormd_command_outcome {
   WORMD_COMMAND_OUTCOME_ALARM_STANDS = 6,
   /* The lease of the supervisor has lapsed, and the command gives no time of its own. */
   WORMD_COMMAND_OUTCOME_NO_LEASE = 7,
+  /* The position of a mark or its standard error is not a number, or beyond what a canal has. */
+  WORMD_COMMAND_OUTCOME_BAD_POSITION = 8,
 };
 
 /* The name, as in logs; "unknown" for a code of a newer version. */
@@ -337,6 +357,7 @@ static inline const char *wormd_command_outcome_name(uint32_t code) {
     case WORMD_COMMAND_OUTCOME_NO_ESTIMATOR: return "no-estimator";
     case WORMD_COMMAND_OUTCOME_ALARM_STANDS: return "alarm-stands";
     case WORMD_COMMAND_OUTCOME_NO_LEASE: return "no-lease";
+    case WORMD_COMMAND_OUTCOME_BAD_POSITION: return "bad-position";
     default: return "unknown";
   }
 }
@@ -497,6 +518,30 @@ static inline const char *wormd_recording_problem_name(uint32_t code) {
     case WORMD_RECORDING_PROBLEM_FILE_REMOVED: return "file-removed";
     case WORMD_RECORDING_PROBLEM_WRITE_ERROR: return "write-error";
     case WORMD_RECORDING_PROBLEM_TOPICS_UNREADABLE: return "topics-unreadable";
+    default: return "unknown";
+  }
+}
+
+/* How far self-sensing is. */
+enum wormd_inferred_standing {
+  /* Too few cycles were fitted: intervals may be too narrow, and no change can be seen yet. */
+  WORMD_INFERRED_STANDING_WARMING_UP = 0,
+  /* The newest cycle was fitted with those before. */
+  WORMD_INFERRED_STANDING_FITTED = 1,
+  /* The newest cycle is not like those before, and was set aside: the next one shows whether that was an
+     accident. */
+  WORMD_INFERRED_STANDING_ODD = 2,
+  /* The worm is another than it was; masks and loads say in what. */
+  WORMD_INFERRED_STANDING_CHANGED = 3,
+};
+
+/* The name, as in logs; "unknown" for a code of a newer version. */
+static inline const char *wormd_inferred_standing_name(uint32_t code) {
+  switch (code) {
+    case WORMD_INFERRED_STANDING_WARMING_UP: return "warming-up";
+    case WORMD_INFERRED_STANDING_FITTED: return "fitted";
+    case WORMD_INFERRED_STANDING_ODD: return "odd";
+    case WORMD_INFERRED_STANDING_CHANGED: return "changed";
     default: return "unknown";
   }
 }
@@ -959,9 +1004,15 @@ typedef struct wormd_command_record {
   /* Who sent it, as the sender says: a program, or the watcher whose command it passed on. UTF-8; it ends
      with a zero, or with the array. */
   char sender[32];
+  /* Gait phase of the tick that processed it, cycles. */
+  double phase;
+  /* For a mark, where the mean of the cells was said to be along the canal, m; NaN for other commands. */
+  double position_m;
+  /* For a mark, the standard error of that, m; NaN for other commands. */
+  double position_sigma_m;
 } wormd_command_record;
 
-static_assert(sizeof(wormd_command_record) == 104, "wormd_command_record has another size here than in wormd");
+static_assert(sizeof(wormd_command_record) == 128, "wormd_command_record has another size here than in wormd");
 static_assert(offsetof(wormd_command_record, sequence) == 0, "wormd_command_record.sequence lies elsewhere in wormd");
 static_assert(offsetof(wormd_command_record, time_ns) == 8, "wormd_command_record.time_ns lies elsewhere in wormd");
 static_assert(offsetof(wormd_command_record, state_sequence) == 16, "wormd_command_record.state_sequence lies elsewhere in wormd");
@@ -976,6 +1027,9 @@ static_assert(offsetof(wormd_command_record, fault) == 60, "wormd_command_record
 static_assert(offsetof(wormd_command_record, supervised) == 64, "wormd_command_record.supervised lies elsewhere in wormd");
 static_assert(offsetof(wormd_command_record, user) == 68, "wormd_command_record.user lies elsewhere in wormd");
 static_assert(offsetof(wormd_command_record, sender) == 72, "wormd_command_record.sender lies elsewhere in wormd");
+static_assert(offsetof(wormd_command_record, phase) == 104, "wormd_command_record.phase lies elsewhere in wormd");
+static_assert(offsetof(wormd_command_record, position_m) == 112, "wormd_command_record.position_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_command_record, position_sigma_m) == 120, "wormd_command_record.position_sigma_m lies elsewhere in wormd");
 
 /* How a trip stands: twice a second, and at every change. Low and high values bound a 90 % interval. Energies
    and what follows from them are not known without a battery. The lists are where the worm is expected if all
@@ -1148,6 +1202,147 @@ static_assert(offsetof(wormd_recording_status, files) == 40, "wormd_recording_st
 static_assert(offsetof(wormd_recording_status, state) == 48, "wormd_recording_status.state lies elsewhere in wormd");
 static_assert(offsetof(wormd_recording_status, problem) == 52, "wormd_recording_status.problem lies elsewhere in wormd");
 
+/* What the motor's current alone says of the worm, with standard errors: after each gait cycle crawled
+   forward, as soon as it is fitted, and after a mark. Positions play no part in it, but for those that
+   correct the dead reckoning. */
+typedef struct wormd_inferred {
+  /* Number of this message since the estimator started. */
+  uint64_t sequence;
+  /* When it was made, ns of CLOCK_MONOTONIC. */
+  uint64_t time_ns;
+  /* When the newest cycle ended, ns of CLOCK_MONOTONIC; 0 before the first. */
+  uint64_t end_ns;
+  /* The tick with which it was made, as in the topic state. */
+  uint64_t state_sequence;
+  /* Gait phase at the end of the newest cycle, cycles. */
+  double end_phase;
+  /* Cycles that were fitted together, forgotten ones counted less. */
+  double cycles;
+  /* Friction force k·δmax of each cell, N. */
+  double friction_n[WORMD_MAX_CELLS];
+  /* Standard error of friction_n, N. */
+  double friction_sigma_n[WORMD_MAX_CELLS];
+  /* Stiffness of each cell, N/m. */
+  double stiffness_n_per_m[WORMD_MAX_CELLS];
+  /* Standard error of stiffness_n_per_m, N/m. */
+  double stiffness_sigma_n_per_m[WORMD_MAX_CELLS];
+  /* Distance that each tip slides forward in a cycle, m, by the model. */
+  double forward_slide_m[WORMD_MAX_CELLS];
+  /* Distance that each tip slides backward in a cycle, m, counted positive. */
+  double backward_slide_m[WORMD_MAX_CELLS];
+  /* Pull on the body down the canal, N: weight and constant drag together. */
+  double pull_n;
+  /* Standard error of pull_n, N. */
+  double pull_sigma_n;
+  /* The slope, if all the pull is the weight of the stated mass, rad. */
+  double slope_rad;
+  /* Standard error of slope_rad, rad. */
+  double slope_sigma_rad;
+  /* Another pull that explains the current as well, N; NaN where there is none. */
+  double other_pull_n;
+  /* Probability of that other answer; NaN where there is none. */
+  double other_probability;
+  /* Advance of a cycle, m, by the model. */
+  double advance_m;
+  /* Standard error of advance_m, m. */
+  double advance_sigma_m;
+  /* Energy of a cycle by losses and weight, equation (11), J. */
+  double energy_loss_j;
+  /* Standard error of energy_loss_j, J. */
+  double energy_loss_sigma_j;
+  /* Net actuator work of a cycle, equation (13), J. */
+  double energy_actuator_net_j;
+  /* Standard error of energy_actuator_net_j, J. */
+  double energy_actuator_net_sigma_j;
+  /* Electrical energy of the newest cycle, J. */
+  double energy_electrical_j;
+  /* Standard error of energy_electrical_j, J. */
+  double energy_electrical_sigma_j;
+  /* Root mean square of what the model leaves unexplained in the mean torque, N m at the cam. */
+  double residual_n_m;
+  /* Distance along the canal by dead reckoning, m, at phase: from where the worm began, or as the tracker or
+     the last mark counts. */
+  double position_m;
+  /* Standard error of position_m, m: it grows until a tracker sample or a mark comes. */
+  double position_sigma_m;
+  /* Gait phase with which this was made, cycles. */
+  double phase;
+  /* Largest share of a cell's friction that was lost; NaN where none was. */
+  double friction_loss_share;
+  /* How much more the cam's load is than before, as a pull on the body, N; NaN while nothing has changed. */
+  double load_rise_n;
+  /* Standard error of one cycle's ln friction, the worst cell's; NaN while no change could be seen. */
+  double change_friction_sigma;
+  /* Standard error of one cycle's pull, N; NaN while no change could be seen. */
+  double change_pull_sigma_n;
+  /* Bit i: friction of cell i was lost. */
+  uint32_t friction_lost_mask;
+  /* Bit i: cell i does not move. */
+  uint32_t jammed_mask;
+  /* 1 when the load is larger than it was: a pull on the body or friction in the gears. */
+  uint32_t more_load;
+  /* Bit i: a loss of 30 % of cell i's friction would be seen. */
+  uint32_t friction_armed_mask;
+  /* Bit i: a jam of cell i would be seen. */
+  uint32_t jam_armed_mask;
+  /* 1 while more load would be seen. */
+  uint32_t load_armed;
+  /* Marks that corrected the distance. */
+  uint32_t marks;
+  /* Cycles at whose end a tracker sample corrected the distance. */
+  uint32_t tracker_marks;
+  /* InferredStanding. A code of enum wormd_inferred_standing. */
+  uint32_t standing;
+  /* How many cells are in use. */
+  uint32_t cell_count;
+} wormd_inferred;
+
+static_assert(sizeof(wormd_inferred) == 1032, "wormd_inferred has another size here than in wormd");
+static_assert(offsetof(wormd_inferred, sequence) == 0, "wormd_inferred.sequence lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, time_ns) == 8, "wormd_inferred.time_ns lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, end_ns) == 16, "wormd_inferred.end_ns lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, state_sequence) == 24, "wormd_inferred.state_sequence lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, end_phase) == 32, "wormd_inferred.end_phase lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, cycles) == 40, "wormd_inferred.cycles lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, friction_n) == 48, "wormd_inferred.friction_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, friction_sigma_n) == 176, "wormd_inferred.friction_sigma_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, stiffness_n_per_m) == 304, "wormd_inferred.stiffness_n_per_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, stiffness_sigma_n_per_m) == 432, "wormd_inferred.stiffness_sigma_n_per_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, forward_slide_m) == 560, "wormd_inferred.forward_slide_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, backward_slide_m) == 688, "wormd_inferred.backward_slide_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, pull_n) == 816, "wormd_inferred.pull_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, pull_sigma_n) == 824, "wormd_inferred.pull_sigma_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, slope_rad) == 832, "wormd_inferred.slope_rad lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, slope_sigma_rad) == 840, "wormd_inferred.slope_sigma_rad lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, other_pull_n) == 848, "wormd_inferred.other_pull_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, other_probability) == 856, "wormd_inferred.other_probability lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, advance_m) == 864, "wormd_inferred.advance_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, advance_sigma_m) == 872, "wormd_inferred.advance_sigma_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, energy_loss_j) == 880, "wormd_inferred.energy_loss_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, energy_loss_sigma_j) == 888, "wormd_inferred.energy_loss_sigma_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, energy_actuator_net_j) == 896, "wormd_inferred.energy_actuator_net_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, energy_actuator_net_sigma_j) == 904, "wormd_inferred.energy_actuator_net_sigma_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, energy_electrical_j) == 912, "wormd_inferred.energy_electrical_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, energy_electrical_sigma_j) == 920, "wormd_inferred.energy_electrical_sigma_j lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, residual_n_m) == 928, "wormd_inferred.residual_n_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, position_m) == 936, "wormd_inferred.position_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, position_sigma_m) == 944, "wormd_inferred.position_sigma_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, phase) == 952, "wormd_inferred.phase lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, friction_loss_share) == 960, "wormd_inferred.friction_loss_share lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, load_rise_n) == 968, "wormd_inferred.load_rise_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, change_friction_sigma) == 976, "wormd_inferred.change_friction_sigma lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, change_pull_sigma_n) == 984, "wormd_inferred.change_pull_sigma_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, friction_lost_mask) == 992, "wormd_inferred.friction_lost_mask lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, jammed_mask) == 996, "wormd_inferred.jammed_mask lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, more_load) == 1000, "wormd_inferred.more_load lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, friction_armed_mask) == 1004, "wormd_inferred.friction_armed_mask lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, jam_armed_mask) == 1008, "wormd_inferred.jam_armed_mask lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, load_armed) == 1012, "wormd_inferred.load_armed lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, marks) == 1016, "wormd_inferred.marks lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, tracker_marks) == 1020, "wormd_inferred.tracker_marks lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, standing) == 1024, "wormd_inferred.standing lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, cell_count) == 1028, "wormd_inferred.cell_count lies elsewhere in wormd");
+
 /* The state of the worm's black box: once a second and at every change. */
 typedef struct wormd_black_box_status {
   /* Number of this message since the black box started. */
@@ -1190,6 +1385,10 @@ typedef struct wormd_command {
      it to the controller: as long as the lease of wormd up lasts, and where nobody holds one
      control.crawl_limit_s. */
   double limit_s;
+  /* For CommandKind::Mark, where the mean of the cells is along the canal, m. */
+  double position_m;
+  /* For CommandKind::Mark, the standard error of that, m; 0 means 5 mm. */
+  double position_sigma_m;
   /* CommandKind. A code of enum wormd_command_kind. */
   uint32_t kind;
   /* Bit k set: the command concerns the alarm with code k, for CommandKind::Acknowledge. */
@@ -1203,14 +1402,16 @@ typedef struct wormd_command {
   char sender[32];
 } wormd_command;
 
-static_assert(sizeof(wormd_command) == 64, "wormd_command has another size here than in wormd");
+static_assert(sizeof(wormd_command) == 80, "wormd_command has another size here than in wormd");
 static_assert(offsetof(wormd_command, cycles_per_s) == 0, "wormd_command.cycles_per_s lies elsewhere in wormd");
 static_assert(offsetof(wormd_command, limit_s) == 8, "wormd_command.limit_s lies elsewhere in wormd");
-static_assert(offsetof(wormd_command, kind) == 16, "wormd_command.kind lies elsewhere in wormd");
-static_assert(offsetof(wormd_command, alarm_mask) == 20, "wormd_command.alarm_mask lies elsewhere in wormd");
-static_assert(offsetof(wormd_command, user) == 24, "wormd_command.user lies elsewhere in wormd");
-static_assert(offsetof(wormd_command, reserved) == 28, "wormd_command.reserved lies elsewhere in wormd");
-static_assert(offsetof(wormd_command, sender) == 32, "wormd_command.sender lies elsewhere in wormd");
+static_assert(offsetof(wormd_command, position_m) == 16, "wormd_command.position_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_command, position_sigma_m) == 24, "wormd_command.position_sigma_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_command, kind) == 32, "wormd_command.kind lies elsewhere in wormd");
+static_assert(offsetof(wormd_command, alarm_mask) == 36, "wormd_command.alarm_mask lies elsewhere in wormd");
+static_assert(offsetof(wormd_command, user) == 40, "wormd_command.user lies elsewhere in wormd");
+static_assert(offsetof(wormd_command, reserved) == 44, "wormd_command.reserved lies elsewhere in wormd");
+static_assert(offsetof(wormd_command, sender) == 48, "wormd_command.sender lies elsewhere in wormd");
 
 /* The controller's answer. */
 typedef struct wormd_reply {

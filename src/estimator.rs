@@ -11,7 +11,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{Observer, ObserverOutput};
-use worm_estimator::message::{Alarm, BlackBoxStatus, Cycle, Estimate, Range, RecordingStatus, State};
+use worm_estimator::message::{
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, State,
+};
 
 /// Longest sleep without an event from the controller; should an event get lost, its state is read this much later.
 const MAX_SLEEP: Duration = Duration::from_millis(10);
@@ -43,6 +45,7 @@ pub(crate) fn run(
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
     let mut recordings = hub.subscriber::<RecordingStatus>().map_err(Failure::failed)?;
     let mut black_boxes = hub.subscriber::<BlackBoxStatus>().map_err(Failure::failed)?;
+    let mut commands = hub.subscriber::<CommandRecord>().map_err(Failure::failed)?;
     let mut recorder_polled = Instant::now();
     let state_event = hub.listener::<State>().map_err(Failure::failed)?;
     let mut output = OutputTopics::open(hub, role).map_err(Failure::failed)?;
@@ -61,6 +64,9 @@ pub(crate) fn run(
             if let Some(share) = gauge.as_ref().and_then(Gauge::next) {
                 observer.note_gauge(share);
             }
+        }
+        while let Some(record) = commands.next().map_err(Failure::failed)? {
+            observer.note_command(&record);
         }
         while let Some(state) = states.next().map_err(Failure::failed)? {
             on_state(&state);
@@ -106,6 +112,7 @@ struct OutputTopics {
     cycle: Publisher<Cycle>,
     alarm: Publisher<Alarm>,
     range: Publisher<Range>,
+    inferred: Publisher<Inferred>,
     alarm_event: Notifier<Alarm>,
     /// When an estimate was last published.
     last_published: Instant,
@@ -120,6 +127,7 @@ impl OutputTopics {
             cycle: hub.publisher(role)?,
             alarm: hub.publisher(role)?,
             range: hub.publisher(role)?,
+            inferred: hub.publisher(role)?,
             alarm_event: hub.notifier(role)?,
             last_published: Instant::now(),
             admitted: Instant::now(),
@@ -144,6 +152,9 @@ impl OutputTopics {
         if let Some(range) = &found.range {
             self.range.publish(range)?;
         }
+        if let Some(inferred) = &found.inferred {
+            self.inferred.publish(inferred)?;
+        }
         Ok(())
     }
 
@@ -159,6 +170,7 @@ impl OutputTopics {
         self.admitted = Instant::now();
         self.cycle.idle()?;
         self.range.idle()?;
+        self.inferred.idle()?;
         self.alarm.idle()
     }
 }

@@ -376,5 +376,6 @@ fn write_all(writer: &mut ChunkWriter, batch: &Batch) -> Result<(), WriteError> 
     each(writer, &batch.alarms)?;
     each(writer, &batch.ranges)?;
     each(writer, &batch.commands)?;
-    each(writer, &batch.trips)
+    each(writer, &batch.trips)?;
+    each(writer, &batch.inferred)
 }

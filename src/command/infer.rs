@@ -1,15 +1,16 @@
 //! `wormd infer`: what the motor's current in a log says of the worm, without looking at positions.
 
 use super::{Failure, print};
+use crate::watch::InferredSummary;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
 use worm_estimator::config::Config;
-use worm_estimator::message::Cycle;
-use worm_estimator::self_sensing::{MotorSample, Reckoned, SelfSensed, SelfSensing, Unknown};
+use worm_estimator::estimate::Inference;
+use worm_estimator::message::{Cycle, Inferred};
+use worm_estimator::self_sensing::{SelfSensed, Unknown};
 use worm_log::messages;
-use worm_physics::Worm;
 
 /// Most time between a cycle's end here and the end that the estimator measured, ns.
 const SAME_END_NS: u64 = 200_000_000;
@@ -38,30 +39,38 @@ pub fn run(args: &InferArgs) -> Result<(), Failure> {
         Some(file) => Config::load(file)?,
         None => log.config()?,
     };
-    let worm = Worm::try_from(&config).map_err(Failure::unusable)?;
-    let mut sensing = SelfSensing::new(&worm, &config.self_sensing());
+    let mut inference = Inference::by_current_alone(&config).map_err(Failure::unusable)?;
+    let mut marks = log.commands.iter().peekable();
     let mut cycles = Vec::new();
-    let mut last = None;
-    for state in log.states.iter().filter(|state| state.motor_is_new == 1) {
-        if let Some(sensed) = sensing.update(&MotorSample::from(state)).copied() {
-            let measured = log
-                .cycles
-                .iter()
-                .find(|cycle| cycle.end_ns.abs_diff(state.time_ns) < SAME_END_NS);
-            cycles.push(InferredCycle::new(state.phase, &sensed, sensing.reckoned(), measured));
-            last = Some(sensed);
+    let mut last_ns = 0;
+    let mut take = |inferred: &Inferred| {
+        if inferred.end_ns != std::mem::replace(&mut last_ns, inferred.end_ns) {
+            let mut ends = log.cycles.iter();
+            let measured = ends.find(|cycle| cycle.end_ns.abs_diff(inferred.end_ns) < SAME_END_NS);
+            cycles.push(InferredCycle::new(inferred, measured));
+        }
+    };
+    for state in &log.states {
+        if let Some(inferred) = inference.update(state) {
+            take(inferred);
+        }
+        while let Some(record) = marks.next_if(|record| record.time_ns <= state.time_ns) {
+            inference.note_command(record);
         }
     }
-    let Some(sensed) = last else {
+    if let Some(inferred) = inference.finish() {
+        take(inferred);
+    }
+    let Some(sensed) = inference.sensing().sensed() else {
         let file = args.log.display();
         return Err(Failure::unusable(format!(
             "{file}: holds no whole gait cycle crawled forward after the first: record for longer, or give a log with the topic `state`"
         )));
     };
-    let inferred = Inferred {
+    let inferred = Answer {
         cells: sensed.cells,
-        worm: InferredWorm::new(&sensed),
-        cannot_tell: CannotTell::new(&sensed),
+        worm: InferredWorm::new(sensed),
+        cannot_tell: CannotTell::new(sensed),
         cycles,
         warnings: log.warnings,
     };
@@ -75,7 +84,7 @@ pub fn run(args: &InferArgs) -> Result<(), Failure> {
 
 /// What `--json` prints. Cells count from 1.
 #[derive(Debug, Serialize)]
-struct Inferred {
+struct Answer {
     cells: usize,
     worm: InferredWorm,
     cannot_tell: CannotTell,
@@ -101,6 +110,7 @@ struct InferredWorm {
 #[derive(Debug, Serialize)]
 struct InferredCycle {
     phase: f64,
+    standing: &'static str,
     advance_m: f64,
     advance_sigma_m: f64,
     energy_loss_j: f64,
@@ -165,29 +175,24 @@ impl InferredWorm {
 }
 
 impl InferredCycle {
-    fn new(phase: f64, sensed: &SelfSensed, reckoned: Reckoned, measured: Option<&Cycle>) -> Self {
-        let cells_of = |mask: u16| {
-            (0..sensed.cells)
-                .filter(|cell| mask >> cell & 1 == 1)
-                .map(|cell| cell + 1)
-                .collect()
-        };
-        let (figures, sigma, changes) = (&sensed.figures, &sensed.figures_sigma, &sensed.changes);
+    fn new(inferred: &Inferred, measured: Option<&Cycle>) -> Self {
+        let it = InferredSummary::of(inferred, inferred.end_phase);
         Self {
-            phase: phase.floor(),
-            advance_m: figures.advance_m,
-            advance_sigma_m: sigma.advance_m,
-            energy_loss_j: figures.energy_loss_j,
-            energy_loss_sigma_j: sigma.energy_loss_j,
-            energy_actuator_net_j: figures.energy_net_j,
-            energy_actuator_net_sigma_j: sigma.energy_net_j,
-            energy_electrical_j: sensed.electrical_j,
-            energy_electrical_sigma_j: sensed.electrical_sigma_j,
-            position_m: reckoned.position_m,
-            position_sigma_m: reckoned.sigma_m,
-            friction_lost: cells_of(changes.friction_lost),
-            jammed: cells_of(changes.jammed),
-            more_load: changes.more_load,
+            phase: inferred.end_phase,
+            standing: it.standing,
+            advance_m: it.advance_m,
+            advance_sigma_m: it.advance_sigma_m,
+            energy_loss_j: it.energy_loss_j,
+            energy_loss_sigma_j: it.energy_loss_sigma_j,
+            energy_actuator_net_j: it.energy_actuator_net_j,
+            energy_actuator_net_sigma_j: it.energy_actuator_net_sigma_j,
+            energy_electrical_j: it.energy_electrical_j,
+            energy_electrical_sigma_j: it.energy_electrical_sigma_j,
+            position_m: it.position_m,
+            position_sigma_m: it.position_sigma_m,
+            friction_lost: it.friction_lost,
+            jammed: it.jammed,
+            more_load: it.more_load,
             measured: measured.map(|cycle| MeasuredCycle {
                 advance_m: cycle.advance_m,
                 energy_loss_j: cycle.energy_loss_j,
@@ -227,7 +232,7 @@ fn not_learned(unknowns: impl Iterator<Item = Unknown>) -> Vec<String> {
     names
 }
 
-fn in_words(inferred: &Inferred) -> String {
+fn in_words(inferred: &Answer) -> String {
     let mut text = String::from(
         "cycle   advance mm          losses mJ           electrical mJ    position mm      measured: advance, losses, electrical",
     );

@@ -14,7 +14,7 @@ use worm_estimator::config::Config;
 use worm_log::Channel;
 
 /// What is recorded by default.
-pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range,command,trip";
+pub(super) const ALL_TOPICS: &str = "state,timing,estimate,cycle,alarm,range,command,trip,inferred";
 
 /// Arguments of `wormd record`.
 #[derive(Debug, Args)]

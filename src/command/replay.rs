@@ -68,6 +68,10 @@ fn in_words(comparison: &Comparison) -> String {
         let (identical, compared) = (comparison.ranges_identical, comparison.ranges_compared);
         text += &format!(", {identical} of {compared} ranges");
     }
+    if comparison.inferred_compared > 0 {
+        let (identical, compared) = (comparison.inferred_identical, comparison.inferred_compared);
+        text += &format!(", {identical} of {compared} messages of self-sensing");
+    }
     for warning in &comparison.warnings {
         text += &format!("\nnote: {warning}");
     }

@@ -30,6 +30,12 @@ pub struct SendCommandArgs {
     /// Crawl as long as this command runs in the foreground: Ctrl-C, or its end however it comes, makes the worm hold
     #[arg(long)]
     attend: bool,
+    /// For `mark`: where the mean of the cells is along the canal, in metres
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    position: Option<f64>,
+    /// For `mark`: standard error of the position, in metres; without it 0.005
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, requires = "position")]
+    sigma: Option<f64>,
     #[command(flatten)]
     worm: WormArgs,
     /// Print one JSON object instead of text
@@ -51,6 +57,8 @@ enum Order {
     Reset,
     /// Note that you have seen these alarms; permits nothing
     Acknowledge,
+    /// Say where the worm is: corrects its dead reckoning, and moves nothing
+    Mark,
 }
 
 impl Order {
@@ -62,6 +70,7 @@ impl Order {
             Self::Stop => CommandKind::Stop,
             Self::Reset => CommandKind::Reset,
             Self::Acknowledge => CommandKind::Acknowledge,
+            Self::Mark => CommandKind::Mark,
         }
     }
 }
@@ -131,6 +140,28 @@ impl SendCommandArgs {
                 return Err(Failure::unusable(format!("{flag} goes with `wormd command crawl`")));
             }
         }
+        let is_place = |position_m: f64| position_m.abs() <= Command::MAX_POSITION_M;
+        match (self.order, self.position) {
+            (Order::Mark, None) => {
+                return Err(Failure::unusable(
+                    "`wormd command mark` needs --position, in metres along the canal",
+                ));
+            }
+            (Order::Mark, Some(position_m)) if !is_place(position_m) => {
+                return Err(Failure::unusable(format!(
+                    "--position must be a number of metres, at most {} either way",
+                    Command::MAX_POSITION_M
+                )));
+            }
+            (Order::Mark, Some(_)) | (_, None) => {}
+            (_, Some(_)) => return Err(Failure::unusable("--position goes with `wormd command mark`")),
+        }
+        if self
+            .sigma
+            .is_some_and(|sigma_m| !(sigma_m > 0.0 && sigma_m <= Command::MAX_POSITION_M))
+        {
+            return Err(Failure::unusable("--sigma must be a number of metres above 0"));
+        }
         if !self.alarms.is_empty() && !matches!(self.order, Order::Acknowledge) {
             return Err(Failure::unusable("names of alarms go with `wormd command acknowledge`"));
         }
@@ -149,6 +180,8 @@ impl SendCommandArgs {
         Command {
             cycles_per_s: self.speed.unwrap_or(0.0),
             limit_s: self.limit.map_or(0.0, |limit| limit.as_secs_f64()),
+            position_m: self.position.unwrap_or(0.0),
+            position_sigma_m: self.sigma.unwrap_or(0.0),
             alarm_mask: match is_about_alarms {
                 true => alarms.iter().fold(0, |mask, alarm| mask | 1 << alarm.code()),
                 false => 0,

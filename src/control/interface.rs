@@ -132,6 +132,13 @@ pub enum Note {
         /// User ID.
         user: u32,
     },
+    /// A user said where the worm is.
+    Marked {
+        /// Where, µm along the canal.
+        position_um: i64,
+        /// User ID.
+        user: u32,
+    },
     /// The silence that was taken for a lost link was a restart of the servo.
     SilenceWasRestart,
 }

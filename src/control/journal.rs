@@ -200,6 +200,10 @@ fn log_note(note: Note) {
                 tracing::info!("alarm {kind} acknowledged by user {user}");
             }
         }
+        Note::Marked { position_um, user } => {
+            let position_m = position_um as f64 * 1e-6;
+            tracing::info!("the worm is at {position_m} m along the canal, says user {user}");
+        }
         Note::SilenceWasRestart => tracing::error!(
             "the servo has restarted: it was silent because it had no power, or was rebooted; check supply and connectors"
         ),

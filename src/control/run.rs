@@ -377,8 +377,9 @@ impl Loop {
         let records = &self.ports.command_records;
         let published = match (command, &outputs.reply) {
             (Some(command), Some(reply)) => {
-                let (time_ns, supervised) = (outputs.state.time_ns, lease == Lease::Held);
-                let record = CommandRecord::new(self.commands, time_ns, supervised, command, reply);
+                let at = (outputs.state.time_ns, outputs.state.phase);
+                let supervised = lease == Lease::Held;
+                let record = CommandRecord::new(self.commands, at, supervised, command, reply);
                 self.commands += 1;
                 records.publish(&record)
             }

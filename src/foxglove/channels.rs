@@ -58,6 +58,7 @@ impl Channels {
         self.send_all(&batch.ranges, offset_ns);
         self.send_all(&batch.commands, offset_ns);
         self.send_all(&batch.trips, offset_ns);
+        self.send_all(&batch.inferred, offset_ns);
     }
 
     fn send_all<T: Logged>(&mut self, messages: &[T], offset_ns: u64) {

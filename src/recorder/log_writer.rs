@@ -108,6 +108,7 @@ fn write_batches(mut series: FileSeries, batches: &Receiver<Batch>) -> Result<Co
                 series.write(&batch.ranges)?;
                 series.write(&batch.commands)?;
                 series.write(&batch.trips)?;
+                series.write(&batch.inferred)?;
                 unsynced_since.get_or_insert_with(Instant::now);
             }
             Err(RecvTimeoutError::Timeout) => {}

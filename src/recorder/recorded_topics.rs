@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::topics::{Hub, Subscriber, Topic};
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing, TripStatus};
+use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Inferred, Range, State, Timing, TripStatus};
 use worm_log::{Channel, Logged};
 
 /// The new messages of one poll.
@@ -16,13 +16,20 @@ pub(crate) struct Batch {
     pub ranges: Vec<Range>,
     pub commands: Vec<CommandRecord>,
     pub trips: Vec<TripStatus>,
+    pub inferred: Vec<Inferred>,
 }
 
 impl Batch {
     /// How many messages.
     pub(crate) fn len(&self) -> usize {
         let by_tick = self.states.len() + self.timings.len() + self.estimates.len();
-        by_tick + self.cycles.len() + self.alarms.len() + self.ranges.len() + self.commands.len() + self.trips.len()
+        by_tick
+            + self.cycles.len()
+            + self.alarms.len()
+            + self.ranges.len()
+            + self.commands.len()
+            + self.trips.len()
+            + self.inferred.len()
     }
 }
 
@@ -39,6 +46,7 @@ pub(crate) struct RecordedTopics {
     range: Recorded<Range>,
     command: Recorded<CommandRecord>,
     trip: Recorded<TripStatus>,
+    inferred: Recorded<Inferred>,
 }
 
 impl RecordedTopics {
@@ -61,6 +69,7 @@ impl RecordedTopics {
             // Part of every recording: nobody can tell from the rest why the worm began or ended to crawl.
             command: subscribe(hub, &[Channel::CommandRecord])?,
             trip: subscribe(hub, topics)?,
+            inferred: subscribe(hub, topics)?,
         })
     }
 
@@ -87,6 +96,7 @@ impl RecordedTopics {
             ranges: take(&mut self.range)?,
             commands: take(&mut self.command)?,
             trips: take(&mut self.trip)?,
+            inferred: take(&mut self.inferred)?,
         })
     }
 
@@ -101,6 +111,7 @@ impl RecordedTopics {
             Channel::Range => self.range.as_ref().map(Subscriber::lost),
             Channel::CommandRecord => self.command.as_ref().map(Subscriber::lost),
             Channel::TripStatus => self.trip.as_ref().map(Subscriber::lost),
+            Channel::Inferred => self.inferred.as_ref().map(Subscriber::lost),
         }
     }
 }

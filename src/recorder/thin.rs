@@ -63,6 +63,7 @@ impl Thinner {
             ranges: batch.ranges.clone(),
             commands: batch.commands.clone(),
             trips: batch.trips.clone(),
+            inferred: batch.inferred.clone(),
         }
     }
 }

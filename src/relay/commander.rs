@@ -238,6 +238,10 @@ fn controllers_command(request: &Request, user: u32, sender: &str) -> Result<Com
                 command.alarm_mask |= 1 << kind.code();
             }
         }
+        Request::Mark { position_m, sigma_m } => {
+            command.position_m = *position_m;
+            command.position_sigma_m = sigma_m.unwrap_or(0.0);
+        }
         _ => {}
     }
     Ok(command)

@@ -119,7 +119,7 @@ impl Drive {
             }
             Request::Alive => Decision::Done(None),
             Request::TakeOver => self.take_over(id, now_ns),
-            Request::Acknowledge { .. } => Decision::Send,
+            Request::Acknowledge { .. } | Request::Mark { .. } => Decision::Send,
             Request::Trip {
                 action: Ask::Alive | Ask::Status | Ask::Pause,
             } => Decision::Send,

@@ -137,6 +137,7 @@ impl Worm {
             recording: telemetry.recording.map(Json),
             range: telemetry.ranges.last().copied().map(Json),
             trip: telemetry.trip.map(Json),
+            inferred: telemetry.inferred.map(Json),
             raised: telemetry.raised().into_iter().map(Json).collect(),
             cycles: telemetry.cycles.since(seen.cycles).copied().map(Json).collect(),
             alarms: telemetry.alarms.since(seen.alarms).copied().map(Json).collect(),

@@ -5,7 +5,9 @@ use crate::latency::Percentiles;
 use crate::trip::wire::Ask;
 use serde::{Deserialize, Serialize};
 use worm_estimator::config::{Config, Direction};
-use worm_estimator::message::{Alarm, CommandKind, Cycle, Estimate, Range, RecordingStatus, State, Timing, TripStatus};
+use worm_estimator::message::{
+    Alarm, CommandKind, Cycle, Estimate, Inferred, Range, RecordingStatus, State, Timing, TripStatus,
+};
 
 /// Version of this language. A higher one may have taken fields away or changed what they mean; new fields need no new version,
 /// because both sides ignore what they do not know.
@@ -94,6 +96,14 @@ pub(crate) struct Subject {
     pub full_scale_m: f64,
     /// Mass of the worm, kg.
     pub mass_kg: f64,
+    /// Distance between neighbouring cells, m: where positions are not measured.
+    #[serde(default = "usual_spacing_m")]
+    pub cell_spacing_m: f64,
+}
+
+/// Of relays that do not say it.
+fn usual_spacing_m() -> f64 {
+    Config::default().worm.cell_spacing_m
 }
 
 impl Subject {
@@ -110,6 +120,7 @@ impl Subject {
             step_order: config.worm.step_order.clone(),
             full_scale_m: bounds_m.into_iter().fold(0.0, f64::max),
             mass_kg: config.worm.mass_kg,
+            cell_spacing_m: config.worm.cell_spacing_m,
         }
     }
 }
@@ -155,6 +166,9 @@ pub(crate) struct Frame {
     /// How the trip stands that is under way, or how the last one ended; none where there was none.
     #[serde(default)]
     pub trip: Option<Json<TripStatus>>,
+    /// What the motor's current alone says, after the newest gait cycle that was fitted; none where self-sensing is off.
+    #[serde(default)]
+    pub inferred: Option<Json<Inferred>>,
     /// The alarms that are raised.
     pub raised: Vec<Json<Alarm>>,
     /// Gait cycles since the frame before.
@@ -292,6 +306,14 @@ pub(crate) enum Request {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         alarms: Vec<String>,
     },
+    /// Note where the worm is, for its dead reckoning. Anyone may.
+    Mark {
+        /// The mean of the cells along the canal, m.
+        position_m: f64,
+        /// Standard error of that, m; without it 5 mm.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        sigma_m: Option<f64>,
+    },
 }
 
 impl Request {
@@ -303,9 +325,13 @@ impl Request {
             Self::Drive => "drive",
             Self::TakeOver => "take_over",
             Self::Trip { .. } => "trip",
-            Self::Arm | Self::Crawl { .. } | Self::Hold | Self::Stop | Self::Reset | Self::Acknowledge { .. } => {
-                self.kind().map_or("", CommandKind::name)
-            }
+            Self::Arm
+            | Self::Crawl { .. }
+            | Self::Hold
+            | Self::Stop
+            | Self::Reset
+            | Self::Acknowledge { .. }
+            | Self::Mark { .. } => self.kind().map_or("", CommandKind::name),
         }
     }
 
@@ -319,6 +345,7 @@ impl Request {
             Self::Stop => Some(CommandKind::Stop),
             Self::Reset => Some(CommandKind::Reset),
             Self::Acknowledge { .. } => Some(CommandKind::Acknowledge),
+            Self::Mark { .. } => Some(CommandKind::Mark),
         }
     }
 }

@@ -62,12 +62,30 @@ pub struct Drawn {
 }
 
 use AlarmKind::{
-    DeviceFault, EnergyOverBudget, JammedCell, LinkFault, ModelMismatch, MotorStall, NoProgress, SlidingDown,
-    TrackerFault,
+    DeviceFault, EnergyOverBudget, FrictionLoss, InferredJam, JammedCell, LinkFault, ModelMismatch, MoreLoad,
+    MotorStall, NoProgress, SlidingDown, TrackerFault,
 };
 
 /// What a body that moves differently may raise.
-const BODY: &[AlarmKind] = &[ModelMismatch, NoProgress, SlidingDown, EnergyOverBudget];
+const BODY: &[AlarmKind] = &[
+    ModelMismatch,
+    NoProgress,
+    SlidingDown,
+    EnergyOverBudget,
+    FrictionLoss,
+    MoreLoad,
+];
+/// What may follow when a cell does not move as far as it should.
+const JAM: &[AlarmKind] = &[
+    JammedCell,
+    NoProgress,
+    SlidingDown,
+    ModelMismatch,
+    EnergyOverBudget,
+    InferredJam,
+    FrictionLoss,
+    MoreLoad,
+];
 /// What may follow when the servo is silent or without power.
 const SERVO_GONE: &[AlarmKind] = &[LinkFault, TrackerFault, DeviceFault];
 /// What the controller says then: which comes first depends on the length of the silence.
@@ -126,7 +144,7 @@ pub const ROWS: &[Row] = &[
         },
         Lasts::Cycles(3.0, 6.0),
         Some((0.5, 2.2)),
-        &[JammedCell, NoProgress, SlidingDown, ModelMismatch, EnergyOverBudget],
+        JAM,
         &[Fault::Alarm],
     ),
     row(
@@ -137,7 +155,7 @@ pub const ROWS: &[Row] = &[
         },
         Lasts::Cycles(3.0, 12.0),
         None,
-        &[JammedCell, NoProgress, SlidingDown, ModelMismatch, EnergyOverBudget],
+        JAM,
         &[Fault::Alarm],
     ),
     row(
@@ -171,7 +189,7 @@ pub const ROWS: &[Row] = &[
         None,
         // It comes at once, and the servo's own loop makes up for it slowly: at 2.7 times the friction, a worm at 1.1 s a cycle
         // turned at 67 % of the command for a tenth of a second. More than 20 % too slow is what the alarm calls a stall.
-        &[EnergyOverBudget, MotorStall],
+        &[EnergyOverBudget, MotorStall, MoreLoad, FrictionLoss],
         &[Fault::Alarm],
     ),
     Row {

@@ -156,6 +156,9 @@ impl Answer {
                 "the speed or the time is not a number, or the speed is beyond servo.velocity_limit_rev_per_min"
                     .to_owned()
             }
+            CommandOutcome::BadPosition => {
+                "the position or its standard error is not a number of metres that a canal has".to_owned()
+            }
             CommandOutcome::NoEstimator => {
                 "no estimator is running, or it does not keep up: start `wormd estimate`, or set \
                  control.require_estimator = false"

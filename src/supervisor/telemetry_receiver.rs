@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{
-    Alarm, CommandKind, CommandRecord, Cycle, Estimate, Mode, Range, RecordingStatus, State, Timing, TripStatus,
+    Alarm, CommandKind, CommandRecord, Cycle, Estimate, Inferred, Mode, Range, RecordingStatus, State, Timing,
+    TripStatus,
 };
 
 /// How long the worm may take to reach a commanded mode, beyond the time of the ramp.
@@ -25,6 +26,7 @@ pub(crate) struct TelemetryReceiver {
     command: Subscriber<CommandRecord>,
     recording: Subscriber<RecordingStatus>,
     trip: Subscriber<TripStatus>,
+    inferred: Subscriber<Inferred>,
 }
 
 impl TelemetryReceiver {
@@ -43,6 +45,7 @@ impl TelemetryReceiver {
             command: hub.subscriber().map_err(Failure::failed)?,
             recording: hub.subscriber().map_err(Failure::failed)?,
             trip: hub.subscriber().map_err(Failure::failed)?,
+            inferred: hub.subscriber().map_err(Failure::failed)?,
         })
     }
 
@@ -74,6 +77,9 @@ impl TelemetryReceiver {
         }
         while let Ok(Some(trip)) = self.trip.next() {
             telemetry.take_trip(&trip);
+        }
+        while let Ok(Some(inferred)) = self.inferred.next() {
+            telemetry.take_inferred(&inferred);
         }
     }
 

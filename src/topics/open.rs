@@ -43,6 +43,7 @@ pub(super) fn open(instance: &Instance) -> Result<Services, Refused> {
         range: open_topic(&node, instance)?,
         recording: open_topic(&node, instance)?,
         trip: open_topic(&node, instance)?,
+        inferred: open_topic(&node, instance)?,
         black_box: open_topic(&node, instance)?,
         state_event: open_event(&node, instance, State::NAME)?,
         alarm_event: open_event(&node, instance, Alarm::NAME)?,

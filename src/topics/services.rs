@@ -3,8 +3,8 @@
 use iceoryx2::prelude::{Node, ipc};
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use worm_estimator::message::{
-    Alarm, BlackBoxStatus, Command, CommandRecord, Cycle, Estimate, Range, RecordingStatus, Reply, State, Timing,
-    TripStatus,
+    Alarm, BlackBoxStatus, Command, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, Reply, State,
+    Timing, TripStatus,
 };
 
 /// The variant of iceoryx2 in use: between processes, ports bound to their thread.
@@ -32,6 +32,7 @@ pub struct Services {
     pub(super) range: TopicService<Range>,
     pub(super) recording: TopicService<RecordingStatus>,
     pub(super) trip: TopicService<TripStatus>,
+    pub(super) inferred: TopicService<Inferred>,
     pub(super) black_box: TopicService<BlackBoxStatus>,
     pub(super) state_event: EventService,
     pub(super) alarm_event: EventService,

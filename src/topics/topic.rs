@@ -5,8 +5,8 @@ use super::services::{EventService, Services, TopicService};
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt::Debug;
 use worm_estimator::message::{
-    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldValue, Layout, Range, RecordingStatus,
-    State, Timing, TripStatus,
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldValue, Inferred, Layout, Range,
+    RecordingStatus, State, Timing, TripStatus,
 };
 
 /// A message that is published on a topic of its own.
@@ -115,6 +115,7 @@ topics! {
     CommandRecord { command, owner: Controller, buffer: 256, history: 32, number: |record| Some(record.sequence) }
     TripStatus { trip, owner: Trip, buffer: 32, history: 1, number: |trip| Some(trip.sequence) }
     RecordingStatus { recording, owner: Recorder, buffer: 16, history: 1, number: |status| Some(status.sequence) }
+    Inferred { inferred, owner: Estimator, buffer: 64, history: 1, number: |inferred| Some(inferred.sequence) }
     BlackBoxStatus { black_box, owner: BlackBox, buffer: 16, history: 1, number: |status| Some(status.sequence) }
 }
 

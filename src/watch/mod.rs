@@ -8,6 +8,7 @@ pub(crate) mod alarm_text;
 pub(crate) mod app;
 pub(crate) mod breakdown;
 mod ghost;
+pub(crate) mod inferred;
 pub(crate) mod mismatch;
 pub(crate) mod picture;
 pub(crate) mod range;
@@ -17,6 +18,7 @@ mod summary;
 mod telemetry;
 mod view;
 
+pub use inferred::{ArmedChanges, InferredSummary};
 pub use recent::Recent;
 pub use summary::{AlarmSummary, CycleSummary, PlaceSummary, RangeSummary, Summary, TimingSummary, remarks};
 pub use telemetry::Telemetry;

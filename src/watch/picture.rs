@@ -4,12 +4,15 @@ use super::recent::Recent;
 use crate::relay::History;
 use crate::relay::message_json::Json;
 use crate::relay::wire::{Ages, Driver, Event, Frame, Hello, Network, Statistics, Subject};
-use worm_estimator::message::{Alarm, Cycle, Estimate, Range, RecordingStatus, State, Timing, TripStatus};
+use worm_estimator::message::{Alarm, Cycle, Estimate, Inferred, Range, RecordingStatus, State, Timing, TripStatus};
 
 /// Gait cycles that are kept: an hour and a half of the usual gait, 1.5 MB.
 const MAX_CYCLES: usize = 2048;
 /// Changes of alarms, and events, that are kept.
 const MAX_CHANGES: usize = 1024;
+
+/// So long after the last sample, ns, positions are not measured any more.
+const POSITIONS_LAST_NS: u64 = 1_000_000_000;
 
 /// What was seen of a worm, in bounded memory.
 #[derive(Debug, Clone)]
@@ -27,6 +30,7 @@ pub(crate) struct Picture {
     pub(crate) recording: Option<RecordingStatus>,
     pub(crate) range: Option<Range>,
     pub(crate) trip: Option<TripStatus>,
+    pub(crate) inferred: Option<Inferred>,
     pub(crate) raised: Vec<Alarm>,
     pub(crate) cycles: Recent<Cycle>,
     pub(crate) alarms: Recent<Alarm>,
@@ -52,6 +56,7 @@ impl Picture {
             recording: None,
             range: None,
             trip: None,
+            inferred: None,
             raised: Vec::new(),
             cycles: Recent::with_limit(MAX_CYCLES),
             alarms: Recent::with_limit(MAX_CHANGES),
@@ -92,6 +97,7 @@ impl Picture {
         self.recording = frame.recording.map(|Json(status)| status);
         self.range = frame.range.map(|Json(range)| range);
         self.trip = frame.trip.map(|Json(trip)| trip);
+        self.inferred = frame.inferred.map(|Json(inferred)| inferred);
         self.raised = frame.raised.into_iter().map(|Json(alarm)| alarm).collect();
         frame.cycles.into_iter().for_each(|Json(cycle)| self.cycles.push(cycle));
         frame.alarms.into_iter().for_each(|Json(alarm)| self.alarms.push(alarm));
@@ -102,6 +108,20 @@ impl Picture {
         if let (Some(state), Some(estimate)) = (&self.state, &self.estimate) {
             self.history.take(state, estimate);
         }
+    }
+
+    /// Whether positions are measured at present, as far as was seen. An estimate is repeated while no sample comes, so it may be old.
+    pub(crate) fn has_positions(&self) -> bool {
+        self.estimate.is_some_and(|estimate| {
+            let is_known = estimate.position_m.iter().any(|position_m| position_m.is_finite());
+            let now_ns = self.state.map_or(0, |state| state.time_ns);
+            is_known && now_ns.saturating_sub(estimate.time_ns) < POSITIONS_LAST_NS
+        })
+    }
+
+    /// The phase of the newest state, cycles.
+    pub(crate) fn phase(&self) -> f64 {
+        self.state.map_or(f64::NAN, |state| state.phase)
     }
 
     /// Ticks that the controller ran.

@@ -1,5 +1,6 @@
 //! The summary of a run that `wormd up` prints, as text and as JSON. The JSON names are a contract.
 
+use super::inferred::InferredSummary;
 use super::telemetry::Telemetry;
 use super::{mismatch, range, recording};
 use crate::latency::{HostPauses, Percentiles, WorstTicks};
@@ -35,6 +36,8 @@ pub struct Summary {
     pub cycles: Vec<CycleSummary>,
     /// How far and how long the battery lasts, after the newest cycle; null without a battery.
     pub range: Option<RangeSummary>,
+    /// What the motor's current alone says, beside what was measured; null where self-sensing is off.
+    pub inferred: Option<InferredSummary>,
     /// Older cycles, which are not among them.
     pub cycles_dropped: u64,
     /// Every alarm that was raised, as far as it is among the newest 8,192 changes.
@@ -191,6 +194,9 @@ impl Summary {
             fault: fault.name(),
             cycles: cycle_summaries(telemetry),
             range: telemetry.ranges.last().map(RangeSummary::of),
+            inferred: telemetry
+                .inferred
+                .map(|inferred| InferredSummary::of(&inferred, state.map_or(f64::NAN, |state| state.phase))),
             cycles_dropped: telemetry.cycles.dropped(),
             alarms: alarm_summaries(telemetry.alarms.iter(), start_ns, &worm.step_order),
             alarm_changes_dropped: telemetry.alarms.dropped(),
@@ -388,6 +394,9 @@ impl fmt::Display for Summary {
         }
         if let Some(range) = &self.range {
             writeln!(f, "{}", range::text(range))?;
+        }
+        if let Some(text) = self.inferred.as_ref().and_then(InferredSummary::text) {
+            writeln!(f, "by current  {text}")?;
         }
         for alarm in &self.alarms {
             let cell = match (alarm.cell, &alarm.place) {

@@ -3,7 +3,7 @@
 use super::recent::Recent;
 use crate::latency::TickStats;
 use worm_estimator::message::{
-    Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Range, RecordingStatus, State, Timing, TripStatus,
+    Alarm, AlarmKind, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, State, Timing, TripStatus,
 };
 
 /// How many cycles are kept: nearly two days of the usual gait, 45 MB.
@@ -33,6 +33,8 @@ pub struct Telemetry {
     pub recording: Option<RecordingStatus>,
     /// How the newest trip stands, or stood at its end.
     pub trip: Option<TripStatus>,
+    /// What the motor's current alone says; none where self-sensing is off.
+    pub inferred: Option<Inferred>,
     /// The newest cycles.
     pub cycles: Recent<Cycle>,
     /// How far the battery lasts, after the newest cycles; empty without a battery.
@@ -63,6 +65,7 @@ impl Telemetry {
             timing: None,
             recording: None,
             trip: None,
+            inferred: None,
             cycles: Recent::with_limit(cycles),
             ranges: Recent::with_limit(cycles.min(MAX_RANGES)),
             alarms: Recent::with_limit(alarms),
@@ -122,6 +125,11 @@ impl Telemetry {
     /// Takes how a trip stands.
     pub fn take_trip(&mut self, trip: &TripStatus) {
         self.trip = Some(*trip);
+    }
+
+    /// Takes what the motor's current alone says.
+    pub fn take_inferred(&mut self, inferred: &Inferred) {
+        self.inferred = Some(*inferred);
     }
 
     /// Ticks that the controller ran.

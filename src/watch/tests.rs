@@ -8,7 +8,8 @@ use ratatui::backend::TestBackend;
 use ratatui::style::Color;
 use worm_estimator::config::Worm as WormConfig;
 use worm_estimator::message::{
-    Alarm, AlarmKind, Cycle, Estimate, Mode, RecordingProblem, RecordingState, RecordingStatus, Severity, State, Timing,
+    Alarm, AlarmKind, Cycle, Estimate, FieldAccess, Inferred, InferredStanding, Mode, RecordingProblem, RecordingState,
+    RecordingStatus, Severity, State, Timing,
 };
 use worm_physics::MAX_CELLS;
 use worm_physics::{Motion, Outcome, Worm, steady_cycle};
@@ -145,6 +146,7 @@ fn screen(seat: Seat, telemetry: &Telemetry, driver: Option<Driver>) -> App {
         step_order: vec![1, 2, 3, 4],
         full_scale_m: 0.00175,
         mass_kg: 0.333,
+        cell_spacing_m: 0.04,
     };
     let mut worm = RelayedWorm::new(subject.clone());
     let mut app = App::new(seat, subject);
@@ -202,6 +204,63 @@ fn the_picture_shows_what_was_heard() {
     for cell in ["▐4▌", "▐3▌", "▐2▌"] {
         assert!(canal.contains(cell), "{cell} is missing in {canal}");
     }
+}
+
+/// What the motor's current says of the worm of [`received`].
+fn inferred() -> Inferred {
+    Inferred {
+        end_ns: 1,
+        friction_n: [1.71; MAX_CELLS],
+        friction_sigma_n: [0.06; MAX_CELLS],
+        stiffness_n_per_m: [972.0; MAX_CELLS],
+        stiffness_sigma_n_per_m: [31.0; MAX_CELLS],
+        forward_slide_m: [6.5e-3; MAX_CELLS],
+        pull_n: 0.1,
+        pull_sigma_n: 0.2,
+        advance_m: 6.7e-3,
+        advance_sigma_m: 2e-4,
+        energy_loss_j: 0.047,
+        energy_loss_sigma_j: 0.002,
+        phase: 3.0,
+        position_m: 0.061,
+        position_sigma_m: 0.004,
+        cell_count: 4,
+        standing: InferredStanding::Fitted.code(),
+        ..Inferred::empty()
+    }
+}
+
+#[test]
+fn a_worm_that_nobody_sees_is_drawn_hollow_where_it_should_be() {
+    let mut telemetry = received(3.4);
+    telemetry.take_inferred(&inferred());
+    // The tracker has been silent since the worm began: the estimate is repeated, and old.
+    let unseen = painted(110, 34, &telemetry);
+    println!("{unseen}");
+    for part in [
+        "[1]",
+        "[4]",
+        "~1.71±0.06",
+        "~972±31",
+        "at ~64±4 mm, ~6.7±0.2 mm and ~47±2 mJ a cycle",
+        "not seen",
+    ] {
+        assert!(unseen.contains(part), "{part:?} is missing in\n{unseen}");
+    }
+    assert!(!unseen.contains("▐1▌"), "{unseen}");
+    // With a sample of now, what is measured is drawn, and what is inferred stands beside it.
+    let now_ns = telemetry.state.map_or(0, |state| state.time_ns);
+    telemetry.estimate = telemetry.estimate.map(|estimate| Estimate {
+        time_ns: now_ns,
+        ..estimate
+    });
+    let seen = painted(130, 34, &telemetry);
+    for part in ["▐1▌", "~1.71±0.06", "at ~64±4 mm"] {
+        assert!(seen.contains(part), "{part:?} is missing in\n{seen}");
+    }
+    let summary = serde_json::to_value(Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling)).expect("JSON");
+    assert_eq!(summary["inferred"]["friction_n"][3], 1.71);
+    assert_eq!(summary["inferred"]["standing"], "fitted");
 }
 
 /// The terminal that everybody has shows the worm, its tips, its alarms and its cycles.

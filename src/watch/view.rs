@@ -4,7 +4,7 @@ mod canal;
 mod panels;
 
 use super::picture::Picture;
-use super::{alarm_text, recording};
+use super::{InferredSummary, alarm_text, inferred, recording};
 use crate::relay::wire::Subject;
 use crate::trip::words;
 use ratatui::Frame;
@@ -248,9 +248,16 @@ fn tip_style(estimate: &Estimate, cell: usize) -> Style {
 }
 
 fn draw_tips(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
-    let block = Block::bordered().title(" tips ");
-    let Some(estimate) = picture.estimate else {
-        frame.render_widget(block, area);
+    let inferred = picture.inferred;
+    let summary = inferred.map(|inferred| InferredSummary::of(&inferred, picture.phase()));
+    let block = Block::bordered()
+        .title(" tips ")
+        .title_bottom(Line::from(summary.and_then(|it| it.text()).unwrap_or_default()).fg(Color::Blue));
+    let Some(estimate) = picture
+        .estimate
+        .filter(|_| picture.has_positions() || inferred.is_none())
+    else {
+        draw_inferred_tips(frame, area, block, picture);
         return;
     };
     let columns = fitting(
@@ -261,6 +268,7 @@ fn draw_tips(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
             ("  mm", 6),
             ("   N", 6),
             ("slid fwd/back mm", 16),
+            (" ~max N", 11),
         ],
         block.inner(area).width,
     );
@@ -277,10 +285,60 @@ fn draw_tips(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
                 estimate.forward_slide_m[cell] * 1e3,
                 estimate.backward_slide_m[cell] * 1e3
             )),
+            TableCell::from(
+                inferred
+                    .and_then(|inferred| inferred::friction_text(&inferred, cell))
+                    .unwrap_or_default(),
+            )
+            .style(Style::new().fg(Color::Blue)),
         ];
         Row::new(fields.into_iter().take(columns.len()))
     };
     let rows = known_positions(&estimate).into_iter().map(row).collect();
+    frame.render_widget(table(rows, &columns).block(block), area);
+}
+
+/// What the current says of each cell, where no positions are measured.
+fn draw_inferred_tips(frame: &mut Frame<'_>, area: Rect, block: Block<'_>, picture: &Picture) {
+    let Some(inferred) = picture.inferred else {
+        frame.render_widget(block, area);
+        return;
+    };
+    let columns = fitting(
+        &[
+            ("cell", 4),
+            ("friction N", 12),
+            ("stiffness N/m", 13),
+            ("slides fwd/back mm", 18),
+        ],
+        block.inner(area).width,
+    );
+    let row = |cell: usize| {
+        let [stiffness, sigma] = [inferred.stiffness_n_per_m[cell], inferred.stiffness_sigma_n_per_m[cell]];
+        let is_known = stiffness.is_finite();
+        let fields = [
+            cell_number(cell),
+            inferred::friction_text(&inferred, cell).unwrap_or_else(|| "–".to_owned()),
+            if is_known {
+                format!("~{stiffness:.0}±{sigma:.0}")
+            } else {
+                "–".to_owned()
+            },
+            format!(
+                "~{:.1}/{:.1}",
+                inferred.forward_slide_m[cell] * 1e3,
+                inferred.backward_slide_m[cell] * 1e3
+            ),
+        ];
+        Row::new(
+            fields
+                .into_iter()
+                .take(if is_known { columns.len() } else { 3.min(columns.len()) }),
+        )
+        .style(Style::new().fg(Color::Blue))
+    };
+    let cells = (inferred.cell_count as usize).min(worm_physics::MAX_CELLS);
+    let rows = (0..cells).map(row).collect();
     frame.render_widget(table(rows, &columns).block(block), area);
 }
 

@@ -6,7 +6,9 @@
 use std::path::Path;
 use std::process::Command;
 use std::time::UNIX_EPOCH;
-use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, JsonMessage, Mode, Range, State, Timing, TripStatus};
+use worm_estimator::message::{
+    Alarm, AlarmKind, Cycle, Estimate, Inferred, JsonMessage, Mode, Range, State, Timing, TripStatus,
+};
 use worm_log::{Origin, Writer};
 
 /// Prints what the readers find, by topic: schema, and time and content of each message.
@@ -112,6 +114,7 @@ fn the_official_reader_yields_named_series() {
         ("/alarm", Alarm::TYPE_NAME),
         ("/range", Range::TYPE_NAME),
         ("/trip", TripStatus::TYPE_NAME),
+        ("/inferred", Inferred::TYPE_NAME),
     ] {
         let channel = &found["topics"][topic];
         assert_eq!(

@@ -8,6 +8,7 @@ mod attending;
 mod black_box;
 mod explaining;
 mod faulting;
+mod inferring;
 mod kills;
 mod latency;
 mod leaks;

@@ -56,7 +56,7 @@ fn command_record(sequence: u64) -> CommandRecord {
         sender: ShortText::new("tester"),
         ..Command::new(CommandKind::Hold)
     };
-    CommandRecord::new(sequence, 7 * sequence, false, &command, &reply)
+    CommandRecord::new(sequence, (7 * sequence, 2.5), false, &command, &reply)
 }
 
 fn estimate(state_sequence: u64) -> Estimate {

@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use worm_estimator::message::{
-    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldKind, FieldValue, Range, RecordingStatus,
-    State, Timing, TripStatus,
+    Alarm, BlackBoxStatus, CommandRecord, Cycle, Estimate, FieldAccess, FieldKind, FieldValue, Inferred, Range,
+    RecordingStatus, State, Timing, TripStatus,
 };
 use wormd::topics::{BlackBox, Controller, Estimator, Hub, Recorder, RoleLock, Trip, describe_topics};
 
@@ -110,7 +110,7 @@ fn every_field_of_every_topic_is_read_as_it_was_published() {
     prepare! {
         State of controller, Timing of controller, Estimate of estimator, Cycle of estimator, Alarm of estimator,
         Range of estimator, CommandRecord of controller, RecordingStatus of recorder, TripStatus of trip,
-        BlackBoxStatus of black_box
+        BlackBoxStatus of black_box, Inferred of estimator
     }
     assert_eq!(publish.len(), describe_topics().len(), "every topic is tried");
 

@@ -29,6 +29,7 @@ MESSAGES = [
     wormd.RecordingStatus,
     wormd.TripStatus,
     wormd.BlackBoxStatus,
+    wormd.Inferred,
 ]
 
 layouts = {}
@@ -54,6 +55,7 @@ with wormd.Worm(config=sys.argv[1]) as worm:
         worm.recording(),
         worm.trip(),
         worm.black_box(),
+        worm.inferred(),
     ]
     print(json.dumps("ready"), flush=True)
     for stream in streams:

@@ -2,6 +2,8 @@
 
 use super::harness::{config, crawling, wired};
 use worm_estimator::config::Config;
+use worm_estimator::estimate::{Inference, Observer};
+use worm_estimator::message::{AlarmKind, CommandKind, CommandRecord, FieldAccess, Inferred, JsonMessage, State};
 use worm_estimator::self_sensing::{MotorSample, SelfSensed, SelfSensing};
 use worm_physics::Worm;
 use wormd::link::virtual_worm::{Options, PlantLedger};
@@ -56,5 +58,136 @@ fn the_virtual_worm_is_known_by_its_current() {
                 "{position_m} m of {travelled_m}"
             );
         }
+    }
+}
+
+/// The estimator beside its positions says the same of the worm as self-sensing without them, to the last bit; and the same again from the
+/// same states and commands.
+#[test]
+fn the_running_estimator_infers_what_the_current_alone_says() {
+    let config = config("");
+    let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
+    let mut states = Vec::new();
+    session.run_s(16.0, |tick| states.push(tick.state));
+    let mark = CommandRecord {
+        state_sequence: states[9_000].sequence,
+        time_ns: states[9_000].time_ns,
+        phase: states[9_000].phase,
+        kind: CommandKind::Mark.code(),
+        position_m: 0.7,
+        position_sigma_m: 1e-3,
+        ..CommandRecord::empty()
+    };
+    // A record may be late, by as much as a record can be.
+    let observe = |late: usize| {
+        let mut observer = Observer::new(&config).expect("a valid configuration");
+        let mut inferred = Vec::new();
+        for (tick, state) in states.iter().enumerate() {
+            if tick == 9_000 + late {
+                observer.note_command(&mark);
+            }
+            inferred.extend(observer.update(state).inferred);
+        }
+        inferred
+    };
+    let live = observe(0);
+    assert_eq!(text(&live), text(&observe(90)));
+    // Once the model's prediction is made, nothing of it allocates: not the search of the third cycle either.
+    let mut observer = Observer::new(&config).expect("a valid configuration");
+    let (before, after) = states.split_at(6_000);
+    for state in before {
+        observer.update(state);
+    }
+    let mut messages = 0;
+    let allocated = allocation_counter::measure(|| {
+        for state in after {
+            messages += usize::from(observer.update(state).inferred.is_some());
+        }
+    });
+    assert_eq!(allocated.count_total, 0);
+    assert!(messages >= 3, "{messages} messages");
+
+    let mut alone = Inference::by_current_alone(&config).expect("a valid configuration");
+    let mut blind = Vec::new();
+    for state in &states {
+        let unseen = State {
+            sample_is_new: 0,
+            position_m: [f64::NAN; worm_physics::MAX_CELLS],
+            ..*state
+        };
+        blind.extend(alone.update(&unseen).copied());
+    }
+    let ends = |messages: &[Inferred]| -> Vec<Inferred> {
+        let mut last_ns = 0;
+        let fitted = messages
+            .iter()
+            .filter(|message| message.end_ns != std::mem::replace(&mut last_ns, message.end_ns));
+        fitted
+            .map(|message| Inferred {
+                sequence: 0,
+                position_m: 0.0,
+                position_sigma_m: 0.0,
+                marks: 0,
+                tracker_marks: 0,
+                ..*message
+            })
+            .collect()
+    };
+    assert!(ends(&live).len() >= 4, "{} cycles", ends(&live).len());
+    assert_eq!(text(&ends(&live)), text(&ends(&blind)));
+    let (last, unseen) = (live.last().expect("messages"), blind.last().expect("messages"));
+    assert_eq!((last.marks, unseen.marks), (1, 0));
+    println!(
+        "at {:.4} ± {:.4} m with tracker and mark, {:.4} ± {:.4} m without",
+        last.position_m, last.position_sigma_m, unseen.position_m, unseen.position_sigma_m
+    );
+    assert!(last.position_sigma_m < 1e-3 && unseen.position_sigma_m > 1e-3);
+    let travelled_m: f64 = session
+        .machine
+        .plant()
+        .ledger()
+        .cycles()
+        .iter()
+        .map(|cycle| cycle.advance_m)
+        .sum();
+    assert!(
+        (unseen.position_at_m(last.end_phase) / travelled_m - 1.0).abs() < 0.1,
+        "of {travelled_m} m"
+    );
+}
+
+fn text(messages: &[Inferred]) -> Vec<u8> {
+    let mut text = Vec::new();
+    messages
+        .iter()
+        .for_each(|message| message.write_json(&mut text).expect("it can be written"));
+    text
+}
+
+/// Friction that one cell loses raises the alarm with that cell, within three cycles of the loss; nothing is raised before.
+#[test]
+fn lost_friction_raises_its_alarm() {
+    for (cell, slope_deg) in [(1, 0.0), (2, 15.0), (4, 15.0)] {
+        let config = config(&format!("canal.slope_deg = {slope_deg}\n"));
+        let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
+        session.run_s(26.0, |_| {});
+        assert_eq!(session.raised_kinds(), []);
+        let fault = format!("slip:friction=0.65,cell={cell}").parse().expect("a fault");
+        session.machine.switch_on(fault).expect("it can be switched on");
+        let from_s = session.now_s();
+        // Three cycles; one more where the cell had already stepped when it lost its friction.
+        session.run_s(4.0 * config.gait.cycle_s, |_| {});
+        let alarm = session
+            .raised
+            .iter()
+            .find(|alarm| alarm.kind == AlarmKind::FrictionLoss.code());
+        let alarm = alarm.unwrap_or_else(|| panic!("cell {cell}, {slope_deg}°: {:?}", session.raised));
+        let cycles = (alarm.time_ns as f64 * 1e-9 - from_s) / config.gait.cycle_s;
+        println!(
+            "cell {cell}, {slope_deg}°: {cycles:.1} cycles after the loss, share {:.2}",
+            alarm.value
+        );
+        assert!(cycles < 3.2);
+        assert_eq!(alarm.cell + 1, cell);
     }
 }

@@ -40,7 +40,7 @@ const CASES: &[Case] = &[
         12.0,
         LEVEL,
         false,
-        &["alarm energy-over-budget"],
+        &["alarm energy-over-budget", "alarm more-load"],
     ),
     (Fault("jam:cell=2,share=0"), 4.0, LEVEL, true, &["alarm jammed-cell"]),
     (Fault("slip:friction=0.3"), 6.0, STEEP, true, &["alarm no-progress"]),
@@ -152,7 +152,13 @@ fn explained((done, lasts_s, toml, ..): &Case) -> Explanation {
                 fault: tick.state.fault,
                 alarm_mask: 0,
             };
-            commands.push(CommandRecord::new(0, tick.state.time_ns, false, &told, &reply));
+            commands.push(CommandRecord::new(
+                0,
+                (tick.state.time_ns, tick.state.phase),
+                false,
+                &told,
+                &reply,
+            ));
             states.push(tick.state);
         }
     }

@@ -283,7 +283,7 @@ fn refused_crawl() -> CommandRecord {
         fault: 1,
         alarm_mask: 4,
     };
-    CommandRecord::new(3, 1_000_000_001, true, &command, &reply)
+    CommandRecord::new(3, (1_000_000_001, 2.5), true, &command, &reply)
 }
 
 /// A message with the byte before it that names its type to the target.

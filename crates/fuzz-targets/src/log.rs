@@ -6,8 +6,8 @@ use std::path::Path;
 use worm_analysis::recording::mcap;
 use worm_estimator::config::Config;
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, RecordingStatus, State, Timing,
-    TripStatus,
+    Alarm, CommandRecord, Cycle, Estimate, Inferred, JsonMessage, ProtobufMessage, Range, RecordingStatus, State,
+    Timing, TripStatus,
 };
 use worm_log::{Log, compare, messages_from, outline, replay};
 
@@ -50,6 +50,7 @@ pub(crate) fn log_messages(data: &[u8]) {
         log.ranges.extend(read::<Range>(line));
         log.commands.extend(read::<CommandRecord>(line));
         log.trips.extend(read::<TripStatus>(line));
+        log.inferred.extend(read::<Inferred>(line));
         read::<Timing>(line);
     }
     check(&log);
@@ -68,6 +69,7 @@ pub(crate) fn protobuf_message(data: &[u8]) {
         4 => read_bytes::<Alarm>(bytes),
         5 => read_bytes::<CommandRecord>(bytes),
         6 => read_bytes::<TripStatus>(bytes),
+        7 => read_bytes::<Inferred>(bytes),
         _ => read_bytes::<RecordingStatus>(bytes),
     }
 }

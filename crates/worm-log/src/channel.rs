@@ -1,7 +1,7 @@
 //! The channels of a log.
 
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, JsonMessage, ProtobufMessage, Range, State, Timing, TripStatus,
+    Alarm, CommandRecord, Cycle, Estimate, Inferred, JsonMessage, ProtobufMessage, Range, State, Timing, TripStatus,
 };
 
 /// Encoding of the messages that are written, and of their schemas, as MCAP names it.
@@ -67,6 +67,7 @@ channels! {
     Range = "range",
     CommandRecord = "command",
     TripStatus = "trip",
+    Inferred = "inferred",
 }
 
 impl Channel {

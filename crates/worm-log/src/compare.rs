@@ -29,6 +29,10 @@ pub struct Comparison {
     pub ranges_compared: usize,
     /// Those that are identical.
     pub ranges_identical: usize,
+    /// Recorded messages of self-sensing that were compared.
+    pub inferred_compared: usize,
+    /// Those that are identical.
+    pub inferred_identical: usize,
     /// The log has every state since the estimator's first, and every result.
     pub complete: bool,
     /// What is missing, and other remarks.
@@ -42,6 +46,7 @@ impl Comparison {
             && self.cycles_compared == self.cycles_identical
             && self.alarms_compared == self.alarms_identical
             && self.ranges_compared == self.ranges_identical
+            && self.inferred_compared == self.inferred_identical
     }
 }
 
@@ -70,6 +75,13 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
     let ranges = span.agreement("ranges", log.ranges.iter().copied(), replayed, |range| {
         (range.index, range.end_ns)
     });
+    let replayed: &[_] = if log.inferred.is_empty() { &[] } else { &replay.inferred };
+    let inferred = span.agreement(
+        "messages of self-sensing",
+        log.inferred.iter().copied(),
+        replayed,
+        |inferred| (inferred.sequence, inferred.time_ns),
+    );
 
     let mut gaps = Vec::new();
     if !replay.first_is_known {
@@ -98,10 +110,10 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
             "the estimator was started anew at t = {time_s:.3} s, and its replay was not"
         ));
     }
-    let agreements = [estimates, cycles, alarms, ranges];
+    let agreements = [estimates, cycles, alarms, ranges, inferred];
     gaps.extend(agreements.iter().flat_map(|agreement| agreement.gap.clone()));
     let complete = gaps.is_empty();
-    let [estimates, cycles, alarms, ranges] = agreements;
+    let [estimates, cycles, alarms, ranges, inferred] = agreements;
     Comparison {
         states: log.states.len(),
         estimates_compared: estimates.compared,
@@ -112,6 +124,8 @@ pub fn compare(log: &Log, replay: &Replay) -> Comparison {
         alarms_identical: alarms.identical,
         ranges_compared: ranges.compared,
         ranges_identical: ranges.identical,
+        inferred_compared: inferred.compared,
+        inferred_identical: inferred.identical,
         complete,
         warnings: log.warnings.iter().cloned().chain(gaps).collect(),
     }

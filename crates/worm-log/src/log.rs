@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use worm_estimator::config::{Config, ConfigError};
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing, TripStatus};
+use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Inferred, Range, State, Timing, TripStatus};
 
 /// The messages of a log, by topic, each topic in the order in which it was recorded.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +31,8 @@ pub struct Log {
     pub commands: Vec<CommandRecord>,
     /// How trips stood; none where there was none, and in logs of older versions.
     pub trips: Vec<TripStatus>,
+    /// What the motor's current alone said; none where self-sensing was off, and in logs of older versions.
+    pub inferred: Vec<Inferred>,
     /// The text of the worm's configuration; none if it ran on defaults.
     pub config: Option<String>,
     /// Worm, cells, version, and when the log was begun.
@@ -88,6 +90,7 @@ fn gather(path: &Path, scan: impl FnOnce(Take<'_>) -> Result<Contents, ReadError
             Channel::Range => log.ranges.push(payload.read()?),
             Channel::CommandRecord => log.commands.push(payload.read()?),
             Channel::TripStatus => log.trips.push(payload.read()?),
+            Channel::Inferred => log.inferred.push(payload.read()?),
         }
         Ok(())
     })?;

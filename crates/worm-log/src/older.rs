@@ -24,6 +24,15 @@ pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'sta
     }
 }
 
+/// Whether a type of an older version has the first fields of the present one, with the same numbers, and no others: Protocol Buffers read
+/// it then as a message whose newer fields are zero.
+pub(super) fn is_beginning(channel: Channel, type_name: &str) -> bool {
+    matches!(
+        (channel, type_name),
+        (Channel::CommandRecord, "wormd_command_record_v1")
+    )
+}
+
 /// The message, with the members that it lacks.
 pub(super) fn completed<'t>(text: &'t [u8], lacking: Option<&str>) -> Cow<'t, [u8]> {
     match (text.split_first(), lacking) {

@@ -1,7 +1,7 @@
 //! A message as it stands in a log: JSON in logs of older versions, Protocol Buffers since.
 
 use super::channel::{Channel, Logged};
-use super::older::{completed, lacking_members};
+use super::older::{completed, is_beginning, lacking_members};
 use worm_estimator::message::ProtobufError;
 
 /// How the messages of a channel are encoded.
@@ -33,7 +33,7 @@ impl Encoding {
                 None if !is_present => Err(Unknown::Type),
                 lacking => Ok(Self::Json { lacking }),
             },
-            "protobuf" if is_present => Ok(Self::Protobuf),
+            "protobuf" if is_present || is_beginning(channel, type_name) => Ok(Self::Protobuf),
             "protobuf" => Err(Unknown::Type),
             _ => Err(Unknown::Encoding),
         }

@@ -2,9 +2,10 @@
 
 use super::log::Log;
 use super::recorder_alarm;
+use std::borrow::Cow;
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{EstimatorError, Observer};
-use worm_estimator::message::{Alarm, Cycle, Estimate, JsonMessage, Range, State};
+use worm_estimator::message::{Alarm, AlarmKind, Cycle, Estimate, Inferred, JsonMessage, Range, State};
 
 /// So many recorded estimates must be reproduced to identify the estimator's first state.
 const FIRST_ESTIMATES: usize = 20;
@@ -29,23 +30,30 @@ pub struct Replay {
     pub alarms: Vec<Alarm>,
     /// How far the battery lasts, after each cycle.
     pub ranges: Vec<Range>,
+    /// What the motor's current alone says.
+    pub inferred: Vec<Inferred>,
 }
 
 /// Feeds a log's states to the estimator, in their order.
 ///
-/// An estimator that was started after the controller has not seen the first states. Its sums depend on where it started, and no
-/// message says where. So every start that the first recorded estimate allows is tried, and the one that reproduces the first
-/// estimates is used; if there is none, the first state.
+/// An estimator that was started after the controller has not seen the first states, and its sums depend on where it started. The first message
+/// of self-sensing says where, for it is made with the estimator's first state. Without it every start that the first recorded estimate allows
+/// is tried, and the one that reproduces the first estimates is used; if there is none, the first state.
 ///
 /// # Errors
 /// [`EstimatorError`] for a configuration that is not valid, or is of a worm with another number of cells.
 pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
+    let config = &*as_recorded(log, config);
     let mut budget = MIN_TRIED_STATES + TRIES * log.states.len();
     let recorded: Vec<_> = fresh(&log.estimates)
         .take(FIRST_ESTIMATES)
         .map(recorder_alarm::without)
         .collect();
-    for first in possible_starts(&log.states, recorded.first()) {
+    let starts = match first_by_message(log) {
+        Some(first) => first..first + 1,
+        None => possible_starts(&log.states, recorded.first()),
+    };
+    for first in starts {
         let (mut found, fed) = run(log, first, config, recorded.len())?;
         let is_same = found.estimates.len() == recorded.len()
             && found
@@ -64,6 +72,33 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
     Ok(run(log, 0, config, usize::MAX)?.0)
 }
 
+/// Bits of the alarms that self-sensing raises.
+const BY_CURRENT: u32 =
+    1 << AlarmKind::FrictionLoss.code() | 1 << AlarmKind::InferredJam.code() | 1 << AlarmKind::MoreLoad.code();
+
+/// The configuration as the estimator had it: that of an older version knew no self-sensing, whatever the defaults of this one say.
+fn as_recorded<'c>(log: &Log, config: &'c Config) -> Cow<'c, Config> {
+    let was_enabled = !log.inferred.is_empty()
+        || log
+            .estimates
+            .iter()
+            .any(|estimate| (estimate.armed_mask | estimate.raised_mask) & BY_CURRENT != 0);
+    let mut config = Cow::Borrowed(config);
+    if !was_enabled && !log.estimates.is_empty() && config.self_sensing.enabled {
+        config.to_mut().self_sensing.enabled = false;
+    }
+    config
+}
+
+/// Index of the estimator's first state, where the log has the message that was made with it.
+fn first_by_message(log: &Log) -> Option<usize> {
+    let first = log.inferred.iter().find(|inferred| inferred.sequence == 0)?;
+    let key = (first.time_ns, first.state_sequence);
+    log.states
+        .iter()
+        .position(|state| (state.time_ns, state.sequence) == key)
+}
+
 /// Indices of the states at which an estimator with this first estimate can have started.
 fn possible_starts(states: &[State], first_estimate: Option<&Estimate>) -> std::ops::Range<usize> {
     let Some(estimate) = first_estimate else { return 0..0 };
@@ -79,11 +114,13 @@ fn possible_starts(states: &[State], first_estimate: Option<&Estimate>) -> std::
 
 /// Runs the estimator until it has made so many estimates, and returns how many states that took.
 ///
-/// The readings of a gauge are no states: they come from the recorded ranges, each of which says what it used.
+/// The readings of a gauge are no states: they come from the recorded ranges, each of which says what it used. Marks come from the
+/// recorded commands.
 fn run(log: &Log, first: usize, config: &Config, enough: usize) -> Result<(Replay, usize), EstimatorError> {
     let mut observer = Observer::new(config)?;
     let mut gauged = log.ranges.iter().peekable();
     note_gauge(&mut observer, gauged.peek().copied());
+    let mut commands = log.commands.iter().peekable();
     let mut replay = Replay {
         first: 0,
         first_is_known: false,
@@ -91,6 +128,7 @@ fn run(log: &Log, first: usize, config: &Config, enough: usize) -> Result<(Repla
         cycles: Vec::new(),
         alarms: Vec::new(),
         ranges: Vec::new(),
+        inferred: Vec::new(),
     };
     let mut fed = 0;
     for state in &log.states[first..] {
@@ -100,6 +138,10 @@ fn run(log: &Log, first: usize, config: &Config, enough: usize) -> Result<(Repla
         replay.alarms.extend(report.alarms.iter());
         replay.estimates.extend(report.estimate);
         replay.cycles.extend(report.cycle);
+        replay.inferred.extend(report.inferred);
+        while let Some(record) = commands.next_if(|record| record.time_ns <= state.time_ns) {
+            observer.note_command(record);
+        }
         if let Some(range) = report.range {
             while gauged.next_if(|recorded| recorded.end_ns <= range.end_ns).is_some() {}
             replay.ranges.push(range);

@@ -110,11 +110,37 @@ impl Motion {
     /// # Panics
     /// When the phase is not finite or beyond 10¹² cycles, where a step could no longer be resolved.
     pub fn advance_to(&mut self, worm: &Worm, phase: f64) -> Result<(), SlidesDown> {
+        self.advance_through(worm, [phase], |_| {})
+    }
+
+    /// Advances to one phase after the other, as [`advance_to`](Self::advance_to) does, of a worm that does not change meanwhile: it is
+    /// balanced once. `each` sees the motion at every phase.
+    ///
+    /// # Errors
+    /// [`SlidesDown`] when the tips cannot hold the worm. Nothing has moved then.
+    ///
+    /// # Panics
+    /// As [`advance_to`](Self::advance_to).
+    pub fn advance_through(
+        &mut self,
+        worm: &Worm,
+        phases: impl IntoIterator<Item = f64>,
+        mut each: impl FnMut(&Self),
+    ) -> Result<(), SlidesDown> {
+        self.rebalance(worm)?;
+        for phase in phases {
+            self.run_to(worm, phase);
+            each(self);
+        }
+        Ok(())
+    }
+
+    /// Runs to a phase from a balanced instant.
+    fn run_to(&mut self, worm: &Worm, phase: f64) {
         assert!(
             phase.abs() <= MAX_PHASE,
             "the gait phase must be finite and within ±{MAX_PHASE} cycles, not {phase}"
         );
-        self.rebalance(worm)?;
         let steps_per_cycle = self.cells as f64;
         let target = phase * steps_per_cycle;
         let mut at = self.phase * steps_per_cycle;
@@ -128,7 +154,6 @@ impl Motion {
             at = end;
         }
         self.phase = phase;
-        Ok(())
     }
 
     /// Changes the parameters at the present phase: tips beyond a bound that shrank slide to it, then the body gives way until the

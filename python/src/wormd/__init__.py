@@ -12,7 +12,7 @@
 - `read`: a log, or a CSV of positions, as pandas data frames.
 - `analyze`, `explain`, `simulate`: the program's analyses, with results as objects.
 
-Messages are `State`, `Timing`, `Estimate`, `Cycle`, `Alarm`, `Range`, `CommandRecord`, `TripStatus`, `RecordingStatus` and
+Messages are `State`, `Timing`, `Estimate`, `Cycle`, `Alarm`, `Range`, `Inferred`, `CommandRecord`, `TripStatus`, `RecordingStatus` and
 `BlackBoxStatus`. All units are
 SI and stand in the names. Everything that can go wrong is a `WormError`. ``python -m wormd`` shows how a worm is.
 """
@@ -31,6 +31,8 @@ from ._messages import (
     Estimate,
     Fault,
     HoldReason,
+    Inferred,
+    InferredStanding,
     Mode,
     Range,
     RecordingProblem,
@@ -82,6 +84,8 @@ __all__ = [
     "Explanation",
     "Fault",
     "HoldReason",
+    "Inferred",
+    "InferredStanding",
     "Latest",
     "Mode",
     "NotDriver",

@@ -95,6 +95,12 @@ class AlarmKind(Code):
     """The worm makes a displacement that the model does not explain."""
     RECORDING_STOPPED = "recording-stopped", 10
     """The recorder could not go on, or was killed."""
+    FRICTION_LOSS = "friction-loss", 11
+    """By the motor's current, a cell or all of them have lost friction: a wet canal, a worn pad."""
+    INFERRED_JAM = "inferred-jam", 12
+    """By the motor's current, a cell does not move in its step."""
+    MORE_LOAD = "more-load", 13
+    """By the motor's current, the cam's load is larger than it was: a pull on the body, or friction in the gears."""
 
 
 class HoldReason(Code):
@@ -162,6 +168,8 @@ class CommandKind(Code):
     RENEW = "renew", 6
     """Go on crawling for Command.limit_s from now on. Never begins a crawl, and changes neither speed nor direction:
     whoever attends to a crawl must not overrule a hold."""
+    MARK = "mark", 7
+    """Note that the worm is at Command.position_m, for the dead reckoning. Moves and permits nothing."""
 
 
 class CommandOutcome(Code):
@@ -183,6 +191,8 @@ class CommandOutcome(Code):
     """An alarm stands whose policy is more than a warning; Reply.alarm_mask has it."""
     NO_LEASE = "no-lease", 7
     """The lease of the supervisor has lapsed, and the command gives no time of its own."""
+    BAD_POSITION = "bad-position", 8
+    """The position of a mark or its standard error is not a number, or beyond what a canal has."""
 
 
 class TripPhase(Code):
@@ -278,6 +288,20 @@ class RecordingProblem(Code):
     """Another write error, such as a disk that failed or was pulled out."""
     TOPICS_UNREADABLE = "topics-unreadable", 5
     """The topics could not be read."""
+
+
+class InferredStanding(Code):
+    """How far self-sensing is."""
+
+    WARMING_UP = "warming-up", 0
+    """Too few cycles were fitted: intervals may be too narrow, and no change can be seen yet."""
+    FITTED = "fitted", 1
+    """The newest cycle was fitted with those before."""
+    ODD = "odd", 2
+    """The newest cycle is not like those before, and was set aside: the next one shows whether that was an
+    accident."""
+    CHANGED = "changed", 3
+    """The worm is another than it was; masks and loads say in what."""
 
 
 class _StateMemory(Memory):
@@ -1012,11 +1036,14 @@ class _CommandRecordMemory(Memory):
         ("supervised", ctypes.c_uint32),
         ("user", ctypes.c_uint32),
         ("sender", ctypes.c_uint8 * 32),
+        ("phase", ctypes.c_double),
+        ("position_m", ctypes.c_double),
+        ("position_sigma_m", ctypes.c_double),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "wormd_command_record_v1"
+        return "wormd_command_record_v2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -1054,6 +1081,12 @@ class CommandRecord(Message):
     """User ID of the sender, as the sender gave it."""
     sender: str
     """Who sent it, as the sender says: a program, or the watcher whose command it passed on."""
+    phase: float
+    """Gait phase of the tick that processed it, cycles."""
+    position_m: float
+    """For a mark, where the mean of the cells was said to be along the canal, m; NaN for other commands."""
+    position_sigma_m: float
+    """For a mark, the standard error of that, m; NaN for other commands."""
 
     @classmethod
     def _from_memory(cls, m: _CommandRecordMemory) -> CommandRecord:
@@ -1072,6 +1105,9 @@ class CommandRecord(Message):
             supervised=m.supervised,
             user=m.user,
             sender=text(m.sender),
+            phase=m.phase,
+            position_m=m.position_m,
+            position_sigma_m=m.position_sigma_m,
         )
 
 
@@ -1355,6 +1391,219 @@ RecordingStatus.TOPIC = Topic(
     memory=_RecordingStatusMemory,
     decode=RecordingStatus._from_memory,
     buffer=16,
+    history=1,
+    has_event=False,
+    number="sequence",
+)
+
+
+class _InferredMemory(Memory):
+    _fields_ = [
+        ("sequence", ctypes.c_uint64),
+        ("time_ns", ctypes.c_uint64),
+        ("end_ns", ctypes.c_uint64),
+        ("state_sequence", ctypes.c_uint64),
+        ("end_phase", ctypes.c_double),
+        ("cycles", ctypes.c_double),
+        ("friction_n", ctypes.c_double * 16),
+        ("friction_sigma_n", ctypes.c_double * 16),
+        ("stiffness_n_per_m", ctypes.c_double * 16),
+        ("stiffness_sigma_n_per_m", ctypes.c_double * 16),
+        ("forward_slide_m", ctypes.c_double * 16),
+        ("backward_slide_m", ctypes.c_double * 16),
+        ("pull_n", ctypes.c_double),
+        ("pull_sigma_n", ctypes.c_double),
+        ("slope_rad", ctypes.c_double),
+        ("slope_sigma_rad", ctypes.c_double),
+        ("other_pull_n", ctypes.c_double),
+        ("other_probability", ctypes.c_double),
+        ("advance_m", ctypes.c_double),
+        ("advance_sigma_m", ctypes.c_double),
+        ("energy_loss_j", ctypes.c_double),
+        ("energy_loss_sigma_j", ctypes.c_double),
+        ("energy_actuator_net_j", ctypes.c_double),
+        ("energy_actuator_net_sigma_j", ctypes.c_double),
+        ("energy_electrical_j", ctypes.c_double),
+        ("energy_electrical_sigma_j", ctypes.c_double),
+        ("residual_n_m", ctypes.c_double),
+        ("position_m", ctypes.c_double),
+        ("position_sigma_m", ctypes.c_double),
+        ("phase", ctypes.c_double),
+        ("friction_loss_share", ctypes.c_double),
+        ("load_rise_n", ctypes.c_double),
+        ("change_friction_sigma", ctypes.c_double),
+        ("change_pull_sigma_n", ctypes.c_double),
+        ("friction_lost_mask", ctypes.c_uint32),
+        ("jammed_mask", ctypes.c_uint32),
+        ("more_load", ctypes.c_uint32),
+        ("friction_armed_mask", ctypes.c_uint32),
+        ("jam_armed_mask", ctypes.c_uint32),
+        ("load_armed", ctypes.c_uint32),
+        ("marks", ctypes.c_uint32),
+        ("tracker_marks", ctypes.c_uint32),
+        ("standing", ctypes.c_uint32),
+        ("cell_count", ctypes.c_uint32),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "wormd_inferred_v1"
+
+
+@dataclass(frozen=True, slots=True)
+class Inferred(Message):
+    """What the motor's current alone says of the worm, with standard errors: after each gait cycle crawled forward,
+    as soon as it is fitted, and after a mark. Positions play no part in it, but for those that correct the dead
+    reckoning."""
+
+    TOPIC: ClassVar[Topic[Inferred]]
+
+    sequence: int
+    """Number of this message since the estimator started."""
+    time_ns: int
+    """When it was made, ns of CLOCK_MONOTONIC."""
+    end_ns: int
+    """When the newest cycle ended, ns of CLOCK_MONOTONIC; 0 before the first."""
+    state_sequence: int
+    """The tick with which it was made, as in the topic state."""
+    end_phase: float
+    """Gait phase at the end of the newest cycle, cycles."""
+    cycles: float
+    """Cycles that were fitted together, forgotten ones counted less."""
+    friction_n: tuple[float, ...]
+    """Friction force k·δmax of each cell, N."""
+    friction_sigma_n: tuple[float, ...]
+    """Standard error of friction_n, N."""
+    stiffness_n_per_m: tuple[float, ...]
+    """Stiffness of each cell, N/m."""
+    stiffness_sigma_n_per_m: tuple[float, ...]
+    """Standard error of stiffness_n_per_m, N/m."""
+    forward_slide_m: tuple[float, ...]
+    """Distance that each tip slides forward in a cycle, m, by the model."""
+    backward_slide_m: tuple[float, ...]
+    """Distance that each tip slides backward in a cycle, m, counted positive."""
+    pull_n: float
+    """Pull on the body down the canal, N: weight and constant drag together."""
+    pull_sigma_n: float
+    """Standard error of pull_n, N."""
+    slope_rad: float
+    """The slope, if all the pull is the weight of the stated mass, rad."""
+    slope_sigma_rad: float
+    """Standard error of slope_rad, rad."""
+    other_pull_n: float
+    """Another pull that explains the current as well, N; NaN where there is none."""
+    other_probability: float
+    """Probability of that other answer; NaN where there is none."""
+    advance_m: float
+    """Advance of a cycle, m, by the model."""
+    advance_sigma_m: float
+    """Standard error of advance_m, m."""
+    energy_loss_j: float
+    """Energy of a cycle by losses and weight, equation (11), J."""
+    energy_loss_sigma_j: float
+    """Standard error of energy_loss_j, J."""
+    energy_actuator_net_j: float
+    """Net actuator work of a cycle, equation (13), J."""
+    energy_actuator_net_sigma_j: float
+    """Standard error of energy_actuator_net_j, J."""
+    energy_electrical_j: float
+    """Electrical energy of the newest cycle, J."""
+    energy_electrical_sigma_j: float
+    """Standard error of energy_electrical_j, J."""
+    residual_n_m: float
+    """Root mean square of what the model leaves unexplained in the mean torque, N m at the cam."""
+    position_m: float
+    """Distance along the canal by dead reckoning, m, at phase: from where the worm began, or as the tracker or the
+    last mark counts."""
+    position_sigma_m: float
+    """Standard error of position_m, m: it grows until a tracker sample or a mark comes."""
+    phase: float
+    """Gait phase with which this was made, cycles."""
+    friction_loss_share: float
+    """Largest share of a cell's friction that was lost; NaN where none was."""
+    load_rise_n: float
+    """How much more the cam's load is than before, as a pull on the body, N; NaN while nothing has changed."""
+    change_friction_sigma: float
+    """Standard error of one cycle's ln friction, the worst cell's; NaN while no change could be seen."""
+    change_pull_sigma_n: float
+    """Standard error of one cycle's pull, N; NaN while no change could be seen."""
+    friction_lost_mask: int
+    """Bit i: friction of cell i was lost."""
+    jammed_mask: int
+    """Bit i: cell i does not move."""
+    more_load: int
+    """1 when the load is larger than it was: a pull on the body or friction in the gears."""
+    friction_armed_mask: int
+    """Bit i: a loss of 30 % of cell i's friction would be seen."""
+    jam_armed_mask: int
+    """Bit i: a jam of cell i would be seen."""
+    load_armed: int
+    """1 while more load would be seen."""
+    marks: int
+    """Marks that corrected the distance."""
+    tracker_marks: int
+    """Cycles at whose end a tracker sample corrected the distance."""
+    standing: InferredStanding
+    """InferredStanding."""
+    cell_count: int
+    """How many cells are in use."""
+
+    @classmethod
+    def _from_memory(cls, m: _InferredMemory) -> Inferred:
+        cells = min(m.cell_count, MAX_CELLS)
+        return cls(
+            sequence=m.sequence,
+            time_ns=m.time_ns,
+            end_ns=m.end_ns,
+            state_sequence=m.state_sequence,
+            end_phase=m.end_phase,
+            cycles=m.cycles,
+            friction_n=tuple(m.friction_n[:cells]),
+            friction_sigma_n=tuple(m.friction_sigma_n[:cells]),
+            stiffness_n_per_m=tuple(m.stiffness_n_per_m[:cells]),
+            stiffness_sigma_n_per_m=tuple(m.stiffness_sigma_n_per_m[:cells]),
+            forward_slide_m=tuple(m.forward_slide_m[:cells]),
+            backward_slide_m=tuple(m.backward_slide_m[:cells]),
+            pull_n=m.pull_n,
+            pull_sigma_n=m.pull_sigma_n,
+            slope_rad=m.slope_rad,
+            slope_sigma_rad=m.slope_sigma_rad,
+            other_pull_n=m.other_pull_n,
+            other_probability=m.other_probability,
+            advance_m=m.advance_m,
+            advance_sigma_m=m.advance_sigma_m,
+            energy_loss_j=m.energy_loss_j,
+            energy_loss_sigma_j=m.energy_loss_sigma_j,
+            energy_actuator_net_j=m.energy_actuator_net_j,
+            energy_actuator_net_sigma_j=m.energy_actuator_net_sigma_j,
+            energy_electrical_j=m.energy_electrical_j,
+            energy_electrical_sigma_j=m.energy_electrical_sigma_j,
+            residual_n_m=m.residual_n_m,
+            position_m=m.position_m,
+            position_sigma_m=m.position_sigma_m,
+            phase=m.phase,
+            friction_loss_share=m.friction_loss_share,
+            load_rise_n=m.load_rise_n,
+            change_friction_sigma=m.change_friction_sigma,
+            change_pull_sigma_n=m.change_pull_sigma_n,
+            friction_lost_mask=m.friction_lost_mask,
+            jammed_mask=m.jammed_mask,
+            more_load=m.more_load,
+            friction_armed_mask=m.friction_armed_mask,
+            jam_armed_mask=m.jam_armed_mask,
+            load_armed=m.load_armed,
+            marks=m.marks,
+            tracker_marks=m.tracker_marks,
+            standing=InferredStanding.of(m.standing),
+            cell_count=m.cell_count,
+        )
+
+
+Inferred.TOPIC = Topic(
+    name="inferred",
+    memory=_InferredMemory,
+    decode=Inferred._from_memory,
+    buffer=64,
     history=1,
     has_event=False,
     number="sequence",

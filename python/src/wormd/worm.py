@@ -23,6 +23,7 @@ from ._messages import (
     CommandRecord,
     Cycle,
     Estimate,
+    Inferred,
     Range,
     RecordingStatus,
     State,
@@ -138,6 +139,10 @@ class Worm:
         """Iterate over how far the battery lasts: after each gait cycle, where a battery is configured."""
         return self._stream(Range.TOPIC, Range.TOPIC.history, timeout)
 
+    def inferred(self, *, timeout: float | None = None) -> Stream[Inferred]:
+        """Iterate over what the motor's current alone says: after each gait cycle, once it is fitted, and after each mark."""
+        return self._stream(Inferred.TOPIC, Inferred.TOPIC.history, timeout)
+
     def commands(self, *, history: bool = False, timeout: float | None = None) -> Stream[CommandRecord]:
         """Iterate over the commands that the controller took or refused, whoever sent them."""
         return self._stream(CommandRecord.TOPIC, CommandRecord.TOPIC.history if history else 0, timeout)
@@ -219,6 +224,11 @@ class Worm:
     def acknowledge(self, alarms: Iterable[AlarmKind | str] = ()) -> Answer:
         """Note that somebody has seen these alarms, or all. Permits nothing."""
         return self._linked().command("acknowledge", alarms=[str(alarm) for alarm in alarms])
+
+    def mark(self, position_m: float, sigma_m: float | None = None) -> Answer:
+        """Say where the mean of the cells is along the canal, for the dead reckoning. Moves and permits nothing."""
+        known = {} if sigma_m is None else {"sigma_m": sigma_m}
+        return self._linked().command("mark", position_m=position_m, **known)
 
     def take_over(self) -> Answer:
         """Drive, whoever did. A crawl goes on, and lasts as long as this script from now on."""

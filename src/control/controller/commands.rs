@@ -17,7 +17,10 @@ impl Controller {
             Err(_) => (CommandOutcome::Unknown, 0),
             Ok(kind) => self.execute(kind, command, now_ns, inputs),
         };
-        if outcome == CommandOutcome::Accepted && command.kind != CommandKind::Acknowledge.code() {
+        let is_remark = [CommandKind::Acknowledge, CommandKind::Mark]
+            .iter()
+            .any(|kind| command.kind == kind.code());
+        if outcome == CommandOutcome::Accepted && !is_remark {
             // Somebody is there.
             self.idle_since_ns = None;
         }
@@ -82,6 +85,16 @@ impl Controller {
                 }
                 (CommandOutcome::Accepted, mask)
             }
+            (CommandKind::Mark, _) => match command.mark() {
+                Some((position_m, _)) => {
+                    self.notes.add(Note::Marked {
+                        position_um: (position_m * 1e6).round() as i64,
+                        user: command.user,
+                    });
+                    ACCEPTED
+                }
+                None => (CommandOutcome::BadPosition, 0),
+            },
             _ => (CommandOutcome::WrongMode, 0),
         }
     }

@@ -68,6 +68,7 @@ function draw() {
     panels.drawCycles(store);
     panels.drawRange(store);
     panels.drawTrip(store, driver);
+    panels.drawInferred(store);
     panels.drawTiming(store);
     panels.drawRecording(store);
     panels.drawEvents(store);

@@ -15,6 +15,7 @@ const hasBit = (mask, code) => Math.floor((mask ?? 0) / 2 ** code) % 2 === 1;
 const ALARMS = [
   "motor-stall", "jammed-cell", "no-progress", "sliding-down", "energy-over-budget", "battery-low", "link-fault", "tracker-fault",
   "device-fault", "model-mismatch", "recording-stopped",
+  "friction-loss", "inferred-jam", "more-load",
 ];
 
 /** Why what is shown is old, or null. */
@@ -48,7 +49,7 @@ export function drawAges(store, why) {
     const topicMs = store.ageMs(topic);
     setText(element, topicMs === null ? "" : `${duration(topicMs / 1000)} old`);
     // What comes once in a gait cycle is as old as the cycle is long.
-    const isOld = topicMs !== null && topicMs >= STALE_MS && topic !== "cycle" && topic !== "range" && topic !== "recording";
+    const isOld = topicMs !== null && topicMs >= STALE_MS && !["cycle", "range", "inferred", "recording"].includes(topic);
     element.closest(".panel").classList.toggle("stale", isOld || (topic === "recording" && topicMs >= 3 * STALE_MS));
   }
 }
@@ -231,6 +232,29 @@ export function drawTrip({ frame }, driver) {
   show(byId("trip-drive"), driver.isLoggedIn && !isOver);
   show(byId("trip_pause"), trip.phase !== "holding");
   show(byId("trip_resume"), trip.phase === "holding");
+}
+
+/** What the motor's current alone says, each with its standard error. */
+export function drawInferred({ frame }) {
+  const { inferred, state } = frame;
+  if (!inferred || inferred.advance_m === null) {
+    fillValues(byId("inferred"), [["state", inferred ? "warming up: after two gait cycles" : "self-sensing is off"]]);
+    return;
+  }
+  const known = (value, sigma, digits, unit) => `~${number(value, digits)} ± ${number(sigma, digits)} ${unit}`;
+  const phase = state?.phase ?? inferred.phase;
+  const position_m = inferred.position_m + (phase - inferred.phase) * inferred.advance_m;
+  fillValues(byId("inferred"), [
+    ["state", inferred.standing],
+    ["advance", known(inferred.advance_m * 1e3, inferred.advance_sigma_m * 1e3, 2, "mm a cycle")],
+    ["losses", known(inferred.energy_loss_j * 1e3, inferred.energy_loss_sigma_j * 1e3, 1, "mJ a cycle")],
+    ["pull", known(inferred.pull_n, inferred.pull_sigma_n, 2, "N")],
+    ["position", known(position_m * 1e3, inferred.position_sigma_m * 1e3, 0, "mm")],
+    ...inferred.friction_n.map((friction, cell) => [
+      `friction ${cell + 1}`,
+      known(friction, inferred.friction_sigma_n[cell], 2, "N"),
+    ]),
+  ]);
 }
 
 export function drawTiming({ frame, worm }) {

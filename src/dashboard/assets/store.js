@@ -88,6 +88,7 @@ export class Store {
     if (!this.frame) return null;
     const since = (time_ns) => (time_ns ? Math.max(0, (this.nowNs() - time_ns) / 1e6) : null);
     if (topic === "cycle") return since(this.cycles.at(-1)?.cycle.end_ns);
+    if (topic === "inferred") return since(this.frame.inferred?.end_ns);
     if (topic === "range") return since(this.frame.range?.end_ns);
     const age = this.frame.age_ms[topic];
     return age === null || age === undefined ? null : age + this.frameAgeMs();

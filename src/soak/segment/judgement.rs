@@ -48,10 +48,14 @@ impl Segment {
         let hot_c = self.config.alarms.device_fault.threshold - COOL_C;
         let is_hot = self.session.machine.plant().motor().case_c() > hot_c;
         let is_warm = self.is_still_warm();
+        // Cycles crawled backward do not show that a change by the current is over.
+        let is_backward = self.speed < 0.0;
+        let by_current = [AlarmKind::FrictionLoss, AlarmKind::InferredJam, AlarmKind::MoreLoad].map(AlarmKind::name);
         let mut standing = self.standing();
         standing.retain(|name| {
             let is_true = (is_hot && *name == AlarmKind::DeviceFault.name())
-                || (is_warm && *name == AlarmKind::EnergyOverBudget.name());
+                || (is_warm && *name == AlarmKind::EnergyOverBudget.name())
+                || (is_backward && by_current.contains(name));
             !is_true
         });
         let cause = self.episode.as_ref().map(|episode| episode.drawn.cause.clone());

@@ -1,7 +1,7 @@
 //! The worm in its canal: cells, the points where their tips touch, and a ruler.
 
 use super::{View, cell_label, known_positions, tip_style};
-use crate::watch::ghost;
+use crate::watch::{ghost, inferred};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -10,6 +10,10 @@ use ratatui::widgets::{Block, Paragraph};
 
 /// Colour of what is predicted.
 const GHOST: Color = Color::Magenta;
+/// Colour of what is inferred.
+const INFERRED: Color = Color::Blue;
+/// Standard errors to either side between which nine of ten lie.
+const NINE_OF_TEN_SIGMAS: f64 = 1.645;
 
 /// Metres of canal that the picture shows beyond the worm, before and behind it.
 const MARGIN_M: f64 = 0.03;
@@ -46,10 +50,18 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
     };
     let inner = block.inner(area);
     frame.render_widget(block, area);
-    let Some(estimate) = picture.estimate else { return };
     // Of a worm of which nothing is heard, the ghost is shown where it is expected.
     let moved_m = view.ghost.map_or(0.0, |ghost| ghost.moved_m.mean);
-    let mut positions = known_positions(&estimate);
+    // Of one that is heard and not seen, what the motor's current says.
+    let by_current = picture
+        .inferred
+        .filter(|_| view.ghost.is_none() && !picture.has_positions())
+        .and_then(|inferred| inferred::place(&inferred, subject, picture.phase()));
+    let mut positions = match (&by_current, &picture.estimate) {
+        (Some((positions, _)), _) => positions.clone(),
+        (None, Some(estimate)) => known_positions(estimate),
+        (None, None) => return,
+    };
     positions.iter_mut().for_each(|cell| cell.1 += moved_m);
     let (Some(rear_m), Some(front_m)) = (
         positions.iter().map(|cell| cell.1).reduce(f64::min),
@@ -63,10 +75,15 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
     if columns < 20 || inner.height < 5 || !is_plausible {
         return;
     }
-    let places = view.ghost.map(|ghost| {
+    let of_ghost = view.ghost.map(|ghost| {
         let of_ends = |end_m: f64| [ghost.moved_m.low, ghost.moved_m.high].map(|m| end_m - moved_m + m);
         (of_ends(rear_m)[0], of_ends(front_m)[1])
     });
+    let of_current = by_current.as_ref().map(|(_, sigma_m)| {
+        let error_m = NINE_OF_TEN_SIGMAS * sigma_m;
+        (rear_m - error_m, front_m + error_m)
+    });
+    let places = of_ghost.or(of_current);
     let (rear_m, front_m, body_m) = match places {
         Some((low_m, high_m)) => (rear_m.min(low_m), front_m.max(high_m), (rear_m, front_m)),
         None => (rear_m, front_m, (rear_m, front_m)),
@@ -84,6 +101,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
     for slot in &mut body[tail..=nose] {
         *slot = match view.ghost {
             Some(_) => Span::raw("░").fg(GHOST),
+            None if by_current.is_some() => Span::raw("╌").fg(Color::DarkGray),
             None => Span::raw("═").fg(Color::DarkGray),
         };
     }
@@ -92,21 +110,32 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
         let style = match (&view.ghost, &view.stale) {
             (Some(_), _) => Style::new().fg(GHOST).dim(),
             (None, Some(_)) => Style::new().fg(Color::DarkGray),
-            (None, None) => tip_style(&estimate, cell),
+            (None, None) => match (&by_current, &picture.estimate) {
+                (None, Some(estimate)) => tip_style(estimate, cell),
+                _ => Style::new().fg(INFERRED).dim(),
+            },
         };
-        for (offset, text) in [(0, "▐"), (1, ""), (2, "▌")] {
+        // What is inferred is hollow.
+        let sides = if by_current.is_some() {
+            ["[", "]"]
+        } else {
+            ["▐", "▌"]
+        };
+        for (offset, text) in [(0, sides[0]), (1, ""), (2, sides[1])] {
             let Some(slot) = (at + offset).checked_sub(1).and_then(|index| body.get_mut(index)) else {
                 continue;
             };
-            *slot = if offset == 1 {
+            *slot = if offset == 1 && by_current.is_some() {
+                Span::from(cell_label(cell)).style(style)
+            } else if offset == 1 {
                 Span::from(cell_label(cell)).style(style.add_modifier(Modifier::BOLD | Modifier::REVERSED))
             } else {
                 Span::raw(text).style(style)
             };
         }
-        if view.ghost.is_some() {
+        let (Some(estimate), None, None) = (&picture.estimate, &view.ghost, &by_current) else {
             continue;
-        }
+        };
         let contact_m = estimate.contact_m[cell];
         let foot = if contact_m.is_finite() { column(contact_m) } else { at };
         feet[foot] = Span::raw(match foot.cmp(&at) {
@@ -117,13 +146,14 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
         .style(style);
     }
     if let Some((low_m, high_m)) = places {
+        let colour = if by_current.is_some() { INFERRED } else { GHOST };
         // From where its last cell may be to where its first may be.
         let (low, high) = (column(low_m), column(high_m));
         for slot in &mut feet[low..=high] {
-            *slot = Span::raw("┄").fg(GHOST);
+            *slot = Span::raw("┄").fg(colour);
         }
-        feet[low] = Span::raw("├").fg(GHOST);
-        feet[high] = Span::raw("┤").fg(GHOST);
+        feet[low] = Span::raw("├").fg(colour);
+        feet[high] = Span::raw("┤").fg(colour);
     }
     let ruler: String = (0..columns)
         .map(|index| {
@@ -148,6 +178,10 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
                     " predicted, not seen: the worm by model and trip; the dashes: where it may be, 9 times of 10",
                 )
                 .fg(GHOST),
+                None if by_current.is_some() => Line::raw(
+                    " inferred from the motor's current, not seen; the dashes: where it may be, 9 times of 10",
+                )
+                .fg(INFERRED),
                 None => legend(),
             },
         ]),

@@ -54,6 +54,12 @@ pub struct Alarms {
     pub model_mismatch: AlarmConfig,
     /// Silence of a recorder, s; one that says that it stopped raises this alarm at once.
     pub recording_stopped: AlarmConfig,
+    /// Share of a cell's friction that is lost, by the motor's current.
+    pub friction_loss: AlarmConfig,
+    /// Share of a cell's usual torque late in its step, by the motor's current, below which it counts as jammed.
+    pub inferred_jam: AlarmConfig,
+    /// Rise of the cam's load, by the motor's current, as a pull on the body, N.
+    pub more_load: AlarmConfig,
 }
 
 const fn alarm(policy: Policy, threshold: f64) -> AlarmConfig {
@@ -74,6 +80,9 @@ impl Default for Alarms {
             device_fault: alarm(Policy::Warn, 60.0),
             model_mismatch: alarm(Policy::Warn, 1.6e-4),
             recording_stopped: alarm(Policy::Warn, 5.0),
+            friction_loss: alarm(Policy::Warn, 0.25),
+            inferred_jam: alarm(Policy::Warn, 0.12),
+            more_load: alarm(Policy::Warn, 2.0),
         }
     }
 }
@@ -93,6 +102,9 @@ impl Alarms {
             AlarmKind::DeviceFault => self.device_fault,
             AlarmKind::ModelMismatch => self.model_mismatch,
             AlarmKind::RecordingStopped => self.recording_stopped,
+            AlarmKind::FrictionLoss => self.friction_loss,
+            AlarmKind::InferredJam => self.inferred_jam,
+            AlarmKind::MoreLoad => self.more_load,
         }
     }
 
@@ -109,6 +121,9 @@ impl Alarms {
             (AlarmKind::DeviceFault, 20.0..=120.0, "°C"),
             (AlarmKind::ModelMismatch, 1e-5..=1.0, "m"),
             (AlarmKind::RecordingStopped, 3.0..=600.0, "s"),
+            (AlarmKind::FrictionLoss, 0.16..=0.95, "of the friction"),
+            (AlarmKind::InferredJam, 0.01..=0.12, "of the usual torque"),
+            (AlarmKind::MoreLoad, 0.3..=100.0, "N"),
         ] {
             let key = format!("alarms.{}.threshold", kind.name().replace('-', "_"));
             checker.range(&key, self.of(kind).threshold, range, unit);

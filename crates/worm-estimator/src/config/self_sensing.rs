@@ -21,6 +21,8 @@ pub enum ReportedCurrent {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SelfSensing {
+    /// Whether the estimator infers from the motor's current while the worm crawls.
+    pub enabled: bool,
     /// What the servo reports as its current.
     pub current: ReportedCurrent,
     /// Standard deviation of `servo.torque_constant_n_m_per_a`, as a share.
@@ -64,6 +66,7 @@ impl Default for SelfSensing {
             (_, [load_squared, load_squared_motor_share]),
         ] = XL330_EFFECTS;
         Self {
+            enabled: true,
             current: ReportedCurrent::Winding,
             torque_constant_sigma_share: 0.02,
             inertia_kg_m2: motor.rotor_inertia_kg_m2,
@@ -128,7 +131,16 @@ impl SelfSensing {
     }
 }
 
+/// Evaluations of the model in a gait cycle that leave the search everywhere some room.
+const EVALUATIONS_PER_CYCLE: f64 = 2_500.0;
+
 impl Config {
+    /// So many evaluations with each tick that a search is over within a cycle: one at the usual rate and gait.
+    fn evaluations_per_tick(&self) -> u32 {
+        let ticks_per_cycle = self.control.rate_hz * self.gait.cycle_s;
+        (EVALUATIONS_PER_CYCLE / ticks_per_cycle).ceil().clamp(1.0, 100.0) as u32
+    }
+
     /// What self-sensing is told of this worm.
     pub fn self_sensing(&self) -> SelfSensingConfig {
         let known = &self.self_sensing;
@@ -162,6 +174,7 @@ impl Config {
             pull_sigma_n: known.pull_sigma_n,
             cycle_s: self.gait.cycle_s,
             memory_cycles: known.memory_cycles,
+            evaluations_per_reading: self.evaluations_per_tick(),
             ..SelfSensingConfig::new(gear)
         }
     }

@@ -1,9 +1,9 @@
 //! Estimator and alarms together: what the estimator process runs, and a replay.
 
 use super::alarm::{self, AlarmChanges, AlarmMonitor};
-use super::{Estimator, EstimatorError, RangeEstimator, ResidualMap};
+use super::{Estimator, EstimatorError, Inference, RangeEstimator, ResidualMap};
 use crate::config::Config;
-use crate::message::{BlackBoxStatus, Cycle, Estimate, Range, RecordingStatus, State};
+use crate::message::{BlackBoxStatus, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, State};
 
 /// What one state gave.
 #[derive(Debug, Clone)]
@@ -14,17 +14,20 @@ pub struct ObserverOutput {
     pub cycle: Option<Cycle>,
     /// How far the battery lasts, if a cycle ended and a battery is configured.
     pub range: Option<Range>,
+    /// What the motor's current alone says, where that is new and self-sensing is enabled.
+    pub inferred: Option<Inferred>,
     /// Alarms that were raised or cleared.
     pub alarms: AlarmChanges,
 }
 
 /// Follows one worm by its states. The same states give the same output, to the last bit; a recorder's reports change nothing but the
-/// alarm `recording-stopped`, and a gauge's readings nothing but the range.
+/// alarm `recording-stopped`, a gauge's readings nothing but the range, and commands nothing but the distance by dead reckoning.
 #[derive(Debug)]
 pub struct Observer {
     estimator: Estimator,
     monitor: AlarmMonitor,
     range: Option<RangeEstimator>,
+    inference: Option<Inference>,
 }
 
 impl Observer {
@@ -37,6 +40,10 @@ impl Observer {
             estimator: Estimator::new(config)?,
             monitor: AlarmMonitor::new(config),
             range: RangeEstimator::new(config)?,
+            inference: match config.self_sensing.enabled {
+                true => Some(Inference::new(config)?),
+                false => None,
+            },
         })
     }
 
@@ -55,16 +62,20 @@ impl Observer {
                 estimate: None,
                 cycle: None,
                 range: None,
+                inferred: None,
                 alarms: AlarmChanges::none(),
             };
         }
         let update = self.estimator.update(state);
         let (estimate, cycle) = (update.estimate.copied(), update.cycle.copied());
+        let inference = self.inference.as_mut();
+        let inferred = inference.and_then(|inference| inference.update(state)).copied();
         let observation = alarm::Observation {
             state,
             estimate: estimate.as_ref(),
             cycle: cycle.as_ref(),
             residuals: Some(self.estimator.residual_map()),
+            inferred: self.inference.as_ref().map(Inference::latest),
         };
         let alarms = self.monitor.update(&observation);
         if !self.monitor.is_fault_free() {
@@ -78,7 +89,15 @@ impl Observer {
             estimate: estimate.map(|estimate| self.with_alarms(estimate)),
             cycle,
             range,
+            inferred,
             alarms,
+        }
+    }
+
+    /// Takes a command that the controller answered: a mark corrects the dead reckoning.
+    pub fn note_command(&mut self, record: &CommandRecord) {
+        if let Some(inference) = &mut self.inference {
+            inference.note_command(record);
         }
     }
 

@@ -29,6 +29,12 @@ coded_enum! {
         ModelMismatch = 9 => "model-mismatch",
         /// The recorder could not go on, or was killed.
         RecordingStopped = 10 => "recording-stopped",
+        /// By the motor's current, a cell or all of them have lost friction: a wet canal, a worn pad.
+        FrictionLoss = 11 => "friction-loss",
+        /// By the motor's current, a cell does not move in its step.
+        InferredJam = 12 => "inferred-jam",
+        /// By the motor's current, the cam's load is larger than it was: a pull on the body, or friction in the gears.
+        MoreLoad = 13 => "more-load",
     }
 }
 

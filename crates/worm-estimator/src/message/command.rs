@@ -25,6 +25,8 @@ coded_enum! {
         /// Go on crawling for [`Command::limit_s`] from now on. Never begins a crawl, and changes neither speed nor direction: whoever
         /// attends to a crawl must not overrule a hold.
         Renew = 6 => "renew",
+        /// Note that the worm is at [`Command::position_m`], for the dead reckoning. Moves and permits nothing.
+        Mark = 7 => "mark",
     }
 }
 
@@ -47,17 +49,23 @@ coded_enum! {
         AlarmStands = 6 => "alarm-stands",
         /// The lease of the supervisor has lapsed, and the command gives no time of its own.
         NoLease = 7 => "no-lease",
+        /// The position of a mark or its standard error is not a number, or beyond what a canal has.
+        BadPosition = 8 => "bad-position",
     }
 }
 
 structure! {
     /// A request to the controller.
-    Command = "wormd_command_v3", {
+    Command = "wormd_command_v4", {
         /// Gait cycles per second for [`CommandKind::Crawl`], negative for backward; 0 means the configured gait.
         cycles_per_s: f64,
         /// For [`CommandKind::Crawl`] and [`CommandKind::Renew`], how long the worm may crawl before it holds, s. 0 leaves it to the controller:
         /// as long as the lease of `wormd up` lasts, and where nobody holds one `control.crawl_limit_s`.
         limit_s: f64,
+        /// For [`CommandKind::Mark`], where the mean of the cells is along the canal, m.
+        position_m: f64,
+        /// For [`CommandKind::Mark`], the standard error of that, m; 0 means 5 mm.
+        position_sigma_m: f64,
         /// [`CommandKind`] as a code.
         kind: u32 as Name<CommandKind>,
         /// Bit k set: the command concerns the alarm with code k, for [`CommandKind::Acknowledge`].
@@ -71,18 +79,40 @@ structure! {
     }
 }
 
+/// Standard error of a mark whose sender gives none, m.
+const DEFAULT_MARK_SIGMA_M: f64 = 5e-3;
+
 impl Command {
+    /// Longest distance that a mark may be away, m.
+    pub const MAX_POSITION_M: f64 = 1e5;
+
     /// A command without parameters, of user 0 and an unnamed sender.
     pub const fn new(kind: CommandKind) -> Self {
         Self {
             cycles_per_s: 0.0,
             limit_s: 0.0,
+            position_m: 0.0,
+            position_sigma_m: 0.0,
             kind: kind.code(),
             alarm_mask: 0,
             user: 0,
             reserved: 0,
             sender: ShortText::EMPTY,
         }
+    }
+}
+
+impl Command {
+    /// Position and standard error of a mark, m; `None` where they make no sense.
+    pub fn mark(&self) -> Option<(f64, f64)> {
+        let sigma_m = if self.position_sigma_m == 0.0 {
+            DEFAULT_MARK_SIGMA_M
+        } else {
+            self.position_sigma_m
+        };
+        let is_position = self.position_m.abs() <= Self::MAX_POSITION_M;
+        let is_error = sigma_m > 0.0 && sigma_m <= Self::MAX_POSITION_M;
+        (is_position && is_error).then_some((self.position_m, sigma_m))
     }
 }
 

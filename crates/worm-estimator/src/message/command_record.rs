@@ -8,7 +8,7 @@ use super::{ZeroCopySend, message};
 
 message! {
     /// One command that the controller took or refused, and its answer.
-    CommandRecord = "wormd_command_record_v1", made: time_ns, cells: |_| 0, {
+    CommandRecord = "wormd_command_record_v2", made: time_ns, cells: |_| 0, {
         /// Number of this command since the controller started.
         sequence: u64,
         /// When the tick that processed it had its readings, ns of `CLOCK_MONOTONIC`.
@@ -37,12 +37,27 @@ message! {
         user: u32,
         /// Who sent it, as the sender says: a program, or the watcher whose command it passed on.
         sender: ShortText,
+        // Since version 2, at the end: so the numbers of the others stay, and logs of version 1 can be read.
+        /// Gait phase of the tick that processed it, cycles.
+        phase: f64,
+        /// For a mark, where the mean of the cells was said to be along the canal, m; `NaN` for other commands.
+        position_m: f64,
+        /// For a mark, the standard error of that, m; `NaN` for other commands.
+        position_sigma_m: f64,
     }
 }
 
 impl CommandRecord {
-    /// The record of a command, with the number `sequence`, that the tick at `time_ns` answered; `supervised` says whether the lease was held.
-    pub fn new(sequence: u64, time_ns: u64, supervised: bool, command: &Command, reply: &Reply) -> Self {
+    /// The record of a command, with the number `sequence`, that the tick at `time_ns` and `phase` answered; `supervised` says whether the lease was held.
+    pub fn new(
+        sequence: u64,
+        (time_ns, phase): (u64, f64),
+        supervised: bool,
+        command: &Command,
+        reply: &Reply,
+    ) -> Self {
+        let is_mark = command.kind == CommandKind::Mark.code();
+        let (position_m, position_sigma_m) = command.mark().filter(|_| is_mark).unwrap_or((f64::NAN, f64::NAN));
         Self {
             sequence,
             time_ns,
@@ -59,6 +74,9 @@ impl CommandRecord {
             user: command.user,
             // The memory is the sender's, which may have left anything in it.
             sender: ShortText::new(command.sender.as_str()),
+            phase,
+            position_m,
+            position_sigma_m,
         }
     }
 

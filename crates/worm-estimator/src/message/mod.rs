@@ -1,7 +1,7 @@
 //! The messages between the processes of one worm: one plain, fixed-size `#[repr(C)]` type per topic.
 //!
 //! The controller fills [`State`], [`Timing`] and [`CommandRecord`]; [`estimate`](crate::estimate) reads `State` and fills [`Estimate`],
-//! [`Cycle`], [`Alarm`] and [`Range`]; the recorder fills [`RecordingStatus`], the black box [`BlackBoxStatus`], and a trip [`TripStatus`].
+//! [`Cycle`], [`Alarm`], [`Range`] and [`Inferred`]; the recorder fills [`RecordingStatus`], the black box [`BlackBoxStatus`], and a trip [`TripStatus`].
 //! Topics carry them all without a copy, and a log holds the
 //! same values. The types are separate from the transport, so that nothing here depends on it.
 //!
@@ -22,6 +22,7 @@ mod cycle;
 mod estimate;
 mod field_kind;
 mod fields;
+mod inferred;
 mod json;
 mod protobuf;
 mod range;
@@ -39,6 +40,7 @@ pub use cycle::Cycle;
 pub use estimate::Estimate;
 pub use field_kind::{CodeValue, Codes, FieldKind, FieldValue, prose};
 pub use fields::{Field, FieldAccess, InMemory, Layout};
+pub use inferred::{Inferred, InferredStanding};
 pub use json::JsonMessage;
 pub use protobuf::{ProtobufError, ProtobufMessage};
 pub use range::Range;

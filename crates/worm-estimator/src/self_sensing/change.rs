@@ -5,7 +5,8 @@
 //! the worm is another now. What it finds is compared with the worm before, and the alarms stand until cycles are again like those.
 
 use super::parameters::{Parameters, Vector};
-use super::profile::BINS_PER_STEP;
+use super::profile::{BINS_PER_STEP, MAX_BINS};
+use std::f64::consts::TAU;
 use worm_physics::{MAX_CELLS, Worm};
 
 /// Cycles that must be known before a cycle can differ from them.
@@ -18,6 +19,8 @@ const FRICTION_CHANGE: f64 = 0.175;
 const PULL_CHANGE_N: f64 = 0.3;
 /// … or in the gears, as a share of their friction.
 const GEAR_CHANGE: f64 = 0.15;
+/// Share of a change that the profile must show directly: one step from the fit shows less than there is.
+const SHOWN_SHARE: f64 = 0.5;
 /// Standard errors by which a change must be known.
 const SIGMAS: f64 = 3.5;
 /// Gait-to-gait scatter of ln friction, and of the pull, N, beyond the noise of one cycle.
@@ -40,12 +43,18 @@ pub struct Changes {
     pub jammed: u16,
     /// The load is larger than usual: a pull on the body or friction of the gears. The current alone hardly says which.
     pub more_load: bool,
+    /// Largest share of a cell's friction that is lost.
+    pub loss_share: f64,
+    /// By how much the load is larger, as a pull on the body, N.
+    pub load_rise_n: f64,
+    /// Torque late in the step of the cell that moves least, as a share of the usual.
+    pub reach_share: f64,
 }
 
 impl Changes {
     /// Whether anything differs.
     pub fn any(&self) -> bool {
-        *self != Self::default()
+        self.friction_lost != 0 || self.jammed != 0 || self.more_load
     }
 }
 
@@ -70,8 +79,10 @@ pub(super) struct ChangeDetector {
     cells: usize,
     step_order: [usize; MAX_CELLS],
     gear_friction_n_m: f64,
+    pull_per_torque: f64, // 1/m: a pull on the body that raises the mean torque as much as friction in the gears
     in_a_row: u32,
     reference: Option<Reference>,
+    reference_n_m: Box<[f64; MAX_BINS]>, // its mean profile
     changes: Changes,
     armed: Armed,
 }
@@ -119,8 +130,10 @@ impl ChangeDetector {
             cells,
             step_order,
             gear_friction_n_m,
+            pull_per_torque: TAU / worm.stroke_m(),
             in_a_row: 0,
             reference: None,
+            reference_n_m: Box::new([0.0; MAX_BINS]),
             changes: Changes::default(),
             armed: Armed::default(),
         }
@@ -157,13 +170,16 @@ impl ChangeDetector {
         let gear_friction_n_m = self.gear_friction_n_m;
         let step_order = self.step_order;
         let step_order = &step_order[..self.cells];
-        let sigma_of = |index: usize, scatter: f64| (sigma[index].powi(2) + scatter * scatter).sqrt();
+        // While a change stands, one cycle of the changed worm is enough to see that it is over; that one scatters as well.
+        let is_enough = *cycles >= KNOWN_CYCLES || self.reference.is_some();
+        let widened = if *cycles < KNOWN_CYCLES { 2f64.sqrt() } else { 1.0 };
+        let sigma_of = |index: usize, scatter: f64| widened * (sigma[index].powi(2) + scatter * scatter).sqrt();
         let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
         self.armed = Armed {
             pull_sigma_n: sigma_of(pull_at, PULL_SCATTER_N),
             ..Armed::default()
         };
-        if *cycles < KNOWN_CYCLES {
+        if !is_enough {
             return Seen::Usual;
         }
         let before = Reference::of(usual, mean_n_m, usual.values[usual.gears_at()], step_order);
@@ -190,18 +206,61 @@ impl ChangeDetector {
             return Seen::Odd;
         }
         self.in_a_row = 0;
-        self.reference.get_or_insert(before);
+        if self.reference.is_none() {
+            self.reference = Some(before);
+            self.reference_n_m[..mean_n_m.len()].copy_from_slice(mean_n_m);
+        }
         Seen::Changed
     }
 
+    /// Mean profile of the worm before it changed, while it is another.
+    pub(super) fn reference_n_m(&self) -> Option<&[f64]> {
+        self.reference
+            .map(|_| &self.reference_n_m[..self.cells * BINS_PER_STEP])
+    }
+
     /// Says in what a changed worm differs from the one before, once it is fitted anew.
-    pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64]) {
-        let Some(reference) = self.reference else { return };
-        let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
-        self.changes = reference.compare(&now, self.cells, self.gear_friction_n_m);
-        if !self.changes.any() {
+    ///
+    /// `difference` is what the cycle's profile says directly, by one step from the fit. Where a profile has two answers, the fits before and
+    /// after may be at different ones, and differ although the profiles do not.
+    pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64], difference: Option<&Vector>) {
+        let Some(changes) = self.changes_of(changed, torque_n_m, difference) else {
+            return;
+        };
+        self.changes = changes;
+        if !changes.any() {
             self.reference = None;
         }
+    }
+
+    /// The same by a first answer, which only counts where it shows a change. True when it does.
+    pub(super) fn judge_early(
+        &mut self,
+        changed: &Parameters,
+        torque_n_m: &[f64],
+        difference: Option<&Vector>,
+    ) -> bool {
+        let changes = self.changes_of(changed, torque_n_m, difference).filter(Changes::any);
+        if let Some(changes) = changes {
+            self.changes = changes;
+        }
+        changes.is_some()
+    }
+
+    fn changes_of(&self, changed: &Parameters, torque_n_m: &[f64], difference: Option<&Vector>) -> Option<Changes> {
+        let reference = self.reference?;
+        let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
+        let mut changes = reference.compare(&now, self.cells, self.gear_friction_n_m, self.pull_per_torque);
+        if let Some(difference) = difference {
+            for cell in (0..self.cells).filter(|&cell| difference[cell] > -SHOWN_SHARE * FRICTION_CHANGE) {
+                changes.friction_lost &= !(1 << cell);
+            }
+            changes.all_friction_lost &= changes.friction_lost.count_ones() as usize == self.cells;
+            let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
+            changes.more_load &= difference[pull_at] > SHOWN_SHARE * PULL_CHANGE_N
+                || difference[gear_at] > SHOWN_SHARE * GEAR_CHANGE * self.gear_friction_n_m;
+        }
+        Some(changes)
     }
 }
 
@@ -220,9 +279,16 @@ impl Reference {
         reference
     }
 
-    fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64) -> Changes {
-        let mut changes = Changes::default();
+    fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64, pull_per_torque: f64) -> Changes {
+        let mut changes = Changes {
+            reach_share: f64::INFINITY,
+            load_rise_n: now.pull_n - self.pull_n + (now.gear_n_m - self.gear_n_m) * pull_per_torque,
+            ..Changes::default()
+        };
         for cell in 0..cells {
+            changes.reach_share = changes.reach_share.min(now.reach_n_m[cell] / self.reach_n_m[cell]);
+            let lost_share = 1.0 - (now.ln_friction[cell] - self.ln_friction[cell]).exp();
+            changes.loss_share = changes.loss_share.max(lost_share);
             if now.reach_n_m[cell] < JAMMED_SHARE * self.reach_n_m[cell] {
                 changes.jammed |= 1 << cell;
             } else if now.ln_friction[cell] - self.ln_friction[cell] < -FRICTION_CHANGE {

@@ -3,7 +3,8 @@
 //! State: the position, and the bias of the inferred advance per cycle. The bias is the same in every cycle, so its error grows in
 //! proportion to the distance; what scatters from cycle to cycle adds up as a random walk. A mark (a known place, or a tracker sample)
 //! corrects both by Kalman's equations: after two marks the bias is known as well as they allow. An advance that becomes better known
-//! corrects what was reckoned with the worse one.
+//! corrects what was reckoned with the worse one. A mark that is further off than any error of the advance explains is believed, but
+//! nothing is learned of the advance from it: the worm has slid as a whole, was carried, or counts from elsewhere.
 
 /// A known position of the worm's mean cell along the canal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +26,8 @@ pub struct Reckoned {
 
 /// Least variance of an advance, m²: below it nothing is known.
 const MIN_VARIANCE_M2: f64 = 1e-16;
+/// Standard errors of the difference from which on a mark says nothing of the advance.
+const FAR_SIGMAS: f64 = 4.0;
 
 /// The dead reckoning.
 #[derive(Debug, Clone)]
@@ -95,6 +98,10 @@ impl DeadReckoning {
         if variance <= 0.0 || !innovation_m.is_finite() {
             return;
         }
+        if innovation_m * innovation_m > FAR_SIGMAS * FAR_SIGMAS * variance {
+            self.place(mark);
+            return;
+        }
         let (gain, bias_gain) = (self.position_variance / variance, self.covariance / variance);
         self.position_m += gain * innovation_m;
         self.bias_m += bias_gain * innovation_m;
@@ -102,6 +109,13 @@ impl DeadReckoning {
         self.covariance *= 1.0 - gain;
         self.position_variance *= 1.0 - gain;
         self.mark_information = (1.0 / self.bias_variance - 1.0 / self.fit_variance).max(0.0);
+    }
+
+    /// The worm is here, whatever was reckoned before.
+    pub fn place(&mut self, mark: &Mark) {
+        self.position_m = mark.position_m;
+        self.position_variance = mark.sigma_m * mark.sigma_m;
+        self.covariance = 0.0;
     }
 
     /// Where the worm is.

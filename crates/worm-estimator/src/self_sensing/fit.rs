@@ -5,18 +5,30 @@
 //! W Σ_b w_b (ȳ_b − h_b)²/R + (θ − θ₀)ᵀ Λ (θ − θ₀), by Gauss-Newton steps with damping. It runs on from where the last cycle left it, so
 //! a cycle needs one or two steps.
 //!
-//! [`search`] finds the place where this begins, [`uncertainty`] the standard errors.
+//! # In small pieces
+//! A cycle takes some hundred evaluations of the model, and more than a thousand where everything is searched. The estimator must not
+//! be late, so [`Fit::take`] only says what is to be done, and each [`Fit::step`] does one evaluation, or one piece of algebra that takes no longer.
+//!
+//! [`work`] is the order of these pieces, [`linearise`] and [`descent`] a Gauss-Newton step, [`search`] the place where this begins,
+//! [`uncertainty`] the standard errors.
 
+mod descent;
+mod linearise;
 mod search;
 mod uncertainty;
+mod work;
 
 use super::SelfSensingConfig;
 use super::gear::{GearModel, MAX_RIPPLES};
-use super::model::CycleModel;
+use super::leading;
+use super::model::{CycleFigures, CycleModel, FIGURES};
 use super::parameters::{MAX_UNKNOWNS, Matrix, Parameters, Vector};
 use super::profile::{BINS_PER_STEP, MAX_BINS};
+use linearise::{Linearisation, dot};
 use std::f64::consts::{PI, TAU};
-use worm_physics::Worm;
+use uncertainty::Slopes;
+use work::Work;
+use worm_physics::{MAX_CELLS, Worm};
 
 /// Damping of the pads makes the force of a loading cell lead by damping over stiffness, s: what is assumed, and its standard deviation.
 const LEAD_S: [f64; 2] = [0.008, 0.005];
@@ -27,12 +39,6 @@ const FIRST_BIN_WEIGHTS: [f64; 2] = [0.01, 0.3];
 const LAST_BIN_WEIGHT: f64 = 0.02;
 /// Finite differences: of a logarithm of friction, of stiffness, and of the pull, N.
 const STEPS: [f64; 3] = [0.01, 0.02, 0.03];
-/// Longest Gauss-Newton step: of a logarithm, and of the pull, N.
-const LONGEST: [f64; 2] = [0.4, 0.8];
-/// Expected gain of a step, in units of its variance, below which the search ends.
-const CLOSE_ENOUGH: f64 = 1e-3;
-/// Gauss-Newton steps in a cycle without a search.
-const ROUNDS: usize = 2;
 /// Cycles after which everything is searched anew, because the mean profile has become much better.
 const SEARCHED_ANEW: f64 = 3.0;
 
@@ -53,8 +59,9 @@ pub(super) struct Fit {
     prior: Vector,
     prior_information: Vector,
     at: Parameters,
-    other: Option<Parameters>, // another answer, with another pull
-    other_odds: f64,           // its odds to the best
+    first_answer: Option<Parameters>, // of a search under way, from where the fit was
+    other: Option<Parameters>,        // another answer, with another pull
+    other_odds: f64,                  // its odds to the best
     mean_n_m: Box<[f64; MAX_BINS]>,
     cycles: f64,         // effective number, forgotten ones left out
     squared_cycles: f64, // Σ of the squared weights
@@ -65,7 +72,15 @@ pub(super) struct Fit {
     single: Matrix, // M
     covariance: Matrix,
     column: Box<[[f64; MAX_BINS]; MAX_UNKNOWNS]>,
-    predicted_n_m: Box<[f64; MAX_BINS]>,
+    predicted_n_m: Box<[f64; MAX_BINS]>, // at the parameters of the linearisation
+    fitted_n_m: Box<[f64; MAX_BINS]>,    // at `at`
+    cycle_n_m: Box<[f64; MAX_BINS]>,     // the cycle that was taken last
+    figures: Option<(CycleFigures, CycleFigures)>, // with their standard errors
+    backward_advance_m: Option<f64>,
+    linearisation: Linearisation,
+    slopes: Box<Slopes>, // of the figures
+    scratch: Box<[Matrix; 2]>,
+    work: Work,
 }
 
 impl Fit {
@@ -102,7 +117,7 @@ impl Fit {
         }
         let mut model = CycleModel::new(worm);
         model.begin_at(&at);
-        Self {
+        let mut fit = Self {
             bins: cells * BINS_PER_STEP,
             unknowns: gears + 4 + 2 * ripples,
             forgetting: 1.0 - 1.0 / config.memory_cycles.max(1.0),
@@ -117,6 +132,7 @@ impl Fit {
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
             at,
+            first_answer: None,
             other: None,
             other_odds: 0.0,
             mean_n_m: Box::new([0.0; MAX_BINS]),
@@ -130,7 +146,19 @@ impl Fit {
             covariance: Matrix::from_diagonal(&sigma.map(|sigma| sigma * sigma)),
             column: Box::new([[0.0; MAX_BINS]; MAX_UNKNOWNS]),
             predicted_n_m: Box::new([0.0; MAX_BINS]),
-        }
+            fitted_n_m: Box::new([0.0; MAX_BINS]),
+            cycle_n_m: Box::new([0.0; MAX_BINS]),
+            figures: None,
+            backward_advance_m: None,
+            linearisation: Linearisation::new(),
+            slopes: Box::new([[0.0; FIGURES]; 2 * MAX_CELLS + 1]),
+            scratch: Box::new([Matrix::zeros(); 2]),
+            work: Work::Idle,
+        };
+        // What is known before the first cycle.
+        fit.work = Work::figures();
+        while !fit.step() {}
+        fit
     }
 
     /// Forgets every cycle, and what they gave stays the place where the next search begins.
@@ -139,7 +167,7 @@ impl Fit {
         self.scatter.fill(0.0);
     }
 
-    /// Takes a cycle's profile, and the variance of its means by the noise within bins.
+    /// Takes a cycle's profile, and the variance of its means by the noise within bins. [`step`](Self::step) fits it.
     pub(super) fn take(&mut self, torque_n_m: &[f64], variance: f64) {
         self.cycles = self.forgetting * self.cycles + 1.0;
         self.squared_cycles = self.forgetting * self.forgetting * self.squared_cycles + 1.0;
@@ -148,14 +176,12 @@ impl Fit {
         for (mean, torque) in self.mean_n_m.iter_mut().zip(torque_n_m) {
             *mean += share * (torque - *mean);
         }
-        if self.cycles == 1.0 || (self.cycles - SEARCHED_ANEW).abs() < 0.5 {
-            self.search_everywhere();
+        self.cycle_n_m[..torque_n_m.len()].copy_from_slice(torque_n_m);
+        self.work = if self.cycles == 1.0 || (self.cycles - SEARCHED_ANEW).abs() < 0.5 {
+            self.search_everywhere()
         } else {
-            self.descend(ROUNDS);
-        }
-        self.weigh_other();
-        self.model.begin_at(&self.at);
-        self.assess(torque_n_m);
+            Work::refine(self.at)
+        };
     }
 
     /// Weight of the data: that of the cycles, less what does not average out.
@@ -222,147 +248,45 @@ impl Fit {
         Some(self.weight() / self.variance * squares + off.component_mul(&self.prior_information).dot(&off))
     }
 
-    /// The profile at the present parameters and its derivatives.
-    fn linearise(&mut self) -> Option<()> {
-        let bins = self.bins;
-        let at = self.at;
-        let mut plain = [0.0; MAX_BINS];
-        self.model.profile(&at, &mut plain[..bins])?;
-        let mut predicted = plain;
-        self.through_gears(&at, &mut predicted[..bins]);
-        *self.predicted_n_m = predicted;
-        let gears = at.gears_at();
-        let gain = 1.0 + at.values[gears + 1];
-        let mut other = [0.0; MAX_BINS];
-        for unknown in 0..at.of_worm() {
-            let step = STEPS[(unknown / at.cells).min(2)];
-            let moved = |by: f64| {
-                let mut moved = at;
-                moved.values[unknown] += by;
-                moved
-            };
-            let mut width = 2.0 * step;
-            let column = &mut self.column[unknown];
-            if self.model.profile(&moved(step), &mut column[..bins]).is_none() {
-                column[..bins].copy_from_slice(&plain[..bins]);
-                width -= step;
-            }
-            if self.model.profile(&moved(-step), &mut other[..bins]).is_none() {
-                other[..bins].copy_from_slice(&plain[..bins]);
-                width -= step;
-            }
-            if width <= 0.0 {
-                return None;
-            }
-            for (forward, backward) in column[..bins].iter_mut().zip(&other[..bins]) {
-                *forward = gain * (*forward - backward) / width;
-            }
-        }
-        for bin in 0..bins {
-            self.column[gears][bin] = 1.0;
-            self.column[gears + 1][bin] = plain[bin];
-            self.column[gears + 2][bin] = self.load_on_gears_n_m(plain[bin]);
-            self.column[gears + 3][bin] = gain * self.bins_per_s * rise(&plain, bin);
-            for ripple in 0..self.ripples {
-                let (sine, cosine) = self.ripple_of(ripple, bin);
-                self.column[gears + 4 + 2 * ripple][bin] = sine;
-                self.column[gears + 5 + 2 * ripple][bin] = cosine;
-            }
-        }
-        let mut single = Matrix::zeros();
-        for row in 0..self.unknowns {
-            for other in 0..=row {
-                let sum: f64 = (0..bins)
-                    .map(|bin| Self::bin_weight(bin) * self.column[row][bin] * self.column[other][bin])
-                    .sum();
-                single[(row, other)] = sum / self.variance;
-                single[(other, row)] = single[(row, other)];
-            }
-        }
-        self.single = single;
-        Some(())
-    }
-
     /// Σ over bins of derivative × weight × (`torque` − `from`) / R.
     fn score(&self, torque_n_m: &[f64], from_n_m: &[f64]) -> Vector {
+        let bins = self.bins;
+        let mut weighted = [0.0; MAX_BINS];
+        for (bin, weighted) in weighted[..bins].iter_mut().enumerate() {
+            *weighted = Self::bin_weight(bin) * (torque_n_m[bin] - from_n_m[bin]);
+        }
         let mut score = Vector::zeros();
         for unknown in 0..self.unknowns {
-            let sum: f64 = (0..self.bins)
-                .map(|bin| Self::bin_weight(bin) * self.column[unknown][bin] * (torque_n_m[bin] - from_n_m[bin]))
-                .sum();
-            score[unknown] = sum / self.variance;
+            score[unknown] = dot(&self.column[unknown][..bins], &weighted[..bins]) / self.variance;
         }
         score
     }
 
-    fn information(&self) -> Matrix {
-        let mut information = self.single * self.weight();
-        for unknown in 0..MAX_UNKNOWNS {
-            information[(unknown, unknown)] += self.prior_information[unknown];
-        }
-        information
-    }
-
-    /// Gauss-Newton steps with damping.
-    fn descend(&mut self, rounds: usize) {
-        let at = self.at;
-        let Some(mut cost) = self.cost(&at) else { return };
-        let mut damping = 1e-3;
-        for _ in 0..rounds {
-            if self.linearise().is_none() {
-                return;
-            }
-            let gradient = self.score(&self.mean_n_m[..], &self.predicted_n_m[..]) * self.weight()
-                - (self.at.values - self.prior).component_mul(&self.prior_information);
-            let information = self.information();
-            let mut improved = false;
-            for _ in 0..4 {
-                let mut damped = information;
-                for unknown in 0..MAX_UNKNOWNS {
-                    damped[(unknown, unknown)] *= 1.0 + damping;
-                }
-                let Some(cholesky) = damped.cholesky() else { return };
-                let mut step = cholesky.solve(&gradient);
-                if gradient.dot(&step) < CLOSE_ENOUGH {
-                    return;
-                }
-                let pull_at = self.at.pull_at();
-                let too_long = (0..self.at.of_worm())
-                    .map(|unknown| step[unknown].abs() / LONGEST[usize::from(unknown == pull_at)])
-                    .fold(1.0, f64::max);
-                step /= too_long;
-                let mut moved = self.at;
-                moved.values += step;
-                match self.cost(&moved) {
-                    Some(lower) if lower < cost => {
-                        (self.at, cost, improved) = (moved, lower, true);
-                        damping *= 0.2;
-                        break;
-                    }
-                    _ => damping = (damping * 8.0).max(1e-2),
-                }
-            }
-            if !improved {
-                return;
-            }
-        }
-    }
-
-    /// One cycle's difference to the mean of all, by a step from the present parameters in which each unknown may change by about
+    /// One cycle's difference to another profile, by a step from the present parameters in which each unknown may change by about
     /// `sigma` (0: not at all), and its standard errors.
-    pub(super) fn change(&self, torque_n_m: &[f64], sigma: &Vector) -> Option<(Vector, Vector)> {
-        let gradient = self.score(torque_n_m, &self.mean_n_m[..]);
+    pub(super) fn change(&self, torque_n_m: &[f64], from_n_m: &[f64], sigma: &Vector) -> Option<(Vector, Vector)> {
+        let gradient = self.score(torque_n_m, from_n_m);
         let mut information = self.single;
-        for unknown in 0..MAX_UNKNOWNS {
-            information[(unknown, unknown)] += if unknown < self.unknowns && sigma[unknown] > 0.0 {
+        for unknown in 0..self.unknowns {
+            information[(unknown, unknown)] += if sigma[unknown] > 0.0 {
                 1.0 / (sigma[unknown] * sigma[unknown])
             } else {
                 1e12
             };
         }
-        let cholesky = information.cholesky()?;
-        let inverse = cholesky.inverse();
-        Some((inverse * gradient, inverse.diagonal().map(f64::sqrt)))
+        if !leading::cholesky(&mut information, self.unknowns) {
+            return None;
+        }
+        let mut inverse = Matrix::zeros();
+        leading::inverse(&information, self.unknowns, &mut inverse);
+        let (mut change, mut error) = (Vector::zeros(), Vector::zeros());
+        for unknown in 0..self.unknowns {
+            change[unknown] = (0..self.unknowns)
+                .map(|other| inverse[(unknown, other)] * gradient[other])
+                .sum();
+            error[unknown] = inverse[(unknown, unknown)].sqrt();
+        }
+        Some((change, error))
     }
 
     pub(super) fn parameters(&self) -> &Parameters {
@@ -383,6 +307,26 @@ impl Fit {
             .map(|other| (other.pull_n(), self.other_odds / (1.0 + self.other_odds)))
     }
 
+    /// The first answer of a search under way, once.
+    pub(super) fn take_first_answer(&mut self) -> Option<Parameters> {
+        self.first_answer.take()
+    }
+
+    /// The profile of the cycle that was taken last, N m at the cam.
+    pub(super) fn cycle_n_m(&self) -> &[f64] {
+        &self.cycle_n_m[..self.bins]
+    }
+
+    /// Figures of the steady cycle with their standard errors; `None` while no worm holds that the profile allows.
+    pub(super) fn figures(&self) -> Option<&(CycleFigures, CycleFigures)> {
+        self.figures.as_ref()
+    }
+
+    /// Advance of a cycle backward, m, along that crawl.
+    pub(super) fn backward_advance_m(&self) -> Option<f64> {
+        self.backward_advance_m
+    }
+
     /// Standard deviation of what was known of an unknown before.
     pub(super) fn prior_sigma(&self, unknown: usize) -> f64 {
         1.0 / self.prior_information[unknown].sqrt()
@@ -400,7 +344,7 @@ impl Fit {
 
     /// The mean profile and the fitted one, N m at the cam.
     pub(super) fn profiles_n_m(&self) -> (&[f64], &[f64]) {
-        (&self.mean_n_m[..self.bins], &self.predicted_n_m[..self.bins])
+        (&self.mean_n_m[..self.bins], &self.fitted_n_m[..self.bins])
     }
 }
 

@@ -17,13 +17,15 @@
 //! - Cycles crawled backward count for the distance, by the model, but are not fitted.
 //!
 //! # Cost
-//! A tick takes some tens of nanoseconds, the end of a cycle about a millisecond for four cells, the first one some ten. Nothing is
-//! allocated after construction.
+//! A cycle is fitted over the readings that follow it: each does one evaluation of the model, a few microseconds for four cells, until
+//! there is nothing left to do. That takes some hundred readings, and some 1,500 where everything is searched: in the first and the third
+//! cycle, and when the worm has changed. A cycle that ends meanwhile waits; of several the newest. Nothing is allocated after construction.
 
 pub mod change;
 pub mod dead_reckoning;
 mod fit;
 pub mod gear;
+mod leading;
 mod model;
 mod parameters;
 mod profile;
@@ -40,17 +42,23 @@ use crate::message::State;
 use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
 use fit::Fit;
-use parameters::Vector;
+use parameters::{Parameters, Vector};
 use profile::Profile;
 use std::f64::consts::TAU;
 use worm_physics::{MAX_CELLS, Worm};
 
 /// Longest turn of the cam between two readings that is still bridged, cycles.
 const LONGEST_TURN: f64 = 0.02;
+/// How far the cam turns after a rest or a reversal until the tips are loaded as in a steady crawl, cycles.
+const LOADING_CYCLES: f64 = 0.9;
+/// Longest time that the cam may stand in a cycle that is fitted, s: tips give way meanwhile, and it then starts with a ramp.
+const LONGEST_REST_S: f64 = 0.1;
 /// Longest time between two readings over which power is taken to be linear, s.
 const LONGEST_GAP_S: f64 = 0.1;
 /// Standard deviation of a voltage read in steps of 0.1 V, V, and of a current read in steps of 1 mA, A.
 const ROUNDING: [f64; 2] = [0.029, 0.29e-3];
+/// Cycles below which the fit may have begun at a wrong answer.
+const WARM_CYCLES: f64 = 3.0;
 /// Gait-to-gait scatter of the advance, as a share of what compliance takes of the stroke.
 const ADVANCE_SCATTER_SHARE: f64 = 0.02;
 
@@ -69,6 +77,8 @@ pub struct SelfSensingConfig {
     pub cycle_s: f64,
     /// Cycles over which the mean profile is taken; older ones fade.
     pub memory_cycles: f64,
+    /// Evaluations of the model with each reading, while there is a cycle to fit.
+    pub evaluations_per_reading: u32,
 }
 
 impl SelfSensingConfig {
@@ -81,6 +91,7 @@ impl SelfSensingConfig {
             pull_sigma_n: 2.5,
             cycle_s: 2.5,
             memory_cycles: 40.0,
+            evaluations_per_reading: 1,
         }
     }
 }
@@ -104,6 +115,8 @@ pub struct MotorSample {
     pub duty: f64,
     /// Temperature of the servo, °C; `NaN` where unknown.
     pub temperature_c: f64,
+    /// By which its taker knows it again, ns: [`SelfSensed::end_ns`] is that of the reading that ended the cycle.
+    pub stamp_ns: u64,
 }
 
 impl From<&State> for MotorSample {
@@ -118,6 +131,7 @@ impl From<&State> for MotorSample {
             bus_voltage_v: state.bus_voltage_v,
             duty: state.motor_duty,
             temperature_c: state.motor_temperature_c,
+            stamp_ns: state.time_ns,
         }
     }
 }
@@ -127,6 +141,12 @@ impl From<&State> for MotorSample {
 pub struct SelfSensed {
     /// Number of cells.
     pub cells: usize,
+    /// [`MotorSample::stamp_ns`] of the reading that ended the newest cycle.
+    pub end_ns: u64,
+    /// Gait phase at its end, cycles.
+    pub end_phase: f64,
+    /// How the newest cycle was taken.
+    pub standing: Standing,
     /// Cycles that were fitted together, forgotten ones counted less.
     pub cycles: f64,
     /// Friction force k·δmax of each cell, N.
@@ -163,6 +183,19 @@ pub struct SelfSensed {
     pub armed: Armed,
 }
 
+/// How the newest cycle was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// Fitted; but of so few cycles the intervals may be too narrow, and no change can be seen yet.
+    WarmingUp,
+    /// Fitted with those before.
+    Fitted,
+    /// Set aside: it is not like those before, and the next one will show whether that was an accident.
+    Odd,
+    /// Fitted: the worm is another than it was, and [`SelfSensed::changes`] says in what.
+    Changed,
+}
+
 /// Senses a worm by its motor's current.
 #[derive(Debug, Clone)]
 pub struct SelfSensing {
@@ -176,9 +209,23 @@ pub struct SelfSensing {
     reckoning: DeadReckoning,
     advance_m: [f64; 2], // a cycle, forward and backward, along the crawl
     last: Option<Reading>,
-    whole: bool, // the open cycle was seen from its beginning; never the first, in which the tips load up
+    turned_s: f64,      // when the cam was last seen to turn
+    loaded_cycles: f64, // how far the cam has turned since it last stood or turned back
+    whole: bool,        // the open cycle was seen from its beginning; never the first, in which the tips load up
     energy: Energy,
+    evaluations: u32,             // with each reading
+    waiting: Option<ClosedCycle>, // its profile is in `profile`
+    fitting: Option<ClosedCycle>,
+    has_changed: bool, // the worm that is being fitted is another than before
     sensed: Option<SelfSensed>,
+}
+
+/// A cycle that is over.
+#[derive(Debug, Clone, Copy)]
+struct ClosedCycle {
+    end_ns: u64,
+    end_phase: f64,
+    energy: Energy,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -202,30 +249,59 @@ impl SelfSensing {
         let gear = &config.gear;
         let gear_friction_n_m = gear.dry_n_m + gear.viscous_n_m_s_per_rad * TAU / config.cycle_s;
         let detector = ChangeDetector::new(worm, gear_friction_n_m);
-        let mut sensing = Self {
+        let (advance_m, advance_sigma_m) = fit
+            .figures()
+            .map_or((0.0, 0.0), |(figures, sigma)| (figures.advance_m, sigma.advance_m));
+        Self {
             gear: config.gear,
             weight_n: worm.weight_n(),
             stroke_m: worm.stroke_m(),
             profile: Profile::new(worm.cells()),
             allowed: detector.allowed(),
             detector,
-            reckoning: DeadReckoning::new(0.0, 0.0),
-            advance_m: [0.0; 2],
+            reckoning: DeadReckoning::new(advance_m, advance_sigma_m),
+            advance_m: [advance_m, fit.backward_advance_m().unwrap_or(advance_m)],
             fit,
             last: None,
+            turned_s: f64::INFINITY,
+            loaded_cycles: 0.0,
             whole: false,
             energy: Energy::default(),
+            evaluations: config.evaluations_per_reading.max(1),
+            waiting: None,
+            fitting: None,
+            has_changed: false,
             sensed: None,
-        };
-        sensing.follow();
-        if let Some(sensed) = sensing.sensed.take() {
-            sensing.reckoning = DeadReckoning::new(sensed.figures.advance_m, sensed.figures_sigma.advance_m);
         }
-        sensing
     }
 
-    /// Takes a reading; readings of which a value is missing are left out. Returns what is known after a cycle, at its end.
+    /// Takes a reading; those of which a value is missing are left out. Returns what is known after a cycle, once it is fitted: some
+    /// readings after its end.
     pub fn update(&mut self, sample: &MotorSample) -> Option<&SelfSensed> {
+        self.take(sample);
+        let mut is_new = false;
+        for _ in 0..self.evaluations {
+            is_new |= self.work();
+        }
+        if is_new { self.sensed.as_ref() } else { None }
+    }
+
+    /// Does all the work that is left, at once. Returns what is known after the last cycle that it fitted, if there was one.
+    pub fn finish(&mut self) -> Option<&SelfSensed> {
+        let mut is_new = false;
+        while self.fitting.is_some() || self.waiting.is_some() {
+            is_new |= self.work();
+        }
+        if is_new { self.sensed.as_ref() } else { None }
+    }
+
+    /// The readings that follow are not those after the last: the controller has started anew. What is known of the worm stays.
+    pub fn interrupt(&mut self) {
+        self.last = None;
+        (self.whole, self.loaded_cycles) = (false, 0.0);
+    }
+
+    fn take(&mut self, sample: &MotorSample) {
         let winding_a = self.gear.winding_current_a(
             sample.current_a,
             sample.bus_voltage_v * sample.duty,
@@ -236,30 +312,40 @@ impl SelfSensing {
             .gear
             .cam_torque_n_m(winding_a, sample.velocity_rad_per_s, sample.angle_rad);
         if !(torque_n_m.is_finite() && sample.phase.is_finite() && sample.time_s.is_finite()) {
-            return None;
+            return;
         }
         let reading = Reading {
             sample: *sample,
             torque_n_m,
         };
-        let last = self.last.replace(reading)?;
+        let Some(last) = self.last.replace(reading) else { return };
         let turned = sample.phase - last.sample.phase;
         if turned == 0.0 {
-            return None;
+            if sample.time_s - self.turned_s > LONGEST_REST_S {
+                (self.whole, self.loaded_cycles) = (false, 0.0);
+            }
+            return;
         }
+        self.turned_s = sample.time_s;
+        self.loaded_cycles = if turned > 0.0 { self.loaded_cycles + turned } else { 0.0 };
         self.reckon(turned);
         self.add_energy(&last.sample, sample);
         if !(0.0..=LONGEST_TURN).contains(&turned) {
             self.whole = false;
-            return None;
+            return;
         }
         let middle = 0.5 * (sample.phase + last.sample.phase);
-        let mut closed = false;
         if sample.phase.floor() != last.sample.phase.floor() {
-            closed = self.whole && self.close();
+            if self.whole && self.profile.close(self.gear.inertia_kg_m2) {
+                self.waiting = Some(ClosedCycle {
+                    end_ns: sample.stamp_ns,
+                    end_phase: sample.phase.floor(),
+                    energy: self.energy,
+                });
+            }
             self.profile.clear();
             self.energy = Energy::default();
-            self.whole = true;
+            self.whole = self.loaded_cycles >= LOADING_CYCLES;
         }
         let mean = |now: f64, before: f64| 0.5 * (now + before);
         self.profile.add(
@@ -268,12 +354,21 @@ impl SelfSensing {
             mean(torque_n_m, last.torque_n_m),
             mean(sample.velocity_rad_per_s, last.sample.velocity_rad_per_s),
         );
-        if closed { self.sensed.as_ref() } else { None }
     }
 
     /// Corrects the distance by a known position.
     pub fn mark(&mut self, mark: &Mark) {
         self.reckoning.mark(mark);
+    }
+
+    /// The worm is here, whatever was reckoned before: nothing is learned from the difference.
+    pub fn place(&mut self, mark: &Mark) {
+        self.reckoning.place(mark);
+    }
+
+    /// How far the worm advances while the cam turns by so many cycles, negative backward, m.
+    pub fn crawled_m(&self, turned: f64) -> f64 {
+        turned * self.advance_m[usize::from(turned < 0.0)]
     }
 
     /// Where the worm is by dead reckoning, along the canal from where it began.
@@ -316,15 +411,22 @@ impl SelfSensing {
         }
     }
 
-    /// Takes the closed cycle, if it counts.
-    fn close(&mut self) -> bool {
-        if !self.profile.close(self.gear.inertia_kg_m2) {
-            return false;
+    /// One evaluation of the model, if there is a cycle to fit. True when there is something new.
+    fn work(&mut self) -> bool {
+        if let Some(cycle) = self.fitting {
+            if !self.fit.step() {
+                let first = self.fit.take_first_answer().filter(|_| self.has_changed);
+                return first.is_some_and(|first| self.judge_early(&cycle, &first));
+            }
+            self.fitting = None;
+            self.follow(&cycle);
+            return true;
         }
+        let Some(cycle) = self.waiting.take() else { return false };
         let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
         let seen = self
             .fit
-            .change(torque_n_m, &self.allowed)
+            .change(torque_n_m, self.fit.profiles_n_m().0, &self.allowed)
             .map_or(Seen::Usual, |change| {
                 self.detector.compare(&ComparedCycle {
                     usual: self.fit.parameters(),
@@ -334,31 +436,69 @@ impl SelfSensing {
                     mean_n_m: self.fit.profiles_n_m().0,
                 })
             });
+        self.has_changed = matches!(seen, Seen::Changed);
         match seen {
-            Seen::Usual => self.fit.take(torque_n_m, variance),
-            Seen::Odd => {}
+            Seen::Usual => {}
+            Seen::Odd => {
+                self.show(&cycle, Standing::Odd);
+                return true;
+            }
             Seen::Changed => {
                 self.reckoning.begin_anew();
                 self.fit.forget();
-                self.fit.take(torque_n_m, variance);
-                self.detector.judge(self.fit.parameters(), torque_n_m);
             }
         }
-        self.follow();
-        true
+        self.fit.take(torque_n_m, variance);
+        self.fitting = Some(cycle);
+        false
+    }
+
+    /// By how much the unknowns of the newest cycle differ from those of the worm before it changed.
+    fn difference(&self) -> Option<Vector> {
+        let usual_n_m = self.detector.reference_n_m()?;
+        let (difference, _) = self.fit.change(self.fit.cycle_n_m(), usual_n_m, &self.allowed)?;
+        Some(difference)
+    }
+
+    /// Says in what a changed worm differs before everything is searched. True when it does.
+    fn judge_early(&mut self, cycle: &ClosedCycle, first: &Parameters) -> bool {
+        let difference = self.difference();
+        let has_changed = self
+            .detector
+            .judge_early(first, self.fit.cycle_n_m(), difference.as_ref());
+        if has_changed {
+            self.show(cycle, Standing::Changed);
+        }
+        has_changed
     }
 
     /// Brings everything that follows from the fit up to date.
-    fn follow(&mut self) {
-        let Some((figures, figures_sigma)) = self.fit.figures(false) else {
+    fn follow(&mut self, cycle: &ClosedCycle) {
+        // While a change stands, every cycle says anew in what the worm differs, and whether it still does.
+        if self.has_changed || self.detector.changes().any() {
+            let difference = self.difference();
+            self.detector
+                .judge(self.fit.parameters(), self.fit.cycle_n_m(), difference.as_ref());
+        }
+        if let Some((figures, sigma)) = self.fit.figures() {
+            let backward_m = self.fit.backward_advance_m().unwrap_or(figures.advance_m);
+            self.advance_m = [figures.advance_m, backward_m];
+            self.reckoning.know_advance(figures.advance_m, sigma.advance_m);
+        }
+        let standing = if self.detector.changes().any() {
+            Standing::Changed
+        } else if self.fit.cycles() < WARM_CYCLES {
+            Standing::WarmingUp
+        } else {
+            Standing::Fitted
+        };
+        self.show(cycle, standing);
+    }
+
+    fn show(&mut self, cycle: &ClosedCycle, standing: Standing) {
+        let Some((figures, figures_sigma)) = self.fit.figures().copied() else {
             return;
         };
-        let backward_m = self
-            .fit
-            .figures(true)
-            .map_or(figures.advance_m, |(backward, _)| backward.advance_m);
-        self.advance_m = [figures.advance_m, backward_m];
-        self.reckoning.know_advance(figures.advance_m, figures_sigma.advance_m);
         let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());
         let cells = parameters.cells;
         let sigma = |unknown: usize| covariance[(unknown, unknown)].max(0.0).sqrt();
@@ -371,8 +511,12 @@ impl SelfSensing {
         let pull_sigma_n = sigma(parameters.pull_at());
         let sine = (pull_n / self.weight_n).clamp(-1.0, 1.0);
         let slope_rad = sine.asin();
+        let energy = &cycle.energy;
         self.sensed = Some(SelfSensed {
             cells,
+            end_ns: cycle.end_ns,
+            end_phase: cycle.end_phase,
+            standing,
             cycles: self.fit.cycles(),
             friction_n: of_cells(&|cell| parameters.friction_n(cell)),
             friction_sigma_n: of_cells(&|cell| parameters.friction_n(cell) * sigma(cell)),
@@ -384,8 +528,8 @@ impl SelfSensing {
             slope_sigma_rad: pull_sigma_n / (self.weight_n * slope_rad.cos().max(0.05)),
             figures,
             figures_sigma,
-            electrical_j: self.energy.electrical_j,
-            electrical_sigma_j: (self.energy.by_voltage * ROUNDING[0]).hypot(self.energy.by_current * ROUNDING[1]),
+            electrical_j: energy.electrical_j,
+            electrical_sigma_j: (energy.by_voltage * ROUNDING[0]).hypot(energy.by_current * ROUNDING[1]),
             residual_n_m: self.fit.residual_n_m(),
             blind: Blind::of(&self.fit),
             changes: *self.detector.changes(),

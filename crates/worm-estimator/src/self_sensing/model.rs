@@ -125,14 +125,16 @@ impl CycleModel {
         let mut motion = self.settle(&worm)?;
         let per_bin = bins.len() as f64 / TAU;
         let count = bins.len() as f64;
-        let mut done_j = 0.0;
-        for (at, torque_n_m) in bins.iter_mut().enumerate() {
-            motion.advance_to(&worm, (at + 1) as f64 / count).ok()?;
+        let ends = (1..=bins.len()).map(|end| end as f64 / count);
+        let (mut done_j, mut bin) = (0.0, bins.iter_mut());
+        let held = motion.advance_through(&worm, ends, |motion| {
             let work_j = motion.ledger().actuator_net_j;
-            *torque_n_m = (work_j - done_j) * per_bin;
+            if let Some(torque_n_m) = bin.next() {
+                *torque_n_m = (work_j - done_j) * per_bin;
+            }
             done_j = work_j;
-        }
-        Some(())
+        });
+        held.ok()
     }
 
     /// Begins later searches at the periodic crawl of these parameters.

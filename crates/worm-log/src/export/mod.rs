@@ -17,7 +17,7 @@ use super::writer::{Index, WriteError, Writer};
 use crate::ReadError;
 use output::Output;
 use std::path::Path;
-use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing, TripStatus};
+use worm_estimator::message::{Alarm, CommandRecord, Cycle, Estimate, Inferred, Range, State, Timing, TripStatus};
 
 /// Why a log cannot be exported.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +54,7 @@ pub fn copy(log: &Path, to: &Path, overwrite: bool) -> Result<(u64, Vec<String>)
                 Channel::Range => write::<Range>(&mut writer, payload),
                 Channel::CommandRecord => write::<CommandRecord>(&mut writer, payload),
                 Channel::TripStatus => write::<TripStatus>(&mut writer, payload),
+                Channel::Inferred => write::<Inferred>(&mut writer, payload),
             }?;
         }
         Ok(())

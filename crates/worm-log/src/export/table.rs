@@ -16,7 +16,7 @@ use super::ExportError;
 use super::output::{Output, OutputError};
 use std::path::{Path, PathBuf};
 use worm_estimator::message::{
-    Alarm, CommandRecord, Cycle, Estimate, FieldKind, FieldValue, Range, ShortText, State, Timing, TripStatus,
+    Alarm, CommandRecord, Cycle, Estimate, FieldKind, FieldValue, Inferred, Range, ShortText, State, Timing, TripStatus,
 };
 
 /// Name of the column with the wall-clock time.
@@ -95,6 +95,7 @@ pub fn tables(
                 Channel::Range => table.add::<Range>(payload, clock),
                 Channel::CommandRecord => table.add::<CommandRecord>(payload, clock),
                 Channel::TripStatus => table.add::<TripStatus>(payload, clock),
+                Channel::Inferred => table.add::<Inferred>(payload, clock),
             }?;
         }
         Ok(())
@@ -126,6 +127,7 @@ fn cells(channel: Channel, payload: Payload<'_>) -> Result<usize, PayloadError> 
         Channel::Range => of::<Range>(payload),
         Channel::CommandRecord => of::<CommandRecord>(payload),
         Channel::TripStatus => of::<TripStatus>(payload),
+        Channel::Inferred => of::<Inferred>(payload),
     }
 }
 
@@ -267,6 +269,7 @@ impl OpenTable {
             Channel::Range => columns::<Range>(cells),
             Channel::CommandRecord => columns::<CommandRecord>(cells),
             Channel::TripStatus => columns::<TripStatus>(cells),
+            Channel::Inferred => columns::<Inferred>(cells),
         };
         let output = Output::create(&file, overwrite)?;
         let rows = match format {

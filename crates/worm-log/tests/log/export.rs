@@ -134,7 +134,7 @@ fn with_gaps() -> Telemetry {
         fault: 0,
         alarm_mask: 1 << AlarmKind::JammedCell.code(),
     };
-    telemetry.commands = vec![CommandRecord::new(3, 1_000_000_001, true, &crawl, &reply)];
+    telemetry.commands = vec![CommandRecord::new(3, (1_000_000_001, 2.5), true, &crawl, &reply)];
     telemetry
 }
 
@@ -248,7 +248,7 @@ mod tables {
         let alarms = fs::read_to_string(&written[1].file).expect("is there");
         assert!(alarms.contains(",jammed-cell,warning,0,2\n"), "{alarms}");
         let commands = fs::read_to_string(&written[2].file).expect("is there");
-        let row = ",3,1000000001,7,-0.5,0.0,crawl,alarm-stands,0,2,armed,none,1,0,änn\n";
+        let row = ",3,1000000001,7,-0.5,0.0,crawl,alarm-stands,0,2,armed,none,1,0,änn,2.5,,\n";
         assert!(commands.contains(row), "{commands}");
 
         let error = tables(&log, folder.path(), TableFormat::Csv, &topics, false).expect_err("are there already");

@@ -133,7 +133,7 @@ impl Bench {
             fault: Fault::None.code(),
             alarm_mask: 0,
         };
-        let record = CommandRecord::new(self.commands, self.now_ns, false, &command, &reply);
+        let record = CommandRecord::new(self.commands, (self.now_ns, self.state.phase), false, &command, &reply);
         match kind {
             CommandKind::Hold => self.rest(HoldReason::Command),
             CommandKind::Stop => self.state.mode = Mode::Disarmed.code(),

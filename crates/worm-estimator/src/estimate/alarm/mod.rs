@@ -4,7 +4,7 @@
 //! alarms that were raised or cleared. It has no clock: time is [`State::time_ns`]. It allocates nothing.
 //!
 //! Reading order: `cam_motion` follows the cam and `sample` selects the positions to trust. Each detector (`stall`, `jam`, `stride` with
-//! `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`, `recording`) describes its decision rule at
+//! `progress` and `sliding`, `cusum` with `energy`, `battery`, `link`, `tracker`, `device`, `mismatch`, `recording`, `inferred`) describes its decision rule at
 //! the top of its file. `latch` turns their output into one "raised" and one "cleared".
 //!
 //! **Calibration.** Baselines are learned on the first `estimator.calibration_cycles` good cycles, as functions of the gait phase:
@@ -29,6 +29,7 @@ mod changes;
 mod cusum;
 mod device;
 mod energy;
+mod inferred;
 mod jam;
 mod latch;
 mod link;
@@ -48,7 +49,7 @@ pub use changes::AlarmChanges;
 
 use crate::config::Config;
 use crate::estimate::ResidualMap;
-use crate::message::{AlarmKind, BlackBoxStatus, Cycle, Estimate, RecordingStatus, State};
+use crate::message::{AlarmKind, BlackBoxStatus, Cycle, Estimate, Inferred, RecordingStatus, State};
 use cam_motion::{CamMotion, Tick};
 use latch::{Delays, DetectorOutput, Latch};
 use sample::VisibleCells;
@@ -65,6 +66,8 @@ pub struct Observation<'a> {
     pub cycle: Option<&'a Cycle>,
     /// The present residuals against the model.
     pub residuals: Option<&'a ResidualMap>,
+    /// What the motor's current alone says, as of the last cycle that was fitted.
+    pub inferred: Option<&'a Inferred>,
 }
 
 /// Monitors one worm for every [`AlarmKind`].
@@ -75,6 +78,7 @@ pub struct AlarmMonitor {
     detectors: Detectors,
     battery: battery::BatteryLow,
     recording: recording::RecordingStopped,
+    by_current: inferred::ByCurrent,
     latches: [Latch; KINDS],
     armed_mask: u32,
     next_sequence: u64,
@@ -129,6 +133,7 @@ impl AlarmMonitor {
             detectors,
             battery: battery::BatteryLow::new(config),
             recording: recording::RecordingStopped::new(config),
+            by_current: inferred::ByCurrent::new(config),
             latches: std::array::from_fn(|index| {
                 let kind = AlarmKind::ALL[index];
                 Latch::new(kind, delays_of(kind))
@@ -220,6 +225,7 @@ impl AlarmMonitor {
             estimate,
             cycle,
             residuals,
+            inferred,
         } = *observation;
         let detectors = &mut self.detectors;
         detectors.visible_cells.follow(state, self.cells);
@@ -242,6 +248,7 @@ impl AlarmMonitor {
             }
         }
         let [jam, progress, sliding] = detectors.by_position;
+        let [friction_loss, inferred_jam, more_load] = self.by_current.update(tick, inferred);
         [
             detectors.stall.update(tick, state),
             jam,
@@ -254,6 +261,9 @@ impl AlarmMonitor {
             detectors.device.update(tick, state),
             detectors.mismatch.update(tick, residuals),
             self.recording.update(tick),
+            friction_loss,
+            inferred_jam,
+            more_load,
         ]
     }
 }
@@ -295,6 +305,7 @@ const fn delays_of(kind: AlarmKind) -> Delays {
         AlarmKind::DeviceFault => (0.0, 2.0),
         AlarmKind::ModelMismatch => (0.0, 0.0),
         AlarmKind::RecordingStopped => (0.0, 1.0),
+        AlarmKind::FrictionLoss | AlarmKind::InferredJam | AlarmKind::MoreLoad => (0.0, 0.0),
     };
     Delays {
         raise_after_ns: (raise_after_s * 1e9) as u64,

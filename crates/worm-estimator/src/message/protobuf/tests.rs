@@ -168,7 +168,9 @@ fn the_descriptor_says_what_a_field_is() {
 
 #[test]
 fn a_text_that_is_none_or_too_long_is_refused() {
-    let number = CommandRecord::FIELDS.len() as u8;
+    let mut fields = CommandRecord::FIELDS.iter();
+    let place = fields.position(|field| field.name == "sender").expect("a sender");
+    let number = place as u8 + 1;
     for text in [&[0xff; 3][..], &[b'x'; 33], b"a\0b"] {
         let bytes = [&[number << 3 | 2, text.len() as u8], text].concat();
         let refused = CommandRecord::read_protobuf(&bytes).expect_err("no sender");

@@ -2,87 +2,137 @@
 //!
 //! Another answer with another pull is kept while the profile does not exclude it.
 
+use super::super::parameters::Parameters;
 use super::super::profile::BINS_PER_STEP;
 use super::Fit;
+use super::descent::Descent;
+use super::work::Work;
 
 /// Where the first search begins: pulls as shares of what all tips hold, and changes of every ln stiffness.
 const FIRST_PULLS: [f64; 12] = [0.0, 0.03, 0.07, 0.11, 0.16, 0.21, 0.27, 0.34, 0.42, 0.5, 0.6, -0.1];
 const FIRST_STIFFNESSES: [f64; 2] = [-0.2, 0.1];
+/// How many places that makes; the first is where the fit was.
+const PLACES: usize = 1 + FIRST_PULLS.len() * FIRST_STIFFNESSES.len();
 /// The best of these searches go on.
 const BEST: usize = 3;
-/// Gauss-Newton steps from each first place, then from each of the best.
+/// Gauss-Newton steps from each first place, then from each of the best. From where the fit was at once as many as these: for a worm that has
+/// changed it is mostly the answer, and a first one that others can wait for no longer.
 const ROUNDS: [usize; 2] = [2, 12];
 /// Difference of two pulls, N, that makes another answer of them.
 const OTHER_PULL_N: f64 = 0.25;
 /// Difference of what is minimised up to which another answer still counts.
 const OTHER_COUNTS: f64 = 12.0;
 
-impl Fit {
-    /// The first search: from several pulls, for the kinks of the profile make local minima.
-    pub(super) fn search_everywhere(&mut self) {
-        let before = self.at;
-        self.begin_with_swings();
-        let start = self.at;
-        let hold_n: f64 = (0..start.cells).map(|cell| start.friction_n(cell)).sum();
-        let mut best = [(f64::INFINITY, start); BEST];
-        let starts = FIRST_PULLS
-            .iter()
-            .flat_map(|share| FIRST_STIFFNESSES.map(|stiffness| Some((share, stiffness))));
-        for (pull_share, stiffness) in starts.chain([None]).map(|start| start.unwrap_or((&f64::NAN, 0.0))) {
-            self.at = if pull_share.is_nan() {
-                before
-            } else {
-                let mut at = start;
-                let pull_n = pull_share * hold_n;
-                at.values[start.pull_at()] = pull_n;
-                at.values[start.gears_at()] -= pull_n / (start.cells as f64 * self.force_per_torque);
-                (0..start.cells).for_each(|cell| at.values[start.cells + cell] += stiffness);
-                at
-            };
-            self.descend(ROUNDS[0]);
-            let at = self.at;
-            if let Some(cost) = self.cost(&at)
-                && let Some(place) = best.iter().position(|(other, _)| cost < *other)
-            {
-                best[place..].rotate_right(1);
-                best[place] = (cost, at);
-            }
+/// A search under way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Search {
+    start: Parameters, // by the swings of the torque
+    place: usize,
+    best: [(f64, Parameters); BEST],
+    settling: Option<usize>, // which of the best goes on
+    least: f64,
+    descent: Descent,
+}
+
+impl Search {
+    /// The next piece; at the end, the least of what is minimised, if any worm holds.
+    pub(super) fn step(&mut self, fit: &mut Fit) -> Option<Option<f64>> {
+        if !self.descent.step(fit) {
+            return None;
         }
-        (self.at, self.other) = (before, None);
-        let mut least = f64::INFINITY;
-        for (_, at) in best.into_iter().filter(|(cost, _)| cost.is_finite()) {
-            let settled = std::mem::replace(&mut self.at, at);
-            self.descend(ROUNDS[1]);
-            let at = self.at;
-            let Some(cost) = self.cost(&at) else { continue };
-            let is_other = (at.pull_n() - settled.pull_n()).abs() > OTHER_PULL_N;
-            if cost < least {
-                self.other = if is_other && least.is_finite() {
-                    Some(settled)
-                } else {
-                    self.other
-                };
-                least = cost;
-            } else {
-                self.at = settled;
-                if is_other && self.other.is_none() {
-                    self.other = Some(at);
+        match self.settling {
+            None => {
+                self.sort_in();
+                if self.place == 0 {
+                    fit.first_answer = self.descent.cost.map(|_| self.descent.at);
                 }
+                self.place += 1;
+                if self.place < PLACES {
+                    self.descent = Descent::new(self.place(fit), ROUNDS[0]);
+                    return None;
+                }
+                fit.other = None;
+                self.settle(0)
+            }
+            Some(of_best) => {
+                self.settled(fit);
+                self.settle(of_best + 1)
             }
         }
     }
 
-    /// Follows the other answer, too, and takes it where it has become the better one.
-    pub(super) fn weigh_other(&mut self) {
-        self.other_odds = 0.0;
-        let Some(other) = self.other else { return };
-        let best = std::mem::replace(&mut self.at, other);
-        self.descend(1);
-        let other = std::mem::replace(&mut self.at, best);
-        let (Some(cost), Some(other_cost)) = (self.cost(&best), self.cost(&other)) else {
+    fn place(&self, fit: &Fit) -> Parameters {
+        let Some(start) = self.place.checked_sub(1) else {
+            return fit.at;
+        };
+        let share = FIRST_PULLS[start / FIRST_STIFFNESSES.len()];
+        let mut at = self.start;
+        let hold_n: f64 = (0..at.cells).map(|cell| at.friction_n(cell)).sum();
+        let pull_n = share * hold_n;
+        let (pull_at, gears) = (at.pull_at(), at.gears_at());
+        at.values[pull_at] = pull_n;
+        at.values[gears] -= pull_n / (at.cells as f64 * fit.force_per_torque);
+        let stiffness = FIRST_STIFFNESSES[start % FIRST_STIFFNESSES.len()];
+        (0..at.cells).for_each(|cell| at.values[at.cells + cell] += stiffness);
+        at
+    }
+
+    fn sort_in(&mut self) {
+        let Some(cost) = self.descent.cost else { return };
+        if let Some(place) = self.best.iter().position(|(other, _)| cost < *other) {
+            self.best[place..].rotate_right(1);
+            self.best[place] = (cost, self.descent.at);
+        }
+    }
+
+    fn settle(&mut self, of_best: usize) -> Option<Option<f64>> {
+        match self.best.get(of_best).filter(|(cost, _)| cost.is_finite()) {
+            Some((_, at)) => {
+                self.settling = Some(of_best);
+                self.descent = Descent::new(*at, ROUNDS[1]);
+                None
+            }
+            None => Some(Some(self.least).filter(|least| least.is_finite())),
+        }
+    }
+
+    fn settled(&mut self, fit: &mut Fit) {
+        let (at, settled) = (self.descent.at, fit.at);
+        let Some(cost) = self.descent.cost else { return };
+        let is_other = (at.pull_n() - settled.pull_n()).abs() > OTHER_PULL_N;
+        if cost < self.least {
+            if is_other && self.least.is_finite() {
+                fit.other = Some(settled);
+            }
+            (fit.at, self.least) = (at, cost);
+        } else if is_other && fit.other.is_none() {
+            fit.other = Some(at);
+        }
+    }
+}
+
+impl Fit {
+    /// The first search: from several pulls.
+    pub(super) fn search_everywhere(&self) -> Work {
+        let start = self.by_swings();
+        Work::Search(Search {
+            start,
+            place: 0,
+            best: [(f64::INFINITY, start); BEST],
+            settling: None,
+            least: f64::INFINITY,
+            descent: Descent::new(self.at, ROUNDS[1]),
+        })
+    }
+
+    /// Takes the other answer where it has become the better one. Both at the end of their descents, with what is minimised.
+    pub(super) fn weigh_other(&mut self, cost: Option<f64>, other: &Descent) {
+        let best = self.at;
+        let (Some(cost), Some(other_cost)) = (cost, other.cost) else {
             self.other = None;
             return;
         };
+        let other = other.at;
         if (best.pull_n() - other.pull_n()).abs() < OTHER_PULL_N || other_cost - cost > OTHER_COUNTS {
             self.other = None;
             return;
@@ -95,10 +145,11 @@ impl Fit {
         self.other_odds = (-0.5 * (other_cost - cost).abs()).exp();
     }
 
-    /// Begins at what is known before, with each cell's friction by the swing of the torque in its step: from −k·δmax to k·δmax.
-    fn begin_with_swings(&mut self) {
-        let cells = self.at.cells;
-        self.at.values = self.prior;
+    /// What is known before, with each cell's friction by the swing of the torque in its step: from −k·δmax to k·δmax.
+    fn by_swings(&self) -> Parameters {
+        let mut at = self.at;
+        let cells = at.cells;
+        at.values = self.prior;
         let mut offset_n_m = 0.0;
         for place in 0..cells {
             let step = &self.mean_n_m[place * BINS_PER_STEP..(place + 1) * BINS_PER_STEP];
@@ -107,10 +158,11 @@ impl Fit {
             let friction_n = 0.5 * (end_n_m - begin_n_m) * self.force_per_torque;
             let cell = self.model.cell_at(place);
             let far = 2.5 / self.prior_information[cell].sqrt();
-            self.at.values[cell] += (friction_n.max(1e-6).ln() - self.prior[cell]).clamp(-far, far);
+            at.values[cell] += (friction_n.max(1e-6).ln() - self.prior[cell]).clamp(-far, far);
             offset_n_m += 0.5 * (end_n_m + begin_n_m) / cells as f64;
         }
-        let gears = self.at.gears_at();
-        self.at.values[gears] = offset_n_m;
+        let gears = at.gears_at();
+        at.values[gears] = offset_n_m;
+        at
     }
 }

@@ -10,8 +10,8 @@
 //! Another answer with another pull that the search found and the profile does not exclude adds how far it is, by its probability.
 //! What the prior leaves uncertain (torque constant, friction of the gears) is in A⁻¹ Λ A⁻¹.
 
+use super::super::leading;
 use super::super::model::{CycleFigures, FIGURES};
-use super::super::parameters::Matrix;
 use super::{FLOOR_N_M, Fit, STEPS};
 use worm_physics::MAX_CELLS;
 
@@ -22,27 +22,71 @@ const SCATTER_CYCLES: f64 = 3.0;
 /// Bins over which what the fit leaves hangs together.
 pub(super) const MISFIT_BINS: f64 = 8.0;
 
-impl Fit {
-    /// Scatter, misfit and covariance, at the present parameters.
-    pub(super) fn assess(&mut self, torque_n_m: &[f64]) {
-        if self.linearise().is_none() {
-            return;
+/// Scatter, misfit and covariance, at the answer and with its derivatives.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Assessment {
+    next: u32,
+}
+
+impl Assessment {
+    pub(super) fn new() -> Self {
+        Self { next: 0 }
+    }
+
+    /// The next piece; true at the end.
+    pub(super) fn step(&mut self, fit: &mut Fit) -> bool {
+        self.next += 1;
+        match self.next {
+            1 => {
+                fit.gather_scatter();
+                false
+            }
+            // The inverse of A in the second scratch matrix.
+            2 => !fit.invert_information(),
+            3 => {
+                fit.fill_meat();
+                false
+            }
+            4 => {
+                let [meat, inverse] = &*fit.scratch;
+                leading::multiply(inverse, meat, fit.unknowns, &mut fit.covariance);
+                false
+            }
+            _ => {
+                let [product, inverse] = &mut *fit.scratch;
+                leading::multiply(&fit.covariance, inverse, fit.unknowns, product);
+                for column in 0..fit.unknowns {
+                    for row in 0..fit.unknowns {
+                        fit.covariance[(row, column)] = product[(row, column)];
+                    }
+                }
+                fit.add_other();
+                true
+            }
         }
+    }
+}
+
+impl Fit {
+    fn gather_scatter(&mut self) {
+        *self.fitted_n_m = *self.predicted_n_m;
         let squared = self.forgetting * self.forgetting;
-        self.scatter *= squared;
         self.scatter_count *= squared;
+        let size = self.unknowns;
+        let mut share = 0.0;
+        let mut score = super::Vector::zeros();
         if self.cycles > 1.0 {
             // Welford's: about the mean that already contains this cycle.
-            let score = self.score(torque_n_m, &self.mean_n_m[..]);
-            self.scatter += score * score.transpose() * (self.cycles / (self.cycles - 1.0));
+            score = self.score(&self.cycle_n_m[..], &self.mean_n_m[..]);
+            share = self.cycles / (self.cycles - 1.0);
             self.scatter_count += 1.0;
         }
-        let mut by_friction = Matrix::zeros();
-        for cell in 0..self.at.cells {
-            by_friction[(cell, cell)] = SCATTER_SHARE * SCATTER_SHARE;
+        for column in 0..size {
+            for row in 0..size {
+                let scatter = &mut self.scatter[(row, column)];
+                *scatter = *scatter * squared + share * score[row] * score[column];
+            }
         }
-        let assumed = self.single + self.single * by_friction * self.single;
-        let scatter = (self.scatter + assumed * SCATTER_CYCLES) / (self.scatter_count + SCATTER_CYCLES);
         let (mut squares, mut weights) = (0.0, 0.0);
         for bin in 0..self.bins {
             let weight = Self::bin_weight(bin);
@@ -51,17 +95,54 @@ impl Fit {
         }
         let left = (squares / weights - self.variance / self.cycles).max(FLOOR_N_M * FLOOR_N_M);
         self.misfit = MISFIT_BINS * left / self.variance;
-        let reduced = self.weight() / self.cycles;
-        let meat = scatter * (self.squared_cycles * reduced * reduced)
-            + self.single * (self.weight() * self.weight() * self.misfit)
-            + Matrix::from_diagonal(&self.prior_information);
-        if let Some(inverse) = self.information().cholesky().map(|cholesky| cholesky.inverse()) {
-            self.covariance = inverse * meat * inverse;
+    }
+
+    fn invert_information(&mut self) -> bool {
+        let (weight, size) = (self.weight(), self.unknowns);
+        let [factor, inverse] = &mut *self.scratch;
+        for column in 0..size {
+            for row in column..size {
+                factor[(row, column)] = weight * self.single[(row, column)];
+            }
+            factor[(column, column)] += self.prior_information[column];
         }
-        if let Some(other) = &self.other {
-            // Of two answers, at the better one: its covariance, and how far the other is, as probably as it is true.
-            let apart = other.values - self.at.values;
-            self.covariance += apart * apart.transpose() * (self.other_odds / (1.0 + self.other_odds));
+        let is_definite = leading::cholesky(factor, size);
+        if is_definite {
+            leading::inverse(factor, size, inverse);
+        }
+        is_definite
+    }
+
+    /// B + Λ, into the first scratch matrix.
+    fn fill_meat(&mut self) {
+        let weight = self.weight();
+        let reduced = weight / self.cycles;
+        let of_scatter = self.squared_cycles * reduced * reduced / (self.scatter_count + SCATTER_CYCLES);
+        let of_single = weight * weight * self.misfit;
+        let meat = &mut self.scratch[0];
+        for column in 0..self.unknowns {
+            for row in 0..self.unknowns {
+                let by_friction: f64 = (0..self.at.cells)
+                    .map(|cell| self.single[(row, cell)] * self.single[(column, cell)])
+                    .sum();
+                let single = self.single[(row, column)];
+                let assumed = single + SCATTER_SHARE * SCATTER_SHARE * by_friction;
+                meat[(row, column)] =
+                    of_scatter * (self.scatter[(row, column)] + assumed * SCATTER_CYCLES) + of_single * single;
+            }
+            meat[(column, column)] += self.prior_information[column];
+        }
+    }
+
+    /// Of two answers, at the better one: its covariance, and how far the other is, as probably as it is true.
+    fn add_other(&mut self) {
+        let Some(other) = &self.other else { return };
+        let apart = other.values - self.at.values;
+        let probability = self.other_odds / (1.0 + self.other_odds);
+        for column in 0..self.unknowns {
+            for row in 0..self.unknowns {
+                self.covariance[(row, column)] += apart[row] * apart[column] * probability;
+            }
         }
     }
 
@@ -72,47 +153,89 @@ impl Fit {
             .sum();
         self.at.values[self.at.gears_at() + 3] * self.velocity_rad_per_s * rise_n_m
     }
+}
 
-    /// Figures of the steady cycle with their standard errors, of the crawl forward or backward. The work of the actuator includes that of
-    /// the pads' damping, the losses (11) do not.
-    pub(in super::super) fn figures(&self, backward: bool) -> Option<(CycleFigures, CycleFigures)> {
-        let mut centre = self.model.figures(&self.at, backward)?;
-        let mut slopes = [[0.0; FIGURES]; 2 * MAX_CELLS + 1];
-        for (unknown, slope) in slopes[..self.at.of_worm()].iter_mut().enumerate() {
-            let step = STEPS[(unknown / self.at.cells).min(2)];
-            let moved = |by: f64| {
-                let mut moved = self.at;
-                moved.values[unknown] += by;
-                self.model
-                    .figures(&moved, backward)
-                    .map_or(centre, |figures| figures)
-                    .flat()
-            };
-            let (up, down) = (moved(step), moved(-step));
-            for figure in 0..FIGURES {
-                slope[figure] = (up[figure] - down[figure]) / (2.0 * step);
-            }
+/// Figures of the steady cycle with their standard errors, by finite differences. The work of the actuator includes that of the pads'
+/// damping, the losses (11) do not.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FigureDerivatives {
+    next: usize,
+    centre: CycleFigures,
+    up: [f64; FIGURES],
+}
+
+/// Derivatives of the figures by the worm's unknowns.
+pub(super) type Slopes = [[f64; FIGURES]; 2 * MAX_CELLS + 1];
+
+impl FigureDerivatives {
+    pub(super) fn new() -> Self {
+        Self {
+            next: 0,
+            centre: CycleFigures::default(),
+            up: [0.0; FIGURES],
         }
+    }
+
+    /// The next piece; true at the end.
+    pub(super) fn step(&mut self, fit: &mut Fit) -> bool {
+        let next = self.next;
+        self.next += 1;
+        if next == 0 {
+            match fit.model.figures(&fit.at, false) {
+                Some(centre) => self.centre = centre,
+                None => {
+                    fit.figures = None;
+                    return true;
+                }
+            }
+            return false;
+        }
+        if next <= 2 * fit.at.of_worm() {
+            let (unknown, is_second) = ((next - 1) / 2, (next - 1) % 2 == 1);
+            self.differentiate(fit, unknown, is_second);
+            return false;
+        }
+        fit.backward_advance_m = fit.model.figures(&fit.at, true).map(|backward| backward.advance_m);
+        fit.figures = Some(self.with_errors(fit));
+        true
+    }
+
+    fn differentiate(&mut self, fit: &mut Fit, unknown: usize, is_second: bool) {
+        let step = STEPS[(unknown / fit.at.cells).min(2)];
+        let mut moved = fit.at;
+        moved.values[unknown] += if is_second { -step } else { step };
+        let figures = fit.model.figures(&moved, false).unwrap_or(self.centre).flat();
+        if !is_second {
+            self.up = figures;
+            return;
+        }
+        for (slope, (up, down)) in fit.slopes[unknown].iter_mut().zip(self.up.iter().zip(figures)) {
+            *slope = (up - down) / (2.0 * step);
+        }
+    }
+
+    fn with_errors(&self, fit: &Fit) -> (CycleFigures, CycleFigures) {
         let mut sigma = [0.0; FIGURES];
         for (figure, sigma) in sigma.iter_mut().enumerate() {
             let mut variance = 0.0;
-            for a in 0..self.at.of_worm() {
-                for b in 0..self.at.of_worm() {
-                    variance += slopes[a][figure] * self.covariance[(a, b)] * slopes[b][figure];
+            for a in 0..fit.at.of_worm() {
+                for b in 0..fit.at.of_worm() {
+                    variance += fit.slopes[a][figure] * fit.covariance[(a, b)] * fit.slopes[b][figure];
                 }
             }
             *sigma = variance.max(0.0).sqrt();
         }
-        let damping_j = self.damping_j();
+        let mut centre = self.centre;
+        let damping_j = fit.damping_j();
         centre.energy_net_j += damping_j;
         centre.energy_positive_j += damping_j;
         let mut sigma = CycleFigures::from_flat(&sigma);
         // Near a leap of the steady cycle the derivative says nothing, but a worm cannot be further off than this.
-        sigma.advance_m = sigma.advance_m.min(self.stroke_m);
-        let lead = self.at.gears_at() + 3;
-        let damping_sigma_j = (damping_j / self.at.values[lead]).abs() * self.covariance[(lead, lead)].max(0.0).sqrt();
+        sigma.advance_m = sigma.advance_m.min(fit.stroke_m);
+        let lead = fit.at.gears_at() + 3;
+        let damping_sigma_j = (damping_j / fit.at.values[lead]).abs() * fit.covariance[(lead, lead)].max(0.0).sqrt();
         sigma.energy_net_j = sigma.energy_net_j.hypot(damping_sigma_j);
         sigma.energy_positive_j = sigma.energy_positive_j.hypot(damping_sigma_j);
-        Some((centre, sigma))
+        (centre, sigma)
     }
 }

@@ -80,6 +80,9 @@ fn crawl(plant: &mut Plant, sensing: &mut SelfSensing, cycles: usize, mut each: 
             each(plant, sensed);
         }
     }
+    if let Some(sensed) = sensing.finish() {
+        each(plant, sensed);
+    }
 }
 
 #[test]

@@ -225,6 +225,7 @@ impl Plant {
             bus_voltage_v: (10.0 * self.bus_v()).round() / 10.0,
             duty: (self.duty * 885.0).round() / 885.0,
             temperature_c: (25.0 + self.warmth_k()).floor(),
+            stamp_ns: 0,
         }
     }
 

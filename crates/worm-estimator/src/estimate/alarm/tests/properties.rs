@@ -65,6 +65,7 @@ proptest! {
                 estimate: sampled.then_some(&estimate),
                 cycle: ended.then_some(&cycle),
                 residuals: None,
+                inferred: None,
             });
             for alarm in &changes {
                 prop_assert_eq!(alarm.sequence, numbered);

@@ -205,6 +205,7 @@ impl Bench {
             estimate: sampled.then_some(&self.estimate),
             cycle: cycle.as_ref(),
             residuals: None,
+            inferred: None,
         };
         let changes = self.monitor.update(&observation);
         self.changes.extend_from_slice(&changes);
