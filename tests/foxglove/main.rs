@@ -75,6 +75,7 @@ fn a_client_decodes_every_state_and_learns_that_the_worm_is_silent() {
         "/command",
         "/cycle",
         "/estimate",
+        "/inferred",
         "/range",
         "/state",
         "/timing",
