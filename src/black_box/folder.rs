@@ -8,7 +8,7 @@ use super::{BOX_RECORD, END_RECORD, utc};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
-use std::io::{self, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 use worm_estimator::config::Config;
@@ -398,7 +398,7 @@ fn parse(name: &str) -> Option<(FileKind, u64, bool)> {
 ///
 /// # Errors
 /// From the operating system, and when it has fewer bytes.
-pub(crate) fn open_from(path: &Path, offset: u64) -> io::Result<File> {
+pub(crate) fn open_from(path: &Path, offset: u64) -> io::Result<impl Read> {
     let mut file = File::open(path)?;
     let length = file.seek(SeekFrom::End(0))?;
     if offset > length {

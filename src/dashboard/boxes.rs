@@ -1,7 +1,8 @@
 //! Files of the black box as downloads that a browser, `curl -C -` or `wget -c` can take up again where they broke off.
 
 use super::byte_range::{Wanted, wanted};
-use crate::black_box::folder::{Folder, FolderError, open_from};
+use super::response::refused;
+use crate::black_box::folder::{Folder, FolderError};
 use axum::body::{Body, Bytes};
 use axum::http::header::{
     ACCEPT_RANGES, CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_RANGE, CONTENT_TYPE, ETAG, IF_NONE_MATCH, IF_RANGE,
@@ -10,8 +11,8 @@ use axum::http::header::{
 use axum::http::{HeaderMap, HeaderName, StatusCode};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::unfold;
-use std::io::{self, Read};
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::time::UNIX_EPOCH;
 
 /// How much is read at a time, bytes.
@@ -20,7 +21,7 @@ const PIECE: usize = 64 << 10;
 /// A file that can be downloaded.
 #[derive(Debug)]
 pub(super) struct BoxFile {
-    path: PathBuf,
+    file: File,
     name: String,
     length: u64,
     /// Tells it from another file of this name.
@@ -44,19 +45,20 @@ pub(super) fn open(folder: &Folder, wanted: &str) -> io::Result<Option<BoxFile>>
     if !name.ends_with(".mcap") {
         return Ok(None);
     }
-    let about = std::fs::metadata(&path)?;
+    let file = File::open(&path)?;
+    let about = file.metadata()?;
     let modified = about.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default();
     Ok(Some(BoxFile {
         tag: format!("\"{name}-{}-{}\"", about.len(), modified.as_nanos()),
         length: about.len(),
-        path,
+        file,
         name,
     }))
 }
 
 impl BoxFile {
     /// What the request asks for of it.
-    pub(super) fn answer(self, headers: &HeaderMap) -> Response {
+    pub(super) fn answer(mut self, headers: &HeaderMap) -> Response {
         let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
         if text(IF_NONE_MATCH) == Some(&self.tag) {
             return (StatusCode::NOT_MODIFIED, [(ETAG, self.tag)]).into_response();
@@ -79,10 +81,10 @@ impl BoxFile {
             (ACCEPT_RANGES, "bytes".to_owned()),
             (ETAG, self.tag),
         ];
-        let body = match open_from(&self.path, bytes.start) {
-            Ok(file) => pieces(file.take(bytes.end - bytes.start)),
-            Err(error) => return (StatusCode::NOT_FOUND, error.to_string()).into_response(),
-        };
+        if let Err(error) = self.file.seek(SeekFrom::Start(bytes.start)) {
+            return refused(StatusCode::INTERNAL_SERVER_ERROR, &error.to_string());
+        }
+        let body = pieces(self.file.take(bytes.end - bytes.start));
         let mut response = (status, head, body).into_response();
         if status == StatusCode::PARTIAL_CONTENT
             && let Ok(part) = format!("bytes {}-{}/{}", bytes.start, bytes.end - 1, self.length).parse()

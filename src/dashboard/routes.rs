@@ -215,11 +215,12 @@ async fn open_report(State(app): State<Arc<App>>, Path(wanted): Path<String>) ->
 async fn list_boxes(State(app): State<Arc<App>>) -> Response {
     let folder = app.boxes.clone();
     let path = folder.path().display().to_string();
-    // Where no black box has ever been there is no folder, which is no error of the page.
-    if !folder.path().exists() {
-        return to_json(StatusCode::OK, &json!({ "folder": path, "boxes": [] }));
-    }
-    match in_background(move || folder.boxes().map_err(std::io::Error::other)).await {
+    let list = move || match folder.path().exists() {
+        true => folder.boxes().map_err(std::io::Error::other),
+        // Where no black box has ever been there is no folder, which is no error of the page.
+        false => Ok(Vec::new()),
+    };
+    match in_background(list).await {
         Ok(boxes) => to_json(StatusCode::OK, &json!({ "folder": path, "boxes": boxes })),
         Err(why) => refused(StatusCode::INTERNAL_SERVER_ERROR, &why),
     }

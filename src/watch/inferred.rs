@@ -76,9 +76,11 @@ impl InferredSummary {
             "fitted" => String::new(),
             standing => format!(" ({standing})"),
         };
+        // So that a small error does not look like none.
+        let digits = usize::from(self.position_sigma_m < 1e-3);
         self.advance_m.is_finite().then(|| {
             format!(
-                "at ~{:.0}±{:.0} mm, ~{:.1}±{:.1} mm and ~{:.0}±{:.0} mJ a cycle, pull ~{:.1}±{:.1} N{standing}",
+                "at ~{:.digits$}±{:.digits$} mm, ~{:.1}±{:.1} mm and ~{:.0}±{:.0} mJ a cycle, pull ~{:.1}±{:.1} N{standing}",
                 1e3 * self.position_m,
                 1e3 * self.position_sigma_m,
                 1e3 * self.advance_m,

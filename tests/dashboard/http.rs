@@ -15,6 +15,7 @@ pub struct Reply {
     pub status: u16,
     pub head: String,
     pub body: String,
+    pub bytes: Vec<u8>,
 }
 
 impl Reply {
@@ -61,6 +62,7 @@ pub fn request(to: SocketAddr, method: &str, path: &str, headers: &[&str], body:
         status,
         head,
         body: String::from_utf8_lossy(&body).into_owned(),
+        bytes: body,
     }
 }
 

@@ -1,5 +1,7 @@
 //! `wormd dashboard` from outside: real processes, requests as bytes, and a real headless Chromium where there is one.
 
+mod boxes;
+mod fleet;
 mod http;
 #[path = "../processes/worm.rs"]
 #[allow(
@@ -23,9 +25,39 @@ const ANN: &str = "X-Wormd-Client: ann";
 const BEN: &str = "X-Wormd-Client: ben";
 const PATIENCE: Duration = Duration::from_secs(30);
 
+/// A dashboard that ends with the test, however that ends.
+struct Dashboard(Child);
+
+impl Dashboard {
+    /// Ends it; its exit status.
+    fn end(&mut self) -> Option<i32> {
+        let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), Signal::SIGTERM);
+        self.0.wait().ok()?.code()
+    }
+}
+
+impl Drop for Dashboard {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// Starts a dashboard, of whose output only the first line is read: it says where it listens.
+fn start(mut command: Command) -> (Dashboard, SocketAddr) {
+    let mut dashboard = command.stdout(Stdio::piped()).spawn().expect("the binary starts");
+    let mut line = String::new();
+    BufReader::new(dashboard.stdout.take().expect("is piped"))
+        .read_line(&mut line)
+        .expect("it says where it is");
+    let address = line
+        .split_once("http://")
+        .and_then(|(_, rest)| rest.trim().trim_end_matches('/').parse().ok());
+    (Dashboard(dashboard), address.unwrap_or_else(|| panic!("{line:?}")))
+}
+
 /// A worm, at rest and disarmed, with a dashboard.
 struct Watched {
-    dashboard: Child,
+    _dashboard: Dashboard,
     address: SocketAddr,
     controller: Process,
     _estimator: Process,
@@ -38,29 +70,18 @@ impl Watched {
     fn start(name: &str) -> Self {
         let worm = Worm::on_a_steady_computer(name);
         let arguments = ["dashboard", "--listen", "127.0.0.1:0"];
-        let mut dashboard = worm
-            .wormd(&arguments)
-            .with_environment("WORMD_DASHBOARD_TOKEN", TOKEN)
-            .into_command()
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the binary starts");
-        let mut line = String::new();
-        let stdout = dashboard.stdout.take().expect("is piped");
-        BufReader::new(stdout)
-            .read_line(&mut line)
-            .expect("it says where it is");
-        let address = line
-            .split_once("http://")
-            .and_then(|(_, rest)| rest.trim().trim_end_matches('/').parse().ok());
-        let address = address.unwrap_or_else(|| panic!("{line:?}"));
+        let (dashboard, address) = start(
+            worm.wormd(&arguments)
+                .with_environment("WORMD_DASHBOARD_TOKEN", TOKEN)
+                .into_command(),
+        );
         assert_eq!(request(address, "GET", "/api/health", &[], "").json()["worm"], "absent");
         let virtual_worm = worm.virtual_worm(&["--allow-faults"]);
         let estimator = worm.wormd(&["estimate"]).start();
         let port = worm.port();
         let controller = worm.wormd(&["control", "--port", &port]).start();
         let watched = Self {
-            dashboard,
+            _dashboard: dashboard,
             address,
             controller,
             _estimator: estimator,
@@ -97,13 +118,6 @@ impl Watched {
     fn arm(&self, client: &str) {
         assert_eq!(self.post("arm", &[BEARER, client]).status, 200);
         self.wait_for_mode("armed");
-    }
-}
-
-impl Drop for Watched {
-    fn drop(&mut self) {
-        let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.dashboard.id() as i32), Signal::SIGTERM);
-        let _ = self.dashboard.wait();
     }
 }
 
@@ -444,144 +458,16 @@ fn on_a_phone_a_stall_is_shown_with_what_to_do() {
     );
 }
 
-/// A worm in a folder of its own for all worms, at rest.
-struct Neighbour {
-    config: String,
-    controller: Process,
-    _estimator: Process,
-    _virtual_worm: Process,
-    worm: Worm,
-}
-
-impl Neighbour {
-    fn start(name: &str, root: &std::path::Path) -> Self {
-        let worm = Worm::on_a_steady_computer(name);
-        // Slow enough for two worms and a browser on a busy computer.
-        let text = format!("[control]\nrate_hz = 100.0\n[topics]\nroot = \"{}\"\n", root.display());
-        let config = worm.config(&text);
-        let port = worm.port();
-        let virtual_worm = worm
-            .plain_wormd(&["virtual-worm", "--config", &config, "--link", &port])
-            .start();
-        let estimator = worm.wormd(&["estimate", "--config", &config]).start();
-        let controller = worm.wormd(&["control", "--config", &config, "--port", &port]).start();
-        Self {
-            config,
-            controller,
-            _estimator: estimator,
-            _virtual_worm: virtual_worm,
-            worm,
-        }
-    }
-
-    /// Tries to make it crawl, whatever has stopped it on a busy computer.
-    fn try_to_crawl(&self) {
-        for arguments in [&["reset"][..], &["arm"], &["crawl", "--for", "100"]] {
-            let arguments = [&["command"], arguments, &["--config", &self.config]].concat();
-            // A reset that is not needed is refused.
-            let _ = self.worm.wormd(&arguments).output();
-        }
-    }
-}
-
-/// A dashboard that ends with the test, however that ends.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), Signal::SIGTERM);
-        let _ = self.0.wait();
-    }
-}
-
-#[test]
-fn all_worms_are_on_one_page_and_one_button_holds_them() {
-    // One button that holds all worms of a computer must not reach those of other tests.
-    let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
-    let (one, two) = (
-        Neighbour::start("d-one", root.path()),
-        Neighbour::start("d-two", root.path()),
-    );
-    let dashboard = one
-        .worm
-        .wormd(&["dashboard", "--listen", "127.0.0.1:0", "--config", &one.config])
-        .into_command()
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the binary starts");
-    let mut dashboard = Ended(dashboard);
-    let mut line = String::new();
-    BufReader::new(dashboard.0.stdout.take().expect("is piped"))
-        .read_line(&mut line)
-        .expect("it says where it is");
-    let (_, url) = line.split_once("http://").expect("an address");
-    let address: SocketAddr = url.trim().trim_end_matches('/').parse().expect("an address");
-    let worms = || request(address, "GET", "/api/fleet", &[], "").json()["worms"].clone();
-    let is_in = |mode: &str| {
-        let worms = worms();
-        let worms = worms.as_array().expect("a list");
-        worms.len() == 2 && worms.iter().all(|worm| worm["mode"] == mode)
-    };
-    let crawl = || {
-        wait_for("both crawl", PATIENCE, || {
-            [&one, &two].iter().for_each(|worm| worm.try_to_crawl());
-            is_in("crawling")
-        });
-    };
-    crawl();
-    let held = request(address, "POST", "/api/fleet/hold", &["User-Agent: curl/8"], "");
-    assert_eq!(held.status, 200, "{held:?}");
-    for held in held.json()["worms"].as_array().expect("a list") {
-        assert_eq!(held["verdict"], "accepted", "{held}");
-    }
-    wait_for("both hold", PATIENCE, || is_in("holding"));
-    let stranger = request(address, "POST", "/api/fleet/hold", &["Origin: http://evil.example"], "");
-    assert_eq!(stranger.status, 403);
-
-    if let Some(browser) = Browser::start(500, 844) {
-        let phone = json!({"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": true});
-        browser.control("Emulation.setDeviceMetricsOverride", phone);
-        crawl();
-        browser.open(&format!("http://{address}/fleet"));
-        browser.wait_for("document.querySelectorAll('.card:not(.stale) [data-mode=crawling]').length === 2");
-        assert_eq!(browser.run("return document.documentElement.scrollWidth"), 390);
-        assert!(is_in("crawling"), "loading commands nothing");
-        browser.run("document.getElementById('hold').click()");
-        wait_for("both hold", PATIENCE, || is_in("holding"));
-        browser.wait_for("/hold accepted by 2 of 2/.test(document.getElementById('message').textContent)");
-        one.controller.signal(Signal::SIGSTOP);
-        let card = format!(".card[data-worm={}]", one.worm.name());
-        browser.wait_for(&format!("document.querySelector('{card}').classList.contains('stale')"));
-        browser.wait_for("/1 silent/.test(document.getElementById('summary').textContent)");
-        one.controller.signal(Signal::SIGCONT);
-        browser.wait_for(&format!(
-            "!document.querySelector('{card}').classList.contains('stale')"
-        ));
-    }
-}
-
 #[test]
 fn who_reads_only_the_first_line_of_its_output_does_not_end_it() {
     let worm = Worm::on_a_steady_computer("d-line");
-    let mut dashboard = worm
-        .wormd(&["dashboard", "--listen", "127.0.0.1:0"])
-        .into_command()
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the binary starts");
-    let mut line = String::new();
-    BufReader::new(dashboard.stdout.take().expect("is piped"))
-        .read_line(&mut line)
-        .expect("it says where it is");
-    let (_, url) = line.split_once("http://").expect("an address");
-    let address: SocketAddr = url.trim().trim_end_matches('/').parse().expect("an address");
+    let (mut dashboard, address) = start(worm.wormd(&["dashboard", "--listen", "127.0.0.1:0"]).into_command());
     assert_eq!(
         request(address, "POST", "/api/command/crawl", &[], "").status,
         401,
         "a token was made"
     );
-    let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(dashboard.id() as i32), Signal::SIGTERM);
-    assert_eq!(dashboard.wait().expect("ends").code(), Some(0), "it ends in order");
+    assert_eq!(dashboard.end(), Some(0), "it ends in order");
 }
 
 #[test]
@@ -600,6 +486,7 @@ fn what_cannot_be_used_ends_with_exit_status_2() {
         (vec!["--token-file", "/nonexistent/token"], "/nonexistent/token"),
         (vec!["--token-file", &short], "a token has 16 to 256"),
         (vec!["--reports", "/nonexistent/reports"], "/nonexistent/reports"),
+        (vec!["--black-box", "/nonexistent/boxes"], "/nonexistent/boxes"),
     ] {
         let output = worm.wormd(&[&["dashboard"], arguments.as_slice()].concat()).output();
         let said = String::from_utf8_lossy(&output.stderr);

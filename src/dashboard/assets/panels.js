@@ -249,7 +249,7 @@ export function drawInferred({ frame }) {
     ["advance", known(inferred.advance_m * 1e3, inferred.advance_sigma_m * 1e3, 2, "mm a cycle")],
     ["losses", known(inferred.energy_loss_j * 1e3, inferred.energy_loss_sigma_j * 1e3, 1, "mJ a cycle")],
     ["pull", known(inferred.pull_n, inferred.pull_sigma_n, 2, "N")],
-    ["position", known(position_m * 1e3, inferred.position_sigma_m * 1e3, 0, "mm")],
+    ["position", known(position_m * 1e3, inferred.position_sigma_m * 1e3, inferred.position_sigma_m < 1e-3 ? 1 : 0, "mm")],
     ...inferred.friction_n.map((friction, cell) => [
       `friction ${cell + 1}`,
       known(friction, inferred.friction_sigma_n[cell], 2, "N"),

@@ -36,7 +36,6 @@ struct WaitingMark {
 #[derive(Debug, Clone)]
 pub struct Inference {
     sensing: SelfSensing,
-    noise_m: f64,
     uses_positions: bool,
     first_sequence: Option<u64>,
     last: Option<(u64, f64)>,   // sequence and phase of the last state
@@ -61,7 +60,6 @@ impl Inference {
         inferred.standing = InferredStanding::WarmingUp.code();
         Ok(Self {
             sensing: SelfSensing::new(&worm, &config.self_sensing()),
-            noise_m: TRACKER_SIGMA_M,
             uses_positions: true,
             first_sequence: None,
             last: None,
@@ -143,13 +141,11 @@ impl Inference {
         if !is_new {
             return None;
         }
-        let reckoned = self.sensing.reckoned();
+        self.fill_place();
         let inferred = &mut self.inferred;
         inferred.sequence = self.made;
         inferred.time_ns = state.time_ns;
         inferred.state_sequence = state.sequence;
-        inferred.position_m = reckoned.position_m;
-        inferred.position_sigma_m = reckoned.sigma_m;
         inferred.phase = phase;
         inferred.marks = self.marks;
         inferred.tracker_marks = self.tracker_marks;
@@ -161,9 +157,13 @@ impl Inference {
     pub fn finish(&mut self) -> Option<&Inferred> {
         let sensed = self.sensing.finish()?;
         fill(&mut self.inferred, sensed);
+        self.fill_place();
+        Some(&self.inferred)
+    }
+
+    fn fill_place(&mut self) {
         let reckoned = self.sensing.reckoned();
         (self.inferred.position_m, self.inferred.position_sigma_m) = (reckoned.position_m, reckoned.sigma_m);
-        Some(&self.inferred)
     }
 
     /// The newest message.
@@ -186,12 +186,13 @@ impl Inference {
             }
         }
         let Some((time_ns, mean_m)) = self.sample else { return };
+        let mark = Mark {
+            position_m: mean_m,
+            sigma_m: TRACKER_SIGMA_M,
+        };
         if !self.is_placed {
             self.is_placed = true;
-            self.sensing.place(&Mark {
-                position_m: mean_m,
-                sigma_m: self.noise_m,
-            });
+            self.sensing.place(&mark);
             return;
         }
         let ends_cycle = self
@@ -200,10 +201,7 @@ impl Inference {
         let age_s = state.time_ns.saturating_sub(time_ns) as f64 * 1e-9;
         if ends_cycle && age_s < FRESH_S {
             self.tracker_marks = self.tracker_marks.saturating_add(1);
-            self.sensing.mark(&Mark {
-                position_m: mean_m,
-                sigma_m: self.noise_m,
-            });
+            self.sensing.mark(&mark);
         }
     }
 

@@ -189,6 +189,18 @@ impl Fit {
         self.cycles / (1.0 + self.cycles * self.misfit)
     }
 
+    /// A = W M + Λ, its lower triangle, into the first scratch matrix.
+    fn fill_information(&mut self) {
+        let weight = self.weight();
+        let information = &mut self.scratch[0];
+        for column in 0..self.unknowns {
+            for row in column..self.unknowns {
+                information[(row, column)] = weight * self.single[(row, column)];
+            }
+            information[(column, column)] += self.prior_information[column];
+        }
+    }
+
     fn bin_weight(bin: usize) -> f64 {
         let of_step = bin % BINS_PER_STEP;
         match FIRST_BIN_WEIGHTS.get(of_step) {
@@ -356,4 +368,12 @@ fn rise(bins: &[f64], at: usize) -> f64 {
         at + usize::from(of_step + 1 < BINS_PER_STEP),
     );
     (bins[to] - bins[from]) / (to - from) as f64
+}
+
+/// Parameters of which an unknown of the worm is moved up, or the second time down, for its derivative; and by how much.
+fn moved(at: &Parameters, unknown: usize, is_second: bool) -> (Parameters, f64) {
+    let step = STEPS[(unknown / at.cells).min(2)];
+    let mut moved = *at;
+    moved.values[unknown] += if is_second { -step } else { step };
+    (moved, step)
 }

@@ -29,6 +29,8 @@ mod leading;
 mod model;
 mod parameters;
 mod profile;
+mod sample;
+mod sensed;
 pub mod twins;
 
 pub use change::{Armed, Changes};
@@ -36,9 +38,10 @@ pub use dead_reckoning::{Mark, Reckoned};
 pub use gear::{CurrentSource, GearModel, Ripple};
 pub use model::CycleFigures;
 pub use profile::{BINS_PER_STEP, MAX_BINS};
+pub use sample::MotorSample;
+pub use sensed::{SelfSensed, Standing};
 pub use twins::{Blind, Twin, Unknown};
 
-use crate::message::State;
 use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
 use fit::Fit;
@@ -94,106 +97,6 @@ impl SelfSensingConfig {
             evaluations_per_reading: 1,
         }
     }
-}
-
-/// A reading of the motor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotorSample {
-    /// When it was taken, s, by any clock that runs evenly.
-    pub time_s: f64,
-    /// Gait phase, cycles, unwrapped.
-    pub phase: f64,
-    /// Angle of the servo's shaft, rad: what ripple returns with.
-    pub angle_rad: f64,
-    /// Velocity of the cam, rad/s.
-    pub velocity_rad_per_s: f64,
-    /// Reported current, A.
-    pub current_a: f64,
-    /// Voltage on the bus, V.
-    pub bus_voltage_v: f64,
-    /// Duty of the bridge, −1 to 1.
-    pub duty: f64,
-    /// Temperature of the servo, °C; `NaN` where unknown.
-    pub temperature_c: f64,
-    /// By which its taker knows it again, ns: [`SelfSensed::end_ns`] is that of the reading that ended the cycle.
-    pub stamp_ns: u64,
-}
-
-impl From<&State> for MotorSample {
-    /// The motor's part of a state; its time is that of the motor's own clock.
-    fn from(state: &State) -> Self {
-        Self {
-            time_s: state.motor_time_s,
-            phase: state.phase,
-            angle_rad: state.motor_angle_rad,
-            velocity_rad_per_s: state.motor_velocity_rad_s,
-            current_a: state.motor_current_a,
-            bus_voltage_v: state.bus_voltage_v,
-            duty: state.motor_duty,
-            temperature_c: state.motor_temperature_c,
-            stamp_ns: state.time_ns,
-        }
-    }
-}
-
-/// What the current says after a cycle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SelfSensed {
-    /// Number of cells.
-    pub cells: usize,
-    /// [`MotorSample::stamp_ns`] of the reading that ended the newest cycle.
-    pub end_ns: u64,
-    /// Gait phase at its end, cycles.
-    pub end_phase: f64,
-    /// How the newest cycle was taken.
-    pub standing: Standing,
-    /// Cycles that were fitted together, forgotten ones counted less.
-    pub cycles: f64,
-    /// Friction force k·δmax of each cell, N.
-    pub friction_n: [f64; MAX_CELLS],
-    /// Its standard error, N.
-    pub friction_sigma_n: [f64; MAX_CELLS],
-    /// Stiffness of each cell, N/m.
-    pub stiffness_n_per_m: [f64; MAX_CELLS],
-    /// Its standard error, N/m.
-    pub stiffness_sigma_n_per_m: [f64; MAX_CELLS],
-    /// Pull on the body down the canal, N: weight and constant drag together.
-    pub pull_n: f64,
-    /// Its standard error, N.
-    pub pull_sigma_n: f64,
-    /// The slope, if all the pull is the stated mass's weight, rad.
-    pub slope_rad: f64,
-    /// Its standard error, rad.
-    pub slope_sigma_rad: f64,
-    /// Figures of the cycle by the model.
-    pub figures: CycleFigures,
-    /// Their standard errors.
-    pub figures_sigma: CycleFigures,
-    /// Electrical energy of the last cycle, measured, J.
-    pub electrical_j: f64,
-    /// Its standard error, J.
-    pub electrical_sigma_j: f64,
-    /// Root mean square of what the model leaves unexplained in the mean profile, N m at the cam.
-    pub residual_n_m: f64,
-    /// What the current cannot tell.
-    pub blind: Blind,
-    /// What differs from the usual.
-    pub changes: Changes,
-    /// What could be seen to differ.
-    pub armed: Armed,
-}
-
-/// How the newest cycle was taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
-    /// Fitted; but of so few cycles the intervals may be too narrow, and no change can be seen yet.
-    WarmingUp,
-    /// Fitted with those before.
-    Fitted,
-    /// Set aside: it is not like those before, and the next one will show whether that was an accident.
-    Odd,
-    /// Fitted: the worm is another than it was, and [`SelfSensed::changes`] says in what.
-    Changed,
 }
 
 /// Senses a worm by its motor's current.

@@ -79,14 +79,10 @@ impl Descent {
         if tried == 0 {
             self.gradient = fit.gradient(&self.at);
         }
+        fit.fill_information();
         let factor = &mut fit.scratch[0];
-        let weight = fit.cycles / (1.0 + fit.cycles * fit.misfit);
-        for column in 0..fit.unknowns {
-            for row in column..fit.unknowns {
-                factor[(row, column)] = weight * fit.single[(row, column)];
-            }
-            factor[(column, column)] += fit.prior_information[column];
-            factor[(column, column)] *= 1.0 + self.damping;
+        for unknown in 0..fit.unknowns {
+            factor[(unknown, unknown)] *= 1.0 + self.damping;
         }
         if !leading::cholesky(factor, fit.unknowns) {
             return true;

@@ -2,7 +2,7 @@
 
 use super::super::parameters::{MAX_UNKNOWNS, Parameters};
 use super::super::profile::MAX_BINS;
-use super::{Fit, STEPS, rise};
+use super::{Fit, moved, rise};
 
 /// How far a linearisation has come.
 #[derive(Debug, Clone)]
@@ -74,9 +74,7 @@ impl Fit {
 
     fn linearise_worm(&mut self, at: &Parameters, unknown: usize, is_second: bool) -> Linearised {
         let bins = self.bins;
-        let step = STEPS[(unknown / at.cells).min(2)];
-        let mut moved = *at;
-        moved.values[unknown] += if is_second { -step } else { step };
+        let (moved, step) = moved(at, unknown, is_second);
         let Linearisation {
             plain, other, width, ..
         } = &mut self.linearisation;

@@ -12,7 +12,7 @@
 
 use super::super::leading;
 use super::super::model::{CycleFigures, FIGURES};
-use super::{FLOOR_N_M, Fit, STEPS};
+use super::{FLOOR_N_M, Fit, moved};
 use worm_physics::MAX_CELLS;
 
 /// Gait-to-gait scatter of a cell's friction that is assumed before it is measured, as a share.
@@ -98,14 +98,9 @@ impl Fit {
     }
 
     fn invert_information(&mut self) -> bool {
-        let (weight, size) = (self.weight(), self.unknowns);
+        self.fill_information();
+        let size = self.unknowns;
         let [factor, inverse] = &mut *self.scratch;
-        for column in 0..size {
-            for row in column..size {
-                factor[(row, column)] = weight * self.single[(row, column)];
-            }
-            factor[(column, column)] += self.prior_information[column];
-        }
         let is_definite = leading::cholesky(factor, size);
         if is_definite {
             leading::inverse(factor, size, inverse);
@@ -201,9 +196,7 @@ impl FigureDerivatives {
     }
 
     fn differentiate(&mut self, fit: &mut Fit, unknown: usize, is_second: bool) {
-        let step = STEPS[(unknown / fit.at.cells).min(2)];
-        let mut moved = fit.at;
-        moved.values[unknown] += if is_second { -step } else { step };
+        let (moved, step) = moved(&fit.at, unknown, is_second);
         let figures = fit.model.figures(&moved, false).unwrap_or(self.centre).flat();
         if !is_second {
             self.up = figures;
