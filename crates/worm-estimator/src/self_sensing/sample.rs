@@ -21,7 +21,7 @@ pub struct MotorSample {
     pub duty: f64,
     /// Temperature of the servo, °C; `NaN` where unknown.
     pub temperature_c: f64,
-    /// By which its taker knows it again, ns: [`SelfSensed::end_ns`] is that of the reading that ended the cycle.
+    /// By which its taker knows it again, ns: [`SelfSensed::end_ns`](super::SelfSensed::end_ns) is that of the reading that ended the cycle.
     pub stamp_ns: u64,
 }
 

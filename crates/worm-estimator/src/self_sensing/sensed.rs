@@ -8,7 +8,7 @@ use worm_physics::MAX_CELLS;
 pub struct SelfSensed {
     /// Number of cells.
     pub cells: usize,
-    /// [`MotorSample::stamp_ns`] of the reading that ended the newest cycle.
+    /// [`MotorSample::stamp_ns`](super::MotorSample::stamp_ns) of the reading that ended the newest cycle.
     pub end_ns: u64,
     /// Gait phase at its end, cycles.
     pub end_phase: f64,
