@@ -77,6 +77,8 @@ pub struct Controller {
     hold_angle_rad: Option<f64>,
     /// Since when a hold commands the cam to stand.
     at_rest_since_ns: Option<u64>,
+    /// Since when the cam of a hold that keeps no angle yet has been at rest.
+    resting_since_ns: Option<u64>,
     back_off: Option<BackOff>,
     crawl_limit: CrawlLimit,
     /// Since when torque is on and no motion is commanded.
@@ -127,6 +129,7 @@ impl Controller {
             hold_reason: HoldReason::None,
             hold_angle_rad: None,
             at_rest_since_ns: None,
+            resting_since_ns: None,
             back_off: None,
             crawl_limit: CrawlLimit::NONE,
             idle_since_ns: None,
@@ -232,6 +235,7 @@ impl Controller {
         self.hold_reason = HoldReason::None;
         self.hold_angle_rad = None;
         self.at_rest_since_ns = None;
+        self.resting_since_ns = None;
         self.back_off = None;
     }
 

@@ -9,6 +9,10 @@ use worm_estimator::message::{HoldReason, Mode};
 /// Cam velocity below which the motor counts as standing still, rad/s: two counts.
 const STANDSTILL_RAD_S: f64 = 2.0 * RAD_S_PER_COUNT;
 
+/// How long the cam must have been at rest before a hold keeps its angle, ns. A servo that brakes hard turns back a little, and is slow for
+/// a few milliseconds between: an angle from there would have to be corrected.
+const STANDSTILL_NS: u64 = 20_000_000;
+
 /// Longest wait for the cam to stand still before torque goes off, or before a hold keeps the angle that it has, ns.
 const STANDSTILL_TIMEOUT_NS: u64 = 500_000_000;
 
@@ -98,7 +102,12 @@ impl Controller {
             self.ramp.aim(0.0);
             let velocity_rad_s = self.ramp.advance(dt_s);
             if self.has_come_to_rest(now_ns) {
-                self.hold_angle_rad = Some(angle_rad);
+                let since_ns = *self.resting_since_ns.get_or_insert(now_ns);
+                if now_ns.saturating_sub(since_ns) >= STANDSTILL_NS {
+                    self.hold_angle_rad = Some(angle_rad);
+                }
+            } else {
+                self.resting_since_ns = None;
             }
             return velocity_rad_s;
         };
