@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `a` | four busy loops at normal priority |
 //! | `b` | its three processes are suspended together for 20 to 300 ms, about once a second |
-//! | `c` | one of the three is suspended for 20 to 80 ms, about once a second |
+//! | `c` | one of the three is suspended for 20 to 60 ms, about once a second |
 //! | `d` | all of that |
 //!
 //! A run is good when it ends without fault or alarm, loses no sample, and each settled cycle's energies are within 3 % of those
@@ -101,8 +101,8 @@ struct Run {
 fn run(arguments: &Arguments, scenario: Option<char>, number: u32) -> Run {
     let kinds = match scenario {
         Some('b') => vec![Pause::Together(20..300)],
-        Some('c') => vec![Pause::OneOf(20..80)],
-        Some('d') => vec![Pause::Together(20..300), Pause::OneOf(20..80)],
+        Some('c') => vec![Pause::OneOf(20..60)],
+        Some('d') => vec![Pause::Together(20..300), Pause::OneOf(20..60)],
         _ => Vec::new(),
     };
     let _load = matches!(scenario, Some('a' | 'd')).then(|| Load::start(BUSY_LOOPS));

@@ -1,13 +1,16 @@
 //! `wormd analyze`: section 3 of the paper on a recording, or on a campaign of several.
 
-use super::dataset::{READING, SourceArgs};
+use super::dataset::{READING, SourceArgs, has_extension};
 use super::progress::Progress;
 use super::{Failure, log_line, print};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use worm_analysis::experiment::{Analysis, analyze};
+use worm_analysis::experiment::{Analysis, TorqueProfile, analyze};
 use worm_analysis::report;
+use worm_estimator::config::Config;
+use worm_estimator::estimate::Inference;
+use worm_log::{Channel, scan};
 
 /// Arguments of `wormd analyze`.
 #[derive(Debug, Args)]
@@ -36,10 +39,16 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Failure> {
     if let Some(dir) = &args.out {
         report::prepare(dir).map_err(Failure::unusable)?;
     }
-    let analyses = analyze(&dataset.runs(), &dataset.config, &mut |step| {
+    let mut analyses = analyze(&dataset.runs(), &dataset.config, &mut |step| {
         progress.tell(step.stage, READING + (1.0 - READING) * step.fraction);
     })
     .map_err(Failure::unusable)?;
+    for analysis in &mut analyses {
+        let recording = Path::new(&analysis.recording);
+        if has_extension(recording, "mcap") {
+            analysis.torque_profile = torque_profile(recording, &dataset.config)?;
+        }
+    }
     let written = args.out.as_deref().map(|dir| {
         progress.tell("report", 1.0);
         let name = args
@@ -60,6 +69,20 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Failure> {
         return print::line(as_json(&args.recording, &analyses, dataset.is_campaign)?);
     }
     print::line(report::text(&analyses))
+}
+
+/// What the motor's current in a log says; none where the log has no whole gait cycle with it.
+fn torque_profile(log: &Path, config: &Config) -> Result<Option<TorqueProfile>, Failure> {
+    let mut inference = Inference::by_current_alone(config).map_err(Failure::unusable)?;
+    scan(log, |channel, payload| {
+        if channel == Channel::State {
+            inference.update(&payload.read()?);
+        }
+        Ok(())
+    })
+    .map_err(Failure::unusable)?;
+    inference.finish();
+    Ok(TorqueProfile::of(inference.sensing()))
 }
 
 /// All warnings, each once: with its recording, unless all recordings share it.

@@ -237,7 +237,8 @@ fn stored_config(recording: &Path) -> Result<(Config, Option<String>), Failure> 
     Ok((log.config()?, log.config))
 }
 
-fn has_extension(path: &Path, wanted: &str) -> bool {
+/// Whether a file's name ends like that, in any case.
+pub(super) fn has_extension(path: &Path, wanted: &str) -> bool {
     path.extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case(wanted))
 }

@@ -357,7 +357,7 @@ pub const ROWS: &[Row] = &[
     ),
     row(
         "controller paused",
-        |rng, _| Cause::Pause(Paused::Controller, rng.random_range(20..80)),
+        |rng, _| Cause::Pause(Paused::Controller, rng.random_range(20..60)),
         Lasts::Seconds(1.0, 2.0),
         None,
         &[],

@@ -383,8 +383,8 @@ impl Invariants {
         ((offset - known).abs() > tolerance).then(|| Broken {
             rule: "the phase is continuous",
             text: format!(
-                "published {:.4}, true {:.4}, {known:.4} apart before",
-                state.phase, truth.phase
+                "published {:.4}, true {:.4}, {known:.4} apart before; the cam turns with {:.3} rad/s, the answer is {age_s:.4} s old",
+                state.phase, truth.phase, truth.velocity_rad_s
             ),
         })
     }

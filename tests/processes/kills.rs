@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use worm_estimator::config::Config;
+use worm_estimator::config::{Config, Realtime};
 use wormd::link::virtual_worm::{Options, VirtualWorm};
 
 const KILLS: usize = 12;
@@ -26,33 +26,86 @@ const WATCHED_S: f64 = 0.6;
 const COUNT_RAD_S: f64 = 0.229 * std::f64::consts::TAU / 60.0;
 /// A hold corrects its angle with no more than this, counts.
 const CORRECTION: f64 = 2.0;
+/// Loaded pads push a cam without torque no faster than this, counts: 2.3 rev/min.
+const PUSHED: f64 = 10.0;
 
-/// What the servo measured: its clock, s, and its speed, counts.
+/// What the servo measured.
+struct Sample {
+    /// Its clock, s.
+    time_s: f64,
+    /// Its speed, counts.
+    speed: f64,
+    has_torque: bool,
+}
+
+impl Sample {
+    /// Whether the motor turns the cam, rather than the loaded pads.
+    fn turns(&self) -> bool {
+        self.speed > if self.has_torque { CORRECTION } else { PUSHED }
+    }
+}
+
 #[derive(Default)]
 struct Servo {
-    measured: Vec<(f64, f64)>,
+    measured: Vec<Sample>,
 }
 
 impl Servo {
     fn now_s(&self) -> f64 {
-        self.measured.last().map_or(0.0, |(time_s, _)| *time_s)
+        self.measured.last().map_or(0.0, |sample| sample.time_s)
     }
 
     fn speed(&self) -> f64 {
-        self.measured.last().map_or(0.0, |(_, speed)| *speed)
+        self.measured.last().map_or(0.0, |sample| sample.speed)
+    }
+
+    fn since(&self, time_s: f64) -> impl DoubleEndedIterator<Item = &Sample> {
+        self.measured.iter().filter(move |sample| sample.time_s >= time_s)
     }
 
     /// How long after `death_s` the motor first stood, and how long after it last turned, s.
     fn stopped_after(&self, death_s: f64) -> (f64, f64) {
-        let after = || self.measured.iter().filter(|(time_s, _)| *time_s >= death_s);
-        let first_stood = after()
-            .find(|(_, speed)| *speed == 0.0)
-            .map_or(f64::INFINITY, |(time_s, _)| time_s - death_s);
-        let last_turned = after()
-            .rfind(|(_, speed)| *speed > CORRECTION)
-            .map_or(0.0, |(time_s, _)| time_s - death_s);
+        let first_stood = self
+            .since(death_s)
+            .find(|sample| sample.speed == 0.0 || !sample.has_torque && !sample.turns())
+            .map_or(f64::INFINITY, |sample| sample.time_s - death_s);
+        let last_turned = self
+            .since(death_s)
+            .rfind(|sample| sample.turns())
+            .map_or(0.0, |sample| sample.time_s - death_s);
         (first_stood, last_turned)
     }
+
+    /// What it measured every ten milliseconds: ms after the death, counts, and a dash where it has no torque.
+    fn in_words(&self, death_s: f64) -> String {
+        let mut due_ms = 0.0;
+        let mut words = String::new();
+        for sample in self.since(death_s) {
+            let since_ms = 1e3 * (sample.time_s - death_s);
+            if since_ms >= due_ms {
+                let torque = if sample.has_torque { "" } else { "-" };
+                words += &format!(" {since_ms:.0}:{:.0}{torque}", sample.speed);
+                due_ms = since_ms + 10.0;
+            }
+        }
+        words
+    }
+}
+
+/// Kills a process, and returns the time by a clock at which it was last alive. A thread of real time looks, so that a busy computer does
+/// not blame the motor for its own delay; and a killed process may take a while to be run once more, to die.
+fn kill_and_see_it_die(pid: Pid, realtime: &Realtime, now_s: impl Fn() -> f64 + Send) -> f64 {
+    let watch = move || {
+        wormd::realtime::request(realtime, 20);
+        kill(pid, Signal::SIGKILL).expect("is alive");
+        let mut last_alive_s = now_s();
+        while is_alive(pid) {
+            last_alive_s = now_s();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        last_alive_s
+    };
+    std::thread::scope(|scope| scope.spawn(watch).join().expect("it does not panic"))
 }
 
 /// Whom to kill, and whether it holds the lease or runs the loop.
@@ -96,14 +149,19 @@ fn the_motor_stands_soon_after_any_kill() {
     let mut config = Config::default();
     // A motor that is still warm from the last round is no fault.
     config.virtual_worm.ambient_c = 20.0;
-    let mut wanted = Some(config.realtime.clone());
+    let realtime = config.realtime.clone();
+    let mut wanted = Some(realtime.clone());
     let devices = VirtualWorm::spawn_observed(&config, &Options::default(), move |devices, now_s| {
         if let Some(wanted) = wanted.take() {
             // As `wormd virtual-worm` does: a servo answers however busy the computer is.
             wormd::realtime::request(&wanted, 10);
         }
         let speed = (devices.plant().motor().velocity_rad_per_s().abs() / COUNT_RAD_S).round();
-        there.lock().expect("no holder panics").measured.push((now_s, speed));
+        there.lock().expect("no holder panics").measured.push(Sample {
+            time_s: now_s,
+            speed,
+            has_torque: devices.plant().torque_is_on(),
+        });
     })
     .expect("a virtual worm");
     let port = devices.path().to_string_lossy().into_owned();
@@ -152,15 +210,9 @@ fn the_motor_stands_soon_after_any_kill() {
         {
             let mut servo = servo();
             let now_s = servo.now_s();
-            servo.measured.retain(|(time_s, _)| *time_s >= now_s);
+            servo.measured.retain(|sample| sample.time_s >= now_s);
         }
-        kill(pid, Signal::SIGKILL).expect("is alive");
-        // On a busy computer a killed process may take a while to be run once more, to die.
-        let mut death_s = servo().now_s();
-        while is_alive(pid) {
-            death_s = servo().now_s();
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        let death_s = kill_and_see_it_die(pid, &realtime, || servo().now_s());
         wait_for("the servo's clock goes on", Duration::from_secs(60), || {
             servo().now_s() > death_s + if holds_it { WATCHED_S } else { 2.0 }
         });
@@ -168,7 +220,8 @@ fn the_motor_stands_soon_after_any_kill() {
         let bound_s = if holds_it { BOUND_S } else { UNATTENDED_BOUND_S };
         assert!(
             first_stood.max(last_turned) <= bound_s,
-            "round {round}, {victim} killed, terminal stalled: {is_stalled}: stood after {first_stood:.3} s, turned until {last_turned:.3} s"
+            "round {round}, {victim} killed, terminal stalled: {is_stalled}: stood after {first_stood:.3} s, turned until {last_turned:.3} s; {}",
+            servo().in_words(death_s)
         );
         delays.push((victim, first_stood.max(last_turned)));
         // Killed, or because another process has ended.

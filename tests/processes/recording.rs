@@ -2,8 +2,10 @@
 
 use super::worm::{Worm, wait_for};
 use super::{Crawling, PATIENCE};
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use worm_analysis::recording::mcap::read;
+use worm_estimator::config::Config;
 use worm_estimator::message::{CommandKind, CommandOutcome};
 use worm_log::messages;
 
@@ -83,6 +85,26 @@ fn the_main_job_records_what_replays_to_the_same_results() {
     }
     let recording = read(&path).expect("a recording");
     assert!(recording.cells() == 4 && recording.samples() > 400, "{recording:?}");
+
+    let output = worm.wormd(&["analyze", &file, "--slope", "0", "--json"]).output();
+    let analysis: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let of_steps = |name: &str| -> Vec<f64> {
+        let profile = serde_json::from_value::<Vec<f64>>(analysis["torque_profile"][name].clone());
+        // The end of each step, where the tip of the cell slides forward and the torque is that of its friction.
+        profile.expect("a profile").chunks(32).map(|step| step[28]).collect()
+    };
+    let physical = worm_physics::Worm::try_from(&Config::default()).expect("the default worm");
+    let contact = physical.contact(0);
+    let friction_n = contact.stiffness_n_per_m * contact.forward_bound_m;
+    let expected_n_m = friction_n * 4.0 * physical.stroke_m() / TAU;
+    for name in ["measured_n_m", "model_n_m"] {
+        for torque_n_m in of_steps(name) {
+            assert!(
+                (torque_n_m / expected_n_m - 1.0).abs() < 0.1,
+                "{name}: {torque_n_m} instead of {expected_n_m} N m"
+            );
+        }
+    }
 }
 
 #[test]

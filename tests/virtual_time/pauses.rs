@@ -34,7 +34,7 @@ fn crawl_with_pauses(seed: u64, who: &[(Paused, std::ops::Range<u64>)]) -> Sessi
 #[test]
 fn pauses_cost_no_cycle_its_energies_and_raise_nothing() {
     let whole = (Paused::Computer, 20..300);
-    let parts = [Paused::Controller, Paused::Worm, Paused::Estimator].map(|part| (part, 20..80));
+    let parts = [Paused::Controller, Paused::Worm, Paused::Estimator].map(|part| (part, 20..60));
     let all = [&[whole.clone()][..], &parts].concat();
     let table = [
         ("the whole computer", &[whole][..]),

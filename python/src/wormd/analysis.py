@@ -110,6 +110,22 @@ class PaperSearch(Result):
 
 
 @dataclass(frozen=True)
+class TorqueProfile(Result):
+    """Torque at the cam over the phase of a gait cycle, in bins of equal width, beside the model's."""
+
+    phase: tuple[float, ...]
+    """Middle of each bin, as a fraction of the cycle."""
+    measured_n_m: tuple[float, ...]
+    """Mean torque after the gears' friction and the inertia, N m."""
+    model_n_m: tuple[float, ...]
+    """The same by the model of the worm that explains it best, N m."""
+    residual_n_m: float
+    """Root mean square of the difference, N m."""
+    cycles: float
+    """Cycles that the mean is over; older ones count less."""
+
+
+@dataclass(frozen=True)
 class Analysis(Result):
     """The result for one recording. Tuples over cells begin with cell 1."""
 
@@ -169,6 +185,8 @@ class Analysis(Result):
     """Limitations of these figures."""
     repairs: tuple[Repair, ...]
     """What was repaired in the recording."""
+    torque_profile: TorqueProfile | None = None
+    """Torque at the cam by the motor's current; None where the recording has no current."""
     report: Path | None = None
     """The page with figures, where a folder was given for it."""
 

@@ -1,5 +1,6 @@
 //! The result of an analysis. Its names in JSON are a contract.
 
+use super::TorqueProfile;
 use crate::recording::Repair;
 use serde::Serialize;
 
@@ -72,6 +73,9 @@ pub struct Analysis {
     pub warnings: Vec<String>,
     /// What was repaired in the recording, and what was noticed but left as it is.
     pub repairs: Vec<Repair>,
+    /// Torque at the cam by the motor's current, where the recording is a log that has it; [`analyze`](super::analyze) leaves it open.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_profile: Option<TorqueProfile>,
     /// The series behind the figures, sample by sample.
     #[serde(skip)]
     pub series: Series,

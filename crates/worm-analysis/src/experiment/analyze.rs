@@ -283,6 +283,7 @@ impl<'a> Prepared<'a> {
             cycles: balance.cycles,
             mean,
             std,
+            torque_profile: None,
             series: balance.series,
         })
     }

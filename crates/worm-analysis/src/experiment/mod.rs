@@ -12,6 +12,7 @@ mod analyze;
 mod energy_balance;
 mod error;
 mod simulate;
+mod torque;
 
 pub use analysis::{
     Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Series, Theory, TheoryCycle,
@@ -19,3 +20,4 @@ pub use analysis::{
 pub use analyze::{Progress, RecordedRun, analyze};
 pub use error::AnalysisError;
 pub use simulate::{Simulation, SimulationError, simulate};
+pub use torque::TorqueProfile;

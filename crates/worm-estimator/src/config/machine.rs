@@ -110,7 +110,7 @@ impl Default for Servo {
             current_limit_a: 1.0,
             velocity_limit_rev_per_min: 60.0,
             temperature_limit_c: 70,
-            watchdog_ms: 100,
+            watchdog_ms: 80,
             accept_unsafe_watchdog: false,
         }
     }

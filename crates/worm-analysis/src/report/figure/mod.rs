@@ -12,6 +12,7 @@ mod energy;
 mod positions;
 mod schematic;
 mod slides;
+mod torque;
 mod trend;
 mod window;
 
@@ -26,7 +27,7 @@ pub(super) use schematic::schematic;
 
 /// Every figure of a report, in reading order.
 pub(super) fn all(runs: Runs<'_>) -> Result<Vec<Figure>, DrawError> {
-    Ok(vec![
+    let mut figures = vec![
         positions::figure(runs)?,
         closeup::figure(runs)?,
         contacts::figure(runs)?,
@@ -34,8 +35,10 @@ pub(super) fn all(runs: Runs<'_>) -> Result<Vec<Figure>, DrawError> {
         balance::figure(runs)?,
         slides::figure(runs)?,
         energy::figure(runs)?,
-        trend::figure(runs)?,
-    ])
+    ];
+    figures.extend(torque::figure(runs)?);
+    figures.push(trend::figure(runs)?);
+    Ok(figures)
 }
 
 /// One panel for each run, drawn by `picture` from the run's name and analysis.
