@@ -158,7 +158,7 @@ impl Invariants {
             .or_else(|| self.torque(tick, truth))
             .or_else(|| self.hold(state, truth))
             .or_else(|| self.rest(tick, truth))
-            .or_else(|| self.phase(state, truth));
+            .or_else(|| self.phase(tick, truth));
         if state.mode != Mode::Fault.code() || self.last.is_some_and(|last| reason(&last) != reason(state)) {
             self.was_reset = false;
         }
@@ -361,7 +361,12 @@ impl Invariants {
     }
 
     /// The published phase is the true one, but for the whole cycles that the servo had forgotten before it was first heard.
-    fn phase(&mut self, state: &State, truth: &Truth) -> Option<Broken> {
+    fn phase(&mut self, tick: &Tick, truth: &Truth) -> Option<Broken> {
+        let state = &tick.state;
+        if tick.service.is_some() {
+            // A service takes some tenths of a second after the reading, and loaded tips may turn the cam meanwhile.
+            return None;
+        }
         if state.motor_is_new == 0 || truth.stood_ns != self.stood_ns {
             (self.answers, self.stood_ns) = (0, truth.stood_ns);
             return None;
