@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use dynamixel_bus::packet::{ReadSpan, StatusError};
 use wormd::link::servo::{self, register, scale};
-use wormd::link::{ExchangePlan, PortError, ReadFailure, ReadPlan, TransactionError, WormBus};
+use wormd::link::{ExchangePlan, PortError, ReadFailure, ReadPlan, TrackerQuery, TransactionError, WormBus};
 
 use super::worm::{SERVO, TRACKER, Worm, id};
 
@@ -14,10 +14,12 @@ const GOAL_RAD_S: f64 = 2.518;
 fn plan(read: ReadPlan) -> ExchangePlan {
     ExchangePlan {
         servo: id(SERVO),
-        tracker: id(TRACKER),
-        cells: CELLS,
+        tracker: Some(TrackerQuery {
+            id: id(TRACKER),
+            cells: CELLS,
+            emergency_stop_mask: None,
+        }),
         read,
-        emergency_stop_mask: None,
     }
 }
 

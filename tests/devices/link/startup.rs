@@ -3,7 +3,8 @@
 use dynamixel_bus::packet::DeviceId;
 use wormd::link::servo::register;
 use wormd::link::{
-    FaultInjector, Faults, Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError, WormBus,
+    FaultInjector, Faults, Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError,
+    TrackerSettings, WormBus,
     prepare, tracker,
 };
 
@@ -14,16 +15,19 @@ pub fn settings() -> LinkSettings {
         baud: 1_000_000,
         servo_id: id(SERVO),
         servo_model: 1200,
-        tracker_id: id(TRACKER),
-        tracker_model: tracker::MODEL,
-        cells: 5,
+        tracker: Some(TrackerSettings {
+            id: id(TRACKER),
+            model: tracker::MODEL,
+            cells: 5,
+            emergency_stop_mask: None,
+            may_be_silent: false,
+        }),
         read: ReadMode::Auto,
         watchdog_ms: 100,
         current_limit_a: 1.0,
         winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 10.0,
         temperature_limit_c: 70.0,
-        emergency_stop_mask: None,
         accept_unsafe_watchdog: false,
     }
 }
@@ -44,8 +48,12 @@ fn servo_from_the_factory_is_set_up() {
     let (prepared, findings) = prepare_worm(&mut worm, &settings());
     let prepared = prepared.expect("prepared");
     assert_eq!(
-        (prepared.plan.read, prepared.tracker_cells, prepared.servo.firmware),
-        (ReadPlan::FastBulk, 5, 52)
+        (
+            prepared.plan.read,
+            prepared.tracker.map(|tracker| tracker.cells),
+            prepared.servo.firmware
+        ),
+        (ReadPlan::FastBulk, Some(5), 52)
     );
     assert!((prepared.servo_reading.position_rad - std::f64::consts::TAU).abs() < 1e-9);
     assert_eq!(

@@ -8,7 +8,7 @@ use crate::message::{BlackBoxStatus, Cycle, Estimate, Range, RecordingStatus, St
 /// What one state gave.
 #[derive(Debug, Clone)]
 pub struct ObserverOutput {
-    /// The estimate, if the state carried a tracker sample.
+    /// The estimate, if the state carried a tracker sample, or one was due without.
     pub estimate: Option<Estimate>,
     /// The gait cycle that ended, if one did.
     pub cycle: Option<Cycle>,
@@ -62,7 +62,7 @@ impl Observer {
         let (estimate, cycle) = (update.estimate.copied(), update.cycle.copied());
         let observation = alarm::Observation {
             state,
-            estimate: estimate.as_ref(),
+            estimate: estimate.as_ref().filter(|_| state.sample_is_new == 1),
             cycle: cycle.as_ref(),
             residuals: Some(self.estimator.residual_map()),
         };
