@@ -129,7 +129,11 @@ fn check_alarms(config: &Config, report: &mut CheckReport) {
             })
             .collect::<Vec<_>>()
     };
-    for (coverage, words) in [("full", "watched"), ("partial", "watched in part"), ("off", "not watched")] {
+    for (coverage, words) in [
+        ("full", "watched"),
+        ("partial", "watched in part"),
+        ("off", "not watched"),
+    ] {
         let names = names(coverage);
         if !names.is_empty() {
             report.good("alarms", format!("{words}: {}", names.join(", ")));

@@ -7,7 +7,9 @@ use worm_estimator::config::Config;
 use worm_estimator::message::{Command, CommandKind};
 use worm_physics::MAX_CELLS;
 use wormd::control::{Controller, EstimateSeen, Inputs, Lease, Service, ServiceOutcome};
-use wormd::link::{ExchangePlan, Port, PortError, ReadPlan, ServoReading, TrackerQuery, TrackerReading, WormBus, servo, tracker};
+use wormd::link::{
+    ExchangePlan, Port, PortError, ReadPlan, ServoReading, TrackerQuery, TrackerReading, WormBus, servo, tracker,
+};
 
 const SERVO_READING: ServoReading = ServoReading {
     watchdog: 5,

@@ -5,8 +5,8 @@ use super::replaceable_port::ReplaceablePort;
 use crate::link::servo::scale;
 use crate::link::{
     ArmError, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, MotionTrial, OpenError,
-    OperationError, Prepared, ReadMode, ReadPlan, StartupError, StopInputs, TrackerSettings, TrialError, Tty, WatchdogTrial,
-    WormBus, arm, disarm, prepare,
+    OperationError, Prepared, ReadMode, ReadPlan, StartupError, StopInputs, TrackerSettings, TrialError, Tty,
+    WatchdogTrial, WormBus, arm, disarm, prepare,
 };
 use dynamixel_bus::packet::DeviceId;
 use std::f64::consts::TAU;

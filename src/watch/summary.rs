@@ -454,7 +454,10 @@ impl fmt::Display for Summary {
         }
         for coverage in &self.alarm_coverage {
             // What the user has not configured he does not miss.
-            if let Some(reason) = coverage.reason.filter(|_| coverage.alarm != AlarmKind::BatteryLow.name()) {
+            if let Some(reason) = coverage
+                .reason
+                .filter(|_| coverage.alarm != AlarmKind::BatteryLow.name())
+            {
                 writeln!(f, "{:<8} {}: {reason}", coverage.coverage, coverage.alarm)?;
             }
         }

@@ -16,8 +16,8 @@ use testkit::pseudo_terminal::PseudoTerminal;
 use worm_estimator::config::Config;
 use wormd::link::virtual_worm::{Options, VirtualWorm};
 use wormd::link::{
-    FaultInjector, Faults, LinkSettings, Port, Prepared, ReadMode, ReadPlan, StartupError, TrackerReading, TrackerSettings,
-    TransactionError, Tty, WormBus, prepare, tracker,
+    FaultInjector, Faults, LinkSettings, Port, Prepared, ReadMode, ReadPlan, StartupError, TrackerReading,
+    TrackerSettings, TransactionError, Tty, WormBus, prepare, tracker,
 };
 
 const BAUD: u32 = 1_000_000;

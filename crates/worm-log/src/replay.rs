@@ -71,18 +71,18 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
 
 /// Indices of the states at which an estimator with this first estimate can have started. `sampled_only`: it answers only states with a
 /// sample.
-fn possible_starts(
-    states: &[State],
-    first_estimate: Option<&Estimate>,
-    sampled_only: bool,
-) -> std::ops::Range<usize> {
+fn possible_starts(states: &[State], first_estimate: Option<&Estimate>, sampled_only: bool) -> std::ops::Range<usize> {
     let Some(estimate) = first_estimate else { return 0..0 };
     let Some(last) = states.iter().position(|state| is_of(estimate, state)) else {
         return 0..0;
     };
     // An earlier state that had to be answered would have given an earlier estimate, if only a little later.
     let is_answered = |state: &State| state.phase.is_finite() && (state.sample_is_new == 1 || !sampled_only);
-    let reach = if sampled_only { last } else { last.saturating_sub(MAX_UNANSWERED) };
+    let reach = if sampled_only {
+        last
+    } else {
+        last.saturating_sub(MAX_UNANSWERED)
+    };
     let sample_before = states[..reach].iter().rposition(is_answered);
     sample_before.map_or(0, |index| index + 1)..last + 1
 }

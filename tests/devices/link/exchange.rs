@@ -36,6 +36,25 @@ fn soon() -> Instant {
     Instant::now() + Duration::from_millis(50)
 }
 
+/// Whatever the tracker would say: it is not asked, and nothing waits for it.
+#[test]
+fn a_worm_without_a_tracker_asks_the_servo_alone() {
+    for read in [ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate] {
+        let mut bus = bus();
+        let plan = ExchangePlan {
+            tracker: None,
+            ..plan(read)
+        };
+        let outcome = bus.exchange(&plan, GOAL_RAD_S, soon());
+        let servo = outcome.servo.expect("the servo's block");
+        assert!((servo.goal_velocity_rad_s - GOAL_RAD_S).abs() < scale::VELOCITY_RAD_S / 2.0);
+        assert_eq!(outcome.tracker, Err(ReadFailure::NotAsked));
+        assert!(outcome.is_complete() && outcome.emergency_stop.is_none());
+        assert_eq!((outcome.sent_bytes, outcome.received_bytes), (30, 60), "{read:?}");
+        assert_eq!(bus.counters().timeouts + bus.exchange_counters().partial_answers, 0);
+    }
+}
+
 #[test]
 fn both_devices_are_read_whatever_the_plan() {
     for (read, sent, received) in [

@@ -4,8 +4,7 @@ use dynamixel_bus::packet::DeviceId;
 use wormd::link::servo::register;
 use wormd::link::{
     FaultInjector, Faults, Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError,
-    TrackerSettings, WormBus,
-    prepare, tracker,
+    TrackerSettings, WormBus, prepare, tracker,
 };
 
 use super::worm::{SERVO, TRACKER, Worm, id};
@@ -79,6 +78,35 @@ fn servo_from_the_factory_is_set_up() {
     let (prepared, findings) = prepare_worm(&mut worm, &settings());
     assert!(prepared.is_ok());
     assert_eq!(findings, []);
+}
+
+#[test]
+fn a_tracker_is_looked_for_only_where_there_is_one_and_missed_only_where_it_must_be() {
+    let mut worm = Worm::new(5);
+    worm.quirks.tracker_silent = true;
+    let tracker = settings().tracker;
+    let of = |tracker| LinkSettings { tracker, ..settings() };
+    let (refused, _) = prepare_worm(&mut worm, &of(tracker));
+    let refusal = refused.expect_err("the tracker is needed").to_string();
+    assert!(refusal.contains("tracker.present = false"), "{refusal}");
+
+    let (prepared, findings) = prepare_worm(&mut worm, &of(None));
+    let prepared = prepared.expect("there is none");
+    assert_eq!((prepared.tracker, prepared.plan.tracker), (None, None));
+    assert!(findings.iter().all(|finding| finding.corrected), "{findings:?}");
+
+    let may_be_silent = tracker.map(|tracker| TrackerSettings {
+        may_be_silent: true,
+        ..tracker
+    });
+    let (prepared, findings) = prepare_worm(&mut worm, &of(may_be_silent));
+    let prepared = prepared.expect("it may be silent");
+    assert!(prepared.tracker.is_none() && prepared.plan.tracker.is_some());
+    let open: Vec<_> = findings.iter().filter(|finding| !finding.corrected).collect();
+    assert!(
+        matches!(open[..], [finding] if finding.what.contains("does not answer")),
+        "{open:?}"
+    );
 }
 
 #[test]

@@ -68,6 +68,7 @@ pub struct Estimator {
     cycle_index: u64,
     last: Option<(u64, f64, f64)>, // sequence, time and phase of the last state
     last_seen: Option<(f64, f64)>, // time and phase of the last accepted position
+    is_blind: bool,                // the tracker fell silent, and no position was accepted since
     first_mean_m: f64,             // mean position when it was first known
     entered: (f64, f64),           // fraction of the present step at which it was entered, and the cell's lead then
     estimate: Estimate,
@@ -122,6 +123,7 @@ impl Estimator {
             cycle_index: 0,
             last: None,
             last_seen: None,
+            is_blind: false,
             first_mean_m: f64::NAN,
             entered: (f64::NAN, f64::NAN),
             estimate: match config.position_source() {
@@ -227,6 +229,7 @@ impl Estimator {
         self.electrical.restart();
         self.mismatch.forget();
         self.last_seen = None;
+        self.is_blind = false;
         self.last = None;
         self.lose_contacts();
     }
@@ -250,6 +253,7 @@ impl Estimator {
         let blind_steps = (phase - seen_phase).abs() * self.cells as f64;
         if blind_steps > MAX_BLIND_STEPS && time_s - seen_s > SHORTEST_SILENCE_PERIODS * self.tracker_period_s {
             self.last_seen = None;
+            self.is_blind = true;
             self.lose_contacts();
         }
     }
@@ -291,7 +295,7 @@ impl Estimator {
     /// Starts a window here, with the present contact points.
     fn begin_window(&mut self) {
         self.window.clear();
-        self.window_is_complete = true;
+        self.window_is_complete = !self.is_blind;
         self.mismatch.begin(self.cycles.direction());
         let sign = f64::from(self.cycles.direction());
         self.window_contact_m = self.contacts.contact_m().map(|contact_m| sign * contact_m);

@@ -22,6 +22,7 @@ impl Estimator {
         let accepted = self.filter.observe(&position_m[..self.cells]);
         if accepted != 0 {
             self.last_seen = Some((time_s, state.phase));
+            self.is_blind = false;
         }
         let sign = f64::from(self.cycles.direction());
         for (cell, position_m) in position_m[..self.cells].iter_mut().enumerate() {
@@ -111,7 +112,11 @@ impl Estimator {
             // What comes after is not to be joined to what was before.
             self.filter.forget();
             let estimate = &mut self.estimate;
-            for unknown_m in [&mut estimate.position_m, &mut estimate.contact_m, &mut estimate.deformation_m] {
+            for unknown_m in [
+                &mut estimate.position_m,
+                &mut estimate.contact_m,
+                &mut estimate.deformation_m,
+            ] {
                 unknown_m.fill(f64::NAN);
             }
             estimate.force_n.fill(f64::NAN);
