@@ -256,7 +256,9 @@ fn refusals_say_what_is_wrong_and_what_to_do() {
              does so)",
         ),
         (
-            |_, settings| settings.cells = 6,
+            |_, settings| {
+                settings.tracker = settings.tracker.map(|tracker| TrackerSettings { cells: 6, ..tracker });
+            },
             "the tracker tracks 5 cells, the config says 6: correct worm.cells, or set up the tracker",
         ),
         (

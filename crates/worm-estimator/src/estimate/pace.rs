@@ -92,6 +92,6 @@ mod tests {
         let dies = estimates_ms("[tracker]\nrate_hz = 100.0", 500);
         assert_eq!(dies.first(), Some(&525));
         assert!((46..=48).contains(&dies.len()), "{dies:?}");
-        assert_eq!(estimates_ms("[tracker]\nrate_hz = 100.0", 999), []);
+        assert!(estimates_ms("[tracker]\nrate_hz = 100.0", 999).is_empty());
     }
 }
