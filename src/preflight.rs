@@ -12,6 +12,8 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::path::Path;
 use worm_estimator::config::{Config, Realtime};
+use worm_estimator::estimate::alarm::Coverage;
+use worm_estimator::message::AlarmKind;
 
 use trials::TrialWorm;
 
@@ -111,6 +113,31 @@ fn check_config(source: &str, config: &Config, report: &mut CheckReport) {
     );
     for advice in config.advice() {
         report.note(Level::Warning, "configuration", advice.key, advice.text);
+    }
+    check_alarms(config, report);
+}
+
+/// Which alarms can speak on this worm. What it lacks on purpose is no warning.
+fn check_alarms(config: &Config, report: &mut CheckReport) {
+    let names = |wanted: &str| {
+        let all = AlarmKind::ALL.iter().map(|kind| (kind, Coverage::of(*kind, config)));
+        let wanted = all.filter(|(_, coverage)| coverage.name() == wanted);
+        wanted
+            .map(|(kind, coverage)| match coverage.reason() {
+                None => kind.name().to_owned(),
+                Some(reason) => format!("{} ({reason})", kind.name()),
+            })
+            .collect::<Vec<_>>()
+    };
+    for (coverage, words) in [
+        ("full", "watched"),
+        ("partial", "watched in part"),
+        ("off", "not watched"),
+    ] {
+        let names = names(coverage);
+        if !names.is_empty() {
+            report.good("alarms", format!("{words}: {}", names.join(", ")));
+        }
     }
 }
 
@@ -243,13 +270,12 @@ fn check_port(
             report.good(
                 "port",
                 format!(
-                    "{} at {} baud: servo model {} (firmware {}), tracker with {} cells, read by {:?}",
+                    "{} at {} baud: servo model {} (firmware {}), {}",
                     port.path,
                     port.baud,
                     prepared.servo.model,
                     prepared.servo.firmware,
-                    prepared.tracker_cells,
-                    prepared.plan.read
+                    tracker_in_words(config, &prepared)
                 ),
             );
             for finding in findings {
@@ -267,6 +293,15 @@ fn check_port(
         }
         // The error's text includes the remedy.
         Err(error) => report.note(Level::Error, "port", "cannot be used", error.to_string()),
+    }
+}
+
+/// What there is of a tracker, and how it is read.
+fn tracker_in_words(config: &Config, prepared: &Prepared) -> String {
+    match prepared.tracker {
+        Some(tracker) => format!("tracker with {} cells, read by {:?}", tracker.cells, prepared.plan.read),
+        None if config.tracker.present => "its tracker is silent".to_owned(),
+        None => "no tracker (configured so)".to_owned(),
     }
 }
 

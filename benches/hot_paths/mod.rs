@@ -7,7 +7,9 @@ use worm_estimator::config::Config;
 use worm_estimator::message::{Command, CommandKind};
 use worm_physics::MAX_CELLS;
 use wormd::control::{Controller, EstimateSeen, Inputs, Lease, Service, ServiceOutcome};
-use wormd::link::{ExchangePlan, Port, PortError, ReadPlan, ServoReading, TrackerReading, WormBus, servo, tracker};
+use wormd::link::{
+    ExchangePlan, Port, PortError, ReadPlan, ServoReading, TrackerQuery, TrackerReading, WormBus, servo, tracker,
+};
 
 const SERVO_READING: ServoReading = ServoReading {
     watchdog: 5,
@@ -94,10 +96,12 @@ impl AnsweredExchange {
         let id = |id| DeviceId::new(id).expect("a valid ID");
         let plan = ExchangePlan {
             servo: id(1),
-            tracker: id(100),
-            cells: 4,
+            tracker: Some(TrackerQuery {
+                id: id(100),
+                cells: 4,
+                emergency_stop_mask: None,
+            }),
             read: ReadPlan::FastBulk,
-            emergency_stop_mask: None,
         };
         Self {
             bus: WormBus::new(AnsweringPort::new(&plan)),
@@ -120,9 +124,10 @@ struct AnsweringPort {
 
 impl AnsweringPort {
     fn new(plan: &ExchangePlan) -> Self {
+        let tracker = plan.tracker.expect("this worm has one");
         let spans = [
             servo::block_span(plan.servo),
-            tracker::block_span(plan.tracker, plan.cells),
+            tracker::block_span(tracker.id, tracker.cells),
         ];
         Self {
             reply: fast_reply(spans),

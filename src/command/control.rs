@@ -58,7 +58,8 @@ pub fn run(args: &ControlArgs) -> Result<(), Failure> {
             tracing::warn!("{}: {}: {}", port.path, finding.what, finding.remedy);
         }
     }
-    tracing::info!(port = port.path, read = ?prepared.plan.read, cells = prepared.tracker_cells, "devices are ready");
+    let cells = prepared.tracker.map(|tracker| tracker.cells);
+    tracing::info!(port = port.path, read = ?prepared.plan.read, ?cells, "devices are ready");
     let hub = Hub::open(&instance).map_err(Failure::failed)?;
     let ending = control::run(&config, &mut drive, &hub, &role, &attendance, &end, |grants| {
         report_grants(grants);

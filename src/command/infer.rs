@@ -127,7 +127,7 @@ struct InferredCycle {
     measured: Option<MeasuredCycle>,
 }
 
-/// The same cycle by the tracker, where the log has it.
+/// The same cycle as the estimator measured it, where the log has it; without positions null but for the electrical energy.
 #[derive(Debug, Serialize)]
 struct MeasuredCycle {
     advance_m: f64,
@@ -232,6 +232,15 @@ fn not_learned(unknowns: impl Iterator<Item = Unknown>) -> Vec<String> {
     names
 }
 
+/// A number in a column of `width`, or a dash where it was not measured.
+fn known(value: f64, width: usize, digits: usize) -> String {
+    if value.is_finite() {
+        format!("{value:width$.digits$}")
+    } else {
+        format!("{:>width$}", "-")
+    }
+}
+
 fn in_words(inferred: &Answer) -> String {
     let mut text = String::from(
         "cycle   advance mm          losses mJ           electrical mJ    position mm      measured: advance, losses, electrical",
@@ -254,9 +263,9 @@ fn in_words(inferred: &Answer) -> String {
         if let Some(measured) = &cycle.measured {
             let _ = write!(
                 text,
-                "  {:6.2} {:8.1} {:8.0}",
-                1e3 * measured.advance_m,
-                1e3 * measured.energy_loss_j,
+                "  {} {} {:8.0}",
+                known(1e3 * measured.advance_m, 6, 2),
+                known(1e3 * measured.energy_loss_j, 8, 1),
                 1e3 * measured.energy_electrical_j,
             );
         }

@@ -111,6 +111,11 @@ pub fn run(args: &TripArgs) -> Result<(), Failure> {
 fn travel(args: &TripArgs, file: &Path) -> Result<(), Failure> {
     print::log_in_background()?;
     let config = args.config()?;
+    if !config.tracker.present {
+        return Err(Failure::unusable(
+            "a trip is measured by cell positions, and tracker.present = false: `wormd command crawl` makes such a worm crawl for a while",
+        ));
+    }
     let bench = Workbench::new(&config).map_err(Failure::unusable)?;
     let text = read_text(file).map_err(|error| {
         let file = file.display();

@@ -122,7 +122,7 @@ pub fn run(args: &UpArgs, verbose: u8) -> Result<(), Failure> {
         Some(_) => STALLED_PATIENCE,
         None => OUTPUT_PATIENCE,
     };
-    let summary = Summary::new(&config.worm, &telemetry, run.mode);
+    let summary = Summary::new(&config, &telemetry, run.mode);
     if args.json {
         let text = serde_json::to_string(&summary).map_err(Failure::failed)?;
         print::line_within(text, patience)?;

@@ -116,7 +116,7 @@ impl Controller {
             loop_clock: LoopClock::default(),
             assembler: StateAssembler::new(config),
             safety: Safety::new(config),
-            estimator: EstimatorWatch::default(),
+            estimator: EstimatorWatch::new(config),
             alarms: StandingAlarms::new(config),
             ramp: Ramp::at_rest(gait_velocity_rad_s.abs() / config.gait.ramp_s),
             rounding: CountRounding::default(),
@@ -505,9 +505,7 @@ impl Controller {
         state.acknowledged_mask = self.alarms.acknowledged();
         state.acknowledged_by = self.alarms.acknowledged_by();
         state.emergency_stop = self.emergency_stop.map_or(u32::MAX, u32::from);
-        if state.sample_is_new == 1 && state.phase.is_finite() {
-            self.estimator.note_sample(state.sequence, now_ns);
-        }
+        self.estimator.note_state(state, now_ns);
         let published = *state;
         state.sequence += 1;
         published

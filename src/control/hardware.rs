@@ -5,14 +5,14 @@ use super::replaceable_port::ReplaceablePort;
 use crate::link::servo::scale;
 use crate::link::{
     ArmError, ExchangeOutcome, ExchangePlan, Finding, LinkCounters, LinkSettings, MotionTrial, OpenError,
-    OperationError, Prepared, ReadMode, ReadPlan, StartupError, StopInputs, TrialError, Tty, WatchdogTrial, WormBus,
-    arm, disarm, prepare,
+    OperationError, Prepared, ReadMode, ReadPlan, StartupError, StopInputs, TrackerSettings, TrialError, Tty,
+    WatchdogTrial, WormBus, arm, disarm, prepare,
 };
 use dynamixel_bus::packet::DeviceId;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use worm_estimator::config::{Config, EmergencyStopSource, ReadMode as ConfiguredRead};
+use worm_estimator::config::{Config, EmergencyStopSource, PositionSource, ReadMode as ConfiguredRead};
 
 /// Why the worm's devices cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -76,15 +76,12 @@ pub enum DriveError {
 /// # Errors
 /// [`DriveError::BadId`] for an ID that no device can have.
 pub fn link_settings(config: &Config, baud: u32) -> Result<LinkSettings, DriveError> {
-    let id = |id: u8| DeviceId::new(id).ok_or(DriveError::BadId(id));
     let read = config.port.as_ref().map_or(ConfiguredRead::Auto, |port| port.read);
     Ok(LinkSettings {
         baud,
-        servo_id: id(config.servo.id)?,
+        servo_id: device_id(config.servo.id)?,
         servo_model: config.servo.model_number,
-        tracker_id: id(config.tracker.id)?,
-        tracker_model: config.tracker.model_number,
-        cells: config.worm.cells,
+        tracker: tracker_settings(config)?,
         read: match read {
             ConfiguredRead::Auto => ReadMode::Auto,
             ConfiguredRead::FastBulk => ReadMode::Always(ReadPlan::FastBulk),
@@ -96,9 +93,27 @@ pub fn link_settings(config: &Config, baud: u32) -> Result<LinkSettings, DriveEr
         winding_resistance_ohm: config.servo.winding_resistance_ohm,
         velocity_limit_rad_s: config.servo.velocity_limit_rev_per_min * TAU / 60.0,
         temperature_limit_c: f64::from(config.servo.temperature_limit_c),
-        emergency_stop_mask: emergency_stop_mask(config),
         accept_unsafe_watchdog: config.servo.accept_unsafe_watchdog,
     })
+}
+
+fn device_id(id: u8) -> Result<DeviceId, DriveError> {
+    DeviceId::new(id).ok_or(DriveError::BadId(id))
+}
+
+fn tracker_settings(config: &Config) -> Result<Option<TrackerSettings>, DriveError> {
+    let may_be_silent = match config.position_source() {
+        PositionSource::Nothing => return Ok(None),
+        PositionSource::Tracker => false,
+        PositionSource::TrackerWhileItLasts => true,
+    };
+    Ok(Some(TrackerSettings {
+        id: device_id(config.tracker.id)?,
+        model: config.tracker.model_number,
+        cells: config.worm.cells,
+        emergency_stop_mask: emergency_stop_mask(config),
+        may_be_silent,
+    }))
 }
 
 /// The tracker's bits that mean a pressed emergency stop, if the tracker reads one.

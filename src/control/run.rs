@@ -157,13 +157,14 @@ pub fn run(
     })
 }
 
-/// The slowest rate that the loop may fall back to: it still reads every sample of the tracker, and detects silences in time.
+/// The slowest rate that the loop may fall back to: it still reads every sample of a tracker, and detects silences in time.
 fn slowest_rate_hz(config: &Config) -> f64 {
     let shortest_s = config
         .control
         .link_timeout_s
         .min(f64::from(config.servo.watchdog_ms) * 1e-3);
-    (2.0 * config.tracker.rate_hz).max(5.0 / shortest_s)
+    let samples_hz = config.tracker_rate_hz().map_or(0.0, |rate_hz| 2.0 * rate_hz);
+    samples_hz.max(5.0 / shortest_s)
 }
 
 struct Loop {

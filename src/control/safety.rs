@@ -22,7 +22,8 @@ const VOLTAGE_AVERAGING_S: f64 = 0.1;
 pub(super) struct Safety {
     limits: Limits,
     link_timeout_ns: u64,
-    tracker_timeout_ns: u64,
+    /// None where the worm may crawl without positions.
+    tracker_timeout_ns: Option<u64>,
     estimator_timeout_ns: u64,
     watchdog_ns: u64,
     require_estimator: bool,
@@ -53,7 +54,8 @@ impl Safety {
         Self {
             limits: config.limits.clone(),
             link_timeout_ns: seconds_to_ns(config.control.link_timeout_s),
-            tracker_timeout_ns: seconds_to_ns(config.control.tracker_timeout_s),
+            tracker_timeout_ns: (!config.position_source().may_be_missing())
+                .then(|| seconds_to_ns(config.control.tracker_timeout_s)),
             estimator_timeout_ns: seconds_to_ns(config.control.estimator_timeout_s),
             watchdog_ns: u64::from(config.servo.watchdog_ms) * 1_000_000,
             require_estimator: config.control.require_estimator,
@@ -84,7 +86,8 @@ impl Safety {
             return Some(Fault::LinkLost);
         }
         let since_ns = inputs.crawling_since_ns?;
-        if silent_for(inputs.assembler.sample_seen_ns, since_ns) > self.tracker_timeout_ns {
+        let is_stale = |timeout_ns| silent_for(inputs.assembler.sample_seen_ns, since_ns) > timeout_ns;
+        if self.tracker_timeout_ns.is_some_and(is_stale) {
             return Some(Fault::TrackerStale);
         }
         let estimator_is_silent = inputs.estimator.silent_ns(inputs.now_ns, since_ns) > self.estimator_timeout_ns;
@@ -141,7 +144,9 @@ impl Safety {
         match fault {
             Fault::OverTemperature => servo.is_none_or(|servo| servo.temperature_c > self.limits.temperature_c),
             Fault::UnderVoltage => servo.is_none_or(|servo| servo.voltage_v < self.limits.voltage_v),
-            Fault::TrackerStale => age_ns(assembler.sample_seen_ns) > self.tracker_timeout_ns,
+            Fault::TrackerStale => self
+                .tracker_timeout_ns
+                .is_some_and(|timeout_ns| age_ns(assembler.sample_seen_ns) > timeout_ns),
             // A lost link may need the port to be reopened, which a reset does; the other causes do not last.
             _ => false,
         }

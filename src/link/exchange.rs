@@ -13,6 +13,8 @@
 //! | `FastBulk` | one | one, of both devices | 16 + 20 + 96 |
 //! | `Bulk` | one | one of each device | 16 + 20 + 60 + 42 |
 //! | `Separate` | one to each device | one to each | 16 + 14 + 60 + 14 + 42 |
+//!
+//! A worm without a tracker asks the servo alone, by a plain read, and waits for nothing else.
 
 use std::time::Instant;
 
@@ -50,23 +52,36 @@ pub enum ReadPlan {
 pub struct ExchangePlan {
     /// The servo.
     pub servo: DeviceId,
-    /// The tracker.
-    pub tracker: DeviceId,
-    /// Cells to read of the tracker, at most [`MAX_CELLS`](worm_physics::MAX_CELLS).
-    pub cells: usize,
-    /// How they are read.
+    /// What is asked of the tracker; none on a worm without one.
+    pub tracker: Option<TrackerQuery>,
+    /// How both are read. Without a tracker it does not matter.
     pub read: ReadPlan,
+}
+
+/// What an exchange asks of the tracker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TrackerQuery {
+    /// The tracker.
+    pub id: DeviceId,
+    /// Cells to read, at most [`MAX_CELLS`](worm_physics::MAX_CELLS).
+    pub cells: usize,
     /// Bits of the tracker's switches of which each means that the emergency stop is pressed; without it they are not read.
     pub emergency_stop_mask: Option<u8>,
 }
 
+impl TrackerQuery {
+    fn span(&self) -> ReadSpan {
+        match self.emergency_stop_mask {
+            None => tracker::block_span(self.id, self.cells),
+            Some(_) => tracker::block_span_with_switches(self.id, self.cells),
+        }
+    }
+}
+
 impl ExchangePlan {
-    fn spans(&self) -> [ReadSpan; 2] {
-        let tracker = match self.emergency_stop_mask {
-            None => tracker::block_span(self.tracker, self.cells),
-            Some(_) => tracker::block_span_with_switches(self.tracker, self.cells),
-        };
-        [servo::block_span(self.servo), tracker]
+    /// How the devices are read, and what is read of the tracker where there is one.
+    fn with_tracker(&self) -> Option<(ReadPlan, TrackerQuery)> {
+        self.tracker.map(|tracker| (self.read, tracker))
     }
 
     /// Bytes of an answer of the servo; of the whole reply where both devices answer in one.
@@ -74,10 +89,12 @@ impl ExchangePlan {
         const STATUS_OVERHEAD: u64 = 11; // header, ID, length, instruction, error, CRC
         const FAST_HEADER: u64 = 8;
         const SEGMENT_OVERHEAD: u64 = 4; // error, ID, CRC
-        let [servo, tracker] = self.spans().map(|span| u64::from(span.length));
-        match self.read {
-            ReadPlan::FastBulk => FAST_HEADER + servo + tracker + 2 * SEGMENT_OVERHEAD,
-            ReadPlan::Bulk | ReadPlan::Separate => STATUS_OVERHEAD + servo,
+        let servo = u64::from(servo::block_span(self.servo).length);
+        match self.with_tracker() {
+            Some((ReadPlan::FastBulk, tracker)) => {
+                FAST_HEADER + servo + u64::from(tracker.span().length) + 2 * SEGMENT_OVERHEAD
+            }
+            Some((ReadPlan::Bulk | ReadPlan::Separate, _)) | None => STATUS_OVERHEAD + servo,
         }
     }
 }
@@ -108,10 +125,10 @@ pub struct ExchangeOutcome {
 }
 
 impl ExchangeOutcome {
-    /// Whether both devices' data arrived.
+    /// Whether the data of every device that was asked arrived.
     #[must_use]
     pub const fn is_complete(&self) -> bool {
-        self.servo.is_ok() && self.tracker.is_ok()
+        self.servo.is_ok() && matches!(self.tracker, Ok(_) | Err(ReadFailure::NotAsked))
     }
 
     /// Whether the port is gone and has to be opened again.
@@ -125,6 +142,9 @@ impl ExchangeOutcome {
 /// Why a device's data did not come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReadFailure {
+    /// It was not asked: the worm has no such device.
+    #[error("not asked: there is none")]
+    NotAsked,
     /// No answer by the deadline.
     #[error("no answer by the deadline")]
     Silent,
@@ -166,12 +186,18 @@ struct Answers {
 }
 
 impl Answers {
-    const NOTHING: Self = Self {
-        servo: Err(ReadFailure::Silent),
-        tracker: Err(ReadFailure::Silent),
-        switches: None,
-        servo_answers: 0,
-    };
+    /// Before anybody has answered.
+    const fn none(plan: &ExchangePlan) -> Self {
+        Self {
+            servo: Err(ReadFailure::Silent),
+            tracker: Err(match plan.tracker {
+                Some(_) => ReadFailure::Silent,
+                None => ReadFailure::NotAsked,
+            }),
+            switches: None,
+            servo_answers: 0,
+        }
+    }
 
     /// Takes a block of either device, or counts why it is none.
     fn take(&mut self, plan: &ExchangePlan, id: DeviceId, flags: StatusFlags, data: &[u8], counters: &mut BusCounters) {
@@ -186,10 +212,10 @@ impl Answers {
                 .ok_or(failure);
             self.servo_answers += u32::from(self.servo.is_ok());
             self.servo == Err(ReadFailure::Malformed)
-        } else if id == plan.tracker {
-            let of_length = flags.error.is_none() && data.len() == usize::from(plan.spans()[1].length);
+        } else if let Some(query) = plan.tracker.filter(|query| query.id == id) {
+            let of_length = flags.error.is_none() && data.len() == usize::from(query.span().length);
             let (switches, block) = match data.split_first() {
-                Some((&switches, block)) if plan.emergency_stop_mask.is_some() => (Some(switches), block),
+                Some((&switches, block)) if query.emergency_stop_mask.is_some() => (Some(switches), block),
                 _ => (None, data),
             };
             let reading = if of_length {
@@ -212,7 +238,9 @@ impl Answers {
     }
 
     fn take_fast_reply(&mut self, plan: &ExchangePlan, reply: FastReply<'_>, counters: &mut BusCounters) {
-        for segment in reply.segments(plan.spans()) {
+        // A worm without a tracker asks for no such reply.
+        let Some(query) = plan.tracker else { return };
+        for segment in reply.segments([servo::block_span(plan.servo), query.span()]) {
             match segment {
                 Ok(segment) => {
                     counters.count_flags(segment.flags);
@@ -234,8 +262,16 @@ impl Answers {
     fn fail(&mut self, plan: &ExchangePlan, id: DeviceId, failure: ReadFailure) {
         if id == plan.servo && self.servo.is_err() {
             self.servo = Err(failure);
-        } else if id == plan.tracker && self.tracker.is_err() {
+        } else if plan.tracker.is_some_and(|query| query.id == id) && self.tracker.is_err() {
             self.tracker = Err(failure);
+        }
+    }
+
+    /// The exchange as a whole failed.
+    fn fail_all(&mut self, plan: &ExchangePlan, failure: ReadFailure) {
+        self.fail(plan, plan.servo, failure);
+        if let Some(query) = plan.tracker {
+            self.fail(plan, query.id, failure);
         }
     }
 
@@ -271,7 +307,7 @@ impl<P: Port> WormBus<P> {
     pub fn exchange(&mut self, plan: &ExchangePlan, goal_velocity_rad_s: f64, deadline: Instant) -> ExchangeOutcome {
         let before = self.bus.counters();
         self.exchange_counters.exchanges += 1;
-        let mut late = Answers::NOTHING;
+        let mut late = Answers::none(plan);
         if self.owed.is_any() {
             // A port that fails here fails in the exchange, too.
             let _ = self.bus.take_late_packets(LATE_LIMIT, |packet, counters| match packet {
@@ -280,17 +316,18 @@ impl<P: Port> WormBus<P> {
                 Packet::Instruction(_) => {}
             });
         }
-        let mut harvest = Answers::NOTHING;
-        let end = match plan.read {
-            ReadPlan::FastBulk | ReadPlan::Bulk => {
-                self.exchange_bulk(plan, goal_velocity_rad_s, deadline, &mut harvest)
+        let mut harvest = Answers::none(plan);
+        let end = match plan.with_tracker() {
+            Some((ReadPlan::FastBulk | ReadPlan::Bulk, tracker)) => {
+                self.exchange_bulk(plan, tracker, goal_velocity_rad_s, deadline, &mut harvest)
             }
-            ReadPlan::Separate => self.exchange_separately(plan, goal_velocity_rad_s, deadline, &mut harvest),
+            Some((ReadPlan::Separate, tracker)) => {
+                self.exchange_separately(plan, tracker, goal_velocity_rad_s, deadline, &mut harvest)
+            }
+            None => self.exchange_with_servo(plan, goal_velocity_rad_s, deadline, &mut harvest),
         };
         if let Err(TransactionError::Port(error)) = end {
-            let failure = ReadFailure::Port(error);
-            harvest.fail(plan, plan.servo, failure);
-            harvest.fail(plan, plan.tracker, failure);
+            harvest.fail_all(plan, ReadFailure::Port(error));
         }
         // An answer may come between the look for late ones and the request, which throws away what is on the line.
         let stale_bytes = self.bus.counters().stale_bytes - before.stale_bytes;
@@ -306,7 +343,8 @@ impl<P: Port> WormBus<P> {
         for failure in [harvest.servo.err(), harvest.tracker.err()] {
             counters.timeouts += u64::from(failure == Some(ReadFailure::Silent));
         }
-        self.exchange_counters.partial_answers += u64::from(harvest.servo.is_ok() != harvest.tracker.is_ok());
+        let is_partial = plan.tracker.is_some() && harvest.servo.is_ok() != harvest.tracker.is_ok();
+        self.exchange_counters.partial_answers += u64::from(is_partial);
         let received_bytes = (counters.received_bytes - before.received_bytes) as u32;
         self.silent_in_a_row = if received_bytes == 0 {
             self.silent_in_a_row.saturating_add(1)
@@ -321,7 +359,8 @@ impl<P: Port> WormBus<P> {
         ExchangeOutcome {
             goal_taken,
             emergency_stop: plan
-                .emergency_stop_mask
+                .tracker
+                .and_then(|query| query.emergency_stop_mask)
                 .zip(switches)
                 .map(|(mask, switches)| switches & mask != 0),
             late: servo_is_late || tracker_is_late,
@@ -337,11 +376,12 @@ impl<P: Port> WormBus<P> {
     fn exchange_bulk(
         &mut self,
         plan: &ExchangePlan,
+        tracker: TrackerQuery,
         goal_velocity_rad_s: f64,
         deadline: Instant,
         harvest: &mut Answers,
     ) -> Result<(), TransactionError> {
-        let wire = plan.spans().map(ReadSpan::to_wire);
+        let wire = [servo::block_span(plan.servo), tracker.span()].map(ReadSpan::to_wire);
         let spans = ReadSpans::from_valid(&wire);
         let fast = plan.read == ReadPlan::FastBulk;
         let instruction = if fast {
@@ -382,19 +422,31 @@ impl<P: Port> WormBus<P> {
     fn exchange_separately(
         &mut self,
         plan: &ExchangePlan,
+        tracker: TrackerQuery,
+        goal_velocity_rad_s: f64,
+        deadline: Instant,
+        harvest: &mut Answers,
+    ) -> Result<(), TransactionError> {
+        let now = Instant::now();
+        let servo_deadline = now + deadline.saturating_duration_since(now) / 2;
+        self.exchange_with_servo(plan, goal_velocity_rad_s, servo_deadline, harvest)?;
+        self.bus.send_packets(&[read_of(tracker.span())], deadline)?;
+        self.receive_answer(plan, tracker.id, deadline, harvest)
+    }
+
+    /// The goal and a read of the servo's block in one write, and the answer.
+    fn exchange_with_servo(
+        &mut self,
+        plan: &ExchangePlan,
         goal_velocity_rad_s: f64,
         deadline: Instant,
         harvest: &mut Answers,
     ) -> Result<(), TransactionError> {
         let goal = goal_counts(goal_velocity_rad_s);
-        let now = Instant::now();
-        let servo_deadline = now + deadline.saturating_duration_since(now) / 2;
-        let [servo_span, tracker_span] = plan.spans();
+        let read = read_of(servo::block_span(plan.servo));
         self.bus
-            .send_packets(&[goal_write(plan.servo, &goal), read_of(servo_span)], servo_deadline)?;
-        self.receive_answer(plan, plan.servo, servo_deadline, harvest)?;
-        self.bus.send_packets(&[read_of(tracker_span)], deadline)?;
-        self.receive_answer(plan, plan.tracker, deadline, harvest)
+            .send_packets(&[goal_write(plan.servo, &goal), read], deadline)?;
+        self.receive_answer(plan, plan.servo, deadline, harvest)
     }
 
     /// Waits for the answer of one device to a read of its own.

@@ -64,10 +64,10 @@ pub use dynamixel_bus::{
     TransactionError, Tty, WaitEnd, packet,
 };
 pub use emergency_stop::{EmergencyStopError, EmergencyStopInput};
-pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPlan};
+pub use exchange::{ExchangeOutcome, ExchangePlan, ReadFailure, ReadMode, ReadPlan, TrackerQuery};
 pub use operations::OperationError;
 pub use servo::ServoReading;
-pub use startup::{LinkSettings, Prepared, StartupError, prepare};
+pub use startup::{LinkSettings, Prepared, PreparedTracker, StartupError, TrackerSettings, prepare};
 pub(crate) use startup::{find_servo, limit_duty_to};
 pub use stop_inputs::StopInputs;
 pub use tracker::{NoTrackerBlock, TrackerReading};

@@ -25,9 +25,11 @@ use set_up::{LEAST_VOLTAGE_V, limit_duty, set_up};
 
 use super::{
     ExchangeOutcome, ExchangePlan, Finding, Identity, Port, PortError, ReadMode, ReadPlan, Register, ServoReading,
-    TrackerReading, TransactionError, WormBus, tracker,
+    TrackerQuery, TrackerReading, TransactionError, WormBus, tracker,
 };
 
+/// What errors call the tracker.
+const TRACKER: &str = "tracker";
 /// Status return level at which only pings and reads are answered.
 const ANSWER_READS: u32 = 1;
 /// Status return level at which everything is answered.
@@ -54,13 +56,9 @@ pub struct LinkSettings {
     pub servo_id: DeviceId,
     /// The servo's model number, [`XL330_M288_MODEL`](crate::link::servo::XL330_M288_MODEL) by default.
     pub servo_model: u16,
-    /// The tracker's ID, [`tracker::DEFAULT_ID`] by default.
-    pub tracker_id: DeviceId,
-    /// The tracker's model number, [`tracker::MODEL`] by default.
-    pub tracker_model: u16,
-    /// Cells of the worm, 1 to [`MAX_CELLS`](worm_physics::MAX_CELLS).
-    pub cells: usize,
-    /// How the devices are read in each tick.
+    /// What has to be known of the tracker; none on a worm without one.
+    pub tracker: Option<TrackerSettings>,
+    /// How the devices are read in each tick. Without a tracker there is but one way.
     pub read: ReadMode,
     /// Silence in ms after which the motor stops by itself, rounded up to 20 ms; 20 to 2540.
     pub watchdog_ms: u32,
@@ -72,10 +70,33 @@ pub struct LinkSettings {
     pub velocity_limit_rad_s: f64,
     /// Temperature in °C at which the servo shuts down; XL330: up to 100, 70 by default.
     pub temperature_limit_c: f64,
-    /// Bits of the tracker's switches of which each means that the emergency stop is pressed; without it they are not read.
-    pub emergency_stop_mask: Option<u8>,
     /// Whether a servo is used whose firmware is known not to stop the motor when its bus watchdog acts.
     pub accept_unsafe_watchdog: bool,
+}
+
+/// What the link has to know of a tracker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TrackerSettings {
+    /// Its ID, [`tracker::DEFAULT_ID`] by default.
+    pub id: DeviceId,
+    /// Its model number, [`tracker::MODEL`] by default.
+    pub model: u16,
+    /// Cells of the worm, 1 to [`MAX_CELLS`](worm_physics::MAX_CELLS).
+    pub cells: usize,
+    /// Bits of its switches of which each means that the emergency stop is pressed; without it they are not read.
+    pub emergency_stop_mask: Option<u8>,
+    /// Whether a worm is prepared though its tracker is silent: it is asked in every exchange all the same.
+    pub may_be_silent: bool,
+}
+
+impl TrackerSettings {
+    const fn query(&self) -> TrackerQuery {
+        TrackerQuery {
+            id: self.id,
+            cells: self.cells,
+            emergency_stop_mask: self.emergency_stop_mask,
+        }
+    }
 }
 
 /// A worm that is ready to tick. Torque is off, the goal is zero, the watchdog is set.
@@ -85,16 +106,23 @@ pub struct Prepared {
     pub plan: ExchangePlan,
     /// Who the servo is.
     pub servo: Identity,
-    /// Who the tracker is.
-    pub tracker: Identity,
-    /// Cells that the tracker tracks.
-    pub tracker_cells: u8,
+    /// The tracker; none where there is none, or a silent one is accepted.
+    pub tracker: Option<PreparedTracker>,
     /// Greatest duty of the motor, in (0, 1].
     pub duty_limit: f64,
     /// The servo as it stands.
     pub servo_reading: ServoReading,
+}
+
+/// A tracker that answers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PreparedTracker {
+    /// Who it is.
+    pub identity: Identity,
+    /// Cells that it tracks.
+    pub cells: u8,
     /// The cells as they lie.
-    pub tracker_reading: TrackerReading,
+    pub reading: TrackerReading,
 }
 
 /// Why a worm cannot be run.
@@ -102,7 +130,8 @@ pub struct Prepared {
 pub enum StartupError {
     /// Nobody answers, or others.
     #[error(
-        "{device} (ID {id}) does not answer at {baud} baud: check power, cable and the ID in the config; {present}"
+        "{device} (ID {id}) does not answer at {baud} baud: check power, cable and the ID in the config; {present}{}",
+        without(device)
     )]
     Silent {
         /// "servo" or "tracker".
@@ -201,6 +230,14 @@ pub enum StartupError {
     Port(#[from] PortError),
 }
 
+/// What else a user can do about a device that is not there.
+fn without(device: &str) -> &'static str {
+    match device {
+        TRACKER => "; a worm that has none needs tracker.present = false",
+        _ => "",
+    }
+}
+
 /// Checks servo and tracker and makes them ready to tick. What was wrong goes into `findings`, corrected or not, even when
 /// an error ends the check.
 ///
@@ -211,19 +248,60 @@ pub fn prepare<P: Port>(
     settings: &LinkSettings,
     findings: &mut Vec<Finding>,
 ) -> Result<Prepared, StartupError> {
-    let (servo_id, tracker_id) = (settings.servo_id, settings.tracker_id);
+    let servo_id = settings.servo_id;
     let servo = find_servo(bus, settings, findings)?;
-    let tracker = identify(bus, settings, "tracker", tracker_id, settings.tracker_model)?;
-    let tracker_cells = bus.register(tracker_id, tracker::register::CELL_COUNT)? as u8;
-    if usize::from(tracker_cells) < settings.cells {
+    let tracker = match &settings.tracker {
+        Some(tracker) => find_tracker(bus, settings, tracker, findings)?,
+        None => None,
+    };
+
+    set_up(bus, settings, findings)?;
+    let duty_limit = limit_duty(bus, settings)?;
+    set_status_level(bus, servo_id, ANSWER_READS)?;
+    bus.rearm_watchdog(servo_id, settings.watchdog_ms)?;
+
+    let (plan, outcome) = choose_read_plan(bus, settings, tracker.is_some(), findings)?;
+    Ok(Prepared {
+        plan,
+        servo,
+        tracker: tracker
+            .zip(outcome.tracker)
+            .map(|((identity, cells), reading)| PreparedTracker {
+                identity,
+                cells,
+                reading,
+            }),
+        duty_limit,
+        servo_reading: outcome.servo,
+    })
+}
+
+/// Finds the configured tracker: who it is, and how many cells it tracks. Nothing where it is silent and may be.
+fn find_tracker<P: Port>(
+    bus: &mut WormBus<P>,
+    settings: &LinkSettings,
+    wanted: &TrackerSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<Option<(Identity, u8)>, StartupError> {
+    let identity = match identify(bus, settings, TRACKER, wanted.id, wanted.model) {
+        Err(StartupError::Silent { id, .. }) if wanted.may_be_silent => {
+            findings.push(Finding::open(
+                format!("the tracker (ID {id}) does not answer: the worm goes without positions"),
+                "look at its power and its cable; it is used as soon as it answers",
+            ));
+            return Ok(None);
+        }
+        found => found?,
+    };
+    let cells = bus.register(wanted.id, tracker::register::CELL_COUNT)? as u8;
+    if usize::from(cells) < wanted.cells {
         return Err(StartupError::TooFewCells {
-            found: tracker_cells,
-            configured: settings.cells,
+            found: cells,
+            configured: wanted.cells,
         });
     }
-
-    if settings.emergency_stop_mask.is_some() {
-        match bus.register(tracker_id, tracker::register::SWITCHES) {
+    if wanted.emergency_stop_mask.is_some() {
+        match bus.register(wanted.id, tracker::register::SWITCHES) {
             Err(OperationError::Transaction {
                 error: TransactionError::Refused { .. },
                 ..
@@ -231,22 +309,7 @@ pub fn prepare<P: Port>(
             read => read?,
         };
     }
-
-    set_up(bus, settings, findings)?;
-    let duty_limit = limit_duty(bus, settings)?;
-    set_status_level(bus, servo_id, ANSWER_READS)?;
-    bus.rearm_watchdog(servo_id, settings.watchdog_ms)?;
-
-    let (plan, servo_reading, tracker_reading) = choose_read_plan(bus, settings, findings)?;
-    Ok(Prepared {
-        plan,
-        servo,
-        tracker,
-        tracker_cells,
-        duty_limit,
-        servo_reading,
-        tracker_reading,
-    })
+    Ok(Some((identity, cells)))
 }
 
 /// Finds the configured servo and brings it to rest: torque off and verified, everything answered, no hardware error, a watchdog that works.
@@ -366,12 +429,20 @@ fn unlock<P: Port>(
     Ok(())
 }
 
+/// The first readings, of the devices that answer.
+struct FirstReadings {
+    servo: ServoReading,
+    tracker: Option<TrackerReading>,
+}
+
 fn choose_read_plan<P: Port>(
     bus: &mut WormBus<P>,
     settings: &LinkSettings,
+    tracker_answers: bool,
     findings: &mut Vec<Finding>,
-) -> Result<(ExchangePlan, ServoReading, TrackerReading), StartupError> {
+) -> Result<(ExchangePlan, FirstReadings), StartupError> {
     let candidates: &[ReadPlan] = match settings.read {
+        _ if settings.tracker.is_none() => &[ReadPlan::Separate],
         ReadMode::Auto => &[ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate],
         ReadMode::Always(ReadPlan::FastBulk) => &[ReadPlan::FastBulk],
         ReadMode::Always(ReadPlan::Bulk) => &[ReadPlan::Bulk],
@@ -379,24 +450,25 @@ fn choose_read_plan<P: Port>(
     };
     let mut last: Option<ExchangeOutcome> = None;
     for &read in candidates {
-        let (servo, tracker) = (settings.servo_id, settings.tracker_id);
         let plan = ExchangePlan {
-            servo,
-            tracker,
-            cells: settings.cells,
+            servo: settings.servo_id,
+            tracker: settings.tracker.as_ref().map(TrackerSettings::query),
             read,
-            emergency_stop_mask: settings.emergency_stop_mask,
         };
         for _ in 0..READ_ATTEMPTS {
             let outcome = bus.exchange(&plan, 0.0, Instant::now() + REPLY_TIME);
-            if let (Ok(servo_reading), Ok(tracker_reading)) = (outcome.servo, outcome.tracker) {
+            let readings = outcome.servo.ok().map(|servo| FirstReadings {
+                servo,
+                tracker: outcome.tracker.ok(),
+            });
+            if let Some(readings) = readings.filter(|readings| readings.tracker.is_some() || !tracker_answers) {
                 if candidates.len() > 1 && read != ReadPlan::FastBulk {
                     findings.push(Finding::corrected(
                         "servo and tracker do not both know the fast bulk read, so ticks take longer on the wire",
                         format!("read mode {read:?}"),
                     ));
                 }
-                return Ok((plan, servo_reading, tracker_reading));
+                return Ok((plan, readings));
             }
             if outcome.is_disconnected() {
                 return Err(PortError::Disconnected.into());

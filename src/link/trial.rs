@@ -201,13 +201,15 @@ impl<P: Port> WormBus<P> {
         let mut back = Turn::new(-SPEED_RAD_S * sign);
         self.turn_on(&plan, &mut back, ANGLE_RAD, stops)?;
         let _stands = self.rest(&plan, stops)?;
-        let cells = prepared.tracker_reading;
+        let cells = prepared.tracker.map(|tracker| tracker.reading);
         Ok(MotionTrial {
             there_rad: there.moved_rad(),
             back_rad: back.moved_rad(),
             began_rad: prepared.servo_reading.position_rad,
             greatest_a: there.greatest_a.max(back.greatest_a),
-            cell_moved_m: rest.and_then(|rest| greatest_displacement_m(&cells, &rest)),
+            cell_moved_m: cells
+                .zip(rest)
+                .and_then(|(cells, rest)| greatest_displacement_m(&cells, &rest)),
         })
     }
 

@@ -9,11 +9,19 @@ pub(crate) fn text(range: &RangeSummary) -> String {
     } else {
         ("min", 60.0)
     };
+    let distance = if range.range_m.is_finite() {
+        format!(
+            "{:.1} m ({:.1} to {:.1})",
+            range.range_m, range.range_low_m, range.range_high_m
+        )
+    } else {
+        format!(
+            "{:.0} gait cycles, how far is not known without positions",
+            range.cycles
+        )
+    };
     format!(
-        "range  {:.1} m ({:.1} to {:.1}), {:.1} {time_unit} ({:.1} to {:.1}), battery {:.0} ± {:.0} %",
-        range.range_m,
-        range.range_low_m,
-        range.range_high_m,
+        "range  {distance}, {:.1} {time_unit} ({:.1} to {:.1}), battery {:.0} ± {:.0} %",
         range.time_s / scale,
         range.time_low_s / scale,
         range.time_high_s / scale,

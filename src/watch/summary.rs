@@ -7,7 +7,8 @@ use crate::latency::{HostPauses, Percentiles, WorstTicks};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
-use worm_estimator::config::Worm;
+use worm_estimator::config::Config;
+use worm_estimator::estimate::alarm::Coverage;
 use worm_estimator::message::{Alarm, AlarmKind, Cycle, Fault, Mode, Range, Severity};
 use worm_estimator::time::seconds;
 
@@ -44,6 +45,8 @@ pub struct Summary {
     pub alarms: Vec<AlarmSummary>,
     /// Older changes of alarms, which are not among them.
     pub alarm_changes_dropped: u64,
+    /// What each alarm can watch with the sensors of this worm.
+    pub alarm_coverage: Vec<CoverageSummary>,
     /// Where the ticks' time went.
     pub timing: TimingSummary,
 }
@@ -141,6 +144,32 @@ pub struct AlarmSummary {
     pub place: Option<PlaceSummary>,
 }
 
+/// What an alarm can watch on this worm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct CoverageSummary {
+    /// The alarm.
+    pub alarm: &'static str,
+    /// `full`, `partial`, or `off` where it can never be raised.
+    pub coverage: &'static str,
+    /// By what it watches, or why it does not; null where it watches fully.
+    pub reason: Option<&'static str>,
+}
+
+impl CoverageSummary {
+    /// Every alarm's, on the configured worm.
+    pub fn of_all(config: &Config) -> Vec<Self> {
+        let of = |kind: &AlarmKind| {
+            let coverage = Coverage::of(*kind, config);
+            Self {
+                alarm: kind.name(),
+                coverage: coverage.name(),
+                reason: coverage.reason(),
+            }
+        };
+        AlarmKind::ALL.iter().map(of).collect()
+    }
+}
+
 /// A place in the gait.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlaceSummary {
@@ -175,7 +204,8 @@ pub struct TimingSummary {
 
 impl Summary {
     /// The summary of a worm's telemetry. `end_mode` is its mode before it was stopped.
-    pub fn new(worm: &Worm, telemetry: &Telemetry, end_mode: Mode) -> Self {
+    pub fn new(config: &Config, telemetry: &Telemetry, end_mode: Mode) -> Self {
+        let worm = &config.worm;
         let start_ns = telemetry.first_state.map_or(0, |state| state.time_ns);
         let state = telemetry.state;
         let fault = state
@@ -200,6 +230,7 @@ impl Summary {
             cycles_dropped: telemetry.cycles.dropped(),
             alarms: alarm_summaries(telemetry.alarms.iter(), start_ns, &worm.step_order),
             alarm_changes_dropped: telemetry.alarms.dropped(),
+            alarm_coverage: CoverageSummary::of_all(config),
             timing: TimingSummary {
                 wake_us: tick_stats.wake.percentiles(),
                 bus_us: tick_stats.bus.percentiles(),
@@ -336,10 +367,21 @@ impl fmt::Display for MechanicalEnergy<'_> {
     }
 }
 
+/// A number in a column of `width`, or a dash where it is not known.
+fn number(value: f64, width: usize, digits: usize) -> String {
+    if value.is_finite() {
+        format!("{value:>width$.digits$}")
+    } else {
+        format!("{:>width$}", "-")
+    }
+}
+
 /// Remarks on a gait cycle, to follow its numbers.
-pub fn remarks(settled: bool, host_paused_s: f64) -> String {
+pub fn remarks(advance_m: f64, settled: bool, host_paused_s: f64) -> String {
     let mut remarks = String::new();
-    if !settled {
+    if advance_m.is_nan() {
+        remarks += " (without positions)";
+    } else if !settled {
         remarks += " (settling)";
     }
     if host_paused_s > 0.0 {
@@ -373,15 +415,15 @@ impl fmt::Display for Summary {
         for cycle in &self.cycles {
             writeln!(
                 f,
-                "{:>5}  {:>7.3}  {}  {:>10.1}  {:>7.1}  {:>15.1}  {:>6}{}",
+                "{:>5}  {}  {}  {:>10.1}  {:>7.1}  {}  {:>6}{}",
                 cycle.index,
-                cycle.advance_m * 1e3,
+                number(cycle.advance_m * 1e3, 7, 3),
                 MechanicalEnergy(cycle),
                 cycle.energy_electrical_j * 1e3,
                 cycle.energy_copper_j * 1e3,
-                cycle.energy_friction_inside_j * 1e3,
+                number(cycle.energy_friction_inside_j * 1e3, 15, 1),
                 cycle.cot.map_or("-".to_owned(), |cot| format!("{cot:.2}")),
-                remarks(cycle.settled, cycle.host_paused_s),
+                remarks(cycle.advance_m, cycle.settled, cycle.host_paused_s),
             )?;
         }
         if let Some(Some(predicted_m)) = self.cycles.last().map(|cycle| cycle.predicted_advance_m) {
@@ -418,6 +460,15 @@ impl fmt::Display for Summary {
                 "alarm  {}{cell}: {}, raised at {:.2} s, {cleared}; {:.4} against {:.4}",
                 alarm.alarm, alarm.severity, alarm.raised_s, alarm.value, alarm.threshold
             )?;
+        }
+        for coverage in &self.alarm_coverage {
+            // What the user has not configured he does not miss.
+            if let Some(reason) = coverage
+                .reason
+                .filter(|_| coverage.alarm != AlarmKind::BatteryLow.name())
+            {
+                writeln!(f, "{:<8} {}: {reason}", coverage.coverage, coverage.alarm)?;
+            }
         }
         let timing = &self.timing;
         writeln!(f, "timing µs     p50      p99    p99.9      max")?;

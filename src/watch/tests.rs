@@ -6,7 +6,7 @@ use crate::relay::wire::{Answer, Driver, Line, Request, Subject, to_bytes};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::style::Color;
-use worm_estimator::config::Worm as WormConfig;
+use worm_estimator::config::Config;
 use worm_estimator::message::{
     Alarm, AlarmKind, Cycle, Estimate, FieldAccess, Inferred, InferredStanding, Mode, RecordingProblem, RecordingState,
     RecordingStatus, Severity, State, Timing,
@@ -258,7 +258,7 @@ fn a_worm_that_nobody_sees_is_drawn_hollow_where_it_should_be() {
     for part in ["▐1▌", "~1.71±0.06", "at ~64±4 mm"] {
         assert!(seen.contains(part), "{part:?} is missing in\n{seen}");
     }
-    let summary = serde_json::to_value(Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling)).expect("JSON");
+    let summary = serde_json::to_value(Summary::new(&Config::default(), &telemetry, Mode::Crawling)).expect("JSON");
     assert_eq!(summary["inferred"]["friction_n"][3], 1.71);
     assert_eq!(summary["inferred"]["standing"], "fitted");
 }
@@ -291,7 +291,7 @@ fn an_unsettled_cycle_has_no_energy() {
         energy_loss_sigma_j: f64::NAN,
         ..*telemetry.cycles.last().expect("two cycles")
     });
-    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling);
+    let summary = Summary::new(&Config::default(), &telemetry, Mode::Crawling);
     assert_eq!(summary.cycles[2].cot, None);
     for text in [summary.to_string(), painted(110, 34, &telemetry)] {
         assert!(!text.contains("NaN"), "{text}");
@@ -405,7 +405,7 @@ fn what_is_old_looks_old() {
     });
     let mut app = screen(Seat::Watch, &old, None);
     let frame = |time_ns: u64| {
-        let mut worm = RelayedWorm::new(Subject::of(&worm_estimator::config::Config::default()));
+        let mut worm = RelayedWorm::new(Subject::of(&Config::default()));
         worm.telemetry = old.clone();
         Line::Frame(Box::new(worm.frame(2, time_ns, Seen::default(), 1, None)))
     };
@@ -486,7 +486,7 @@ fn keys_ask_for_what_they_say() {
 
 #[test]
 fn a_summary_is_what_was_heard() {
-    let summary = Summary::new(&WormConfig::default(), &received(3.4), Mode::Crawling);
+    let summary = Summary::new(&Config::default(), &received(3.4), Mode::Crawling);
     let json = serde_json::to_value(&summary).expect("serialises");
     assert_eq!(json["ticks"], 101);
     assert_eq!(json["cycles"].as_array().map(Vec::len), Some(3));
@@ -518,7 +518,7 @@ fn a_mismatch_comes_with_its_place() {
         ..alarm(3, 6_000_000_000, 1)
     });
     let words = "cell 2 while cell 3 steps, phase 0.55: +0.31 mm a cycle unexplained";
-    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling);
+    let summary = Summary::new(&Config::default(), &telemetry, Mode::Crawling);
     assert!(summary.to_string().contains(words), "{summary}");
     let places: Vec<_> = summary.alarms.iter().map(|alarm| alarm.place.is_some()).collect();
     assert_eq!(places, [false, false, true]);
@@ -560,7 +560,7 @@ fn a_recording_is_shown() {
     for part in ["recording stopped: disk-full", "recording-stopped: disk-full"] {
         assert!(picture.contains(part), "{part} is not in {picture}");
     }
-    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling).to_string();
+    let summary = Summary::new(&Config::default(), &telemetry, Mode::Crawling).to_string();
     assert!(summary.contains("recording-stopped (disk-full): warning"), "{summary}");
 }
 
@@ -577,7 +577,7 @@ fn what_is_raised_does_not_depend_on_what_is_kept() {
     }
     let raised: Vec<u32> = telemetry.raised().iter().map(|alarm| alarm.kind).collect();
     assert_eq!(raised, [AlarmKind::JammedCell.code(), AlarmKind::LinkFault.code()]);
-    let summary = Summary::new(&WormConfig::default(), &telemetry, Mode::Crawling);
+    let summary = Summary::new(&Config::default(), &telemetry, Mode::Crawling);
     assert_eq!(
         (summary.alarm_changes_dropped, summary.alarms.len()),
         (20_000 - 8_192, 4_096)

@@ -439,7 +439,7 @@ fn draw_cycles(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
         };
         let fields = [
             format!("{:5}", cycle.index),
-            format!("{:7.2}", cycle.advance_m * 1e3),
+            format!(" {}", number(cycle.advance_m * 1e3, 2)),
             number(cycle.predicted_advance_m * 1e3, 2),
             energy,
             number(cycle.predicted_energy_loss_j * 1e3, 1),

@@ -64,7 +64,9 @@ pub fn moments(log: &Log, config: &Config) -> Vec<Moment> {
     moments.extend(of_commands(&log.commands));
     moments.extend(of_states(&log.states));
     moments.extend(silences_of_servo(&log.states));
-    moments.extend(silences_of_tracker(&log.states, config));
+    if let Some(rate_hz) = config.tracker_rate_hz() {
+        moments.extend(silences_of_tracker(&log.states, rate_hz));
+    }
     moments.extend(limits(&log.states, config));
     // Of several at one moment, what the controller read comes first, and what it did last.
     let rank = |kind: MomentKind| match kind {
@@ -239,8 +241,8 @@ fn silences_of_servo(states: &[State]) -> Vec<Moment> {
 }
 
 /// Times without a new sample of the tracker, while the servo answered.
-fn silences_of_tracker(states: &[State], config: &Config) -> Vec<Moment> {
-    let longest_ns = (SILENT_PERIODS * 1e9 / config.tracker.rate_hz) as u64;
+fn silences_of_tracker(states: &[State], rate_hz: f64) -> Vec<Moment> {
+    let longest_ns = (SILENT_PERIODS * 1e9 / rate_hz) as u64;
     let mut moments = Vec::new();
     let mut since_ns: Option<u64> = None;
     let mut end = |since_ns: Option<u64>, until_ns: u64| {

@@ -17,7 +17,7 @@ use worm_estimator::config::Config;
 use wormd::link::virtual_worm::{Options, VirtualWorm};
 use wormd::link::{
     FaultInjector, Faults, LinkSettings, Port, Prepared, ReadMode, ReadPlan, StartupError, TrackerReading,
-    TransactionError, Tty, WormBus, prepare, tracker,
+    TrackerSettings, TransactionError, Tty, WormBus, prepare, tracker,
 };
 
 const BAUD: u32 = 1_000_000;
@@ -255,16 +255,19 @@ fn settings(read: ReadMode) -> LinkSettings {
         baud: BAUD,
         servo_id: id(1),
         servo_model: 1200,
-        tracker_id: id(100),
-        tracker_model: tracker::MODEL,
-        cells: CELLS,
+        tracker: Some(TrackerSettings {
+            id: id(100),
+            model: tracker::MODEL,
+            cells: CELLS,
+            emergency_stop_mask: None,
+            may_be_silent: false,
+        }),
         read,
         watchdog_ms: 2_000,
         current_limit_a: 1.0,
         winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 6.0,
         temperature_limit_c: 70.0,
-        emergency_stop_mask: None,
         accept_unsafe_watchdog: false,
     }
 }
@@ -287,8 +290,9 @@ fn example_tracker_and_a_servo_on_one_line_are_prepared_and_exchanged_with() {
     for plan in [ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate] {
         let mut bus = WormBus::new(line.open());
         let prepared = prepare_patiently(&mut bus, &settings(ReadMode::Always(plan)));
-        assert_eq!((prepared.plan.read, usize::from(prepared.tracker_cells)), (plan, CELLS));
-        assert_is_of_the_pattern(&prepared.tracker_reading, CELLS);
+        let tracker = prepared.tracker.expect("the example tracker");
+        assert_eq!((prepared.plan.read, usize::from(tracker.cells)), (plan, CELLS));
+        assert_is_of_the_pattern(&tracker.reading, CELLS);
         bus.set_torque(prepared.plan.servo, true).expect("torque");
         let mut complete = 0;
         for _ in 0..50 {

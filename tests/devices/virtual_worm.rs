@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use wormd::link::virtual_worm::{Options, VirtualWorm};
-use wormd::link::{LinkSettings, ReadMode, ReadPlan, StartupError, Tty, WormBus, prepare, tracker};
+use wormd::link::{LinkSettings, ReadMode, ReadPlan, StartupError, TrackerSettings, Tty, WormBus, prepare, tracker};
 
 const BAUD: u32 = 1_000_000;
 
@@ -20,21 +20,28 @@ fn spawn(faults: &[&str], baud: Option<u32>) -> VirtualWorm {
     VirtualWorm::spawn(&Config::default(), &options).expect("a virtual worm")
 }
 
+fn tracker_settings(emergency_stop_mask: Option<u8>) -> TrackerSettings {
+    TrackerSettings {
+        id: DeviceId::new(100).expect("an ID"),
+        model: tracker::MODEL,
+        cells: 4,
+        emergency_stop_mask,
+        may_be_silent: false,
+    }
+}
+
 fn settings() -> LinkSettings {
     LinkSettings {
         baud: BAUD,
         servo_id: DeviceId::new(1).expect("an ID"),
         servo_model: 1200,
-        tracker_id: DeviceId::new(100).expect("an ID"),
-        tracker_model: tracker::MODEL,
-        cells: 4,
+        tracker: Some(tracker_settings(None)),
         read: ReadMode::Auto,
         watchdog_ms: 100,
         current_limit_a: 1.0,
         winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 6.0,
         temperature_limit_c: 70.0,
-        emergency_stop_mask: None,
         accept_unsafe_watchdog: false,
     }
 }
@@ -181,7 +188,7 @@ fn emergency_stop_comes_with_each_reading_of_the_tracker() {
             let mut bus = open(worm.path(), BAUD);
             let settings = LinkSettings {
                 read: ReadMode::Always(read),
-                emergency_stop_mask: Some(2),
+                tracker: Some(tracker_settings(Some(2))),
                 watchdog_ms: 2540,
                 ..settings()
             };

@@ -20,6 +20,7 @@ mod service;
 mod stopping;
 mod trips;
 mod watching;
+mod without_tracker;
 mod worm;
 
 use std::time::Duration;

@@ -11,6 +11,7 @@
 //! - `pauses`: a pause of the computer, in whole or in part, is not a fault of the worm and does not distort the energies.
 //! - `range`: how far the battery lasts, against worms that crawl until it does not.
 //! - `self_sensing`: what the current of the motor says of the virtual worm, against its ledger.
+//! - `without_positions`: worms without a tracker, and with one that dies and may.
 //! - `hours`: healthy worms on many kinds of journeys raise no alarm. **`WORMD_HOURS=100`** makes the journeys 100 hours long.
 //!   With it, `mismatch` tries all of its healthy worms, otherwise half of them.
 //!
@@ -29,3 +30,4 @@ mod self_sensing;
 mod soak;
 mod stall;
 mod why;
+mod without_positions;

@@ -5,7 +5,7 @@ use std::time::Instant;
 use worm_physics::MAX_CELLS;
 use wormd::link::servo::BLOCK_LEN;
 use wormd::link::tracker::block_len;
-use wormd::link::{ExchangePlan, Port, PortError, ReadPlan, ServoReading, TrackerReading, WormBus};
+use wormd::link::{ExchangePlan, Port, PortError, ReadPlan, ServoReading, TrackerQuery, TrackerReading, WormBus};
 
 /// The bytes as a block of each device; then as what both answer in ticks, see [`Answers`].
 pub(crate) fn tracker_table(data: &[u8]) {
@@ -60,10 +60,12 @@ fn exchange(data: &[u8], read: ReadPlan) {
     };
     let plan = ExchangePlan {
         servo,
-        tracker,
-        cells: 4,
+        tracker: Some(TrackerQuery {
+            id: tracker,
+            cells: 4,
+            emergency_stop_mask: Some(1),
+        }),
         read,
-        emergency_stop_mask: Some(1),
     };
     let mut bus = WormBus::new(Answers { rest: data });
     for _ in 0..MAX_TICKS {

@@ -15,6 +15,10 @@ const TRIES: usize = 20;
 /// … and not before so many states.
 const MIN_TRIED_STATES: usize = 100_000;
 
+/// Where states without a sample are answered, the first estimate comes within so many states of the start: silence of the tracker counts
+/// from there.
+const MAX_UNANSWERED: usize = 500;
+
 /// The estimator's results on a log's states.
 #[derive(Debug, Clone)]
 pub struct Replay {
@@ -22,7 +26,7 @@ pub struct Replay {
     pub first: usize,
     /// Whether that is the first state of the recorded estimator.
     pub first_is_known: bool,
-    /// One for each new sample.
+    /// One for each new sample, and for each state at which one was due without.
     pub estimates: Vec<Estimate>,
     /// The gait cycles that ended.
     pub cycles: Vec<Cycle>,
@@ -49,9 +53,10 @@ pub fn replay(log: &Log, config: &Config) -> Result<Replay, EstimatorError> {
         .take(FIRST_ESTIMATES)
         .map(recorder_alarm::without)
         .collect();
+    let sampled_only = !config.position_source().may_be_missing();
     let starts = match first_by_message(log) {
         Some(first) => first..first + 1,
-        None => possible_starts(&log.states, recorded.first()),
+        None => possible_starts(&log.states, recorded.first(), sampled_only),
     };
     for first in starts {
         let (mut found, fed) = run(log, first, config, recorded.len())?;
@@ -99,16 +104,21 @@ fn first_by_message(log: &Log) -> Option<usize> {
         .position(|state| (state.time_ns, state.sequence) == key)
 }
 
-/// Indices of the states at which an estimator with this first estimate can have started.
-fn possible_starts(states: &[State], first_estimate: Option<&Estimate>) -> std::ops::Range<usize> {
+/// Indices of the states at which an estimator with this first estimate can have started. `sampled_only`: it answers only states with a
+/// sample.
+fn possible_starts(states: &[State], first_estimate: Option<&Estimate>, sampled_only: bool) -> std::ops::Range<usize> {
     let Some(estimate) = first_estimate else { return 0..0 };
     let Some(last) = states.iter().position(|state| is_of(estimate, state)) else {
         return 0..0;
     };
-    // An earlier state with a sample would have given an earlier estimate.
-    let sample_before = states[..last]
-        .iter()
-        .rposition(|state| state.sample_is_new == 1 && state.phase.is_finite());
+    // An earlier state that had to be answered would have given an earlier estimate, if only a little later.
+    let is_answered = |state: &State| state.phase.is_finite() && (state.sample_is_new == 1 || !sampled_only);
+    let reach = if sampled_only {
+        last
+    } else {
+        last.saturating_sub(MAX_UNANSWERED)
+    };
+    let sample_before = states[..reach].iter().rposition(is_answered);
     sample_before.map_or(0, |index| index + 1)..last + 1
 }
 

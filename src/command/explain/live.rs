@@ -105,6 +105,13 @@ impl<'a> CycleProgress<'a> {
                 "{worm} does not crawl ({why}): let it crawl first, with `wormd command crawl --name {worm}`"
             )));
         }
+        if state.sample == 0 {
+            let worm = self.worm;
+            return Err(Failure::unusable(format!(
+                "{worm} has no cell positions, and the search needs them: `wormd record --name {worm}` and `wormd infer` say what the motor's \
+                 current shows"
+            )));
+        }
         if state.phase.is_finite() {
             self.phase = state.phase;
             self.first_phase.get_or_insert(state.phase);

@@ -84,9 +84,14 @@ impl Painter for LinePainter {
 }
 
 fn cycle_line(cycle: &Cycle) -> String {
-    let head = format!("cycle {:>4}: advance {:6.2} mm, ", cycle.index, cycle.advance_m * 1e3);
+    let advance = if cycle.advance_m.is_finite() {
+        format!("advance {:6.2} mm, ", cycle.advance_m * 1e3)
+    } else {
+        String::new()
+    };
+    let head = format!("cycle {:>4}: {advance}", cycle.index);
     let electrical = format!("{:.1} mJ electrical", cycle.energy_electrical_j * 1e3);
-    let remarks = remarks(cycle.settled != 0, cycle.host_paused_s);
+    let remarks = remarks(cycle.advance_m, cycle.settled != 0, cycle.host_paused_s);
     if !cycle.energy_loss_sigma_j.is_finite() {
         return format!("{head}{electrical}{remarks}");
     }

@@ -13,7 +13,8 @@ pub(super) fn identify_servo<P: Port>(bus: &mut WormBus<P>, settings: &LinkSetti
         return found;
     };
     // The tracker answers: it is not the baud rate.
-    if bus.ping(settings.tracker_id, Instant::now() + REPLY_TIME).is_ok() {
+    let mut answers = |id| bus.ping(id, Instant::now() + REPLY_TIME).is_ok();
+    if settings.tracker.is_some_and(|tracker| answers(tracker.id)) {
         return found;
     }
     let mut rate_found = None;

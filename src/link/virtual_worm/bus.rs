@@ -29,6 +29,7 @@ pub(super) struct Bus {
     conditions: Conditions,
     plant: Plant,
     servo: Servo,
+    has_tracker: bool, // else the tracker is not on the bus: it hears and says nothing
     tracker: Tracker,
     line: Line,
 }
@@ -51,6 +52,7 @@ impl Bus {
             conditions: Conditions::default(),
             plant: Plant::with_step(config, options.seed, options.step_s.unwrap_or(DEFAULT_STEP_S))?,
             servo: Servo::new(config, options.baud),
+            has_tracker: config.tracker.present,
             tracker: Tracker::new(config),
             line: Line::new(derived_seed(options.seed.unwrap_or(config.virtual_worm.seed))),
         };
@@ -194,9 +196,10 @@ impl Bus {
     /// The device with this ID, if it can receive.
     fn device(&self, id: DeviceId) -> Option<Device> {
         let servo_hears = !self.conditions.wire.servo_silent && self.servo.is_awake(self.now_s);
+        let tracker_hears = self.has_tracker && !self.conditions.wire.tracker_silent;
         if servo_hears && self.servo.id() == id {
             Some(Device::Servo)
-        } else if !self.conditions.wire.tracker_silent && self.tracker.id() == id {
+        } else if tracker_hears && self.tracker.id() == id {
             Some(Device::Tracker)
         } else if servo_hears && self.servo.has_secondary_id(id) {
             Some(Device::Servo)

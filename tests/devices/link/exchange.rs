@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use dynamixel_bus::packet::{ReadSpan, StatusError};
 use wormd::link::servo::{self, register, scale};
-use wormd::link::{ExchangePlan, PortError, ReadFailure, ReadPlan, TransactionError, WormBus};
+use wormd::link::{ExchangePlan, PortError, ReadFailure, ReadPlan, TrackerQuery, TransactionError, WormBus};
 
 use super::worm::{SERVO, TRACKER, Worm, id};
 
@@ -14,10 +14,12 @@ const GOAL_RAD_S: f64 = 2.518;
 fn plan(read: ReadPlan) -> ExchangePlan {
     ExchangePlan {
         servo: id(SERVO),
-        tracker: id(TRACKER),
-        cells: CELLS,
+        tracker: Some(TrackerQuery {
+            id: id(TRACKER),
+            cells: CELLS,
+            emergency_stop_mask: None,
+        }),
         read,
-        emergency_stop_mask: None,
     }
 }
 
@@ -32,6 +34,25 @@ fn bus() -> WormBus<Worm> {
 
 fn soon() -> Instant {
     Instant::now() + Duration::from_millis(50)
+}
+
+/// Whatever the tracker would say: it is not asked, and nothing waits for it.
+#[test]
+fn a_worm_without_a_tracker_asks_the_servo_alone() {
+    for read in [ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate] {
+        let mut bus = bus();
+        let plan = ExchangePlan {
+            tracker: None,
+            ..plan(read)
+        };
+        let outcome = bus.exchange(&plan, GOAL_RAD_S, soon());
+        let servo = outcome.servo.expect("the servo's block");
+        assert!((servo.goal_velocity_rad_s - GOAL_RAD_S).abs() < scale::VELOCITY_RAD_S / 2.0);
+        assert_eq!(outcome.tracker, Err(ReadFailure::NotAsked));
+        assert!(outcome.is_complete() && outcome.emergency_stop.is_none());
+        assert_eq!((outcome.sent_bytes, outcome.received_bytes), (30, 60), "{read:?}");
+        assert_eq!(bus.counters().timeouts + bus.exchange_counters().partial_answers, 0);
+    }
 }
 
 #[test]

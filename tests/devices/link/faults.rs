@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::time::{Duration, Instant};
 
 use wormd::link::servo::{register, scale};
-use wormd::link::{ExchangePlan, FaultInjector, Faults, Port, PortError, ReadPlan, WormBus};
+use wormd::link::{ExchangePlan, FaultInjector, Faults, Port, PortError, ReadPlan, TrackerQuery, WormBus};
 
 use super::worm::{SERVO, TRACKER, Worm, id};
 
@@ -21,10 +21,12 @@ fn bus(faults: Faults, seed: u64) -> WormBus<FaultInjector<Worm>> {
 fn plan(read: ReadPlan) -> ExchangePlan {
     ExchangePlan {
         servo: id(SERVO),
-        tracker: id(TRACKER),
-        cells: 5,
+        tracker: Some(TrackerQuery {
+            id: id(TRACKER),
+            cells: 5,
+            emergency_stop_mask: None,
+        }),
         read,
-        emergency_stop_mask: None,
     }
 }
 

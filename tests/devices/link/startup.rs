@@ -3,8 +3,8 @@
 use dynamixel_bus::packet::DeviceId;
 use wormd::link::servo::register;
 use wormd::link::{
-    FaultInjector, Faults, Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError, WormBus,
-    prepare, tracker,
+    FaultInjector, Faults, Finding, LinkSettings, OperationError, Prepared, ReadMode, ReadPlan, StartupError,
+    TrackerSettings, WormBus, prepare, tracker,
 };
 
 use super::worm::{SERVO, TRACKER, Worm, id};
@@ -14,16 +14,19 @@ pub fn settings() -> LinkSettings {
         baud: 1_000_000,
         servo_id: id(SERVO),
         servo_model: 1200,
-        tracker_id: id(TRACKER),
-        tracker_model: tracker::MODEL,
-        cells: 5,
+        tracker: Some(TrackerSettings {
+            id: id(TRACKER),
+            model: tracker::MODEL,
+            cells: 5,
+            emergency_stop_mask: None,
+            may_be_silent: false,
+        }),
         read: ReadMode::Auto,
         watchdog_ms: 100,
         current_limit_a: 1.0,
         winding_resistance_ohm: 3.4,
         velocity_limit_rad_s: 10.0,
         temperature_limit_c: 70.0,
-        emergency_stop_mask: None,
         accept_unsafe_watchdog: false,
     }
 }
@@ -44,8 +47,12 @@ fn servo_from_the_factory_is_set_up() {
     let (prepared, findings) = prepare_worm(&mut worm, &settings());
     let prepared = prepared.expect("prepared");
     assert_eq!(
-        (prepared.plan.read, prepared.tracker_cells, prepared.servo.firmware),
-        (ReadPlan::FastBulk, 5, 52)
+        (
+            prepared.plan.read,
+            prepared.tracker.map(|tracker| tracker.cells),
+            prepared.servo.firmware
+        ),
+        (ReadPlan::FastBulk, Some(5), 52)
     );
     assert!((prepared.servo_reading.position_rad - std::f64::consts::TAU).abs() < 1e-9);
     assert_eq!(
@@ -71,6 +78,35 @@ fn servo_from_the_factory_is_set_up() {
     let (prepared, findings) = prepare_worm(&mut worm, &settings());
     assert!(prepared.is_ok());
     assert_eq!(findings, []);
+}
+
+#[test]
+fn a_tracker_is_looked_for_only_where_there_is_one_and_missed_only_where_it_must_be() {
+    let mut worm = Worm::new(5);
+    worm.quirks.tracker_silent = true;
+    let tracker = settings().tracker;
+    let of = |tracker| LinkSettings { tracker, ..settings() };
+    let (refused, _) = prepare_worm(&mut worm, &of(tracker));
+    let refusal = refused.expect_err("the tracker is needed").to_string();
+    assert!(refusal.contains("tracker.present = false"), "{refusal}");
+
+    let (prepared, findings) = prepare_worm(&mut worm, &of(None));
+    let prepared = prepared.expect("there is none");
+    assert_eq!((prepared.tracker, prepared.plan.tracker), (None, None));
+    assert!(findings.iter().all(|finding| finding.corrected), "{findings:?}");
+
+    let may_be_silent = tracker.map(|tracker| TrackerSettings {
+        may_be_silent: true,
+        ..tracker
+    });
+    let (prepared, findings) = prepare_worm(&mut worm, &of(may_be_silent));
+    let prepared = prepared.expect("it may be silent");
+    assert!(prepared.tracker.is_none() && prepared.plan.tracker.is_some());
+    let open: Vec<_> = findings.iter().filter(|finding| !finding.corrected).collect();
+    assert!(
+        matches!(open[..], [finding] if finding.what.contains("does not answer")),
+        "{open:?}"
+    );
 }
 
 #[test]
@@ -220,7 +256,9 @@ fn refusals_say_what_is_wrong_and_what_to_do() {
              does so)",
         ),
         (
-            |_, settings| settings.cells = 6,
+            |_, settings| {
+                settings.tracker = settings.tracker.map(|tracker| TrackerSettings { cells: 6, ..tracker });
+            },
             "the tracker tracks 5 cells, the config says 6: correct worm.cells, or set up the tracker",
         ),
         (

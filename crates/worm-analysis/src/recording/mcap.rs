@@ -53,7 +53,7 @@ pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, Read
     let longest = runs.into_iter().max_by_key(|run| run.samples.len());
     let longest = longest.filter(|run| !run.samples.is_empty()).ok_or_else(|| {
         if count > 0 {
-            let remedy = "record a worm whose tracker works: see `wormd check`";
+            let remedy = "`wormd infer` says what the motor's current shows; positions need a tracker that works: see `wormd check`";
             return nothing(path, "holds no sample of the tracker", remedy);
         }
         // What is compressed may be lost whole where the file is cut.

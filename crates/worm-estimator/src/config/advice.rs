@@ -1,6 +1,6 @@
 //! Settings that are valid but inadvisable.
 
-use super::{Config, Policy};
+use super::{Config, EmergencyStopSource, Policy, PositionSource};
 use crate::message::AlarmKind;
 
 /// One setting that is valid but inadvisable, and a better choice.
@@ -65,9 +65,22 @@ pub(super) fn advise(config: &Config) -> Vec<Advice> {
         "above servo.current_limit_a, so it can never be reached".to_owned(),
     );
     say(
-        config.tracker.rate_hz > config.control.rate_hz,
+        config
+            .tracker_rate_hz()
+            .is_some_and(|rate_hz| rate_hz > config.control.rate_hz),
         "tracker.rate_hz",
         "faster than the loop reads: samples will be missed".to_owned(),
+    );
+    let stops_at_tracker = config
+        .emergency_stop
+        .as_ref()
+        .is_some_and(|stop| stop.source == EmergencyStopSource::Tracker);
+    say(
+        stops_at_tracker && config.position_source() == PositionSource::TrackerWhileItLasts,
+        "control.on_stale_tracker",
+        "\"continue\" with an emergency stop at the tracker: where the tracker falls silent the emergency stop cannot be read, which stops \
+         the worm; give emergency_stop.source = \"gpio\""
+            .to_owned(),
     );
     say(
         config.alarms.of(AlarmKind::MotorStall).policy == Policy::Warn,

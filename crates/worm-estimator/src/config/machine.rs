@@ -153,6 +153,9 @@ impl Servo {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tracker {
+    /// Whether there is one. Without it the worm crawls without positions, and no other key here counts but `rate_hz`, at which
+    /// estimates are made then.
+    pub present: bool,
     /// Device ID on the bus.
     pub id: u8,
     /// Required model number.
@@ -166,6 +169,7 @@ pub struct Tracker {
 impl Default for Tracker {
     fn default() -> Self {
         Self {
+            present: true,
             id: 100,
             model_number: 0x574D,
             rate_hz: 120.0,
@@ -177,7 +181,8 @@ impl Default for Tracker {
 impl Tracker {
     pub(super) fn check(&self, servo_id: u8, checker: &mut Checker) {
         checker.range("tracker.id", self.id, 0..=252, "");
-        checker.require(self.id != servo_id, "tracker.id", self.id, "must differ from servo.id");
+        let is_own_id = !self.present || self.id != servo_id;
+        checker.require(is_own_id, "tracker.id", self.id, "must differ from servo.id");
         checker.range("tracker.rate_hz", self.rate_hz, 20.0..=2000.0, "Hz");
         checker.range("tracker.noise_m", self.noise_m, 1e-7..=5e-3, "m");
     }
@@ -228,7 +233,13 @@ fn default_emergency_timeout_s() -> f64 {
 }
 
 impl EmergencyStop {
-    pub(super) fn check(&self, checker: &mut Checker) {
+    pub(super) fn check(&self, has_tracker: bool, checker: &mut Checker) {
+        checker.require(
+            has_tracker || self.source != EmergencyStopSource::Tracker,
+            "emergency_stop.source",
+            "\"tracker\"",
+            "needs the tracker, and tracker.present = false: give \"gpio\", or leave the section out and keep a hand on the supply's switch",
+        );
         checker.range("emergency_stop.mask", self.mask, 1..=255, "");
         checker.range("emergency_stop.timeout_s", self.timeout_s, 0.005..=5.0, "s");
         if self.source == EmergencyStopSource::Gpio {
@@ -260,6 +271,8 @@ pub struct Control {
     pub link_timeout_s: f64,
     /// Time without a new tracker sample after which the tracker counts as stale, s.
     pub tracker_timeout_s: f64,
+    /// What a crawling worm does when the tracker is stale.
+    pub on_stale_tracker: OnStaleTracker,
     /// Estimator silence after which it counts as gone, s.
     pub estimator_timeout_s: f64,
     /// Whether the worm crawls only while an estimator is running.
@@ -282,6 +295,16 @@ pub struct Control {
     pub idle_disarm_s: f64,
     /// Where torque goes off after idling.
     pub idle_disarm: IdleDisarm,
+}
+
+/// What a crawling worm does when the tracker gives no samples any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnStaleTracker {
+    /// Stops and latches the fault `tracker-stale`.
+    Stop,
+    /// Crawls on without positions until they come again.
+    Continue,
 }
 
 /// What a crawling worm does when whoever made it crawl is gone.
@@ -318,6 +341,7 @@ impl Default for Control {
             bus_wait_share: 0.7,
             link_timeout_s: 0.1,
             tracker_timeout_s: 0.5,
+            on_stale_tracker: OnStaleTracker::Stop,
             estimator_timeout_s: 0.5,
             require_estimator: true,
             hold_gain_per_s: 5.0,

@@ -15,6 +15,7 @@ mod effect;
 mod effect_table;
 mod machine;
 mod physics;
+mod positions;
 mod self_sensing;
 mod trip;
 mod virtual_worm;
@@ -28,10 +29,11 @@ pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use effect_table::{OneOrTwo, Rows, TableFields};
 pub use machine::{
-    Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, Port, ReadMode,
-    Realtime, Servo, Topics, Tracker,
+    Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, OnStaleTracker, Port,
+    ReadMode, Realtime, Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;
+pub use positions::PositionSource;
 pub use self_sensing::{ReportedCurrent, SelfSensing};
 pub use trip::{OnLinkBack, OnLinkLoss, OnStuck, Trip};
 pub use virtual_worm::{PresentCurrent, ServoEffect, VirtualWorm};
@@ -168,7 +170,7 @@ impl Config {
         self.servo.check(&mut checker);
         self.tracker.check(self.servo.id, &mut checker);
         if let Some(emergency_stop) = &self.emergency_stop {
-            emergency_stop.check(&mut checker);
+            emergency_stop.check(self.tracker.present, &mut checker);
         }
         self.control.check(&mut checker);
         self.limits.check(&mut checker);
@@ -204,7 +206,8 @@ impl Config {
             ),
         );
         let tick_s = 1.0 / self.control.rate_hz;
-        let sample_s = 1.0 / self.tracker.rate_hz;
+        // A tracker that is not there is never stale.
+        let sample_s = self.tracker_rate_hz().map_or(0.0, |rate_hz| 1.0 / rate_hz);
         for (key, value, timeout_s, period_s, periods) in [
             (
                 "servo.watchdog_ms",

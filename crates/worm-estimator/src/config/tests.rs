@@ -169,6 +169,10 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         ),
         ("[tracker]\nid = 1\n", "tracker.id = 1: must differ from servo.id"),
         (
+            "[tracker]\npresent = false\n[emergency_stop]\nsource = \"tracker\"\n",
+            "emergency_stop.source = \"tracker\": needs the tracker, and tracker.present = false: give \"gpio\"",
+        ),
+        (
             "[alarms]\njammed_cell = { policy = \"panic\", threshold = 0.5 }\n",
             "worm.toml:2:26: unknown variant `panic`",
         ),
@@ -182,7 +186,7 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         ),
         (
             "[control]\nrate_hz = 10.0\n",
-            "servo.watchdog_ms = 100: must be at least two ticks at control.rate_hz (0.200 s)",
+            "servo.watchdog_ms = 80: must be at least two ticks at control.rate_hz (0.200 s)",
         ),
         (
             "[tracker]\nrate_hz = 20.0\n[control]\ntracker_timeout_s = 0.02\n",
@@ -286,4 +290,29 @@ fn inadvisable_settings_are_reported() {
     let config = Config::from_toml(inadvisable, file()).expect("valid");
     let keys: Vec<_> = config.advice().iter().map(|advice| advice.key).collect();
     assert_eq!(keys, ["port.baud", "servo.watchdog_ms"]);
+}
+
+#[test]
+fn a_worm_needs_no_other_keys_to_have_no_tracker() {
+    let source = |toml: &str| {
+        let config = Config::from_toml(toml, file()).expect("a valid configuration");
+        (
+            config.position_source(),
+            config.tracker_rate_hz().is_some(),
+            config.advice().len(),
+        )
+    };
+    assert_eq!(source(""), (PositionSource::Tracker, true, 0));
+    // Its ID, rate and time-out do not matter then.
+    let without = "[tracker]\npresent = false\nid = 1\nrate_hz = 20.0\n[control]\ntracker_timeout_s = 0.02\n";
+    assert_eq!(source(without), (PositionSource::Nothing, false, 0));
+    let may_die = "[control]\non_stale_tracker = \"continue\"\n";
+    assert_eq!(source(may_die), (PositionSource::TrackerWhileItLasts, true, 0));
+    let stops_all_the_same = format!("{may_die}[emergency_stop]\nsource = \"tracker\"\n");
+    assert_eq!(
+        source(&stops_all_the_same),
+        (PositionSource::TrackerWhileItLasts, true, 1)
+    );
+    let example = include_str!("../../../../config/no-tracker.toml");
+    assert_eq!(source(example), (PositionSource::Nothing, false, 0));
 }

@@ -14,11 +14,12 @@ use super::fit::Fit;
 use super::gait::StepSequence;
 use super::mismatch::{Mismatch, ResidualMap};
 use super::motor_time::MotorTime;
+use super::pace::Pace;
 use super::prediction::Predictor;
 use super::unknown;
 use super::update::{EstimatorError, Update};
 use super::window::Window;
-use crate::config::{Config, DeformationSource};
+use crate::config::{Config, DeformationSource, PositionSource};
 use crate::message::{Cycle, Estimate, Mode, State};
 use worm_physics::MAX_CELLS;
 
@@ -49,6 +50,7 @@ pub struct Estimator {
     contacts: Contacts,
     motor_time: MotorTime,
     capture: Capture,
+    pace: Pace,
     host_paused_ns: u64, // as of the last state
     cycles: Cycles,
     electrical: Electrical,
@@ -66,6 +68,7 @@ pub struct Estimator {
     cycle_index: u64,
     last: Option<(u64, f64, f64)>, // sequence, time and phase of the last state
     last_seen: Option<(f64, f64)>, // time and phase of the last accepted position
+    is_blind: bool,                // the tracker fell silent, and no position was accepted since
     first_mean_m: f64,             // mean position when it was first known
     entered: (f64, f64),           // fraction of the present step at which it was entered, and the cell's lead then
     estimate: Estimate,
@@ -95,6 +98,7 @@ impl Estimator {
             contacts: Contacts::new(&tips),
             motor_time: MotorTime::default(),
             capture: Capture::default(),
+            pace: Pace::new(config),
             host_paused_ns: 0,
             cycles: Cycles::new(config.gait.direction.sign() as i32),
             electrical: Electrical::new(config.servo.winding_resistance_ohm),
@@ -119,9 +123,13 @@ impl Estimator {
             cycle_index: 0,
             last: None,
             last_seen: None,
+            is_blind: false,
             first_mean_m: f64::NAN,
             entered: (f64::NAN, f64::NAN),
-            estimate: unknown::estimate(cells),
+            estimate: match config.position_source() {
+                PositionSource::Nothing => unknown::estimate_without_positions(cells),
+                PositionSource::Tracker | PositionSource::TrackerWhileItLasts => unknown::estimate(cells),
+            },
             cycle: unknown::cycle(cells),
             tips,
         };
@@ -129,7 +137,7 @@ impl Estimator {
         Ok(estimator)
     }
 
-    /// The estimate after the last tracker sample, for a heartbeat; positions are `NaN` before the first.
+    /// The last estimate, for a heartbeat; positions are `NaN` before the first sample.
     pub fn latest(&self) -> &Estimate {
         &self.estimate
     }
@@ -182,6 +190,7 @@ impl Estimator {
         }
         let sampled = state.sample_is_new == 1 && state.phase.is_finite();
         if sampled {
+            self.pace.note_sample(time_s);
             self.take_sample(state, time_s, motor_s);
         }
         if state.phase.is_finite() {
@@ -191,11 +200,14 @@ impl Estimator {
         } else if let Some((sequence, ..)) = &mut self.last {
             *sequence = state.sequence;
         }
+        let unsampled = !sampled && state.phase.is_finite() && self.pace.is_due(time_s);
         if sampled {
             self.fill_estimate(state);
+        } else if unsampled {
+            self.fill_estimate_without_sample(state, time_s);
         }
         Update {
-            estimate: sampled.then_some(&self.estimate),
+            estimate: (sampled || unsampled).then_some(&self.estimate),
             cycle: cycle_ended.then_some(&self.cycle),
         }
     }
@@ -212,10 +224,12 @@ impl Estimator {
         self.filter.forget();
         self.motor_time.forget();
         self.capture.forget();
+        self.pace.forget();
         self.cycles.forget();
         self.electrical.restart();
         self.mismatch.forget();
         self.last_seen = None;
+        self.is_blind = false;
         self.last = None;
         self.lose_contacts();
     }
@@ -239,6 +253,7 @@ impl Estimator {
         let blind_steps = (phase - seen_phase).abs() * self.cells as f64;
         if blind_steps > MAX_BLIND_STEPS && time_s - seen_s > SHORTEST_SILENCE_PERIODS * self.tracker_period_s {
             self.last_seen = None;
+            self.is_blind = true;
             self.lose_contacts();
         }
     }
@@ -280,7 +295,7 @@ impl Estimator {
     /// Starts a window here, with the present contact points.
     fn begin_window(&mut self) {
         self.window.clear();
-        self.window_is_complete = true;
+        self.window_is_complete = !self.is_blind;
         self.mismatch.begin(self.cycles.direction());
         let sign = f64::from(self.cycles.direction());
         self.window_contact_m = self.contacts.contact_m().map(|contact_m| sign * contact_m);

@@ -22,6 +22,9 @@
 //! A cycle may start before the contact points of the tips are known: the first from rest, or the first after the tracker was silent.
 //! It is reported with guessed contact points, `settled = 0`, and standard errors that include the uncertainty of the guess.
 //!
+//! Without a tracker, or with one that has failed and may (`control.on_stale_tracker`), `pace` makes estimates from the ticks alone. Whatever
+//! follows from positions is `NaN` then; phase, cycles, electrical energy, charge and the other alarms go on.
+//!
 //! All positions are along the canal. Internally, `window`, `fit`, `energy_balance` and `bounds` look at a backward crawl from the
 //! other end of the canal, so that it runs forward, too.
 //!
@@ -49,6 +52,7 @@ mod inference;
 pub mod mismatch;
 mod motor_time;
 mod observer;
+mod pace;
 mod prediction;
 pub mod range;
 mod unknown;

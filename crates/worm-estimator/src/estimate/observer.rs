@@ -8,7 +8,7 @@ use crate::message::{BlackBoxStatus, CommandRecord, Cycle, Estimate, Inferred, R
 /// What one state gave.
 #[derive(Debug, Clone)]
 pub struct ObserverOutput {
-    /// The estimate, if the state carried a tracker sample.
+    /// The estimate, if the state carried a tracker sample, or one was due without.
     pub estimate: Option<Estimate>,
     /// The gait cycle that ended, if one did.
     pub cycle: Option<Cycle>,
@@ -72,7 +72,7 @@ impl Observer {
         let inferred = inference.and_then(|inference| inference.update(state)).copied();
         let observation = alarm::Observation {
             state,
-            estimate: estimate.as_ref(),
+            estimate: estimate.as_ref().filter(|_| state.sample_is_new == 1),
             cycle: cycle.as_ref(),
             residuals: Some(self.estimator.residual_map()),
             inferred: self.inference.as_ref().map(Inference::latest),

@@ -30,6 +30,16 @@ pub(super) fn estimate(cells: usize) -> Estimate {
     }
 }
 
+/// On a worm that never has positions, the totals that come from them are unknown, too, and not zero.
+pub(super) fn estimate_without_positions(cells: usize) -> Estimate {
+    Estimate {
+        forward_slide_m: NOT_KNOWN,
+        backward_slide_m: NOT_KNOWN,
+        energy_loss_j: f64::NAN,
+        ..estimate(cells)
+    }
+}
+
 pub(super) fn cycle(cells: usize) -> Cycle {
     Cycle {
         index: 0,

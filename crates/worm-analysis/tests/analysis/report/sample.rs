@@ -156,6 +156,7 @@ pub fn analysis(cells: usize, slope_deg: f64, cycles: usize, samples_per_cycle: 
         },
         warnings: vec!["x2_m: 84 gaps of up to 0.06 s were bridged".to_owned()],
         repairs: Vec::new(),
+        torque_profile: None,
         series,
     }
 }

@@ -11,6 +11,8 @@
 //! cycles. The way home may be steeper or flatter than the way out was; the last known cost is used for both. Before the first cycle that
 //! advanced, the way home is at most a few strokes, and only the reserve counts.
 //!
+//! On a worm without positions nobody knows how far it is home: then, too, only the reserve counts.
+//!
 //! The monitored value is (charge − reserve) over the energy for the way home.
 
 use super::cam_motion::{Tick, finite_or_zero};

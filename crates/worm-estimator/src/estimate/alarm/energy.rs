@@ -2,7 +2,8 @@
 //!
 //! Two CUSUM charts (see [`super::cusum`]), one for the electrical energy of a cycle and one for its locomotion energy by equation (11);
 //! either may raise the alarm. Only whole, undisturbed cycles count: crawling at one steady speed from end to end, with every tip's
-//! deformation known. The cost of a cycle depends on speed and direction, so a new regime calibrates anew and the alarm is unarmed
+//! deformation known. On a worm that may crawl without positions, cycles without them count in the chart of the electrical energy, from
+//! the second on: in the first the tips load up. The cost of a cycle depends on speed and direction, so a new regime calibrates anew and the alarm is unarmed
 //! meanwhile; a hold that resumes at the same speed keeps the calibration.
 
 use super::cam_motion::Tick;
@@ -21,6 +22,7 @@ pub(super) struct EnergyOverBudget {
     initial: CusumChart,
     electrical: CusumChart,
     locomotion: CusumChart,
+    may_lack_positions: bool,
     regime: u32,
     disturbed: bool, // since the last cycle ended
     reading: Option<Reading>,
@@ -36,6 +38,7 @@ impl EnergyOverBudget {
             electrical: initial.clone(),
             locomotion: initial.clone(),
             initial,
+            may_lack_positions: config.position_source().may_be_missing(),
             regime: 0,
             disturbed: true,
             reading: None,
@@ -55,7 +58,8 @@ impl EnergyOverBudget {
         if let Some(cycle) = cycle {
             let expected_s = 1.0 / tick.regime_cycles_per_s.abs();
             let whole = (cycle.duration_s - expected_s).abs() <= DURATION_FRACTION * expected_s;
-            if !self.disturbed && whole && cycle.settled == 1 {
+            let lacks_positions = self.may_lack_positions && cycle.advance_m.is_nan() && cycle.index > 0;
+            if !self.disturbed && whole && (cycle.settled == 1 || lacks_positions) {
                 self.evaluate(cycle);
             }
             self.disturbed = false;

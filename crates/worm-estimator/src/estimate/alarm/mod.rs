@@ -13,6 +13,9 @@
 //! threshold. Where it does not (energy), it is unarmed until then, and [`AlarmMonitor::armed_mask`] says so. Cycles with a fault are never
 //! used for calibration.
 //!
+//! **Without positions** jam, progress, sliding and model mismatch cannot be armed, and `energy` and `battery` watch less; `coverage` says
+//! what each can watch on the configured worm.
+//!
 //! **Clearing.** An alarm is cleared when its condition has clearly been over for a while. Stall, jam and lack of progress can exist only
 //! while the worm is commanded to move: they also clear two seconds after it no longer is, so that the fault that they caused can be
 //! reset. Energy, battery and model mismatch keep their alarm through pauses.
@@ -26,6 +29,7 @@
 mod battery;
 mod cam_motion;
 mod changes;
+mod coverage;
 mod cusum;
 mod device;
 mod energy;
@@ -46,6 +50,7 @@ mod tracker;
 mod tests;
 
 pub use changes::AlarmChanges;
+pub use coverage::Coverage;
 
 use crate::config::Config;
 use crate::estimate::ResidualMap;
@@ -101,7 +106,7 @@ struct Detectors {
     sliding: sliding::SlidingDown,
     energy: energy::EnergyOverBudget,
     link: link::LinkFault,
-    tracker: tracker::TrackerFault,
+    tracker: Option<tracker::TrackerFault>, // none without a tracker
     device: device::DeviceFault,
     mismatch: mismatch::ModelMismatch,
     by_position: [DetectorOutput; 3], // jam, progress, sliding, as of the last sample
@@ -121,7 +126,7 @@ impl AlarmMonitor {
             sliding: sliding::SlidingDown::new(config),
             energy: energy::EnergyOverBudget::new(config),
             link: link::LinkFault::new(config),
-            tracker: tracker::TrackerFault::new(config),
+            tracker: config.tracker.present.then(|| tracker::TrackerFault::new(config)),
             device: device::DeviceFault::new(config),
             mismatch: mismatch::ModelMismatch::new(config),
             by_position: [DetectorOutput::Unknown; 3],
@@ -257,7 +262,10 @@ impl AlarmMonitor {
             detectors.energy.update(tick, cycle, fault_free),
             self.battery.update(tick, state),
             detectors.link.update(tick, state),
-            detectors.tracker.update(tick, state),
+            match &mut detectors.tracker {
+                Some(tracker) => tracker.update(tick, state),
+                None => DetectorOutput::Unknown,
+            },
             detectors.device.update(tick, state),
             detectors.mismatch.update(tick, residuals),
             self.recording.update(tick),

@@ -1,4 +1,4 @@
-//! A tracker sample: filter, contact points, and the estimate that they give.
+//! A tracker sample: filter, contact points, and the estimate that they give; and the estimate where no sample comes.
 
 use super::Estimator;
 use crate::message::State;
@@ -22,6 +22,7 @@ impl Estimator {
         let accepted = self.filter.observe(&position_m[..self.cells]);
         if accepted != 0 {
             self.last_seen = Some((time_s, state.phase));
+            self.is_blind = false;
         }
         let sign = f64::from(self.cycles.direction());
         for (cell, position_m) in position_m[..self.cells].iter_mut().enumerate() {
@@ -97,15 +98,41 @@ impl Estimator {
             loss_j += pull_n * (mean_m - self.first_mean_m);
             estimate.energy_loss_j = loss_j;
         }
+        estimate.contact_m = *contacts.contact_m();
+        estimate.forward_slide_m = *contacts.forward_m();
+        estimate.backward_slide_m = *contacts.backward_m();
+        estimate.sliding_mask = contacts.sliding_mask();
+        self.fill_from_motor(state);
+    }
+
+    /// The estimate at a state without a sample: positions and what follows from them as of the last one, and unknown once that is too
+    /// old. Totals (slides, losses) leave out what nobody saw.
+    pub(super) fn fill_estimate_without_sample(&mut self, state: &State, time_s: f64) {
+        if self.pace.is_stale(time_s) {
+            // What comes after is not to be joined to what was before.
+            self.filter.forget();
+            let estimate = &mut self.estimate;
+            for unknown_m in [
+                &mut estimate.position_m,
+                &mut estimate.contact_m,
+                &mut estimate.deformation_m,
+            ] {
+                unknown_m.fill(f64::NAN);
+            }
+            estimate.force_n.fill(f64::NAN);
+            estimate.sliding_mask = 0;
+        }
+        self.fill_from_motor(state);
+    }
+
+    /// What an estimate says without positions.
+    fn fill_from_motor(&mut self, state: &State) {
+        let estimate = &mut self.estimate;
         estimate.state_sequence = state.sequence;
         estimate.time_ns = state.time_ns;
         estimate.sample = state.sample;
         estimate.phase = state.phase;
-        estimate.contact_m = *contacts.contact_m();
-        estimate.forward_slide_m = *contacts.forward_m();
-        estimate.backward_slide_m = *contacts.backward_m();
         estimate.power_electrical_w = self.electrical.power_w();
         estimate.energy_electrical_j = self.electrical.total().electrical_j;
-        estimate.sliding_mask = contacts.sliding_mask();
     }
 }

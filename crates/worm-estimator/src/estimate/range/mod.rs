@@ -51,6 +51,7 @@ pub struct RangeEstimator {
     battery: Battery,
     motor: Motor,
     lowest_bus_v: f64,
+    may_lack_positions: bool,
     charge: ChargeEstimate,
     window: Window,
     load_a: f64,
@@ -93,6 +94,7 @@ impl RangeEstimator {
         Ok(Some(Self {
             charge: ChargeEstimate::new(&battery, factor_sigma),
             lowest_bus_v: battery.lowest_bus_v(&config.limits),
+            may_lack_positions: config.position_source().may_be_missing(),
             battery,
             motor,
             window: Window::default(),
@@ -147,7 +149,10 @@ impl RangeEstimator {
     pub fn note_cycle(&mut self, cycle: &Cycle) -> Option<Range> {
         let peak_a = self.read_battery();
         self.follow(cycle);
-        let (energy_j, advance_m) = (self.energy_j?, self.advance_m?);
+        let energy_j = self.energy_j?;
+        if self.advance_m.is_none() && !self.may_lack_positions {
+            return None;
+        }
         // A replay finds the reading in the range that is returned.
         let gauge_share = std::mem::replace(&mut self.gauge_share, f64::NAN);
         if gauge_share.is_finite() {
@@ -172,9 +177,19 @@ impl RangeEstimator {
         let left = self.charge.left_above_j(too_low.max(self.battery.reserve_share));
         let cycles = scaled(left, 1.0 / cost_j, cost_sigma_j / cost_j);
         let time_s = scaled(left, self.duration_s / cost_j, cost_sigma_j / cost_j);
-        let (mean_m, sigma_m) = (advance_m.mean(), advance_m.sigma());
+        // Without positions nobody knows how far a cycle goes: cycles and time are all that can be said.
+        let (mean_m, sigma_m) = match self.advance_m {
+            Some(advance_m) => (advance_m.mean(), advance_m.sigma()),
+            None => (f64::NAN, f64::NAN),
+        };
         let range_m = if mean_m > 0.0 {
             scaled(left, mean_m / cost_j, (cost_sigma_j / cost_j).hypot(sigma_m / mean_m))
+        } else if mean_m.is_nan() {
+            Spread {
+                mean: f64::NAN,
+                low: f64::NAN,
+                high: f64::NAN,
+            }
         } else {
             scaled(left, 0.0, 0.0)
         };

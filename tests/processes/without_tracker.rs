@@ -1,0 +1,109 @@
+//! A worm without a tracker, as real processes on a pseudo-terminal whose bus has none.
+
+use super::worm::Worm;
+use std::path::Path;
+use worm_estimator::message::AlarmKind;
+use worm_log::messages;
+
+const NO_TRACKER: &str = "[gait]\ncycle_s = 1.25\n[tracker]\npresent = false\n";
+
+fn json(output: &std::process::Output) -> serde_json::Value {
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}\n{error}", output.status);
+    serde_json::from_slice(&output.stdout).expect("standard output is one JSON object")
+}
+
+#[test]
+fn it_crawls_and_is_recorded_and_its_log_says_what_the_current_shows() {
+    let worm = Worm::new("blind");
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("worm.mcap").to_string_lossy().into_owned();
+    let config = worm.config(NO_TRACKER);
+    let up = [
+        "up",
+        "--json",
+        "--duration",
+        "12",
+        "--config",
+        &config,
+        "--record",
+        &log,
+    ];
+    let summary = json(&worm.wormd(&up).output());
+    assert_eq!(
+        (&summary["mode"], &summary["fault"], &summary["alarms"]),
+        (&"crawling".into(), &"none".into(), &serde_json::json!([]))
+    );
+    let cycles = summary["cycles"].as_array().expect("a list");
+    assert!(cycles.len() >= 3, "{} cycles", cycles.len());
+    for cycle in cycles {
+        for unknown in [
+            "advance_m",
+            "energy_loss_j",
+            "energy_actuator_net_j",
+            "energy_friction_inside_j",
+            "cot",
+        ] {
+            assert_eq!(cycle[unknown], serde_json::Value::Null, "{unknown}");
+        }
+        assert!(
+            cycle["energy_electrical_j"]
+                .as_f64()
+                .is_some_and(|energy_j| energy_j > 0.1)
+        );
+    }
+    let inferred = &summary["inferred"];
+    for known in [
+        "advance_m",
+        "advance_sigma_m",
+        "energy_loss_j",
+        "position_m",
+        "position_sigma_m",
+    ] {
+        assert!(
+            inferred[known].as_f64().is_some_and(|value| value > 0.0),
+            "{known}: {inferred}"
+        );
+    }
+    let coverage = summary["alarm_coverage"].as_array().expect("a list");
+    let of = |kind: AlarmKind| {
+        coverage
+            .iter()
+            .find(|alarm| alarm["alarm"] == kind.name())
+            .expect("every alarm")
+    };
+    assert_eq!(of(AlarmKind::MotorStall)["coverage"], "full");
+    assert_eq!(of(AlarmKind::FrictionLoss)["coverage"], "full");
+    assert_eq!(of(AlarmKind::SlidingDown)["coverage"], "off");
+
+    let recorded = messages(Path::new(&log)).expect("a log");
+    assert!(
+        recorded
+            .states
+            .iter()
+            .all(|state| state.sample == 0 && state.position_m[0].is_nan())
+    );
+    let replayed = worm.replay(&log);
+    assert!(
+        replayed.status.success(),
+        "{}",
+        String::from_utf8_lossy(&replayed.stderr)
+    );
+    let inferred = json(&worm.plain_wormd(&["infer", "--json", &log]).output());
+    assert!(inferred["cycles"].as_array().is_some_and(|cycles| cycles.len() >= 2));
+    assert!(
+        inferred["cycles"][0]["advance_sigma_m"]
+            .as_f64()
+            .is_some_and(|sigma_m| sigma_m > 0.0)
+    );
+    let out = folder.path().join("why").to_string_lossy().into_owned();
+    for refused in [
+        vec!["analyze", &log, "--slope", "0"],
+        vec!["explain", &log, "--slope", "0", "--out", &out],
+    ] {
+        let output = worm.plain_wormd(&refused).output();
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains("wormd infer"), "{error}");
+    }
+}
