@@ -54,6 +54,7 @@
 //! | `foxglove` | the topics live in Foxglove: what a recorder reads, over a WebSocket. The feature `foxglove` | `recorder` |
 //! | `bridge` | worms over a network: the relay's language by Zenoh. The feature `bridge` | `relay`, `watch` |
 //! | `supervisor` | a worm's processes under one parent: start, command, observe, end | `topics`, `watch` |
+//! | `calibration` | slow turns of a running worm, for the friction of its gears | `topics`, `supervisor` |
 //! | `benchmark` | the measurement of `wormd latency` | `supervisor`, `estimator`, `control`, `latency` |
 //! | [`servo_bench`] | recordings of a servo that moves an arm on a bench, through the link | `link` |
 //! | [`soak`] | many hours in virtual time with drawn worms and faults, and the session that the tests in virtual time use | `link`, `control` |
@@ -80,6 +81,7 @@ mod black_box;
 #[cfg(feature = "bridge")]
 mod bridge;
 mod bundle;
+mod calibration;
 pub mod command;
 pub mod control;
 #[cfg(feature = "dashboard")]

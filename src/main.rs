@@ -62,6 +62,8 @@ enum Subcommands {
     Replay(command::replay::ReplayArgs),
     /// Friction, stiffness, advance and energy from the motor's current in a log, without looking at positions
     Infer(command::infer::InferArgs),
+    /// Friction of the gears from slow turns of a running worm, lifted or on the level, into its configuration
+    Calibrate(command::calibrate::CalibrateArgs),
     /// A log as Parquet or CSV tables, or as a complete log of one that was cut off
     Export(command::export::ExportArgs),
     /// Distance and energy of a design: Tables 1 and 2 of the paper, range on a battery
@@ -165,6 +167,7 @@ fn run(command: Subcommands, verbose: u8) -> Result<(), Failure> {
         Subcommands::Why(args) => command::why::run(&args),
         Subcommands::Replay(args) => command::replay::run(&args),
         Subcommands::Infer(args) => command::infer::run(&args),
+        Subcommands::Calibrate(args) => command::calibrate::run(&args),
         Subcommands::Export(args) => command::export::run(&args),
         Subcommands::Study(args) => command::study::run(&args),
         Subcommands::Plan(args) => command::plan::run(&args),

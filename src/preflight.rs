@@ -283,6 +283,7 @@ fn check_port(
                 report.note(level, "port", finding.what, finding.remedy);
             }
             report_current(config, &prepared, report);
+            report_calibration(config, &prepared, report);
             let mut worm = TrialWorm {
                 config,
                 drive: &mut drive,
@@ -302,6 +303,17 @@ fn tracker_in_words(config: &Config, prepared: &Prepared) -> String {
         Some(tracker) => format!("tracker with {} cells, read by {:?}", tracker.cells, prepared.plan.read),
         None if config.tracker.present => "its tracker is silent".to_owned(),
         None => "no tracker (configured so)".to_owned(),
+    }
+}
+
+/// Whether the friction that `wormd calibrate` found is that of this servo as it is.
+fn report_calibration(config: &Config, prepared: &Prepared, report: &mut CheckReport) {
+    let Some(calibrated) = &config.self_sensing.calibrated else {
+        return;
+    };
+    match calibrated.misfit(config, prepared.servo_reading.temperature_c) {
+        None => report.good("gears", format!("calibrated on {}", calibrated.date)),
+        Some(misfit) => report.note(Level::Warning, "gears", misfit, "calibrate anew: `wormd calibrate`"),
     }
 }
 

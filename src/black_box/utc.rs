@@ -1,4 +1,4 @@
-//! The wall-clock time in names of files. Nothing is judged by it.
+//! The wall-clock time in names of files, and in files. Nothing is judged by it.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -6,6 +6,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub(super) fn compact(time: SystemTime) -> String {
     let ([year, month, day], [hour, minute, second]) = parts(time);
     format!("{year:04}{month:02}{day:02}T{hour:02}{minute:02}{second:02}Z")
+}
+
+/// The time as `2026-11-24T20:15:33Z`, RFC 3339.
+pub(crate) fn rfc3339(time: SystemTime) -> String {
+    let ([year, month, day], [hour, minute, second]) = parts(time);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
 }
 
 /// The time as `2026-11-24 20:15:33 UTC`.

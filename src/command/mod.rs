@@ -6,6 +6,7 @@ pub mod black_box;
 #[cfg(feature = "bridge")]
 pub mod bridge;
 pub mod bundle;
+pub mod calibrate;
 pub mod check;
 pub mod control;
 #[cfg(feature = "dashboard")]
@@ -52,6 +53,7 @@ pub use crate::failure::Failure;
 pub use crate::print::{LogOutput, finish_log, log_line};
 
 use crate::print;
+use crate::topics::{Controller, Instance, RoleLock};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -122,6 +124,21 @@ impl WormArgs {
         }
         arguments
     }
+}
+
+/// Refuses where the worm does not run.
+///
+/// # Errors
+/// [`Failure::Unusable`].
+pub(crate) fn require_worm(instance: &Instance) -> Result<(), Failure> {
+    if RoleLock::<Controller>::holder(instance).is_some() {
+        return Ok(());
+    }
+    let worm = instance.worm();
+    instance.remove_folder_if_empty();
+    Err(Failure::unusable(format!(
+        "no worm {worm} is running: start it with `wormd up --name {worm}`, or give the name of another with --name"
+    )))
 }
 
 /// A configuration of which the command line has changed something.

@@ -114,7 +114,7 @@ fn attend(args: &SendCommandArgs, config: &Config) -> Result<(), Failure> {
     let end = end_on_signal()?;
     let hub = open(config)?;
     let worm = &config.worm.name;
-    attend::crawl(&hub, args.speed.unwrap_or(0.0), &end, || {
+    attend::crawl(&hub, "wormd command --attend", args.speed.unwrap_or(0.0), &end, || {
         print::log_line(format_args!("{worm}: crawls until Ctrl-C, or until this command ends"));
         print::ready();
     })?;

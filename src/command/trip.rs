@@ -1,9 +1,9 @@
 //! `wormd trip`: makes a trip along a route, and tells one that is under way what to do.
 
-use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
+use super::{Failure, WormArgs, end_on_signal, positive_seconds, print, require_worm};
 use crate::realtime::monotonic_ns;
 use crate::supervisor::controller::refuse_foreign;
-use crate::topics::{Controller, Instance, RoleLock, Trip};
+use crate::topics::{Instance, RoleLock, Trip};
 use crate::trip::wire::{Ask, Attendance, Question};
 use crate::trip::{self, words};
 use clap::{Args, Subcommand, ValueEnum};
@@ -145,18 +145,6 @@ fn travel(args: &TripArgs, file: &Path) -> Result<(), Failure> {
     } else {
         Err(Failure::failed(words::change(&last)))
     }
-}
-
-/// A trip needs a worm that runs.
-fn require_worm(instance: &Instance) -> Result<(), Failure> {
-    if RoleLock::<Controller>::holder(instance).is_some() {
-        return Ok(());
-    }
-    let worm = instance.worm();
-    instance.remove_folder_if_empty();
-    Err(Failure::unusable(format!(
-        "no worm {worm} is running: start it with `wormd up --name {worm}`, or give the name of another with --name"
-    )))
 }
 
 /// What the trip is about, before it begins.

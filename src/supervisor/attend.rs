@@ -11,20 +11,24 @@ use worm_estimator::message::{Command, CommandKind, Mode, State};
 const LIMIT_S: f64 = 1.0;
 /// How often the crawl is permitted anew.
 const RENEWAL: Duration = Duration::from_millis(250);
-/// Its name in the record of commands.
-const SENDER: &str = "wormd command --attend";
 /// How often the end is looked for.
 const POLL: Duration = Duration::from_millis(10);
 
-/// Makes the worm crawl, and permits that anew until `end` is set; then it holds. Calls `begun` once it crawls. Nothing here makes it
+/// Makes the worm crawl in the name of `sender`, and permits that anew until `end` is set; then it holds. Calls `begun` once it crawls. Nothing here makes it
 /// crawl a second time: a hold of somebody else ends it, whenever it comes.
 ///
 /// # Errors
 /// [`Failure::Failed`] when the controller refuses or is gone, or when somebody else has ended the crawl.
-pub(crate) fn crawl(hub: &Hub, cycles_per_s: f64, end: &AtomicBool, begun: impl FnOnce()) -> Result<(), Failure> {
+pub(crate) fn crawl(
+    hub: &Hub,
+    sender: &str,
+    cycles_per_s: f64,
+    end: &AtomicBool,
+    begun: impl FnOnce(),
+) -> Result<(), Failure> {
     let client = hub.command_client().map_err(Failure::failed)?;
     let mut states = hub.subscriber::<State>().map_err(Failure::failed)?;
-    let mut permitted = permit(&client, CommandKind::Crawl, cycles_per_s)?;
+    let mut permitted = permit(&client, sender, CommandKind::Crawl, cycles_per_s)?;
     begun();
     let mut renewed = Instant::now();
     while !end.load(Ordering::Relaxed) {
@@ -41,19 +45,19 @@ pub(crate) fn crawl(hub: &Hub, cycles_per_s: f64, end: &AtomicBool, begun: impl 
             )));
         }
         if renewed.elapsed() >= RENEWAL {
-            permitted = permit(&client, CommandKind::Renew, cycles_per_s)?;
+            permitted = permit(&client, sender, CommandKind::Renew, cycles_per_s)?;
             renewed = Instant::now();
         }
     }
-    accepted(&client, command(CommandKind::Hold, SENDER)).map(drop)
+    accepted(&client, command(CommandKind::Hold, sender)).map(drop)
 }
 
 /// Permits the crawl for a little longer; returns the controller's tick that did.
-fn permit(client: &CommandClient, kind: CommandKind, cycles_per_s: f64) -> Result<u64, Failure> {
+fn permit(client: &CommandClient, sender: &str, kind: CommandKind, cycles_per_s: f64) -> Result<u64, Failure> {
     let permission = Command {
         cycles_per_s,
         limit_s: LIMIT_S,
-        ..command(kind, SENDER)
+        ..command(kind, sender)
     };
     accepted(client, permission)
 }

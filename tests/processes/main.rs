@@ -6,6 +6,7 @@
 mod any_order;
 mod attending;
 mod black_box;
+mod calibration;
 mod explaining;
 mod faulting;
 mod inferring;

@@ -34,7 +34,7 @@ pub use machine::{
 };
 pub use physics::PhysicsError;
 pub use positions::PositionSource;
-pub use self_sensing::{ReportedCurrent, SelfSensing};
+pub use self_sensing::{Calibrated, CalibrationMode, ReportedCurrent, SelfSensing};
 pub use trip::{OnLinkBack, OnLinkLoss, OnStuck, Trip};
 pub use virtual_worm::{PresentCurrent, ServoEffect, VirtualWorm};
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};

@@ -4,7 +4,7 @@ use super::Config;
 use super::check::Checker;
 use crate::self_sensing::gear::MAX_RIPPLES;
 use crate::self_sensing::{CurrentSource, GearModel, Ripple, SelfSensingConfig};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use worm_physics::servo::identified::{XL330_EFFECTS, XL330_IDENTIFIED};
 
 /// What the servo reports as its current.
@@ -15,6 +15,60 @@ pub enum ReportedCurrent {
     Winding,
     /// The duty of its bridge.
     Duty,
+}
+
+/// How the gears' friction was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CalibrationMode {
+    /// On a worm held free: the motor drove nothing else.
+    Lifted,
+    /// In the canal, on the level.
+    Level,
+}
+
+/// When and how `wormd calibrate` found the gears' friction.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibrated {
+    /// When, RFC 3339.
+    pub date: String,
+    /// How.
+    pub mode: CalibrationMode,
+    /// Temperature of the servo then, °C.
+    pub temperature_c: f64,
+    /// Voltage on the bus then, V.
+    pub supply_v: f64,
+    /// Model number of the servo.
+    pub servo_model: u16,
+    /// Its ID.
+    pub servo_id: u8,
+    /// Standard error of the dry friction, N m.
+    pub dry_friction_sigma_n_m: f64,
+    /// Standard error of the friction that grows with speed, N m s/rad.
+    pub viscous_friction_sigma_n_m_s_per_rad: f64,
+}
+
+impl Calibrated {
+    /// Difference of temperatures, K, from which the friction of grease and seals is another.
+    pub const FAR_K: f64 = 15.0;
+
+    /// Why it does not hold for the configured servo at a temperature; none where it does.
+    pub fn misfit(&self, config: &Config, temperature_c: f64) -> Option<String> {
+        let (servo, apart_k) = (&config.servo, temperature_c - self.temperature_c);
+        if (self.servo_model, self.servo_id) != (servo.model_number, servo.id) {
+            return Some(format!(
+                "the gears were calibrated on a servo of model {} with ID {}, and this is model {} with ID {}",
+                self.servo_model, self.servo_id, servo.model_number, servo.id
+            ));
+        }
+        (apart_k.abs() > Self::FAR_K).then(|| {
+            format!(
+                "the gears were calibrated at {:.0} °C, and the servo has {temperature_c:.0} °C",
+                self.temperature_c
+            )
+        })
+    }
 }
 
 /// The gears between motor and cam, for what follows from the motor's current. The torque constant and the winding are the servo's.
@@ -55,6 +109,8 @@ pub struct SelfSensing {
     pub pull_sigma_n: f64,
     /// Gait cycles over which the torque profile is averaged.
     pub memory_cycles: f64,
+    /// When and how friction was calibrated, where it was.
+    pub calibrated: Option<Calibrated>,
 }
 
 impl Default for SelfSensing {
@@ -83,6 +139,7 @@ impl Default for SelfSensing {
             worm_sigma_share: 0.35,
             pull_sigma_n: 2.5,
             memory_cycles: 40.0,
+            calibrated: None,
         }
     }
 }
@@ -121,6 +178,26 @@ impl SelfSensing {
             ("memory_cycles", self.memory_cycles, 5.0..=1e4, "cycles"),
         ] {
             checker.range(&format!("self_sensing.{key}"), value, range, unit);
+        }
+        if let Some(calibrated) = &self.calibrated {
+            for (key, value, range, unit) in [
+                ("temperature_c", calibrated.temperature_c, -40.0..=120.0, "degrees C"),
+                ("supply_v", calibrated.supply_v, 0.0..=60.0, "V"),
+                (
+                    "dry_friction_sigma_n_m",
+                    calibrated.dry_friction_sigma_n_m,
+                    0.0..=10.0,
+                    "N m",
+                ),
+                (
+                    "viscous_friction_sigma_n_m_s_per_rad",
+                    calibrated.viscous_friction_sigma_n_m_s_per_rad,
+                    0.0..=10.0,
+                    "N m s/rad",
+                ),
+            ] {
+                checker.range(&format!("self_sensing.calibrated.{key}"), value, range, unit);
+            }
         }
         checker.require(
             self.ripple_waves.len() <= MAX_RIPPLES && self.ripple_waves.iter().all(|waves| (1..=200).contains(waves)),

@@ -8,7 +8,7 @@
 //!    its friction, how steeply the stiffness, and where the rise bends (a cell behind begins to slide) the pull on the body.
 //! 4. `fit`: worm and gears that explain the mean profile best, with their covariance, and by the exact model what follows from
 //!    them: advance, slides, energies.
-//! 5. [`dead_reckoning`]: the distance. [`twins`]: what the current cannot tell. [`change`]: alarms.
+//! 5. [`dead_reckoning`]: the distance. [`twins`]: what the current cannot tell. [`change`]: alarms. [`calibration`]: the gears' friction.
 //!
 //! # What it cannot tell
 //! - Slope, payload on a slope and constant drag are one pull. On the level a payload does nothing at all.
@@ -21,6 +21,7 @@
 //! there is nothing left to do. That takes some hundred readings, and some 1,500 where everything is searched: in the first and the third
 //! cycle, and when the worm has changed. A cycle that ends meanwhile waits; of several the newest. Nothing is allocated after construction.
 
+pub mod calibration;
 pub mod change;
 pub mod dead_reckoning;
 mod fit;
@@ -282,6 +283,15 @@ impl SelfSensing {
     /// What was known after the last cycle.
     pub fn sensed(&self) -> Option<&SelfSensed> {
         self.sensed.as_ref()
+    }
+
+    /// By how much the gears' friction exceeds what was stated, and its standard error, N m; none before a cycle was fitted.
+    pub fn gear_excess_n_m(&self) -> Option<(f64, f64)> {
+        self.sensed.as_ref()?;
+        let parameters = self.fit.parameters();
+        let at = parameters.gears_at();
+        let variance = self.fit.covariance()[(at, at)];
+        Some((parameters.values[at], variance.max(0.0).sqrt()))
     }
 
     /// Mean torque at the cam over the phase, and the model's, N m, [`BINS_PER_STEP`] for each step.
