@@ -14,6 +14,9 @@ use toml_edit::{DocumentMut, Item, Table, value};
 use worm_estimator::config::{CalibrationMode, Config};
 use worm_estimator::self_sensing::calibration::GearFriction;
 
+/// What a motor that warms up, by some 10 K, changes of its gears' friction, as a share: it is in the standard deviation that is written.
+const WARMING_SHARE: f64 = 0.03;
+
 /// Arguments of `wormd calibrate`.
 ///
 /// The worm must be running, and nobody else may drive it meanwhile. It turns its cam for one to two minutes, and holds at the end.
@@ -121,7 +124,9 @@ fn write_into(document: &mut DocumentMut, config: &Config, mode: CalibrationMode
         "viscous_friction_n_m_s_per_rad",
         rounded(friction.viscous_n_m_s_per_rad),
     );
-    set(known, "friction_sigma_n_m", rounded(friction.sigma_n_m));
+    let usual_n_m = friction.dry_n_m + friction.viscous_n_m_s_per_rad * TAU * config.gait_cycles_per_s().abs();
+    let sigma_n_m = friction.sigma_n_m.hypot(WARMING_SHARE * usual_n_m);
+    set(known, "friction_sigma_n_m", rounded(sigma_n_m));
     let mut calibrated = Table::new();
     for (key, item) in [
         ("date", value(date)),

@@ -124,9 +124,20 @@ impl Drawn {
         }
     }
 
-    /// What the estimator is told.
+    /// What the estimator is told. With `WORMD_CALIBRATED` set to a standard deviation, N m: after the cold gears of this worm were calibrated lifted, by
+    /// a torque constant that is as wrong as before.
     pub fn config(&self) -> SelfSensingConfig {
-        SelfSensingConfig::new(self.told_gear)
+        let mut gear = self.told_gear;
+        if let Some(sigma_n_m) = std::env::var("WORMD_CALIBRATED")
+            .ok()
+            .and_then(|text| text.parse().ok())
+        {
+            let by_constant = gear.torque_constant_n_m_per_a / self.gear.torque_constant_n_m_per_a;
+            gear.dry_n_m = self.gear.dry_n_m * by_constant;
+            gear.viscous_n_m_s_per_rad = self.gear.viscous_n_m_s_per_rad * by_constant;
+            gear.friction_sigma_n_m = sigma_n_m;
+        }
+        SelfSensingConfig::new(gear)
     }
 
     pub fn slope_deg(&self) -> f64 {
