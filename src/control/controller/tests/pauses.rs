@@ -40,8 +40,9 @@ fn a_ramp_goes_on_after_a_pause_where_it_was() {
 fn a_pause_that_outlasts_the_watchdog_is_reported_as_a_pause() {
     for (pause_ms, fault) in [
         (150, Fault::HostPaused),
-        (50, Fault::HostPaused),
-        (40, Fault::WatchdogTripped),
+        // Half of what the servo's watchdog waits for.
+        (40, Fault::HostPaused),
+        (30, Fault::WatchdogTripped),
     ] {
         let mut rig = Rig::crawling("");
         rig.pause(pause_ms);
