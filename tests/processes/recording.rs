@@ -90,8 +90,8 @@ fn the_main_job_records_what_replays_to_the_same_results() {
     let analysis: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     let of_steps = |name: &str| -> Vec<f64> {
         let profile = serde_json::from_value::<Vec<f64>>(analysis["torque_profile"][name].clone());
-        // The end of each step, where the tip of the cell slides forward and the torque is that of its friction.
-        profile.expect("a profile").chunks(32).map(|step| step[28]).collect()
+        // Late in each step, where the tip of the cell slides forward and the torque is that of its friction, and before the drive slows for the next.
+        profile.expect("a profile").chunks(32).map(|step| step[22]).collect()
     };
     let physical = worm_physics::Worm::try_from(&Config::default()).expect("the default worm");
     let contact = physical.contact(0);
