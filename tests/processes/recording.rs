@@ -86,7 +86,7 @@ fn the_main_job_records_what_replays_to_the_same_results() {
     let recording = read(&path).expect("a recording");
     assert!(recording.cells() == 4 && recording.samples() > 400, "{recording:?}");
 
-    let output = worm.wormd(&["analyze", &file, "--slope", "0", "--json"]).output();
+    let output = worm.plain_wormd(&["analyze", &file, "--slope", "0", "--json"]).output();
     let analysis: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     let of_steps = |name: &str| -> Vec<f64> {
         let profile = serde_json::from_value::<Vec<f64>>(analysis["torque_profile"][name].clone());
