@@ -54,6 +54,9 @@ pub struct ExplainArgs {
     /// Leave an effect of the library out of the search, to see what it would say without; may be given several times
     #[arg(long, value_name = "EFFECT", value_parser = effect_name)]
     without: Vec<&'static str>,
+    /// Take the motor's current as evidence, too: what it shows of the forces on the cells, as well as [self_sensing] knows the gears
+    #[arg(long)]
+    current: bool,
     /// Record the worm that is crawling now, into DIR/live.mcap, and explain that; at its configured slope unless --slope is
     /// given
     #[arg(long, conflicts_with = "recording", requires = "out")]
@@ -152,6 +155,7 @@ impl ExplainArgs {
             matters: self.matters.unwrap_or(usual.matters),
             expected_impact: self.expected_impact,
             without: self.without.clone(),
+            with_current: self.current,
         }
     }
 

@@ -200,6 +200,16 @@ class Screened(Result):
 
 
 @dataclass(frozen=True)
+class CurrentEvidence(Result):
+    """What the motor's current shows of a run, beside what models have it show."""
+
+    torque_residual_n_m: tuple[float, ...]
+    """Torque on the cam that stays unexplained: by the recalibrated model, by the named one, N m."""
+    work_j: tuple[float, ...]
+    """Net work that the cam takes in a cycle: by the current, by the recalibrated model, by the named one, J."""
+
+
+@dataclass(frozen=True)
 class ExplainedRun(Result):
     """A recording that was explained."""
 
@@ -225,6 +235,8 @@ class ExplainedRun(Result):
     """Mean advance per cycle: measured, by the recalibrated model, by the named one, m."""
     advance_sigma_m: float | None
     """Standard error of the measured advance, m, where the run is known by its advance alone."""
+    current: CurrentEvidence | None
+    """What the motor's current shows, where it counts as evidence."""
 
 
 @dataclass(frozen=True)

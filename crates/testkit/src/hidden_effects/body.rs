@@ -137,6 +137,8 @@ pub struct Motion<'a> {
     mean_m: f64,
     /// Positive work of the drive so far (13), J.
     pub work_j: f64,
+    /// All its work, with what dampers, drags and the body's inertia take, J.
+    pub drive_j: f64,
     /// Mean position where the run began, m.
     begin_m: f64,
     effect_begun: bool,
@@ -178,6 +180,7 @@ impl<'a> Motion<'a> {
             stand_off_m: [0.0; MAX_CELLS],
             mean_m,
             work_j: 0.0,
+            drive_j: 0.0,
             begin_m: mean_m,
             effect_begun: begun,
             followed_m: 0.0,
@@ -227,7 +230,8 @@ impl<'a> Motion<'a> {
     pub fn step(&mut self, now: StepInput) {
         let step_s = self.step_s;
         let cell_kg = self.mass_kg / self.cells as f64;
-        self.momentum_n_s -= self.pull_n() * step_s;
+        let pull_n = self.pull_n();
+        self.momentum_n_s -= pull_n * step_s;
 
         let follow = step_s / (FOLLOW_S + step_s);
         let mut extension_m = self.cam_profile.extensions_m(now.phase);
@@ -246,6 +250,16 @@ impl<'a> Motion<'a> {
             })
             .sum();
         self.work_j += work_j.max(0.0);
+        // The drive pushes the cells apart: its forces are in balance. Each bears what pulls at its cell, less its part of what moves the body.
+        self.drive_j += (0..self.cells)
+            .map(|cell| {
+                let on_cell_n = self.tips[cell].force_n + self.deviations.drag_n_s_per_m * self.velocity_m_s[cell];
+                let on_all_n: f64 = (0..self.cells)
+                    .map(|cell| self.tips[cell].force_n + self.deviations.drag_n_s_per_m * self.velocity_m_s[cell])
+                    .sum();
+                (on_cell_n - on_all_n / self.cells as f64) * (extension_m[cell] - self.extension_m[cell])
+            })
+            .sum::<f64>();
         self.translation_m_s = (self.momentum_n_s - cell_kg * extended_m / step_s) / self.mass_kg;
         for (cell, extension_m) in extension_m.into_iter().enumerate().take(self.cells) {
             let displacement_m = extension_m - self.extension_m[cell] + self.translation_m_s * step_s;

@@ -103,6 +103,7 @@ fn complete(hidden: Hidden, setting: Setting, seed: u64, rng: &mut Xoshiro256Plu
         laws,
         ..Deviations::default()
     };
+    scenes.iter_mut().for_each(|scene| scene.servo = seed);
     let mut unmodelled = None;
     let (effects, deviations) = hide(hidden, &clean, parameters.cells, &mut unmodelled, rng);
     let needs_phase =

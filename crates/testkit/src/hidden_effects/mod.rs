@@ -43,6 +43,7 @@ pub mod library;
 pub mod motor;
 pub mod parameters;
 pub mod scene;
+pub mod servo;
 pub mod setting;
 pub mod split;
 pub mod statistics;

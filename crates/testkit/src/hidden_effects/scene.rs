@@ -5,11 +5,13 @@ use super::body::{Motion, Placement, StepInput, Worm};
 use super::camera::{Camera, CameraSampler};
 use super::drive::Drive;
 use super::parameters::each_of;
+use super::servo::Servo;
 use crate::nominal::{MAX_BODY_SPEED_M_S, TIMEOUT_CYCLES};
 use crate::random::log_uniform;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 use worm_analysis::recording::Recording;
 
@@ -81,6 +83,8 @@ pub struct Scene {
     /// Whether the cam's phase is recorded.
     pub with_phase: bool,
     pub seed: u64,
+    /// Which servo it has: the same in all runs of a worm.
+    pub servo: u64,
     /// Time step of the integrator, s.
     pub step_s: f64,
 }
@@ -95,6 +99,8 @@ pub struct SimulatedRun {
     pub position_m: Vec<Vec<f64>>,
     /// Positive work of the drive at each sample, J, as old as the positions.
     pub work_j: Vec<f64>,
+    /// Torque on the cam at each sample, N m, as old as the phase.
+    pub cam_n_m: Vec<f64>,
 }
 
 impl Scene {
@@ -115,6 +121,7 @@ impl Scene {
             begins_at_cycle: f64::NEG_INFINITY,
             with_phase: true,
             seed: 1,
+            servo: 1,
             step_s: STEP_S,
         }
     }
@@ -151,7 +158,7 @@ impl Scene {
         // Positions are those of so long ago, so they are taken from the origin on and the phase so much later.
         while cam.phase < to_phase || recorder.phase.len() < recorder.position_m[0].len() {
             let begun_s = motion.time_s() - origin_s;
-            let (before_m, before) = (motion.position_m, cam.phase);
+            let (before_m, before, before_j) = (motion.position_m, cam.phase, motion.drive_j);
             let going = cam.phase < to_phase;
             self.step(&mut motion, &mut cam, worm, &scatter, from_phase)?;
             let ended_s = motion.time_s() - origin_s;
@@ -166,6 +173,8 @@ impl Scene {
             while latency_s + recorder.phase.len() as f64 / rate_hz < ended_s {
                 let fraction = fraction_at(latency_s + recorder.phase.len() as f64 / rate_hz);
                 recorder.phase.push(before + fraction * (cam.phase - before));
+                let turned_rad = TAU * (cam.phase - before);
+                recorder.cam_n_m.push(if turned_rad > 0.0 { (motion.drive_j - before_j) / turned_rad } else { 0.0 });
             }
         }
         Ok(recorder.finish(self))
@@ -251,6 +260,7 @@ struct Recorder {
     error_m: [f64; MAX_CELLS],
     scale: f64,
     phase: Vec<f64>,
+    cam_n_m: Vec<f64>,
     position_m: Vec<Vec<f64>>,
     work_j: Vec<f64>,
     seen_m: Vec<Vec<f64>>,
@@ -270,6 +280,7 @@ impl Recorder {
             error_m,
             scale: worm.deviations.scale,
             phase: Vec::new(),
+            cam_n_m: Vec::new(),
             work_j: Vec::new(),
             position_m: vec![Vec::new(); cells],
             seen_m: vec![Vec::new(); cells],
@@ -290,6 +301,7 @@ impl Recorder {
     fn finish(mut self, scene: &Scene) -> SimulatedRun {
         let samples = self.seen_m[0].len();
         self.phase.truncate(samples);
+        self.cam_n_m.truncate(samples);
         let recording = Recording {
             source: PathBuf::from(format!("seed{}at{}deg", scene.seed, scene.placement.slope_deg)),
             cell_names: (1..=self.seen_m.len()).map(|cell| format!("x{cell}_m")).collect(),
@@ -298,7 +310,10 @@ impl Recorder {
                 .collect(),
             position_m: self.seen_m,
             gait_phase: scene.with_phase.then(|| self.phase.clone()),
-            motor: None,
+            motor: scene.with_phase.then(|| {
+                let rate_hz = scene.capture.camera.rate_hz;
+                Servo::draw(scene.servo).report(rate_hz, &self.phase, &self.cam_n_m, scene.seed)
+            }),
             warnings: Vec::new(),
             repairs: Vec::new(),
         };
@@ -307,10 +322,11 @@ impl Recorder {
             phase: self.phase,
             position_m: self.position_m,
             work_j: self.work_j,
+            cam_n_m: self.cam_n_m,
         }
     }
 }
 
-fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+pub(super) fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
     StandardNormal.sample(rng)
 }

@@ -77,6 +77,7 @@ pub fn usual_setting(size: CampaignSize, rng: &mut Xoshiro256PlusPlus) -> Settin
             jump_at_cycle: [f64::INFINITY, 0.5 * size.cycles, f64::NEG_INFINITY][run],
             begins_at_cycle: f64::NEG_INFINITY,
             with_phase: phase_is_recorded,
+            servo: 1,
             seed: rng.random(),
             step_s: STEP_S,
         })

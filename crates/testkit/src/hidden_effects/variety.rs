@@ -93,6 +93,7 @@ pub fn setting(hidden: Hidden, rng: &mut Xoshiro256PlusPlus) -> Setting {
                 std::cmp::Ordering::Greater => f64::NEG_INFINITY,
             },
             with_phase,
+            servo: 1,
             seed: rng.random(),
             step_s: STEP_S,
         })

@@ -407,6 +407,19 @@ pub struct RunSummary {
     /// then `NaN`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub advance_sigma_m: Option<f64>,
+    /// What the motor's current shows, where it counts as evidence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub current: Option<CurrentEvidence>,
+}
+
+/// What the motor's current shows of a run, beside what models have it show; `NaN` where a model cannot make the run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CurrentEvidence {
+    /// Root mean square of the mean cycle's torque on the cam that stays unexplained: by the recalibrated model, by the named one (where
+    /// there is one), N m. The ripple of gears that nobody described is part of both.
+    pub torque_residual_n_m: [f64; 2],
+    /// Net work that the cam takes in a cycle: by the current and the gears of the answer, by the recalibrated model, by the named one, J.
+    pub work_j: [f64; 3],
 }
 
 /// Series and maps that the page draws, beyond the JSON.

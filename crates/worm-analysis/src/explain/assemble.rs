@@ -161,7 +161,12 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
             agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
             discrepancy_m: parts.discrepancy_m,
         },
-        warnings: words::warnings(worm, final_fit, named.first()),
+        warnings: words::warnings(
+            worm,
+            final_fit,
+            named.first(),
+            config.self_sensing.calibrated.is_some(),
+        ),
         repairs: words::repairs(worm),
         runs,
         figures: Figures {

@@ -244,6 +244,7 @@ fn assemble(
             table.advance_m(run, recalibrated),
             best.map_or(f64::NAN, |kind| table.advance_m(run, &kind.candidate.fit)),
         ],
+        current: None,
         advance_sigma_m: Some(advance.sigma_m),
     });
     Answer {

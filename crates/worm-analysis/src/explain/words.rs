@@ -137,7 +137,12 @@ pub(super) fn repairs(worm: &RecordedWorm<'_>) -> Vec<Repair> {
 }
 
 /// Limitations of the answer.
-pub(super) fn warnings(worm: &RecordedWorm<'_>, fit: &Fit, named: Option<&Candidate>) -> Vec<String> {
+pub(super) fn warnings(
+    worm: &RecordedWorm<'_>,
+    fit: &Fit,
+    named: Option<&Candidate>,
+    gears_calibrated: bool,
+) -> Vec<String> {
     let observed = &worm.scene.observed;
     let mut warnings: Vec<String> = observed
         .iter()
@@ -161,6 +166,12 @@ pub(super) fn warnings(worm: &RecordedWorm<'_>, fit: &Fit, named: Option<&Candid
             "no gait phase was recorded: {} cannot be seen without it, nor can most of what the stepping cell does",
             names.join(" and ")
         ));
+    }
+    if worm.counts_current() && !gears_calibrated {
+        warnings.push(
+            "the motor's current counts, and the friction of its gears was never calibrated: `wormd calibrate` makes the forces better known"
+                .to_owned(),
+        );
     }
     let limits = fit.hypothesis.free.iter().enumerate();
     let at_limit = limits

@@ -5,6 +5,7 @@ mod write;
 pub use write::write;
 
 use super::{Motor, Recording};
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -80,11 +81,53 @@ const MAX_PHASE_GAP_S: f64 = 0.1;
 /// How long before the first motor reading a capture is still given its phase, s: the error of the clocks' comparison.
 const BEFORE_FIRST_S: f64 = 1e-3;
 
-/// One new sample, with the motor as it was in the tick that brought it.
+/// Readings of the motor that are kept: a capture is no older than they are, or their phase is not known either.
+const KEPT_READINGS: usize = 256;
+
+/// One new sample, with the motor as it was at the capture.
 struct Sample {
     time_s: f64,
     captured_s: f64, // without the time during which the computer was paused
     state: State,
+}
+
+/// What a reading says of the motor, and when, without the time during which the computer was paused.
+struct Reading {
+    time_s: f64,
+    values: [f64; 6],
+}
+
+impl Reading {
+    fn of(state: &State, time_s: f64) -> Self {
+        let values = [
+            state.motor_angle_rad,
+            state.motor_velocity_rad_s,
+            state.motor_current_a,
+            state.bus_voltage_v,
+            state.motor_duty,
+            state.motor_temperature_c,
+        ];
+        Self { time_s, values }
+    }
+
+    fn towards(&self, after: &Self, at_s: f64) -> Self {
+        let fraction = (at_s - self.time_s) / (after.time_s - self.time_s);
+        Self {
+            time_s: at_s,
+            values: std::array::from_fn(|at| self.values[at] + fraction * (after.values[at] - self.values[at])),
+        }
+    }
+
+    fn set(&self, state: &mut State) {
+        [
+            state.motor_angle_rad,
+            state.motor_velocity_rad_s,
+            state.motor_current_a,
+            state.bus_voltage_v,
+            state.motor_duty,
+            state.motor_temperature_c,
+        ] = self.values;
+    }
 }
 
 /// The states of one run of the controller.
@@ -97,6 +140,8 @@ struct ControllerRun {
     capture: Capture,
     /// Time, without pauses of the computer, and phase of each tick that read the motor.
     phases: Vec<(f64, f64)>,
+    /// The last readings of the motor.
+    readings: VecDeque<Reading>,
     samples: Vec<Sample>,
     /// New samples without a time, or with one that does not grow.
     without_time: usize,
@@ -112,6 +157,7 @@ impl ControllerRun {
             lived: MotorTime::default(),
             capture: Capture::default(),
             phases: Vec::new(),
+            readings: VecDeque::with_capacity(KEPT_READINGS),
             samples: Vec::new(),
             without_time: 0,
         };
@@ -128,11 +174,18 @@ impl ControllerRun {
         let is_repeated = state.sequence == self.last_tick && state.sequence != self.first_tick;
         (self.last_tick, self.last_sample) = (state.sequence, state.sample);
         let time_s = self.lived.update(state) as f64 * 1e-9;
+        if state.motor_is_new == 1 && !is_repeated {
+            if self.readings.len() == KEPT_READINGS {
+                self.readings.pop_front();
+            }
+            self.readings.push_back(Reading::of(state, time_s));
+        }
         if state.sample_is_new == 1 && !is_repeated {
             let (captured_s, _) = self.capture.place(state.sample_time_s, time_s, state.phase);
             let before_s = self.samples.last().map_or(f64::NEG_INFINITY, |sample| sample.time_s);
             if state.sample_time_s.is_finite() && state.sample_time_s > before_s {
-                let (time_s, state) = (state.sample_time_s, *state);
+                let (time_s, mut state) = (state.sample_time_s, *state);
+                self.set_motor_at(captured_s, &mut state);
                 self.samples.push(Sample {
                     time_s,
                     captured_s,
@@ -147,6 +200,16 @@ impl ControllerRun {
         let is_later = self.phases.last().is_none_or(|(last_s, _)| time_s > *last_s);
         if state.phase.is_finite() && is_read && is_later {
             self.phases.push((time_s, state.phase));
+        }
+    }
+
+    /// Sets the motor of a state to what it was at a time without pauses, between the readings before and after; it stays where that
+    /// is not known.
+    fn set_motor_at(&self, at_s: f64, state: &mut State) {
+        let next = self.readings.partition_point(|reading| reading.time_s < at_s);
+        let before = next.checked_sub(1).and_then(|before| self.readings.get(before));
+        if let (Some(before), Some(after)) = (before, self.readings.get(next)) {
+            before.towards(after, at_s).set(state);
         }
     }
 
@@ -208,6 +271,8 @@ impl ControllerRun {
                 velocity_rad_s: of_each(|state| state.motor_velocity_rad_s),
                 current_a: of_each(|state| state.motor_current_a),
                 voltage_v: of_each(|state| state.bus_voltage_v),
+                duty: of_each(|state| state.motor_duty),
+                temperature_c: of_each(|state| state.motor_temperature_c),
             }),
             warnings,
             repairs: Vec::new(),

@@ -15,29 +15,44 @@ pub struct Motor {
     pub current_a: Vec<f64>,
     /// Bus voltage, V.
     pub voltage_v: Vec<f64>,
+    /// Duty of the bridge, −1 to 1.
+    pub duty: Vec<f64>,
+    /// Temperature of the servo, °C.
+    pub temperature_c: Vec<f64>,
 }
 
 impl Motor {
-    /// Column names of the four series in a file, in the order of [`series`](Self::series).
-    pub const COLUMNS: [&'static str; 4] = [
+    /// Column names of the series in a file, in the order of [`series`](Self::series).
+    pub const COLUMNS: [&'static str; 6] = [
         "motor_angle_rad",
         "motor_velocity_rad_s",
         "motor_current_a",
         "bus_voltage_v",
+        "motor_duty",
+        "motor_temperature_c",
     ];
 
-    /// The four series, in the order of [`COLUMNS`](Self::COLUMNS).
-    pub fn series(&self) -> [&Vec<f64>; 4] {
-        [&self.angle_rad, &self.velocity_rad_s, &self.current_a, &self.voltage_v]
+    /// The series, in the order of [`COLUMNS`](Self::COLUMNS).
+    pub fn series(&self) -> [&Vec<f64>; 6] {
+        [
+            &self.angle_rad,
+            &self.velocity_rad_s,
+            &self.current_a,
+            &self.voltage_v,
+            &self.duty,
+            &self.temperature_c,
+        ]
     }
 
-    /// The four series to change, in the order of [`COLUMNS`](Self::COLUMNS).
-    pub(super) fn series_mut(&mut self) -> [&mut Vec<f64>; 4] {
+    /// The series to change, in the order of [`COLUMNS`](Self::COLUMNS).
+    pub(super) fn series_mut(&mut self) -> [&mut Vec<f64>; 6] {
         [
             &mut self.angle_rad,
             &mut self.velocity_rad_s,
             &mut self.current_a,
             &mut self.voltage_v,
+            &mut self.duty,
+            &mut self.temperature_c,
         ]
     }
 }

@@ -28,14 +28,21 @@ pub fn write_csv(recording: &Recording, out: &mut impl Write) -> io::Result<()> 
     if recording.gait_phase.is_some() {
         write!(out, ",gait_phase")?;
     }
-    if recording.motor.is_some() {
-        write!(out, ",{}", Motor::COLUMNS.join(","))?;
+    let of_motor = recording
+        .motor
+        .iter()
+        .flat_map(|motor| Motor::COLUMNS.iter().zip(motor.series()));
+    let known: Vec<_> = of_motor
+        .filter(|(_, series)| series.iter().any(|value| !value.is_nan()))
+        .collect();
+    for (name, _) in &known {
+        write!(out, ",{name}")?;
     }
     writeln!(out)?;
     let optional = recording
         .gait_phase
         .iter()
-        .chain(recording.motor.iter().flat_map(Motor::series));
+        .chain(known.into_iter().map(|(_, series)| series));
     let series: Vec<&Vec<f64>> = recording.position_m.iter().chain(optional).collect();
     for (sample, time_s) in recording.time_s.iter().enumerate() {
         write!(out, "{time_s:?}")?;

@@ -144,6 +144,8 @@ fn a_recording_written_is_read_back() {
                 velocity_rad_s: series(2.0),
                 current_a: series(3.0),
                 voltage_v: series(4.0),
+                duty: series(5.0),
+                temperature_c: series(6.0),
             });
         }
         write(&recording, &config, Some("[worm]"), &path).expect("there is room");

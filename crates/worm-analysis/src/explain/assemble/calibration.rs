@@ -36,6 +36,10 @@ pub(in crate::explain) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibra
                 Nuisance::Rounding => ("rounding".to_owned(), free.quantity.centre, value, sigma, ""),
                 Nuisance::Viscosity => ("viscosity".to_owned(), free.quantity.centre, value, sigma, "N s/m"),
                 Nuisance::Breakaway => ("breakaway".to_owned(), free.quantity.centre, value, sigma, ""),
+                Nuisance::GearOffset => ("friction of the gears".to_owned(), 0.0, value, sigma, "N m"),
+                Nuisance::TorqueGain => ("torque constant".to_owned(), 0.0, value, sigma, ""),
+                Nuisance::PadDamping => ("damping in the pads".to_owned(), free.quantity.centre, value, sigma, ""),
+                Nuisance::GearLoad => ("friction of the gears by the load".to_owned(), 0.0, value, sigma, ""),
             };
             Some(Calibrated {
                 name,

@@ -45,12 +45,7 @@ pub(in crate::explain) fn named_effects(
         });
         NamedEffect {
             name: hypothesised.effect.name.to_owned(),
-            twins: hypothesised
-                .effect
-                .all_twins(hypothesised.cell)
-                .into_iter()
-                .map(str::to_owned)
-                .collect(),
+            twins: hypothesised.twins().into_iter().map(str::to_owned).collect(),
             parameters: parameters.collect(),
             cell: hypothesised.cell.map(|cell| cell + 1),
             onset: hypothesised.onset.map(when),

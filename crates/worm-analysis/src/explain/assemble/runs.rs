@@ -1,11 +1,13 @@
 //! The recordings of an answer, and how far the worm advanced in them.
 
 use super::Parts;
-use crate::explain::answer::RunSummary;
+use crate::explain::answer::{CurrentEvidence, RunSummary};
 use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::worm::energy::of_cycles;
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::recorded_worm::RecordedWorm;
+use crate::explain::worm::torque;
 
 /// What the recordings are, and how far the worm got in them.
 pub(super) fn runs(worm: &RecordedWorm<'_>, parts: &Parts, named: Option<&Candidate>) -> Vec<RunSummary> {
@@ -33,9 +35,41 @@ pub(super) fn runs(worm: &RecordedWorm<'_>, parts: &Parts, named: Option<&Candid
                 named.map_or(f64::NAN, |candidate| predicted_m(&candidate.fit)),
             ],
             advance_sigma_m: None,
+            current: current(worm, run, &parts.recalibrated, named),
         }
     };
     worm.scene.observed.iter().enumerate().map(of).collect()
+}
+
+/// What the current shows, where it counts.
+fn current(
+    worm: &RecordedWorm<'_>,
+    run: usize,
+    recalibrated: &Fit,
+    named: Option<&Candidate>,
+) -> Option<CurrentEvidence> {
+    let observed = &worm.scene.observed[run];
+    let torque = observed.torque.as_ref()?;
+    let named = named.map(|candidate| &candidate.fit);
+    let mean = |of_cycles: Vec<f64>| of_cycles.iter().sum::<f64>() / of_cycles.len() as f64;
+    let by = |fit: Option<&Fit>| {
+        let predicted = fit.and_then(|fit| worm.scene.predict(run, &fit.hypothesis, &fit.at));
+        predicted.map_or([f64::NAN; 2], |predicted| {
+            let residual_n_m = torque::residual_n_m(observed, &worm.bins[run], &predicted);
+            [
+                worm.torque_noise[run].rms_of_mean_cycle(&worm.bins[run], &residual_n_m),
+                mean(of_cycles(observed, &predicted.work_j)),
+            ]
+        })
+    };
+    let best = named.unwrap_or(recalibrated);
+    let gears = worm.scene.predict(run, &best.hypothesis, &best.at)?.gears;
+    let shown_j = mean(of_cycles(observed, &torque.cumulative_j(&observed.phase, &gears)));
+    let [recalibrated, named] = [Some(recalibrated), named].map(by);
+    Some(CurrentEvidence {
+        torque_residual_n_m: [recalibrated[0], named[0]],
+        work_j: [shown_j, recalibrated[1], named[1]],
+    })
 }
 
 /// Advance per cycle, m: mean over the settled samples, each against the one a cycle later in which every cell was seen too.

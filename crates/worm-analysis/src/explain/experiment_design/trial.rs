@@ -102,6 +102,7 @@ impl<'r> Trial<'r> {
             pauses: false,
             pace: Pace::default(),
             settled: None,
+            torque: None,
         };
         observed.assume_laid_down(true);
         let bins = bins(&observed);

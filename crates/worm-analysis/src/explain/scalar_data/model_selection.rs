@@ -8,7 +8,7 @@
 use super::super::answer::{Remainder, Verdict};
 use super::table::Table;
 use crate::explain::search::fit::Fit;
-use crate::explain::search::judge::candidate::{Candidate, are_twins};
+use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::parameter::{Hypothesised, What};
 
 /// A quantile of chi-square: its first values from 1 degree of freedom on, and the same quantile of the normal distribution.
@@ -135,7 +135,7 @@ fn asked(kind: &AdvanceKind) -> usize {
 }
 
 fn are_alike(one: &Hypothesised, other: &Hypothesised) -> bool {
-    one.effect.name == other.effect.name || are_twins(one, other)
+    one.effect.name == other.effect.name || one.is_twin_of(other)
 }
 
 impl Selected {

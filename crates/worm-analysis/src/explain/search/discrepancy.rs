@@ -25,15 +25,15 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// ρ: the share of what all channels have in common by their role.
-const SHARED: f64 = 0.8;
+pub(in crate::explain) const SHARED: f64 = 0.8;
 /// Most cosines in a step, and most columns that each channel's own part may have: fewer cosines for many channels.
 const COSINES: usize = 8;
 const OWN_COLUMNS: usize = 512;
 /// Covariance over the conditions: constant, and proportional to the standardised one.
 const OVER_CONDITIONS: [f64; 2] = [0.7, 0.3];
 /// Scale of the slow part over a, its waves over the run with their weights, and its cosines in a step.
-const SLOW: f64 = 0.3;
-const WAVES: [f64; 2] = [0.85, 0.5];
+pub(in crate::explain) const SLOW: f64 = 0.3;
+pub(in crate::explain) const WAVES: [f64; 2] = [0.85, 0.5];
 const SLOW_COSINES: usize = 3;
 /// Strength of a direction at a₀, in variances of the noise, below which it is left out.
 const NEGLIGIBLE: f64 = 0.02;
@@ -212,7 +212,7 @@ pub(in crate::explain) fn repeating_columns(plant: &impl Recorded, scale_m: f64)
 }
 
 /// Standard deviations of the cosines, for a variance of 1 in all: the mean square of cos πmu is a half but for m = 0.
-fn weights(cosines: usize) -> Vec<f64> {
+pub(in crate::explain) fn weights(cosines: usize) -> Vec<f64> {
     let weight = |m: usize| (1.0 + 0.5 * m as f64).powi(-2);
     let variance: f64 = (0..cosines)
         .map(|m| weight(m).powi(2) * if m == 0 { 1.0 } else { 0.5 })
@@ -221,7 +221,7 @@ fn weights(cosines: usize) -> Vec<f64> {
 }
 
 /// Values of the functions of the condition, for each run; a constant alone where all runs are alike.
-fn over_conditions(plant: &impl Recorded) -> Vec<Vec<f64>> {
+pub(in crate::explain) fn over_conditions(plant: &impl Recorded) -> Vec<Vec<f64>> {
     let runs = plant.runs() as f64;
     let values: Vec<f64> = (0..plant.runs()).map(|run| plant.condition(run)).collect();
     let mean = values.iter().sum::<f64>() / runs;

@@ -32,6 +32,8 @@ pub struct Options {
     pub expected_impact: f64,
     /// Names of effects that are left out of the search: what would it say if it did not know them?
     pub without: Vec<&'static str>,
+    /// Whether the motor's current is evidence of a worm's forces, beside the positions of its cells.
+    pub with_current: bool,
 }
 
 impl Default for Options {
@@ -42,6 +44,7 @@ impl Default for Options {
             matters: 0.02,
             expected_impact: 0.06,
             without: Vec::new(),
+            with_current: false,
         }
     }
 }

@@ -106,6 +106,8 @@ pub(in crate::explain) struct Hypothesised {
     pub cell: Option<usize>,
     /// When it begins or ends; it acts throughout for none.
     pub onset: Option<Onset>,
+    /// The data may tell it from its twins, which are those of positions alone.
+    pub without_twins: bool,
 }
 
 impl Hypothesised {
@@ -115,7 +117,22 @@ impl Hypothesised {
             effect,
             cell,
             onset: None,
+            without_twins: false,
         }
+    }
+
+    /// Names and descriptions of what the data cannot distinguish from it.
+    pub fn twins(&self) -> Vec<&'static str> {
+        if self.without_twins {
+            Vec::new()
+        } else {
+            self.effect.all_twins(self.cell)
+        }
+    }
+
+    /// Whether the data cannot distinguish two effects.
+    pub fn is_twin_of(&self, other: &Self) -> bool {
+        !self.without_twins && self.cell.is_none() && other.cell.is_none() && self.effect.is_twin_of(other.effect)
     }
 
     /// Whether it is the same effect of the same cell, whenever it begins.

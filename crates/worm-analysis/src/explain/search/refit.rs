@@ -2,7 +2,7 @@
 
 use super::fit::Fit;
 use super::hypothesis::Hypothesis;
-use super::judge::candidate::{Candidate, are_twins};
+use super::judge::candidate::Candidate;
 use super::judge::chance::Chance;
 use super::judgement::Judge;
 use super::local_restart::restart_locally;
@@ -163,7 +163,7 @@ pub(in crate::explain) fn pair_up(
     let problem = judge.problem;
     let others: Vec<Hypothesised> = hypothesised
         .iter()
-        .filter(|other| !other.is_same_effect(&first.hypothesised[0]) && !are_twins(other, &first.hypothesised[0]))
+        .filter(|other| !other.is_same_effect(&first.hypothesised[0]) && !other.is_twin_of(&first.hypothesised[0]))
         .copied()
         .collect();
     let single = judge.ln_prior(&first.hypothesised);

@@ -19,9 +19,14 @@ pub(in crate::explain) struct Walk {
 impl Walk {
     /// Energy of each whole settled cycle, J.
     pub fn energy_j(&self, observed: &Observed<'_>) -> Vec<f64> {
-        let at_j = at_boundaries(observed, &settled_cycles(observed), &self.loss_j);
-        at_j.windows(2).map(|pair| pair[1] - pair[0]).collect()
+        of_cycles(observed, &self.loss_j)
     }
+}
+
+/// What a cumulative energy grows by in each whole settled cycle, J.
+pub(in crate::explain) fn of_cycles(observed: &Observed<'_>, cumulative_j: &[f64]) -> Vec<f64> {
+    let at_j = at_boundaries(observed, &settled_cycles(observed), cumulative_j);
+    at_j.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
 /// A hypothesis, and values of what is free in it.

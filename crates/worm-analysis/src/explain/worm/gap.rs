@@ -5,7 +5,8 @@
 //!   wrong advance does. Over the settled whole cycles, all cells, all runs.
 //! - *advance*: how much more the worm advances in a cycle than the model: the slope of a straight line over the cycles through
 //!   residuals at the same phase, common to all phases and cells.
-//! - *energy*: per cycle by (11). Nobody measured it; the reference is the energy that the contacts of the best model take along the
+//! - *energy*: per cycle by (11). Where the motor's current counts, it is the net work of the drive (13), and the reference the work that
+//!   the current shows the cam take, by the gears of the best model. Elsewhere nobody measured it; the reference is the energy that the contacts of the best model take along the
 //!   measured path, which is that model's path plus its smoothed residual, as [`crate::experiment`] computes it for a recording.
 //!
 //! # The two ends
@@ -131,6 +132,12 @@ impl<'p, 'a> Measured<'p, 'a> {
         let runs = 0..worm.scene.observed.len();
         let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(worm, run, best)).collect();
         let energy = |(run, residuals): (usize, &Option<CellResiduals>)| {
+            let observed = &worm.scene.observed[run];
+            if let Some(torque) = &observed.torque {
+                let gears = worm.scene.predict(run, &best.hypothesis, &best.at)?.gears;
+                let work_j = torque.cumulative_j(&observed.phase, &gears);
+                return Some(energy::of_cycles(observed, &work_j));
+            }
             let drift_m = worm.noise[run].smooth(&worm.scene.observed[run], &residuals.as_ref()?.body_m);
             let walk = energy::carried(&worm.scene, run, best, &drift_m)?;
             Some(walk.energy_j(&worm.scene.observed[run]))
@@ -150,7 +157,12 @@ impl<'p, 'a> Measured<'p, 'a> {
         let fit_rms_m = self.rms(&residuals, |_, _| true);
         let held_out = clusters(self.worm, all, &folds.iter().collect::<Vec<_>>());
         let energy_j = |run: usize| {
-            energy::own(&self.worm.scene, run, (&all.hypothesis, &all.at)).map(|walk| walk.energy_j(self.observed(run)))
+            let (observed, under) = (self.observed(run), (&all.hypothesis, &all.at[..]));
+            if observed.torque.is_some() {
+                let predicted = self.worm.scene.predict(run, under.0, under.1)?;
+                return Some(energy::of_cycles(observed, &predicted.work_j));
+            }
+            Some(energy::own(&self.worm.scene, run, under)?.energy_j(observed))
         };
         Stage {
             stage,

@@ -284,7 +284,7 @@ impl CycleChanges {
 }
 
 /// Variance of values about 0 by the median of their squares; none where there are none.
-fn variance(values: &[f64]) -> Option<f64> {
+pub(super) fn variance(values: &[f64]) -> Option<f64> {
     let mut squares: Vec<f64> = values
         .iter()
         .map(|value| value * value)

@@ -36,10 +36,18 @@ pub(in crate::explain) enum Nuisance {
     Viscosity,
     /// Friction at rest over that of a sliding tip, less 1.
     Breakaway,
+    /// Torque that the current shows beyond the known friction of the gears, N m.
+    GearOffset,
+    /// Share by which the torque that the current shows is wrong.
+    TorqueGain,
+    /// Friction of the gears for each torque on them, beyond the known one.
+    GearLoad,
+    /// Share of the body's damping that bears on the drive.
+    PadDamping,
 }
 
 /// Nuisances of the whole campaign, and of each cell or run.
-const OF_ALL: [Nuisance; 10] = [
+const OF_ALL: [Nuisance; 14] = [
     Nuisance::Friction,
     Nuisance::Stiffness,
     Nuisance::Stroke,
@@ -50,6 +58,10 @@ const OF_ALL: [Nuisance; 10] = [
     Nuisance::Rounding,
     Nuisance::Viscosity,
     Nuisance::Breakaway,
+    Nuisance::GearOffset,
+    Nuisance::TorqueGain,
+    Nuisance::GearLoad,
+    Nuisance::PadDamping,
 ];
 const OF_EACH: [fn(usize) -> Nuisance; 4] = [
     Nuisance::FrictionOf,
@@ -137,6 +149,10 @@ impl Nuisance {
             Self::Rounding => 7,
             Self::Viscosity => 8,
             Self::Breakaway => 9,
+            Self::GearOffset => 10,
+            Self::TorqueGain => 11,
+            Self::GearLoad => 12,
+            Self::PadDamping => 13,
             Self::FrictionOf(cell) => of_each(0, cell),
             Self::StiffnessOf(cell) => of_each(1, cell),
             Self::StrokeOf(cell) => of_each(2, cell),
@@ -154,7 +170,16 @@ impl Nuisance {
     pub fn is_of_model_file(self) -> bool {
         !matches!(
             self,
-            Self::ClockDrift | Self::Damping | Self::Presliding | Self::Rounding | Self::Viscosity | Self::Breakaway
+            Self::ClockDrift
+                | Self::Damping
+                | Self::Presliding
+                | Self::Rounding
+                | Self::Viscosity
+                | Self::Breakaway
+                | Self::GearOffset
+                | Self::TorqueGain
+                | Self::GearLoad
+                | Self::PadDamping
         )
     }
 
@@ -162,7 +187,12 @@ impl Nuisance {
         self.free_within((0.0, sigma, -reach, reach, step))
     }
 
-    fn free_within(self, (centre, sigma, min, max, step): (f64, f64, f64, f64, f64)) -> Free {
+    /// About 0, with a reach and a step in standard deviations.
+    pub(super) fn free_by_sigma(self, sigma: f64, reach: f64, step: f64) -> Free {
+        self.free((sigma, reach * sigma, step * sigma))
+    }
+
+    pub(super) fn free_within(self, (centre, sigma, min, max, step): (f64, f64, f64, f64, f64)) -> Free {
         Free {
             what: self.what(),
             quantity: Quantity {
@@ -192,7 +222,11 @@ impl Nuisance {
             | Self::Presliding
             | Self::Rounding
             | Self::Viscosity
-            | Self::Breakaway => {}
+            | Self::Breakaway
+            | Self::GearOffset
+            | Self::TorqueGain
+            | Self::GearLoad
+            | Self::PadDamping => {}
         }
     }
 
@@ -216,7 +250,7 @@ mod tests {
             let nuisance = Nuisance::of(free.what).expect("it is one");
             assert_eq!(nuisance.what(), free.what);
         }
-        for nuisance in [Nuisance::FrictionOf(5), Nuisance::SlopeOf(2), Nuisance::Breakaway] {
+        for nuisance in [Nuisance::FrictionOf(5), Nuisance::SlopeOf(2), Nuisance::GearLoad] {
             assert_eq!(Nuisance::of(nuisance.what()), Some(nuisance));
         }
     }

@@ -2,11 +2,13 @@
 
 use super::super::error::ExplainError;
 use super::pace::{Pace, time_at_s};
+use super::torque::MeasuredTorque;
 use crate::experiment::RecordedRun;
 use crate::identify::clean::leave_out_outliers;
 use crate::identify::{self, GaitError, IdentifiedGait, Prior, Steadied, gait};
 use crate::recording::{Recording, Repair};
 use worm_estimator::config::Config;
+use worm_estimator::self_sensing::GearModel;
 use worm_physics::Crawl;
 
 /// Cycles at the start that do not count unless the worm was just laid down: the state of the tips is unknown there.
@@ -56,6 +58,8 @@ pub(in crate::explain) struct Observed<'a> {
     pub settled: Option<Crawl>,
     /// Every repair of the recording.
     pub repairs: Vec<Repair>,
+    /// What the motor's current shows, where it counts as evidence and the phase was recorded.
+    pub torque: Option<MeasuredTorque>,
 }
 
 impl<'a> Observed<'a> {
@@ -124,6 +128,7 @@ impl<'a> Observed<'a> {
             pace: Pace::default(),
             settled: None,
             repairs,
+            torque: None,
         };
         observed.assume_laid_down(false);
         if observed.whole_cycles() < MIN_CYCLES {
@@ -134,6 +139,13 @@ impl<'a> Observed<'a> {
             });
         }
         Ok(observed)
+    }
+
+    /// Counts the motor's current as evidence, too; not where the phase was found from the positions, or a current was hardly ever read.
+    pub fn count_current(&mut self, gear: &GearModel) {
+        if self.phase_recorded {
+            self.torque = MeasuredTorque::new(self.run.recording, &self.phase, gear);
+        }
     }
 
     pub fn cells(&self) -> usize {

@@ -1,6 +1,7 @@
 //! The worm as a plant: what it predicts, its nuisances and its effects.
 
 use super::binning::bins;
+use super::gears;
 use super::gap::closed;
 use super::laws::laws;
 use super::matters::impact;
@@ -11,6 +12,8 @@ use super::prepare::judge_start;
 use super::recorded_worm::RecordedWorm;
 use super::residual::Residual;
 use super::sway;
+use super::torque;
+use super::torque_noise::TorqueNoise;
 use super::whole_effects::with_whole_effects;
 use crate::explain::error::ExplainError;
 use crate::explain::search::fit::{Fit, FitWithout};
@@ -47,7 +50,10 @@ pub(in crate::explain) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<
 
 impl Plant for RecordedWorm<'_> {
     fn nuisances(&self) -> Vec<Free> {
-        Nuisance::all(self.channels(), self.runs(), self.phase_recorded())
+        let mut all = Nuisance::all(self.channels(), self.runs(), self.phase_recorded());
+        let torque = self.scene.observed.iter().find_map(|observed| observed.torque.as_ref());
+        all.extend(torque.into_iter().flat_map(|torque| gears::nuisances(&torque.gear)));
+        all
     }
 
     fn concerns(&self, nuisance: usize, run: usize) -> bool {
@@ -55,7 +61,10 @@ impl Plant for RecordedWorm<'_> {
     }
 
     fn hypotheses(&self) -> Vec<Hypothesised> {
-        hypotheses(self.channels(), self.phase_recorded())
+        let mut all = hypotheses(self.channels(), self.phase_recorded());
+        let without_twins = self.counts_current();
+        all.iter_mut().for_each(|one| one.without_twins = without_twins);
+        all
     }
 
     /// The stretch of canal where tips have been.
@@ -74,11 +83,15 @@ impl Plant for RecordedWorm<'_> {
         let observed = &self.scene.observed[run];
         match self.scene.predict(run, hypothesis, at) {
             Some(predicted) => PredictedRun {
-                residuals: self.whitened(run, &Residual::binned(observed, &self.bins[run], &predicted)),
+                residuals: self.whitened(
+                    run,
+                    &Residual::binned(observed, &self.bins[run], &predicted),
+                    &torque::residual_n_m(observed, &self.bins[run], &predicted),
+                ),
                 outcome: predicted.advance_m(observed),
             },
             None => PredictedRun {
-                residuals: vec![IMPOSSIBLE; self.bins[run].len() * (1 + self.channels())],
+                residuals: vec![IMPOSSIBLE; self.rows(run)],
                 outcome: f64::NAN,
             },
         }
@@ -116,6 +129,7 @@ impl Plant for RecordedWorm<'_> {
     fn measure_noise(&mut self, hypothesis: &Hypothesis, at: &[f64]) -> Result<(), ExplainError> {
         self.bins = self.scene.observed.iter().map(bins).collect();
         self.noise.clear();
+        self.torque_noise.clear();
         for (run, observed) in self.scene.observed.iter().enumerate() {
             let predicted = self
                 .scene
@@ -126,6 +140,9 @@ impl Plant for RecordedWorm<'_> {
                 })?;
             let residual = Residual::binned(observed, &self.bins[run], &predicted);
             self.noise.push(RunNoise::measure(observed, &self.bins[run], &residual));
+            let torque_n_m = torque::residual_n_m(observed, &self.bins[run], &predicted);
+            self.torque_noise
+                .push(TorqueNoise::measure(observed, &self.bins[run], &torque_n_m));
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! The positions that a hypothesis predicts for every sample.
 
 use super::clock::Clock;
+use super::gears::GearErrors;
 use super::nuisance::Nuisance;
 use super::observed::Observed;
 use super::phase_correction::PhaseCorrection;
@@ -90,7 +91,7 @@ impl Scene<'_> {
         let physics = recalibrated.physics.clone().with(&hypothesis.settings_at_end(run, at));
         let damping_ratio = recalibrated.damping_ratio;
         let clock = |physics: &Physics| Clock::new(observed, physics.view.latency_s, recalibrated.clock_drift);
-        match hypothesis.changes_at(run) {
+        let mut predicted = match hypothesis.changes_at(run) {
             Some(cycle) => {
                 let before = recalibrated
                     .physics
@@ -102,7 +103,9 @@ impl Scene<'_> {
                 let repeats = self.repeats(run, hypothesis, at);
                 predict_with(observed, clock(&physics), &physics, damping_ratio, repeats)
             }
-        }
+        }?;
+        predicted.gears = GearErrors::of(hypothesis, at, (&physics.worm, damping_ratio));
+        Some(predicted)
     }
 }
 

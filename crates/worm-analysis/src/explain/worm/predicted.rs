@@ -1,12 +1,17 @@
 //! The prediction for one run.
 
+use super::gears::GearErrors;
 use super::observed::Observed;
 
-/// The positions of one run as a hypothesis predicts them.
+/// Positions of one run, and the work of its drive, as a hypothesis predicts them.
 #[derive(Debug, Clone)]
 pub(in crate::explain) struct Predicted {
     /// `[sample][cell]`, flat, m.
     pub position_m: Vec<f64>,
+    /// Net work of the drive up to each sample, from any beginning, J.
+    pub work_j: Vec<f64>,
+    /// What the gears make of it.
+    pub gears: GearErrors,
 }
 
 impl Predicted {

@@ -51,6 +51,20 @@ pub(in crate::explain) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config)
     Ok(scene)
 }
 
+/// Counts the motor's current as evidence, too.
+///
+/// # Errors
+/// [`ExplainError::NoCurrent`] where no run has one with its phase.
+pub(in crate::explain) fn count_current(scene: &mut Scene<'_>, config: &Config) -> Result<(), ExplainError> {
+    let gear = config.self_sensing().gear;
+    scene
+        .observed
+        .iter_mut()
+        .for_each(|observed| observed.count_current(&gear));
+    let counts = scene.observed.iter().any(|observed| observed.torque.is_some());
+    counts.then_some(()).ok_or(ExplainError::NoCurrent)
+}
+
 fn same_order(first: &Observed<'_>, other: &Observed<'_>) -> Result<(), ExplainError> {
     if first.step_order == other.step_order {
         return Ok(());

@@ -4,9 +4,13 @@ use super::noise::RunNoise;
 use super::observed::Observed;
 use super::predict::Scene;
 use super::residual::Residual;
+use super::torque_discrepancy;
+use super::torque_noise::TorqueNoise;
 use crate::explain::search::bins::Bins;
+use crate::explain::search::discrepancy::repeating_columns;
 use crate::explain::search::plant::Recorded;
 use crate::explain::search::problem::FitProblem;
+use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// Part of the stroke that changes of a smaller advance are relative to: of a worm that hardly advances, no change is small.
@@ -18,6 +22,7 @@ pub(in crate::explain) struct RecordedWorm<'a> {
     /// Of each run; empty before the noise is measured.
     pub bins: Vec<Bins>,
     pub noise: Vec<RunNoise>,
+    pub torque_noise: Vec<TorqueNoise>,
 }
 
 /// A recorded worm, as a problem of least squares.
@@ -30,6 +35,7 @@ impl<'a> RecordedWorm<'a> {
             scene,
             bins: Vec::new(),
             noise: Vec::new(),
+            torque_noise: Vec::new(),
         }
     }
 
@@ -43,15 +49,33 @@ impl<'a> RecordedWorm<'a> {
         OF_STROKE * self.scene.nominal[run].worm.stroke_m()
     }
 
-    /// A residual, whitened by the noise.
-    pub fn whitened(&self, run: usize, residual: &Residual) -> Vec<f64> {
-        let mut rows = Vec::with_capacity(self.bins[run].len() * (1 + self.channels()));
+    /// The motor's current counts as evidence in some run.
+    pub fn counts_current(&self) -> bool {
+        self.scene.observed.iter().any(|observed| observed.torque.is_some())
+    }
+
+    /// Number of rows of a run.
+    pub fn rows(&self, run: usize) -> usize {
+        self.bins[run].len() * (1 + self.channels()) + self.torque_noise[run].rows()
+    }
+
+    /// A residual of the positions, and of the torque in every bin, N m, whitened by the noise.
+    pub fn whitened(&self, run: usize, residual: &Residual, torque_n_m: &[f64]) -> Vec<f64> {
+        let mut rows = Vec::with_capacity(self.rows(run));
         self.noise[run].whiten(residual, &mut rows);
+        self.torque_noise[run].whiten(torque_n_m, &mut rows);
+        rows
+    }
+
+    /// The rows of a torque that the current shows in every bin of a run, N m, and no position.
+    pub fn rows_of_torque(&self, run: usize, torque_n_m: &[f64]) -> Vec<f64> {
+        let mut rows = vec![0.0; self.rows(run) - self.torque_noise[run].rows()];
+        self.torque_noise[run].whiten(torque_n_m, &mut rows);
         rows
     }
 }
 
-/// Rows of a run: the body's in every bin, then every cell's relative to it in every bin.
+/// Rows of a run: the body's in every bin, then every cell's relative to it in every bin; where the current counts, the torque's in every bin.
 impl Recorded for RecordedWorm<'_> {
     fn runs(&self) -> usize {
         self.scene.observed.len()
@@ -72,12 +96,27 @@ impl Recorded for RecordedWorm<'_> {
     fn bin_of_rows(&self, run: usize) -> Vec<usize> {
         let (bins, cells) = (0..self.bins[run].len(), self.channels());
         let of_cells = bins.clone().flat_map(|bin| std::iter::repeat_n(bin, cells));
-        bins.chain(of_cells).collect()
+        let of_torque = 0..self.torque_noise[run].rows();
+        bins.chain(of_cells).chain(of_torque).collect()
+    }
+
+    /// Those of the positions, and those of the torque where it counts.
+    fn discrepancy_columns(&self, scale_m: f64) -> DMatrix<f64> {
+        let of_positions = repeating_columns(self, scale_m);
+        let Some(of_torque) = torque_discrepancy::columns(self) else {
+            return of_positions;
+        };
+        let count = of_positions.ncols();
+        let mut all = of_positions.resize_horizontally(count + of_torque.ncols(), 0.0);
+        all.columns_mut(count, of_torque.ncols()).copy_from(&of_torque);
+        all
     }
 
     fn rows_of(&self, run: usize, pattern_m: &[f64]) -> Vec<f64> {
         let residual = Residual::of_pattern(&self.scene.observed[run], &self.bins[run], pattern_m);
-        self.whitened(run, &residual)
+        let mut rows = self.whitened(run, &residual, &[]);
+        rows.resize(self.rows(run), 0.0);
+        rows
     }
 
     /// The cells' positions relative to the body are about their means again.
@@ -87,8 +126,14 @@ impl Recorded for RecordedWorm<'_> {
         within[bins.clone()].copy_from_slice(&rows[bins.clone()]);
         let of_cells = count + bins.start * cells..count + bins.end * cells;
         within[of_cells.clone()].copy_from_slice(&rows[of_cells]);
+        let of_torque = count * (1 + cells);
+        if rows.len() > of_torque {
+            let bins = of_torque + bins.start..of_torque + bins.end;
+            within[bins.clone()].copy_from_slice(&rows[bins]);
+        }
         for cell in 0..cells {
-            let mut of_cell: Vec<&mut f64> = within[count..].iter_mut().skip(cell).step_by(cells).collect();
+            let of_cells = &mut within[count..of_torque];
+            let mut of_cell: Vec<&mut f64> = of_cells.iter_mut().skip(cell).step_by(cells).collect();
             let mean = of_cell.iter().map(|row| **row).sum::<f64>() / count as f64;
             of_cell.iter_mut().for_each(|row| **row -= mean);
         }

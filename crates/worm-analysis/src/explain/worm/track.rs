@@ -22,6 +22,7 @@ pub(in crate::explain) struct Track<'a> {
     first: i64,
     knots: usize,
     position_m: Vec<f64>, // `[knot][cell]`, flat
+    work_j: Vec<f64>,     // of the drive, up to each knot
     may_repeat: bool,
     /// Of every pad after the last whole cycle, and the largest change in it.
     deformation_m: [f64; MAX_CELLS],
@@ -29,6 +30,15 @@ pub(in crate::explain) struct Track<'a> {
     /// Whether the last cycle goes on for ever, and the advance of each cell in it, m.
     repeats: bool,
     advance_m: Vec<f64>,
+    /// Work of the drive in that cycle, J.
+    cycle_j: f64,
+}
+
+/// Where a phase lies: the knot before it, the fraction of the way to the next, and by how many cycles it is beyond the knots.
+struct Place {
+    knot: usize,
+    fraction: f64,
+    cycles: f64,
 }
 
 impl<'a> Track<'a> {
@@ -41,11 +51,13 @@ impl<'a> Track<'a> {
             knots: 0,
             first: (crawl.phase() * observed.pace.knots() as f64).round() as i64,
             position_m: crawl.positions_m().to_vec(),
+            work_j: vec![crawl.ledger().actuator_net_j],
             may_repeat,
             deformation_m: deformations_m(crawl),
             change_m: f64::INFINITY,
             repeats: false,
             advance_m: vec![0.0; observed.cells()],
+            cycle_j: 0.0,
         }
     }
 
@@ -63,6 +75,7 @@ impl<'a> Track<'a> {
         track.repeat();
         let forgotten = track.knots - track.per_cycle;
         track.position_m.drain(..forgotten * track.cells);
+        track.work_j.drain(..forgotten);
         track.first += forgotten as i64;
         track.knots -= forgotten;
         let mut here_m = Vec::with_capacity(track.cells);
@@ -105,6 +118,7 @@ impl<'a> Track<'a> {
         };
         crawl.advance_to(mechanics, phase, duration_s).ok()?;
         self.position_m.extend_from_slice(crawl.positions_m());
+        self.work_j.push(crawl.ledger().actuator_net_j);
         self.knots += 1;
         if self.may_repeat && self.knots.is_multiple_of(self.per_cycle) && self.has_settled(crawl) {
             self.repeat();
@@ -117,6 +131,7 @@ impl<'a> Track<'a> {
         let at_m = |knot: usize| &self.position_m[knot * self.cells..];
         let ends_m = at_m(self.knots).iter().zip(at_m(self.knots - self.per_cycle));
         self.advance_m = ends_m.map(|(last_m, first_m)| last_m - first_m).collect();
+        self.cycle_j = self.work_j[self.knots] - self.work_j[self.knots - self.per_cycle];
         self.repeats = true;
     }
 
@@ -135,6 +150,21 @@ impl<'a> Track<'a> {
 
     /// Appends the positions of all cells at a phase that it reaches.
     pub fn extend(&self, phase: f64, out: &mut Vec<f64>) {
+        let Place { knot, fraction, cycles } = self.find(phase);
+        let from = knot * self.cells;
+        let (low_m, high_m) = self.position_m[from..from + 2 * self.cells].split_at(self.cells);
+        let ends = low_m.iter().zip(high_m).zip(&self.advance_m);
+        out.extend(ends.map(|((low_m, high_m), advance_m)| low_m + fraction * (high_m - low_m) + cycles * advance_m));
+    }
+
+    /// Work of the drive up to a phase that it reaches, J.
+    pub fn work_j(&self, phase: f64) -> f64 {
+        let Place { knot, fraction, cycles } = self.find(phase);
+        let (low_j, high_j) = (self.work_j[knot], self.work_j[knot + 1]);
+        low_j + fraction * (high_j - low_j) + cycles * self.cycle_j
+    }
+
+    fn find(&self, phase: f64) -> Place {
         let (last, per_cycle) = (self.knots as f64, self.per_cycle as f64);
         let place = self.place(phase);
         let is_beyond = self.repeats && !(0.0..=last).contains(&place);
@@ -146,11 +176,11 @@ impl<'a> Track<'a> {
         let place = place - cycles * per_cycle;
         // A phase may run backwards a little where the drive rests.
         let knot = (place.max(0.0) as usize).min(self.knots - 1);
-        let fraction = place - knot as f64;
-        let from = knot * self.cells;
-        let (low_m, high_m) = self.position_m[from..from + 2 * self.cells].split_at(self.cells);
-        let ends = low_m.iter().zip(high_m).zip(&self.advance_m);
-        out.extend(ends.map(|((low_m, high_m), advance_m)| low_m + fraction * (high_m - low_m) + cycles * advance_m));
+        Place {
+            knot,
+            fraction: place - knot as f64,
+            cycles,
+        }
     }
 }
 

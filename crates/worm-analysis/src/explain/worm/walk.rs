@@ -1,6 +1,7 @@
 //! A crawl through the samples of a recording: simulated from knot to knot until it repeats, and then repeated.
 
 use super::clock::Clock;
+use super::gears::GearErrors;
 use super::observed::Observed;
 use super::predicted::Predicted;
 use super::start::{LEAD_CYCLES, start};
@@ -20,6 +21,9 @@ pub(in crate::explain) struct Walk<'a> {
     /// Phase of the last sample that was reached.
     before: f64,
     position_m: Vec<f64>, // `[sample][cell]`, flat, of the samples so far
+    work_j: Vec<f64>,     // of the drive, up to each of them
+    phase: Vec<f64>,      // that each of them shows
+    begun_j: f64,         // work before the crawl's ledger began
 }
 
 impl<'a> Walk<'a> {
@@ -55,6 +59,9 @@ impl<'a> Walk<'a> {
             settled: None,
             before: first,
             position_m: Vec::with_capacity(observed.cells() * observed.samples()),
+            work_j: Vec::with_capacity(observed.samples()),
+            phase: Vec::with_capacity(observed.samples()),
+            begun_j: 0.0,
         };
         if settles {
             let first_knot = walk.knot_from(first);
@@ -105,8 +112,33 @@ impl<'a> Walk<'a> {
     pub fn seen_at(mut self, scale: f64) -> Predicted {
         self.position_m.iter_mut().for_each(|at_m| *at_m *= scale);
         Predicted {
+            work_j: self.work_at_samples_j(),
             position_m: self.position_m,
+            gears: GearErrors::default(),
         }
+    }
+
+    /// Work up to the phase that was recorded with each sample, J: the current is not as late as the positions are. Nothing where no current
+    /// counts.
+    fn work_at_samples_j(&self) -> Vec<f64> {
+        if self.observed.torque.is_none() {
+            return Vec::new();
+        }
+        let last = self.work_j.len() - 1;
+        let mut after = 1;
+        let at = |phase: &f64| {
+            while after < last && self.phase[after] < *phase {
+                after += 1;
+            }
+            let (low, high) = (self.phase[after - 1], self.phase[after]);
+            let (low_j, high_j) = (self.work_j[after - 1], self.work_j[after]);
+            if high > low {
+                low_j + (high_j - low_j) * (phase - low) / (high - low)
+            } else {
+                high_j
+            }
+        };
+        self.observed.phase.iter().map(at).collect()
     }
 
     fn next_sample(&self) -> usize {
@@ -122,6 +154,8 @@ impl<'a> Walk<'a> {
             }
             self.advance(mechanics, phase, sample, phase)?;
             self.position_m.extend_from_slice(self.crawl.positions_m());
+            self.work_j.push(self.begun_j + self.crawl.ledger().actuator_net_j);
+            self.phase.push(phase);
             self.before = phase;
         }
         Some(())
@@ -154,6 +188,8 @@ impl<'a> Walk<'a> {
                 track.advance(&mut self.crawl, mechanics)?;
             }
             track.extend(phase, &mut self.position_m);
+            self.work_j.push(self.begun_j + track.work_j(phase));
+            self.phase.push(phase);
             self.before = phase;
         }
         Some(())
@@ -167,6 +203,7 @@ impl<'a> Walk<'a> {
         self.crawl.advance_to(mechanics, ended + further, duration_s).ok()?;
         let mut at_m = Vec::with_capacity(self.observed.cells());
         track.extend(until, &mut at_m);
+        self.begun_j += track.work_j(until);
         self.crawl.begin_at_phase(mechanics, until, &at_m);
         Some(())
     }

@@ -65,6 +65,8 @@ fn state(recording: &Recording, sample: usize) -> State {
         state.goal_velocity_rad_s = motor.velocity_rad_s[sample];
         state.motor_current_a = motor.current_a[sample];
         state.bus_voltage_v = motor.voltage_v[sample];
+        state.motor_duty = motor.duty[sample];
+        state.motor_temperature_c = motor.temperature_c[sample];
         state.motor_is_new = 1;
     }
     state

@@ -17,7 +17,9 @@ fn recording() -> Recording {
         angle_rad: numbers.clone(),
         velocity_rad_s: numbers.clone(),
         current_a: numbers.clone(),
-        voltage_v: numbers,
+        voltage_v: numbers.clone(),
+        duty: numbers.clone(),
+        temperature_c: numbers,
     });
     recording
 }

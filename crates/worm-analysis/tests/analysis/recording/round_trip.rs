@@ -35,6 +35,8 @@ prop_compose! {
                 velocity_rad_s: series.iter().map(|value| value / 3.0).collect(),
                 current_a: vec![f64::NAN; samples],
                 voltage_v: series,
+                duty: vec![0.5; samples],
+                temperature_c: vec![f64::NAN; samples],
             }),
             warnings: Vec::new(),
             repairs: Vec::new(),

@@ -280,6 +280,7 @@ fn runs(figures: &Figures, is_named: bool) -> Vec<RunSummary> {
             advance_m(&series.recalibrated_m),
             if is_named { advance_m(&series.named_m) } else { f64::NAN },
         ],
+        current: None,
         advance_sigma_m: None,
     };
     figures.cycles.iter().map(run).collect()

@@ -85,14 +85,9 @@ impl Candidate {
     }
 }
 
-/// Whether no positions can distinguish two effects.
-pub(in crate::explain) fn are_twins(one: &Hypothesised, other: &Hypothesised) -> bool {
-    one.cell.is_none() && other.cell.is_none() && one.effect.is_twin_of(other.effect)
-}
-
 /// Whether two answers are the same up to twins and cells.
 pub(in crate::explain) fn are_alike(one: &Candidate, other: &Candidate) -> bool {
-    let alike = |a: &Hypothesised, b: &Hypothesised| a.effect.name == b.effect.name || are_twins(a, b);
+    let alike = |a: &Hypothesised, b: &Hypothesised| a.effect.name == b.effect.name || a.is_twin_of(b);
     one.named().count() == other.named().count() && one.named().all(|(_, a)| other.named().any(|(_, b)| alike(a, b)))
 }
 

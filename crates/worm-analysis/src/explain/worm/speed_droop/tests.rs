@@ -101,6 +101,7 @@ fn found(per_n: f64, rest_s: f64, seed: u64) -> SpeedDroop {
         pauses: false,
         pace: Pace::default(),
         settled: None,
+        torque: None,
     };
     let still = Scene {
         observed: recordings

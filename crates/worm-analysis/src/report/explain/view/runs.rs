@@ -36,14 +36,12 @@ const MEASURED: QuantityRow<'_, RunSummary> = ("advance a cycle, mm: measured", 
 const RECALIBRATED: QuantityRow<'_, RunSummary> = ("by the recalibrated model", &|run| mm(run.advance_m[1]));
 
 fn advances(answer: &Answer) -> Table {
-    let candidate: QuantityRow<'_, RunSummary> = ("by the first candidate", &|run| mm(run.advance_m[2]));
     let sigma: QuantityRow<'_, RunSummary> = ("its standard error", &|run| mm(run.advance_sigma_m.unwrap_or(f64::NAN)));
-    table(
-        "Advances",
-        answer,
-        &[PAYLOAD, CYCLE, MEASURED, sigma, RECALIBRATED],
-        candidate,
-    )
+    let mut quantities = vec![PAYLOAD, CYCLE, MEASURED, sigma, RECALIBRATED];
+    if !answer.effects.is_empty() {
+        quantities.push(("by the first candidate", &|run| mm(run.advance_m[2])));
+    }
+    table("Advances", answer, &quantities)
 }
 
 fn recordings(answer: &Answer) -> Table {
@@ -63,24 +61,47 @@ fn recordings(answer: &Answer) -> Table {
         ("random walk of the body a cycle, mm", &|run| mm(run.drift_per_cycle_m)),
         MEASURED,
     ];
-    let named: QuantityRow<'_, RunSummary> = ("by the named model", &|run| mm(run.advance_m[2]));
-    table(
-        "Recordings",
-        answer,
-        &[&quantities[..], &[RECALIBRATED]].concat(),
-        named,
-    )
+    let mut quantities = [&quantities[..], &[RECALIBRATED]].concat();
+    if !answer.effects.is_empty() {
+        quantities.push(("by the named model", &|run| mm(run.advance_m[2])));
+    }
+    if answer.runs.iter().any(|run| run.current.is_some()) {
+        quantities.extend(CURRENT);
+        if !answer.effects.is_empty() {
+            quantities.extend(CURRENT_NAMED);
+        }
+    }
+    table("Recordings", answer, &quantities)
 }
 
-/// The table, with the advance by the named model where there is one.
-fn table(
-    title: &str,
-    answer: &Answer,
-    quantities: &[QuantityRow<'_, RunSummary>],
-    named: QuantityRow<'_, RunSummary>,
-) -> Table {
+/// What the motor's current shows, where it counts.
+const CURRENT: [QuantityRow<'_, RunSummary>; 3] = [
+    ("work of a cycle, mJ: by the motor's current", &|run| {
+        milli(run.current.map(|current| current.work_j[0]))
+    }),
+    ("work by the recalibrated model", &|run| {
+        milli(run.current.map(|current| current.work_j[1]))
+    }),
+    ("torque that it leaves, mN m", &|run| {
+        milli(run.current.map(|current| current.torque_residual_n_m[0]))
+    }),
+];
+const CURRENT_NAMED: [QuantityRow<'_, RunSummary>; 2] = [
+    ("work by the named model, mJ", &|run| {
+        milli(run.current.map(|current| current.work_j[2]))
+    }),
+    ("torque that it leaves, mN m", &|run| {
+        milli(run.current.map(|current| current.torque_residual_n_m[1]))
+    }),
+];
+
+/// In thousandths of its unit.
+fn milli(value: Option<f64>) -> String {
+    fixed(value.unwrap_or(f64::NAN) * 1e3, 2)
+}
+
+/// The table of all runs.
+fn table(title: &str, answer: &Answer, quantities: &[QuantityRow<'_, RunSummary>]) -> Table {
     let names = names_by_slope(answer.runs.iter().map(|run| run.slope_deg));
-    let named = (!answer.effects.is_empty()).then_some(named);
-    let quantities: Vec<_> = quantities.iter().copied().chain(named).collect();
-    Table::of_items(title, names, &answer.runs, &quantities)
+    Table::of_items(title, names, &answer.runs, quantities)
 }

@@ -1,0 +1,93 @@
+//! The noise of the torque: how well the current repeats from cycle to cycle.
+//!
+//! As of the positions (see [`super::noise`]): neighbouring cycles differ by noise alone, whatever the model misses, and a median does not
+//! see a change in mid-run. Beside the jump from one step to the next a bin's torque depends on when exactly the jump was sampled; those
+//! bins do not count.
+
+use super::noise::variance;
+use super::observed::Observed;
+use crate::explain::search::bins::Bins;
+
+/// Torque that no bin is sure of, N m: rounding of current and velocity within it.
+const FLOOR_N_M: f64 = 2e-4;
+/// Fewest bins of a step of which the outer ones can be left out.
+const MIN_BINS: usize = 4;
+
+/// The noise of the torque in one run.
+#[derive(Debug, Clone, Default)]
+pub(in crate::explain) struct TorqueNoise {
+    /// One over the standard deviation in each bin, 1/(N m); 0 where it does not count. Empty without a current.
+    scale: Vec<f64>,
+}
+
+impl TorqueNoise {
+    /// By the residual of the torque in bins under some hypothesis, N m.
+    pub fn measure(observed: &Observed<'_>, bins: &Bins, residual_n_m: &[f64]) -> Self {
+        if residual_n_m.is_empty() {
+            return Self::default();
+        }
+        let per_cycle = bins.per_cycle();
+        let later = |bin: usize| {
+            let number = bins.bins[bin].number + per_cycle;
+            let at = bins.bins.partition_point(|bin| bin.number < number);
+            bins.bins.get(at).filter(|bin| bin.number == number).map(|_| at)
+        };
+        let counts = |bin: usize| !is_at_jump(bins, bin) && bins.bins[bin].samples.start >= observed.settled_from();
+        let changes: Vec<f64> = (0..bins.len())
+            .map(|bin| match later(bin) {
+                Some(later) if counts(bin) => residual_n_m[later] - residual_n_m[bin],
+                _ => f64::NAN,
+            })
+            .collect();
+        let of_bin = 0.5 * variance(&changes).unwrap_or(0.0);
+        // What neighbouring bins share counts as often as there are bins.
+        let of_steps: Vec<f64> = changes.chunks(bins.per_step).map(mean_of_seen).collect();
+        let along = variance(&of_steps).map_or(1.0, |of_step| 0.5 * of_step * bins.per_step as f64 / of_bin);
+        let variance = of_bin * along.clamp(1.0, bins.per_step as f64) + FLOOR_N_M.powi(2);
+        let scale = |(bin, residual): (usize, &f64)| {
+            if residual.is_finite() && !is_at_jump(bins, bin) {
+                variance.sqrt().recip()
+            } else {
+                0.0
+            }
+        };
+        Self {
+            scale: residual_n_m.iter().enumerate().map(scale).collect(),
+        }
+    }
+
+    /// Rows of a run: none without a current.
+    pub fn rows(&self) -> usize {
+        self.scale.len()
+    }
+
+    /// Root mean square over the bins of a cycle of what is there on average, N m.
+    pub fn rms_of_mean_cycle(&self, bins: &Bins, torque_n_m: &[f64]) -> f64 {
+        let places = bins.per_cycle() as usize;
+        let (mut sums_n_m, mut counts) = (vec![0.0; places], vec![0.0; places]);
+        for bin in (0..bins.len()).filter(|&bin| self.scale[bin] > 0.0) {
+            sums_n_m[bins.place(bin)] += torque_n_m[bin];
+            counts[bins.place(bin)] += 1.0;
+        }
+        let seen = sums_n_m.iter().zip(&counts).filter(|(_, count)| **count > 0.0);
+        let squares: Vec<f64> = seen.map(|(sum_n_m, count)| (sum_n_m / count).powi(2)).collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    }
+
+    /// Appends a torque in every bin, N m, whitened.
+    pub fn whiten(&self, torque_n_m: &[f64], out: &mut Vec<f64>) {
+        let with_scale = torque_n_m.iter().zip(&self.scale);
+        out.extend(with_scale.map(|(torque, scale)| if *scale > 0.0 { torque * scale } else { 0.0 }));
+    }
+}
+
+/// Whether a bin lies beside the jump from one step to the next.
+fn is_at_jump(bins: &Bins, bin: usize) -> bool {
+    let of_step = bins.place(bin) % bins.per_step;
+    bins.per_step >= MIN_BINS && (of_step == 0 || of_step + 1 == bins.per_step)
+}
+
+fn mean_of_seen(values: &[f64]) -> f64 {
+    let seen: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    seen.iter().sum::<f64>() / seen.len() as f64
+}
