@@ -57,6 +57,26 @@ pub fn draw_sized(hidden: Hidden, seed: u64, size: CampaignSize) -> HiddenCampai
     draw_by(seed, |rng| complete(hidden, usual_setting(size, rng), seed, rng))
 }
 
+/// The same with the phase of the drive recorded, and so the motor's current.
+///
+/// # Panics
+/// When no worm crawls: the ranges are wrong.
+pub fn draw_with_phase(hidden: Hidden, seed: u64) -> HiddenCampaign {
+    draw_with_phase_sized(hidden, seed, CampaignSize::FULL)
+}
+
+/// The same of another size.
+///
+/// # Panics
+/// When no worm crawls: the ranges are wrong.
+pub fn draw_with_phase_sized(hidden: Hidden, seed: u64, size: CampaignSize) -> HiddenCampaign {
+    draw_by(seed, |rng| {
+        let mut setting = usual_setting(size, rng);
+        setting.scenes.iter_mut().for_each(|scene| scene.with_phase = true);
+        complete(hidden, setting, seed, rng)
+    })
+}
+
 /// A campaign of any size, of a worm from wider ranges and with laws of other forms than the library's.
 ///
 /// # Panics

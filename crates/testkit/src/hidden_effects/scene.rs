@@ -174,7 +174,11 @@ impl Scene {
                 let fraction = fraction_at(latency_s + recorder.phase.len() as f64 / rate_hz);
                 recorder.phase.push(before + fraction * (cam.phase - before));
                 let turned_rad = TAU * (cam.phase - before);
-                recorder.cam_n_m.push(if turned_rad > 0.0 { (motion.drive_j - before_j) / turned_rad } else { 0.0 });
+                recorder.cam_n_m.push(if turned_rad > 0.0 {
+                    (motion.drive_j - before_j) / turned_rad
+                } else {
+                    0.0
+                });
             }
         }
         Ok(recorder.finish(self))

@@ -99,7 +99,8 @@ impl Servo {
         let mut motor_n_m = out_n_m;
         for _ in 0..40 {
             let on_gears = MOTOR_SHARE * motor_n_m + (1.0 - MOTOR_SHARE) * out_n_m;
-            let against = warm * self.friction * DRY_N_M + self.by_load * on_gears.abs() + BY_SQUARE * motor_n_m * motor_n_m;
+            let against =
+                warm * self.friction * DRY_N_M + self.by_load * on_gears.abs() + BY_SQUARE * motor_n_m * motor_n_m;
             motor_n_m = out_n_m + turning * against + warm * self.friction * VISCOUS * speed;
         }
         motor_n_m
@@ -107,6 +108,8 @@ impl Servo {
 
     fn ripple_n_m(&self, angle_rad: f64) -> f64 {
         let waves = self.ripple_n_m.iter();
-        waves.map(|(waves, sine, cosine)| sine * (waves * angle_rad).sin() + cosine * (waves * angle_rad).cos()).sum()
+        waves
+            .map(|(waves, sine, cosine)| sine * (waves * angle_rad).sin() + cosine * (waves * angle_rad).cos())
+            .sum()
     }
 }

@@ -1,7 +1,7 @@
 //! The cases: a development split to tune on and a sealed test split, from disjoint ranges of seeds and with strangers of disjoint
 //! kinds, and the few that the tests of the search run at a smaller size.
 
-use super::campaign::{HiddenCampaign, draw, draw_varied, draw_varied_short};
+use super::campaign::{HiddenCampaign, draw, draw_varied, draw_varied_short, draw_with_phase};
 use super::effect::{Effect, SeverityRange};
 use super::hidden::{Hidden, Twin};
 use super::unmodelled::{DEVELOPMENT_KINDS, TEST_KINDS};
@@ -20,6 +20,9 @@ pub enum Split {
     /// One of each effect, the strangers of the development split and clean worms, of the usual size and with a further run on a slope
     /// between: for the laws that are found where the library does not explain the data.
     Laws,
+    /// Payloads, softer pads and clean worms, of the usual size and with the drive's phase: what positions cannot tell apart and the
+    /// motor's current can.
+    Current,
 }
 
 /// The seed of every case of [`Split::Search`]: in no range of the others.
@@ -28,6 +31,10 @@ pub const SEARCH_SEED: u64 = 501;
 const SAMPLE_SEED: u64 = 701;
 /// Clean worms of [`Split::Laws`].
 const LAWS_CLEAN: usize = 20;
+/// Worms of each kind of [`Split::Current`].
+const CURRENT_OF_EACH: usize = 20;
+/// Its payloads: from 30 g to 150 g.
+const FROM_30_G: SeverityRange = SeverityRange { from: 0.527, to: 1.0 };
 
 impl Split {
     /// Below the first seed.
@@ -38,6 +45,7 @@ impl Split {
             Self::Search => SEARCH_SEED,
             Self::Sample => SAMPLE_SEED,
             Self::Laws => 57_300_000,
+            Self::Current => 57_400_000,
         }
     }
 
@@ -48,6 +56,7 @@ impl Split {
             Self::Search => "search",
             Self::Sample => "sample",
             Self::Laws => "laws",
+            Self::Current => "current",
         }
     }
 
@@ -63,7 +72,7 @@ impl Split {
                 twins: 6,
                 onsets: 16,
             },
-            Self::Test | Self::Search | Self::Sample | Self::Laws => Counts {
+            Self::Test | Self::Search | Self::Sample | Self::Laws | Self::Current => Counts {
                 severities: 10,
                 clean: 132,
                 discrepant: 48,
@@ -79,16 +88,22 @@ impl Split {
     /// The kinds of strangers in it.
     fn stranger_kinds(self) -> [u64; 9] {
         match self {
-            Self::Development | Self::Sample | Self::Laws => DEVELOPMENT_KINDS,
+            Self::Development | Self::Sample | Self::Laws | Self::Current => DEVELOPMENT_KINDS,
             Self::Test | Self::Search => TEST_KINDS,
         }
     }
 
     /// The split of a name.
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Development, Self::Test, Self::Search, Self::Sample, Self::Laws]
-            .into_iter()
-            .find(|split| split.name() == name)
+        let all = [
+            Self::Development,
+            Self::Test,
+            Self::Search,
+            Self::Sample,
+            Self::Laws,
+            Self::Current,
+        ];
+        all.into_iter().find(|split| split.name() == name)
     }
 }
 
@@ -125,6 +140,7 @@ impl Case {
     pub fn draw(self) -> HiddenCampaign {
         let mut campaign = match self.split {
             Split::Search | Split::Laws => draw(self.hidden, self.seed),
+            Split::Current => draw_with_phase(self.hidden, self.seed),
             Split::Sample => draw_varied_short(self.hidden, self.seed),
             Split::Development | Split::Test => draw_varied(self.hidden, self.seed),
         };
@@ -190,6 +206,21 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
         let strangers = split.stranger_kinds().into_iter().map(Hidden::Outside);
         let clean = std::iter::repeat_n(Hidden::Clean, LAWS_CLEAN);
         let all = singles.chain(strangers).chain(clean).enumerate();
+        return all
+            .map(|(number, hidden)| case(hidden, split.base() + number as u64))
+            .collect();
+    }
+    if split == Split::Current {
+        let kinds = [
+            Hidden::Single(Effect::Payload, FROM_30_G),
+            Hidden::Twin(Twin::SofterPads),
+            Hidden::Clean,
+        ];
+        let all = kinds
+            .into_iter()
+            .cycle()
+            .take(CURRENT_OF_EACH * kinds.len())
+            .enumerate();
         return all
             .map(|(number, hidden)| case(hidden, split.base() + number as u64))
             .collect();

@@ -133,17 +133,18 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         Some((_, fit)) => calibration(fit, config),
         None => calibration(&as_written(problem, final_fit), config),
     };
+    let verdict_in_words = words::sentence(
+        verdict,
+        &effects,
+        &rivals,
+        selected,
+        found.open_share,
+        change.as_ref(),
+        "cycles",
+    );
     Answer {
         verdict,
-        sentence: words::sentence(
-            verdict,
-            &effects,
-            &rivals,
-            selected,
-            found.open_share,
-            change.as_ref(),
-            "cycles",
-        ),
+        sentence: verdict_in_words + &words::of_pads(worm, final_fit).unwrap_or_default(),
         r#where: places(&maps_before, PLACES),
         effects,
         rivals,
@@ -161,12 +162,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
             agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
             discrepancy_m: parts.discrepancy_m,
         },
-        warnings: words::warnings(
-            worm,
-            final_fit,
-            named.first(),
-            config.self_sensing.calibrated.is_some(),
-        ),
+        warnings: words::warnings(worm, final_fit, named.first(), config.self_sensing.calibrated.is_some()),
         repairs: words::repairs(worm),
         runs,
         figures: Figures {

@@ -79,7 +79,9 @@ pub enum ExplainError {
         recording: String,
     },
     /// The current was to count, and there is none.
-    #[error("no recording has the motor's current with the gait phase: record with wormd, or leave the current out of the evidence")]
+    #[error(
+        "no recording has the motor's current with the gait phase: record with wormd, or leave the current out of the evidence"
+    )]
     NoCurrent,
     /// The slope is none.
     #[error("{recording}: a slope of {slope_deg}°: give -90 to 90 degrees")]

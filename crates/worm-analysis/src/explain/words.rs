@@ -4,7 +4,8 @@ use super::answer::{FoundOnset, NamedEffect, Place, Verdict, answers_in_words};
 use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::judge::decision::Selected;
-use crate::explain::search::parameter::What;
+use crate::explain::search::parameter::{Free, What};
+use crate::explain::worm::nuisance::Nuisance;
 use crate::explain::worm::recorded_worm::RecordedWorm;
 use crate::recording::Repair;
 use worm_estimator::number::percent;
@@ -12,6 +13,8 @@ use worm_physics::effect::{LIBRARY, Visible};
 
 /// Probability from which an effect that is not named is mentioned.
 const WORTH_A_WORD: f64 = 0.1;
+/// Standard deviations from which a deviation is no chance.
+const SURE: f64 = 3.0;
 
 /// The verdict in a sentence or two; `held_out` is what the effects were judged on that they were not fitted to.
 pub(super) fn sentence(
@@ -109,6 +112,31 @@ fn closing(effects: &[NamedEffect], held_out: &str) -> String {
         ),
         _ => String::new(),
     }
+}
+
+/// Share by which the stiffness may be off before it is worth a word where the current shows it: more than positions alone may move it.
+const SOFTER: f64 = 0.1;
+
+/// By how much the pads are softer or stiffer than the model has them, as a further sentence; none where it is little, not sure, or
+/// nothing that the recordings show.
+pub(super) fn of_pads(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<String> {
+    let is_stiffness = |free: &Free| Nuisance::of(free.what) == Some(Nuisance::Stiffness);
+    let at = fit
+        .hypothesis
+        .free
+        .iter()
+        .position(is_stiffness)
+        .filter(|_| worm.counts_current())?;
+    let (value, sigma) = (fit.at[at], fit.sigmas()[at]);
+    let share = value.exp_m1();
+    (share.abs() > SOFTER && value.abs() > SURE * sigma).then(|| {
+        format!(
+            " The pads are {:.0} ± {:.0} % {} than the model has them: the motor's current shows it.",
+            100.0 * share.abs(),
+            100.0 * value.exp() * sigma,
+            if share < 0.0 { "softer" } else { "stiffer" }
+        )
+    })
 }
 
 /// What no effect explains, in words.

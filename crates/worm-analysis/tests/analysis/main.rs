@@ -3,6 +3,7 @@
 //! `independent_worm` and `hidden_effects` test the simulated worms of the testkit, which `identify`, `score` and `search` use to
 //! test the library.
 
+mod current;
 mod effects_recorded;
 mod hidden_effects;
 mod identify;

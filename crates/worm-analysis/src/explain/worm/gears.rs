@@ -78,3 +78,36 @@ pub(in crate::explain) fn nuisances(gear: &GearModel) -> Vec<Free> {
     all.push(Nuisance::PadDamping.free_within(IN_PADS));
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_current_shows_leads_back_to_the_torque() {
+        let errors = GearErrors {
+            offset_n_m: -0.004,
+            gain: 0.05,
+            load: 0.03,
+            lead_s: 0.0,
+        };
+        for (cam_n_m, shown_n_m) in [(0.02, 0.0176), (0.0, -0.004), (-0.01, -0.0142)] {
+            assert!((errors.shown_n_m(cam_n_m) - shown_n_m).abs() < 1e-12, "{cam_n_m}");
+            assert!((errors.cam_n_m(shown_n_m) - cam_n_m).abs() < 1e-12, "{shown_n_m}");
+        }
+    }
+
+    #[test]
+    fn dampers_in_the_pads_are_ahead_by_damper_over_spring() {
+        let worm = Worm::paper();
+        let hypothesis = Hypothesis::new(&[Nuisance::PadDamping.free_within(IN_PADS)], &[]);
+        // Of a body of m on pads of k in all, a ratio of ζ is a damper of c = 2 ζ √(k m), and ahead by c / k.
+        let pads_n_per_m: f64 = worm.contacts().iter().map(|contact| contact.stiffness_n_per_m).sum();
+        let damper_n_s_per_m = 2.0 * 0.4 * (pads_n_per_m * worm.mass_kg()).sqrt();
+        let errors = GearErrors::of(&hypothesis, &[1.0], (&worm, 0.4));
+        assert!(
+            (errors.lead_s - damper_n_s_per_m / pads_n_per_m).abs() < 1e-12,
+            "{errors:?}"
+        );
+    }
+}

@@ -17,8 +17,8 @@
 pub(in crate::explain) mod binning;
 pub(in crate::explain) mod clock;
 pub(in crate::explain) mod energy;
-pub(in crate::explain) mod gears;
 pub(in crate::explain) mod gap;
+pub(in crate::explain) mod gears;
 mod laws;
 pub(in crate::explain) mod matters;
 pub(in crate::explain) mod noise;

@@ -72,7 +72,10 @@ const OF_EACH: [fn(usize) -> Nuisance; 4] = [
 
 /// Prior of a nuisance: standard deviation, distance of the limits from the centre, step of derivatives.
 const FRICTION: (f64, f64, f64) = (0.15, 0.5, 2e-3);
+/// Tight, because positions show forces over stiffness alone: with it free, pads as soft as one likes would take the place of any load.
 const STIFFNESS: (f64, f64, f64) = (0.05, 0.1, 4e-3);
+/// Where the motor's current shows forces: as friction.
+const STIFFNESS_BY_FORCES: (f64, f64, f64) = FRICTION;
 const STROKE: (f64, f64, f64) = (0.01, 0.03, 5e-4);
 const FRICTION_OF: (f64, f64, f64) = (0.025, 0.1, 4e-3);
 const STIFFNESS_OF: (f64, f64, f64) = (0.02, 0.08, 4e-3);
@@ -93,7 +96,7 @@ const BREAKAWAY: (f64, f64, f64, f64, f64) = (0.0, 0.05, 0.0, 0.15, 0.01);
 const DAMPING: (f64, f64, f64, f64) = (-0.9, 1.0, 2.2, 0.1);
 
 impl Nuisance {
-    /// The nuisances of a campaign of so many cells and runs.
+    /// The nuisances of a campaign of so many cells and runs, of which only positions are known.
     pub fn all(cells: usize, runs: usize, phase_recorded: bool) -> Vec<Free> {
         let mut all = vec![
             Self::Friction.free(FRICTION),
@@ -116,6 +119,15 @@ impl Nuisance {
         all.push(Self::Presliding.free_within(PRESLIDING));
         all.push(Self::Viscosity.free_within(VISCOSITY));
         all.push(Self::Breakaway.free_within(BREAKAWAY));
+        all
+    }
+
+    /// Those of a campaign in which forces are known, too: the same, with a wider prior of the stiffness.
+    pub fn all_by_forces(cells: usize, runs: usize, phase_recorded: bool) -> Vec<Free> {
+        let mut all = Self::all(cells, runs, phase_recorded);
+        for free in all.iter_mut().filter(|free| free.what == Self::Stiffness.what()) {
+            *free = Self::Stiffness.free(STIFFNESS_BY_FORCES);
+        }
         all
     }
 

@@ -1,8 +1,8 @@
 //! The worm as a plant: what it predicts, its nuisances and its effects.
 
 use super::binning::bins;
-use super::gears;
 use super::gap::closed;
+use super::gears;
 use super::laws::laws;
 use super::matters::impact;
 use super::noise::RunNoise;
@@ -50,10 +50,15 @@ pub(in crate::explain) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<
 
 impl Plant for RecordedWorm<'_> {
     fn nuisances(&self) -> Vec<Free> {
-        let mut all = Nuisance::all(self.channels(), self.runs(), self.phase_recorded());
-        let torque = self.scene.observed.iter().find_map(|observed| observed.torque.as_ref());
-        all.extend(torque.into_iter().flat_map(|torque| gears::nuisances(&torque.gear)));
-        all
+        let (cells, runs, phase_recorded) = (self.channels(), self.runs(), self.phase_recorded());
+        match self.scene.observed.iter().find_map(|observed| observed.torque.as_ref()) {
+            Some(torque) => {
+                let mut all = Nuisance::all_by_forces(cells, runs, phase_recorded);
+                all.extend(gears::nuisances(&torque.gear));
+                all
+            }
+            None => Nuisance::all(cells, runs, phase_recorded),
+        }
     }
 
     fn concerns(&self, nuisance: usize, run: usize) -> bool {

@@ -74,7 +74,12 @@ impl MeasuredTorque {
 fn cam_torque_n_m(motor: &Motor, gear: &GearModel, sample: usize) -> f64 {
     let velocity = motor.velocity_rad_s[sample];
     let winding_v = motor.voltage_v[sample] * motor.duty[sample];
-    let winding_a = gear.winding_current_a(motor.current_a[sample], winding_v, velocity, motor.temperature_c[sample]);
+    let winding_a = gear.winding_current_a(
+        motor.current_a[sample],
+        winding_v,
+        velocity,
+        motor.temperature_c[sample],
+    );
     gear.cam_torque_n_m(winding_a, velocity, motor.angle_rad[sample])
 }
 
@@ -141,4 +146,85 @@ fn rise_n_m(bins: &Bins, pairs_n_m: &[[f64; 2]], bin: usize) -> f64 {
 pub(in crate::explain) fn residual_n_m(observed: &Observed<'_>, bins: &Bins, predicted: &Predicted) -> Vec<f64> {
     let pairs = in_bins(observed, bins, predicted);
     pairs.iter().map(|[measured, model]| measured - model).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 100.0;
+    const CYCLES: f64 = 2.0;
+
+    fn gear() -> GearModel {
+        GearModel {
+            dry_n_m: 0.01,
+            viscous_n_m_s_per_rad: 0.004,
+            ..GearModel::plain(0.4, 3.0, 0.002)
+        }
+    }
+
+    /// A motor that comes from 1 to 3 rad/s over two cycles while the cam takes a torque, N m; its angle and currents follow by the
+    /// work done. `seen` is whether the current of a sample was.
+    fn recorded(cam_n_m: f64, seen: impl Fn(usize) -> bool) -> (Recording, Vec<f64>) {
+        let angle_rad = CYCLES * TAU;
+        let acceleration = (9.0 - 1.0) / (2.0 * angle_rad);
+        let samples = (2.0 / acceleration * RATE_HZ) as usize;
+        let time_s: Vec<f64> = (0..=samples).map(|sample| sample as f64 / RATE_HZ).collect();
+        let velocity = |&at_s: &f64| 1.0 + acceleration * at_s;
+        let angle = |&at_s: &f64| at_s + 0.5 * acceleration * at_s * at_s;
+        let mut motor = Motor::default();
+        for (sample, at_s) in time_s.iter().enumerate() {
+            let torque_n_m = cam_n_m + 0.01 + 0.004 * velocity(at_s) + 0.002 * acceleration;
+            motor.angle_rad.push(angle(at_s));
+            motor.velocity_rad_s.push(velocity(at_s));
+            motor
+                .current_a
+                .push(if seen(sample) { torque_n_m / 0.4 } else { f64::NAN });
+            motor.voltage_v.push(5.0);
+            motor.duty.push(f64::NAN);
+            motor.temperature_c.push(f64::NAN);
+        }
+        let phase: Vec<f64> = time_s.iter().map(|at_s| angle(at_s) / TAU).collect();
+        let recording = Recording {
+            source: "two cycles".into(),
+            cell_names: Vec::new(),
+            position_m: Vec::new(),
+            gait_phase: Some(phase.clone()),
+            motor: Some(motor),
+            warnings: Vec::new(),
+            repairs: Vec::new(),
+            time_s,
+        };
+        (recording, phase)
+    }
+
+    #[test]
+    fn the_cam_takes_what_friction_and_inertia_leave() {
+        let (recording, phase) = recorded(0.03, |_| true);
+        let torque = MeasuredTorque::new(&recording, &phase, &gear()).expect("it has a current");
+        let done_j = torque.cumulative_j(&phase, &GearErrors::default());
+        let turned = phase.last().expect("samples") - phase[0];
+        // The inertia is taken from averaged velocities, which miss half a sample at either end.
+        let expected_j = 0.03 * TAU * turned;
+        let found_j = done_j.last().expect("samples");
+        assert!((found_j / expected_j - 1.0).abs() < 2e-3, "{found_j} of {expected_j} J");
+        let corrected = GearErrors {
+            offset_n_m: 0.01,
+            ..GearErrors::default()
+        };
+        let less_j = torque.cumulative_j(&phase, &corrected);
+        let saved_j = found_j - less_j.last().expect("samples");
+        assert!((saved_j - 0.01 * TAU * turned).abs() < 1e-9, "{saved_j}");
+    }
+
+    #[test]
+    fn gaps_in_the_current_are_bridged_as_long_as_they_are_few() {
+        let (recording, phase) = recorded(0.03, |sample| !(200..220).contains(&sample));
+        let torque = MeasuredTorque::new(&recording, &phase, &gear()).expect("most of it is there");
+        let done_j = torque.cumulative_j(&phase, &GearErrors::default());
+        let expected_j = 0.03 * TAU * (phase.last().expect("samples") - phase[0]);
+        assert!((done_j.last().expect("samples") / expected_j - 1.0).abs() < 5e-3);
+        let (recording, phase) = recorded(0.03, |sample| sample % 4 != 0);
+        assert!(MeasuredTorque::new(&recording, &phase, &gear()).is_none());
+    }
 }

@@ -37,7 +37,12 @@ enum Column {
 
 /// Columns of the torque, whitened by the noise; none where no current counts.
 pub(super) fn columns(worm: &RecordedWorm<'_>) -> Option<DMatrix<f64>> {
-    let gear = worm.scene.observed.iter().find_map(|observed| observed.torque.as_ref())?.gear;
+    let gear = worm
+        .scene
+        .observed
+        .iter()
+        .find_map(|observed| observed.torque.as_ref())?
+        .gear;
     let scale_n_m = SHARE * sliding_n_m(worm);
     let (over_conditions, weights) = (over_conditions(worm), weights(COSINES));
     let mut kinds = Vec::new();
@@ -51,7 +56,10 @@ pub(super) fn columns(worm: &RecordedWorm<'_>) -> Option<DMatrix<f64>> {
     for ripple in gear.ripple.iter().filter(|ripple| ripple.waves != 0.0) {
         kinds.extend([true, false].map(|sine| Column::Ripple(ripple.waves, sine, gear.ripple_sigma_n_m)));
     }
-    let places = (0..worm.runs()).map(|run| worm.bins(run).per_cycle()).max().unwrap_or(0) as usize;
+    let places = (0..worm.runs())
+        .map(|run| worm.bins(run).per_cycle())
+        .max()
+        .unwrap_or(0) as usize;
     kinds.extend((0..places).map(|place| Column::Place(place, UNKNOWN_WAVES * gear.ripple_sigma_n_m)));
     let place_of = |phase: f64| (phase.rem_euclid(1.0) * places as f64) as usize;
     let columns: Vec<Vec<f64>> = kinds
@@ -86,7 +94,11 @@ pub(super) fn columns(worm: &RecordedWorm<'_>) -> Option<DMatrix<f64>> {
         })
         .collect();
     let rows = columns.first().map_or(0, Vec::len);
-    Some(DMatrix::from_iterator(rows, columns.len(), columns.into_iter().flatten()))
+    Some(DMatrix::from_iterator(
+        rows,
+        columns.len(),
+        columns.into_iter().flatten(),
+    ))
 }
 
 /// Torque on the cam while a tip slides, N m: its friction over the stroke, which a step makes in its part of a turn.

@@ -91,3 +91,49 @@ fn mean_of_seen(values: &[f64]) -> f64 {
     let seen: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     seen.iter().sum::<f64>() / seen.len() as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::binning::bins;
+    use super::*;
+    use crate::explain::fixture::{Campaign, record, scene};
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn it_is_what_does_not_repeat_and_leaves_the_jumps_out() {
+        const NOISE_N_M: f64 = 2e-3;
+        let campaign = Campaign::default();
+        let recordings = record(&campaign, None, 5);
+        let scene = scene(&recordings, &campaign);
+        let observed = &scene.observed[0];
+        let bins = bins(observed);
+        assert!(bins.per_step >= MIN_BINS);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+        // What repeats, and far more where one step follows the other, is no noise.
+        let residual_n_m: Vec<f64> = (0..bins.len())
+            .map(|bin| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                let repeats_n_m = 0.01 * (TAU * bins.bins[bin].phase).sin();
+                let jump_n_m = if is_at_jump(&bins, bin) { 0.5 * noise } else { 0.0 };
+                repeats_n_m + jump_n_m + NOISE_N_M * noise
+            })
+            .collect();
+        let noise = TorqueNoise::measure(observed, &bins, &residual_n_m);
+        assert_eq!(noise.rows(), bins.len());
+        let mut unit = Vec::new();
+        noise.whiten(&vec![1.0; bins.len()], &mut unit);
+        for (bin, scale) in unit.iter().enumerate() {
+            if is_at_jump(&bins, bin) {
+                assert!(*scale == 0.0, "bin {bin}");
+            } else {
+                // At most what neighbours seem to share by chance makes it larger.
+                assert!((0.7..1.15).contains(&(scale * NOISE_N_M)), "bin {bin}: {scale}");
+            }
+        }
+        let mean_n_m = noise.rms_of_mean_cycle(&bins, &residual_n_m);
+        assert!((mean_n_m / (0.01 / 2f64.sqrt()) - 1.0).abs() < 0.1, "{mean_n_m}");
+    }
+}
