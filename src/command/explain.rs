@@ -18,7 +18,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use worm_analysis::bench::Plant;
 use worm_analysis::experiment::Progress as Step;
-use worm_analysis::explain::{Answer, Options, explain, explain_advances, model_update};
+use worm_analysis::explain::{Answer, ExplainError, Options, explain, explain_advances, model_update};
 use worm_analysis::report;
 use worm_estimator::config::Config;
 use worm_physics::effect::{named, named_of_servo};
@@ -189,10 +189,10 @@ fn search(dataset: &Dataset, options: Options, progress: &mut Progress) -> Resul
         stage = step.stage;
         progress.tell(stage, READING + (1.0 - READING) * step.fraction);
     };
-    let answer = if dataset.advances.is_empty() {
-        explain(&runs, &dataset.config, &options, &mut report_step)
-    } else {
-        explain_advances(&dataset.advances, &dataset.config, &mut report_step)
+    let answer = match dataset.advances.is_empty() {
+        true => explain(&runs, &dataset.config, &options, &mut report_step),
+        false if options.with_current => Err(ExplainError::NoCurrent),
+        false => explain_advances(&dataset.advances, &dataset.config, &mut report_step),
     };
     answer.map_err(|error| (Failure::unusable(error), stage))
 }

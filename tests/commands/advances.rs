@@ -134,6 +134,12 @@ fn what_cannot_be_a_table_of_advances_is_refused() {
             &["--from", "3"],
             &["lists advances", "leave out --from"],
         ),
+        (
+            "no current",
+            up("advance_m = 0.0046\nadvance_sigma_m = 0.0001"),
+            &["--current"],
+            &["no recording has the motor's current"],
+        ),
     ];
     for (name, text, more, expected) in table {
         let path = writer.write("campaign.toml", text);

@@ -58,6 +58,11 @@ fn what_cannot_be_explained_is_named_and_ends_with_status_2() {
             &["empty.toml:1", "no run", "[[run]]"],
         ),
         (
+            written("positions.toml", "worm.toml", &[("up.csv", "slope_deg = 30.0")]),
+            &["--current"],
+            &["no recording has the motor's current", "record with wormd"],
+        ),
+        (
             written("missing.toml", "worm.toml", &[level, ("gone.csv", "slope_deg = 3.0")]),
             &[],
             &["missing.toml:8", "gone.csv", "relative to the campaign"],

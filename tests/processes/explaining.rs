@@ -44,6 +44,22 @@ fn the_crawling_worm_is_recorded_and_explained() {
     );
     Config::load(&out.join("model.toml")).expect("a model");
 
+    let log = log.to_string_lossy();
+    let by_current = crawling
+        .worm
+        .plain_wormd(&["explain", &log, "--slope", "0", "--current", "--json"]);
+    let by_current = by_current.output();
+    let said = String::from_utf8_lossy(&by_current.stderr);
+    assert_eq!(by_current.status.code(), Some(0), "{said}");
+    let answer: serde_json::Value = serde_json::from_slice(&by_current.stdout).expect("one JSON object");
+    let current = &answer["runs"][0]["current"];
+    let value = |of: &serde_json::Value| of.as_f64().unwrap_or_else(|| panic!("{current}"));
+    let [shown_j, model_j] = [0, 1].map(|place| value(&current["work_j"][place]));
+    // Of the level's 46.7 mJ.
+    assert!((0.04..0.055).contains(&shown_j), "{current}");
+    assert!((shown_j / model_j - 1.0).abs() < 0.1, "{current}");
+    assert!(value(&current["torque_residual_n_m"][0]) < 2e-3, "{current}");
+
     assert_eq!(crawling.worm.order(CommandKind::Hold), CommandOutcome::Accepted);
     crawling.wait_for_mode(Mode::Holding);
     let (code, said, _) = live(&crawling.worm);

@@ -74,8 +74,8 @@ const OF_EACH: [fn(usize) -> Nuisance; 4] = [
 const FRICTION: (f64, f64, f64) = (0.15, 0.5, 2e-3);
 /// Tight, because positions show forces over stiffness alone: with it free, pads as soft as one likes would take the place of any load.
 const STIFFNESS: (f64, f64, f64) = (0.05, 0.1, 4e-3);
-/// Where the motor's current shows forces: as friction.
-const STIFFNESS_BY_FORCES: (f64, f64, f64) = FRICTION;
+/// Friction and stiffness where the motor's current shows forces: data decide there, and a load is named only where they ask for one.
+const BY_FORCES: (f64, f64, f64) = (0.25, 0.7, 3e-3);
 const STROKE: (f64, f64, f64) = (0.01, 0.03, 5e-4);
 const FRICTION_OF: (f64, f64, f64) = (0.025, 0.1, 4e-3);
 const STIFFNESS_OF: (f64, f64, f64) = (0.02, 0.08, 4e-3);
@@ -122,11 +122,12 @@ impl Nuisance {
         all
     }
 
-    /// Those of a campaign in which forces are known, too: the same, with a wider prior of the stiffness.
+    /// Those of a campaign in which forces are known, too: the same, with wider priors of friction and stiffness.
     pub fn all_by_forces(cells: usize, runs: usize, phase_recorded: bool) -> Vec<Free> {
         let mut all = Self::all(cells, runs, phase_recorded);
-        for free in all.iter_mut().filter(|free| free.what == Self::Stiffness.what()) {
-            *free = Self::Stiffness.free(STIFFNESS_BY_FORCES);
+        for nuisance in [Self::Friction, Self::Stiffness] {
+            let of_it = all.iter_mut().filter(|free| free.what == nuisance.what());
+            of_it.for_each(|free| *free = nuisance.free(BY_FORCES));
         }
         all
     }
