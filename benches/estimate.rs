@@ -87,6 +87,7 @@ fn motor_samples(worm: &Worm, gear: &GearModel, cycles: usize) -> Vec<MotorSampl
                 bus_voltage_v: 5.0,
                 duty: 0.3,
                 temperature_c: 25.0,
+                pitch_rad: f64::NAN,
                 stamp_ns: 0,
             }
         })

@@ -17,7 +17,7 @@
 #define WORMD_NONE UINT32_MAX
 
 #define WORMD_STATE_TOPIC "state"
-#define WORMD_STATE_TYPE "wormd_state_v3"
+#define WORMD_STATE_TYPE "wormd_state_v4"
 #define WORMD_STATE_BUFFER 1024
 #define WORMD_STATE_HISTORY 1
 
@@ -62,7 +62,7 @@
 #define WORMD_RECORDING_HISTORY 1
 
 #define WORMD_INFERRED_TOPIC "inferred"
-#define WORMD_INFERRED_TYPE "wormd_inferred_v1"
+#define WORMD_INFERRED_TYPE "wormd_inferred_v2"
 #define WORMD_INFERRED_BUFFER 64
 #define WORMD_INFERRED_HISTORY 1
 
@@ -609,9 +609,12 @@ typedef struct wormd_state {
   uint32_t acknowledged_by;
   /* 1 while the emergency stop is pressed, else 0; WORMD_NONE where there is none. */
   uint32_t emergency_stop;
+  /* Pitch of the body, rad, growing up the canal, by the inertial sensor; NaN where there is none or it is
+     silent. */
+  double pitch_rad;
 } wormd_state;
 
-static_assert(sizeof(wormd_state) == 304, "wormd_state has another size here than in wormd");
+static_assert(sizeof(wormd_state) == 312, "wormd_state has another size here than in wormd");
 static_assert(offsetof(wormd_state, sequence) == 0, "wormd_state.sequence lies elsewhere in wormd");
 static_assert(offsetof(wormd_state, time_ns) == 8, "wormd_state.time_ns lies elsewhere in wormd");
 static_assert(offsetof(wormd_state, phase) == 16, "wormd_state.phase lies elsewhere in wormd");
@@ -641,6 +644,7 @@ static_assert(offsetof(wormd_state, hold_reason) == 288, "wormd_state.hold_reaso
 static_assert(offsetof(wormd_state, acknowledged_mask) == 292, "wormd_state.acknowledged_mask lies elsewhere in wormd");
 static_assert(offsetof(wormd_state, acknowledged_by) == 296, "wormd_state.acknowledged_by lies elsewhere in wormd");
 static_assert(offsetof(wormd_state, emergency_stop) == 300, "wormd_state.emergency_stop lies elsewhere in wormd");
+static_assert(offsetof(wormd_state, pitch_rad) == 304, "wormd_state.pitch_rad lies elsewhere in wormd");
 
 /* How long the parts of one tick took, published every tick. */
 typedef struct wormd_timing {
@@ -1234,7 +1238,7 @@ typedef struct wormd_inferred {
   double pull_n;
   /* Standard error of pull_n, N. */
   double pull_sigma_n;
-  /* The slope, if all the pull is the weight of the stated mass, rad. */
+  /* The slope, rad: as the inertial sensor measured it, or if all the pull is the weight of the stated mass. */
   double slope_rad;
   /* Standard error of slope_rad, rad. */
   double slope_sigma_rad;
@@ -1295,9 +1299,11 @@ typedef struct wormd_inferred {
   uint32_t standing;
   /* How many cells are in use. */
   uint32_t cell_count;
+  /* 1 when the inertial sensor measured the slope, 0 when it follows from the pull. */
+  uint32_t slope_is_measured;
 } wormd_inferred;
 
-static_assert(sizeof(wormd_inferred) == 1032, "wormd_inferred has another size here than in wormd");
+static_assert(sizeof(wormd_inferred) == 1040, "wormd_inferred has another size here than in wormd");
 static_assert(offsetof(wormd_inferred, sequence) == 0, "wormd_inferred.sequence lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, time_ns) == 8, "wormd_inferred.time_ns lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, end_ns) == 16, "wormd_inferred.end_ns lies elsewhere in wormd");
@@ -1342,6 +1348,7 @@ static_assert(offsetof(wormd_inferred, marks) == 1016, "wormd_inferred.marks lie
 static_assert(offsetof(wormd_inferred, tracker_marks) == 1020, "wormd_inferred.tracker_marks lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, standing) == 1024, "wormd_inferred.standing lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, cell_count) == 1028, "wormd_inferred.cell_count lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, slope_is_measured) == 1032, "wormd_inferred.slope_is_measured lies elsewhere in wormd");
 
 /* The state of the worm's black box: once a second and at every change. */
 typedef struct wormd_black_box_status {

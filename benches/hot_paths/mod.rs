@@ -43,6 +43,7 @@ impl Crawling {
                 cell_count: 4,
                 valid: 0b1111,
                 positions_m: [0.1; MAX_CELLS],
+                pitch_rad: None,
             },
             now_ns: 0,
             tick: 0,
@@ -100,6 +101,7 @@ impl AnsweredExchange {
                 id: id(100),
                 cells: 4,
                 emergency_stop_mask: None,
+                pitch: false,
             }),
             read: ReadPlan::FastBulk,
         };

@@ -103,6 +103,7 @@ struct InferredWorm {
     pull_sigma_n: f64,
     slope_deg: f64,
     slope_sigma_deg: f64,
+    slope_is_measured: bool,
     residual_n_m: f64,
 }
 
@@ -169,6 +170,7 @@ impl InferredWorm {
             pull_sigma_n: sensed.pull_sigma_n,
             slope_deg: sensed.slope_rad.to_degrees(),
             slope_sigma_deg: sensed.slope_sigma_rad.to_degrees(),
+            slope_is_measured: sensed.slope_is_measured,
             residual_n_m: sensed.residual_n_m,
         }
     }

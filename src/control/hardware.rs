@@ -102,16 +102,19 @@ fn device_id(id: u8) -> Result<DeviceId, DriveError> {
 }
 
 fn tracker_settings(config: &Config) -> Result<Option<TrackerSettings>, DriveError> {
-    let may_be_silent = match config.position_source() {
-        PositionSource::Nothing => return Ok(None),
-        PositionSource::Tracker => false,
-        PositionSource::TrackerWhileItLasts => true,
+    let pitch = config.inertial_sensor.is_some();
+    let (cells, may_be_silent) = match config.position_source() {
+        PositionSource::Nothing if !pitch => return Ok(None),
+        PositionSource::Nothing => (0, true),
+        PositionSource::Tracker => (config.worm.cells, false),
+        PositionSource::TrackerWhileItLasts => (config.worm.cells, true),
     };
     Ok(Some(TrackerSettings {
         id: device_id(config.tracker.id)?,
         model: config.tracker.model_number,
-        cells: config.worm.cells,
+        cells,
         emergency_stop_mask: emergency_stop_mask(config),
+        pitch,
         may_be_silent,
     }))
 }

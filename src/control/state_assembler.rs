@@ -1,5 +1,6 @@
 //! From device readings to the [`State`] message: angles of the cam, unwrapped counters, freshness.
 
+use super::loop_clock::seconds_to_ns;
 use crate::link::{ServoReading, TrackerReading};
 use std::f64::consts::TAU;
 use worm_estimator::config::Config;
@@ -71,6 +72,10 @@ pub(super) struct StateAssembler {
     pub(super) servo_seen_ns: Option<u64>,
     /// When the last new tracker sample came, ns of the loop's own clock.
     pub(super) sample_seen_ns: Option<u64>,
+    has_positions: bool,
+    /// When the pitch last came, and how long it holds, ns of the loop's own clock.
+    pitch_seen_ns: u64,
+    pitch_holds_ns: u64,
 }
 
 /// The servo's own clock as last read.
@@ -112,6 +117,9 @@ impl StateAssembler {
             sample_time_ns: 0,
             servo_seen_ns: None,
             sample_seen_ns: None,
+            has_positions: config.tracker.present,
+            pitch_seen_ns: 0,
+            pitch_holds_ns: seconds_to_ns(config.control.tracker_timeout_s),
         }
     }
 
@@ -171,7 +179,10 @@ impl StateAssembler {
     /// Takes the tracker's answer, likewise.
     pub(super) fn take_tracker(&mut self, now_ns: u64, present_ns: u64, reading: Option<&TrackerReading>) {
         self.state.sample_is_new = 0;
-        let Some(reading) = reading else { return };
+        self.take_pitch(present_ns, reading.and_then(|reading| reading.pitch_rad));
+        let Some(reading) = reading.filter(|_| self.has_positions) else {
+            return;
+        };
         let clock = TrackerClock {
             sample: reading.sample,
             capture_us: reading.capture_time_us,
@@ -209,5 +220,15 @@ impl StateAssembler {
             state.position_m[cell] = if is_valid { reading.positions_m[cell] } else { f64::NAN };
         }
         self.sample_seen_ns = Some(present_ns);
+    }
+
+    /// A pitch is repeated while it does not come, but not for longer than a tracker may be silent.
+    fn take_pitch(&mut self, present_ns: u64, pitch_rad: Option<f64>) {
+        if let Some(pitch_rad) = pitch_rad {
+            self.state.pitch_rad = pitch_rad;
+            self.pitch_seen_ns = present_ns;
+        } else if present_ns.saturating_sub(self.pitch_seen_ns) > self.pitch_holds_ns {
+            self.state.pitch_rad = f64::NAN;
+        }
     }
 }

@@ -67,14 +67,33 @@ pub struct TrackerQuery {
     pub cells: usize,
     /// Bits of the tracker's switches of which each means that the emergency stop is pressed; without it they are not read.
     pub emergency_stop_mask: Option<u8>,
+    /// Whether its inertial sensor's pitch is read.
+    pub pitch: bool,
 }
 
 impl TrackerQuery {
     fn span(&self) -> ReadSpan {
-        match self.emergency_stop_mask {
-            None => tracker::block_span(self.id, self.cells),
-            Some(_) => tracker::block_span_with_switches(self.id, self.cells),
+        use tracker::register::{PITCH, SWITCHES};
+        match (self.pitch, self.emergency_stop_mask) {
+            (false, None) => tracker::block_span(self.id, self.cells),
+            (false, Some(_)) => tracker::block_span_from(SWITCHES, self.id, self.cells),
+            (true, _) => tracker::block_span_from(PITCH, self.id, self.cells),
         }
+    }
+
+    /// What an answer says: the reading, and the switches where they were read. Nothing where it has another length.
+    fn parse(&self, data: &[u8]) -> Option<(TrackerReading, Option<u8>)> {
+        let span = self.span();
+        if data.len() != usize::from(span.length) {
+            return None;
+        }
+        let (extras, block) = data.split_at_checked(usize::from(tracker::BLOCK_ADDRESS - span.address))?;
+        let reading = TrackerReading::from_block(block).ok()?;
+        // The pitch comes first, and the switches last.
+        let pitch = extras.first_chunk().filter(|_| self.pitch);
+        let pitch_rad = pitch.and_then(|counts| tracker::pitch_rad(i16::from_le_bytes(*counts)));
+        let switches = extras.last().copied().filter(|_| self.emergency_stop_mask.is_some());
+        Some((TrackerReading { pitch_rad, ..reading }, switches))
     }
 }
 
@@ -213,18 +232,11 @@ impl Answers {
             self.servo_answers += u32::from(self.servo.is_ok());
             self.servo == Err(ReadFailure::Malformed)
         } else if let Some(query) = plan.tracker.filter(|query| query.id == id) {
-            let of_length = flags.error.is_none() && data.len() == usize::from(query.span().length);
-            let (switches, block) = match data.split_first() {
-                Some((&switches, block)) if query.emergency_stop_mask.is_some() => (Some(switches), block),
-                _ => (None, data),
-            };
-            let reading = if of_length {
+            let read = query.parse(data).filter(|_| flags.error.is_none());
+            if let Some((_, switches)) = read {
                 self.switches = switches;
-                TrackerReading::from_block(block).ok()
-            } else {
-                None
-            };
-            self.tracker = reading.ok_or(failure);
+            }
+            self.tracker = read.map(|(reading, _)| reading).ok_or(failure);
             self.tracker == Err(ReadFailure::Malformed)
         } else {
             counters.wrong_ids += 1;

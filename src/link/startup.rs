@@ -81,10 +81,12 @@ pub struct TrackerSettings {
     pub id: DeviceId,
     /// Its model number, [`tracker::MODEL`] by default.
     pub model: u16,
-    /// Cells of the worm, 1 to [`MAX_CELLS`](worm_physics::MAX_CELLS).
+    /// Cells of the worm, 1 to [`MAX_CELLS`](worm_physics::MAX_CELLS); 0 for a device that only has an inertial sensor.
     pub cells: usize,
     /// Bits of its switches of which each means that the emergency stop is pressed; without it they are not read.
     pub emergency_stop_mask: Option<u8>,
+    /// Whether its inertial sensor's pitch is read.
+    pub pitch: bool,
     /// Whether a worm is prepared though its tracker is silent: it is asked in every exchange all the same.
     pub may_be_silent: bool,
 }
@@ -95,6 +97,7 @@ impl TrackerSettings {
             id: self.id,
             cells: self.cells,
             emergency_stop_mask: self.emergency_stop_mask,
+            pitch: self.pitch,
         }
     }
 }
@@ -196,6 +199,12 @@ pub enum StartupError {
         tracker::register::SWITCHES
     )]
     NoEmergencyStop,
+    /// The device does not have the pitch's register.
+    #[error(
+        "the tracker has no {}: give it an inertial sensor, or leave [inertial_sensor] out",
+        tracker::register::PITCH
+    )]
+    NoInertialSensor,
     /// The supply is not one that a servo can work with, so no duty can be derived from it.
     #[error(
         "the servo reads a supply of {voltage_v:.1} V, less than {LEAST_VOLTAGE_V} V: look at the supply and its cable, and try again"
@@ -285,8 +294,12 @@ fn find_tracker<P: Port>(
 ) -> Result<Option<(Identity, u8)>, StartupError> {
     let identity = match identify(bus, settings, TRACKER, wanted.id, wanted.model) {
         Err(StartupError::Silent { id, .. }) if wanted.may_be_silent => {
+            let (device, without) = match wanted.cells {
+                0 => ("inertial sensor", "a measured slope"),
+                _ => ("tracker", "positions"),
+            };
             findings.push(Finding::open(
-                format!("the tracker (ID {id}) does not answer: the worm goes without positions"),
+                format!("the {device} (ID {id}) does not answer: the worm goes without {without}"),
                 "look at its power and its cable; it is used as soon as it answers",
             ));
             return Ok(None);
@@ -300,12 +313,23 @@ fn find_tracker<P: Port>(
             configured: wanted.cells,
         });
     }
-    if wanted.emergency_stop_mask.is_some() {
-        match bus.register(wanted.id, tracker::register::SWITCHES) {
+    let optional = [
+        (
+            wanted.emergency_stop_mask.is_some(),
+            tracker::register::SWITCHES,
+            StartupError::NoEmergencyStop,
+        ),
+        (wanted.pitch, tracker::register::PITCH, StartupError::NoInertialSensor),
+    ];
+    for (is_wanted, register, missing) in optional {
+        if !is_wanted {
+            continue;
+        }
+        match bus.register(wanted.id, register) {
             Err(OperationError::Transaction {
                 error: TransactionError::Refused { .. },
                 ..
-            }) => return Err(StartupError::NoEmergencyStop),
+            }) => return Err(missing),
             read => read?,
         };
     }

@@ -7,12 +7,16 @@
 //! | 0 | 2 | model number, [`MODEL`] |
 //! | 6 | 1 | firmware version |
 //! | 7 | 1 | ID, 100 by default |
+//! | 125 | 2 | pitch of the body in 0.01°, signed, growing up the canal, [`NO_PITCH`] while it is not known; only with an inertial sensor |
 //! | 127 | 1 | emergency stop and other switches, one bit each; only where one is configured |
 //! | 128 | 4 | sample counter, one more with each capture |
 //! | 132 | 4 | time of the capture in µs of the tracker's clock, wraps after 71.6 minutes |
 //! | 136 | 1 | number of cells it tracks, 1 to 16 |
 //! | 137 | 2 | valid mask: bit *i* says that cell *i* was seen in this capture |
 //! | 139 + 4 *i* | 4 | position of cell *i* along the canal in µm, signed; the last one known when it was not seen |
+//!
+//! A device that has an inertial sensor and tracks no cells (a cell count of 0) serves a worm without a tracker. The pitch is read in every
+//! tick; it should be the mean of what the sensor measures in some hundredths of a second.
 //!
 //! A capture is taken over whole: a read never mixes two. The table fits a device built on the maker's Arduino library
 //! (`DYNAMIXEL::Slave`), whose registers 0, 6 and 7 are the same.
@@ -31,6 +35,8 @@ pub mod register {
     pub const FIRMWARE_VERSION: Register = Register::new(6, 1, "firmware version");
     /// The device's ID, 0 to 252.
     pub const ID: Register = Register::new(7, 1, "ID");
+    /// Pitch in 0.01°. It need not be there.
+    pub const PITCH: Register = Register::new(125, 2, "pitch");
     /// Emergency stop and other switches, one bit each. It need not be there.
     pub const SWITCHES: Register = Register::new(127, 1, "switches");
     /// One more with each capture, wrapping.
@@ -57,6 +63,12 @@ pub const BLOCK_ADDRESS: u16 = register::SAMPLE.address;
 /// Metres of a position count.
 pub const POSITION_M: f64 = 1e-6;
 
+/// Radians of a count of the pitch.
+pub const PITCH_RAD: f64 = 0.01 * std::f64::consts::PI / 180.0;
+
+/// Pitch of a sensor that does not know it.
+pub const NO_PITCH: i16 = i16::MIN;
+
 /// Bytes in front of the positions.
 const HEAD_LEN: usize = (register::FIRST_POSITION.address - BLOCK_ADDRESS) as usize;
 
@@ -80,15 +92,28 @@ pub const fn block_span(id: DeviceId, cells: usize) -> ReadSpan {
     }
 }
 
-/// What a tick reads of a tracker with switches: as [`block_span`], with the byte of the switches in front.
+/// What a tick reads of a tracker with more in front of the block than that: as [`block_span`], from this register on.
 #[must_use]
-pub const fn block_span_with_switches(id: DeviceId, cells: usize) -> ReadSpan {
+pub const fn block_span_from(first: super::Register, id: DeviceId, cells: usize) -> ReadSpan {
     let ReadSpan { length, .. } = block_span(id, cells);
     ReadSpan {
         id,
-        address: register::SWITCHES.address,
-        length: length + register::SWITCHES.size,
+        address: first.address,
+        length: length + BLOCK_ADDRESS - first.address,
     }
+}
+
+/// The pitch that a device reports, rad; none where it does not know it.
+#[must_use]
+pub fn pitch_rad(counts: i16) -> Option<f64> {
+    (counts != NO_PITCH).then(|| f64::from(counts) * PITCH_RAD)
+}
+
+/// How a device reports a pitch, rad.
+#[must_use]
+pub fn pitch_counts(pitch_rad: f64) -> i16 {
+    // The cast saturates, and no pitch is NO_PITCH.
+    ((pitch_rad / PITCH_RAD).round() as i16).max(-i16::MAX)
 }
 
 /// What one tick learns from the tracker.
@@ -104,6 +129,8 @@ pub struct TrackerReading {
     pub valid: u16,
     /// Positions along the canal in m; zero for cells that were not read.
     pub positions_m: [f64; MAX_CELLS],
+    /// Pitch of the body, rad, where it was read and is known.
+    pub pitch_rad: Option<f64>,
 }
 
 /// A block that no tracker sends.
@@ -144,6 +171,7 @@ impl TrackerReading {
             cell_count,
             valid: head.u16(register::VALID_MASK) & read_mask,
             positions_m,
+            pitch_rad: None,
         })
     }
 
@@ -182,6 +210,7 @@ mod tests {
             cell_count: cells as u8,
             valid,
             positions_m,
+            pitch_rad: None,
         }
     }
 
@@ -208,6 +237,16 @@ mod tests {
                 expected
             );
         }
+    }
+
+    #[test]
+    fn pitches_come_back_to_a_hundredth_of_a_degree() {
+        for pitch_deg in [-90.0, -0.01, 0.0, 12.34, 89.99] {
+            let found = pitch_rad(pitch_counts(f64::to_radians(pitch_deg))).expect("it is known");
+            assert!((found.to_degrees() - pitch_deg).abs() < 1e-9, "{pitch_deg}");
+        }
+        assert_eq!(pitch_rad(NO_PITCH), None);
+        assert!(pitch_counts(f64::NEG_INFINITY) > NO_PITCH, "no pitch is none");
     }
 
     #[test]

@@ -23,10 +23,12 @@ pub struct InferredSummary {
     pub pull_n: f64,
     /// Its standard error, N.
     pub pull_sigma_n: f64,
-    /// The slope, if all the pull is the worm's own weight, degrees.
+    /// The slope, degrees: as the inertial sensor measured it, or if all the pull is the worm's own weight.
     pub slope_deg: f64,
     /// Its standard error, degrees.
     pub slope_sigma_deg: f64,
+    /// Whether the inertial sensor measured it.
+    pub slope_is_measured: bool,
     /// Another pull that the current does not exclude, N.
     pub other_pull_n: f64,
     /// Its probability.
@@ -132,6 +134,7 @@ impl InferredSummary {
             pull_sigma_n: inferred.pull_sigma_n,
             slope_deg: inferred.slope_rad.to_degrees(),
             slope_sigma_deg: inferred.slope_sigma_rad.to_degrees(),
+            slope_is_measured: inferred.slope_is_measured == 1,
             other_pull_n: inferred.other_pull_n,
             other_probability: inferred.other_probability,
             advance_m: inferred.advance_m,

@@ -260,6 +260,7 @@ fn settings(read: ReadMode) -> LinkSettings {
             model: tracker::MODEL,
             cells: CELLS,
             emergency_stop_mask: None,
+            pitch: false,
             may_be_silent: false,
         }),
         read,

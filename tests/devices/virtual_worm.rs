@@ -26,6 +26,7 @@ fn tracker_settings(emergency_stop_mask: Option<u8>) -> TrackerSettings {
         model: tracker::MODEL,
         cells: 4,
         emergency_stop_mask,
+        pitch: false,
         may_be_silent: false,
     }
 }

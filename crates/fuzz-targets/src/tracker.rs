@@ -31,6 +31,10 @@ fn check_tracker_block(bytes: &[u8]) {
 fn check_tracker(reading: &TrackerReading) {
     let is_metric = |position_m: &f64| position_m.abs() <= 2148.0;
     assert!(reading.positions_m.iter().all(is_metric), "a position beyond 32 bits");
+    assert!(
+        reading.pitch_rad.is_none_or(|pitch_rad| pitch_rad.abs() < 6.0),
+        "a pitch beyond 16 bits"
+    );
     let cells = usize::from(reading.cell_count).min(MAX_CELLS);
     assert_eq!(
         u32::from(reading.valid) >> cells,
@@ -64,6 +68,7 @@ fn exchange(data: &[u8], read: ReadPlan) {
             id: tracker,
             cells: 4,
             emergency_stop_mask: Some(1),
+            pitch: data.first().is_some_and(|byte| byte & 1 == 1),
         }),
         read,
     };

@@ -3,10 +3,18 @@
 use super::channel::Channel;
 use std::borrow::Cow;
 
-/// What states have since version 3; a macro, for `concat!` takes no constant.
+/// What states have since version 4, and since version 3; macros, for `concat!` takes no constants.
+macro_rules! not_in_state_v3 {
+    () => {
+        "\"pitch_rad\":null,"
+    };
+}
 macro_rules! not_in_state_v2 {
     () => {
-        "\"hold_reason\":\"none\",\"acknowledged_mask\":0,\"acknowledged_by\":null,\"emergency_stop\":null,"
+        concat!(
+            "\"hold_reason\":\"none\",\"acknowledged_mask\":0,\"acknowledged_by\":null,\"emergency_stop\":null,",
+            not_in_state_v3!()
+        )
     };
 }
 
@@ -19,18 +27,21 @@ pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'sta
             not_in_state_v2!()
         )),
         (Channel::State, "wormd_state_v2") => Some(not_in_state_v2!()),
+        (Channel::State, "wormd_state_v3") => Some(not_in_state_v3!()),
+        (Channel::Inferred, "wormd_inferred_v1") => Some("\"slope_is_measured\":0,"),
         (Channel::Cycle, "wormd_cycle_v1") => Some("\"host_paused_s\":0.0,"),
         _ => None,
     }
 }
 
-/// Whether a type of an older version has the first fields of the present one, with the same numbers, and no others: Protocol Buffers read
-/// it then as a message whose newer fields are zero.
-pub(super) fn is_beginning(channel: Channel, type_name: &str) -> bool {
-    matches!(
-        (channel, type_name),
-        (Channel::CommandRecord, "wormd_command_record_v1")
-    )
+/// Of a type of an older version that has the first fields of the present one, with the same numbers, and no others: the newer fields that
+/// are not known then. Protocol Buffers read the rest of them as zero, which is right for those.
+pub(super) fn unknown_fields(channel: Channel, type_name: &str) -> Option<&'static [&'static str]> {
+    match (channel, type_name) {
+        (Channel::State, "wormd_state_v3") => Some(&["pitch_rad"]),
+        (Channel::Inferred, "wormd_inferred_v1") | (Channel::CommandRecord, "wormd_command_record_v1") => Some(&[]),
+        _ => None,
+    }
 }
 
 /// The message, with the members that it lacks.

@@ -1,16 +1,16 @@
 //! A message as it stands in a log: JSON in logs of older versions, Protocol Buffers since.
 
 use super::channel::{Channel, Logged};
-use super::older::{completed, is_beginning, lacking_members};
-use worm_estimator::message::ProtobufError;
+use super::older::{completed, lacking_members, unknown_fields};
+use worm_estimator::message::{FieldValue, ProtobufError};
 
 /// How the messages of a channel are encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
     /// JSON of a type of this version, or of an older one that lacks these members.
     Json { lacking: Option<&'static str> },
-    /// Protocol Buffers.
-    Protobuf,
+    /// Protocol Buffers, of a type in which these numbers are not known.
+    Protobuf { unknown: &'static [&'static str] },
 }
 
 /// The names of both encodings for people.
@@ -33,8 +33,11 @@ impl Encoding {
                 None if !is_present => Err(Unknown::Type),
                 lacking => Ok(Self::Json { lacking }),
             },
-            "protobuf" if is_present || is_beginning(channel, type_name) => Ok(Self::Protobuf),
-            "protobuf" => Err(Unknown::Type),
+            "protobuf" if is_present => Ok(Self::Protobuf { unknown: &[] }),
+            "protobuf" => match unknown_fields(channel, type_name) {
+                Some(unknown) => Ok(Self::Protobuf { unknown }),
+                None => Err(Unknown::Type),
+            },
             _ => Err(Unknown::Encoding),
         }
     }
@@ -55,7 +58,14 @@ impl Payload<'_> {
     pub fn read<T: Logged>(&self) -> Result<T, PayloadError> {
         Ok(match self.encoding {
             Encoding::Json { lacking } => T::read_json(&completed(self.data, lacking))?,
-            Encoding::Protobuf => T::read_protobuf(self.data)?,
+            Encoding::Protobuf { unknown } => {
+                let mut message = T::read_protobuf(self.data)?;
+                for name in unknown {
+                    let place = T::FIELDS.iter().position(|field| field.name == *name);
+                    place.map(|place| message.set_field(place, FieldValue::Number(f64::NAN)));
+                }
+                message
+            }
         })
     }
 }

@@ -335,11 +335,12 @@ class _StateMemory(Memory):
         ("acknowledged_mask", ctypes.c_uint32),
         ("acknowledged_by", ctypes.c_uint32),
         ("emergency_stop", ctypes.c_uint32),
+        ("pitch_rad", ctypes.c_double),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "wormd_state_v3"
+        return "wormd_state_v4"
 
 
 @dataclass(frozen=True, slots=True)
@@ -409,6 +410,9 @@ class State(Message):
     """User ID of whoever acknowledged an alarm last, or None."""
     emergency_stop: int | None
     """1 while the emergency stop is pressed, else 0; None where there is none."""
+    pitch_rad: float
+    """Pitch of the body, rad, growing up the canal, by the inertial sensor; NaN where there is none or it is
+    silent."""
 
     @classmethod
     def _from_memory(cls, m: _StateMemory) -> State:
@@ -443,6 +447,7 @@ class State(Message):
             acknowledged_mask=m.acknowledged_mask,
             acknowledged_by=None if m.acknowledged_by == _NONE else m.acknowledged_by,
             emergency_stop=None if m.emergency_stop == _NONE else m.emergency_stop,
+            pitch_rad=m.pitch_rad,
         )
 
 
@@ -1443,11 +1448,12 @@ class _InferredMemory(Memory):
         ("tracker_marks", ctypes.c_uint32),
         ("standing", ctypes.c_uint32),
         ("cell_count", ctypes.c_uint32),
+        ("slope_is_measured", ctypes.c_uint32),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "wormd_inferred_v1"
+        return "wormd_inferred_v2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -1487,7 +1493,7 @@ class Inferred(Message):
     pull_sigma_n: float
     """Standard error of pull_n, N."""
     slope_rad: float
-    """The slope, if all the pull is the weight of the stated mass, rad."""
+    """The slope, rad: as the inertial sensor measured it, or if all the pull is the weight of the stated mass."""
     slope_sigma_rad: float
     """Standard error of slope_rad, rad."""
     other_pull_n: float
@@ -1547,6 +1553,8 @@ class Inferred(Message):
     """InferredStanding."""
     cell_count: int
     """How many cells are in use."""
+    slope_is_measured: int
+    """1 when the inertial sensor measured the slope, 0 when it follows from the pull."""
 
     @classmethod
     def _from_memory(cls, m: _InferredMemory) -> Inferred:
@@ -1596,6 +1604,7 @@ class Inferred(Message):
             tracker_marks=m.tracker_marks,
             standing=InferredStanding.of(m.standing),
             cell_count=m.cell_count,
+            slope_is_measured=m.slope_is_measured,
         )
 
 

@@ -84,6 +84,11 @@ impl Body {
         })
     }
 
+    /// Slope of the canal where it is, rad.
+    pub fn slope_rad(&self) -> f64 {
+        self.physics.worm.slope_rad()
+    }
+
     /// Draws the tip deformations of the next cycle.
     ///
     /// # Errors

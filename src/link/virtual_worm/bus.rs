@@ -29,7 +29,7 @@ pub(super) struct Bus {
     conditions: Conditions,
     plant: Plant,
     servo: Servo,
-    has_tracker: bool, // else the tracker is not on the bus: it hears and says nothing
+    has_tracker: bool, // or a device with an inertial sensor alone; else it is not on the bus: it hears and says nothing
     tracker: Tracker,
     line: Line,
 }
@@ -43,6 +43,7 @@ enum Device {
 
 impl Bus {
     pub(super) fn new(config: &Config, options: &Options) -> Result<Self, BodyError> {
+        let seed = options.seed.unwrap_or(config.virtual_worm.seed);
         let mut bus = Self {
             now_s: 0.0,
             crawl_began_s: None,
@@ -52,9 +53,9 @@ impl Bus {
             conditions: Conditions::default(),
             plant: Plant::with_step(config, options.seed, options.step_s.unwrap_or(DEFAULT_STEP_S))?,
             servo: Servo::new(config, options.baud),
-            has_tracker: config.tracker.present,
-            tracker: Tracker::new(config),
-            line: Line::new(derived_seed(options.seed.unwrap_or(config.virtual_worm.seed))),
+            has_tracker: config.tracker.present || config.inertial_sensor.is_some(),
+            tracker: Tracker::new(config, seed),
+            line: Line::new(derived_seed(seed)),
         };
         if let Some(arm) = options.arm {
             bus.plant.carry(arm);

@@ -41,9 +41,15 @@ impl Camera {
             reading: TrackerReading {
                 sample: 0,
                 capture_time_us: 0,
-                cell_count: config.worm.cells as u8, // at most MAX_CELLS
+                // At most MAX_CELLS; a device without a camera tracks none.
+                cell_count: if config.tracker.present {
+                    config.worm.cells as u8
+                } else {
+                    0
+                },
                 valid: 0,
                 positions_m: [0.0; MAX_CELLS],
+                pitch_rad: None,
             },
         }
     }

@@ -32,6 +32,7 @@ mod devices;
 pub mod fault;
 mod fault_kinds;
 mod fault_switch;
+mod inertial_sensor;
 pub mod ledger;
 mod line;
 pub mod motor;

@@ -1,19 +1,21 @@
 //! The simulated tracker: [`link::tracker`](crate::link::tracker)'s control table around the plant's camera.
 
 use super::control_table::{Area, ControlTable, Entry, eeprom, read_only};
+use super::inertial_sensor::InertialSensor;
 use super::plant::Plant;
-use crate::link::tracker::register::{FIRMWARE_VERSION, ID, MODEL_NUMBER, SWITCHES};
-use crate::link::tracker::{BLOCK_ADDRESS, DEFAULT_ID, MAX_BLOCK_LEN, MODEL};
+use crate::link::tracker::register::{FIRMWARE_VERSION, ID, MODEL_NUMBER, PITCH, SWITCHES};
+use crate::link::tracker::{BLOCK_ADDRESS, DEFAULT_ID, MAX_BLOCK_LEN, MODEL, NO_PITCH};
 use dynamixel_bus::packet::{DeviceId, ResetScope, StatusError};
 use worm_estimator::config::Config;
 
 /// Firmware version.
 const FIRMWARE: i64 = 1;
 
-static ENTRIES: [Entry; 4] = [
+static ENTRIES: [Entry; 5] = [
     read_only(MODEL_NUMBER, MODEL as i64),
     read_only(FIRMWARE_VERSION, FIRMWARE),
     eeprom(ID, DEFAULT_ID as i64, 0, 252),
+    read_only(PITCH, NO_PITCH as i64),
     read_only(SWITCHES, 0),
 ];
 
@@ -21,17 +23,20 @@ static ENTRIES: [Entry; 4] = [
 #[derive(Debug, Clone)]
 pub(super) struct Tracker {
     table: ControlTable, // the head of the table
-    bytes: Vec<u8>,      // the whole table, as it was last read
+    inertial_sensor: Option<InertialSensor>,
+    bytes: Vec<u8>, // the whole table, as it was last read
     registered: Option<(u16, Vec<u8>)>,
 }
 
 impl Tracker {
-    pub(super) fn new(config: &Config) -> Self {
+    /// The sensor's error comes from the seed.
+    pub(super) fn new(config: &Config, seed: u64) -> Self {
         let mut table = ControlTable::new(&ENTRIES, BLOCK_ADDRESS);
         table.set(ID, i64::from(config.tracker.id));
         table.set(MODEL_NUMBER, i64::from(config.tracker.model_number));
         Self {
             table,
+            inertial_sensor: InertialSensor::new(config, seed),
             bytes: vec![0; usize::from(BLOCK_ADDRESS) + MAX_BLOCK_LEN],
             registered: None,
         }
@@ -55,6 +60,9 @@ impl Tracker {
     pub(super) fn read(&mut self, address: u16, length: u16, plant: &Plant) -> Result<&[u8], StatusError> {
         if length == 0 {
             return Err(StatusError::DataLength);
+        }
+        if let Some(sensor) = &self.inertial_sensor {
+            self.table.set(PITCH, i64::from(sensor.counts(plant.body())));
         }
         let (head, captured) = self.bytes.split_at_mut(usize::from(BLOCK_ADDRESS));
         head.copy_from_slice(self.table.read(0, BLOCK_ADDRESS)?);

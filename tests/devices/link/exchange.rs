@@ -18,6 +18,7 @@ fn plan(read: ReadPlan) -> ExchangePlan {
             id: id(TRACKER),
             cells: CELLS,
             emergency_stop_mask: None,
+            pitch: false,
         }),
         read,
     }

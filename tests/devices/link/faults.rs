@@ -25,6 +25,7 @@ fn plan(read: ReadPlan) -> ExchangePlan {
             id: id(TRACKER),
             cells: 5,
             emergency_stop_mask: None,
+            pitch: false,
         }),
         read,
     }

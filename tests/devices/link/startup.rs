@@ -19,6 +19,7 @@ pub fn settings() -> LinkSettings {
             model: tracker::MODEL,
             cells: 5,
             emergency_stop_mask: None,
+            pitch: false,
             may_be_silent: false,
         }),
         read: ReadMode::Auto,

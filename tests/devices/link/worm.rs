@@ -89,6 +89,7 @@ impl Worm {
             cell_count: cells as u8,
             valid,
             positions_m,
+            pitch_rad: None,
         };
         let from = usize::from(tracker::BLOCK_ADDRESS);
         worm.tracker[from..from + tracker::MAX_BLOCK_LEN].copy_from_slice(&reading.to_block());

@@ -210,6 +210,7 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
             .map(|(number, hidden)| case(hidden, split.base() + number as u64))
             .collect();
     }
+    let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     if split == Split::Current {
         let kinds = [
             Hidden::Single(Effect::Payload, FROM_30_G),
@@ -219,14 +220,13 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
         let all = kinds
             .into_iter()
             .cycle()
-            .take(CURRENT_OF_EACH * kinds.len())
+            .take(kinds.len() * count(CURRENT_OF_EACH))
             .enumerate();
         return all
             .map(|(number, hidden)| case(hidden, split.base() + number as u64))
             .collect();
     }
     let counts = split.counts();
-    let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     let seed = |group: usize, number: usize| split.base() + 1000 * group as u64 + number as u64;
     let mut cases = Vec::new();
     for (group, &effect) in Effect::ALL.iter().enumerate() {

@@ -179,12 +179,39 @@ impl Default for Tracker {
 }
 
 impl Tracker {
-    pub(super) fn check(&self, servo_id: u8, checker: &mut Checker) {
+    /// `is_used` is whether there is such a device.
+    pub(super) fn check(&self, servo_id: u8, is_used: bool, checker: &mut Checker) {
         checker.range("tracker.id", self.id, 0..=252, "");
-        let is_own_id = !self.present || self.id != servo_id;
+        let is_own_id = !is_used || self.id != servo_id;
         checker.require(is_own_id, "tracker.id", self.id, "must differ from servo.id");
         checker.range("tracker.rate_hz", self.rate_hz, 20.0..=2000.0, "Hz");
         checker.range("tracker.noise_m", self.noise_m, 1e-7..=5e-3, "m");
+    }
+}
+
+/// An inertial sensor in the tracker's device, or in a device of its kind that tracks no cells: it measures the pitch of the body.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InertialSensor {
+    /// Standard deviation of a cycle's mean pitch about the slope, degrees: offset, mounting, how the body lies in the canal.
+    pub sigma_deg: f64,
+    /// Standard deviation of the pull on the body about the weight of the stated mass on that slope, N: payload and drag.
+    pub load_sigma_n: f64,
+}
+
+impl Default for InertialSensor {
+    fn default() -> Self {
+        Self {
+            sigma_deg: 0.5,
+            load_sigma_n: 0.3,
+        }
+    }
+}
+
+impl InertialSensor {
+    pub(super) fn check(&self, checker: &mut Checker) {
+        checker.range("inertial_sensor.sigma_deg", self.sigma_deg, 0.01..=30.0, "degrees");
+        checker.range("inertial_sensor.load_sigma_n", self.load_sigma_n, 1e-3..=100.0, "N");
     }
 }
 

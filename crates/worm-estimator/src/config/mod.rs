@@ -29,8 +29,8 @@ pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use effect_table::{OneOrTwo, Rows, TableFields};
 pub use machine::{
-    Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, Limits, OnLapsedLease, OnStaleTracker, Port,
-    ReadMode, Realtime, Servo, Topics, Tracker,
+    Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, InertialSensor, Limits, OnLapsedLease,
+    OnStaleTracker, Port, ReadMode, Realtime, Servo, Topics, Tracker,
 };
 pub use physics::PhysicsError;
 pub use positions::PositionSource;
@@ -63,6 +63,8 @@ pub struct Config {
     pub servo: Servo,
     /// The device that measures cell positions.
     pub tracker: Tracker,
+    /// The sensor of the body's pitch, in the tracker's device; absent: there is none.
+    pub inertial_sensor: Option<InertialSensor>,
     /// The emergency stop's input; absent: there is none.
     pub emergency_stop: Option<EmergencyStop>,
     /// The control loop.
@@ -168,7 +170,11 @@ impl Config {
             port.check(&mut checker);
         }
         self.servo.check(&mut checker);
-        self.tracker.check(self.servo.id, &mut checker);
+        let is_used = self.tracker.present || self.inertial_sensor.is_some();
+        self.tracker.check(self.servo.id, is_used, &mut checker);
+        if let Some(inertial_sensor) = &self.inertial_sensor {
+            inertial_sensor.check(&mut checker);
+        }
         if let Some(emergency_stop) = &self.emergency_stop {
             emergency_stop.check(self.tracker.present, &mut checker);
         }

@@ -3,7 +3,7 @@
 use super::Config;
 use super::check::Checker;
 use crate::self_sensing::gear::MAX_RIPPLES;
-use crate::self_sensing::{CurrentSource, GearModel, Ripple, SelfSensingConfig};
+use crate::self_sensing::{CurrentSource, GearModel, PitchSensor, Ripple, SelfSensingConfig};
 use serde::{Deserialize, Serialize};
 use worm_physics::servo::identified::{XL330_EFFECTS, XL330_IDENTIFIED};
 
@@ -249,6 +249,13 @@ impl Config {
             friction_sigma: known.worm_sigma_share,
             stiffness_sigma: known.worm_sigma_share,
             pull_sigma_n: known.pull_sigma_n,
+            pitch: self
+                .inertial_sensor
+                .as_ref()
+                .map_or_else(PitchSensor::default, |sensor| PitchSensor {
+                    sigma_rad: sensor.sigma_deg.to_radians(),
+                    load_sigma_n: sensor.load_sigma_n,
+                }),
             cycle_s: self.gait.cycle_s,
             memory_cycles: known.memory_cycles,
             evaluations_per_reading: self.evaluations_per_tick(),

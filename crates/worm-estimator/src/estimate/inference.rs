@@ -243,6 +243,7 @@ fn fill(inferred: &mut Inferred, sensed: &SelfSensed) {
     inferred.pull_sigma_n = sensed.pull_sigma_n;
     inferred.slope_rad = sensed.slope_rad;
     inferred.slope_sigma_rad = sensed.slope_sigma_rad;
+    inferred.slope_is_measured = sensed.slope_is_measured.into();
     (inferred.other_pull_n, inferred.other_probability) = sensed.blind.other_pull.unwrap_or((f64::NAN, f64::NAN));
     inferred.advance_m = figures.advance_m;
     inferred.advance_sigma_m = sigma.advance_m;

@@ -34,7 +34,7 @@ impl From<Standing> for InferredStanding {
 message! {
     /// What the motor's current alone says of the worm, with standard errors: after each gait cycle crawled forward, as soon as it is
     /// fitted, and after a mark. Positions play no part in it, but for those that correct the dead reckoning.
-    Inferred = "wormd_inferred_v1", made: time_ns, cells: |inferred| inferred.cell_count, {
+    Inferred = "wormd_inferred_v2", made: time_ns, cells: |inferred| inferred.cell_count, {
         /// Number of this message since the estimator started.
         sequence: u64,
         /// When it was made, ns of `CLOCK_MONOTONIC`.
@@ -63,7 +63,7 @@ message! {
         pull_n: f64,
         /// Standard error of `pull_n`, N.
         pull_sigma_n: f64,
-        /// The slope, if all the pull is the weight of the stated mass, rad.
+        /// The slope, rad: as the inertial sensor measured it, or if all the pull is the weight of the stated mass.
         slope_rad: f64,
         /// Standard error of `slope_rad`, rad.
         slope_sigma_rad: f64,
@@ -123,6 +123,8 @@ message! {
         standing: u32 as Name<InferredStanding>,
         /// How many cells are in use.
         cell_count: u32,
+        /// 1 when the inertial sensor measured the slope, 0 when it follows from the pull.
+        slope_is_measured: u32,
     }
 }
 

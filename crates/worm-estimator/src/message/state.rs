@@ -73,7 +73,7 @@ coded_enum! {
 
 message! {
     /// One tick of the controller, published every tick.
-    State = "wormd_state_v3", made: time_ns, cells: |state| state.cell_count, {
+    State = "wormd_state_v4", made: time_ns, cells: |state| state.cell_count, {
         /// Tick number since the controller started; skipped ticks leave a gap in `time_ns`, never here.
         sequence: u64,
         /// When the tick's exchange with the bus ended, ns of `CLOCK_MONOTONIC`.
@@ -134,6 +134,8 @@ message! {
         acknowledged_by: u32 as OrNone<u32>,
         /// 1 while the emergency stop is pressed, else 0; `u32::MAX` where there is none.
         emergency_stop: u32 as OrNone<u32>,
+        /// Pitch of the body, rad, growing up the canal, by the inertial sensor; `NaN` where there is none or it is silent.
+        pitch_rad: f64,
     }
 }
 
@@ -170,6 +172,7 @@ impl State {
             acknowledged_mask: 0,
             acknowledged_by: u32::MAX,
             emergency_stop: u32::MAX,
+            pitch_rad: f64::NAN,
         }
     }
 

@@ -241,6 +241,7 @@ mod tests {
                 bus_voltage_v: 5.0,
                 duty: 0.2,
                 temperature_c: 30.0,
+                pitch_rad: f64::NAN,
                 stamp_ns: tick * 1_000_000,
             }
         };

@@ -87,12 +87,16 @@ pub(super) struct ChangeDetector {
     armed: Armed,
 }
 
+/// A fitted worm, and the pull that follows from the slope where it was measured, N.
+pub(super) type WormNow<'a> = (&'a Parameters, Option<f64>);
+
 /// The worm before it changed.
 #[derive(Debug, Clone, Copy)]
 struct Reference {
     ln_friction: [f64; MAX_CELLS],
     reach_n_m: [f64; MAX_CELLS],
     pull_n: f64,
+    weight_n: Option<f64>, // along the canal, where the pitch was measured: its part of the pull
     gear_n_m: f64,
 }
 
@@ -100,6 +104,8 @@ struct Reference {
 pub(super) struct ComparedCycle<'a> {
     /// The worm and the gears before.
     pub(super) usual: &'a Parameters,
+    /// The pull that follows from the slope where it was measured, N.
+    pub(super) weight_n: Option<f64>,
     /// How many cycles that was.
     pub(super) cycles: f64,
     /// By how much the unknowns differ in this cycle, and the standard errors.
@@ -162,6 +168,7 @@ impl ChangeDetector {
     pub(super) fn compare(&mut self, cycle: &ComparedCycle) -> Seen {
         let ComparedCycle {
             usual,
+            weight_n,
             cycles,
             change: (change, sigma),
             torque_n_m,
@@ -182,7 +189,7 @@ impl ChangeDetector {
         if !is_enough {
             return Seen::Usual;
         }
-        let before = Reference::of(usual, mean_n_m, usual.values[usual.gears_at()], step_order);
+        let before = Reference::of((usual, *weight_n), mean_n_m, usual.values[usual.gears_at()], step_order);
         let mut odd = false;
         for (place, &cell) in step_order.iter().enumerate() {
             let sigma = sigma_of(cell, SCATTER);
@@ -223,7 +230,7 @@ impl ChangeDetector {
     ///
     /// `difference` is what the cycle's profile says directly, by one step from the fit. Where a profile has two answers, the fits before and
     /// after may be at different ones, and differ although the profiles do not.
-    pub(super) fn judge(&mut self, changed: &Parameters, torque_n_m: &[f64], difference: Option<&Vector>) {
+    pub(super) fn judge(&mut self, changed: WormNow<'_>, torque_n_m: &[f64], difference: Option<&Vector>) {
         let Some(changes) = self.changes_of(changed, torque_n_m, difference) else {
             return;
         };
@@ -236,7 +243,7 @@ impl ChangeDetector {
     /// The same by a first answer, which only counts where it shows a change. True when it does.
     pub(super) fn judge_early(
         &mut self,
-        changed: &Parameters,
+        changed: WormNow<'_>,
         torque_n_m: &[f64],
         difference: Option<&Vector>,
     ) -> bool {
@@ -247,7 +254,7 @@ impl ChangeDetector {
         changes.is_some()
     }
 
-    fn changes_of(&self, changed: &Parameters, torque_n_m: &[f64], difference: Option<&Vector>) -> Option<Changes> {
+    fn changes_of(&self, changed: WormNow<'_>, torque_n_m: &[f64], difference: Option<&Vector>) -> Option<Changes> {
         let reference = self.reference?;
         let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
         let mut changes = reference.compare(&now, self.cells, self.gear_friction_n_m, self.pull_per_torque);
@@ -257,7 +264,8 @@ impl ChangeDetector {
             }
             changes.all_friction_lost &= changes.friction_lost.count_ones() as usize == self.cells;
             let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
-            changes.more_load &= difference[pull_at] > SHOWN_SHARE * PULL_CHANGE_N
+            let pulled_n = difference[pull_at] - reference.steeper_by_n(&now);
+            changes.more_load &= pulled_n > SHOWN_SHARE * PULL_CHANGE_N
                 || difference[gear_at] > SHOWN_SHARE * GEAR_CHANGE * self.gear_friction_n_m;
         }
         Some(changes)
@@ -265,11 +273,12 @@ impl ChangeDetector {
 }
 
 impl Reference {
-    fn of(parameters: &Parameters, mean_n_m: &[f64], idle_n_m: f64, step_order: &[usize]) -> Self {
+    fn of((parameters, weight_n): WormNow<'_>, mean_n_m: &[f64], idle_n_m: f64, step_order: &[usize]) -> Self {
         let mut reference = Self {
             ln_friction: [0.0; MAX_CELLS],
             reach_n_m: [0.0; MAX_CELLS],
             pull_n: parameters.pull_n(),
+            weight_n,
             gear_n_m: parameters.values[parameters.gears_at()],
         };
         for (place, &cell) in step_order.iter().enumerate() {
@@ -279,10 +288,19 @@ impl Reference {
         reference
     }
 
+    /// How much more the weight pulls along the canal now, N; 0 where the pitch was not measured both times.
+    fn steeper_by_n(&self, now: &Self) -> f64 {
+        self.weight_n
+            .zip(now.weight_n)
+            .map_or(0.0, |(before_n, now_n)| now_n - before_n)
+    }
+
     fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64, pull_per_torque: f64) -> Changes {
+        // A steeper canal is no load.
+        let pulled_n = now.pull_n - self.pull_n - self.steeper_by_n(now);
         let mut changes = Changes {
             reach_share: f64::INFINITY,
-            load_rise_n: now.pull_n - self.pull_n + (now.gear_n_m - self.gear_n_m) * pull_per_torque,
+            load_rise_n: pulled_n + (now.gear_n_m - self.gear_n_m) * pull_per_torque,
             ..Changes::default()
         };
         for cell in 0..cells {
@@ -302,8 +320,7 @@ impl Reference {
         changes.all_friction_lost = changes.friction_lost.count_ones() as usize == cells;
         changes.more_load = changes.jammed == 0
             && changes.friction_lost == 0
-            && (now.pull_n - self.pull_n > PULL_CHANGE_N
-                || now.gear_n_m - self.gear_n_m > GEAR_CHANGE * gear_friction_n_m);
+            && (pulled_n > PULL_CHANGE_N || now.gear_n_m - self.gear_n_m > GEAR_CHANGE * gear_friction_n_m);
         changes
     }
 }

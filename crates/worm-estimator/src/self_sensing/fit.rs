@@ -58,6 +58,7 @@ pub(super) struct Fit {
     force_per_torque: f64, // of the stepping cell, 1/m
     prior: Vector,
     prior_information: Vector,
+    known_pull_n: Option<f64>, // by the pitch, in the mean over the cycles
     at: Parameters,
     first_answer: Option<Parameters>, // of a search under way, from where the fit was
     other: Option<Parameters>,        // another answer, with another pull
@@ -131,6 +132,7 @@ impl Fit {
             force_per_torque: TAU / (cells as f64 * worm.stroke_m()),
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
+            known_pull_n: None,
             at,
             first_answer: None,
             other: None,
@@ -167,14 +169,23 @@ impl Fit {
         self.scatter.fill(0.0);
     }
 
-    /// Takes a cycle's profile, and the variance of its means by the noise within bins. [`step`](Self::step) fits it.
-    pub(super) fn take(&mut self, torque_n_m: &[f64], variance: f64) {
+    /// Takes a cycle's profile, and the variance of its means by the noise within bins; where the slope was measured, the pull that follows
+    /// from it, with its standard deviation, N. [`step`](Self::step) fits it.
+    pub(super) fn take(&mut self, torque_n_m: &[f64], variance: f64, pull_n: Option<(f64, f64)>) {
         self.cycles = self.forgetting * self.cycles + 1.0;
         self.squared_cycles = self.forgetting * self.forgetting * self.squared_cycles + 1.0;
         let share = 1.0 / self.cycles;
         self.variance += share * (variance + FLOOR_N_M * FLOOR_N_M - self.variance);
         for (mean, torque) in self.mean_n_m.iter_mut().zip(torque_n_m) {
             *mean += share * (torque - *mean);
+        }
+        if let Some((pull_n, sigma_n)) = pull_n {
+            let before_n = self.known_pull_n.filter(|_| self.cycles > 1.0).unwrap_or(pull_n);
+            let mean_n = before_n + share * (pull_n - before_n);
+            let pull_at = self.at.pull_at();
+            self.known_pull_n = Some(mean_n);
+            self.prior[pull_at] = mean_n;
+            self.prior_information[pull_at] = sigma_n.powi(-2);
         }
         self.cycle_n_m[..torque_n_m.len()].copy_from_slice(torque_n_m);
         self.work = if self.cycles == 1.0 || (self.cycles - SEARCHED_ANEW).abs() < 0.5 {
@@ -342,6 +353,11 @@ impl Fit {
     /// Standard deviation of what was known of an unknown before.
     pub(super) fn prior_sigma(&self, unknown: usize) -> f64 {
         1.0 / self.prior_information[unknown].sqrt()
+    }
+
+    /// The pull that follows from the slope as it was measured, in the mean over the cycles, N.
+    pub(super) fn known_pull_n(&self) -> Option<f64> {
+        self.known_pull_n
     }
 
     /// Effective number of cycles.

@@ -8,10 +8,12 @@
 //!    its friction, how steeply the stiffness, and where the rise bends (a cell behind begins to slide) the pull on the body.
 //! 4. `fit`: worm and gears that explain the mean profile best, with their covariance, and by the exact model what follows from
 //!    them: advance, slides, energies.
-//! 5. [`dead_reckoning`]: the distance. [`twins`]: what the current cannot tell. [`change`]: alarms. [`calibration`]: the gears' friction.
+//! 5. `pitch`: where a sensor measures it, the slope, and what it says of the pull.
+//! 6. [`dead_reckoning`]: the distance. [`twins`]: what the current cannot tell. [`change`]: alarms. [`calibration`]: the gears' friction.
 //!
 //! # What it cannot tell
-//! - Slope, payload on a slope and constant drag are one pull. On the level a payload does nothing at all.
+//! - Slope, payload on a slope and constant drag are one pull, unless a sensor measures the pitch. On the level a payload does nothing at
+//!   all.
 //! - An error of the torque constant scales every force: friction is never known better than that constant.
 //! - An advance follows from the model. A worm that slides as a whole, tips and all, does not turn its cam any differently.
 //! - Cycles crawled backward count for the distance, by the model, but are not fitted.
@@ -29,6 +31,7 @@ pub mod gear;
 mod leading;
 mod model;
 mod parameters;
+mod pitch;
 mod profile;
 mod sample;
 mod sensed;
@@ -38,6 +41,7 @@ pub use change::{Armed, Changes};
 pub use dead_reckoning::{Mark, Reckoned};
 pub use gear::{CurrentSource, GearModel, Ripple};
 pub use model::CycleFigures;
+pub use pitch::PitchSensor;
 pub use profile::{BINS_PER_STEP, MAX_BINS};
 pub use sample::MotorSample;
 pub use sensed::{SelfSensed, Standing};
@@ -47,6 +51,7 @@ use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
 use fit::Fit;
 use parameters::{Parameters, Vector};
+use pitch::MeanPitch;
 use profile::Profile;
 use std::f64::consts::TAU;
 use worm_physics::{MAX_CELLS, Worm};
@@ -75,8 +80,10 @@ pub struct SelfSensingConfig {
     pub friction_sigma: f64,
     /// Standard deviation of each cell's ln stiffness about the stated worm's.
     pub stiffness_sigma: f64,
-    /// Standard deviation of the pull about that of the stated slope, N.
+    /// Standard deviation of the pull about that of the stated slope, N, while no pitch is measured.
     pub pull_sigma_n: f64,
+    /// How well a pitch that is measured says the slope, and the slope the pull.
+    pub pitch: PitchSensor,
     /// Usual time of a gait cycle, s.
     pub cycle_s: f64,
     /// Cycles over which the mean profile is taken; older ones fade.
@@ -93,6 +100,7 @@ impl SelfSensingConfig {
             friction_sigma: 0.4,
             stiffness_sigma: 0.25,
             pull_sigma_n: 2.5,
+            pitch: PitchSensor::default(),
             cycle_s: 2.5,
             memory_cycles: 40.0,
             evaluations_per_reading: 1,
@@ -107,6 +115,8 @@ pub struct SelfSensing {
     weight_n: f64,
     stroke_m: f64,
     profile: Profile,
+    pitch: MeanPitch, // of the open cycle
+    pitch_sensor: PitchSensor,
     fit: Fit,
     detector: ChangeDetector,
     allowed: Vector,
@@ -130,6 +140,7 @@ struct ClosedCycle {
     end_ns: u64,
     end_phase: f64,
     energy: Energy,
+    pitch_sine: Option<f64>, // where it was measured
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -161,6 +172,8 @@ impl SelfSensing {
             weight_n: worm.weight_n(),
             stroke_m: worm.stroke_m(),
             profile: Profile::new(worm.cells()),
+            pitch: MeanPitch::default(),
+            pitch_sensor: config.pitch,
             allowed: detector.allowed(),
             detector,
             reckoning: DeadReckoning::new(advance_m, advance_sigma_m),
@@ -245,12 +258,15 @@ impl SelfSensing {
                     end_ns: sample.stamp_ns,
                     end_phase: sample.phase.floor(),
                     energy: self.energy,
+                    pitch_sine: self.pitch.sine(),
                 });
             }
             self.profile.clear();
+            self.pitch.clear();
             self.energy = Energy::default();
             self.whole = self.loaded_cycles >= LOADING_CYCLES;
         }
+        self.pitch.add(sample.pitch_rad, turned);
         let mean = |now: f64, before: f64| 0.5 * (now + before);
         self.profile.add(
             middle - middle.floor(),
@@ -343,6 +359,7 @@ impl SelfSensing {
             .map_or(Seen::Usual, |change| {
                 self.detector.compare(&ComparedCycle {
                     usual: self.fit.parameters(),
+                    weight_n: self.fit.known_pull_n(),
                     cycles: self.fit.cycles(),
                     change,
                     torque_n_m,
@@ -361,7 +378,11 @@ impl SelfSensing {
                 self.fit.forget();
             }
         }
-        self.fit.take(torque_n_m, variance);
+        let pull_n = cycle.pitch_sine.map(|sine| {
+            let sigma_n = self.pitch_sensor.pull_sigma_n(self.weight_n, sine);
+            (self.weight_n * sine, sigma_n)
+        });
+        self.fit.take(torque_n_m, variance, pull_n);
         self.fitting = Some(cycle);
         false
     }
@@ -376,9 +397,11 @@ impl SelfSensing {
     /// Says in what a changed worm differs before everything is searched. True when it does.
     fn judge_early(&mut self, cycle: &ClosedCycle, first: &Parameters) -> bool {
         let difference = self.difference();
-        let has_changed = self
-            .detector
-            .judge_early(first, self.fit.cycle_n_m(), difference.as_ref());
+        let has_changed = self.detector.judge_early(
+            (first, self.fit.known_pull_n()),
+            self.fit.cycle_n_m(),
+            difference.as_ref(),
+        );
         if has_changed {
             self.show(cycle, Standing::Changed);
         }
@@ -390,8 +413,8 @@ impl SelfSensing {
         // While a change stands, every cycle says anew in what the worm differs, and whether it still does.
         if self.has_changed || self.detector.changes().any() {
             let difference = self.difference();
-            self.detector
-                .judge(self.fit.parameters(), self.fit.cycle_n_m(), difference.as_ref());
+            let now = (self.fit.parameters(), self.fit.known_pull_n());
+            self.detector.judge(now, self.fit.cycle_n_m(), difference.as_ref());
         }
         if let Some((figures, sigma)) = self.fit.figures() {
             let backward_m = self.fit.backward_advance_m().unwrap_or(figures.advance_m);
@@ -422,8 +445,13 @@ impl SelfSensing {
         };
         let pull_n = parameters.pull_n();
         let pull_sigma_n = sigma(parameters.pull_at());
-        let sine = (pull_n / self.weight_n).clamp(-1.0, 1.0);
-        let slope_rad = sine.asin();
+        let pulled_rad = (pull_n / self.weight_n).clamp(-1.0, 1.0).asin();
+        let pulled = (pulled_rad, pull_sigma_n / (self.weight_n * pulled_rad.cos().max(0.05)));
+        let measured = self.fit.known_pull_n().map(|weight_n| {
+            let slope_rad = (weight_n / self.weight_n).clamp(-1.0, 1.0).asin();
+            (slope_rad, self.pitch_sensor.sigma_rad)
+        });
+        let (slope_rad, slope_sigma_rad) = measured.unwrap_or(pulled);
         let energy = &cycle.energy;
         self.sensed = Some(SelfSensed {
             cells,
@@ -438,7 +466,8 @@ impl SelfSensing {
             pull_n,
             pull_sigma_n,
             slope_rad,
-            slope_sigma_rad: pull_sigma_n / (self.weight_n * slope_rad.cos().max(0.05)),
+            slope_sigma_rad,
+            slope_is_measured: measured.is_some(),
             figures,
             figures_sigma,
             electrical_j: energy.electrical_j,

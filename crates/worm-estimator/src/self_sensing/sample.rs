@@ -21,6 +21,8 @@ pub struct MotorSample {
     pub duty: f64,
     /// Temperature of the servo, °C; `NaN` where unknown.
     pub temperature_c: f64,
+    /// Pitch of the body, rad, growing up the canal; `NaN` where nothing measures it.
+    pub pitch_rad: f64,
     /// By which its taker knows it again, ns: [`SelfSensed::end_ns`](super::SelfSensed::end_ns) is that of the reading that ended the cycle.
     pub stamp_ns: u64,
 }
@@ -37,6 +39,7 @@ impl From<&State> for MotorSample {
             bus_voltage_v: state.bus_voltage_v,
             duty: state.motor_duty,
             temperature_c: state.motor_temperature_c,
+            pitch_rad: state.pitch_rad,
             stamp_ns: state.time_ns,
         }
     }

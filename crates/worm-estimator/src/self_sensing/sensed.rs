@@ -28,10 +28,12 @@ pub struct SelfSensed {
     pub pull_n: f64,
     /// Its standard error, N.
     pub pull_sigma_n: f64,
-    /// The slope, if all the pull is the stated mass's weight, rad.
+    /// The slope, rad: as measured, or if all the pull is the stated mass's weight.
     pub slope_rad: f64,
     /// Its standard error, rad.
     pub slope_sigma_rad: f64,
+    /// Whether a pitch sensor measured it.
+    pub slope_is_measured: bool,
     /// Figures of the cycle by the model.
     pub figures: CycleFigures,
     /// Their standard errors.

@@ -75,6 +75,7 @@ impl Rig {
                 cell_count: 4,
                 valid: 0b1111,
                 positions_m: [0.0; worm_physics::MAX_CELLS],
+                pitch_rad: None,
             },
             goal_counts: 0,
             served: None,

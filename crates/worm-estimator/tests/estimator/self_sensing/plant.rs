@@ -37,6 +37,14 @@ pub struct Drawn {
     scatter: f64,
     damping_ratio: f64,
     noise_a: f64,
+    pitch: Option<Pitch>,
+}
+
+/// An inertial sensor on the body.
+#[derive(Debug, Clone, Copy)]
+struct Pitch {
+    offset_rad: f64,
+    rocking_rad: f64,
 }
 
 /// The motor whose friction was identified (`docs/servo-bench.md`), as a gear model with what a calibration leaves uncertain.
@@ -121,7 +129,19 @@ impl Drawn {
             scatter: rng.random_range(0.002..0.02),
             damping_ratio: rng.random_range(0.2..0.7),
             noise_a: rng.random_range(0.5e-3..3e-3),
+            pitch: None,
         }
+    }
+
+    /// The same worm with an inertial sensor, half a degree off.
+    pub fn with_pitch(mut self) -> Self {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed ^ 0x91c);
+        let normal: f64 = StandardNormal.sample(&mut rng);
+        self.pitch = Some(Pitch {
+            offset_rad: 0.5f64.to_radians() * normal,
+            rocking_rad: rng.random_range(0.0..2f64).to_radians(),
+        });
+        self
     }
 
     /// What the estimator is told. With `WORMD_CALIBRATED` set to a standard deviation, N m: after the cold gears of this worm were calibrated lifted, by
@@ -236,8 +256,19 @@ impl Plant {
             bus_voltage_v: (10.0 * self.bus_v()).round() / 10.0,
             duty: (self.duty * 885.0).round() / 885.0,
             temperature_c: (25.0 + self.warmth_k()).floor(),
+            pitch_rad: self.pitch_rad(),
             stamp_ns: 0,
         }
+    }
+
+    /// What an inertial sensor says: the slope, off by what it is mounted askew and by its offset, and the body's rocking with the gait.
+    fn pitch_rad(&self) -> f64 {
+        let Some(pitch) = self.drawn.pitch else { return f64::NAN };
+        let rocking_rad = pitch.rocking_rad * self.angle_rad.sin();
+        ((self.drawn.worm.slope_rad() + pitch.offset_rad + rocking_rad).to_degrees() * 100.0)
+            .round()
+            .to_radians()
+            / 100.0
     }
 
     fn bus_v(&self) -> f64 {
