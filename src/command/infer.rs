@@ -292,8 +292,15 @@ fn in_words(inferred: &Answer) -> String {
     }
     let _ = write!(
         text,
-        "\npull {:.2} ± {:.2} N; a slope of {:.1} ± {:.1} degrees if all of it is the worm's own weight: a payload or a drag looks the same",
-        worm.pull_n, worm.pull_sigma_n, worm.slope_deg, worm.slope_sigma_deg,
+        "\npull {:.2} ± {:.2} N; a slope of {:.1} ± {:.1} degrees{}",
+        worm.pull_n,
+        worm.pull_sigma_n,
+        worm.slope_deg,
+        worm.slope_sigma_deg,
+        match worm.slope_is_measured {
+            true => " by the inertial sensor",
+            false => " if all of it is the worm's own weight: a payload or a drag looks the same",
+        }
     );
     if let Some(other) = &inferred.cannot_tell.other_pull {
         let _ = write!(

@@ -80,9 +80,13 @@ impl InferredSummary {
         };
         // So that a small error does not look like none.
         let digits = usize::from(self.position_sigma_m < 1e-3);
+        let slope = match self.slope_is_measured {
+            true => format!(", slope {:.1}±{:.1}°", self.slope_deg, self.slope_sigma_deg),
+            false => String::new(),
+        };
         self.advance_m.is_finite().then(|| {
             format!(
-                "at ~{:.digits$}±{:.digits$} mm, ~{:.1}±{:.1} mm and ~{:.0}±{:.0} mJ a cycle, pull ~{:.1}±{:.1} N{standing}",
+                "at ~{:.digits$}±{:.digits$} mm, ~{:.1}±{:.1} mm and ~{:.0}±{:.0} mJ a cycle, pull ~{:.1}±{:.1} N{slope}{standing}",
                 1e3 * self.position_m,
                 1e3 * self.position_sigma_m,
                 1e3 * self.advance_m,

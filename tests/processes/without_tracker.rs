@@ -107,3 +107,48 @@ fn it_crawls_and_is_recorded_and_its_log_says_what_the_current_shows() {
         assert!(error.contains("wormd infer"), "{error}");
     }
 }
+
+/// A device that tracks no cells says the slope, until it falls silent.
+#[test]
+fn an_inertial_sensor_measures_the_slope_of_a_worm_without_a_tracker() {
+    let worm = Worm::new("pitch");
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("worm.mcap").to_string_lossy().into_owned();
+    let config = worm.config(&format!("{NO_TRACKER}[inertial_sensor]\n[canal]\nslope_deg = 15.0\n"));
+    let up = [
+        "up",
+        "--json",
+        "--duration",
+        "10",
+        "--config",
+        &config,
+        "--record",
+        &log,
+        "--fault",
+        "silence:device=tracker@6",
+    ];
+    let summary = json(&worm.wormd(&up).output());
+    assert_eq!(
+        (&summary["mode"], &summary["fault"]),
+        (&"crawling".into(), &"none".into())
+    );
+    let inferred = &summary["inferred"];
+    assert_eq!(inferred["slope_is_measured"], true, "{inferred}");
+    let slope_deg = inferred["slope_deg"].as_f64().expect("a slope");
+    assert!((slope_deg - 15.0).abs() < 2.0, "{slope_deg}");
+    let states = messages(Path::new(&log)).expect("a log").states;
+    let known = |from_s: f64, to_s: f64| {
+        let began_ns = states[0].time_ns;
+        let seconds = |time_ns: u64| (time_ns - began_ns) as f64 * 1e-9;
+        let within = states
+            .iter()
+            .filter(move |state| (from_s..to_s).contains(&seconds(state.time_ns)));
+        within.map(|state| state.pitch_rad.to_degrees()).collect::<Vec<f64>>()
+    };
+    let early = known(1.0, 4.0);
+    assert!(early.iter().all(|pitch_deg| (pitch_deg - 15.0).abs() < 3.0) && !early.is_empty());
+    let late = known(8.0, 20.0);
+    assert!(late.iter().all(|pitch_deg| pitch_deg.is_nan()) && !late.is_empty());
+    assert!(states.iter().all(|state| state.sample == 0));
+    assert!(worm.replay(&log).status.success());
+}

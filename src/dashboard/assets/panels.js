@@ -241,6 +241,7 @@ export function drawInferred({ frame }) {
     fillValues(byId("inferred"), [["state", inferred ? "warming up: after two gait cycles" : "self-sensing is off"]]);
     return;
   }
+  const degrees = (...angles_rad) => `${angles_rad.map((angle_rad) => number((angle_rad * 180) / Math.PI, 1)).join(" ± ")}°`;
   const known = (value, sigma, digits, unit) => `~${number(value, digits)} ± ${number(sigma, digits)} ${unit}`;
   const phase = state?.phase ?? inferred.phase;
   const position_m = inferred.position_m + (phase - inferred.phase) * inferred.advance_m;
@@ -249,6 +250,7 @@ export function drawInferred({ frame }) {
     ["advance", known(inferred.advance_m * 1e3, inferred.advance_sigma_m * 1e3, 2, "mm a cycle")],
     ["losses", known(inferred.energy_loss_j * 1e3, inferred.energy_loss_sigma_j * 1e3, 1, "mJ a cycle")],
     ["pull", known(inferred.pull_n, inferred.pull_sigma_n, 2, "N")],
+    ...(inferred.slope_is_measured ? [["slope, measured", degrees(inferred.slope_rad, inferred.slope_sigma_rad)]] : []),
     ["position", known(position_m * 1e3, inferred.position_sigma_m * 1e3, inferred.position_sigma_m < 1e-3 ? 1 : 0, "mm")],
     ...inferred.friction_n.map((friction, cell) => [
       `friction ${cell + 1}`,

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use dynamixel_bus::packet::{ReadSpan, StatusError};
 use wormd::link::servo::{self, register, scale};
-use wormd::link::{ExchangePlan, PortError, ReadFailure, ReadPlan, TrackerQuery, TransactionError, WormBus};
+use wormd::link::{ExchangePlan, PortError, ReadFailure, ReadPlan, TrackerQuery, TransactionError, WormBus, tracker};
 
 use super::worm::{SERVO, TRACKER, Worm, id};
 
@@ -35,6 +35,38 @@ fn bus() -> WormBus<Worm> {
 
 fn soon() -> Instant {
     Instant::now() + Duration::from_millis(50)
+}
+
+/// With switches and without, of a tracker and of a device that tracks no cells.
+#[test]
+fn an_inertial_sensor_is_read_with_the_rest() {
+    let pitches = [(0x04d2, Some(12.34)), (0xfb2e, Some(-12.34)), (0x8000, None)];
+    let reads = [ReadPlan::FastBulk, ReadPlan::Bulk, ReadPlan::Separate];
+    for (counts, pitch_deg) in pitches {
+        for (read, cells, mask) in [(0, CELLS, None), (1, CELLS, Some(2)), (2, 0, None), (0, 0, Some(2))] {
+            let mut bus = bus();
+            bus.port_mut().put_tracker(tracker::register::PITCH, counts);
+            bus.port_mut().put_tracker(tracker::register::SWITCHES, 2);
+            let plan = plan(reads[read]);
+            let query = plan.tracker.map(|query| TrackerQuery {
+                cells,
+                emergency_stop_mask: mask,
+                pitch: true,
+                ..query
+            });
+            let outcome = bus.exchange(&ExchangePlan { tracker: query, ..plan }, GOAL_RAD_S, soon());
+            let reading = outcome.tracker.expect("the tracker's block");
+            let found_deg = reading.pitch_rad.map(f64::to_degrees);
+            let is_right = match (found_deg, pitch_deg) {
+                (Some(found), Some(expected)) => f64::abs(found - expected) < 1e-9,
+                (found, expected) => found == expected,
+            };
+            assert!(is_right, "{counts:#x}, {read}: {found_deg:?}");
+            assert_eq!(reading.valid.count_ones() as usize, cells);
+            assert_eq!(outcome.emergency_stop, mask.map(|_| true));
+            assert!(outcome.is_complete());
+        }
+    }
 }
 
 /// Whatever the tracker would say: it is not asked, and nothing waits for it.

@@ -38,7 +38,7 @@ pub trait InMemory {
 pub struct Layout {
     /// Its name here, as `State`.
     pub name: &'static str,
-    /// Its name and version on the service, as `wormd_state_v3`.
+    /// Its name and version on the service, as `wormd_state_v4`.
     pub type_name: &'static str,
     /// What it is about.
     pub documentation: &'static str,

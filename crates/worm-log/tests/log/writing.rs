@@ -3,7 +3,7 @@
 use super::text;
 use std::fs;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
-use worm_estimator::message::{Estimate, State};
+use worm_estimator::message::{Estimate, ProtobufMessage, State};
 use worm_log::{Channel, Index, Writer, messages};
 
 #[test]
@@ -88,6 +88,9 @@ fn foreign(topic: &str, type_name: &str, encoding: &str, message: impl AsRef<[u8
     bytes.into_inner()
 }
 
+/// Bytes of the last field of a state, with its tag of two.
+const PITCH_LEN: usize = 10;
+
 #[test]
 fn states_of_an_older_version_are_read_without_what_they_lack() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -102,6 +105,7 @@ fn states_of_an_older_version_are_read_without_what_they_lack() {
         fs::write(&path, foreign("/state", version, "json", &older)).expect("can be written");
         text(&messages(&path).expect("a log").states)
     };
+    assert_eq!(read_as("wormd_state_v3", &["pitch_rad"]), text(&[state]));
     let new_in_v3 = ["hold_reason", "acknowledged_mask", "acknowledged_by", "emergency_stop"];
     assert_eq!(read_as("wormd_state_v2", &new_in_v3), text(&[state]));
     let expected = State {
@@ -113,6 +117,12 @@ fn states_of_an_older_version_are_read_without_what_they_lack() {
         read_as("wormd_state_v1", &["motor_time_s", "host_paused_ns"]),
         text(&[expected])
     );
+    // In Protocol Buffers what is left out would be a pitch of zero.
+    let mut protobuf = Vec::new();
+    state.write_protobuf(&mut protobuf);
+    let without_pitch = &protobuf[..protobuf.len() - PITCH_LEN];
+    fs::write(&path, foreign("/state", "wormd_state_v3", "protobuf", without_pitch)).expect("can be written");
+    assert_eq!(text(&messages(&path).expect("a log").states), text(&[state]));
 }
 
 #[test]
@@ -129,7 +139,7 @@ fn other_files_are_refused_with_what_to_do() {
             &["channel /state: has no channel of a worm, only /tf"],
         ),
         (
-            foreign("/state", "wormd_state_v3", "cdr", "x"),
+            foreign("/state", "wormd_state_v4", "cdr", "x"),
             &[
                 "channel /state: holds messages encoded as 'cdr', not as 'protobuf' or 'json'",
                 "wormd record",
@@ -137,15 +147,15 @@ fn other_files_are_refused_with_what_to_do() {
         ),
         (
             foreign("/state", "wormd_state_v2", "protobuf", ""),
-            &["channel /state: holds 'wormd_state_v2', and this version of wormd reads 'wormd_state_v3'"],
+            &["channel /state: holds 'wormd_state_v2', and this version of wormd reads 'wormd_state_v4'"],
         ),
         (
-            foreign("/state", "wormd_state_v3", "protobuf", [0x90, 1, 2]),
+            foreign("/state", "wormd_state_v4", "protobuf", [0x90, 1, 2]),
             &["channel /state, message 1 of the file: cannot be read: position_m has 0 values for 2 cells"],
         ),
         (
             foreign("/state", "wormd_state_v9", "json", "{}"),
-            &["channel /state: holds 'wormd_state_v9', and this version of wormd reads 'wormd_state_v3'"],
+            &["channel /state: holds 'wormd_state_v9', and this version of wormd reads 'wormd_state_v4'"],
         ),
         (
             foreign("/state", "wormd_state_v3", "json", "{\"sequence\": -1}"),

@@ -136,7 +136,7 @@ proptest! {
 fn the_descriptor_says_what_a_field_is() {
     let state = described::<State>();
     let file = state.parent_file();
-    assert_eq!((file.name(), state.fields().len()), ("wormd_state_v3.proto", 29));
+    assert_eq!((file.name(), state.fields().len()), ("wormd_state_v4.proto", 30));
     assert_eq!(format!("{:?}", file.syntax()), "proto3");
     let field = |name: &str| state.get_field_by_name(name).expect(name);
     assert_eq!(field("time_ns").kind(), Kind::Fixed64);
@@ -153,7 +153,7 @@ fn the_descriptor_says_what_a_field_is() {
     let Kind::Enum(alarms) = field("fault_alarm").kind() else {
         panic!("{:?}", field("fault_alarm").kind());
     };
-    assert_eq!(alarms.full_name(), "wormd_state_v3.AlarmKind");
+    assert_eq!(alarms.full_name(), "wormd_state_v4.AlarmKind");
     let comments = file
         .file_descriptor_proto()
         .source_code_info
@@ -188,8 +188,8 @@ fn what_is_no_message_is_refused_with_the_reason() {
     for (bytes, expected) in [
         (&[0xff, 0xff][..], "ends within the number of a field"),
         (&[0x0b], "ends within the number of a field"),
-        (&[0xf8, 0x01, 1], "wormd_state_v3 has no field 31"),
-        (&[0x00, 1], "wormd_state_v3 has no field 0"),
+        (&[0xf8, 0x01, 1], "wormd_state_v4 has no field 31"),
+        (&[0x00, 1], "wormd_state_v4 has no field 0"),
         (
             &[0x09, 0, 0, 0, 0, 0, 0, 0, 0],
             "sequence is encoded as another type than it has",
@@ -207,7 +207,7 @@ fn what_is_no_message_is_refused_with_the_reason() {
     assert_eq!(
         State::read_protobuf(&[&bytes[..], &[0xf8, 1, 0]].concat()),
         Err(ProtobufError::UnknownField {
-            type_name: "wormd_state_v3",
+            type_name: "wormd_state_v4",
             number: 31
         })
     );
