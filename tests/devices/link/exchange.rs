@@ -242,7 +242,7 @@ fn transactions() {
         bus.broadcast_ping(soon(), |id, who| present.push((id.get(), who.model))),
         Ok(2)
     );
-    assert_eq!(present, [(SERVO, 1200), (TRACKER, wormd::link::tracker::MODEL)]);
+    assert_eq!(present, [(SERVO, 1200), (TRACKER, tracker::MODEL)]);
 
     let mut lengths = Vec::new();
     let ids = [id(SERVO), id(TRACKER)];

@@ -42,7 +42,7 @@ impl MeasuredTorque {
             })
             .collect();
         let seen = increment_j.iter().filter(|increment_j| increment_j.is_finite()).count();
-        (seen as f64 >= SHOWN * increment_j.len() as f64).then(|| Self {
+        (seen as f64 >= SHOWN * increment_j.len() as f64).then_some(Self {
             gear: *gear,
             increment_j,
         })
