@@ -300,8 +300,24 @@ fn check_port(
 /// What there is of a tracker, and how it is read.
 fn tracker_in_words(config: &Config, prepared: &Prepared) -> String {
     match prepared.tracker {
+        Some(_) if !config.tracker.present => {
+            format!(
+                "an inertial sensor and no tracker (configured so), read by {:?}",
+                prepared.plan.read
+            )
+        }
+        Some(tracker) if config.inertial_sensor.is_some() => {
+            let cells = tracker.cells;
+            format!(
+                "tracker with {cells} cells and an inertial sensor, read by {:?}",
+                prepared.plan.read
+            )
+        }
         Some(tracker) => format!("tracker with {} cells, read by {:?}", tracker.cells, prepared.plan.read),
         None if config.tracker.present => "its tracker is silent".to_owned(),
+        None if config.inertial_sensor.is_some() => {
+            "no tracker (configured so), and its inertial sensor is silent".to_owned()
+        }
         None => "no tracker (configured so)".to_owned(),
     }
 }

@@ -10,6 +10,7 @@
 //! 4. **Ready to tick:** status return level 1 (answer reads only, see the exchange), goal zero, watchdog cleared and set.
 //! 5. **How are they read?** The read mode is tried with real requests, and the first reading is kept.
 
+mod find_tracker;
 mod identify;
 mod set_up;
 
@@ -19,13 +20,14 @@ use std::time::{Duration, Instant};
 use super::operations::{OperationError, REPLY_TIME};
 use super::packet::DeviceId;
 use super::servo::{HardwareErrors, WATCHDOG_LATCHED, register};
-use identify::{identify, identify_servo};
+use find_tracker::find_tracker;
+use identify::identify_servo;
 pub(crate) use set_up::limit_duty_to;
 use set_up::{LEAST_VOLTAGE_V, limit_duty, set_up};
 
 use super::{
     ExchangeOutcome, ExchangePlan, Finding, Identity, Port, PortError, ReadMode, ReadPlan, Register, ServoReading,
-    TrackerQuery, TrackerReading, TransactionError, WormBus, tracker,
+    TrackerQuery, TrackerReading, WormBus, tracker,
 };
 
 /// What errors call the tracker.
@@ -283,57 +285,6 @@ pub fn prepare<P: Port>(
         duty_limit,
         servo_reading: outcome.servo,
     })
-}
-
-/// Finds the configured tracker: who it is, and how many cells it tracks. Nothing where it is silent and may be.
-fn find_tracker<P: Port>(
-    bus: &mut WormBus<P>,
-    settings: &LinkSettings,
-    wanted: &TrackerSettings,
-    findings: &mut Vec<Finding>,
-) -> Result<Option<(Identity, u8)>, StartupError> {
-    let identity = match identify(bus, settings, TRACKER, wanted.id, wanted.model) {
-        Err(StartupError::Silent { id, .. }) if wanted.may_be_silent => {
-            let (device, without) = match wanted.cells {
-                0 => ("inertial sensor", "a measured slope"),
-                _ => ("tracker", "positions"),
-            };
-            findings.push(Finding::open(
-                format!("the {device} (ID {id}) does not answer: the worm goes without {without}"),
-                "look at its power and its cable; it is used as soon as it answers",
-            ));
-            return Ok(None);
-        }
-        found => found?,
-    };
-    let cells = bus.register(wanted.id, tracker::register::CELL_COUNT)? as u8;
-    if usize::from(cells) < wanted.cells {
-        return Err(StartupError::TooFewCells {
-            found: cells,
-            configured: wanted.cells,
-        });
-    }
-    let optional = [
-        (
-            wanted.emergency_stop_mask.is_some(),
-            tracker::register::SWITCHES,
-            StartupError::NoEmergencyStop,
-        ),
-        (wanted.pitch, tracker::register::PITCH, StartupError::NoInertialSensor),
-    ];
-    for (is_wanted, register, missing) in optional {
-        if !is_wanted {
-            continue;
-        }
-        match bus.register(wanted.id, register) {
-            Err(OperationError::Transaction {
-                error: TransactionError::Refused { .. },
-                ..
-            }) => return Err(missing),
-            read => read?,
-        };
-    }
-    Ok(Some((identity, cells)))
 }
 
 /// Finds the configured servo and brings it to rest: torque off and verified, everything answered, no hardware error, a watchdog that works.

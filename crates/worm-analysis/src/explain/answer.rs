@@ -2,12 +2,18 @@
 //!
 //! Cells count from 1 here. Phases are fractions of a gait cycle, 0 to 1.
 
+mod figures;
 mod law;
+mod next_experiment;
 mod onset;
+mod run;
 
 use crate::recording::Repair;
+pub use figures::{CycleSeries, Figures, ResidualMap};
 pub use law::{FoundLaw, LawAxes, LawOver};
+pub use next_experiment::{ExperimentChange, NextExperiment, Prediction, RunChange};
 pub use onset::FoundOnset;
+pub use run::{CurrentEvidence, RunSummary};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -257,82 +263,6 @@ pub struct Remainder {
     pub places: Vec<Place>,
 }
 
-/// What a run may change against the runs of the campaign.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum RunChange {
-    /// Slope of the canal, degrees.
-    #[serde(rename = "slope_deg")]
-    Slope,
-    /// Time of a gait cycle, s.
-    #[serde(rename = "cycle_s")]
-    Cycle,
-    /// Where the worm starts along the canal, as a shift, m.
-    #[serde(rename = "start_m")]
-    Start,
-    /// Known extra mass, kg.
-    #[serde(rename = "payload_kg")]
-    Payload,
-    /// Number of gait cycles.
-    #[serde(rename = "cycles")]
-    Cycles,
-    /// Rest after each gait cycle, s.
-    #[serde(rename = "dwell_s")]
-    Dwell,
-}
-
-impl RunChange {
-    /// Unit of its value; empty for none.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Slope => "deg",
-            Self::Cycle | Self::Dwell => "s",
-            Self::Start => "m",
-            Self::Payload => "kg",
-            Self::Cycles => "",
-        }
-    }
-}
-
-/// What the next experiment changes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(untagged)]
-pub enum ExperimentChange {
-    /// One condition of a run.
-    Run(RunChange),
-    /// Nothing: a measurement on the bench, in words.
-    Measurement(&'static str),
-}
-
-/// A proposal for the next experiment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NextExperiment {
-    /// What to change, or to measure.
-    pub change: ExperimentChange,
-    /// The new value; none for a measurement.
-    pub value: Option<f64>,
-    /// Unit of the value.
-    pub unit: String,
-    /// Slope of the run to make, degrees; that of the run to repeat where something else is changed. None for a measurement.
-    pub slope_deg: Option<f64>,
-    /// In words, with how to do it.
-    pub description: String,
-    /// What each rival predicts.
-    pub predictions: Vec<Prediction>,
-    /// Expected distance between the two nearest predictions, in standard deviations.
-    pub separation_sigma: Option<f64>,
-}
-
-/// What an effect predicts for an experiment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Prediction {
-    /// The effect.
-    pub effect: String,
-    /// Advance per cycle that it predicts, m.
-    pub advance_m: Option<f64>,
-    /// In words.
-    pub description: String,
-}
-
 /// A parameter of the recalibrated model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibrated {
@@ -378,98 +308,6 @@ pub struct Screened {
     pub improvement: Option<f64>,
     /// What became of it.
     pub outcome: ScreeningOutcome,
-}
-
-/// A run of the campaign.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RunSummary {
-    /// Where it comes from.
-    pub recording: String,
-    /// Slope, degrees.
-    pub slope_deg: f64,
-    /// Known extra mass, kg.
-    pub payload_kg: f64,
-    /// Whole gait cycles.
-    pub cycles: usize,
-    /// Time of a gait cycle, s.
-    pub cycle_s: f64,
-    /// Whether the gait phase was recorded.
-    pub phase_recorded: bool,
-    /// Whether the recording starts with the worm just laid down.
-    pub laid_down: bool,
-    /// Standard deviation of one position, m.
-    pub noise_m: f64,
-    /// Standard deviation of the random walk that the body makes in a cycle beyond any model, m.
-    pub drift_per_cycle_m: f64,
-    /// Mean advance per cycle: measured, by the recalibrated model, by the named one (where there is one), m.
-    pub advance_m: [f64; 3],
-    /// Standard error of the measured advance, m, where the run is known by its advance alone; figures that need positions are
-    /// then `NaN`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub advance_sigma_m: Option<f64>,
-    /// What the motor's current shows, where it counts as evidence.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub current: Option<CurrentEvidence>,
-}
-
-/// What the motor's current shows of a run, beside what models have it show; `NaN` where a model cannot make the run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct CurrentEvidence {
-    /// Root mean square of the mean cycle's torque on the cam that stays unexplained: by the recalibrated model, by the named one (where
-    /// there is one), N m. The ripple of gears that nobody described is part of both.
-    pub torque_residual_n_m: [f64; 2],
-    /// Net work that the cam takes in a cycle: by the current and the gears of the answer, by the recalibrated model, by the named one, J.
-    pub work_j: [f64; 3],
-}
-
-/// Series and maps that the page draws, beyond the JSON.
-#[derive(Debug, Clone, Default)]
-pub struct Figures {
-    /// One map for each run: residual of the recalibrated model.
-    pub maps_before: Vec<ResidualMap>,
-    /// The same for the named model, where there is one.
-    pub maps_after: Vec<ResidualMap>,
-    /// Each run's displacement of the body within a cycle.
-    pub cycles: Vec<CycleSeries>,
-    /// The old model's text and the new one's difference to it, as lines with ' ', '-' or '+' before them.
-    pub model_diff: Vec<String>,
-}
-
-/// Residual by cell and phase of one run.
-#[derive(Debug, Clone, Default)]
-pub struct ResidualMap {
-    /// Slope, degrees.
-    pub slope_deg: f64,
-    /// The cell, from 1, that steps in each bin.
-    pub stepping_cell: Vec<usize>,
-    /// Phase at the middle of each bin.
-    pub phase: Vec<f64>,
-    /// Displacement within the bin beyond the model's, mean over the cycles, m: `[cell][bin]`.
-    pub residual_m: Vec<Vec<f64>>,
-    /// That in standard errors: `[cell][bin]`; `NaN` where too few cycles were seen.
-    pub significance: Vec<Vec<f64>>,
-    /// The significance that the largest on all maps of the campaign stays below by chance nineteen times in twenty.
-    pub limit: f64,
-}
-
-/// The mean cycle of one run: data and models, all over the same phases.
-#[derive(Debug, Clone, Default)]
-pub struct CycleSeries {
-    /// Slope, degrees.
-    pub slope_deg: f64,
-    /// Phase, 0 to 1.
-    pub phase: Vec<f64>,
-    /// Mean position of the cells since the start of the cycle less what the stroke alone would make, m: measured, mean over
-    /// the settled cycles.
-    pub measured_m: Vec<f64>,
-    /// Standard deviation over the cycles, m.
-    pub scatter_m: Vec<f64>,
-    /// By the nominal model, m.
-    pub baseline_m: Vec<f64>,
-    /// By the recalibrated model, m.
-    pub recalibrated_m: Vec<f64>,
-    /// By the named model, m; empty where there is none.
-    pub named_m: Vec<f64>,
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ mod machine;
 mod physics;
 mod positions;
 mod self_sensing;
+mod sensors;
 mod trip;
 mod virtual_worm;
 mod worm;
@@ -29,12 +30,12 @@ pub use check::{ConfigError, ConfigProblem};
 pub use effect::{Effect, EffectTextError};
 pub use effect_table::{OneOrTwo, Rows, TableFields};
 pub use machine::{
-    Control, EmergencyStop, EmergencyStopSource, Estimator, IdleDisarm, InertialSensor, Limits, OnLapsedLease,
-    OnStaleTracker, Port, ReadMode, Realtime, Servo, Topics, Tracker,
+    Control, Estimator, IdleDisarm, Limits, OnLapsedLease, OnStaleTracker, Port, ReadMode, Realtime, Servo, Topics,
 };
 pub use physics::PhysicsError;
 pub use positions::PositionSource;
 pub use self_sensing::{Calibrated, CalibrationMode, ReportedCurrent, SelfSensing};
+pub use sensors::{EmergencyStop, EmergencyStopSource, InertialSensor, Tracker};
 pub use trip::{OnLinkBack, OnLinkLoss, OnStuck, Trip};
 pub use virtual_worm::{PresentCurrent, ServoEffect, VirtualWorm};
 pub use worm::{Canal, DeformationSource, Direction, Gait, PerCell, Worm};

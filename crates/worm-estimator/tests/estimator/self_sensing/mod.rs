@@ -1,6 +1,7 @@
 //! Self-sensing on drawn worms in virtual time. `WORMD_SEEDS=200` draws as many; without it a small sample. With `WORMD_PITCH` set, every
 //! worm has an inertial sensor.
 
+mod pitch;
 mod plant;
 
 use plant::{Drawn, Plant};
@@ -195,39 +196,6 @@ fn ten_cycles_of_drawn_worms() {
 }
 
 #[test]
-fn a_pitch_sensor_tells_the_slope_from_other_loads() {
-    let [mut slope, mut load] = std::array::from_fn(|_| Errors::default());
-    let seeds = seeds(12);
-    for seed in seeds.clone() {
-        let drag_n = 0.1 * (seed % 4) as f64;
-        let drawn = Drawn::new(seed).with_pitch();
-        let dragged = drawn.worm.clone().with_resisting_force_n(drag_n);
-        let mut plant = Plant::new(&drawn);
-        plant.change(dragged.expect("a force in range"));
-        let mut sensing = SelfSensing::new(&drawn.told, &drawn.config());
-        crawl(&mut plant, &mut sensing, 12, |_, _| {});
-        let sensed = sensing.sensed().expect("cycles were seen");
-        assert!(sensed.slope_is_measured);
-        slope.add(
-            sensed.slope_rad.to_degrees() - drawn.slope_deg(),
-            1.0,
-            sensed.slope_sigma_rad.to_degrees(),
-        );
-        let weight_n = drawn.told.weight_n() * sensed.slope_rad.sin();
-        load.add(sensed.pull_n - weight_n - drag_n, 1.0, sensed.pull_sigma_n);
-    }
-    println!(
-        "{} worms from seed {}, ten cycles, drags of 0 to 0.3 N",
-        seeds.end - seeds.start,
-        seeds.start
-    );
-    slope.line("slope, degrees", 1.0);
-    load.line("drag, N", 1.0);
-    assert!(slope.within(2.0) == 1.0 && slope.coverage() > 0.6);
-    assert!(load.within(0.3) > 0.8 && load.coverage() > 0.6);
-}
-
-#[test]
 fn distance_after_fifty_cycles() {
     let mut distance = Errors::default();
     let seeds = seeds(6);
@@ -340,45 +308,6 @@ fn a_changed_worm_is_reported() {
         percent(loaded, count)
     );
     assert!(percent(right_cell, count) > 80.0 && percent(jammed, count) > 80.0);
-}
-
-/// A canal that gets steeper is no load where the pitch is measured, and a drag still is one.
-#[test]
-fn a_steeper_canal_is_no_load() {
-    let seeds = seeds(4);
-    let [mut steeper, mut dragged, mut count] = [0; 3];
-    for seed in seeds.clone() {
-        let drawn = Drawn::new(seed).with_pitch();
-        let slope_rad = drawn.worm.slope_rad() + 14f64.to_radians();
-        let worms = [
-            drawn.worm.clone().with_slope_rad(slope_rad),
-            drawn.worm.clone().with_resisting_force_n(0.8),
-        ];
-        let mut usual = Plant::new(&drawn);
-        let mut sensing = SelfSensing::new(&drawn.told, &drawn.config());
-        crawl(&mut usual, &mut sensing, 10, |_, _| {});
-        let worms = worms.map(|worm| worm.expect("figures in range"));
-        if worms.iter().any(|worm| steady_cycle(worm).cycle().is_none()) {
-            continue;
-        }
-        count += 1;
-        let [is_load, is_drag] = worms.map(|worm| {
-            let (mut plant, mut sensing) = (usual.clone(), sensing.clone());
-            plant.change(worm);
-            let mut seen = false;
-            crawl(&mut plant, &mut sensing, 6, |_, sensed| {
-                seen |= sensed.changes.more_load
-            });
-            seen
-        });
-        steeper += u32::from(is_load);
-        dragged += u32::from(is_drag);
-    }
-    println!(
-        "{count} worms from seed {} with a pitch sensor: more load on 14° more {steeper} times, by a drag of 0.8 N {dragged} times",
-        seeds.start
-    );
-    assert!(count > 0 && 5 * steeper <= count && 2 * dragged > count);
 }
 
 #[test]
