@@ -349,6 +349,7 @@ def explain(
     discrepancy: float | None = None,
     matters: float | None = None,
     expected_impact: float | None = None,
+    current: bool = False,
     progress: ProgressCallback | bool | None = None,
     wormd: StrPath | None = None,
 ) -> Explanation:
@@ -363,6 +364,7 @@ def explain(
         discrepancy: what the model is taken to be wrong by everywhere, as a fraction of the largest deformation.
         matters: relative change of advance or energy that matters.
         expected_impact: how much of the advance an effect is expected to cost or bring.
+        current: takes the motor's current as evidence, too.
         progress: is told stage and fraction. Without it progress is shown on standard error; False shows nothing.
         wormd: the program.
 
@@ -377,6 +379,8 @@ def explain(
         matters=matters,
         **{"expected-impact": expected_impact},
     )
+    if current:
+        more.append("--current")
     with tempfile.TemporaryDirectory(prefix="wormd-") as folder:
         if isinstance(campaign, (str, os.PathLike)):
             source: StrPath = campaign
