@@ -9,7 +9,7 @@ mod onset;
 mod run;
 
 use crate::recording::Repair;
-pub use figures::{CycleSeries, Figures, ResidualMap};
+pub use figures::{CycleSeries, Figures, ResidualMap, TorqueSeries};
 pub use law::{FoundLaw, LawAxes, LawOver};
 pub use next_experiment::{ExperimentChange, NextExperiment, Prediction, RunChange};
 pub use onset::FoundOnset;

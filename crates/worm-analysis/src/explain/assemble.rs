@@ -22,6 +22,7 @@ use crate::explain::worm::nuisance::Nuisance;
 use crate::explain::worm::period::period;
 use crate::explain::worm::recorded_worm::{RecordedWorm, WormProblem};
 use crate::explain::worm::speed_droop::SpeedDroop;
+use crate::explain::worm::torque_cycle::torque_cycles;
 pub(super) use calibration::calibration;
 pub(super) use effects::named_effects;
 pub(super) use screening::{add_unscreened, screening};
@@ -174,6 +175,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
                 &parts.recalibrated,
                 named.first().map(|candidate| &candidate.fit),
             ),
+            torque: torque_cycles(worm, &parts.recalibrated, named.first().map(|candidate| &candidate.fit)),
             model_diff: Vec::new(),
         },
     }

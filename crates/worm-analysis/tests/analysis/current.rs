@@ -77,6 +77,13 @@ fn current_tells_a_payload_from_softer_pads() {
         (payload.value - true_kg).abs() < 3.0 * payload.sigma,
         "{payload:?}, {true_kg} kg"
     );
+    assert_eq!(by_both.figures.torque.len(), loaded.recordings.len());
+    for series in &by_both.figures.torque {
+        let pairs = series.measured_n_m.iter().zip(&series.named_n_m);
+        let squares: Vec<f64> = pairs.map(|(measured, named)| (measured - named).powi(2)).collect();
+        let rms_n_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        assert!(squares.len() == series.phase.len() && rms_n_m < 2e-3, "{rms_n_m} N m");
+    }
     for run in &by_both.runs {
         let current = run.current.expect("it counts");
         let [shown_j, recalibrated_j, named_j] = current.work_j;

@@ -9,6 +9,8 @@ pub struct Figures {
     pub maps_after: Vec<ResidualMap>,
     /// Each run's displacement of the body within a cycle.
     pub cycles: Vec<CycleSeries>,
+    /// Each run's mean torque on the cam, where the motor's current counts.
+    pub torque: Vec<TorqueSeries>,
     /// The old model's text and the new one's difference to it, as lines with ' ', '-' or '+' before them.
     pub model_diff: Vec<String>,
 }
@@ -48,4 +50,19 @@ pub struct CycleSeries {
     pub recalibrated_m: Vec<f64>,
     /// By the named model, m; empty where there is none.
     pub named_m: Vec<f64>,
+}
+
+/// The mean torque on the cam over the phase in one run, all over the same phases.
+#[derive(Debug, Clone, Default)]
+pub struct TorqueSeries {
+    /// Slope, degrees.
+    pub slope_deg: f64,
+    /// Phase, 0 to 1; those beside the jump from one step to the next are left out.
+    pub phase: Vec<f64>,
+    /// By the current and the gears as they are believed to be, N m.
+    pub measured_n_m: Vec<f64>,
+    /// As the recalibrated model has the current show it, its recalibrated gears included, N m.
+    pub recalibrated_n_m: Vec<f64>,
+    /// Likewise by the named model; empty where there is none.
+    pub named_n_m: Vec<f64>,
 }

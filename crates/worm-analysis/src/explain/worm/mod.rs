@@ -38,6 +38,7 @@ pub(in crate::explain) mod speed_droop;
 pub(in crate::explain) mod start;
 pub(in crate::explain) mod sway;
 pub(in crate::explain) mod torque;
+pub(in crate::explain) mod torque_cycle;
 mod torque_discrepancy;
 pub(in crate::explain) mod torque_noise;
 pub(in crate::explain) mod track;

@@ -82,7 +82,7 @@ impl TorqueNoise {
 }
 
 /// Whether a bin lies beside the jump from one step to the next.
-fn is_at_jump(bins: &Bins, bin: usize) -> bool {
+pub(super) fn is_at_jump(bins: &Bins, bin: usize) -> bool {
     let of_step = bins.place(bin) % bins.per_step;
     bins.per_step >= MIN_BINS && (of_step == 0 || of_step + 1 == bins.per_step)
 }

@@ -127,7 +127,7 @@ fn picture(name: &str, run: &CycleSeries, map: Option<&ResidualMap>, colours: &[
 }
 
 /// Marks the steps with a pale band in the colour of the cell that makes it.
-fn shade_steps(
+pub(super) fn shade_steps(
     plot: &mut Plot<'_, '_, '_>,
     map: &ResidualMap,
     colours: &[Colour],

@@ -5,6 +5,7 @@ mod gap;
 mod law;
 mod map;
 mod screening;
+mod torque;
 
 use super::view::FigureKind;
 use crate::explain::Answer;
@@ -16,6 +17,7 @@ pub(super) fn draw(kind: FigureKind, answer: &Answer) -> Result<Figure, DrawErro
         FigureKind::Map => map::figure(answer),
         FigureKind::Screening => screening::figure(answer),
         FigureKind::Cycle => cycle::figure(answer),
+        FigureKind::Torque => torque::figure(answer),
         FigureKind::Gap => gap::figure(answer),
         FigureKind::Law => law::figure(answer),
     }

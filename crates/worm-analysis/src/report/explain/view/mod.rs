@@ -80,6 +80,8 @@ pub enum FigureKind {
     Screening,
     /// The mean cycle, measured and by each model.
     Cycle,
+    /// The mean torque on the cam, by the motor's current and by each model.
+    Torque,
     /// The gap, stage by stage.
     Gap,
     /// A law that nobody listed, over the data that carry it.

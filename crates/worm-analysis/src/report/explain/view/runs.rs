@@ -13,7 +13,9 @@ pub(super) fn cycle_blocks(answer: &Answer) -> Vec<Block> {
     } else if answer.figures.cycles.iter().all(|run| run.phase.is_empty()) {
         "There is no mean cycle to show: the answer holds none of any run."
     } else {
-        return vec![Block::Figure(FigureKind::Cycle)];
+        let torque = (!answer.figures.torque.is_empty()).then_some(FigureKind::Torque);
+        let figures = std::iter::once(FigureKind::Cycle).chain(torque);
+        return figures.map(Block::Figure).collect();
     };
     vec![Block::paragraph(why)]
 }
