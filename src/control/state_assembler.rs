@@ -73,6 +73,7 @@ pub(super) struct StateAssembler {
     /// When the last new tracker sample came, ns of the loop's own clock.
     pub(super) sample_seen_ns: Option<u64>,
     has_positions: bool,
+    has_pitch: bool,
     /// When the pitch last came, and how long it holds, ns of the loop's own clock.
     pitch_seen_ns: u64,
     pitch_holds_ns: u64,
@@ -118,6 +119,7 @@ impl StateAssembler {
             servo_seen_ns: None,
             sample_seen_ns: None,
             has_positions: config.tracker.present,
+            has_pitch: config.inertial_sensor.is_some(),
             pitch_seen_ns: 0,
             pitch_holds_ns: seconds_to_ns(config.control.tracker_timeout_s),
         }
@@ -179,7 +181,9 @@ impl StateAssembler {
     /// Takes the tracker's answer, likewise.
     pub(super) fn take_tracker(&mut self, now_ns: u64, present_ns: u64, reading: Option<&TrackerReading>) {
         self.state.sample_is_new = 0;
-        self.take_pitch(present_ns, reading.and_then(|reading| reading.pitch_rad));
+        if self.has_pitch {
+            self.take_pitch(present_ns, reading.and_then(|reading| reading.pitch_rad));
+        }
         let Some(reading) = reading.filter(|_| self.has_positions) else {
             return;
         };

@@ -73,7 +73,7 @@ pub struct TrackerQuery {
 }
 
 impl TrackerQuery {
-    fn span(&self) -> ReadSpan {
+    const fn span(&self) -> ReadSpan {
         use tracker::register::{PITCH, SWITCHES};
         match (self.pitch, self.emergency_stop_mask) {
             (false, None) => tracker::block_span(self.id, self.cells),
@@ -82,19 +82,25 @@ impl TrackerQuery {
         }
     }
 
-    /// What an answer says: the reading, and the switches where they were read. Nothing where it has another length.
-    fn parse(&self, data: &[u8]) -> Option<(TrackerReading, Option<u8>)> {
-        let span = self.span();
-        if data.len() != usize::from(span.length) {
-            return None;
+    /// The reading of an answer; nothing where it has another length than was asked for.
+    fn reading(&self, data: &[u8]) -> Option<TrackerReading> {
+        let mut reading = TrackerReading::from_block(data.get(self.extra_len()..)?).ok()?;
+        // The pitch comes first.
+        if let Some(counts) = data.first_chunk().filter(|_| self.pitch) {
+            reading.pitch_rad = tracker::pitch_rad(i16::from_le_bytes(*counts));
         }
-        let (extras, block) = data.split_at_checked(usize::from(tracker::BLOCK_ADDRESS - span.address))?;
-        let reading = TrackerReading::from_block(block).ok()?;
-        // The pitch comes first, and the switches last.
-        let pitch = extras.first_chunk().filter(|_| self.pitch);
-        let pitch_rad = pitch.and_then(|counts| tracker::pitch_rad(i16::from_le_bytes(*counts)));
-        let switches = extras.last().copied().filter(|_| self.emergency_stop_mask.is_some());
-        Some((TrackerReading { pitch_rad, ..reading }, switches))
+        Some(reading)
+    }
+
+    /// The switches of an answer, where they were asked for: right in front of the block.
+    fn switches(&self, data: &[u8]) -> Option<u8> {
+        self.emergency_stop_mask?;
+        data.get(self.extra_len() - 1).copied()
+    }
+
+    /// Bytes in front of the block.
+    const fn extra_len(&self) -> usize {
+        (tracker::BLOCK_ADDRESS - self.span().address) as usize
     }
 }
 

@@ -49,11 +49,14 @@ impl Answers {
             self.servo_answers += u32::from(self.servo.is_ok());
             self.servo == Err(ReadFailure::Malformed)
         } else if let Some(query) = plan.tracker.filter(|query| query.id == id) {
-            let read = query.parse(data).filter(|_| flags.error.is_none());
-            if let Some((_, switches)) = read {
-                self.switches = switches;
-            }
-            self.tracker = read.map(|(reading, _)| reading).ok_or(failure);
+            let of_length = flags.error.is_none() && data.len() == usize::from(query.span().length);
+            let reading = if of_length {
+                self.switches = query.switches(data);
+                query.reading(data)
+            } else {
+                None
+            };
+            self.tracker = reading.ok_or(failure);
             self.tracker == Err(ReadFailure::Malformed)
         } else {
             counters.wrong_ids += 1;

@@ -21,8 +21,8 @@ pub(in crate::explain) struct Walk<'a> {
     /// Phase of the last sample that was reached.
     before: f64,
     position_m: Vec<f64>, // `[sample][cell]`, flat, of the samples so far
-    work_j: Vec<f64>,     // of the drive, up to each of them
-    phase: Vec<f64>,      // that each of them shows
+    work_j: Vec<f64>,     // of the drive, up to each of them; empty where no current counts
+    phase: Vec<f64>,      // that each of them shows; likewise
     begun_j: f64,         // work before the crawl's ledger began
 }
 
@@ -59,8 +59,8 @@ impl<'a> Walk<'a> {
             settled: None,
             before: first,
             position_m: Vec::with_capacity(observed.cells() * observed.samples()),
-            work_j: Vec::with_capacity(observed.samples()),
-            phase: Vec::with_capacity(observed.samples()),
+            work_j: Vec::new(),
+            phase: Vec::new(),
             begun_j: 0.0,
         };
         if settles {
@@ -121,10 +121,9 @@ impl<'a> Walk<'a> {
     /// Work up to the phase that was recorded with each sample, J: the current is not as late as the positions are. Nothing where no current
     /// counts.
     fn work_at_samples_j(&self) -> Vec<f64> {
-        if self.observed.torque.is_none() {
+        let Some(last) = self.work_j.len().checked_sub(1) else {
             return Vec::new();
-        }
-        let last = self.work_j.len() - 1;
+        };
         let mut after = 1;
         let at = |phase: &f64| {
             while after < last && self.phase[after] < *phase {
@@ -141,6 +140,11 @@ impl<'a> Walk<'a> {
         self.observed.phase.iter().map(at).collect()
     }
 
+    /// Whether the drive's work is asked for.
+    fn counts_work(&self) -> bool {
+        self.observed.torque.is_some()
+    }
+
     fn next_sample(&self) -> usize {
         self.position_m.len() / self.observed.cells()
     }
@@ -154,8 +158,10 @@ impl<'a> Walk<'a> {
             }
             self.advance(mechanics, phase, sample, phase)?;
             self.position_m.extend_from_slice(self.crawl.positions_m());
-            self.work_j.push(self.begun_j + self.crawl.ledger().actuator_net_j);
-            self.phase.push(phase);
+            if self.counts_work() {
+                self.work_j.push(self.begun_j + self.crawl.ledger().actuator_net_j);
+                self.phase.push(phase);
+            }
             self.before = phase;
         }
         Some(())
@@ -188,8 +194,10 @@ impl<'a> Walk<'a> {
                 track.advance(&mut self.crawl, mechanics)?;
             }
             track.extend(phase, &mut self.position_m);
-            self.work_j.push(self.begun_j + track.work_j(phase));
-            self.phase.push(phase);
+            if self.counts_work() {
+                self.work_j.push(self.begun_j + track.work_j(phase));
+                self.phase.push(phase);
+            }
             self.before = phase;
         }
         Some(())
