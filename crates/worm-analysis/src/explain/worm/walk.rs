@@ -140,7 +140,7 @@ impl<'a> Walk<'a> {
         self.observed.phase.iter().map(at).collect()
     }
 
-    /// Whether the drive's work is asked for.
+    /// Whether the drive's work is needed.
     fn counts_work(&self) -> bool {
         self.observed.torque.is_some()
     }
