@@ -12,10 +12,15 @@ pub fn log_uniform(min: f64, max: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
     min * (max / min).powf(rng.random::<f64>())
 }
 
+/// A standard normal value.
+pub fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    StandardNormal.sample(rng)
+}
+
 /// A standard normal value, truncated at 2.2 standard deviations.
 pub fn truncated_normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
     loop {
-        let value: f64 = StandardNormal.sample(rng);
+        let value = normal(rng);
         if value.abs() <= MAX_SIGMAS {
             return value;
         }

@@ -7,9 +7,8 @@ use super::drive::Drive;
 use super::parameters::each_of;
 use super::servo::Servo;
 use crate::nominal::{MAX_BODY_SPEED_M_S, TIMEOUT_CYCLES};
-use crate::random::log_uniform;
+use crate::random::{log_uniform, normal};
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -329,8 +328,4 @@ impl Recorder {
             cam_n_m: self.cam_n_m,
         }
     }
-}
-
-pub(super) fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
-    StandardNormal.sample(rng)
 }

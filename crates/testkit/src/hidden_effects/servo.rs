@@ -4,7 +4,7 @@
 //! known of the kind: dry, viscous, in proportion to the load and by its square, with a ripple that returns with the angle. Friction falls
 //! while it warms up. What it reports is rounded as its registers round.
 
-use super::scene::normal;
+use crate::random::normal;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;

@@ -5,7 +5,7 @@ use crate::explain::search::discrepancy::Discrepancy;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::parameter::{Hypothesised, Onset};
-use crate::explain::search::plant::Plant;
+use crate::explain::search::plant::{Plant, Recorded};
 use crate::explain::search::problem::FitProblem;
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::predict::Scene;
@@ -144,7 +144,7 @@ pub(super) fn worm<'a>(
 
 /// Its problem with a discrepancy of 10 µm.
 pub(super) fn with_discrepancy<'p, 'a>(worm: &'p RecordedWorm<'a>) -> (WormProblem<'p, 'a>, Discrepancy) {
-    let discrepancy = Discrepancy::new(worm, 1e-5);
+    let discrepancy = Discrepancy::new(worm.discrepancy_columns(1e-5), 1e-5);
     let problem = FitProblem {
         discrepancy: Some(discrepancy.clone()),
         ..FitProblem::with_noise_alone(worm)

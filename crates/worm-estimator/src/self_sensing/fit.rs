@@ -189,7 +189,7 @@ impl Fit {
         }
         self.cycle_n_m[..torque_n_m.len()].copy_from_slice(torque_n_m);
         self.work = if self.cycles == 1.0 || (self.cycles - SEARCHED_ANEW).abs() < 0.5 {
-            self.search_everywhere()
+            Work::Search(self.search_everywhere())
         } else {
             Work::refine(self.at)
         };

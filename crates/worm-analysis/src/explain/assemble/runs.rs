@@ -7,7 +7,7 @@ use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::worm::energy::of_cycles;
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::recorded_worm::RecordedWorm;
-use crate::explain::worm::torque;
+use crate::explain::worm::torque_residual;
 
 /// What the recordings are, and how far the worm got in them.
 pub(super) fn runs(worm: &RecordedWorm<'_>, parts: &Parts, named: Option<&Candidate>) -> Vec<RunSummary> {
@@ -55,7 +55,7 @@ fn current(
     let by = |fit: Option<&Fit>| {
         let predicted = fit.and_then(|fit| worm.scene.predict(run, &fit.hypothesis, &fit.at));
         predicted.map_or([f64::NAN; 2], |predicted| {
-            let residual_n_m = torque::residual_n_m(observed, &worm.bins[run], &predicted);
+            let residual_n_m = torque_residual::residual_n_m(observed, &worm.bins[run], &predicted);
             [
                 worm.torque_noise[run].rms_of_mean_cycle(&worm.bins[run], &residual_n_m),
                 mean(of_cycles(observed, &predicted.work_j)),

@@ -17,24 +17,16 @@
 //! fit is added: of two hypotheses that predict the same, the one with less extreme values is more likely.
 
 use super::fit::{Fit, FitWithout};
+use super::folds::{Fold, Folds};
 use super::parameter::What;
-use super::plant::{Plant, Recorded};
+use super::plant::Plant;
 use super::problem::FitProblem;
 use crate::least_squares::{dot, prior_chi_squared, standard_errors, submatrix};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Blocks of neighbouring cycles.
-const BLOCKS: usize = 3;
 /// Standard errors from its neutral value at which a severity is determined.
 const DETERMINED: f64 = 2.0;
-
-/// What is left out at once.
-#[derive(Debug, Clone)]
-pub(in crate::explain) struct Fold {
-    /// For each run and whole cycle since its first sample, whether it is left out.
-    pub left_out: Vec<Vec<bool>>,
-}
 
 /// How a hypothesis does on data that it was not fitted to.
 #[derive(Debug, Clone)]
@@ -59,57 +51,16 @@ impl HeldOut {
     }
 }
 
-/// The parts of a campaign that are left out in turn. Each partition of the data is in it as a whole.
-#[derive(Debug, Clone)]
-pub(in crate::explain) struct Folds {
-    pub each: Vec<Fold>,
-    /// Number of partitions.
-    pub partitions: f64,
-}
-
-impl Folds {
-    /// First the runs, where there are several, then the blocks of cycles.
-    pub fn of_runs_and_cycles(plant: &impl Recorded) -> Self {
-        let runs = plant.runs();
-        let cycles = |run: usize| plant.bins(run).cycles;
-        let mut each = Vec::new();
-        if runs > 1 {
-            for run in 0..runs {
-                let left_out = (0..runs).map(|other| vec![other == run; cycles(other)]);
-                each.push(Fold {
-                    left_out: left_out.collect(),
-                });
-            }
-        }
-        for block in 0..BLOCKS {
-            let left_out = (0..runs).map(|run| {
-                let first = plant.bins(run).bins.first().map_or(0, |bin| bin.cycle);
-                let count = cycles(run);
-                (0..count)
-                    .map(|cycle| cycle >= first && (cycle - first) * BLOCKS / (count - first).max(1) == block)
-                    .collect()
-            });
-            each.push(Fold {
-                left_out: left_out.collect(),
-            });
-        }
-        let partitions = if runs > 1 { 2.0 } else { 1.0 };
-        Self { each, partitions }
-    }
-}
-
-impl Fold {
-    /// For each residual, whether it stays in.
-    fn stays<P: Plant>(&self, problem: &FitProblem<'_, P>) -> Vec<bool> {
-        let stays = |(run, bin): (usize, usize)| !self.left_out[run][problem.plant.bins(run).bins[bin].cycle];
-        problem.bin_of_rows().into_iter().map(stays).collect()
-    }
+/// For each residual, whether it stays in without a fold.
+fn stays_without<P: Plant>(problem: &FitProblem<'_, P>, fold: &Fold) -> Vec<bool> {
+    let stays = |(run, bin): (usize, usize)| !fold.left_out[run][problem.plant.bins(run).bins[bin].cycle];
+    problem.bin_of_rows().into_iter().map(stays).collect()
 }
 
 /// Scores a fitted hypothesis, which has its derivatives, on every fold.
 pub(in crate::explain) fn hold_out<P: Plant>(problem: &FitProblem<'_, P>, fit: &Fit, folds: &Folds) -> HeldOut {
     let refit = |fold: &Fold| {
-        let stays = fold.stays(problem);
+        let stays = stays_without(problem, fold);
         let mut without = fit.clone();
         for _ in 0..problem.plant.steps_without() {
             without = problem.step_without(without, &stays);

@@ -1,7 +1,7 @@
 //! The discrepancy: by how much the model is wrong everywhere, whatever is missing from it.
 //!
 //! No model is quite right, and what it lacks repeats with the phase as an effect does. So the residual holds, beside
-//! noise, a smooth unknown function, which a plant gives as columns ([`Recorded::discrepancy_columns`]). That of a machine that does the
+//! noise, a smooth unknown function, which a plant gives as columns. That of a machine that does the
 //! same in every cycle is (Kennedy and O'Hagan 2001, <https://doi.org/10.1111/1467-9868.00294>):
 //!
 //! ```text
@@ -18,7 +18,7 @@
 //! the residual has covariance 1 + κ² Q Λ Qᵀ at a = κ a₀. [`Discrepancy::whiten`] applies the inverse root for κ = 1, and every fit,
 //! score and held-out likelihood is taken of that. Other scales follow from the products with Q.
 
-use super::plant::Recorded;
+use super::bins::Bins;
 use crate::least_squares::cross;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -50,9 +50,8 @@ pub(in crate::explain) struct Discrepancy {
 }
 
 impl Discrepancy {
-    /// The discrepancy whose standard deviation a₀ is `scale_m`.
-    pub fn new(plant: &impl Recorded, scale_m: f64) -> Self {
-        let columns = plant.discrepancy_columns(scale_m);
+    /// The discrepancy whose standard deviation a₀ is `scale_m`, by its columns at that scale, whitened by the noise.
+    pub fn new(columns: DMatrix<f64>, scale_m: f64) -> Self {
         let gram = cross(&columns, &columns);
         let eigen = gram.symmetric_eigen();
         let kept: Vec<usize> = (0..eigen.eigenvalues.len())
@@ -147,10 +146,16 @@ enum Column {
     Ramp(usize),
 }
 
-/// Columns of a machine that does the same in every cycle, whitened by the noise.
-pub(in crate::explain) fn repeating_columns(plant: &impl Recorded, scale_m: f64) -> DMatrix<f64> {
-    let channels = plant.channels();
-    let over_conditions = over_conditions(plant);
+/// Columns of a machine that does the same in every cycle. `bins` and `conditions` are those of every run; `rows_of` makes rows of a run,
+/// whitened by the noise, of a pattern `[bin][channel]`, flat.
+pub(in crate::explain) fn repeating_columns(
+    channels: usize,
+    bins: &[&Bins],
+    conditions: &[f64],
+    scale_m: f64,
+    rows_of: impl Fn(usize, &[f64]) -> Vec<f64> + Sync,
+) -> DMatrix<f64> {
+    let over_conditions = over_conditions(conditions);
     let functions = over_conditions.first().map_or(0, Vec::len);
     let cosines = (OWN_COLUMNS / (channels * channels * functions.max(1))).clamp(1, COSINES);
     let weights = weights(cosines);
@@ -174,9 +179,8 @@ pub(in crate::explain) fn repeating_columns(plant: &impl Recorded, scale_m: f64)
     let rows: Vec<Vec<f64>> = kinds
         .par_iter()
         .map(|kind| {
-            let runs = 0..plant.runs();
-            runs.flat_map(|run| {
-                let bins = plant.bins(run);
+            let runs = bins.iter().enumerate();
+            runs.flat_map(|(run, bins)| {
                 let (first, last) = (
                     bins.bins.first().map_or(0.0, |bin| bin.phase),
                     bins.bins.last().map_or(1.0, |bin| bin.phase),
@@ -202,7 +206,7 @@ pub(in crate::explain) fn repeating_columns(plant: &impl Recorded, scale_m: f64)
                     }
                 }
                 pattern.iter_mut().for_each(|m| *m *= scale_m);
-                plant.rows_of(run, &pattern)
+                rows_of(run, &pattern)
             })
             .collect()
         })
@@ -220,13 +224,12 @@ pub(in crate::explain) fn weights(cosines: usize) -> Vec<f64> {
     (0..cosines).map(|m| weight(m) / variance.sqrt()).collect()
 }
 
-/// Values of the functions of the condition, for each run; a constant alone where all runs are alike.
-pub(in crate::explain) fn over_conditions(plant: &impl Recorded) -> Vec<Vec<f64>> {
-    let runs = plant.runs() as f64;
-    let values: Vec<f64> = (0..plant.runs()).map(|run| plant.condition(run)).collect();
+/// Values of the functions of the condition, for the condition of each run; a constant alone where all runs are alike.
+pub(in crate::explain) fn over_conditions(values: &[f64]) -> Vec<Vec<f64>> {
+    let runs = values.len() as f64;
     let mean = values.iter().sum::<f64>() / runs;
     let spread = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / runs).sqrt();
-    let of = |value: f64| {
+    let of = |&value: &f64| {
         if spread < 1e-3 {
             return vec![1.0];
         }
@@ -235,13 +238,14 @@ pub(in crate::explain) fn over_conditions(plant: &impl Recorded) -> Vec<Vec<f64>
             OVER_CONDITIONS[1].sqrt() * (value - mean) / spread,
         ]
     };
-    values.into_iter().map(of).collect()
+    values.iter().map(of).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::explain::fixture::{Campaign, hypothesis, record, worm};
+    use crate::explain::search::plant::Recorded;
     use crate::least_squares::dot;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -270,7 +274,7 @@ mod tests {
         };
         let recordings = record(&campaign, None, 1);
         let worm = worm(&recordings, &campaign, &hypothesis(None));
-        let discrepancy = Discrepancy::new(&worm, 1e-5);
+        let discrepancy = Discrepancy::new(worm.discrepancy_columns(1e-5), 1e-5);
         let rows = discrepancy.directions.nrows();
         assert!(
             discrepancy.strengths.iter().any(|strength| *strength > 10.0),

@@ -11,8 +11,7 @@
 //! - `score_test`: screens all effects, by their `directions`; `refit`: fits them to the end, `local_restart`: from one local minimum to
 //!   another; `onset`: effects that begin in mid-run.
 //! - `judge`: priors, evidence, chance and the verdict; `judgement`: weighs the candidates by them; `cross_validation`: held-out data,
-//!   which may veto; `squares`: what
-//!   fraction of a gap is closed there.
+//!   which may veto, by `folds`; `squares`: what fraction of a gap is closed there.
 //! - `law`: a law that nobody listed, where no effect of the library explains the data.
 
 pub(in crate::explain) mod bins;
@@ -21,6 +20,7 @@ pub(in crate::explain) mod directions;
 pub(in crate::explain) mod discrepancy;
 pub(in crate::explain) mod find;
 pub(in crate::explain) mod fit;
+pub(in crate::explain) mod folds;
 pub(in crate::explain) mod hypothesis;
 pub(in crate::explain) mod impact;
 pub(in crate::explain) mod judge;

@@ -4,9 +4,9 @@
 //! motion; it has nuisances, effects of the library that its recordings can show, and predictions of both.
 
 use super::bins::Bins;
-use super::cross_validation::Folds;
 use super::discrepancy;
 use super::fit::{Fit, FitWithout};
+use super::folds::Folds;
 use super::hypothesis::Hypothesis;
 use super::impact::Impact;
 use super::law::offer::Offer;
@@ -33,6 +33,16 @@ pub(in crate::explain) trait Recorded: Sync {
     /// What is left of rows of a run where they count in some bins alone.
     fn within(&self, run: usize, rows: &[f64], bins: Range<usize>) -> Vec<f64>;
 
+    /// The condition of every run.
+    fn conditions(&self) -> Vec<f64> {
+        (0..self.runs()).map(|run| self.condition(run)).collect()
+    }
+
+    /// The bins of every run.
+    fn all_bins(&self) -> Vec<&Bins> {
+        (0..self.runs()).map(|run| self.bins(run)).collect()
+    }
+
     /// Whether it does the same in every cycle, so that changes in mid-run and rhythms can be told from the rest.
     fn has_cycles(&self) -> bool {
         true
@@ -44,7 +54,8 @@ pub(in crate::explain) trait Recorded: Sync {
     where
         Self: Sized,
     {
-        discrepancy::repeating_columns(self, scale)
+        let rows_of = |run: usize, pattern: &[f64]| self.rows_of(run, pattern);
+        discrepancy::repeating_columns(self.channels(), &self.all_bins(), &self.conditions(), scale, rows_of)
     }
 
     /// The parts that are left out in turn to see how a hypothesis predicts what it was not fitted to.
@@ -52,7 +63,7 @@ pub(in crate::explain) trait Recorded: Sync {
     where
         Self: Sized,
     {
-        Folds::of_runs_and_cycles(self)
+        Folds::of_runs_and_cycles(&self.all_bins())
     }
 
     /// Steps of a refit without such a part.

@@ -36,7 +36,8 @@ pub(in crate::explain) fn recalibrate<'p, P: Plant>(
     from: Vec<f64>,
     fraction: f64,
 ) -> (FitProblem<'p, P>, Discrepancy, Fit) {
-    let discrepancy = Discrepancy::new(plant, fraction * plant.discrepancy_unit());
+    let scale = fraction * plant.discrepancy_unit();
+    let discrepancy = Discrepancy::new(plant.discrepancy_columns(scale), scale);
     let mut problem = FitProblem {
         discrepancy: Some(discrepancy.clone()),
         ..FitProblem::with_noise_alone(plant)

@@ -10,8 +10,7 @@
 //! a short correlation time: what a model lacks shows at every frequency at which the arm moves. What is faster counts as noise.
 //! What the runs of a trajectory have in common varies with the logarithm of the gain, as a worm's with its slope.
 
-use super::recorded_servo::RecordedServo;
-use crate::explain::search::plant::Recorded;
+use super::observed::Observed;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -26,16 +25,21 @@ const CORRELATED_S: f64 = 0.06;
 const COSINES_PER_S: f64 = 6.0;
 const MOST_COLUMNS: usize = 900;
 
-/// Columns of the discrepancy, whitened by the noise.
-pub(super) fn columns(servo: &RecordedServo<'_>, scale_rad: f64) -> DMatrix<f64> {
-    let runs = servo.observed.len();
-    let trajectories = servo.observed.iter().map(|one| one.trajectory + 1).max().unwrap_or(0);
-    let longest_s = servo
-        .observed
+/// Columns of the discrepancy of some runs. `conditions` are the logarithms of their gains; `rows_of` makes rows of a run, whitened by the
+/// noise, of a position in each bin, rad.
+pub(super) fn columns(
+    observed: &[Observed<'_>],
+    conditions: &[f64],
+    scale_rad: f64,
+    rows_of: impl Fn(usize, &[f64]) -> Vec<f64> + Sync,
+) -> DMatrix<f64> {
+    let runs = observed.len();
+    let trajectories = observed.iter().map(|one| one.trajectory + 1).max().unwrap_or(0);
+    let longest_s = observed
         .iter()
         .map(|one| one.recording.duration_s())
         .fold(0.0, f64::max);
-    let over_gains = over_gains(servo);
+    let over_gains = over_gains(conditions);
     let functions = over_gains.first().map_or(1, Vec::len);
     let most = MOST_COLUMNS / (runs + functions * trajectories).max(1);
     let cosines = ((COSINES_PER_S * longest_s) as usize).clamp(4, most.max(4));
@@ -47,24 +51,24 @@ pub(super) fn columns(servo: &RecordedServo<'_>, scale_rad: f64) -> DMatrix<f64>
     let all: Vec<Vec<f64>> = kinds
         .par_iter()
         .flat_map_iter(|&(of_trajectory, of_run)| {
-            let (weights, over_gains) = (&weights, &over_gains);
+            let (weights, over_gains, rows_of) = (&weights, &over_gains, &rows_of);
             (0..cosines).map(move |cosine| {
                 let of = |run: usize| {
                     let factor = match of_trajectory {
-                        Some((trajectory, function)) if servo.observed[run].trajectory == trajectory => {
+                        Some((trajectory, function)) if observed[run].trajectory == trajectory => {
                             SHARED.sqrt() * over_gains[run][function]
                         }
                         None if of_run == run => (1.0 - SHARED).sqrt(),
                         _ => 0.0,
                     };
-                    let bins = servo.observed[run].bins.bins.iter();
+                    let bins = observed[run].bins.bins.iter();
                     let pattern: Vec<f64> = bins
                         .map(|bin| {
                             let wave = (PI * cosine as f64 * bin.phase / longest_s).cos();
                             factor * scale_rad * weights[cosine] * wave
                         })
                         .collect();
-                    servo.rows_of(run, &pattern)
+                    rows_of(run, &pattern)
                 };
                 (0..runs).flat_map(of).collect()
             })
@@ -87,15 +91,14 @@ fn weights(cosines: usize, longest_s: f64) -> Vec<f64> {
     (0..cosines).map(|m| weight(m) / variance.sqrt()).collect()
 }
 
-/// Values of the functions of the gain, for each run; a constant alone where all runs are alike.
-fn over_gains(servo: &RecordedServo<'_>) -> Vec<Vec<f64>> {
-    let runs = servo.observed.len();
-    let values: Vec<f64> = (0..runs).map(|run| servo.condition(run)).collect();
+/// Values of the functions of the gain, for its logarithm in each run; a constant alone where all runs are alike.
+fn over_gains(values: &[f64]) -> Vec<Vec<f64>> {
+    let runs = values.len();
     let mean = values.iter().sum::<f64>() / runs as f64;
     let spread = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / runs as f64).sqrt();
-    let of = |value: f64| match spread < 1e-3 {
+    let of = |&value: &f64| match spread < 1e-3 {
         true => vec![1.0],
         false => vec![OVER_GAINS[0].sqrt(), OVER_GAINS[1].sqrt() * (value - mean) / spread],
     };
-    values.into_iter().map(of).collect()
+    values.iter().map(of).collect()
 }

@@ -4,8 +4,8 @@ use super::discrepancy;
 use super::observed::Observed;
 use super::supply::SupplyReading;
 use crate::explain::search::bins::Bins;
-use crate::explain::search::cross_validation::{Fold, Folds};
 use crate::explain::search::fit::Fit;
+use crate::explain::search::folds::{Fold, Folds};
 use crate::explain::search::plant::Recorded;
 use crate::explain::search::problem::FitProblem;
 use nalgebra::DMatrix;
@@ -113,7 +113,8 @@ impl Recorded for RecordedServo<'_> {
     }
 
     fn discrepancy_columns(&self, scale_rad: f64) -> DMatrix<f64> {
-        discrepancy::columns(self, scale_rad)
+        let rows_of = |run: usize, pattern_rad: &[f64]| self.rows_of(run, pattern_rad);
+        discrepancy::columns(&self.observed, &self.conditions(), scale_rad, rows_of)
     }
 
     /// Whole trajectories, then whole gains; where all runs have the same of both, the runs.
@@ -129,7 +130,7 @@ impl Recorded for RecordedServo<'_> {
             folds.leave_out(self, &(0..self.runs()).collect::<Vec<_>>());
         }
         if folds.each.is_empty() {
-            return Folds::of_runs_and_cycles(self);
+            return Folds::of_runs_and_cycles(&self.all_bins());
         }
         folds
     }

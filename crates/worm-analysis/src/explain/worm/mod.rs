@@ -6,8 +6,8 @@
 //! - `predict`: the positions that a hypothesis predicts, by a `walk` from `start` along a `track` at a `pace`, at samples by their `clock`;
 //!   `phase_correction`: for phases found from overlapping steps; `predicted`: the result.
 //! - `residual`: what a prediction leaves of the data; `noise`: how well the worm repeats itself.
-//! - `torque`: what the motor's current shows of the forces, where it counts as evidence; `torque_noise`: how well that repeats;
-//!   `torque_discrepancy`: what its model may be wrong by; `gears`: what is not known of the gears between motor and cam.
+//! - `torque`: what the motor's current shows of the forces, where it counts as evidence; `torque_residual`: what a prediction leaves of it;
+//!   `torque_noise`: how well that repeats; `torque_discrepancy`: what its model may be wrong by; `gears`: what is not known of the gears between motor and cam.
 //! - `gap`: how far a model is off, from the nominal one down to the noise floor.
 //! - `energy`: what cycles cost, over the `settled_cycles`; `matters`: whether an effect changes what anybody asks.
 //! - `period`: whether the residual repeats from cycle to cycle, `sway`: within the cycles, `wave`: how probable that is.
@@ -37,10 +37,11 @@ pub(in crate::explain) mod settled_cycles;
 pub(in crate::explain) mod speed_droop;
 pub(in crate::explain) mod start;
 pub(in crate::explain) mod sway;
-pub(in crate::explain) mod torque;
+mod torque;
 pub(in crate::explain) mod torque_cycle;
 mod torque_discrepancy;
 pub(in crate::explain) mod torque_noise;
+pub(in crate::explain) mod torque_residual;
 pub(in crate::explain) mod track;
 pub(in crate::explain) mod walk;
 pub(in crate::explain) mod wave;

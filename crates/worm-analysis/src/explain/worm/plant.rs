@@ -12,8 +12,8 @@ use super::prepare::judge_start;
 use super::recorded_worm::RecordedWorm;
 use super::residual::Residual;
 use super::sway;
-use super::torque;
 use super::torque_noise::TorqueNoise;
+use super::torque_residual;
 use super::whole_effects::with_whole_effects;
 use crate::explain::error::ExplainError;
 use crate::explain::search::fit::{Fit, FitWithout};
@@ -51,10 +51,10 @@ pub(in crate::explain) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<
 impl Plant for RecordedWorm<'_> {
     fn nuisances(&self) -> Vec<Free> {
         let (cells, runs, phase_recorded) = (self.channels(), self.runs(), self.phase_recorded());
-        match self.scene.observed.iter().find_map(|observed| observed.torque.as_ref()) {
-            Some(torque) => {
+        match self.gear() {
+            Some(gear) => {
                 let mut all = Nuisance::all_by_forces(cells, runs, phase_recorded);
-                all.extend(gears::nuisances(&torque.gear));
+                all.extend(gears::nuisances(gear));
                 all
             }
             None => Nuisance::all(cells, runs, phase_recorded),
@@ -91,7 +91,7 @@ impl Plant for RecordedWorm<'_> {
                 residuals: self.whitened(
                     run,
                     &Residual::binned(observed, &self.bins[run], &predicted),
-                    &torque::residual_n_m(observed, &self.bins[run], &predicted),
+                    &torque_residual::residual_n_m(observed, &self.bins[run], &predicted),
                 ),
                 outcome: predicted.advance_m(observed),
             },
@@ -145,7 +145,7 @@ impl Plant for RecordedWorm<'_> {
                 })?;
             let residual = Residual::binned(observed, &self.bins[run], &predicted);
             self.noise.push(RunNoise::measure(observed, &self.bins[run], &residual));
-            let torque_n_m = torque::residual_n_m(observed, &self.bins[run], &predicted);
+            let torque_n_m = torque_residual::residual_n_m(observed, &self.bins[run], &predicted);
             self.torque_noise
                 .push(TorqueNoise::measure(observed, &self.bins[run], &torque_n_m));
         }

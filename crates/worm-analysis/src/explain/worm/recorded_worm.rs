@@ -12,6 +12,7 @@ use crate::explain::search::plant::Recorded;
 use crate::explain::search::problem::FitProblem;
 use nalgebra::DMatrix;
 use std::ops::Range;
+use worm_estimator::self_sensing::GearModel;
 
 /// Part of the stroke that changes of a smaller advance are relative to: of a worm that hardly advances, no change is small.
 const OF_STROKE: f64 = 0.25;
@@ -51,7 +52,17 @@ impl<'a> RecordedWorm<'a> {
 
     /// The motor's current counts as evidence in some run.
     pub fn counts_current(&self) -> bool {
-        self.scene.observed.iter().any(|observed| observed.torque.is_some())
+        self.gear().is_some()
+    }
+
+    /// What was assumed of the gears, where the current counts.
+    pub fn gear(&self) -> Option<&GearModel> {
+        let mut torques = self
+            .scene
+            .observed
+            .iter()
+            .filter_map(|observed| observed.torque.as_ref());
+        torques.next().map(|torque| &torque.gear)
     }
 
     /// Number of rows of a run.
@@ -68,7 +79,7 @@ impl<'a> RecordedWorm<'a> {
     }
 
     /// The rows of a torque that the current shows in every bin of a run, N m, and no position.
-    pub fn rows_of_torque(&self, run: usize, torque_n_m: &[f64]) -> Vec<f64> {
+    fn rows_of_torque(&self, run: usize, torque_n_m: &[f64]) -> Vec<f64> {
         let mut rows = vec![0.0; self.rows(run) - self.torque_noise[run].rows()];
         self.torque_noise[run].whiten(torque_n_m, &mut rows);
         rows
@@ -102,10 +113,15 @@ impl Recorded for RecordedWorm<'_> {
 
     /// Those of the positions, and those of the torque where it counts.
     fn discrepancy_columns(&self, scale_m: f64) -> DMatrix<f64> {
-        let of_positions = repeating_columns(self, scale_m);
-        let Some(of_torque) = torque_discrepancy::columns(self) else {
+        let (cells, bins, conditions) = (self.channels(), self.all_bins(), self.conditions());
+        let rows_of = |run: usize, pattern_m: &[f64]| self.rows_of(run, pattern_m);
+        let of_positions = repeating_columns(cells, &bins, &conditions, scale_m, rows_of);
+        let Some(gear) = self.gear() else {
             return of_positions;
         };
+        let scale_n_m = torque_discrepancy::scale_n_m(&self.scene.nominal);
+        let rows_of = |run: usize, torque_n_m: &[f64]| self.rows_of_torque(run, torque_n_m);
+        let of_torque = torque_discrepancy::columns((scale_n_m, gear), cells, &bins, &conditions, rows_of);
         let count = of_positions.ncols();
         let mut all = of_positions.resize_horizontally(count + of_torque.ncols(), 0.0);
         all.columns_mut(count, of_torque.ncols()).copy_from(&of_torque);

@@ -1,7 +1,7 @@
 //! The mean cycle of the torque for the page: by the current, and as models have the current show it.
 
 use super::recorded_worm::RecordedWorm;
-use super::torque::in_bins;
+use super::torque_residual::in_bins;
 use crate::explain::answer::TorqueSeries;
 use crate::explain::search::bins::Bins;
 use crate::explain::search::fit::Fit;

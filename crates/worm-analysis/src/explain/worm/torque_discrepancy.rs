@@ -6,18 +6,18 @@
 //! it stands the ripple of the motor and its gears, which returns with the angle on every run: known waves of it as such, and others as
 //! whatever each place in the cycle has of its own.
 
-use super::recorded_worm::RecordedWorm;
+use crate::explain::search::bins::Bins;
 use crate::explain::search::discrepancy::{SHARED, SLOW, WAVES, over_conditions, weights};
-use crate::explain::search::plant::Recorded;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
+use worm_estimator::self_sensing::GearModel;
+use worm_physics::Physics;
 
 /// Its standard deviation over the torque with which a tip slides.
 const SHARE: f64 = 0.03;
 /// Cosines in a step.
 const COSINES: usize = 6;
-
 /// Standard deviation of that over what is known of each wave.
 const UNKNOWN_WAVES: f64 = 0.5;
 
@@ -35,38 +35,34 @@ enum Column {
     Ripple(f64, bool, f64),
 }
 
-/// Columns of the torque, whitened by the noise; none where no current counts.
-pub(super) fn columns(worm: &RecordedWorm<'_>) -> Option<DMatrix<f64>> {
-    let gear = worm
-        .scene
-        .observed
-        .iter()
-        .find_map(|observed| observed.torque.as_ref())?
-        .gear;
-    let scale_n_m = SHARE * sliding_n_m(worm);
-    let (over_conditions, weights) = (over_conditions(worm), weights(COSINES));
+/// Columns of the torque at a scale, N m. `bins` and `conditions` are those of every run; `rows_of` makes rows of a run, whitened by the
+/// noise, of the torque in each bin, N m.
+pub(super) fn columns(
+    (scale_n_m, gear): (f64, &GearModel),
+    cells: usize,
+    bins: &[&Bins],
+    conditions: &[f64],
+    rows_of: impl Fn(usize, &[f64]) -> Vec<f64> + Sync,
+) -> DMatrix<f64> {
+    let (over_conditions, weights) = (over_conditions(conditions), weights(COSINES));
     let mut kinds = Vec::new();
     for function in 0..over_conditions.first().map_or(0, Vec::len) {
         for cosine in 0..COSINES {
             kinds.push(Column::All(cosine, function));
-            kinds.extend((0..worm.channels()).map(|cell| Column::Own(cell, cosine, function)));
+            kinds.extend((0..cells).map(|cell| Column::Own(cell, cosine, function)));
             kinds.extend((0..WAVES.len()).map(|wave| Column::Slow(cosine, function, wave)));
         }
     }
     for ripple in gear.ripple.iter().filter(|ripple| ripple.waves != 0.0) {
         kinds.extend([true, false].map(|sine| Column::Ripple(ripple.waves, sine, gear.ripple_sigma_n_m)));
     }
-    let places = (0..worm.runs())
-        .map(|run| worm.bins(run).per_cycle())
-        .max()
-        .unwrap_or(0) as usize;
+    let places = bins.iter().map(|bins| bins.per_cycle()).max().unwrap_or(0) as usize;
     kinds.extend((0..places).map(|place| Column::Place(place, UNKNOWN_WAVES * gear.ripple_sigma_n_m)));
     let place_of = |phase: f64| (phase.rem_euclid(1.0) * places as f64) as usize;
     let columns: Vec<Vec<f64>> = kinds
         .par_iter()
         .map(|kind| {
-            let of_run = |run: usize| {
-                let bins = worm.bins(run);
+            let of_run = |(run, bins): (usize, &&Bins)| {
                 let first = bins.bins.first().map_or(0.0, |bin| bin.phase);
                 let last = bins.bins.last().map_or(1.0, |bin| bin.phase);
                 let of_bin = bins.bins.iter().map(|bin| {
@@ -88,23 +84,18 @@ pub(super) fn columns(worm: &RecordedWorm<'_>) -> Option<DMatrix<f64>> {
                         Column::Ripple(waves, false, amplitude) => amplitude * (TAU * waves * bin.phase).cos(),
                     }
                 });
-                worm.rows_of_torque(run, &of_bin.collect::<Vec<f64>>())
+                rows_of(run, &of_bin.collect::<Vec<f64>>())
             };
-            (0..worm.runs()).flat_map(of_run).collect()
+            bins.iter().enumerate().flat_map(of_run).collect()
         })
         .collect();
     let rows = columns.first().map_or(0, Vec::len);
-    Some(DMatrix::from_iterator(
-        rows,
-        columns.len(),
-        columns.into_iter().flatten(),
-    ))
+    DMatrix::from_iterator(rows, columns.len(), columns.into_iter().flatten())
 }
 
-/// Torque on the cam while a tip slides, N m: its friction over the stroke, which a step makes in its part of a turn.
-fn sliding_n_m(worm: &RecordedWorm<'_>) -> f64 {
-    let nominal = &worm.scene.nominal;
-    let of_worm = |physics: &worm_physics::Physics| {
+/// Its scale, N m, by the torque on the cam while a tip slides: its friction over the stroke, which a step makes in its part of a turn.
+pub(super) fn scale_n_m(nominal: &[Physics]) -> f64 {
+    let of_worm = |physics: &Physics| {
         let contacts = physics.worm.contacts();
         let friction_n: f64 = contacts
             .iter()
@@ -112,5 +103,5 @@ fn sliding_n_m(worm: &RecordedWorm<'_>) -> f64 {
             .sum();
         friction_n * physics.worm.stroke_m() / TAU // the mean over the cells times their number
     };
-    nominal.iter().map(of_worm).sum::<f64>() / nominal.len() as f64
+    SHARE * (nominal.iter().map(of_worm).sum::<f64>() / nominal.len() as f64)
 }

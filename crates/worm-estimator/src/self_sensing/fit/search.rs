@@ -6,7 +6,6 @@ use super::super::parameters::Parameters;
 use super::super::profile::BINS_PER_STEP;
 use super::Fit;
 use super::descent::Descent;
-use super::work::Work;
 
 /// Where the first search begins: pulls as shares of what all tips hold, and changes of every ln stiffness.
 const FIRST_PULLS: [f64; 12] = [0.0, 0.03, 0.07, 0.11, 0.16, 0.21, 0.27, 0.34, 0.42, 0.5, 0.6, -0.1];
@@ -113,16 +112,16 @@ impl Search {
 
 impl Fit {
     /// The first search: from several pulls.
-    pub(super) fn search_everywhere(&self) -> Work {
+    pub(super) fn search_everywhere(&self) -> Search {
         let start = self.by_swings();
-        Work::Search(Search {
+        Search {
             start,
             place: 0,
             best: [(f64::INFINITY, start); BEST],
             settling: None,
             least: f64::INFINITY,
             descent: Descent::new(self.at, ROUNDS[1]),
-        })
+        }
     }
 
     /// Takes the other answer where it has become the better one. Both at the end of their descents, with what is minimised.

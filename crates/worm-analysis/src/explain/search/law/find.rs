@@ -1,8 +1,9 @@
 //! The search for a law: over which quantity, of what form, and whether it predicts what it was not fitted to.
 
-use super::super::cross_validation::{Folds, HeldOut};
+use super::super::cross_validation::HeldOut;
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
+use super::super::folds::Folds;
 use super::super::judge::ln_sum::ln_mean;
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;

@@ -1,7 +1,8 @@
 //! A law fitted to the end, with what it does on data held out and its band.
 
-use super::super::cross_validation::{Folds, HeldOut};
+use super::super::cross_validation::HeldOut;
 use super::super::fit::Fit;
+use super::super::folds::Folds;
 use super::super::judgement::held_out;
 use super::super::parameter::What;
 use super::super::plant::Plant;

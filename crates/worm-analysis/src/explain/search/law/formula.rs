@@ -3,8 +3,9 @@
 //! Terms are added one after the other as long as the evidence grows, each with a prior as wide as that of the law. The formula stands where
 //! it predicts data held out as well as the law does.
 
-use super::super::cross_validation::{Folds, HeldOut};
+use super::super::cross_validation::HeldOut;
 use super::super::fit::Fit;
+use super::super::folds::Folds;
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;
 use super::evidence::Scores;
