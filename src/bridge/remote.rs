@@ -3,7 +3,8 @@
 use super::backlog::Backlog;
 use super::network::Party;
 use super::wire::{Beat, Echo, RemoteRequest, RemoteWatcher, Up};
-use crate::relay::client::{Connection, Received, RelayLink};
+use crate::relay::client::{Received, RelayLink};
+use crate::relay::connection::Connection;
 use crate::relay::wire::{Answer, Line, Request, VERSION as RELAY_VERSION};
 use crate::topics::Instance;
 use crate::trip::wire::Ask;

@@ -7,7 +7,7 @@
 use super::caller::Caller;
 use crate::attendance::{Request as StopRequest, ask};
 use crate::failure::Failure;
-use crate::relay::client::Connection;
+use crate::relay::connection::Connection;
 use crate::relay::message_json::Json;
 use crate::relay::wire::{Ages, Answer, Frame, Line, Network, Request, VERSION};
 use crate::supervisor::controller;

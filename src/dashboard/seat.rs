@@ -1,6 +1,6 @@
 //! The connection of a page that drives: a watcher of its own, which is heard when the page is.
 
-use crate::relay::client::Connection;
+use crate::relay::connection::Connection;
 use crate::relay::wire::{Answer, Line, Request, VERSION};
 use crate::topics::Instance;
 use std::collections::BTreeMap;

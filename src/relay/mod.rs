@@ -14,10 +14,11 @@
 //! - [`outbox`]: what waits for one watcher; [`watcher`]: its connection.
 //! - [`server`]: the process.
 //! - [`socket`]: where it listens, and who may connect.
-//! - [`client`]: the other end: connects, and starts a relay where there is none.
+//! - [`client`]: the other end: connects by a [`connection`], and starts a relay where there is none.
 
 pub(crate) mod client;
 mod commander;
+pub(crate) mod connection;
 mod drive;
 mod event_log;
 mod history;

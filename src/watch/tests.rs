@@ -1,6 +1,6 @@
 use super::app::{App, Seat};
 use super::*;
-use crate::relay::client::read_line;
+use crate::relay::connection::read_line;
 use crate::relay::source::{Seen, Worm as RelayedWorm};
 use crate::relay::wire::{Answer, Driver, Line, Request, Subject, to_bytes};
 use ratatui::Terminal;

@@ -15,6 +15,7 @@ use super::truth::{CampaignKind, TrueEffect, Truth};
 use super::variety;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use worm_analysis::experiment::RecordedRun;
 use worm_analysis::recording::Recording;
 use worm_estimator::config::Config;
 
@@ -39,6 +40,20 @@ pub struct HiddenCampaign {
     pub worm: Worm,
     /// How each run was made.
     pub scenes: Vec<Scene>,
+}
+
+impl HiddenCampaign {
+    /// Its runs, as stated, with what was recorded on them: `recordings` has its own, as they are or repaired.
+    pub fn runs<'r>(&self, recordings: &'r [Recording]) -> Vec<RecordedRun<'r>> {
+        let runs = recordings.iter().zip(&self.slopes_deg);
+        runs.map(|(recording, &slope_deg)| RecordedRun {
+            recording,
+            slope_deg,
+            payload_kg: 0.0,
+            cycle_s: Some(self.cycle_s),
+        })
+        .collect()
+    }
 }
 
 /// A campaign with something hidden in it; the same for the same seed.

@@ -28,21 +28,14 @@ fn search(campaign: &HiddenCampaign, extra: &[ExtraRun]) -> Result<explain::Answ
         .map(|recording| recording.checked(&OpenOptions::default()))
         .collect::<Result<_, _>>()
         .map_err(|problem| problem.to_string())?;
-    let own = checked.iter().zip(&campaign.slopes_deg);
-    let own = own.map(|(recording, &slope_deg)| RecordedRun {
-        recording,
-        slope_deg,
-        payload_kg: 0.0,
-        cycle_s: Some(campaign.cycle_s),
-    });
-    let proposed = extra.iter().map(|extra| RecordedRun {
+    let mut runs = campaign.runs(&checked);
+    runs.extend(extra.iter().map(|extra| RecordedRun {
         recording: &extra.recording,
         slope_deg: extra.condition.slope_deg,
         payload_kg: extra.condition.payload_kg,
         // The time that the motor takes for a turn, rests left out.
         cycle_s: Some(extra.condition.cycle_s),
-    });
-    let runs: Vec<RecordedRun> = own.chain(proposed).collect();
+    }));
     let options = explain::Options::default();
     let answer = || explain::explain(&runs, &campaign.config, &options, &mut |_| ());
     panic::catch_unwind(AssertUnwindSafe(answer))

@@ -4,7 +4,6 @@ use testkit::hidden_effects::campaign::{HiddenCampaign, draw_with_phase_sized};
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::hidden::{Hidden, Twin};
 use testkit::hidden_effects::setting::CampaignSize;
-use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain::{Answer, ExplainError, Options, Verdict, explain};
 
 /// In no range of the splits.
@@ -22,15 +21,7 @@ fn asked(campaign: &HiddenCampaign, with_current: bool) -> Result<Answer, Explai
         with_current,
         ..Options::default()
     };
-    let runs = campaign.recordings.iter().zip(&campaign.slopes_deg);
-    let runs: Vec<RecordedRun<'_>> = runs
-        .map(|(recording, &slope_deg)| RecordedRun {
-            recording,
-            slope_deg,
-            payload_kg: 0.0,
-            cycle_s: Some(campaign.cycle_s),
-        })
-        .collect();
+    let runs = campaign.runs(&campaign.recordings);
     let answer = explain(&runs, &campaign.config, &options, &mut |_| ());
     if let Ok(answer) = &answer {
         println!("{}: {}", campaign.truth.case, answer.sentence);

@@ -4,7 +4,6 @@ use testkit::hidden_effects::campaign::{HiddenCampaign, draw, draw_sized};
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::hidden::Hidden;
 use testkit::hidden_effects::setting::CampaignSize;
-use worm_analysis::experiment::RecordedRun;
 use worm_analysis::explain::{Answer, Options, Verdict, explain, model_update};
 use worm_estimator::config::Config;
 use worm_physics::effect::LIBRARY;
@@ -22,15 +21,7 @@ fn answer(campaign: &HiddenCampaign, without: &[&'static str]) -> Answer {
         without: without.to_vec(),
         ..Options::default()
     };
-    let runs = campaign.recordings.iter().zip(&campaign.slopes_deg);
-    let runs: Vec<RecordedRun<'_>> = runs
-        .map(|(recording, &slope_deg)| RecordedRun {
-            recording,
-            slope_deg,
-            payload_kg: 0.0,
-            cycle_s: Some(campaign.cycle_s),
-        })
-        .collect();
+    let runs = campaign.runs(&campaign.recordings);
     let answer = explain(&runs, &campaign.config, &options, &mut |_| ()).expect("an answer");
     println!("{}: {}", campaign.truth.case, answer.sentence);
     println!("{:?}", answer.law.as_ref().map(|law| &law.sentence));
