@@ -47,6 +47,7 @@ pub(super) const ASSETS: &[Asset] = assets! {
     "store.js": JS,
     "drive.js": JS,
     "worm.js": JS,
+    "inferred.js": JS,
     "panels.js": JS,
     "charts.js": JS,
     "reports.js": JS,

@@ -7,7 +7,6 @@ use crate::topics::{Controller, Instance, Relay, RoleLock};
 use crossbeam::channel::{Receiver, bounded};
 use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader};
-use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -152,7 +151,7 @@ impl RelayLink {
 
     /// The connection's socket, which can be read when there is something to poll for.
     #[cfg(any(feature = "bridge", feature = "dashboard"))]
-    pub(crate) fn stream(&self) -> Option<&UnixStream> {
+    pub(crate) fn stream(&self) -> Option<&std::os::unix::net::UnixStream> {
         self.connection.as_ref().map(Connection::stream)
     }
 

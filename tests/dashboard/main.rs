@@ -3,6 +3,7 @@
 mod boxes;
 mod fleet;
 mod http;
+mod without_tracker;
 #[path = "../processes/worm.rs"]
 #[allow(
     dead_code,

@@ -1,6 +1,6 @@
 // The history of a cell: position, deformation and motor current over the last minutes, by uPlot.
 
-import { byId, fillChoice } from "./dom.js";
+import { byId, fillChoice, show } from "./dom.js";
 
 const SPANS = [
   { value: 60, label: "1 min" },
@@ -34,7 +34,11 @@ export class Charts {
     this.#drawnNs = newestNs;
     if (this.#plots.length === 0) this.#rebuild();
     const data = this.#data();
-    this.#plots.forEach((plot, index) => plot.setData([data.seconds, data.series[index]]));
+    this.#plots.forEach((plot, index) => {
+      // Of a worm that nobody sees there are no positions.
+      show(plot.root, data.series[index].some((value) => value !== null));
+      plot.setData([data.seconds, data.series[index]]);
+    });
   }
 
   #choose(change) {

@@ -1,10 +1,11 @@
 // The panels with texts and tables. Each is a function of what the page knows, and changes only what has changed.
 
 import { byId, duration, fillRows, fillValues, make, number, scaled, setText, show } from "./dom.js";
+import { positionM } from "./inferred.js";
 import { STALE_MS } from "./stream.js";
 import { tipState } from "./worm.js";
 
-const TIP_TEXT = { stick: "sticks", forward: "slides forward", backward: "slides backward" };
+const TIP_TEXT = { stick: "sticks", forward: "slides forward", backward: "slides backward", unknown: "–" };
 const PARTS = ["copper", "gears", "sliding", "weight"];
 const SHOWN_CYCLES = 12;
 const SHOWN_EVENTS = 40;
@@ -236,22 +237,20 @@ export function drawTrip({ frame }, driver) {
 
 /** What the motor's current alone says, each with its standard error. */
 export function drawInferred({ frame }) {
-  const { inferred, state } = frame;
+  const { inferred } = frame;
   if (!inferred || inferred.advance_m === null) {
     fillValues(byId("inferred"), [["state", inferred ? "warming up: after two gait cycles" : "self-sensing is off"]]);
     return;
   }
   const degrees = (...angles_rad) => `${angles_rad.map((angle_rad) => number((angle_rad * 180) / Math.PI, 1)).join(" ± ")}°`;
   const known = (value, sigma, digits, unit) => `~${number(value, digits)} ± ${number(sigma, digits)} ${unit}`;
-  const phase = state?.phase ?? inferred.phase;
-  const position_m = inferred.position_m + (phase - inferred.phase) * inferred.advance_m;
   fillValues(byId("inferred"), [
     ["state", inferred.standing],
     ["advance", known(inferred.advance_m * 1e3, inferred.advance_sigma_m * 1e3, 2, "mm a cycle")],
     ["losses", known(inferred.energy_loss_j * 1e3, inferred.energy_loss_sigma_j * 1e3, 1, "mJ a cycle")],
     ["pull", known(inferred.pull_n, inferred.pull_sigma_n, 2, "N")],
     ...(inferred.slope_is_measured ? [["slope, measured", degrees(inferred.slope_rad, inferred.slope_sigma_rad)]] : []),
-    ["position", known(position_m * 1e3, inferred.position_sigma_m * 1e3, inferred.position_sigma_m < 1e-3 ? 1 : 0, "mm")],
+    ["position", known(scaled(positionM(frame), 1e3), inferred.position_sigma_m * 1e3, inferred.position_sigma_m < 1e-3 ? 1 : 0, "mm")],
     ...inferred.friction_n.map((friction, cell) => [
       `friction ${cell + 1}`,
       known(friction, inferred.friction_sigma_n[cell], 2, "N"),

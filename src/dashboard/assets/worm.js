@@ -1,7 +1,9 @@
 // The worm in its canal, to scale along the canal and at the canal's slope: each cell, where its tip touches, a ruler in millimetres. How far
-// a tip is deformed is too little to be seen at that scale, so below each cell a gauge shows it against the largest deformation.
+// a tip is deformed is too little to be seen at that scale, so below each cell a gauge shows it against the largest deformation. A worm that
+// nobody sees is dashed, and is where the motor's current has it.
 
 import { byId, setText } from "./dom.js";
+import { cellPositionsM } from "./inferred.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 /** What is shown of the canal before and behind the worm, m. */
@@ -37,9 +39,16 @@ export class WormPicture {
   }
 
   draw(worm, frame) {
-    const positions = (frame.estimate?.position_m ?? frame.state?.position_m ?? []).slice(0, worm.cells);
-    const known = positions.filter((x) => typeof x === "number" && Math.abs(x) < MAX_POSITION_M);
-    if (known.length === 0) return;
+    const isKnown = (x) => typeof x === "number" && Math.abs(x) < MAX_POSITION_M;
+    const measured = (frame.estimate?.position_m ?? frame.state?.position_m ?? []).slice(0, worm.cells);
+    const inferred = measured.some(isKnown) ? null : cellPositionsM(worm, frame);
+    const positions = inferred ?? measured;
+    const known = positions.filter(isKnown);
+    this.#canal.toggleAttribute("hidden", known.length === 0);
+    if (known.length === 0) {
+      setText(byId("canal-text"), "no positions: they are inferred from the motor's current after some gait cycles");
+      return;
+    }
     const [rear, front] = [Math.min(...known), Math.max(...known)];
     const { lengthPx } = this.#place(worm.slope_deg);
     this.#scale(front - rear);
@@ -54,11 +63,12 @@ export class WormPicture {
     this.#drawRuler(startM, stepM, labelMm, lengthPx, at);
     const gapM = known.length > 1 ? (front - rear) / (known.length - 1) : 0.03;
     const sizes = { width: Math.min(46, Math.max(14, (gapM / this.#widthM) * lengthPx * 0.55)), fullM: worm.full_scale_m };
-    positions.forEach((x, cell) => this.#drawCell(cell, x, frame.estimate, at, sizes));
+    positions.forEach((x, cell) => this.#drawCell(cell, x, frame.estimate, at, sizes, inferred !== null));
     const text = positions.map((x, cell) => `cell ${cell + 1} at ${typeof x === "number" ? (x * 1e3).toFixed(0) : "unknown"} mm`);
-    this.#svg.setAttribute("aria-label", `The worm in its canal: ${text.join(", ")}`);
+    const how = inferred ? `inferred from the motor's current, ± ${(frame.inferred.position_sigma_m * 1e3).toFixed(0)} mm; ` : "";
+    this.#svg.setAttribute("aria-label", `The worm in its canal: ${how}${text.join(", ")}`);
     const direction = worm.backward ? "left" : "right";
-    setText(byId("canal-text"), `canal ${worm.slope_deg}°, it crawls to the ${direction}; ruler in mm`);
+    setText(byId("canal-text"), `${how}canal ${worm.slope_deg}°, it crawls to the ${direction}; ruler in mm`);
   }
 
   /** Turns the canal to its slope, as long as there is room. */
@@ -100,7 +110,7 @@ export class WormPicture {
     }
   }
 
-  #drawCell(cell, x, estimate, at, { width, fullM }) {
+  #drawCell(cell, x, estimate, at, { width, fullM }, isInferred) {
     const parts = (this.#cells[cell] ??= this.#makeCell(cell));
     const isKnown = typeof x === "number";
     parts.group.classList.toggle("unseen", !isKnown);
@@ -109,7 +119,7 @@ export class WormPicture {
     const contact = estimate?.contact_m[cell];
     const deformation = estimate?.deformation_m[cell] ?? 0;
     parts.group.dataset.positionMm = (x * 1e3).toFixed(3);
-    parts.group.setAttribute("class", `cell ${tipState(estimate, cell)}`);
+    parts.group.setAttribute("class", `cell ${isInferred ? "inferred" : tipState(estimate, cell)}`);
     set(parts.box, { x: centre - width / 2, width });
     set(parts.label, { x: centre });
     set(parts.foot, { x1: centre, x2: typeof contact === "number" ? at(contact) : centre });
@@ -133,9 +143,9 @@ export class WormPicture {
   }
 }
 
-/** What a tip does: stick, forward, backward. */
+/** What a tip does: stick, forward, backward; unknown where nothing says how it is deformed. */
 export function tipState(estimate, cell) {
-  if (!estimate) return "stick";
+  if (typeof estimate?.deformation_m[cell] !== "number") return "unknown";
   const slides = Math.floor(estimate.sliding_mask / 2 ** cell) % 2 === 1;
   if (!slides) return "stick";
   return estimate.deformation_m[cell] > 0 ? "forward" : "backward";
