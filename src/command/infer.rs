@@ -107,24 +107,12 @@ struct InferredWorm {
     residual_n_m: f64,
 }
 
-/// One gait cycle.
+/// One gait cycle, by the message at its end.
 #[derive(Debug, Serialize)]
 struct InferredCycle {
     phase: f64,
-    standing: &'static str,
-    advance_m: f64,
-    advance_sigma_m: f64,
-    energy_loss_j: f64,
-    energy_loss_sigma_j: f64,
-    energy_actuator_net_j: f64,
-    energy_actuator_net_sigma_j: f64,
-    energy_electrical_j: f64,
-    energy_electrical_sigma_j: f64,
-    position_m: f64,
-    position_sigma_m: f64,
-    friction_lost: Vec<usize>,
-    jammed: Vec<usize>,
-    more_load: bool,
+    #[serde(flatten)]
+    inferred: InferredSummary,
     measured: Option<MeasuredCycle>,
 }
 
@@ -178,23 +166,9 @@ impl InferredWorm {
 
 impl InferredCycle {
     fn new(inferred: &Inferred, measured: Option<&Cycle>) -> Self {
-        let it = InferredSummary::of(inferred, inferred.end_phase);
         Self {
             phase: inferred.end_phase,
-            standing: it.standing,
-            advance_m: it.advance_m,
-            advance_sigma_m: it.advance_sigma_m,
-            energy_loss_j: it.energy_loss_j,
-            energy_loss_sigma_j: it.energy_loss_sigma_j,
-            energy_actuator_net_j: it.energy_actuator_net_j,
-            energy_actuator_net_sigma_j: it.energy_actuator_net_sigma_j,
-            energy_electrical_j: it.energy_electrical_j,
-            energy_electrical_sigma_j: it.energy_electrical_sigma_j,
-            position_m: it.position_m,
-            position_sigma_m: it.position_sigma_m,
-            friction_lost: it.friction_lost,
-            jammed: it.jammed,
-            more_load: it.more_load,
+            inferred: InferredSummary::of(inferred, inferred.end_phase),
             measured: measured.map(|cycle| MeasuredCycle {
                 advance_m: cycle.advance_m,
                 energy_loss_j: cycle.energy_loss_j,
@@ -248,19 +222,20 @@ fn in_words(inferred: &Answer) -> String {
         "cycle   advance mm          losses mJ           electrical mJ    position mm      measured: advance, losses, electrical",
     );
     for cycle in &inferred.cycles {
+        let it = &cycle.inferred;
         // Writing to a string cannot fail.
         let _ = write!(
             text,
             "\n{:5}  {:6.2} ± {:<6.2}  {:8.1} ± {:<6.1}  {:8.0} ± {:<5.0}  {:7.1} ± {:<5.1}",
             cycle.phase,
-            1e3 * cycle.advance_m,
-            1e3 * cycle.advance_sigma_m,
-            1e3 * cycle.energy_loss_j,
-            1e3 * cycle.energy_loss_sigma_j,
-            1e3 * cycle.energy_electrical_j,
-            1e3 * cycle.energy_electrical_sigma_j,
-            1e3 * cycle.position_m,
-            1e3 * cycle.position_sigma_m,
+            1e3 * it.advance_m,
+            1e3 * it.advance_sigma_m,
+            1e3 * it.energy_loss_j,
+            1e3 * it.energy_loss_sigma_j,
+            1e3 * it.energy_electrical_j,
+            1e3 * it.energy_electrical_sigma_j,
+            1e3 * it.position_m,
+            1e3 * it.position_sigma_m,
         );
         if let Some(measured) = &cycle.measured {
             let _ = write!(
@@ -271,12 +246,12 @@ fn in_words(inferred: &Answer) -> String {
                 1e3 * measured.energy_electrical_j,
             );
         }
-        for (name, cells) in [("friction lost", &cycle.friction_lost), ("jammed", &cycle.jammed)] {
+        for (name, cells) in [("friction lost", &it.friction_lost), ("jammed", &it.jammed)] {
             if !cells.is_empty() {
                 let _ = write!(text, "  {name}: {cells:?}");
             }
         }
-        text += if cycle.more_load { "  more load" } else { "" };
+        text += if it.more_load { "  more load" } else { "" };
     }
     let worm = &inferred.worm;
     for cell in 0..inferred.cells {

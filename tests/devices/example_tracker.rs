@@ -65,9 +65,15 @@ struct Process(Child);
 
 impl Process {
     fn spawn(tracker_id: u8, cells: usize, input: Stdio, output: Stdio) -> Self {
+        Self::spawn_with(tracker_id, cells, None, input, output)
+    }
+
+    /// The same with an inertial sensor: a file with its pitch.
+    fn spawn_with(tracker_id: u8, cells: usize, pitch: Option<&Path>, input: Stdio, output: Stdio) -> Self {
         let child = Command::new(example())
             .env("TRACKER_ID", tracker_id.to_string())
             .env("TRACKER_CELLS", cells.to_string())
+            .envs(pitch.map(|pitch| ("TRACKER_PITCH", pitch)))
             .stdin(input)
             .stdout(output)
             .spawn()
@@ -167,6 +173,28 @@ fn example_tracker_alone_on_a_pseudo_terminal_is_identified_and_read() {
 
     drop(bus);
     assert!(process.ends_well(), "the line is closed");
+}
+
+#[test]
+fn example_tracker_reports_the_pitch_of_its_sensor_and_none_without_one() {
+    let file = tempfile::NamedTempFile::new().expect("a file");
+    std::fs::write(file.path(), "-12.34\n").expect("is written");
+    for (sensor, expected_deg) in [(Some(file.path()), Some(-12.34)), (None, None)] {
+        let PseudoTerminal { far, near, path } = PseudoTerminal::open();
+        let output = far.try_clone().expect("a second descriptor");
+        let _process = Process::spawn_with(100, 0, sensor, far.into(), output.into());
+        let mut bus = WormBus::new(Tty::open(&path, BAUD).expect("the port").0);
+        drop(near);
+        (0..40).find_map(|_| bus.ping(id(100), soon()).ok()).expect("an answer");
+        let counts = bus
+            .read_register(id(100), tracker::register::PITCH, soon())
+            .expect("it is there");
+        let pitch_deg = tracker::pitch_rad(counts as u16 as i16).map(f64::to_degrees);
+        match (pitch_deg, expected_deg) {
+            (Some(found_deg), Some(expected_deg)) => assert!((found_deg - expected_deg).abs() < 1e-9, "{found_deg}"),
+            (found, expected) => assert_eq!(found, expected),
+        }
+    }
 }
 
 /// A line with three ends: the controller's pseudo-terminal, the virtual worm's servo, and the example. What one sends the

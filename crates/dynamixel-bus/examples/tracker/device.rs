@@ -8,6 +8,7 @@
 //! | 6 | 1 | read | firmware version |
 //! | 7 | 1 | read, write | ID, 0 to 252 |
 //! | 68 | 1 | read, write | status return level: 0 answers pings, 1 pings and reads, 2 everything |
+//! | 125 | 2 | read | pitch of the body in 0.01°, signed, growing up the canal; −32768 without an inertial sensor |
 //! | 127 | 1 | read | switches: bit 0 is set while the emergency stop is pressed |
 //! | 128 | 4 | read | sample counter, one more with each capture |
 //! | 132 | 4 | read | time of the capture in µs, wraps |
@@ -34,6 +35,9 @@ pub const MODEL: u16 = 0x574D;
 /// Version of this firmware.
 pub const FIRMWARE: u8 = 1;
 
+/// Pitch of a device that does not know it.
+pub const NO_PITCH: i16 = i16::MIN;
+
 /// A packet whose end does not come within this time is given up, µs.
 const IDLE_US: u64 = 5_000;
 /// Time slot of each ID after a broadcast ping, µs. The maker's SDK allows 3 ms.
@@ -49,6 +53,7 @@ const MODEL_NUMBER: Register = Register::new(0, 2, "model number");
 const FIRMWARE_VERSION: Register = Register::new(6, 1, "firmware version");
 const ID: Register = Register::new(7, 1, "ID");
 const STATUS_RETURN_LEVEL: Register = Register::new(68, 1, "status return level");
+const PITCH: Register = Register::new(125, 2, "pitch");
 const SWITCHES: Register = Register::new(127, 1, "switches");
 const SAMPLE: Register = Register::new(128, 4, "sample counter");
 const CAPTURE_TIME: Register = Register::new(132, 4, "capture time");
@@ -76,6 +81,7 @@ impl Tracker {
                 cells: cells.min(MAX_CELLS),
                 status_return_level: 2,
                 emergency_stop: false,
+                pitch: NO_PITCH,
                 turn: Turn::None,
             },
         }
@@ -85,6 +91,11 @@ impl Tracker {
     /// was true a while ago.
     pub fn set_emergency_stop(&mut self, pressed: bool) {
         self.device.emergency_stop = pressed;
+    }
+
+    /// Notes the pitch that an inertial sensor measures, in 0.01°: the mean over some hundredths of a second. [`NO_PITCH`] while it does not.
+    pub fn set_pitch(&mut self, counts: i16) {
+        self.device.pitch = counts;
     }
 
     /// Takes a byte from the line. `send` gets what is to be sent at once, if anything.
@@ -215,6 +226,7 @@ struct Device {
     cells: usize,            // in 0..=MAX_CELLS
     status_return_level: u8, // in 0..=2
     emergency_stop: bool,
+    pitch: i16, // 0.01°
     turn: Turn,
 }
 
@@ -458,6 +470,7 @@ impl Device {
         put(FIRMWARE_VERSION, &[FIRMWARE]);
         put(ID, &[self.id.get()]);
         put(STATUS_RETURN_LEVEL, &[self.status_return_level]);
+        put(PITCH, &self.pitch.to_le_bytes());
         put(SWITCHES, &[u8::from(self.emergency_stop)]);
         put(SAMPLE, &capture.sample.to_le_bytes());
         put(CAPTURE_TIME, &capture.time_us.to_le_bytes());

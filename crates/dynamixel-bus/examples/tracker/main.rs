@@ -9,12 +9,13 @@
 //! ```
 //!
 //! It has ID 100 and tracks 5 cells, unless `TRACKER_ID` and `TRACKER_CELLS` say otherwise. Its emergency stop is a file, for want of
-//! a switch: it is pressed while the file that `TRACKER_EMERGENCY_STOP` names exists.
+//! a switch: it is pressed while the file that `TRACKER_EMERGENCY_STOP` names exists. Its inertial sensor is a file, too: `TRACKER_PITCH` names
+//! one that says the pitch in degrees.
 
 mod capture;
 mod device;
 
-use device::Tracker;
+use device::{NO_PITCH, Tracker};
 use dynamixel_bus::packet::DeviceId;
 use dynamixel_bus::{Port, PortError, Tty};
 use std::error::Error;
@@ -31,12 +32,16 @@ const SEND_TIME: Duration = Duration::from_millis(100);
 fn main() -> Result<(), Box<dyn Error>> {
     let id = DeviceId::new(number("TRACKER_ID", 100)?).ok_or("TRACKER_ID: an ID is 0 to 252")?;
     let tracker = Tracker::new(id, usize::from(number("TRACKER_CELLS", 5)?));
-    let switch = std::env::var_os("TRACKER_EMERGENCY_STOP").map(PathBuf::from);
+    let file = |variable: &str| std::env::var_os(variable).map(PathBuf::from);
+    let sensors = Sensors {
+        emergency_stop: file("TRACKER_EMERGENCY_STOP"),
+        pitch: file("TRACKER_PITCH"),
+    };
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let ended = match arguments.as_slice() {
-        [] => run(tracker, switch.as_deref(), StandardIo::new()),
-        [path] => run(tracker, switch.as_deref(), Tty::open(Path::new(path), 1_000_000)?.0),
-        [path, baud] => run(tracker, switch.as_deref(), Tty::open(Path::new(path), baud.parse()?)?.0),
+        [] => run(tracker, &sensors, StandardIo::new()),
+        [path] => run(tracker, &sensors, Tty::open(Path::new(path), 1_000_000)?.0),
+        [path, baud] => run(tracker, &sensors, Tty::open(Path::new(path), baud.parse()?)?.0),
         _ => return Err("usage: tracker [PORT [BAUD]]".into()),
     };
     match ended {
@@ -52,8 +57,31 @@ fn number(variable: &str, default: u8) -> Result<u8, Box<dyn Error>> {
     }
 }
 
+/// Files that stand for switch and sensor.
+struct Sensors {
+    emergency_stop: Option<PathBuf>,
+    pitch: Option<PathBuf>,
+}
+
+impl Sensors {
+    fn is_pressed(&self) -> bool {
+        self.emergency_stop.as_deref().is_some_and(Path::exists)
+    }
+
+    /// In 0.01°.
+    fn pitch(&self) -> i16 {
+        let text = self
+            .pitch
+            .as_deref()
+            .and_then(|file| std::fs::read_to_string(file).ok());
+        let degrees = text.and_then(|text| text.trim().parse::<f64>().ok());
+        let counts = degrees.map(|degrees| (100.0 * degrees).round() as i16);
+        counts.unwrap_or(NO_PITCH)
+    }
+}
+
 /// Runs the device until the port fails.
-fn run(mut tracker: Tracker, switch: Option<&Path>, mut port: impl Port) -> PortError {
+fn run(mut tracker: Tracker, sensors: &Sensors, mut port: impl Port) -> PortError {
     let started = Instant::now();
     let mut bytes = [0; 256];
     loop {
@@ -62,7 +90,8 @@ fn run(mut tracker: Tracker, switch: Option<&Path>, mut port: impl Port) -> Port
             Err(error) => return error,
         };
         let now_us = started.elapsed().as_micros() as u64;
-        tracker.set_emergency_stop(switch.is_some_and(Path::exists));
+        tracker.set_emergency_stop(sensors.is_pressed());
+        tracker.set_pitch(sensors.pitch());
         let mut failed = None;
         let mut send = |answer: &[u8]| failed = port.send(answer, Instant::now() + SEND_TIME).err().or(failed);
         for &byte in &bytes[..received] {
