@@ -6,7 +6,7 @@ mod capture;
 mod device;
 
 use capture::{PERIOD_US, is_seen, position_um};
-use device::{FIRMWARE, MODEL, Tracker};
+use device::{FIRMWARE, MODEL, NO_PITCH, Tracker};
 use dynamixel_bus::packet::{
     Decoder, DeviceId, FastReplyWriter, FastSegment, Instruction, InstructionPacket, MAX_PACKET_LEN, Packet, ReadSpan,
     ReadSpans, Recipient, StatusError, StatusFlags, StatusPacket,
@@ -121,16 +121,21 @@ fn block_holds_one_capture() {
 }
 
 #[test]
-fn emergency_stop_is_read_in_front_of_the_capture() {
+fn pitch_and_emergency_stop_are_read_in_front_of_the_capture() {
     let mut tracker = tracker();
     let read = Instruction::Read {
-        address: 127,
-        length: 2,
+        address: 125,
+        length: 4,
     };
-    for (pressed, sample) in [(false, 7), (true, 8), (false, 9)] {
+    // Nothing is known before a sensor has measured it.
+    for (pitch, pressed, sample) in [(NO_PITCH, false, 7), (-1234, true, 8), (9000, false, 9)] {
+        if pitch != NO_PITCH {
+            tracker.set_pitch(pitch);
+        }
         tracker.set_emergency_stop(pressed);
         let (_, error, data) = ask(&mut tracker, read, sample * PERIOD_US);
-        assert_eq!((error, data), (None, vec![u8::from(pressed), sample as u8]));
+        let [low, high] = pitch.to_le_bytes();
+        assert_eq!((error, data), (None, vec![low, high, u8::from(pressed), sample as u8]));
     }
 }
 
