@@ -61,7 +61,7 @@ impl ScoreTable<'_> {
 
     /// Campaigns of several effects, each of which must be found.
     fn several(&self, kind: CampaignKind) -> impl Iterator<Item = &Assessment> {
-        let each_shows = |one: &&Assessment| one.truth.effects.iter().all(|effect| effect.sigma >= STRONG_SIGMA);
+        let each_shows = |one: &&Assessment| one.truth.weakest_sigma().is_some_and(|sigma| sigma >= STRONG_SIGMA);
         self.of(kind).filter(each_shows)
     }
 
@@ -257,6 +257,7 @@ impl ScoreTable<'_> {
             "cell",
             "parameters",
             "sigma",
+            "weakest_sigma",
             "sigma_per_cycle",
             "impact",
             "discrepancy_m",
@@ -304,6 +305,7 @@ impl ScoreTable<'_> {
                     each.collect::<Vec<_>>().join(" ")
                 }),
                 truth.sigma.to_string(),
+                cell_of(truth.weakest_sigma()),
                 truth.sigma_per_cycle.to_string(),
                 truth.impact().to_string(),
                 truth.discrepancy_m.to_string(),

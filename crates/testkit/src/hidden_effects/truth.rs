@@ -159,6 +159,11 @@ impl Truth {
         self.sigma >= STRONG_SIGMA && self.impact() >= STRONG_IMPACT
     }
 
+    /// Significance of the effect that shows least, standard deviations; none of a worm without one.
+    pub fn weakest_sigma(&self) -> Option<f64> {
+        self.effects.iter().map(|effect| effect.sigma).min_by(f64::total_cmp)
+    }
+
     /// Whether something is hidden in which nobody need be interested.
     pub fn is_negligible(&self) -> bool {
         self.impact() < NEGLIGIBLE_IMPACT
