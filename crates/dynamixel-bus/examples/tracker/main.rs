@@ -75,8 +75,8 @@ impl Sensors {
             .as_deref()
             .and_then(|file| std::fs::read_to_string(file).ok());
         let degrees = text.and_then(|text| text.trim().parse::<f64>().ok());
-        let counts = degrees.map(|degrees| (100.0 * degrees).round() as i16);
-        counts.unwrap_or(NO_PITCH)
+        let known = degrees.filter(|degrees| degrees.is_finite());
+        known.map_or(NO_PITCH, |degrees| (100.0 * degrees).round() as i16)
     }
 }
 
