@@ -6,7 +6,9 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use worm_analysis::bench::{self, Plant};
 use worm_analysis::experiment::RecordedRun;
-use worm_analysis::recording::{Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, open_with_progress};
+use worm_analysis::recording::{
+    Advance, Axis, Campaign, OpenOptions, PAYLOADS_KG, Recording, Wanted, open_with_progress,
+};
 use worm_estimator::config::Config;
 
 /// Fraction of the progress bar for reading.
@@ -120,7 +122,7 @@ impl SourceArgs {
     /// # Errors
     /// [`Failure::Unusable`] names the file, the place in it and the remedy.
     pub(super) fn read(&self, path: &Path, progress: &mut Progress) -> Result<Dataset, Failure> {
-        let dataset = self.read_also_advances(path, progress)?;
+        let dataset = self.read_also_advances(path, Wanted::Positions, progress)?;
         if dataset.advances.is_empty() {
             return Ok(dataset);
         }
@@ -130,13 +132,18 @@ impl SourceArgs {
         )))
     }
 
-    /// As [`read`](Self::read), but a campaign may list advances instead.
+    /// As [`read`](Self::read), but a campaign may list advances instead, and it is said what is wanted of logs.
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub(super) fn read_also_advances(&self, path: &Path, progress: &mut Progress) -> Result<Dataset, Failure> {
+    pub(super) fn read_also_advances(
+        &self,
+        path: &Path,
+        wanted: Wanted,
+        progress: &mut Progress,
+    ) -> Result<Dataset, Failure> {
         if has_extension(path, "toml") {
-            return self.read_campaign(path, progress);
+            return self.read_campaign(path, wanted, progress);
         }
         let Some(slope_deg) = self.slope else {
             return Err(Failure::unusable(format!(
@@ -144,11 +151,12 @@ impl SourceArgs {
                 path.display()
             )));
         };
-        self.read_recording(path, slope_deg, progress)
+        self.read_recording(path, slope_deg, wanted, progress)
     }
 
-    fn options(&self) -> OpenOptions {
+    fn options(&self, wanted: Wanted) -> OpenOptions {
         OpenOptions {
+            wanted,
             from_s: self.from,
             to_s: self.to,
             max_gap_s: self.max_gap,
@@ -156,7 +164,7 @@ impl SourceArgs {
         }
     }
 
-    fn read_campaign(&self, path: &Path, progress: &mut Progress) -> Result<Dataset, Failure> {
+    fn read_campaign(&self, path: &Path, wanted: Wanted, progress: &mut Progress) -> Result<Dataset, Failure> {
         if self.slope.is_some() || self.payload != 0.0 || self.config.is_some() {
             return Err(Failure::unusable(format!(
                 "{}: a campaign has its own slopes, payloads and worm: leave out --slope, --payload and --config",
@@ -172,7 +180,7 @@ impl SourceArgs {
         }
         Ok(Dataset {
             recordings: campaign
-                .open_all(&self.options(), &mut |fraction| {
+                .open_all(&self.options(wanted), &mut |fraction| {
                     progress.tell("reading", READING * fraction)
                 })
                 .map_err(Failure::unusable)?,
@@ -200,9 +208,10 @@ impl SourceArgs {
         &self,
         path: &Path,
         slope_deg: f64,
+        wanted: Wanted,
         progress: &mut Progress,
     ) -> Result<Dataset, Failure> {
-        let recording = open_with_progress(path, &self.options(), &mut |fraction| {
+        let recording = open_with_progress(path, &self.options(wanted), &mut |fraction| {
             progress.tell("reading", READING * fraction);
         })
         .map_err(Failure::unusable)?;

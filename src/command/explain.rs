@@ -11,14 +11,15 @@ mod servo;
 use super::dataset::{Dataset, READING, SourceArgs};
 use super::progress::Progress;
 use super::{Failure, WormArgs, log_line, print};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use folder::Folder;
 use serde::Serialize;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use worm_analysis::bench::Plant;
 use worm_analysis::experiment::Progress as Step;
-use worm_analysis::explain::{Answer, ExplainError, Options, explain, explain_advances, model_update};
+use worm_analysis::explain::{Answer, Evidence, ExplainError, Options, explain, explain_advances, model_update};
+use worm_analysis::recording::Wanted;
 use worm_analysis::report;
 use worm_estimator::config::Config;
 use worm_physics::effect::{named, named_of_servo};
@@ -54,9 +55,10 @@ pub struct ExplainArgs {
     /// Leave an effect of the library out of the search, to see what it would say without; may be given several times
     #[arg(long, value_name = "EFFECT", value_parser = effect_name)]
     without: Vec<&'static str>,
-    /// Take the motor's current as evidence, too: what it shows of the forces on the cells, as well as [self_sensing] knows the gears
-    #[arg(long)]
-    current: bool,
+    /// Take the motor's current as evidence, too: what it shows of the forces on the cells, as well as [self_sensing] knows the gears. A
+    /// recording without positions is explained by it alone; with "alone" all are, and positions are not looked at
+    #[arg(long, value_name = "EVIDENCE", value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "beside")]
+    current: Option<Current>,
     /// Record the worm that is crawling now, into DIR/live.mcap, and explain that; at its configured slope unless --slope is
     /// given
     #[arg(long, conflicts_with = "recording", requires = "out")]
@@ -67,6 +69,15 @@ pub struct ExplainArgs {
     /// Gait cycles to record of the running worm
     #[arg(long, value_name = "N", default_value_t = 8, requires = "live", value_parser = clap::value_parser!(u32).range(6..=1000))]
     cycles: u32,
+}
+
+/// How the motor's current is evidence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Current {
+    /// Beside the positions, where there are any
+    Beside,
+    /// Instead of them
+    Alone,
 }
 
 /// Runs `wormd explain`. Every verdict is a success.
@@ -155,14 +166,28 @@ impl ExplainArgs {
             matters: self.matters.unwrap_or(usual.matters),
             expected_impact: self.expected_impact,
             without: self.without.clone(),
-            with_current: self.current,
+            evidence: match self.current {
+                None => Evidence::Positions,
+                Some(Current::Beside) => Evidence::PositionsAndCurrent,
+                Some(Current::Alone) => Evidence::CurrentAlone,
+            },
+        }
+    }
+
+    /// What is wanted of logs.
+    fn wanted(&self) -> Wanted {
+        match self.current {
+            None => Wanted::Positions,
+            Some(Current::Beside) => Wanted::PositionsOrMotor,
+            Some(Current::Alone) => Wanted::Motor,
         }
     }
 
     /// The data to explain, and where they come from.
     fn read(&self, progress: &mut Progress) -> Result<(PathBuf, Dataset), Failure> {
         if let Some(recording) = &self.recording {
-            return Ok((recording.clone(), self.source.read_also_advances(recording, progress)?));
+            let dataset = self.source.read_also_advances(recording, self.wanted(), progress)?;
+            return Ok((recording.clone(), dataset));
         }
         let worm = WormArgs {
             config: self.source.config.clone(),
@@ -174,8 +199,8 @@ impl ExplainArgs {
         let folder = self.out.as_deref().unwrap_or(Path::new("."));
         report::prepare(folder).map_err(Failure::unusable)?;
         let log = folder.join("live.mcap");
-        live::record(&config, text, self.cycles, &log, progress)?;
-        let dataset = self.source.read_recording(&log, slope_deg, progress)?;
+        live::record(&config, text, (self.cycles, self.current.is_some()), &log, progress)?;
+        let dataset = self.source.read_recording(&log, slope_deg, self.wanted(), progress)?;
         Ok((log, dataset))
     }
 }
@@ -191,7 +216,7 @@ fn search(dataset: &Dataset, options: Options, progress: &mut Progress) -> Resul
     };
     let answer = match dataset.advances.is_empty() {
         true => explain(&runs, &dataset.config, &options, &mut report_step),
-        false if options.with_current => Err(ExplainError::NoCurrent),
+        false if options.evidence != Evidence::Positions => Err(ExplainError::NoCurrent),
         false => explain_advances(&dataset.advances, &dataset.config, &mut report_step),
     };
     answer.map_err(|error| (Failure::unusable(error), stage))

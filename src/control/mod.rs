@@ -10,7 +10,7 @@
 //!    goal and, rarely, a [`Service`]. It enforces the limits (`safety`, `estimator_watch`, `crawl_limit`), reacts to alarms
 //!    (`standing_alarms`), ramps (`ramp`), assembles the state (`state_assembler`), and handles pauses of the computer (`loop_clock`,
 //!    `resume`). Time is an argument, so all of it is tested in virtual time.
-//! 4. The loop publishes, wakes the listeners, executes a service if one is due, and finishes the tick on the schedule. The kernel's
+//! 4. The loop publishes (`ports`), wakes the listeners, executes a service if one is due, and finishes the tick on the schedule. The kernel's
 //!    counters (`sched_counters`) show what made a late tick late; the `journal` logs from a thread of its own.
 
 mod controller;
@@ -20,6 +20,7 @@ mod hardware;
 mod interface;
 mod journal;
 mod loop_clock;
+mod ports;
 mod ramp;
 mod rate;
 mod replaceable_port;

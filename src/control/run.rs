@@ -6,6 +6,7 @@ use super::hardware::Drive;
 use super::interface::{EstimateSeen, Inputs, Lease, Outputs, Service, ServiceOutcome};
 use super::journal::{Entry, Journal};
 use super::loop_clock::{ExchangeTimes, MIN_PAUSE_NS, Silence, absent_ns};
+use super::ports::{ALARMS_PER_TICK, Asker, Ports, take_command};
 use super::rate::RateKeeper;
 use super::sched_counters::{Counts, Parts, find_culprit};
 use super::schedule::{Schedule, bus_allowed_ns};
@@ -13,17 +14,11 @@ use crate::attendance::{Attendance, Parent};
 use crate::link::{EmergencyStopError, EmergencyStopInput};
 use crate::logging::Summed;
 use crate::realtime::{self, CpuWitness, Grant, monotonic_ns};
-use crate::topics::{
-    CommandServer, Controller as ControllerRole, Hub, Notifier, PortError, PublishError, Publisher, Responder,
-    RoleLock, Subscriber,
-};
+use crate::topics::{Controller as ControllerRole, Hub, PortError, PublishError, RoleLock};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, AlarmKind, Command, CommandRecord, Culprit, Estimate, Mode, State, Timing};
-
-/// Maximum number of alarm changes that one tick reads; more wait for the next tick.
-const ALARMS_PER_TICK: usize = AlarmKind::ALL.len();
+use worm_estimator::message::{Alarm, Command, CommandRecord, Culprit, Mode, Timing};
 
 /// The witness's priority lies this far below the loop's: never in its way, and above everything that could delay a device's
 /// answer.
@@ -47,43 +42,6 @@ pub enum RunError {
     /// A thread beside the loop cannot be started.
     #[error("a thread beside the loop cannot be started: {0}")]
     Thread(std::io::Error),
-}
-
-/// The loop's ports on the topics.
-struct Ports {
-    state: Publisher<State>,
-    state_event: Notifier<State>,
-    timing: Publisher<Timing>,
-    estimates: Subscriber<Estimate>,
-    alarms: Subscriber<Alarm>,
-    commands: CommandServer,
-    command_records: Publisher<CommandRecord>,
-}
-
-impl Ports {
-    fn open(hub: &Hub, role: &RoleLock<ControllerRole>) -> Result<Self, PortError> {
-        Ok(Self {
-            state: hub.publisher(role)?,
-            state_event: hub.notifier(role)?,
-            timing: hub.publisher(role)?,
-            estimates: hub.subscriber()?,
-            alarms: hub.subscriber()?,
-            commands: hub.command_server(role)?,
-            command_records: hub.publisher(role)?,
-        })
-    }
-
-    /// Reads the alarms that arrived since the last tick. A topic that cannot be read counts as silent, which the safety rules
-    /// handle.
-    fn take_alarms(&mut self, into: &mut [Alarm; ALARMS_PER_TICK]) -> usize {
-        let mut count = 0;
-        while count < into.len() {
-            let Ok(Some(alarm)) = self.alarms.next() else { break };
-            into[count] = *alarm;
-            count += 1;
-        }
-        count
-    }
 }
 
 /// Totals of the loop at its end.
@@ -500,24 +458,6 @@ fn serve(drive: &mut Drive, service: Service, failures: &mut Summed<u64>) -> Ser
         outcome: Some(outcome),
         hardware_error,
         took_ns: monotonic_ns() - begun,
-    }
-}
-
-/// Who asked for a command, and gets the answer.
-enum Asker {
-    Topic(Responder),
-    StopSocket(u64),
-}
-
-/// The next command: from the stop socket, else from the topics.
-fn take_command(topic: &CommandServer, attendance: &Attendance) -> (Option<Command>, Option<Asker>) {
-    if let Some((number, command)) = attendance.take_command() {
-        return (Some(command), Some(Asker::StopSocket(number)));
-    }
-    match topic.take() {
-        Ok(Some((command, responder))) => (Some(command), Some(Asker::Topic(responder))),
-        // A request that cannot be read is not answered; its sender times out.
-        Ok(None) | Err(_) => (None, None),
     }
 }
 

@@ -4,7 +4,7 @@ use super::explanation::LastCycles;
 use std::path::Path;
 use worm_analysis::experiment::{Progress, RecordedRun};
 use worm_analysis::explain::{Options, explain};
-use worm_analysis::recording::{OpenOptions, open};
+use worm_analysis::recording::{OpenOptions, Wanted, open};
 use worm_analysis::report::explain::view::View;
 use worm_estimator::config::Config;
 use worm_estimator::message::{Mode, State};
@@ -30,6 +30,7 @@ pub(crate) fn search(log: &Log, config: &Config, until_ns: u64, report: &mut dyn
         to_s: Some(span.to_s),
         max_gap_s: MAX_GAP_S,
         axis: None,
+        wanted: Wanted::Positions,
     };
     let recording = match open(Path::new(&log.file), &options) {
         Ok(recording) => recording,

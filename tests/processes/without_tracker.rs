@@ -23,7 +23,7 @@ fn it_crawls_and_is_recorded_and_its_log_says_what_the_current_shows() {
         "up",
         "--json",
         "--duration",
-        "12",
+        "16",
         "--config",
         &config,
         "--record",
@@ -106,6 +106,26 @@ fn it_crawls_and_is_recorded_and_its_log_says_what_the_current_shows() {
         assert_eq!(output.status.code(), Some(2), "{error}");
         assert!(error.contains("wormd infer"), "{error}");
     }
+    let explained = json(
+        &worm
+            .plain_wormd(&["explain", &log, "--slope", "0", "--current", "--json"])
+            .output(),
+    );
+    let run = &explained["runs"][0];
+    assert_eq!(
+        (&run["sees_positions"], &run["advance_m"][0]),
+        (&false.into(), &serde_json::Value::Null)
+    );
+    let shown_j = run["current"]["work_j"][0].as_f64().expect("a work");
+    // Of the level's 46.7 mJ, as far as the friction of the gears is known.
+    assert!((0.03..0.06).contains(&shown_j), "{run}");
+    let stages = explained["gap"].as_array().expect("a list");
+    assert!(
+        stages
+            .iter()
+            .all(|stage| stage["torque"]["held_out_rms_n_m"].as_f64().is_some()),
+        "{stages:?}"
+    );
 }
 
 /// A device that tracks no cells says the slope, until it falls silent.

@@ -3,7 +3,7 @@
 use crate::{MAX_WARNINGS_LEN, readable, recording};
 use std::io::Cursor;
 use std::path::Path;
-use worm_analysis::recording::mcap;
+use worm_analysis::recording::{OpenOptions, Wanted, mcap, read_from};
 use worm_estimator::config::Config;
 use worm_estimator::message::{
     Alarm, CommandRecord, Cycle, Estimate, Inferred, JsonMessage, ProtobufMessage, Range, RecordingStatus, State,
@@ -25,17 +25,21 @@ pub(crate) fn mcap_log(data: &[u8]) {
         Ok(read) => assert!(read.time_s.iter().all(|time_s| time_s.is_finite()), "a time"),
         Err(error) => drop(readable(error)),
     }
-    let options = worm_analysis::recording::OpenOptions::default();
-    let opened = worm_analysis::recording::read_from(
-        Cursor::new(data),
-        data.len() as u64,
-        path,
-        &options,
-        &mut |_fraction| {},
-    );
-    match opened {
-        Ok(opened) => recording::check(&opened),
-        Err(error) => drop(readable(error)),
+    for wanted in [Wanted::Positions, Wanted::PositionsOrMotor, Wanted::Motor] {
+        let options = OpenOptions {
+            wanted,
+            ..OpenOptions::default()
+        };
+        match read_from(
+            Cursor::new(data),
+            data.len() as u64,
+            path,
+            &options,
+            &mut |_fraction| {},
+        ) {
+            Ok(opened) => recording::check(&opened),
+            Err(error) => drop(readable(error)),
+        }
     }
 }
 

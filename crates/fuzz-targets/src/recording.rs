@@ -3,7 +3,7 @@
 use crate::{MAX_WARNINGS_LEN, readable};
 use std::io::Cursor;
 use std::path::Path;
-use worm_analysis::recording::{Motor, OpenOptions, Recording, read_from, write_csv};
+use worm_analysis::recording::{Motor, OpenOptions, Recording, Wanted, read_from, write_csv};
 use worm_physics::MAX_CELLS;
 
 /// A recording as a table of named columns.
@@ -91,6 +91,7 @@ pub(crate) fn check(recording: &Recording) {
     // What was accepted with longer gaps than usual is accepted again.
     let options = OpenOptions {
         max_gap_s: f64::MAX,
+        wanted: Wanted::PositionsOrMotor,
         ..OpenOptions::default()
     };
     let again = read_bytes(&text, "again.csv", &options).expect("what was written can be read");

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ._program import ProgressCallback, StrPath, call_json
 from ._result import Result
@@ -94,6 +94,18 @@ class Place(Result):
 
 
 @dataclass(frozen=True)
+class TorqueGap(Result):
+    """How far a stage's torque on the cam is off."""
+
+    fit_rms_n_m: float
+    """Root mean square of the residual on the data it was fitted to, N m."""
+    held_out_rms_n_m: float
+    """The same on cycles that it was not fitted to, N m."""
+    held_out_interval_n_m: tuple[float, ...]
+    """90 % interval of that, N m."""
+
+
+@dataclass(frozen=True)
 class Stage(Result):
     """A model in the order in which the gap between model and data shrinks."""
 
@@ -113,6 +125,8 @@ class Stage(Result):
     """90 % interval of that, m."""
     energy_error_j: float
     """How far the energy per cycle is off, J."""
+    torque: TorqueGap | None
+    """Of the torque, where the motor's current counts; without positions it is all that the gap is judged by."""
 
 
 @dataclass(frozen=True)
@@ -225,6 +239,8 @@ class ExplainedRun(Result):
     """Time of a gait cycle, s."""
     phase_recorded: bool
     """Whether the gait phase was recorded."""
+    sees_positions: bool
+    """Whether positions count; where they do not, the motor's current alone is evidence."""
     laid_down: bool
     """Whether the recording starts with the worm just laid down."""
     noise_m: float
@@ -311,6 +327,8 @@ class Explanation(Result):
     """Posterior probability that something else is missing."""
     agrees_within_m: float
     """Measured and modelled advance differ by no more than this, m, with a probability of 95 %."""
+    agrees_within_j: float | None
+    """The work of a cycle by the motor's current and by the model differ by no more than this, J; where the current counts."""
     discrepancy_m: float
     """What the model is taken to be wrong by everywhere, m."""
     runs: tuple[ExplainedRun, ...]
@@ -349,7 +367,7 @@ def explain(
     discrepancy: float | None = None,
     matters: float | None = None,
     expected_impact: float | None = None,
-    current: bool = False,
+    current: bool | Literal["alone"] = False,
     progress: ProgressCallback | bool | None = None,
     wormd: StrPath | None = None,
 ) -> Explanation:
@@ -364,7 +382,7 @@ def explain(
         discrepancy: what the model is taken to be wrong by everywhere, as a fraction of the largest deformation.
         matters: relative change of advance or energy that matters.
         expected_impact: how much of the advance an effect is expected to cost or bring.
-        current: takes the motor's current as evidence, too.
+        current: takes the motor's current as evidence, too, or alone: then positions are not looked at.
         progress: is told stage and fraction. Without it progress is shown on standard error; False shows nothing.
         wormd: the program.
 
@@ -380,7 +398,7 @@ def explain(
         **{"expected-impact": expected_impact},
     )
     if current:
-        more.append("--current")
+        more.append("--current=alone" if current == "alone" else "--current")
     with tempfile.TemporaryDirectory(prefix="wormd-") as folder:
         if isinstance(campaign, (str, os.PathLike)):
             source: StrPath = campaign

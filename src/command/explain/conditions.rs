@@ -2,7 +2,7 @@
 
 use crate::command::Failure;
 use worm_analysis::experiment::RecordedRun;
-use worm_analysis::identify::{IdentifiedGait, Prior, gait};
+use worm_analysis::identify::{Prior, gait};
 use worm_estimator::config::Config;
 use worm_physics::Worm;
 
@@ -31,14 +31,19 @@ fn check_cycle(run: &RecordedRun<'_>, config: &Config) -> Result<(), Failure> {
     let (Some(stated_s), recording) = (run.cycle_s, run.recording) else {
         return Ok(());
     };
+    let step_order = config.worm.step_order_from_zero();
     let prior = Prior {
-        step_order: &config.worm.step_order_from_zero(),
+        step_order: &step_order,
         phase: recording.gait_phase.as_deref(),
     };
     // Without a gait, the search itself reports why.
-    let gait = gait::find(&recording.time_s, &recording.position_m, &recording.filled(), prior).ok();
+    let phase = match recording.has_positions() {
+        true => gait::find(&recording.time_s, &recording.position_m, &recording.filled(), prior)
+            .map_or(None, |gait| Some(gait.phase)),
+        false => recording.gait_phase.clone(),
+    };
     let contradicts = |seen_s: f64| contradicts(seen_s, stated_s);
-    match gait.and_then(|gait| cycle_s(&gait, &recording.time_s)) {
+    match phase.and_then(|phase| cycle_s(&phase, step_order.len(), &recording.time_s)) {
         // Where the worm rests between the cycles, either the cam's turn or the whole cycle may be stated.
         Some([seen_s, turning_s]) if contradicts(seen_s) && contradicts(turning_s) => Err(Failure::unusable(format!(
             "{}: a gait cycle took {seen_s:.2} s, but cycle_s = {stated_s} is stated: give the time of this run, or leave \
@@ -56,11 +61,11 @@ fn contradicts(seen_s: f64, stated_s: f64) -> bool {
 
 /// Mean time of the whole gait cycles, s, without rests before and after them; and what it would be if every step took the median
 /// time of a step, so without rests between the cycles, too. None where there is no whole cycle.
-fn cycle_s(gait: &IdentifiedGait, time_s: &[f64]) -> Option<[f64; 2]> {
-    let (first, last) = (gait.phase.first()?.ceil(), gait.phase.last()?.floor());
-    let begun_s = |phase: f64| time_s.get(gait.phase.partition_point(|at| *at <= phase)).copied();
-    let ended_s = |phase: f64| time_s.get(gait.phase.partition_point(|at| *at < phase)).copied();
-    let cells = gait.step_order.len() as f64;
+fn cycle_s(phase: &[f64], cells: usize, time_s: &[f64]) -> Option<[f64; 2]> {
+    let (first, last) = (phase.first()?.ceil(), phase.last()?.floor());
+    let begun_s = |from: f64| time_s.get(phase.partition_point(|at| *at <= from)).copied();
+    let ended_s = |until: f64| time_s.get(phase.partition_point(|at| *at < until)).copied();
+    let cells = cells as f64;
     let steps = ((last - first) * cells).round() as usize;
     let step_s = |step: usize| {
         let phase = |step: usize| first + step as f64 / cells;
@@ -117,18 +122,8 @@ mod tests {
             let cycle = (time_s / (turn_s + dwell_s)).floor();
             cycle + ((time_s - cycle * (turn_s + dwell_s)) / turn_s).min(1.0)
         });
-        let gait = IdentifiedGait {
-            step_order: vec![0, 1, 2, 3],
-            phase: phase.collect(),
-            phase_sigma: 0.0,
-            stroke_m: 0.0115,
-            place_m: vec![0.0; 4],
-            noise_m: 0.0,
-            body_m: Vec::new(),
-            seen: Vec::new(),
-            outliers: 0,
-        };
-        let [seen_s, turning_s] = cycle_s(&gait, &time_s).expect("whole cycles");
+        let phase: Vec<f64> = phase.collect();
+        let [seen_s, turning_s] = cycle_s(&phase, 4, &time_s).expect("whole cycles");
         assert!((seen_s - 3.5).abs() < 0.2, "{seen_s}");
         assert!((turning_s - turn_s).abs() < 0.1, "{turning_s}");
     }

@@ -18,7 +18,8 @@ const SILENCE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Gait cycles recorded beyond the last whole one, so that its end is recorded.
 const MARGIN_CYCLES: f64 = 0.05;
 
-/// Records the crawling worm over `cycles` whole gait cycles into a log, which replaces an older one.
+/// Records the crawling worm over so many whole gait cycles into a log, which replaces an older one; one without cell positions where the
+/// motor will do.
 ///
 /// # Errors
 /// [`Failure::Unusable`] when no worm of this name runs, or it does not crawl; [`Failure::Failed`] when it stops, falls silent or
@@ -26,7 +27,7 @@ const MARGIN_CYCLES: f64 = 0.05;
 pub(super) fn record(
     config: &Config,
     text: Option<String>,
-    cycles: u32,
+    (cycles, motor_will_do): (u32, bool),
     log: &Path,
     progress: &mut Progress,
 ) -> Result<(), Failure> {
@@ -42,7 +43,7 @@ pub(super) fn record(
     let (end, over) = end_on_signal_until()?;
     let topics = [Channel::State, Channel::Estimate, Channel::Cycle, Channel::Alarm];
     let mut recorder = Recorder::open(config, text, &topics, log, true, FileOptions::default())?;
-    let mut cycles_recorded = CycleProgress::new(&config.worm.name, cycles);
+    let mut cycles_recorded = CycleProgress::new(&config.worm.name, cycles, motor_will_do);
     let mut done = Ok(false);
     while matches!(done, Ok(false)) {
         if end.load(Ordering::Relaxed) {
@@ -65,15 +66,17 @@ pub(super) fn record(
 struct CycleProgress<'a> {
     worm: &'a str,
     cycles: f64,
+    motor_will_do: bool,
     last_state: Instant,
     first_phase: Option<f64>,
     phase: f64,
 }
 
 impl<'a> CycleProgress<'a> {
-    fn new(worm: &'a str, cycles: u32) -> Self {
+    fn new(worm: &'a str, cycles: u32, motor_will_do: bool) -> Self {
         Self {
             worm,
+            motor_will_do,
             cycles: f64::from(cycles),
             last_state: Instant::now(),
             first_phase: None,
@@ -105,11 +108,10 @@ impl<'a> CycleProgress<'a> {
                 "{worm} does not crawl ({why}): let it crawl first, with `wormd command crawl --name {worm}`"
             )));
         }
-        if state.sample == 0 {
+        if state.sample == 0 && !self.motor_will_do {
             let worm = self.worm;
             return Err(Failure::unusable(format!(
-                "{worm} has no cell positions, and the search needs them: `wormd record --name {worm}` and `wormd infer` say what the motor's \
-                 current shows"
+                "{worm} has no cell positions: --current takes what the motor's current shows as evidence instead"
             )));
         }
         if state.phase.is_finite() {

@@ -12,7 +12,8 @@ use testkit::hidden_effects::campaign::HiddenCampaign;
 use testkit::hidden_effects::folders::{is_written, write, write_unseen};
 use testkit::hidden_effects::split::{Case, Split, scale_from_environment, split};
 
-const USAGE: &str = "usage: write_campaigns development|test|search|sample|laws|current FOLDER [WHAT ...]";
+const USAGE: &str =
+    "usage: write_campaigns development|test|search|sample|laws|current|current-library FOLDER [WHAT ...]";
 
 fn main() -> ExitCode {
     match run(&std::env::args().skip(1).collect::<Vec<String>>()) {

@@ -23,6 +23,9 @@ pub enum Split {
     /// Payloads, softer pads and clean worms, of the usual size and with the drive's phase: what positions cannot tell apart and the
     /// motor's current can.
     Current,
+    /// One of each effect, twice over, and the strangers of the development split, of the usual size and with the drive's phase: what the
+    /// motor's current shows of each.
+    CurrentLibrary,
 }
 
 /// The seed of every case of [`Split::Search`]: in no range of the others.
@@ -46,6 +49,7 @@ impl Split {
             Self::Sample => SAMPLE_SEED,
             Self::Laws => 57_300_000,
             Self::Current => 57_400_000,
+            Self::CurrentLibrary => 57_500_000,
         }
     }
 
@@ -57,6 +61,7 @@ impl Split {
             Self::Sample => "sample",
             Self::Laws => "laws",
             Self::Current => "current",
+            Self::CurrentLibrary => "current-library",
         }
     }
 
@@ -72,7 +77,7 @@ impl Split {
                 twins: 6,
                 onsets: 16,
             },
-            Self::Test | Self::Search | Self::Sample | Self::Laws | Self::Current => Counts {
+            Self::Test | Self::Search | Self::Sample | Self::Laws | Self::Current | Self::CurrentLibrary => Counts {
                 severities: 10,
                 clean: 132,
                 discrepant: 48,
@@ -88,7 +93,7 @@ impl Split {
     /// The kinds of strangers in it.
     fn stranger_kinds(self) -> [u64; 9] {
         match self {
-            Self::Development | Self::Sample | Self::Laws | Self::Current => DEVELOPMENT_KINDS,
+            Self::Development | Self::Sample | Self::Laws | Self::Current | Self::CurrentLibrary => DEVELOPMENT_KINDS,
             Self::Test | Self::Search => TEST_KINDS,
         }
     }
@@ -102,6 +107,7 @@ impl Split {
             Self::Sample,
             Self::Laws,
             Self::Current,
+            Self::CurrentLibrary,
         ];
         all.into_iter().find(|split| split.name() == name)
     }
@@ -140,7 +146,7 @@ impl Case {
     pub fn draw(self) -> HiddenCampaign {
         let mut campaign = match self.split {
             Split::Search | Split::Laws => draw(self.hidden, self.seed),
-            Split::Current => draw_with_phase(self.hidden, self.seed),
+            Split::Current | Split::CurrentLibrary => draw_with_phase(self.hidden, self.seed),
             Split::Sample => draw_varied_short(self.hidden, self.seed),
             Split::Development | Split::Test => draw_varied(self.hidden, self.seed),
         };
@@ -199,16 +205,23 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
         ];
         return hidden.map(|hidden| case(hidden, split.base())).to_vec();
     }
-    if split == Split::Laws {
-        let singles = Effect::ALL
+    let numbered = |all: &mut dyn Iterator<Item = Hidden>| -> Vec<Case> {
+        let all = all.enumerate();
+        all.map(|(number, hidden)| case(hidden, split.base() + number as u64))
+            .collect()
+    };
+    let singles = || {
+        Effect::ALL
             .iter()
-            .map(|&effect| Hidden::Single(effect, SeverityRange::UPPER_HALF));
-        let strangers = split.stranger_kinds().into_iter().map(Hidden::Outside);
+            .map(|&effect| Hidden::Single(effect, SeverityRange::UPPER_HALF))
+    };
+    let strangers = || split.stranger_kinds().into_iter().map(Hidden::Outside);
+    if split == Split::Laws {
         let clean = std::iter::repeat_n(Hidden::Clean, LAWS_CLEAN);
-        let all = singles.chain(strangers).chain(clean).enumerate();
-        return all
-            .map(|(number, hidden)| case(hidden, split.base() + number as u64))
-            .collect();
+        return numbered(&mut singles().chain(strangers()).chain(clean));
+    }
+    if split == Split::CurrentLibrary {
+        return numbered(&mut singles().chain(singles()).chain(strangers()));
     }
     let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     if split == Split::Current {
@@ -217,14 +230,7 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
             Hidden::Twin(Twin::SofterPads),
             Hidden::Clean,
         ];
-        let all = kinds
-            .into_iter()
-            .cycle()
-            .take(kinds.len() * count(CURRENT_OF_EACH))
-            .enumerate();
-        return all
-            .map(|(number, hidden)| case(hidden, split.base() + number as u64))
-            .collect();
+        return numbered(&mut kinds.into_iter().cycle().take(kinds.len() * count(CURRENT_OF_EACH)));
     }
     let counts = split.counts();
     let seed = |group: usize, number: usize| split.base() + 1000 * group as u64 + number as u64;

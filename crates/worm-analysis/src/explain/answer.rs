@@ -78,6 +78,11 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// Whether it is based on the motor's current alone: nobody saw the cells.
+    pub fn is_by_current_alone(&self) -> bool {
+        !self.runs.is_empty() && self.runs.iter().all(|run| !run.sees_positions)
+    }
+
     /// Whether it is based on advances alone, without a recording.
     pub fn is_by_advances(&self) -> bool {
         !self.runs.is_empty() && self.runs.iter().all(|run| run.advance_sigma_m.is_some())
@@ -94,6 +99,10 @@ pub struct Doubt {
     /// The measured advance of a cycle and that of the model in the answer differ on no run by more than this, m, with a probability
     /// of 95 %.
     pub agrees_within_m: f64,
+    /// Where the motor's current counts: the work of a cycle by it and by the model in the answer differ on no run by more than this, J,
+    /// with a probability of 95 %, by the gears of that answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub agrees_within_j: Option<f64>,
     /// Standard deviation that the model is taken to be wrong by everywhere, m.
     pub discrepancy_m: f64,
 }
@@ -105,6 +114,7 @@ impl Default for Doubt {
             null_probability: f64::NAN,
             other_probability: f64::NAN,
             agrees_within_m: f64::NAN,
+            agrees_within_j: None,
             discrepancy_m: f64::NAN,
         }
     }
@@ -244,6 +254,21 @@ pub struct Stage {
     pub advance_error_interval_m: [f64; 2],
     /// Mean over the runs of how far the energy per cycle (11) is off, J.
     pub energy_error_j: f64,
+    /// The gap of the torque, where the motor's current counts as evidence. Where no positions were recorded beside it the figures in
+    /// metres are `NaN`, and closures are those of the torque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque: Option<TorqueGap>,
+}
+
+/// How far a stage's torque on the cam is off.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TorqueGap {
+    /// Root mean square of the residual in each bin of the phase, on the data it was fitted to, N m.
+    pub fit_rms_n_m: f64,
+    /// The same on cycles that it was not fitted to, N m.
+    pub held_out_rms_n_m: f64,
+    /// 90 % interval of that, by the scatter from cycle to cycle, N m.
+    pub held_out_interval_n_m: [f64; 2],
 }
 
 /// What no effect explains.

@@ -96,6 +96,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         Verdict::Agrees => Vec::new(),
         _ => best.map_or_else(Vec::new, |fit| maps(worm, fit)),
     };
+    let torque = torque_cycles(worm, &parts.recalibrated, named.first().map(|candidate| &candidate.fit));
     let change = selected.change.map(|change| {
         let onset = Onset {
             cycle: change.cycle as f64,
@@ -108,7 +109,10 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         let places = places(&maps_after, PLACES);
         let period = period(worm, best.unwrap_or(&parts.recalibrated));
         Remainder {
-            description: words::remainder(found.open_share, &places),
+            description: match worm.sees_positions() {
+                true => words::remainder(found.open_share, &places),
+                false => words::remainder_of_torque(worm, found.open_share, &torque),
+            },
             open_share: found.open_share,
             onset: change.clone(),
             period_cycles: period.cycles,
@@ -161,6 +165,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
             null_probability: selected.null_probability,
             other_probability: selected.other_probability,
             agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
+            agrees_within_j: agrees_within_j(worm, &runs, final_fit, !named.is_empty()),
             discrepancy_m: parts.discrepancy_m,
         },
         warnings: words::warnings(worm, final_fit, named.first(), config.self_sensing.calibrated.is_some()),
@@ -175,7 +180,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
                 &parts.recalibrated,
                 named.first().map(|candidate| &candidate.fit),
             ),
-            torque: torque_cycles(worm, &parts.recalibrated, named.first().map(|candidate| &candidate.fit)),
+            torque,
             model_diff: Vec::new(),
         },
     }
@@ -215,7 +220,22 @@ fn agrees_within_m(problem: &WormProblem<'_, '_>, runs: &[RunSummary], fit: &Fit
     };
     let with_noise = runs.iter().zip(&problem.plant.noise);
     let all = with_noise.zip(problem.outcome_sigmas(fit)).map(of_run);
-    all.fold(0.0, f64::max)
+    largest(all.filter(|within_m| within_m.is_finite())).unwrap_or(f64::NAN)
+}
+
+/// The same of the work of a cycle, J, where the motor's current counts: the mean has the error of the scatter of the cycles.
+fn agrees_within_j(worm: &RecordedWorm<'_>, runs: &[RunSummary], fit: &Fit, is_named: bool) -> Option<f64> {
+    let of_run = |(number, run): (usize, &RunSummary)| {
+        let [shown_j, recalibrated_j, named_j] = run.current?.work_j;
+        let model_j = if is_named { named_j } else { recalibrated_j };
+        let of_mean_j = runs::sigma_of_shown_j(worm, number, fit)?;
+        Some((shown_j - model_j).abs() + ONE_SIDED * of_mean_j)
+    };
+    largest(runs.iter().enumerate().filter_map(of_run))
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> Option<f64> {
+    values.reduce(f64::max)
 }
 
 fn maps(worm: &RecordedWorm<'_>, fit: &Fit) -> Vec<ResidualMap> {

@@ -83,6 +83,22 @@ pub enum ExplainError {
         "no recording has the motor's current with the gait phase: record with wormd, or leave the current out of the evidence"
     )]
     NoCurrent,
+    /// A run was to be explained by the current alone, and has none, or no phase.
+    #[error(
+        "{recording}: it has neither positions that count nor the motor's current with the gait phase in nine of ten samples: record with wormd, and have the servo's current read"
+    )]
+    NoCurrentOfRun {
+        /// The recording.
+        recording: String,
+    },
+    /// A recording without positions, and the current was not to count.
+    #[error(
+        "{recording}: it holds no positions: `--current` takes what the motor's current shows as evidence, or record with a tracker that works"
+    )]
+    NoPositions {
+        /// The recording.
+        recording: String,
+    },
     /// The slope is none.
     #[error("{recording}: a slope of {slope_deg}°: give -90 to 90 degrees")]
     Slope {

@@ -26,6 +26,9 @@ const CLOSE_LOOKS: usize = 2;
 /// Fraction of the stroke that every rival's worm must advance in a cycle: one that hardly advances is no experiment.
 pub(super) const MIN_ADVANCE: f64 = 0.05;
 
+/// What to measure of a worm that nobody saw.
+const POSITIONS: &str = "positions of the cells beside the current";
+
 /// A change with the separation it would give.
 struct ScoredChange {
     change: Change,
@@ -45,6 +48,9 @@ impl ScoredChange {
 pub(super) fn propose(worm: &RecordedWorm<'_>, candidates: &[&Fit], cycle_s: f64) -> Option<NextExperiment> {
     if candidates.len() < 2 {
         return None;
+    }
+    if worm.scene.observed.iter().any(|observed| !observed.sees_positions) {
+        return Some(with_positions(candidates));
     }
     // A new run shows what has begun from its start.
     let begun: Vec<Fit> = candidates
@@ -220,6 +226,25 @@ fn difference_in_words(trial: &Trial<'_>, mine: &RunOutcome, first: &RunOutcome,
         farther_m.abs() * 1e3,
         widest_m * 1e3
     )
+}
+
+/// Positions beside the current: what they would show more, no run without them was recorded to tell.
+fn with_positions(candidates: &[&Fit]) -> NextExperiment {
+    let prediction = |rival: &&Fit| Prediction {
+        effect: name(rival),
+        advance_m: None,
+        description: values(rival),
+    };
+    NextExperiment {
+        change: ExperimentChange::Measurement(POSITIONS),
+        value: None,
+        unit: String::new(),
+        slope_deg: None,
+        description: "The motor's current alone does not decide between these. Record the positions of the cells as well, and explain both."
+            .to_owned(),
+        predictions: candidates.iter().map(prediction).collect(),
+        separation_sigma: None,
+    }
 }
 
 /// A measurement on the bench, where no run decides; none where no rival has an effect.

@@ -42,4 +42,4 @@ pub use error::ExplainError;
 pub use prediction::Prediction;
 pub use recorded::explain;
 pub use scalar_data::explain_advances;
-pub use search::find::Options;
+pub use search::find::{Evidence, Options};

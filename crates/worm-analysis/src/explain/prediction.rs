@@ -2,6 +2,7 @@
 
 use super::error::ExplainError;
 use crate::experiment::RecordedRun;
+use crate::explain::search::find::Evidence;
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::worm::predict::Scene;
 use crate::explain::worm::prepare::prepare;
@@ -20,7 +21,7 @@ impl<'a> Prediction<'a> {
     /// [`ExplainError`] where there is no run, or a recording is not of the configured worm.
     pub fn new(runs: &[RecordedRun<'a>], config: &Config) -> Result<Self, ExplainError> {
         Ok(Self {
-            scene: prepare(runs, config)?,
+            scene: prepare(runs, config, Evidence::Positions)?,
             nominal: Hypothesis::default(),
         })
     }

@@ -8,7 +8,7 @@ use super::search::hypothesis::Hypothesis;
 use super::search::law;
 use super::search::plant::Plant;
 use super::search::recalibrate::{measure_noise, recalibrate};
-use super::worm::prepare::{count_current, prepare};
+use super::worm::prepare::prepare;
 use super::worm::recorded_worm::RecordedWorm;
 use super::worm::speed_droop::speed_droop;
 use crate::experiment::{Progress, RecordedRun};
@@ -26,11 +26,7 @@ pub fn explain(
 ) -> Result<Answer, ExplainError> {
     let mut report = |stage: &'static str, fraction: f64| progress(Progress { stage, fraction });
     report("gait", 0.0);
-    let mut scene = prepare(runs, config)?;
-    if options.with_current {
-        count_current(&mut scene, config)?;
-    }
-    let mut worm = RecordedWorm::new(scene);
+    let mut worm = RecordedWorm::new(prepare(runs, config, options.evidence)?);
     report("recalibration", 0.03);
     let base = Hypothesis::new(&worm.nuisances(), &[]);
     let at = measure_noise(&mut worm, &base)?;

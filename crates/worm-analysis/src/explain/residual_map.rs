@@ -38,7 +38,7 @@ const OF_BODY: f64 = 0.5;
 /// Phase, in bins, by which a recording may begin after the first bin or end before the last.
 const SLACK: f64 = 0.1;
 
-/// The map of one run under a fit; `NaN` all over where the fit cannot make the run.
+/// The map of one run under a fit; `NaN` all over where the fit cannot make the run, or nobody saw the cells.
 pub(super) fn map(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> ResidualMap {
     let observed = &worm.scene.observed[run];
     let cells = observed.cells();
@@ -53,7 +53,8 @@ pub(super) fn map(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> ResidualMap
         significance: vec![vec![f64::NAN; bins]; cells],
         limit: f64::INFINITY,
     };
-    let Some(predicted) = worm.scene.predict(run, &fit.hypothesis, &fit.at) else {
+    let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at);
+    let Some(predicted) = predicted.filter(|_| observed.sees_positions) else {
         return map;
     };
     let displacements = BinDisplacements::new(observed, &Residual::new(observed, &predicted));

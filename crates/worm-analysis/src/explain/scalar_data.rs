@@ -213,6 +213,7 @@ fn assemble(
         fit_rms_m: f64::NAN,
         held_out_rms_m: f64::NAN,
         held_out_interval_m: [f64::NAN; 2],
+        torque: None,
         advance_error_m: table.mean_error_m(fit),
         advance_error_interval_m: [f64::NAN; 2],
         energy_error_j: f64::NAN,
@@ -237,6 +238,7 @@ fn assemble(
         cycle_s: advance.cycle_s.unwrap_or(config.gait.cycle_s),
         phase_recorded: false,
         laid_down: false,
+        sees_positions: true,
         noise_m: f64::NAN,
         drift_per_cycle_m: f64::NAN,
         advance_m: [

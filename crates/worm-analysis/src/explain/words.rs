@@ -1,6 +1,6 @@
 //! The answer in words.
 
-use super::answer::{FoundOnset, NamedEffect, Place, Verdict, answers_in_words};
+use super::answer::{FoundOnset, NamedEffect, Place, TorqueSeries, Verdict, answers_in_words};
 use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::judge::decision::Selected;
@@ -130,11 +130,20 @@ pub(super) fn of_pads(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<String> {
     let (value, sigma) = (fit.at[at], fit.sigmas()[at]);
     let share = value.exp_m1();
     (share.abs() > SOFTER && value.abs() > SURE * sigma).then(|| {
+        let (pads, worm_is) = if share < 0.0 {
+            ("softer", "heavier")
+        } else {
+            ("stiffer", "lighter")
+        };
+        let shown = match worm.sees_positions() {
+            true => "the motor's current shows it".to_owned(),
+            // Force over stiffness is what positions show.
+            false => format!("that, or the worm is {worm_is}, which the motor's current alone hardly tells apart"),
+        };
         format!(
-            " The pads are {:.0} ± {:.0} % {} than the model has them: the motor's current shows it.",
+            " The pads are {:.0} ± {:.0} % {pads} than the model has them: {shown}.",
             100.0 * share.abs(),
             100.0 * value.exp() * sigma,
-            if share < 0.0 { "softer" } else { "stiffer" }
         )
     })
 }
@@ -154,6 +163,28 @@ pub(super) fn remainder(open_share: f64, places: &[Place]) -> String {
         ),
         None => format!("{whole}; it does not repeat from cycle to cycle at any one place"),
     }
+}
+
+/// The same of a worm that nobody sees, by the mean cycle of the torque in each run.
+pub(super) fn remainder_of_torque(worm: &RecordedWorm<'_>, open_share: f64, torque: &[TorqueSeries]) -> String {
+    let whole = format!("{:.0} % of the gap stays open", 100.0 * open_share);
+    let off = torque.iter().flat_map(|run| {
+        let model_n_m = match run.named_n_m.is_empty() {
+            true => &run.recalibrated_n_m,
+            false => &run.named_n_m,
+        };
+        let pairs = run.phase.iter().zip(run.measured_n_m.iter().zip(model_n_m));
+        pairs.map(|(phase, (measured_n_m, model_n_m))| (run.slope_deg, *phase, measured_n_m - model_n_m))
+    });
+    let Some((slope_deg, phase, off_n_m)) = off.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else {
+        return whole;
+    };
+    let order = &worm.scene.observed[0].step_order;
+    let steps = order[(phase * order.len() as f64) as usize % order.len()] + 1;
+    format!(
+        "{whole}; the torque on the cam is farthest off while cell {steps} steps, phase {phase:.2}, on the {slope_deg}° run: {:+.2} mN m",
+        1e3 * off_n_m
+    )
 }
 
 /// Every repair of the recordings.
@@ -194,6 +225,12 @@ pub(super) fn warnings(
             "no gait phase was recorded: {} cannot be seen without it, nor can most of what the stepping cell does",
             names.join(" and ")
         ));
+    }
+    if !worm.sees_positions() {
+        warnings.push(
+            "the motor's current alone is evidence, and it shows forces: how far the worm came is what a model with these forces does"
+                .to_owned(),
+        );
     }
     if worm.counts_current() && !gears_calibrated {
         warnings.push(

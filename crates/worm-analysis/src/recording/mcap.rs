@@ -1,7 +1,9 @@
 //! The tracker samples of a log as a recording, and a recording as a log.
 
+mod motor;
 mod write;
 
+pub use motor::{read_motor, read_motor_from};
 pub use write::write;
 
 use super::{Motor, Recording};
@@ -22,14 +24,13 @@ use worm_log::{Channel, ReadError, nothing, scan_from};
 /// # Errors
 /// [`ReadError`] when the file cannot be read, is no log of a worm, is of another version, or has no samples.
 pub fn read(path: &Path) -> Result<Recording, ReadError> {
-    let file = File::open(path).map_err(|error| {
-        ReadError::whole(
-            path,
-            format!("cannot be read: {error}"),
-            "check that the file is there and may be read",
-        )
-    })?;
+    let file = File::open(path).map_err(|error| cannot_open(path, &error))?;
     read_from(file, path)
+}
+
+fn cannot_open(path: &Path, error: &std::io::Error) -> ReadError {
+    let problem = format!("cannot be read: {error}");
+    ReadError::whole(path, problem, "check that the file is there and may be read")
 }
 
 /// As [`read`], from anything that can be read and rewound; errors call it `path`.
@@ -37,6 +38,21 @@ pub fn read(path: &Path) -> Result<Recording, ReadError> {
 /// # Errors
 /// As [`read`].
 pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, ReadError> {
+    match read_seen(input, path)? {
+        Some(recording) => Ok(recording),
+        None => {
+            let remedy = "`wormd infer` says what the motor's current shows, and `wormd explain --current` takes it as evidence; positions \
+                          need a tracker that works: see `wormd check`";
+            Err(nothing(path, "holds no sample of the tracker", remedy))
+        }
+    }
+}
+
+/// As [`read_from`]; none of a log in which the tracker gave no sample.
+///
+/// # Errors
+/// As [`read`].
+pub(super) fn read_seen(input: impl Read + Seek, path: &Path) -> Result<Option<Recording>, ReadError> {
     let mut runs: Vec<ControllerRun> = Vec::new();
     let contents = scan_from(input, path, |channel, payload| {
         if channel != Channel::State {
@@ -52,28 +68,35 @@ pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, Read
     let mut warnings = contents.warnings;
     let count = runs.len();
     let longest = runs.into_iter().max_by_key(|run| run.samples.len());
-    let longest = longest.filter(|run| !run.samples.is_empty()).ok_or_else(|| {
-        if count > 0 {
-            let remedy = "`wormd infer` says what the motor's current shows; positions need a tracker that works: see `wormd check`";
-            return nothing(path, "holds no sample of the tracker", remedy);
-        }
-        // What is compressed may be lost whole where the file is cut.
-        match warnings.first() {
-            Some(damage) => nothing(path, &format!("holds no message, {damage}"), "record for longer"),
-            None => nothing(path, "holds no message", "record the topic `state`"),
-        }
-    })?;
-    if longest.cells < 2 {
-        let problem = format!("is of {} cell, and a worm has at least 2", longest.cells);
-        return Err(nothing(path, &problem, "record a worm"));
-    }
+    let Some(longest) = longest.filter(|run| !run.samples.is_empty()) else {
+        return match (count, warnings.first()) {
+            (1.., _) => Ok(None),
+            // What is compressed may be lost whole where the file is cut.
+            (0, Some(damage)) => Err(nothing(
+                path,
+                &format!("holds no message, {damage}"),
+                "record for longer",
+            )),
+            (0, None) => Err(nothing(path, "holds no message", "record the topic `state`")),
+        };
+    };
+    check_cells(path, longest.cells)?;
     if count > 1 {
         warnings.push(format!(
             "the controller was started {count} times: only the longest stretch is taken, from tick {} on",
             longest.first_tick
         ));
     }
-    Ok(longest.into_recording(path, warnings))
+    Ok(Some(longest.into_recording(path, warnings)))
+}
+
+/// Refuses what is no worm.
+fn check_cells(path: &Path, cells: usize) -> Result<(), ReadError> {
+    if cells >= 2 {
+        return Ok(());
+    }
+    let problem = format!("is of {cells} cell, and a worm has at least 2");
+    Err(nothing(path, &problem, "record a worm"))
 }
 
 /// Longest time between a capture and the nearest motor reading for which its gait phase is known, s.

@@ -44,7 +44,7 @@ mod write;
 pub use campaign::PAYLOADS_KG;
 pub use campaign::{Advance, Campaign, CampaignError, CampaignRun};
 pub use open::{open, open_with_progress, read_from};
-pub use options::OpenOptions;
+pub use options::{OpenOptions, Wanted};
 pub use projection::{Axis, AxisError};
 pub use repair_note::{Repair, RepairKind};
 pub use series::{Motor, Recording};

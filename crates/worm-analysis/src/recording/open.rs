@@ -1,6 +1,6 @@
 //! Opens a recording of any format.
 
-use super::options::OpenOptions;
+use super::options::{OpenOptions, Wanted};
 use super::series::Recording;
 use super::text::Text;
 use super::{c3d, mcap, projection, sanity_check, table, vicon};
@@ -90,7 +90,17 @@ pub fn read_from(
         }
         Format::Mcap => {
             input.rewind().map_err(cannot)?;
-            mcap::read_from(input, path)?
+            match options.wanted {
+                Wanted::Positions => mcap::read_from(input, path)?,
+                Wanted::Motor => mcap::read_motor_from(input, path)?,
+                Wanted::PositionsOrMotor => match mcap::read_seen(&mut input, path)? {
+                    Some(recording) => recording,
+                    None => {
+                        input.rewind().map_err(cannot)?;
+                        mcap::read_motor_from(input, path)?
+                    }
+                },
+            }
         }
     };
     let full_range_s = recording.time_s.first().copied().zip(recording.time_s.last().copied());

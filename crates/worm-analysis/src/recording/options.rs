@@ -15,6 +15,20 @@ pub struct OpenOptions {
     pub max_gap_s: f64,
     /// Direction up the canal in the space of the markers; `None`: found from their motion.
     pub axis: Option<Axis>,
+    /// What is wanted of a log.
+    pub wanted: Wanted,
+}
+
+/// What is wanted of a log of the worm, which may be without a tracker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Wanted {
+    /// Positions: a log without them is refused.
+    #[default]
+    Positions,
+    /// Positions with the motor at their times; where there is none, the motor's readings will do.
+    PositionsOrMotor,
+    /// All readings of the motor, and no positions.
+    Motor,
 }
 
 impl Default for OpenOptions {
@@ -24,6 +38,7 @@ impl Default for OpenOptions {
             to_s: None,
             max_gap_s: 0.2,
             axis: None,
+            wanted: Wanted::Positions,
         }
     }
 }

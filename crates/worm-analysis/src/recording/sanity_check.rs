@@ -1,7 +1,7 @@
 //! What every recording must satisfy, whatever its format.
 
 use super::gaps::{bridge, is_longer, round_up, unseen_runs};
-use super::options::OpenOptions;
+use super::options::{OpenOptions, Wanted};
 use super::projection::MAX_POSITION_M;
 use super::repair::repair;
 use super::series::Recording;
@@ -41,6 +41,11 @@ pub(super) fn check(
     full_range_s: Option<(f64, f64)>,
 ) -> Result<(), ReadError> {
     check_samples(recording, options, full_range_s)?;
+    let is_of_motor = recording.motor.is_some() && recording.gait_phase.is_some() && !recording.has_positions();
+    if is_of_motor && options.wanted != Wanted::Positions {
+        check_time(recording, options.max_gap_s)?;
+        return complete_phase(recording, options.max_gap_s);
+    }
     check_seen(recording)?;
     check_positions(recording)?;
     check_time(recording, options.max_gap_s)?;

@@ -85,6 +85,11 @@ impl Recording {
         self.position_m.len()
     }
 
+    /// Whether any cell is seen anywhere: the log of a worm without a tracker has the motor alone.
+    pub fn has_positions(&self) -> bool {
+        self.position_m.iter().flatten().any(|at_m| at_m.is_finite())
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.time_s.len()

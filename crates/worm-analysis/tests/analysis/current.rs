@@ -4,7 +4,9 @@ use testkit::hidden_effects::campaign::{HiddenCampaign, draw_with_phase_sized};
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::hidden::{Hidden, Twin};
 use testkit::hidden_effects::setting::CampaignSize;
-use worm_analysis::explain::{Answer, ExplainError, Options, Verdict, explain};
+use worm_analysis::explain::answer::StageKind;
+use worm_analysis::explain::{Answer, Evidence, ExplainError, Options, Verdict, explain};
+use worm_analysis::report::explain::page;
 
 /// In no range of the splits.
 const SEED: u64 = 902;
@@ -16,9 +18,9 @@ const SIZE: CampaignSize = CampaignSize {
 /// A payload of 100 to 150 g, a third of the worm's own mass.
 const HEAVY: SeverityRange = SeverityRange { from: 0.88, to: 1.0 };
 
-fn asked(campaign: &HiddenCampaign, with_current: bool) -> Result<Answer, ExplainError> {
+fn asked(campaign: &HiddenCampaign, evidence: Evidence) -> Result<Answer, ExplainError> {
     let options = Options {
-        with_current,
+        evidence,
         ..Options::default()
     };
     let runs = campaign.runs(&campaign.recordings);
@@ -36,13 +38,13 @@ fn first(answer: &Answer) -> Option<&str> {
 #[test]
 fn current_tells_a_payload_from_softer_pads() {
     let softer = draw_with_phase_sized(Hidden::Twin(Twin::SofterPads), SEED, SIZE);
-    let by_positions = asked(&softer, false).expect("an answer");
+    let by_positions = asked(&softer, Evidence::Positions).expect("an answer");
     assert_eq!(
         first(&by_positions),
         Some("payload"),
         "positions show force over stiffness"
     );
-    let by_both = asked(&softer, true).expect("an answer");
+    let by_both = asked(&softer, Evidence::PositionsAndCurrent).expect("an answer");
     assert_eq!(by_both.verdict, Verdict::Agrees);
     assert!(by_both.sentence.contains("softer"), "{}", by_both.sentence);
     let true_factor = softer.truth.effects[0].parameters["stiffness_factor"];
@@ -60,7 +62,7 @@ fn current_tells_a_payload_from_softer_pads() {
     );
 
     let loaded = draw_with_phase_sized(Hidden::Single(Effect::Payload, HEAVY), SEED, SIZE);
-    let by_both = asked(&loaded, true).expect("an answer");
+    let by_both = asked(&loaded, Evidence::PositionsAndCurrent).expect("an answer");
     assert_eq!(first(&by_both), Some("payload"));
     let payload = &by_both.effects[0].parameters[0];
     let true_kg = loaded.truth.effects[0].parameters["mass_kg"];
@@ -85,6 +87,64 @@ fn current_tells_a_payload_from_softer_pads() {
     }
 }
 
+/// Of a worm that nobody sees: its positions are lost, so any that were looked at would show.
+#[test]
+fn current_alone_shows_which_cell_holds_otherwise() {
+    let unseen = |hidden: Hidden| {
+        let mut campaign = draw_with_phase_sized(hidden, SEED, SIZE);
+        let positions = campaign
+            .recordings
+            .iter_mut()
+            .flat_map(|recording| &mut recording.position_m);
+        positions.for_each(|of_cell| of_cell.fill(f64::NAN));
+        campaign
+    };
+    let softer = unseen(Hidden::Twin(Twin::SofterPads));
+    let refused = asked(&softer, Evidence::Positions).expect_err("there is nothing to see");
+    assert!(matches!(refused, ExplainError::NoPositions { .. }), "{refused}");
+    let agreed = asked(&softer, Evidence::PositionsAndCurrent).expect("an answer");
+    assert_eq!(agreed.verdict, Verdict::Agrees);
+    assert!(agreed.sentence.contains("softer"), "{}", agreed.sentence);
+
+    let unequal = unseen(Hidden::Single(Effect::UnequalClamping, SeverityRange::UPPER_HALF));
+    for evidence in [Evidence::PositionsAndCurrent, Evidence::CurrentAlone] {
+        let answer = asked(&unequal, evidence).expect("an answer");
+        assert_eq!(first(&answer), Some("unequal-clamping"));
+        let (named, truth) = (&answer.effects[0], &unequal.truth.effects[0]);
+        assert_eq!(named.cell, truth.cell.map(|from_zero| from_zero + 1));
+        let factor = &named.parameters[0];
+        let true_factor = truth.parameters["friction_factor"];
+        assert!(
+            (factor.value - true_factor).abs() < 3.0 * factor.sigma,
+            "{factor:?}, {true_factor}"
+        );
+        let left_n_m = |kind: StageKind| {
+            let stage = answer.stages.iter().find(|stage| stage.stage == kind).expect("a stage");
+            assert!(
+                stage.held_out_rms_m.is_nan() && stage.advance_error_m.is_nan(),
+                "{stage:?}"
+            );
+            stage.torque.expect("the current counts").held_out_rms_n_m
+        };
+        let order = [
+            StageKind::Baseline,
+            StageKind::Recalibrated,
+            StageKind::Named,
+            StageKind::Floor,
+        ]
+        .map(left_n_m);
+        assert!(order.is_sorted_by(|more, less| more > less), "{order:?}");
+        // The rest is the ripple of gears that nobody described.
+        let closure = answer.effects[0].closure;
+        assert!((0.3..1.0).contains(&closure), "{closure}");
+        for run in &answer.runs {
+            assert!(!run.sees_positions && run.advance_m[0].is_nan(), "{run:?}");
+        }
+        let page = page(&answer, "unseen").expect("a page");
+        assert!(page.contains("mN m") && page.contains("Nobody saw the cells"));
+    }
+}
+
 #[test]
 fn current_that_nobody_recorded_is_no_evidence() {
     let mut campaign = draw_with_phase_sized(Hidden::Clean, SEED, CampaignSize::SMALL);
@@ -92,5 +152,8 @@ fn current_that_nobody_recorded_is_no_evidence() {
         .recordings
         .iter_mut()
         .for_each(|recording| recording.motor = None);
-    assert!(matches!(asked(&campaign, true), Err(ExplainError::NoCurrent)));
+    assert!(matches!(
+        asked(&campaign, Evidence::PositionsAndCurrent),
+        Err(ExplainError::NoCurrent)
+    ));
 }

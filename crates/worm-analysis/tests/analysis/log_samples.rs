@@ -1,10 +1,10 @@
 //! Logs as recordings, and recordings as logs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use testkit::crawl::{Crawl, Scene, paper_worm};
 use testkit::log_sample::{Telemetry, write_log};
 use worm_analysis::recording::mcap::{read, write};
-use worm_analysis::recording::{Motor, Recording};
+use worm_analysis::recording::{Motor, OpenOptions, ReadError, Recording, Wanted, open};
 use worm_estimator::config::Config;
 use worm_estimator::message::State;
 
@@ -22,7 +22,12 @@ fn states(seconds: f64) -> (Crawl, Vec<State>) {
     (crawl, states)
 }
 
-fn read_states(states: Vec<State>) -> Result<Recording, worm_analysis::recording::ReadError> {
+fn read_states(states: Vec<State>) -> Result<Recording, ReadError> {
+    in_a_log(states, read)
+}
+
+/// What `of` makes of the log of some states.
+fn in_a_log<T>(states: Vec<State>, of: impl FnOnce(&Path) -> T) -> T {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("worm.mcap");
     let telemetry = Telemetry {
@@ -30,7 +35,7 @@ fn read_states(states: Vec<State>) -> Result<Recording, worm_analysis::recording
         ..Telemetry::default()
     };
     write_log(&path, &telemetry);
-    read(&path)
+    of(&path)
 }
 
 #[test]
@@ -63,6 +68,52 @@ fn a_recording_has_each_sample_with_its_position_and_time() {
     assert!((mean_m(at(3.0)) - mean_m(at(1.0)) - truth_m).abs() < 2e-4);
     let motor = recording.motor.expect("is recorded");
     assert_eq!((motor.current_a[500], motor.voltage_v[500]), (0.2, 5.0));
+}
+
+#[test]
+fn the_log_of_a_worm_that_nobody_sees_has_the_motor_alone() {
+    let (_, seen) = states(8.3);
+    let mut unseen = seen.clone();
+    for (tick, state) in unseen.iter_mut().enumerate() {
+        (state.sample, state.sample_is_new, state.valid_mask) = (0, 0, 0);
+        state.position_m.fill(f64::NAN);
+        // A current that the mean over any readings has right; every fifth reading fails, and some have none.
+        state.motor_current_a = if tick % 7 == 3 { f64::NAN } else { state.phase };
+        state.motor_is_new = u32::from(tick % 5 != 4);
+    }
+    let opened = |states: &[State], wanted: Wanted| {
+        let options = OpenOptions {
+            wanted,
+            ..OpenOptions::default()
+        };
+        in_a_log(states.to_vec(), |path| open(path, &options))
+    };
+    let refused = opened(&unseen, Wanted::Positions)
+        .expect_err("there are none")
+        .to_string();
+    assert!(
+        refused.contains("no sample of the tracker") && refused.contains("wormd explain --current"),
+        "{refused}"
+    );
+    for wanted in [Wanted::PositionsOrMotor, Wanted::Motor] {
+        let recording = opened(&unseen, wanted).expect("the motor is there");
+        assert!(!recording.has_positions() && recording.cells() == 4, "{wanted:?}");
+        assert!((900..=996).contains(&recording.samples()), "{}", recording.samples());
+        let phase = recording.gait_phase.expect("is recorded");
+        let motor = recording.motor.expect("is recorded");
+        for (phase, current_a) in phase.iter().zip(&motor.current_a) {
+            // A window without one of its two readings is a quarter of a window off.
+            assert!(
+                current_a.is_nan() || (current_a - phase).abs() < 2e-3,
+                "{current_a} at {phase}"
+            );
+        }
+        let unread = motor.current_a.iter().filter(|current_a| current_a.is_nan());
+        assert!(unread.count() < 100);
+    }
+    let recording = opened(&seen, Wanted::PositionsOrMotor).expect("a recording");
+    assert!(recording.has_positions() && recording.samples() == 996);
+    assert!(!opened(&seen, Wanted::Motor).expect("a recording").has_positions());
 }
 
 #[test]

@@ -17,6 +17,8 @@ pub struct RunSummary {
     pub cycle_s: f64,
     /// Whether the gait phase was recorded.
     pub phase_recorded: bool,
+    /// Whether positions count; where they do not, the motor's current alone is evidence.
+    pub sees_positions: bool,
     /// Whether the recording starts with the worm just laid down.
     pub laid_down: bool,
     /// Standard deviation of one position, m.

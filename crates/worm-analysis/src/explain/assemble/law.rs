@@ -21,9 +21,9 @@ pub(super) fn law(
 ) -> Option<FoundLaw> {
     let law = &found.law;
     let (left, open) = law.held_out.determined_beside(without);
-    let floor_m = Measured::new(worm, &law.fit).floor_stage().held_out_rms_m;
+    let floor = Measured::new(worm, &law.fit).floor_of_closure();
     let left = clusters(worm, &law.fit, &left);
-    let (closure, closure_interval) = clusters(worm, recalibrated, &open).closure(&left, floor_m);
+    let (closure, closure_interval) = clusters(worm, recalibrated, &open).closure(&left, floor);
     if closure.is_nan() || closure < CLOSES || closure_interval[0] <= 0.0 {
         return None;
     }

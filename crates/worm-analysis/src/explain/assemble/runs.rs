@@ -27,8 +27,13 @@ pub(super) fn runs(worm: &RecordedWorm<'_>, parts: &Parts, named: Option<&Candid
             cycle_s: observed.cycle_s,
             phase_recorded: observed.phase_recorded,
             laid_down: observed.laid_down,
+            sees_positions: observed.sees_positions,
             noise_m: observed.noise_m,
-            drift_per_cycle_m: worm.noise[run].drift_per_cycle_m(),
+            drift_per_cycle_m: if observed.sees_positions {
+                worm.noise[run].drift_per_cycle_m()
+            } else {
+                f64::NAN
+            },
             advance_m: [
                 advance_m(observed, |sample, cell| observed.position_m[cell][sample]),
                 predicted_m(&parts.recalibrated),
@@ -49,7 +54,7 @@ fn current(
     named: Option<&Candidate>,
 ) -> Option<CurrentEvidence> {
     let observed = &worm.scene.observed[run];
-    let torque = observed.torque.as_ref()?;
+    observed.torque.as_ref()?;
     let named = named.map(|candidate| &candidate.fit);
     let mean = |of_cycles: Vec<f64>| of_cycles.iter().sum::<f64>() / of_cycles.len() as f64;
     let by = |fit: Option<&Fit>| {
@@ -62,14 +67,29 @@ fn current(
             ]
         })
     };
-    let best = named.unwrap_or(recalibrated);
-    let gears = worm.scene.predict(run, &best.hypothesis, &best.at)?.gears;
-    let shown_j = mean(of_cycles(observed, &torque.cumulative_j(&observed.phase, &gears)));
+    let shown_j = mean(shown_j(worm, run, named.unwrap_or(recalibrated))?);
     let [recalibrated, named] = [Some(recalibrated), named].map(by);
     Some(CurrentEvidence {
         torque_residual_n_m: [recalibrated[0], named[0]],
         work_j: [shown_j, recalibrated[1], named[1]],
     })
+}
+
+/// Net work that the cam takes in each settled cycle of a run, J: by the current and the gears of a fit.
+fn shown_j(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<Vec<f64>> {
+    let observed = &worm.scene.observed[run];
+    let torque = observed.torque.as_ref()?;
+    let gears = worm.scene.predict(run, &fit.hypothesis, &fit.at)?.gears;
+    Some(of_cycles(observed, &torque.cumulative_j(&observed.phase, &gears)))
+}
+
+/// Standard error of its mean over the cycles, J, by their scatter; none of fewer than two.
+pub(super) fn sigma_of_shown_j(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<f64> {
+    let shown_j = shown_j(worm, run, fit)?;
+    let count = shown_j.len() as f64;
+    let mean_j = shown_j.iter().sum::<f64>() / count;
+    let squares: f64 = shown_j.iter().map(|work_j| (work_j - mean_j).powi(2)).sum();
+    (count > 1.0).then(|| (squares / (count - 1.0) / count).sqrt())
 }
 
 /// Advance per cycle, m: mean over the settled samples, each against the one a cycle later in which every cell was seen too.

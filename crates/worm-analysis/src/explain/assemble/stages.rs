@@ -28,7 +28,7 @@ impl Gap {
             &parts.recalibrated,
             &parts.found.recalibrated_held_out.fits,
         );
-        let floor = measured.floor_stage();
+        let floor = measured.floor_of_closure();
         let stage = |kind: StageKind, candidate: &Candidate| {
             let folds = candidate.held_out.as_ref().map_or(&[][..], |held_out| &held_out.fits);
             let names: Vec<&str> = candidate
@@ -42,7 +42,7 @@ impl Gap {
             let held_out = candidate.held_out.as_ref();
             let (left, open) = held_out.map_or_else(Default::default, |held_out| held_out.determined_beside(without));
             let left = clusters(worm, &candidate.fit, &left);
-            clusters(worm, &parts.recalibrated, &open).closure(&left, floor.held_out_rms_m)
+            clusters(worm, &parts.recalibrated, &open).closure(&left, floor)
         };
         let of_named: Vec<Stage> = named
             .iter()
@@ -64,7 +64,7 @@ impl Gap {
         stages.extend(wrong);
         stages.extend(of_named.into_iter().next());
         stages.push(measured.free_form_stage(&parts.recalibrated));
-        stages.push(floor);
+        stages.push(measured.floor_stage());
         Self {
             stages,
             closure: closures,

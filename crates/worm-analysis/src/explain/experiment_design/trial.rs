@@ -92,6 +92,7 @@ impl<'r> Trial<'r> {
             phase: recording.gait_phase.clone()?,
             phase_recorded: base.phase_recorded,
             step_order: base.step_order.clone(),
+            sees_positions: base.sees_positions,
             position_m: recording.position_m.clone(),
             first_m: base.first_m.iter().map(|at_m| at_m + change.shift_m).collect(),
             noise_m: base.noise_m,

@@ -32,8 +32,20 @@ pub struct Options {
     pub expected_impact: f64,
     /// Names of effects that are left out of the search: what would it say if it did not know them?
     pub without: Vec<&'static str>,
-    /// Whether the motor's current is evidence of a worm's forces, beside the positions of its cells.
-    pub with_current: bool,
+    /// What of a worm's recordings is evidence.
+    pub evidence: Evidence,
+}
+
+/// What of a worm's recordings is evidence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Evidence {
+    /// The positions of its cells.
+    #[default]
+    Positions,
+    /// Positions, and the forces that the motor's current shows; of a run without positions the current alone.
+    PositionsAndCurrent,
+    /// The motor's current alone: positions are not looked at.
+    CurrentAlone,
 }
 
 impl Default for Options {
@@ -44,7 +56,7 @@ impl Default for Options {
             matters: 0.02,
             expected_impact: 0.06,
             without: Vec::new(),
-            with_current: false,
+            evidence: Evidence::Positions,
         }
     }
 }

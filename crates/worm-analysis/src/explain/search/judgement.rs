@@ -172,7 +172,8 @@ impl<P: Plant> Judge<'_, P> {
                         self.discrepancy.scale_m,
                     );
                     holds = of_trace.unwrap_or(without.chi_squared) > held_out.chi_squared
-                        && closed.is_none_or(|[_, most]| most >= CLOSES);
+                        && closed.is_none_or(|[_, most]| most >= CLOSES)
+                        && self.second_closes(&singles, &candidate, folds, &held_out);
                     candidate.held_out = Some(held_out);
                 }
                 Judged {
@@ -185,6 +186,25 @@ impl<P: Plant> Judge<'_, P> {
                 }
             })
             .collect()
+    }
+
+    /// Whether a pair closes some of the gap that its first effect alone leaves beyond its error; true of a single effect, and where that
+    /// is not asked.
+    fn second_closes(&self, singles: &[Candidate], pair: &Candidate, folds: &Folds, held_out: &HeldOut) -> bool {
+        let plant = self.problem.plant;
+        if !plant.asks_seconds_to_close() || pair.named().count() < 2 {
+            return true;
+        }
+        let first = singles
+            .iter()
+            .find(|single| single.hypothesised[0] == pair.hypothesised[0]);
+        let Some(first) = first else {
+            return true;
+        };
+        let alone = self::held_out(self.problem, &first.fit, folds);
+        let (left, open) = held_out.determined_beside(&alone);
+        let closed = plant.closed((&first.fit, &open), (&pair.fit, &left), self.discrepancy.scale_m);
+        closed.is_some_and(|[_, most]| most > 0.0)
     }
 
     /// Probability, for each effect of a candidate, that it changes what matters.

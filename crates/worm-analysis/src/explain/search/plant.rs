@@ -105,6 +105,11 @@ pub(in crate::explain) trait Plant: Recorded {
     /// 90 % interval of the fraction of the squared gap that one fit leaves open and another closes on data held out, down to noise and the
     /// discrepancy's scale; none where that is within its error.
     fn closed(&self, open: (&Fit, &[&FitWithout]), left: (&Fit, &[&FitWithout]), discrepancy: f64) -> Option<[f64; 2]>;
+    /// Whether a second effect must close some of the gap that the first one alone leaves, as [`closed`](Self::closed) counts it: where
+    /// much of the gap is nothing that an effect could close, a pair may be more probable than one effect and yet no nearer to the data.
+    fn asks_seconds_to_close(&self) -> bool {
+        false
+    }
     /// A fit with what nuisances have of an effect's law moved into the effect; it predicts the same.
     fn with_whole_effects(&self, fit: Fit) -> Fit;
 

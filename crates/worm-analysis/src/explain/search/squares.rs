@@ -87,6 +87,12 @@ pub(in crate::explain) struct Squares {
 }
 
 impl Squares {
+    /// Of a run that a model cannot make.
+    pub const IMPOSSIBLE: Self = Self {
+        sum: f64::NAN,
+        count: 1.0,
+    };
+
     pub fn add(&mut self, other: Self) {
         self.sum += other.sum;
         self.count += other.count;

@@ -9,12 +9,16 @@
 //!   the current shows the cam take, by the gears of the best model. Elsewhere nobody measured it; the reference is the energy that the contacts of the best model take along the
 //!   measured path, which is that model's path plus its smoothed residual, as [`crate::experiment`] computes it for a recording.
 //!
+//! - *torque*: where the motor's current counts, its residual in the bins of the same cycles. Of a campaign without positions it takes the
+//!   place of the first two: nobody measured an advance, and closures are those of the torque.
+//!
 //! # The two ends
 //! The *free form* adds the mean cycle of its residual to the recalibrated model: about as much as any periodic law could explain.
 //! The *floor* is the scatter of single cycles about that: no periodic model falls below it.
 
 mod free_form;
 mod mean_cycle;
+mod torque;
 
 use super::energy;
 use super::observed::Observed;
@@ -22,7 +26,8 @@ use super::predicted::Predicted;
 use super::recorded_worm::RecordedWorm;
 use super::residual::Residual;
 use super::settled_cycles::{Cycle, settled_cycles};
-use crate::explain::answer::{Stage, StageKind};
+use super::torque_discrepancy;
+use crate::explain::answer::{Stage, StageKind, TorqueGap};
 use crate::explain::search::fit::{Fit, FitWithout};
 use crate::explain::search::squares::{Clusters, NINETY, Squares};
 pub(in crate::explain) use mean_cycle::cycles;
@@ -37,6 +42,7 @@ pub(in crate::explain) struct Measured<'p, 'a> {
     energy_j: Vec<Option<Vec<f64>>>,
     /// Residuals of the best model in each run; none where it cannot make the run.
     residuals: Vec<Option<CellResiduals>>,
+    best: &'p Fit,
 }
 
 /// Every cell's residual in a run, m, `[sample][cell]`, flat, and the body's, m; `NaN` where not seen.
@@ -65,21 +71,30 @@ impl CellResiduals {
     }
 }
 
-/// Squares of each cycle held out, as [`Measured::stage`] counts them.
+/// Squares of each cycle held out, by which closures are judged: of the positions, or of the torque where nobody sees the cells.
 pub(in crate::explain) fn clusters(worm: &RecordedWorm<'_>, all: &Fit, folds: &[&FitWithout]) -> Clusters {
+    match worm.sees_positions() {
+        true => clusters_by(worm, all, folds, of_cycles),
+        false => clusters_by(worm, all, folds, torque::of_cycles),
+    }
+}
+
+/// Squares of each cycle held out: `of_cycles` gives those of all settled cycles of a run under a fit. Without folds all are held out.
+fn clusters_by(
+    worm: &RecordedWorm<'_>,
+    all: &Fit,
+    folds: &[&FitWithout],
+    of_cycles: impl Fn(&RecordedWorm<'_>, usize, &Fit) -> Option<Vec<Squares>>,
+) -> Clusters {
     let mut clusters = Clusters::default();
     let mut add = |fit: &Fit, is_out: &dyn Fn(usize, usize) -> bool| {
         for (run, observed) in worm.scene.observed.iter().enumerate() {
-            let residuals = CellResiduals::of(worm, run, fit);
-            for cycle in settled_cycles(observed).iter().filter(|cycle| is_out(run, cycle.index)) {
-                let squares = residuals.as_ref().map_or(
-                    Squares {
-                        sum: f64::NAN,
-                        count: 1.0,
-                    },
-                    |residuals| of_cycle(observed, residuals, cycle),
-                );
-                clusters.add(run, cycle.index, squares);
+            let squares = of_cycles(worm, run, fit);
+            for (number, cycle) in settled_cycles(observed).iter().enumerate() {
+                if is_out(run, cycle.index) {
+                    let of_cycle = squares.as_ref().map_or(Squares::IMPOSSIBLE, |squares| squares[number]);
+                    clusters.add(run, cycle.index, of_cycle);
+                }
             }
         }
     };
@@ -95,18 +110,26 @@ pub(in crate::explain) fn clusters(worm: &RecordedWorm<'_>, all: &Fit, folds: &[
 }
 
 /// 90 % interval of the fraction of the squared gap that one fit leaves open and another closes on data held out, down to the scatter of
-/// single cycles and a discrepancy that no model is without, m; none where that is within its error.
+/// single cycles and a discrepancy that no model is without (`discrepancy_m` of the positions, of a torque the ripple of the gears, too);
+/// none where that is within its error.
 pub(in crate::explain) fn closed(
     worm: &RecordedWorm<'_>,
     (open, open_folds): (&Fit, &[&FitWithout]),
     (left, left_folds): (&Fit, &[&FitWithout]),
     discrepancy_m: f64,
 ) -> Option<[f64; 2]> {
-    let runs = 0..worm.scene.observed.len();
-    let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(worm, run, left)).collect();
-    let floor_m = scatter(worm, &residuals).rms().hypot(discrepancy_m);
+    let floor = if worm.sees_positions() {
+        let runs = 0..worm.scene.observed.len();
+        let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(worm, run, left)).collect();
+        scatter(worm, &residuals).rms().hypot(discrepancy_m)
+    } else {
+        let gear = worm.gear()?;
+        torque::floor(worm, left)
+            .rms()
+            .hypot(torque_discrepancy::rms_n_m(&worm.scene.nominal, gear))
+    };
     let left = clusters(worm, left, left_folds);
-    let (_, interval) = clusters(worm, open, open_folds).closure(&left, floor_m);
+    let (_, interval) = clusters(worm, open, open_folds).closure(&left, floor);
     interval.iter().all(|end| end.is_finite()).then_some(interval)
 }
 
@@ -116,11 +139,9 @@ fn scatter(worm: &RecordedWorm<'_>, residuals: &[Option<CellResiduals>]) -> Squa
     let mut squares = Squares::default();
     for (observed, residuals) in worm.scene.observed.iter().zip(residuals) {
         squares.add(match residuals {
+            Some(_) if !observed.sees_positions => Squares::default(),
             Some(residuals) => free_form::floor(observed, &free_form::all(observed, residuals)),
-            None => Squares {
-                sum: f64::NAN,
-                count: 0.0,
-            },
+            None => Squares::IMPOSSIBLE,
         });
     }
     squares
@@ -128,7 +149,7 @@ fn scatter(worm: &RecordedWorm<'_>, residuals: &[Option<CellResiduals>]) -> Squa
 
 impl<'p, 'a> Measured<'p, 'a> {
     /// The reference by the best fit.
-    pub fn new(worm: &'p RecordedWorm<'a>, best: &Fit) -> Self {
+    pub fn new(worm: &'p RecordedWorm<'a>, best: &'p Fit) -> Self {
         let runs = 0..worm.scene.observed.len();
         let residuals: Vec<Option<CellResiduals>> = runs.map(|run| CellResiduals::of(worm, run, best)).collect();
         let energy = |(run, residuals): (usize, &Option<CellResiduals>)| {
@@ -146,6 +167,7 @@ impl<'p, 'a> Measured<'p, 'a> {
             worm,
             energy_j: residuals.iter().enumerate().map(energy).collect(),
             residuals,
+            best,
         }
     }
 
@@ -155,7 +177,8 @@ impl<'p, 'a> Measured<'p, 'a> {
     pub fn stage(&self, stage: StageKind, effect: Option<String>, all: &Fit, folds: &[FitWithout]) -> Stage {
         let residuals = self.residuals(all);
         let fit_rms_m = self.rms(&residuals, |_, _| true);
-        let held_out = clusters(self.worm, all, &folds.iter().collect::<Vec<_>>());
+        let folds: Vec<&FitWithout> = folds.iter().collect();
+        let held_out = clusters_by(self.worm, all, &folds, of_cycles);
         let energy_j = |run: usize| {
             let (observed, under) = (self.observed(run), (&all.hypothesis, &all.at[..]));
             if observed.torque.is_some() {
@@ -172,9 +195,18 @@ impl<'p, 'a> Measured<'p, 'a> {
             held_out_interval_m: held_out.interval_m(),
             advance_error_interval_m: self.advance_interval_m(&residuals),
             advance_error_m: self
-                .mean_over_runs(|run| Some(advance_m(self.observed(run), residuals[run].as_ref()?).abs())),
+                .mean_over_seen(|run| Some(advance_m(self.observed(run), residuals[run].as_ref()?).abs())),
             energy_error_j: self.energy_error_j(energy_j),
+            torque: self.of_torque(|| {
+                let fitted = clusters_by(self.worm, all, &[], torque::of_cycles).total();
+                torque::gap(fitted, &clusters_by(self.worm, all, &folds, torque::of_cycles))
+            }),
         }
+    }
+
+    /// Of the torque, where it counts.
+    fn of_torque(&self, gap: impl FnOnce() -> TorqueGap) -> Option<TorqueGap> {
+        self.worm.counts_current().then(gap)
     }
 
     /// The stage of the recalibrated model plus the mean cycle of its residual in each run: over all cycles for the fit, over the others
@@ -192,7 +224,8 @@ impl<'p, 'a> Measured<'p, 'a> {
         let rms = |residuals: &[Option<CellResiduals>]| self.rms(residuals, |_, _| true);
         let energy_j = |run: usize| {
             let observed = self.observed(run);
-            let beyond_m = free_form::mean_displacement_m(observed, residuals[run].as_ref()?);
+            let residuals = residuals[run].as_ref().filter(|_| observed.sees_positions)?;
+            let beyond_m = free_form::mean_displacement_m(observed, residuals);
             Some(energy::carried(&self.worm.scene, run, recalibrated, &beyond_m)?.energy_j(observed))
         };
         Stage {
@@ -202,8 +235,9 @@ impl<'p, 'a> Measured<'p, 'a> {
             held_out_rms_m: f64::min(rms(&alone), rms(&trend)),
             held_out_interval_m: [f64::NAN; 2],
             advance_error_interval_m: [f64::NAN; 2],
-            advance_error_m: self.mean_over_runs(|run| Some(advance_m(self.observed(run), all[run].as_ref()?).abs())),
+            advance_error_m: self.mean_over_seen(|run| Some(advance_m(self.observed(run), all[run].as_ref()?).abs())),
             energy_error_j: self.energy_error_j(energy_j),
+            torque: self.of_torque(|| torque::free_form(self.worm, recalibrated)),
         }
     }
 
@@ -222,21 +256,38 @@ impl<'p, 'a> Measured<'p, 'a> {
             held_out_rms_m: squares.rms(),
             held_out_interval_m: [f64::NAN; 2],
             advance_error_interval_m: [f64::NAN; 2],
-            advance_error_m: self.mean_over_runs(|run| Some(chance(self.worm.noise[run].drift_per_cycle_m(), run))),
+            advance_error_m: self.mean_over_seen(|run| Some(chance(self.worm.noise[run].drift_per_cycle_m(), run))),
             energy_error_j: self.mean_over_runs(|run| Some(chance(deviation(self.energy_j[run].as_ref()?), run))),
+            torque: self.of_torque(|| {
+                let rms_n_m = torque::floor(self.worm, self.best).rms();
+                TorqueGap {
+                    fit_rms_n_m: rms_n_m,
+                    held_out_rms_n_m: rms_n_m,
+                    held_out_interval_n_m: [f64::NAN; 2],
+                }
+            }),
+        }
+    }
+
+    /// The noise floor of what closures are judged by: m of positions, N m of a torque.
+    pub fn floor_of_closure(&self) -> f64 {
+        match self.worm.sees_positions() {
+            true => scatter(self.worm, &self.residuals).rms(),
+            false => torque::floor(self.worm, self.best).rms(),
         }
     }
 
     /// 90 % interval of the mean over the runs of how far the advance is off, m: by the scatter of the cycles.
     fn advance_interval_m(&self, residuals: &[Option<CellResiduals>]) -> [f64; 2] {
         let of = |run: usize| Some(advance_m(self.observed(run), residuals[run].as_ref()?).abs());
-        let mean_m = self.mean_over_runs(of);
-        let variance_m2: f64 = (0..self.runs())
+        let mean_m = self.mean_over_seen(of);
+        let seen = || (0..self.runs()).filter(|&run| self.observed(run).sees_positions);
+        let variance_m2: f64 = seen()
             .map(|run| {
                 self.worm.noise[run].drift_per_cycle_m().powi(2) / settled_cycles(self.observed(run)).len() as f64
             })
             .sum();
-        let half_m = NINETY * variance_m2.sqrt() / self.runs() as f64;
+        let half_m = NINETY * variance_m2.sqrt() / seen().count() as f64;
         [(mean_m - half_m).max(0.0), mean_m + half_m]
     }
 
@@ -269,10 +320,7 @@ impl<'p, 'a> Measured<'p, 'a> {
         for (run, residuals) in residuals.iter().enumerate() {
             squares.add(match residuals {
                 Some(residuals) => within_cycles(self.observed(run), residuals, |cycle| counts(run, cycle)),
-                None => Squares {
-                    sum: f64::NAN,
-                    count: 0.0,
-                },
+                None => Squares::IMPOSSIBLE,
             });
         }
         squares
@@ -286,6 +334,12 @@ impl<'p, 'a> Measured<'p, 'a> {
     fn mean_over_runs(&self, of: impl Fn(usize) -> Option<f64>) -> f64 {
         let sum: f64 = (0..self.runs()).map(|run| of(run).unwrap_or(f64::NAN)).sum();
         sum / self.runs() as f64
+    }
+
+    /// Mean over the runs with positions; `NaN` where there is none, or one has no figure.
+    fn mean_over_seen(&self, of: impl Fn(usize) -> Option<f64>) -> f64 {
+        let seen = (0..self.runs()).filter(|&run| self.observed(run).sees_positions);
+        mean(&seen.map(|run| of(run).unwrap_or(f64::NAN)).collect::<Vec<_>>())
     }
 
     /// Error of a model's energy per cycle against the reference, J.
@@ -303,6 +357,18 @@ fn deviation(values: &[f64]) -> f64 {
     let mean = mean(values);
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (squares / (values.len() as f64 - 1.0)).sqrt()
+}
+
+/// Squares of each settled cycle of a run under a fit; none where the fit cannot make the run.
+fn of_cycles(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<Vec<Squares>> {
+    let (observed, residuals) = (&worm.scene.observed[run], CellResiduals::of(worm, run, fit)?);
+    let cycles = settled_cycles(observed);
+    Some(
+        cycles
+            .iter()
+            .map(|cycle| of_cycle(observed, &residuals, cycle))
+            .collect(),
+    )
 }
 
 /// Squares of every cell's residual within the cycles that count, about its mean in each.

@@ -122,9 +122,12 @@ impl Nuisance {
         all
     }
 
-    /// Those of a campaign in which forces are known, too: the same, with wider priors of friction and stiffness.
-    pub fn all_by_forces(cells: usize, runs: usize, phase_recorded: bool) -> Vec<Free> {
+    /// Those of a campaign in which forces are known, too: the same, with wider priors of friction and stiffness, and without those of the
+    /// tracker where it saw nothing.
+    pub fn all_by_forces(cells: usize, runs: usize, phase_recorded: bool, sees_positions: bool) -> Vec<Free> {
         let mut all = Self::all(cells, runs, phase_recorded);
+        let of_tracker = [Self::Clock, Self::ClockDrift].map(Self::what);
+        all.retain(|free| sees_positions || !of_tracker.contains(&free.what));
         for nuisance in [Self::Friction, Self::Stiffness] {
             let of_it = all.iter_mut().filter(|free| free.what == nuisance.what());
             of_it.for_each(|free| *free = nuisance.free(BY_FORCES));

@@ -37,11 +37,13 @@ pub(in crate::explain) struct Observed<'a> {
     pub phase_recorded: bool,
     /// Cells in the order in which they step.
     pub step_order: Vec<usize>,
+    /// Whether positions count; where they do not, there is a [`torque`](Self::torque).
+    pub sees_positions: bool,
     /// Positions without outliers, m: `[cell][sample]`; `NaN` where not seen.
     pub position_m: Vec<Vec<f64>>,
-    /// Where the cells were at the first sample, m.
+    /// Where the cells were at the first sample, m; without positions where the first is at 0.
     pub first_m: Vec<f64>,
-    /// Standard deviation of the white part of one position, m.
+    /// Standard deviation of the white part of one position, m; `NaN` without positions.
     pub noise_m: f64,
     /// The recording may start with the worm just laid down.
     pub may_be_laid_down: bool,
@@ -66,19 +68,7 @@ impl<'a> Observed<'a> {
     pub fn new(run: RecordedRun<'a>, config: &Config) -> Result<Self, ExplainError> {
         let recording = run.recording;
         let name = || recording.source.display().to_string();
-        if !(-90.0..=90.0).contains(&run.slope_deg) {
-            return Err(ExplainError::Slope {
-                recording: name(),
-                slope_deg: run.slope_deg,
-            });
-        }
-        if recording.cells() != config.worm.cells {
-            return Err(ExplainError::Cells {
-                recording: name(),
-                found: recording.cells(),
-                configured: config.worm.cells,
-            });
-        }
+        check_conditions(run, config)?;
         let Steadied {
             recording: steadied,
             gait,
@@ -111,14 +101,14 @@ impl<'a> Observed<'a> {
             .collect();
         let steps = gait.phase[0] * recording.cells() as f64;
         let may_be_laid_down = (steps - steps.round()).abs() < AT_BEGIN * recording.cells() as f64;
-        let last = gait.phase.len() - 1;
-        let mut observed = Self {
-            cycle_s: (recording.time_s[last] - recording.time_s[0]) / (gait.phase[last] - gait.phase[0]),
+        Self {
+            cycle_s: mean_cycle_s(&recording.time_s, &gait.phase),
             pauses: pauses(&recording.time_s, &gait.phase),
             run,
             phase_recorded: recording.gait_phase.is_some(),
             step_order: gait.step_order,
             phase: gait.phase,
+            sees_positions: true,
             position_m,
             first_m,
             noise_m,
@@ -129,16 +119,57 @@ impl<'a> Observed<'a> {
             settled: None,
             repairs,
             torque: None,
-        };
-        observed.assume_laid_down(false);
-        if observed.whole_cycles() < MIN_CYCLES {
-            return Err(ExplainError::TooShort {
-                recording: name(),
-                cycles: observed.whole_cycles(),
-                needed: MIN_CYCLES,
-            });
         }
-        Ok(observed)
+        .long_enough()
+    }
+
+    /// By the motor's current alone, whatever positions there are.
+    pub fn by_current(run: RecordedRun<'a>, config: &Config, gear: &GearModel) -> Result<Self, ExplainError> {
+        let recording = run.recording;
+        check_conditions(run, config)?;
+        let phase = recording.gait_phase.clone().unwrap_or_default();
+        let turned = phase
+            .last()
+            .zip(phase.first())
+            .map_or(0.0, |(last, first)| last - first);
+        let cells = recording.cells();
+        let torque = MeasuredTorque::new(recording, &phase, gear).ok_or_else(|| ExplainError::NoCurrentOfRun {
+            recording: recording.source.display().to_string(),
+        })?;
+        if turned < MIN_CYCLES as f64 {
+            return Err(too_short(recording, turned.max(0.0) as usize));
+        }
+        Self {
+            cycle_s: mean_cycle_s(&recording.time_s, &phase),
+            pauses: pauses(&recording.time_s, &phase),
+            run,
+            phase_recorded: true,
+            step_order: config.worm.step_order_from_zero(),
+            phase,
+            sees_positions: false,
+            position_m: vec![vec![f64::NAN; recording.samples()]; cells],
+            first_m: (0..cells)
+                .map(|cell| -config.worm.cell_spacing_m * cell as f64)
+                .collect(),
+            noise_m: f64::NAN,
+            // How the tips were loaded then shows in the positions alone.
+            may_be_laid_down: false,
+            laid_down: false,
+            counts_from: 0,
+            pace: Pace::default(),
+            settled: None,
+            repairs: Vec::new(),
+            torque: Some(torque),
+        }
+        .long_enough()
+    }
+
+    fn long_enough(mut self) -> Result<Self, ExplainError> {
+        self.assume_laid_down(false);
+        match self.whole_cycles() {
+            cycles if cycles < MIN_CYCLES => Err(too_short(self.run.recording, cycles)),
+            _ => Ok(self),
+        }
     }
 
     /// Counts the motor's current as evidence, too; not where the phase was found from the positions, or a current was hardly ever read.
@@ -208,6 +239,37 @@ impl<'a> Observed<'a> {
         let step = (self.phase[sample] * cells).floor().rem_euclid(cells);
         self.step_order[step as usize]
     }
+}
+
+/// Refuses a slope that is none, and a worm with another number of cells.
+fn check_conditions(run: RecordedRun<'_>, config: &Config) -> Result<(), ExplainError> {
+    let (recording, slope_deg) = (run.recording.source.display().to_string(), run.slope_deg);
+    let (found, configured) = (run.recording.cells(), config.worm.cells);
+    if !(-90.0..=90.0).contains(&slope_deg) {
+        return Err(ExplainError::Slope { recording, slope_deg });
+    }
+    if found != configured {
+        return Err(ExplainError::Cells {
+            recording,
+            found,
+            configured,
+        });
+    }
+    Ok(())
+}
+
+fn too_short(recording: &Recording, cycles: usize) -> ExplainError {
+    ExplainError::TooShort {
+        recording: recording.source.display().to_string(),
+        cycles,
+        needed: MIN_CYCLES,
+    }
+}
+
+/// Mean time of a gait cycle, rests included, s.
+fn mean_cycle_s(time_s: &[f64], phase: &[f64]) -> f64 {
+    let last = phase.len() - 1;
+    (time_s[last] - time_s[0]) / (phase[last] - phase[0])
 }
 
 /// Whether the drive stands still for a while on the way.

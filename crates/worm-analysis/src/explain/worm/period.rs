@@ -119,7 +119,7 @@ fn displacements_of_all(worm: &RecordedWorm<'_>, fit: &Fit) -> Vec<Series> {
 
 /// Displacement of the body in each settled cycle of a run beyond the model's.
 fn displacements(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<Series> {
-    let observed = &worm.scene.observed[run];
+    let observed = Some(&worm.scene.observed[run]).filter(|observed| observed.sees_positions)?;
     let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at)?;
     let left = Residual::new(observed, &predicted);
     let from = observed.settled_from();

@@ -22,7 +22,7 @@ use crate::explain::search::impact::Impact;
 use crate::explain::search::law::offer::Offer;
 use crate::explain::search::parameter::{Free, Hypothesised};
 use crate::explain::search::plant::{Plant, PredictedRun, Recorded};
-use worm_physics::effect::{LIBRARY, Scope};
+use worm_physics::effect::{Effect, LIBRARY, Scope};
 
 /// Residual of a run that the worm could not have made.
 const IMPOSSIBLE: f64 = 1e3;
@@ -33,9 +33,14 @@ const BEHIND_M: f64 = 0.02;
 
 /// Every hypothesis about a single effect that positions can show.
 pub(in crate::explain) fn hypotheses(cells: usize, phase_recorded: bool) -> Vec<Hypothesised> {
+    hypotheses_of(cells, |effect| effect.is_visible_in_positions(phase_recorded))
+}
+
+/// Every hypothesis about a single effect of some.
+fn hypotheses_of(cells: usize, is_visible: impl Fn(&Effect) -> bool) -> Vec<Hypothesised> {
     let mut all = Vec::new();
     for &effect in &LIBRARY {
-        if !effect.is_visible_in_positions(phase_recorded) {
+        if !is_visible(effect) {
             continue;
         }
         if effect.scope != Scope::OneCell {
@@ -53,7 +58,7 @@ impl Plant for RecordedWorm<'_> {
         let (cells, runs, phase_recorded) = (self.channels(), self.runs(), self.phase_recorded());
         match self.gear() {
             Some(gear) => {
-                let mut all = Nuisance::all_by_forces(cells, runs, phase_recorded);
+                let mut all = Nuisance::all_by_forces(cells, runs, phase_recorded, self.sees_positions());
                 all.extend(gears::nuisances(gear));
                 all
             }
@@ -66,19 +71,33 @@ impl Plant for RecordedWorm<'_> {
     }
 
     fn hypotheses(&self) -> Vec<Hypothesised> {
-        let mut all = hypotheses(self.channels(), self.phase_recorded());
+        let mut all = match self.sees_positions() {
+            true => hypotheses(self.channels(), self.phase_recorded()),
+            false => hypotheses_of(self.channels(), Effect::is_visible_in_forces),
+        };
         let without_twins = self.counts_current();
         all.iter_mut().for_each(|one| one.without_twins = without_twins);
         all
     }
 
-    /// The stretch of canal where tips have been.
+    /// The stretch of canal where tips have been, or may have been where nobody saw them.
     fn stretch_m(&self) -> (f64, f64) {
-        let observed = self.scene.observed.iter();
-        let seen = observed.flat_map(|observed| observed.position_m.iter().flatten());
+        let places = self.scene.observed.iter().zip(&self.scene.nominal);
+        let seen = places.flat_map(|(observed, physics)| {
+            let farthest_m = (!observed.sees_positions).then(|| {
+                let cycles = observed.phase[observed.samples() - 1] - observed.phase[0];
+                observed
+                    .first_m
+                    .iter()
+                    .map(move |at_m| at_m + cycles * physics.worm.stroke_m())
+            });
+            let unseen = farthest_m.into_iter().flatten().chain(observed.first_m.iter().copied());
+            let positions = observed.position_m.iter().flatten().copied();
+            positions.chain(unseen.filter(|_| !observed.sees_positions))
+        });
         let (min_m, max_m) = seen
             .filter(|at_m| at_m.is_finite())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(min_m, max_m), &at_m| {
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(min_m, max_m), at_m| {
                 (f64::min(min_m, at_m), f64::max(max_m, at_m))
             });
         (min_m - BEHIND_M, max_m)
@@ -125,6 +144,10 @@ impl Plant for RecordedWorm<'_> {
         discrepancy_m: f64,
     ) -> Option<[f64; 2]> {
         closed(self, open, left, discrepancy_m)
+    }
+
+    fn asks_seconds_to_close(&self) -> bool {
+        !self.sees_positions()
     }
 
     fn with_whole_effects(&self, fit: Fit) -> Fit {

@@ -5,6 +5,7 @@ use super::observed::Observed;
 use super::predict::{Scene, nominal, predict};
 use super::residual::Residual;
 use crate::experiment::RecordedRun;
+use crate::explain::search::find::Evidence;
 use worm_estimator::config::Config;
 use worm_physics::effect::Setting;
 use worm_physics::{Physics, Worm};
@@ -13,7 +14,11 @@ use worm_physics::{Physics, Worm};
 const USUAL: f64 = 0.4;
 
 /// Prepares the runs of a campaign.
-pub(in crate::explain) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config) -> Result<Scene<'a>, ExplainError> {
+pub(in crate::explain) fn prepare<'a>(
+    runs: &[RecordedRun<'a>],
+    config: &Config,
+    evidence: Evidence,
+) -> Result<Scene<'a>, ExplainError> {
     if runs.is_empty() {
         return Err(ExplainError::NoRun);
     }
@@ -30,7 +35,7 @@ pub(in crate::explain) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config)
         nominal: Vec::with_capacity(runs.len()),
     };
     for run in runs {
-        let mut observed = Observed::new(*run, config)?;
+        let mut observed = observe(*run, config, evidence)?;
         if let Some(first) = scene.observed.first() {
             same_order(first, &observed)?;
         }
@@ -48,21 +53,29 @@ pub(in crate::explain) fn prepare<'a>(runs: &[RecordedRun<'a>], config: &Config)
         scene.observed.push(observed);
         scene.nominal.push(physics);
     }
+    let counts_current = scene.observed.iter().any(|observed| observed.torque.is_some());
+    if evidence != Evidence::Positions && !counts_current {
+        return Err(ExplainError::NoCurrent);
+    }
     Ok(scene)
 }
 
-/// Counts the motor's current as evidence, too.
-///
-/// # Errors
-/// [`ExplainError::NoCurrent`] where no run has one with its phase.
-pub(in crate::explain) fn count_current(scene: &mut Scene<'_>, config: &Config) -> Result<(), ExplainError> {
+/// A run by what counts of it.
+fn observe<'a>(run: RecordedRun<'a>, config: &Config, evidence: Evidence) -> Result<Observed<'a>, ExplainError> {
     let gear = config.self_sensing().gear;
-    scene
-        .observed
-        .iter_mut()
-        .for_each(|observed| observed.count_current(&gear));
-    let counts = scene.observed.iter().any(|observed| observed.torque.is_some());
-    counts.then_some(()).ok_or(ExplainError::NoCurrent)
+    let has_positions = run.recording.has_positions();
+    match evidence {
+        Evidence::Positions if !has_positions => Err(ExplainError::NoPositions {
+            recording: run.recording.source.display().to_string(),
+        }),
+        Evidence::Positions => Observed::new(run, config),
+        Evidence::PositionsAndCurrent if has_positions => {
+            let mut observed = Observed::new(run, config)?;
+            observed.count_current(&gear);
+            Ok(observed)
+        }
+        Evidence::PositionsAndCurrent | Evidence::CurrentAlone => Observed::by_current(run, config, &gear),
+    }
 }
 
 fn same_order(first: &Observed<'_>, other: &Observed<'_>) -> Result<(), ExplainError> {

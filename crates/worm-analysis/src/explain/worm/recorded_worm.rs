@@ -55,6 +55,11 @@ impl<'a> RecordedWorm<'a> {
         self.gear().is_some()
     }
 
+    /// Whether positions count in some run; else the current alone is evidence.
+    pub fn sees_positions(&self) -> bool {
+        self.scene.observed.iter().any(|observed| observed.sees_positions)
+    }
+
     /// What was assumed of the gears, where the current counts.
     pub fn gear(&self) -> Option<&GearModel> {
         let mut torques = self
@@ -115,20 +120,31 @@ impl Recorded for RecordedWorm<'_> {
     fn discrepancy_columns(&self, scale_m: f64) -> DMatrix<f64> {
         let (cells, bins, conditions) = (self.channels(), self.all_bins(), self.conditions());
         let rows_of = |run: usize, pattern_m: &[f64]| self.rows_of(run, pattern_m);
-        let of_positions = repeating_columns(cells, &bins, &conditions, scale_m, rows_of);
+        let of_positions = || repeating_columns(cells, &bins, &conditions, scale_m, rows_of);
         let Some(gear) = self.gear() else {
-            return of_positions;
+            return of_positions();
         };
         let scale_n_m = torque_discrepancy::scale_n_m(&self.scene.nominal);
         let rows_of = |run: usize, torque_n_m: &[f64]| self.rows_of_torque(run, torque_n_m);
         let of_torque = torque_discrepancy::columns((scale_n_m, gear), cells, &bins, &conditions, rows_of);
+        if !self.sees_positions() {
+            return of_torque;
+        }
+        let of_positions = of_positions();
         let count = of_positions.ncols();
         let mut all = of_positions.resize_horizontally(count + of_torque.ncols(), 0.0);
         all.columns_mut(count, of_torque.ncols()).copy_from(&of_torque);
         all
     }
 
+    /// Where nobody sees the cells, the torque takes it that the stepping cell's pad is deformed by its displacement.
     fn rows_of(&self, run: usize, pattern_m: &[f64]) -> Vec<f64> {
+        if !self.sees_positions() {
+            let n_m_per_m = torque_discrepancy::of_deformation_n_m_per_m(&self.scene.nominal[run]);
+            let bins = self.bins[run].bins.iter().zip(pattern_m.chunks_exact(self.channels()));
+            let torque_n_m: Vec<f64> = bins.map(|(bin, at_m)| n_m_per_m * at_m[bin.leading]).collect();
+            return self.rows_of_torque(run, &torque_n_m);
+        }
         let residual = Residual::of_pattern(&self.scene.observed[run], &self.bins[run], pattern_m);
         let mut rows = self.whitened(run, &residual, &[]);
         rows.resize(self.rows(run), 0.0);

@@ -45,7 +45,7 @@ pub(in crate::explain) fn period(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<f
 fn tables(worm: &RecordedWorm<'_>, fit: &Fit) -> Vec<DMatrix<f64>> {
     let runs = 0..worm.scene.observed.len();
     let table = |run: usize| {
-        let observed = &worm.scene.observed[run];
+        let observed = Some(&worm.scene.observed[run]).filter(|observed| observed.sees_positions)?;
         let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at)?;
         let bins = &worm.bins[run];
         let left = Residual::binned(observed, bins, &predicted);

@@ -105,3 +105,18 @@ pub(super) fn scale_n_m(nominal: &[Physics]) -> f64 {
     };
     SHARE * (nominal.iter().map(of_worm).sum::<f64>() / nominal.len() as f64)
 }
+
+/// Root mean square of all of it, N m: what no effect has to close.
+pub(super) fn rms_n_m(nominal: &[Physics], gear: &GearModel) -> f64 {
+    let waves = gear.ripple.iter().filter(|ripple| ripple.waves != 0.0).count() as f64;
+    let of_ripple_n_m = (waves + UNKNOWN_WAVES * UNKNOWN_WAVES).sqrt() * gear.ripple_sigma_n_m;
+    scale_n_m(nominal).hypot(of_ripple_n_m)
+}
+
+/// Torque on the cam by the deformation of the stepping cell's pad, N m for each metre: by the mean stiffness, over the way of the cell for
+/// each turn of the cam.
+pub(super) fn of_deformation_n_m_per_m(nominal: &Physics) -> f64 {
+    let contacts = nominal.worm.contacts().iter();
+    let stiffness_n_per_m: f64 = contacts.map(|contact| contact.stiffness_n_per_m).sum();
+    stiffness_n_per_m * nominal.worm.stroke_m() / TAU // the mean over the cells times their number
+}

@@ -24,7 +24,7 @@ fn usual_options_are_accepted() {
             from_s,
             to_s,
             max_gap_s,
-            axis: None,
+            ..OpenOptions::default()
         };
         assert_eq!(check(options.clone()), Ok(()), "{options:?}");
     }
@@ -49,7 +49,7 @@ fn times_that_cannot_be_used_are_refused_by_the_name_of_the_flag() {
             from_s,
             to_s,
             max_gap_s,
-            axis: None,
+            ..OpenOptions::default()
         };
         let error = check(options).expect_err(expected);
         assert!(error.starts_with("worm.csv: ") && error.contains(expected), "{error}");

@@ -93,6 +93,7 @@ fn found(per_n: f64, rest_s: f64, seed: u64) -> SpeedDroop {
         phase_recorded: true,
         step_order: (0..cells).collect(),
         first_m: first_m.clone(),
+        sees_positions: true,
         noise_m: 1e-4,
         may_be_laid_down: true,
         laid_down: true,

@@ -1,6 +1,6 @@
 //! How the gap shrinks, stage by stage, on cycles that nothing was fitted to.
 
-use super::super::view::{StageView, mm, stage_of, stages};
+use super::super::view::{Distance, StageView, stage_of, stages};
 use crate::explain::Answer;
 use crate::explain::answer::Stage;
 use crate::explain::answer::StageKind;
@@ -16,7 +16,7 @@ const HALF_BAR: f64 = 0.24;
 const BELOW: f64 = 0.4;
 const MAX_CHARACTERS: usize = 60;
 /// Room beside the longest bar for its value, as a fraction of its length.
-const BESIDE: f64 = 0.2;
+const BESIDE: f64 = 0.28;
 
 /// How a stage's bar looks.
 fn style(stage: &StageView) -> (Mark, Colour) {
@@ -30,6 +30,7 @@ fn style(stage: &StageView) -> (Mark, Colour) {
 }
 
 pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
+    let distance = Distance::of(answer);
     let bars = stages(answer);
     let floor = stage_of(answer, StageKind::Floor);
     let key = |(stage, _): &(StageView, &Stage)| {
@@ -54,8 +55,8 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
         keys,
         panels: vec![Panel::new(
             "distance of model and data",
-            "root mean square within a cycle, held-out cycles, mm",
-            picture(&bars, floor)?,
+            format!("{}, held-out cycles, {}", distance.in_words(), distance.unit()),
+            picture(&bars, floor, distance)?,
         )],
         caption: format!("{}.{missing}", sentence_case(&meanings.collect::<Vec<_>>().join("; "))),
     })
@@ -69,47 +70,44 @@ fn sentence_case(text: &str) -> String {
     }
 }
 
-fn picture(bars: &[(StageView, &Stage)], floor: Option<&Stage>) -> Result<Svg, DrawError> {
-    let floor_mm = floor.map_or(f64::NAN, |floor| floor.held_out_rms_m * 1e3);
-    let values_mm = bars
-        .iter()
-        .map(|(_, stage)| stage.held_out_rms_m * 1e3)
-        .chain([floor_mm]);
-    let longest_mm = values_mm.filter(|mm| Axis::is_drawable(*mm)).fold(0.0, f64::max);
+fn picture(bars: &[(StageView, &Stage)], floor: Option<&Stage>, distance: Distance) -> Result<Svg, DrawError> {
+    let at_floor = floor.map_or(f64::NAN, |floor| distance.held_out(floor));
+    let values = bars.iter().map(|(_, stage)| distance.held_out(stage)).chain([at_floor]);
+    let longest = values.filter(|value| Axis::is_drawable(*value)).fold(0.0, f64::max);
     let values = bars
         .iter()
-        .map(|(view, stage)| format!("{} {}", view.with_effect(stage), mm(stage.held_out_rms_m)));
+        .map(|(view, stage)| format!("{} {}", view.with_effect(stage), distance.held_out_in_words(stage)));
     let sheet = Sheet {
         description: format!("The gap stage by stage: {}", values.collect::<Vec<_>>().join(", ")),
-        x_label: Some("mm".to_owned()),
-        x: Axis::between(0.0, (1.0 + BESIDE) * longest_mm, 5),
+        x_label: Some(distance.unit().to_owned()),
+        x: Axis::between(0.0, (1.0 + BESIDE) * longest, 5),
         rows: vec![Row::new(
             Axis::listed(bars.iter().map(|(view, _)| view.name.to_owned()).collect()),
             ROW * bars.len() as f64,
         )],
     };
     // The floor's line must not run through the names of effects, if there is room beside it.
-    let beside_floor_mm = if floor_mm < 0.5 * longest_mm { floor_mm } else { 0.0 };
+    let beside_floor = if at_floor < 0.5 * longest { at_floor } else { 0.0 };
     draw(&sheet, |_, plot| {
         for (number, (view, stage)) in bars.iter().enumerate() {
             let row = (bars.len() - 1 - number) as f64;
-            let value_mm = stage.held_out_rms_m * 1e3;
+            let value = distance.held_out(stage);
             if let Some(effect) = &stage.effect {
-                plot.text_beside(beside_floor_mm, row - BELOW, MUTED, &shortened(effect))?;
+                plot.text_beside(beside_floor, row - BELOW, MUTED, &shortened(effect))?;
             }
-            if !Axis::is_drawable(value_mm) {
+            if !Axis::is_drawable(value) {
                 plot.text_beside(0.0, row, MUTED, "not known")?;
                 continue;
             }
-            let (along, across) = ([0.0, value_mm], [row - HALF_BAR, row + HALF_BAR]);
+            let (along, across) = ([0.0, value], [row - HALF_BAR, row + HALF_BAR]);
             match style(view) {
                 (Mark::Frame, colour) => plot.edge(along, across, Stroke::new(colour, 1.5))?,
                 (_, colour) => plot.fill(along, across, colour, 1.0)?,
             }
-            plot.text_beside(value_mm, row, INK, &format!("{} mm", fixed(value_mm, 3)))?;
+            plot.text_beside(value, row, INK, &distance.held_out_in_words(stage))?;
         }
         let height = [-0.5, bars.len() as f64 - 0.5];
-        plot.threshold(floor_mm, height, INK, &format!("floor {}", fixed(floor_mm, 3)))
+        plot.threshold(at_floor, height, INK, &format!("floor {}", fixed(at_floor, 3)))
     })
 }
 

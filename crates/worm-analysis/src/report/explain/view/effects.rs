@@ -1,6 +1,7 @@
 //! Which effect, and why not another: the candidates beside each other, and the screening of the whole library.
 
-use super::quantity::{ParameterView, clause, mm};
+use super::distance::Distance;
+use super::quantity::{ParameterView, clause};
 use super::{Block, FigureKind, place, stage_of};
 use crate::explain::answer::{NamedEffect, Remainder, Screened, ScreeningOutcome, StageKind, with_cell};
 use crate::explain::{Answer, Verdict};
@@ -135,11 +136,12 @@ fn against_best_rival(answer: &Answer) -> String {
     ) else {
         return String::new();
     };
+    let distance = Distance::of(answer);
     let other = rival.effect.as_deref().unwrap_or("the best effect of another kind");
     format!(
         ", down to {}; the best of another kind, {other}, leaves {}",
-        mm(named.held_out_rms_m),
-        mm(rival.held_out_rms_m)
+        distance.held_out_in_words(named),
+        distance.held_out_in_words(rival)
     )
 }
 

@@ -1,5 +1,6 @@
 //! How the gap shrinks, stage by stage, on cycles that nothing was fitted to.
 
+use super::distance::Distance;
 use super::quantity::mm;
 use super::{Block, FigureKind};
 use crate::explain::answer::{Stage, StageKind};
@@ -92,7 +93,7 @@ pub(super) fn blocks(answer: &Answer) -> Vec<Block> {
 fn doubt(answer: &Answer) -> String {
     let doubt = &answer.doubt;
     let mut parts = Vec::new();
-    if doubt.discrepancy_m.is_finite() {
+    if doubt.discrepancy_m.is_finite() && !answer.is_by_current_alone() {
         parts.push(format!(
             "The model is taken to be wrong by {} everywhere, smoothly over the step: an effect must explain more than that.",
             mm(doubt.discrepancy_m)
@@ -111,12 +112,20 @@ fn doubt(answer: &Answer) -> String {
             mm(doubt.agrees_within_m)
         ));
     }
+    if let Some(within_j) = doubt.agrees_within_j.filter(|within_j| within_j.is_finite()) {
+        parts.push(format!(
+            "The work of a cycle by the motor's current, with the gears of this answer, and by its model agree to within {} mJ on every \
+             run, with a probability of 95 %.",
+            fixed(within_j * 1e3, 2)
+        ));
+    }
     parts.join(" ")
 }
 
 fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
     let floor = stage_of(answer, FLOOR.key).map(|stage| (FLOOR, stage));
     let stages = stages.iter().copied().chain(floor);
+    let distance = Distance::of(answer);
     let advance_head = "error of advance, mm";
     let advance = |stage: &Stage| fixed(stage.advance_error_m * 1e3, 3);
     let title = "The gap, stage by stage";
@@ -128,12 +137,30 @@ fn table(answer: &Answer, stages: &[(StageView, &Stage)]) -> Table {
                 .collect(),
             "The error of the advance in a cycle is the mean over the slopes.",
         )
+    } else if distance == Distance::Torque {
+        let row = |(view, stage): (StageView, &Stage)| {
+            let [fitted, held_out] = distance.of_stage(stage);
+            let energy = fixed(stage.energy_error_j * 1e3, 2);
+            vec![view.with_effect(stage), fixed(fitted, 3), fixed(held_out, 3), energy]
+        };
+        (
+            &[
+                "model",
+                "torque left, fitted cycles, mN m",
+                "torque left, held-out cycles, mN m",
+                "error of work, mJ",
+            ],
+            stages.map(row).collect(),
+            "Held-out cycles were kept out of every fit, so a model that merely bends to the data gains nothing there. The work of a \
+             cycle is what the motor's current shows the cam take, by the gears of the best model.",
+        )
     } else {
         let row = |(view, stage): (StageView, &Stage)| {
+            let [fitted, held_out] = distance.of_stage(stage);
             vec![
                 view.with_effect(stage),
-                fixed(stage.fit_rms_m * 1e3, 3),
-                fixed(stage.held_out_rms_m * 1e3, 3),
+                fixed(fitted, 3),
+                fixed(held_out, 3),
                 advance(stage),
                 fixed(stage.energy_error_j * 1e3, 2),
             ]

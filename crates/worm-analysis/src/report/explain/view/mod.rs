@@ -1,6 +1,7 @@
 //! The answer in words: everything that the page and the terminal say of it, as data.
 
 mod changes;
+mod distance;
 mod effects;
 mod gap;
 mod law;
@@ -10,6 +11,7 @@ mod quantity;
 mod runs;
 mod verdict;
 
+pub(super) use distance::Distance;
 pub(super) use effects::{best_of_each, is_visible, named_model, outcome, reached};
 pub(super) use gap::{StageView, stage_of, stages};
 pub(super) use quantity::{cells, mm};

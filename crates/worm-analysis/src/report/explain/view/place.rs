@@ -16,6 +16,10 @@ pub(super) fn blocks(answer: &Answer) -> Vec<Block> {
         let why = "Advances show that there is a gap, and on which slopes. In which cell and when, only recorded positions show.";
         return vec![Block::paragraph(why)];
     }
+    if answer.is_by_current_alone() {
+        let why = "Nobody saw the cells. Where in the gait cycle the torque on the cam is not as the model has it shows below.";
+        return vec![Block::paragraph(why)];
+    }
     let mut blocks = vec![Block::Paragraph(largest(answer))];
     let has_map = answer.figures.maps_before.iter().any(|map| !map.phase.is_empty());
     blocks.push(if has_map {

@@ -10,6 +10,8 @@ use worm_estimator::number::fixed;
 pub(super) fn cycle_blocks(answer: &Answer) -> Vec<Block> {
     let why = if answer.is_by_advances() {
         "There is no cycle to show, because no positions were recorded. The advances are at the end."
+    } else if answer.is_by_current_alone() && !answer.figures.torque.is_empty() {
+        return vec![Block::Figure(FigureKind::Torque)];
     } else if answer.figures.cycles.iter().all(|run| run.phase.is_empty()) {
         "There is no mean cycle to show: the answer holds none of any run."
     } else {

@@ -1,5 +1,6 @@
 //! The verdict: what is missing, its values, and how far the gap shrinks.
 
+use super::distance::Distance;
 use super::effects::names;
 use super::gap::{FLOOR, StageView, stage_of, stages};
 use super::quantity::{ParameterView, cells, clause, formula, library_sentence};
@@ -43,10 +44,12 @@ pub(super) fn lead(answer: &Answer) -> String {
         same if answer.runs.len() > 1 && !same.contains('°') => format!("{same} each, at {}", in_words(&names)),
         lengths => lengths,
     };
-    format!(
-        "What the model of the worm misses, by {}: {lengths}.{warned}",
-        count(answer.runs.len(), "recording")
-    )
+    let recordings = count(answer.runs.len(), "recording");
+    let by = match answer.is_by_current_alone() {
+        true => format!("by the motor's current alone in {recordings}"),
+        false => format!("by {recordings}"),
+    };
+    format!("What the model of the worm misses, {by}: {lengths}.{warned}")
 }
 
 /// What the answer is based on, in a word.
@@ -213,18 +216,19 @@ fn gap(answer: &Answer) -> Option<TileRow> {
         );
         is_shown && (!answer.is_by_advances() || stage.held_out_rms_m.is_finite())
     });
+    let distance = Distance::of(answer);
     let tile = |(view, stage): (StageView, &Stage)| {
         let how = match view.key {
             StageKind::Recalibrated => "within the priors",
             StageKind::Floor => view.meaning,
             _ => "",
         };
-        Tile::new(view.name, fixed(stage.held_out_rms_m * 1e3, 3), "mm", how)
+        Tile::new(view.name, fixed(distance.held_out(stage), 3), distance.unit(), how)
     };
     let tiles: Vec<Tile> = shown.map(tile).collect();
     (!tiles.is_empty()).then(|| TileRow {
         name: "The gap".to_owned(),
-        note: "root mean square distance of model and data within a cycle, on held-out cycles".to_owned(),
+        note: format!("{}, on held-out cycles", distance.in_words()),
         tiles,
         ..TileRow::default()
     })
