@@ -57,13 +57,14 @@ pub(crate) fn search(log: &Log, config: &Config, until_ns: u64, report: &mut dyn
     match explain(&[run], config, &search, &mut step) {
         Ok(answer) => {
             let view = View::of(&answer);
+            let by_what = match span.clock {
+                Clock::Tracker => "",
+                Clock::Motor => " It goes by the motor's current alone, for nobody saw the cells.",
+            };
             LastCycles {
                 cycles: span.cycles,
-                verdict: Some(format!("{}. {}", view.badge, view.headline)),
-                details: Some(match span.clock {
-                    Clock::Tracker => view.sentence,
-                    Clock::Motor => format!("By the motor's current alone: {}", view.sentence),
-                }),
+                verdict: Some(format!("{}. {}{by_what}", view.badge, view.headline)),
+                details: Some(view.sentence),
                 why_not: None,
             }
         }
