@@ -228,23 +228,10 @@ fn difference_in_words(trial: &Trial<'_>, mine: &RunOutcome, first: &RunOutcome,
     )
 }
 
-/// Positions beside the current: what they would show more, no run without them was recorded to tell.
+/// Positions beside the current, where some run has none: what a run would show in its torque is not simulated.
 fn with_positions(candidates: &[&Fit]) -> NextExperiment {
-    let prediction = |rival: &&Fit| Prediction {
-        effect: name(rival),
-        advance_m: None,
-        description: values(rival),
-    };
-    NextExperiment {
-        change: ExperimentChange::Measurement(POSITIONS),
-        value: None,
-        unit: String::new(),
-        slope_deg: None,
-        description: "The motor's current alone does not decide between these. Record the positions of the cells as well, and explain both."
-            .to_owned(),
-        predictions: candidates.iter().map(prediction).collect(),
-        separation_sigma: None,
-    }
+    let description = "The motor's current alone does not decide between these. Record the positions of the cells as well, and explain both.";
+    measurement(candidates, POSITIONS, description.to_owned())
 }
 
 /// A measurement on the bench, where no run decides; none where no rival has an effect.
@@ -252,23 +239,30 @@ fn on_the_bench(candidates: &[&Fit]) -> Option<NextExperiment> {
     let hypothesised = candidates
         .iter()
         .find_map(|rival| rival.hypothesis.hypothesised.first())?;
-    let predictions = candidates.iter().map(|rival| Prediction {
+    let by = hypothesised.effect.separated_by;
+    let description = format!(
+        "No single run of this worm separates these. Measure {} directly ({by}).",
+        hypothesised.effect.name
+    );
+    Some(measurement(candidates, by, description))
+}
+
+/// A measurement instead of a run, with what each rival says of it.
+fn measurement(candidates: &[&Fit], what: &'static str, description: String) -> NextExperiment {
+    let prediction = |rival: &&Fit| Prediction {
         effect: name(rival),
         advance_m: None,
         description: values(rival),
-    });
-    Some(NextExperiment {
-        change: ExperimentChange::Measurement(hypothesised.effect.separated_by),
+    };
+    NextExperiment {
+        change: ExperimentChange::Measurement(what),
         value: None,
         unit: String::new(),
         slope_deg: None,
-        description: format!(
-            "No single run of this worm separates these. Measure {} directly ({}).",
-            hypothesised.effect.name, hypothesised.effect.separated_by
-        ),
-        predictions: predictions.collect(),
+        description,
+        predictions: candidates.iter().map(prediction).collect(),
         separation_sigma: None,
-    })
+    }
 }
 
 /// Names of the effects of a rival.

@@ -169,11 +169,7 @@ pub(super) fn remainder(open_share: f64, places: &[Place]) -> String {
 pub(super) fn remainder_of_torque(worm: &RecordedWorm<'_>, open_share: f64, torque: &[TorqueSeries]) -> String {
     let whole = format!("{:.0} % of the gap stays open", 100.0 * open_share);
     let off = torque.iter().flat_map(|run| {
-        let model_n_m = match run.named_n_m.is_empty() {
-            true => &run.recalibrated_n_m,
-            false => &run.named_n_m,
-        };
-        let pairs = run.phase.iter().zip(run.measured_n_m.iter().zip(model_n_m));
+        let pairs = run.phase.iter().zip(run.measured_n_m.iter().zip(&run.recalibrated_n_m));
         pairs.map(|(phase, (measured_n_m, model_n_m))| (run.slope_deg, *phase, measured_n_m - model_n_m))
     });
     let Some((slope_deg, phase, off_n_m)) = off.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else {

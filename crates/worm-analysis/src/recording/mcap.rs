@@ -13,7 +13,7 @@ use std::io::{Read, Seek};
 use std::path::Path;
 use worm_estimator::estimate::{Capture, MotorTime};
 use worm_estimator::message::State;
-use worm_log::{Channel, ReadError, nothing, scan_from};
+use worm_log::{Channel, Contents, ReadError, nothing, scan_from};
 
 /// Reads a log's states as a recording: one sample for each new sample of the tracker.
 ///
@@ -53,18 +53,7 @@ pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, Read
 /// # Errors
 /// As [`read`].
 pub(super) fn read_seen(input: impl Read + Seek, path: &Path) -> Result<Option<Recording>, ReadError> {
-    let mut runs: Vec<ControllerRun> = Vec::new();
-    let contents = scan_from(input, path, |channel, payload| {
-        if channel != Channel::State {
-            return Ok(());
-        }
-        let state: State = payload.read()?;
-        match runs.last_mut() {
-            Some(run) if run.continues_with(&state) => run.push(&state),
-            _ => runs.push(ControllerRun::begin(&state)),
-        }
-        Ok(())
-    })?;
+    let (runs, contents) = read_runs::<ControllerRun>(input, path)?;
     let mut warnings = contents.warnings;
     let count = runs.len();
     let longest = runs.into_iter().max_by_key(|run| run.samples.len());
@@ -88,6 +77,33 @@ pub(super) fn read_seen(input: impl Read + Seek, path: &Path) -> Result<Option<R
         ));
     }
     Ok(Some(longest.into_recording(path, warnings)))
+}
+
+/// What is kept of a run of the controller, state by state.
+trait OfRun: Sized {
+    /// From its first state on.
+    fn begin(state: &State) -> Self;
+    /// Whether a state belongs to the same run; a repeated tick does.
+    fn continues_with(&self, state: &State) -> bool;
+    /// Takes a state that does.
+    fn push(&mut self, state: &State);
+}
+
+/// The runs of the controller in a log, and what else was found in it.
+fn read_runs<R: OfRun>(input: impl Read + Seek, path: &Path) -> Result<(Vec<R>, Contents), ReadError> {
+    let mut runs: Vec<R> = Vec::new();
+    let contents = scan_from(input, path, |channel, payload| {
+        if channel != Channel::State {
+            return Ok(());
+        }
+        let state: State = payload.read()?;
+        match runs.last_mut() {
+            Some(run) if run.continues_with(&state) => run.push(&state),
+            _ => runs.push(R::begin(&state)),
+        }
+        Ok(())
+    })?;
+    Ok((runs, contents))
 }
 
 /// Refuses what is no worm.
@@ -114,6 +130,18 @@ struct Sample {
     state: State,
 }
 
+/// What a state says of the motor, in the order of [`Motor::COLUMNS`].
+fn motor_values(state: &State) -> [f64; 6] {
+    [
+        state.motor_angle_rad,
+        state.motor_velocity_rad_s,
+        state.motor_current_a,
+        state.bus_voltage_v,
+        state.motor_duty,
+        state.motor_temperature_c,
+    ]
+}
+
 /// What a reading says of the motor, and when, without the time during which the computer was paused.
 struct Reading {
     time_s: f64,
@@ -122,15 +150,10 @@ struct Reading {
 
 impl Reading {
     fn of(state: &State, time_s: f64) -> Self {
-        let values = [
-            state.motor_angle_rad,
-            state.motor_velocity_rad_s,
-            state.motor_current_a,
-            state.bus_voltage_v,
-            state.motor_duty,
-            state.motor_temperature_c,
-        ];
-        Self { time_s, values }
+        Self {
+            time_s,
+            values: motor_values(state),
+        }
     }
 
     fn towards(&self, after: &Self, at_s: f64) -> Self {
@@ -170,7 +193,7 @@ struct ControllerRun {
     without_time: usize,
 }
 
-impl ControllerRun {
+impl OfRun for ControllerRun {
     fn begin(state: &State) -> Self {
         let mut run = Self {
             cells: state.cell_count as usize,
@@ -188,7 +211,6 @@ impl ControllerRun {
         run
     }
 
-    /// Whether a state belongs to the same run; a repeated tick does.
     fn continues_with(&self, state: &State) -> bool {
         state.sequence >= self.last_tick && state.sample >= self.last_sample && state.cell_count as usize == self.cells
     }
@@ -225,7 +247,9 @@ impl ControllerRun {
             self.phases.push((time_s, state.phase));
         }
     }
+}
 
+impl ControllerRun {
     /// Sets the motor of a state to what it was at a time without pauses, between the readings before and after; it stays where that
     /// is not known.
     fn set_motor_at(&self, at_s: f64, state: &mut State) {

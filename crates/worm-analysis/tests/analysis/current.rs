@@ -148,6 +148,10 @@ fn current_alone_shows_which_cell_holds_otherwise() {
 #[test]
 fn current_that_nobody_recorded_is_no_evidence() {
     let mut campaign = draw_with_phase_sized(Hidden::Clean, SEED, CampaignSize::SMALL);
+    let mut without_phase = campaign.clone();
+    without_phase.recordings[0].gait_phase = None;
+    let refused = asked(&without_phase, Evidence::CurrentAlone).expect_err("where it turned is not known");
+    assert!(matches!(refused, ExplainError::NoCurrentOfRun { .. }), "{refused}");
     campaign
         .recordings
         .iter_mut()

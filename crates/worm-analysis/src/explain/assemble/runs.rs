@@ -5,6 +5,7 @@ use crate::explain::answer::{CurrentEvidence, RunSummary};
 use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::worm::energy::of_cycles;
+use crate::explain::worm::gap::deviation;
 use crate::explain::worm::observed::Observed;
 use crate::explain::worm::recorded_worm::RecordedWorm;
 use crate::explain::worm::torque_residual;
@@ -54,7 +55,6 @@ fn current(
     named: Option<&Candidate>,
 ) -> Option<CurrentEvidence> {
     let observed = &worm.scene.observed[run];
-    observed.torque.as_ref()?;
     let named = named.map(|candidate| &candidate.fit);
     let mean = |of_cycles: Vec<f64>| of_cycles.iter().sum::<f64>() / of_cycles.len() as f64;
     let by = |fit: Option<&Fit>| {
@@ -86,10 +86,8 @@ fn shown_j(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<Vec<f64>> {
 /// Standard error of its mean over the cycles, J, by their scatter; none of fewer than two.
 pub(super) fn sigma_of_shown_j(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<f64> {
     let shown_j = shown_j(worm, run, fit)?;
-    let count = shown_j.len() as f64;
-    let mean_j = shown_j.iter().sum::<f64>() / count;
-    let squares: f64 = shown_j.iter().map(|work_j| (work_j - mean_j).powi(2)).sum();
-    (count > 1.0).then(|| (squares / (count - 1.0) / count).sqrt())
+    let sigma_j = deviation(&shown_j) / (shown_j.len() as f64).sqrt();
+    Some(sigma_j).filter(|sigma_j| sigma_j.is_finite())
 }
 
 /// Advance per cycle, m: mean over the settled samples, each against the one a cycle later in which every cell was seen too.

@@ -353,7 +353,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// Standard deviation of single values; `NaN` of fewer than two.
-fn deviation(values: &[f64]) -> f64 {
+pub(in crate::explain) fn deviation(values: &[f64]) -> f64 {
     let mean = mean(values);
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (squares / (values.len() as f64 - 1.0)).sqrt()

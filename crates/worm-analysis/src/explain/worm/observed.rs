@@ -127,15 +127,16 @@ impl<'a> Observed<'a> {
     pub fn by_current(run: RecordedRun<'a>, config: &Config, gear: &GearModel) -> Result<Self, ExplainError> {
         let recording = run.recording;
         check_conditions(run, config)?;
-        let phase = recording.gait_phase.clone().unwrap_or_default();
+        let no_current = || ExplainError::NoCurrentOfRun {
+            recording: recording.source.display().to_string(),
+        };
+        let phase = recording.gait_phase.clone().ok_or_else(no_current)?;
         let turned = phase
             .last()
             .zip(phase.first())
             .map_or(0.0, |(last, first)| last - first);
         let cells = recording.cells();
-        let torque = MeasuredTorque::new(recording, &phase, gear).ok_or_else(|| ExplainError::NoCurrentOfRun {
-            recording: recording.source.display().to_string(),
-        })?;
+        let torque = MeasuredTorque::new(recording, &phase, gear).ok_or_else(no_current)?;
         if turned < MIN_CYCLES as f64 {
             return Err(too_short(recording, turned.max(0.0) as usize));
         }

@@ -7,6 +7,7 @@ use super::laws::laws;
 use super::matters::impact;
 use super::noise::RunNoise;
 use super::nuisance::Nuisance;
+use super::observed::Observed;
 use super::period;
 use super::prepare::judge_start;
 use super::recorded_worm::RecordedWorm;
@@ -22,6 +23,7 @@ use crate::explain::search::impact::Impact;
 use crate::explain::search::law::offer::Offer;
 use crate::explain::search::parameter::{Free, Hypothesised};
 use crate::explain::search::plant::{Plant, PredictedRun, Recorded};
+use worm_physics::Physics;
 use worm_physics::effect::{Effect, LIBRARY, Scope};
 
 /// Residual of a run that the worm could not have made.
@@ -82,20 +84,21 @@ impl Plant for RecordedWorm<'_> {
 
     /// The stretch of canal where tips have been, or may have been where nobody saw them.
     fn stretch_m(&self) -> (f64, f64) {
-        let places = self.scene.observed.iter().zip(&self.scene.nominal);
-        let seen = places.flat_map(|(observed, physics)| {
-            let farthest_m = (!observed.sees_positions).then(|| {
-                let cycles = observed.phase[observed.samples() - 1] - observed.phase[0];
-                observed
-                    .first_m
-                    .iter()
-                    .map(move |at_m| at_m + cycles * physics.worm.stroke_m())
-            });
-            let unseen = farthest_m.into_iter().flatten().chain(observed.first_m.iter().copied());
-            let positions = observed.position_m.iter().flatten().copied();
-            positions.chain(unseen.filter(|_| !observed.sees_positions))
-        });
-        let (min_m, max_m) = seen
+        let places_m = |(observed, physics): (&Observed<'_>, &Physics)| -> Vec<f64> {
+            if observed.sees_positions {
+                return observed.position_m.concat();
+            }
+            let cycles = observed.phase[observed.samples() - 1] - observed.phase[0];
+            let reach_m = cycles * physics.worm.stroke_m();
+            observed
+                .first_m
+                .iter()
+                .flat_map(|at_m| [*at_m, at_m + reach_m])
+                .collect()
+        };
+        let runs = self.scene.observed.iter().zip(&self.scene.nominal);
+        let (min_m, max_m) = runs
+            .flat_map(places_m)
             .filter(|at_m| at_m.is_finite())
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(min_m, max_m), at_m| {
                 (f64::min(min_m, at_m), f64::max(max_m, at_m))

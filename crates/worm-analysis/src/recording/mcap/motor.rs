@@ -9,7 +9,7 @@ use std::io::{Read, Seek};
 use std::path::Path;
 use worm_estimator::estimate::MotorTime;
 use worm_estimator::message::State;
-use worm_log::{Channel, ReadError, nothing, scan_from};
+use worm_log::{ReadError, nothing};
 
 /// Time over which readings are averaged, s.
 const WINDOW_S: f64 = 1.0 / 120.0;
@@ -31,18 +31,7 @@ pub fn read_motor(path: &Path) -> Result<Recording, ReadError> {
 /// # Errors
 /// As [`read_motor`].
 pub fn read_motor_from(input: impl Read + Seek, path: &Path) -> Result<Recording, ReadError> {
-    let mut runs: Vec<Readings> = Vec::new();
-    let contents = scan_from(input, path, |channel, payload| {
-        if channel != Channel::State {
-            return Ok(());
-        }
-        let state: State = payload.read()?;
-        match runs.last_mut() {
-            Some(run) if run.continues_with(&state) => run.push(&state),
-            _ => runs.push(Readings::begin(&state)),
-        }
-        Ok(())
-    })?;
+    let (mut runs, contents) = super::read_runs::<Readings>(input, path)?;
     runs.iter_mut().for_each(Readings::end_window);
     let count = runs.len();
     let longest = runs.into_iter().max_by_key(|run| run.time_s.len());
@@ -80,7 +69,7 @@ struct Window {
     sums: [(f64, f64); VALUES],
 }
 
-impl Readings {
+impl super::OfRun for Readings {
     fn begin(state: &State) -> Self {
         let mut run = Self {
             cells: state.cell_count as usize,
@@ -94,7 +83,6 @@ impl Readings {
         run
     }
 
-    /// Whether a state belongs to the same run; a repeated tick does.
     fn continues_with(&self, state: &State) -> bool {
         state.sequence >= self.last_tick && state.cell_count as usize == self.cells
     }
@@ -106,7 +94,9 @@ impl Readings {
             self.take(state);
         }
     }
+}
 
+impl Readings {
     fn take(&mut self, state: &State) {
         let time_s = self.lived.update(state) as f64 * 1e-9;
         if state.motor_is_new != 1 || !state.phase.is_finite() {
@@ -119,15 +109,7 @@ impl Readings {
         }
         self.window.readings += 1.0;
         self.window.time_s += time_s;
-        let values = [
-            state.phase,
-            state.motor_angle_rad,
-            state.motor_velocity_rad_s,
-            state.motor_current_a,
-            state.bus_voltage_v,
-            state.motor_duty,
-            state.motor_temperature_c,
-        ];
+        let values = [state.phase].into_iter().chain(super::motor_values(state));
         for ((sum, count), value) in self.window.sums.iter_mut().zip(values) {
             if value.is_finite() {
                 (*sum, *count) = (*sum + value, *count + 1.0);
@@ -154,29 +136,20 @@ impl Readings {
     }
 
     fn into_recording(self, path: &Path, warnings: Vec<String>) -> Recording {
-        let [
-            phase,
-            angle_rad,
-            velocity_rad_s,
-            current_a,
-            voltage_v,
-            duty,
-            temperature_c,
-        ] = self.values;
+        let [phase, of_motor @ ..] = self.values;
+        let mut motor = Motor::default();
+        motor
+            .series_mut()
+            .into_iter()
+            .zip(of_motor)
+            .for_each(|(series, values)| *series = values);
         Recording {
             source: path.to_owned(),
             cell_names: (1..=self.cells).map(|cell| format!("x{cell}_m")).collect(),
             position_m: vec![vec![f64::NAN; self.time_s.len()]; self.cells],
             time_s: self.time_s,
             gait_phase: Some(phase),
-            motor: Some(Motor {
-                angle_rad,
-                velocity_rad_s,
-                current_a,
-                voltage_v,
-                duty,
-                temperature_c,
-            }),
+            motor: Some(motor),
             warnings,
             repairs: Vec::new(),
         }
