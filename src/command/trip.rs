@@ -111,9 +111,9 @@ pub fn run(args: &TripArgs) -> Result<(), Failure> {
 fn travel(args: &TripArgs, file: &Path) -> Result<(), Failure> {
     print::log_in_background()?;
     let config = args.config()?;
-    if !config.tracker.present {
+    if !config.tracker.present && !config.self_sensing.enabled {
         return Err(Failure::unusable(
-            "a trip is measured by cell positions, and tracker.present = false: `wormd command crawl` makes such a worm crawl for a while",
+            "nobody would know where the worm is on its trip: tracker.present and self_sensing.enabled are both false. Enable self-sensing,              or make it crawl for a while with `wormd command crawl`",
         ));
     }
     let bench = Workbench::new(&config).map_err(Failure::unusable)?;
@@ -166,8 +166,13 @@ fn plan_text(config: &Config, guide: &Guide, return_home: bool) -> String {
         Some(_) => format!("reserve {:.0} % of the battery", 100.0 * trip.reserve_share),
         None => "no [battery] is configured: the trip does not watch the energy".to_owned(),
     };
+    let reckoned = if config.tracker.present {
+        ""
+    } else {
+        "; without a tracker it goes by the motor's current: its place is uncertain by some percent of the way"
+    };
     format!(
-        "{}: {} legs, {:.2} m; out {}, home {}{}; when nobody is heard for {} s {lost}; {battery}",
+        "{}: {} legs, {:.2} m; out {}, home {}{}; when nobody is heard for {} s {lost}; {battery}{reckoned}",
         config.worm.name,
         way.legs().len(),
         way.length_m(),

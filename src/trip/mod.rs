@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use wire::{Answer, Asked, Listener};
 use worm_estimator::message::{
-    Command, CommandKind, CommandRecord, Cycle, Estimate, JsonMessage, Range, ShortText, State, TripStatus,
+    Command, CommandKind, CommandRecord, Cycle, Estimate, Inferred, JsonMessage, Range, ShortText, State, TripStatus,
 };
 use worm_plan::guide::{LIMIT_S, SENDER};
 use worm_plan::{Action, Guide};
@@ -99,6 +99,7 @@ struct Topics {
     estimate: Subscriber<Estimate>,
     cycle: Subscriber<Cycle>,
     range: Subscriber<Range>,
+    inferred: Subscriber<Inferred>,
     command: Subscriber<CommandRecord>,
 }
 
@@ -109,6 +110,7 @@ impl Topics {
             estimate: hub.subscriber().map_err(Failure::failed)?,
             cycle: hub.subscriber().map_err(Failure::failed)?,
             range: hub.subscriber().map_err(Failure::failed)?,
+            inferred: hub.subscriber().map_err(Failure::failed)?,
             command: hub.subscriber().map_err(Failure::failed)?,
         })
     }
@@ -121,6 +123,9 @@ impl Topics {
         }
         if let Some(estimate) = self.estimate.latest().map_err(Failure::failed)? {
             guide.note_estimate(&estimate);
+        }
+        if let Some(inferred) = self.inferred.latest().map_err(Failure::failed)? {
+            guide.note_inferred(&inferred);
         }
         while let Some(cycle) = self.cycle.next().map_err(Failure::failed)? {
             guide.note_cycle(&cycle, now_ns);

@@ -39,10 +39,19 @@ pub(crate) fn change(trip: &TripStatus) -> String {
         ""
     };
     format!(
-        "trip {phase}{leg}, {:.2} m from home: {}{link}{resume}",
-        trip.position_m,
+        "trip {phase}{leg}, {} m from home: {}{link}{resume}",
+        place(trip),
         reason(trip)
     )
+}
+
+/// Distance from home, m, with its standard error where that shows.
+fn place(trip: &TripStatus) -> String {
+    if trip.position_sigma_m >= 0.005 {
+        format!("{:.2} ± {:.2}", trip.position_m, trip.position_sigma_m)
+    } else {
+        format!("{:.2}", trip.position_m)
+    }
 }
 
 /// Why the trip does what it does.
@@ -80,9 +89,9 @@ pub(crate) fn reason(trip: &TripStatus) -> String {
 pub(crate) fn line(trip: &TripStatus) -> String {
     let phase = TripPhase::try_from(trip.phase);
     let mut text = format!(
-        "trip {}: {:.2} of {:.2} m",
+        "trip {}: {} of {:.2} m",
         phase.map_or("?", TripPhase::name),
-        trip.position_m,
+        place(trip),
         trip.length_m
     );
     if !matches!(phase, Ok(TripPhase::Done | TripPhase::Aborted)) {

@@ -73,3 +73,30 @@ fn a_leg_that_cannot_be_crawled_is_refused_by_its_number() {
     assert_eq!(output.status.code(), Some(2), "{error}");
     assert!(error.contains("leg 2 (65°) cannot be crawled"), "{error}");
 }
+
+#[test]
+fn a_worm_that_nobody_sees_goes_out_and_home_by_its_motors_current() {
+    let worm = Worm::on_a_steady_computer("blind-trip");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("route.csv");
+    std::fs::write(&file, "length_m,slope_deg,cycle_s\n0.02,0,1.5\n").expect("it can be written");
+    let file = file.to_string_lossy().into_owned();
+    let config = worm.config("[tracker]\npresent = false\n");
+    let up = worm
+        .wormd(&["up", "--plain", "--config", &config])
+        .start_without_reader();
+    wait_for("a worm that crawls", PATIENCE, || is_in(&worm, Mode::Crawling));
+    let trip = ["trip", &file, "--config", &config, "--link-loss", "continue", "--json"];
+    let output = worm.wormd(&trip).output();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let end: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert_eq!((&end["phase"], &end["reason"]), (&"done".into(), &"home".into()));
+    let at = |name: &str| end[name].as_f64().expect("a number");
+    // Some percent of the way out and home, and what a gait cycle begun at rest is off by.
+    let (place_m, sigma_m) = (at("position_m"), at("position_sigma_m"));
+    assert!(place_m.abs() < 0.007 && (0.001..0.01).contains(&sigma_m), "{end}");
+    assert!(at("cycles") >= 5.0, "{end}");
+    wait_for("a worm that holds", PATIENCE, || is_in(&worm, Mode::Holding));
+    drop(up);
+}

@@ -61,6 +61,9 @@ fn faults_that_need_no_positions_are_found_without_a_tracker() {
     assert_eq!(table, STORIES, "\n{table}");
 }
 
+/// Advance of the paper's worm on the level, by its exact cycle.
+const LEVEL_ADVANCE_M: f64 = 6.833e-3;
+
 #[test]
 fn a_worm_without_a_tracker_arms_crawls_holds_and_stops() {
     let config = config(BATTERY);
@@ -68,7 +71,7 @@ fn a_worm_without_a_tracker_arms_crawls_holds_and_stops() {
     session.cycles = Some(Vec::new());
     session.begin();
     session.command(CommandKind::Crawl, 0.0);
-    session.run_s(13.0, |_| {});
+    session.run_s(18.0, |_| {});
     session.command(CommandKind::Hold, 0.0);
     session.run_s(2.0, |_| {});
     assert_eq!(session.mode(), Mode::Holding);
@@ -110,6 +113,21 @@ fn a_worm_without_a_tracker_arms_crawls_holds_and_stops() {
         assert!(off.abs() < 0.02, "electrical energy {off:+.3}");
         assert!(cycle.advance_m.is_nan() && cycle.energy_loss_j.is_nan() && cycle.cot.is_nan());
     }
+    let forward = session
+        .ranges
+        .iter()
+        .rfind(|range| range.direction > 0)
+        .expect("a range");
+    let (advance_m, sigma_m) = (forward.advance_per_cycle_m, forward.advance_per_cycle_sigma_m);
+    assert!(
+        (advance_m - LEVEL_ADVANCE_M).abs() < 1.645 * sigma_m,
+        "{advance_m} ± {sigma_m} m"
+    );
+    assert!(
+        sigma_m < 0.15 * advance_m && (forward.range_m / (forward.cycles * advance_m) - 1.0).abs() < 1e-9,
+        "{forward:?}"
+    );
+    // What a cycle backward advances, the current does not say.
     let range = session.ranges.last().expect("a battery has a range");
     assert!(range.time_s > 0.0 && range.cycles > 0.0 && range.range_m.is_nan());
 }

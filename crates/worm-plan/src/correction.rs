@@ -5,13 +5,12 @@
 //! with what the way out has shown, and with what that does not tell about it.
 
 use super::itinerary::Heading;
-use worm_estimator::estimate::range::{MODEL_ADVANCE_SIGMA, MODEL_ENERGY_SIGMA};
+use worm_estimator::estimate::range::{MODEL_ADVANCE_SIGMA, MODEL_ENERGY_SIGMA, MODEL_LEG_SIGMA};
 
 /// How much a ratio wanders in one cycle.
 const WANDER: f64 = 0.002;
-/// How much it may change from one leg to the next: against the paper's experiment (Table 4) the model is off by +5, −18 and 0 % on three
-/// slopes.
-pub(super) const LEG_SIGMA: f64 = 0.08;
+/// How much it may change from one leg to the next.
+pub(super) const LEG_SIGMA: f64 = MODEL_LEG_SIGMA;
 /// What the way out does not tell about the way home: other slopes, and the other direction.
 pub(super) const TRANSFER_SIGMA: f64 = 0.08;
 /// The guess of the scatter from cycle to cycle …
@@ -53,6 +52,12 @@ impl Ratio {
         self.scatter_variance += (scatter - self.scatter_variance) / self.scatter_values;
         self.mean = (self.mean + gain * innovation).max(LEAST);
         self.variance *= 1.0 - gain;
+    }
+
+    /// It is this, whatever was thought before. What is inferred has weighed all cycles already: taken like single measurements, it would seem
+    /// surer with each.
+    fn know(&mut self, mean: f64, sigma: f64) {
+        (self.mean, self.variance) = (mean.max(LEAST), sigma * sigma);
     }
 
     fn widened(self, sigma: f64) -> Self {
@@ -114,10 +119,19 @@ pub(super) struct Correction {
 /// A cycle over what the model says of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured {
-    /// Advance, and its standard error; none where it is not known.
-    pub(super) advance: Option<(f64, f64)>,
+    /// Advance; none where it is not known.
+    pub(super) advance: Option<Advance>,
     /// Energy of the motor, and its standard error; none where it is not known.
     pub(super) energy: Option<(f64, f64)>,
+}
+
+/// An advance over the model's, with its standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Advance {
+    /// Of this cycle, by positions.
+    Measured(f64, f64),
+    /// Of the cycles of late, by the motor's current.
+    Inferred(f64, f64),
 }
 
 impl Correction {
@@ -133,8 +147,10 @@ impl Correction {
             ratios = ratios.widened(LEG_SIGMA);
         }
         ratios.leg = Some(leg);
-        if let Some((value, sigma)) = measured.advance {
-            ratios.advance.add(value, sigma);
+        match measured.advance {
+            Some(Advance::Measured(value, sigma)) => ratios.advance.add(value, sigma),
+            Some(Advance::Inferred(value, sigma)) => ratios.advance.know(value, sigma),
+            None => {}
         }
         if let Some((value, sigma)) = measured.energy {
             ratios.energy.add(value, sigma);
@@ -169,7 +185,7 @@ mod tests {
             (1.0, MODEL_ADVANCE_SIGMA)
         );
         let measured = Measured {
-            advance: Some((0.9, 0.005)),
+            advance: Some(Advance::Measured(0.9, 0.005)),
             energy: Some((1.3, 0.01)),
         };
         (0..20).for_each(|_| correction.add(Heading::Out, 0, &measured));
@@ -189,7 +205,7 @@ mod tests {
                 Heading::Home,
                 1,
                 &Measured {
-                    advance: Some((1.0, 0.005)),
+                    advance: Some(Advance::Measured(1.0, 0.005)),
                     energy: None,
                 },
             )

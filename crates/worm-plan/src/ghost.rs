@@ -40,8 +40,8 @@ const WITHIN_CYCLE: f64 = 0.3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Heard {
     time_ns: u64,
-    /// Mean position of the cells along the canal, m.
-    at_m: f64,
+    /// Mean position of the cells along the canal, m; none where nobody saw it.
+    at_m: Option<f64>,
     /// Gait cycles per second, negative for backward; 0 where it does not crawl.
     cycles_per_s: f64,
     /// Whether the crawl lasts only as long as its driver is heard.
@@ -131,7 +131,7 @@ impl Ghost {
     }
 
     /// Takes what is heard of the worm now: messages that are no older than [`SILENCE_NS`]. `is_attended` says whether it crawls only as long as
-    /// its driver is heard. Returns the score of the ghost, if there was a silence.
+    /// its driver is heard. Returns the score of the ghost, if there was a silence before and after which the worm was seen.
     pub fn hear(
         &mut self,
         state: &State,
@@ -140,9 +140,9 @@ impl Ghost {
         is_attended: bool,
         now_ns: u64,
     ) -> Option<Score> {
-        let at_m = mean_position_m(estimate)?;
+        let at_m = mean_position_m(estimate);
         let is_crawling = state.mode == Mode::Crawling.code();
-        let score = self.score(at_m, now_ns);
+        let score = at_m.and_then(|at_m| self.score(at_m, now_ns));
         self.heard = Some(Heard {
             time_ns: now_ns,
             at_m,
@@ -171,7 +171,7 @@ impl Ghost {
         let heard = self.heard.as_ref()?;
         let silent_ns = now_ns.saturating_sub(heard.time_ns);
         let predicted = self.predict(now_ns).filter(|_| silent_ns >= SCORED_NS)?;
-        let moved_m = at_m - heard.at_m;
+        let moved_m = at_m - heard.at_m?;
         let expected = predicted.moved_m;
         let sigma_m = (expected.high - expected.low) / (2.0 * INTERVAL_SIGMAS);
         let error_m = moved_m - expected.mean;
@@ -269,14 +269,14 @@ struct Step {
 
 impl Pace {
     fn add(&mut self, cycle: &Cycle) {
-        if !cycle.advance_m.is_finite() {
-            return;
-        }
         if cycle.direction != self.direction {
             self.advances_m.clear();
         }
         self.direction = cycle.direction;
         self.predicted_m = cycle.predicted_advance_m;
+        if !cycle.advance_m.is_finite() {
+            return;
+        }
         if self.advances_m.len() == CYCLES {
             self.advances_m.remove(0);
         }

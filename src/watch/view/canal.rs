@@ -52,10 +52,10 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
     frame.render_widget(block, area);
     // Of a worm of which nothing is heard, the ghost is shown where it is expected.
     let moved_m = view.ghost.map_or(0.0, |ghost| ghost.moved_m.mean);
-    // Of one that is heard and not seen, what the motor's current says.
+    // Of one that is not seen, what the motor's current says, or said last.
     let by_current = picture
         .inferred
-        .filter(|_| view.ghost.is_none() && !picture.has_positions())
+        .filter(|_| !picture.has_positions())
         .and_then(|inferred| inferred::place(&inferred, subject, picture.phase()));
     let mut positions = match (&by_current, &picture.estimate) {
         (Some((positions, _)), _) => positions.clone(),
@@ -75,15 +75,14 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
     if columns < 20 || inner.height < 5 || !is_plausible {
         return;
     }
-    let of_ghost = view.ghost.map(|ghost| {
-        let of_ends = |end_m: f64| [ghost.moved_m.low, ghost.moved_m.high].map(|m| end_m - moved_m + m);
-        (of_ends(rear_m)[0], of_ends(front_m)[1])
+    let error_m = by_current
+        .as_ref()
+        .map_or(0.0, |(_, sigma_m)| NINE_OF_TEN_SIGMAS * sigma_m);
+    let (low_m, high_m) = view.ghost.map_or((0.0, 0.0), |ghost| {
+        (ghost.moved_m.low - moved_m, ghost.moved_m.high - moved_m)
     });
-    let of_current = by_current.as_ref().map(|(_, sigma_m)| {
-        let error_m = NINE_OF_TEN_SIGMAS * sigma_m;
-        (rear_m - error_m, front_m + error_m)
-    });
-    let places = of_ghost.or(of_current);
+    let is_sure = by_current.is_none() && view.ghost.is_none();
+    let places = (!is_sure).then_some((rear_m + low_m - error_m, front_m + high_m + error_m));
     let (rear_m, front_m, body_m) = match places {
         Some((low_m, high_m)) => (rear_m.min(low_m), front_m.max(high_m), (rear_m, front_m)),
         None => (rear_m, front_m, (rear_m, front_m)),

@@ -83,6 +83,9 @@ impl Observer {
         }
         let range = self.range.as_mut().and_then(|range| {
             range.note_state(state);
+            if let Some((advance_m, sigma_m)) = inferred.as_ref().and_then(Inferred::known_advance_m) {
+                range.note_inferred_advance(advance_m, sigma_m);
+            }
             cycle.as_ref().and_then(|cycle| range.note_cycle(cycle))
         });
         ObserverOutput {

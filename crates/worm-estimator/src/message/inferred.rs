@@ -3,7 +3,7 @@
 use super::ZeroCopySend;
 use super::json::Name;
 use super::{coded_enum, message};
-use crate::self_sensing::Standing;
+use crate::self_sensing::{Standing, WARM_CYCLES};
 use worm_physics::MAX_CELLS;
 
 coded_enum! {
@@ -129,6 +129,13 @@ message! {
 }
 
 impl Inferred {
+    /// Advance of a forward cycle with its standard error, m; none while so few cycles were fitted that the search may have begun at a wrong
+    /// answer.
+    pub fn known_advance_m(&self) -> Option<(f64, f64)> {
+        let is_known = self.advance_m.is_finite() && self.advance_sigma_m.is_finite() && self.cycles >= WARM_CYCLES;
+        is_known.then_some((self.advance_m, self.advance_sigma_m))
+    }
+
     /// The distance by dead reckoning at a later phase, m, where the worm crawls on as it did.
     pub fn position_at_m(&self, phase: f64) -> f64 {
         let advance_m = if self.advance_m.is_finite() {

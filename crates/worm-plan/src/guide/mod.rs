@@ -7,6 +7,7 @@
 //! - Nothing but its start and an operator's word arms the worm. Whoever else commands the worm makes the trip wait for an operator.
 //! - Its crawl is permitted for [`LIMIT_S`] at a time and renewed while this is called: a trip that is killed leaves a worm that holds.
 
+mod by_current;
 mod place;
 mod rules;
 mod status;
@@ -18,12 +19,13 @@ use super::design::{Going, Workbench};
 use super::energy_budget::EnergyBudget;
 use super::itinerary::{Heading, Impassable, Itinerary};
 use super::route::Route;
+use by_current::ByCurrent;
 use place::Place;
 use std::collections::VecDeque;
 use worm_estimator::config::{Config, OnLinkLoss, OnStuck, Policy, Trip};
 use worm_estimator::message::{
-    AlarmKind, CommandKind, CommandOutcome, CommandRecord, Cycle, Estimate, Range, ShortText, State, TripPhase,
-    TripReason,
+    AlarmKind, CommandKind, CommandOutcome, CommandRecord, Cycle, Estimate, Inferred, Range, ShortText, State,
+    TripPhase, TripReason,
 };
 
 /// The name of a trip in the record of commands.
@@ -128,6 +130,7 @@ pub struct Guide {
     acting_alarms: u32,
     budget: Option<EnergyBudget>,
     correction: Correction,
+    by_current: ByCurrent,
     place: Place,
     heading: Heading,
     wait: Option<Wait>,
@@ -186,6 +189,7 @@ impl Guide {
             itinerary,
             return_home,
             correction: Correction::new(),
+            by_current: ByCurrent::default(),
             place: Place::home(now_ns),
             heading: Heading::Out,
             wait: None,
@@ -235,6 +239,12 @@ impl Guide {
             state: *state,
             at_ns: now_ns,
         });
+        self.by_current.note_phase(state.phase, self.place.m, &self.itinerary);
+    }
+
+    /// Takes what the motor's current says of the worm: it counts for the cycles that nobody sees.
+    pub const fn note_inferred(&mut self, inferred: &Inferred) {
+        self.by_current.note(inferred);
     }
 
     /// Takes the newest estimate, for the alarms that are raised.
@@ -251,7 +261,8 @@ impl Guide {
 
     /// Takes a finished gait cycle, whoever commanded it: the worm is where it is.
     pub fn note_cycle(&mut self, cycle: &Cycle, now_ns: u64) {
-        let Some(progress) = self.place.add(&self.itinerary, &mut self.correction, cycle) else {
+        let (itinerary, by_current) = (&self.itinerary, &self.by_current);
+        let Some(progress) = self.place.add(itinerary, &mut self.correction, by_current, cycle) else {
             return;
         };
         if progress.heading == self.heading && self.wait.is_none() && self.over.is_none() {
@@ -270,12 +281,30 @@ impl Guide {
             Ok(CommandKind::Crawl) => TripReason::OtherDriver,
             Ok(CommandKind::Hold) => TripReason::HoldCommanded,
             Ok(CommandKind::Stop) => TripReason::StopCommanded,
+            Ok(CommandKind::Mark) => return self.note_mark(record),
             _ => return,
         };
         // Whoever commands has what they want; a hold of this trip would overrule it.
         self.motion = Motion::Rest;
         self.wait_for(Wait::Operator, reason, now_ns);
         self.why.by = record.sender;
+    }
+
+    /// Somebody says where the worm is. A tracker knows better.
+    fn note_mark(&mut self, record: &CommandRecord) {
+        if self.place.is_seen() {
+            return;
+        }
+        if self.place.cycles == 0 {
+            return self.by_current.mark_home(record);
+        }
+        let advance_m = self.advance_m();
+        let place = self
+            .by_current
+            .place_of_mark(record, self.heading, &self.itinerary, advance_m);
+        if let Some(place) = place {
+            self.place.mark(&place);
+        }
     }
 
     /// Somebody who attends was heard.

@@ -121,10 +121,38 @@ impl Bench {
 
     /// Somebody else gives a command.
     fn command(&mut self, kind: CommandKind) -> &mut Self {
+        self.give(&Command::new(kind))
+    }
+
+    /// Somebody says where along the canal the worm is.
+    fn mark(&mut self, position_m: f64, position_sigma_m: f64) -> &mut Self {
+        self.give(&Command {
+            position_m,
+            position_sigma_m,
+            ..Command::new(CommandKind::Mark)
+        })
+    }
+
+    /// What is inferred of a cycle that has just ended, with where dead reckoning has the worm.
+    fn infer(&mut self, advance_m: f64, position_m: f64) -> &mut Self {
+        self.guide.note_inferred(&Inferred {
+            end_ns: self.now_ns,
+            phase: self.state.phase,
+            cycles: 4.0,
+            advance_m,
+            advance_sigma_m: 1e-5,
+            position_m,
+            position_sigma_m: 0.0,
+            ..Inferred::empty()
+        });
+        self
+    }
+
+    fn give(&mut self, command: &Command) -> &mut Self {
         self.commands += 1;
         let command = Command {
             sender: ShortText::new("ann"),
-            ..Command::new(kind)
+            ..*command
         };
         let reply = Reply {
             sequence: self.state.sequence,
@@ -134,7 +162,7 @@ impl Bench {
             alarm_mask: 0,
         };
         let record = CommandRecord::new(self.commands, (self.now_ns, self.state.phase), false, &command, &reply);
-        match kind {
+        match CommandKind::try_from(command.kind).expect("a known kind") {
             CommandKind::Hold => self.rest(HoldReason::Command),
             CommandKind::Stop => self.state.mode = Mode::Disarmed.code(),
             CommandKind::Crawl => self.until_ns = u64::MAX,
@@ -382,4 +410,50 @@ proptest::proptest! {
             was_home = is_home;
         }
     }
+}
+
+/// A bench whose worm nobody sees, and which stands at a whole gait phase.
+fn unseen() -> Bench {
+    let mut bench = Bench::new(Trip::default(), true);
+    (bench.advance_m, bench.state.phase) = (f64::NAN, 0.0);
+    bench
+}
+
+#[test]
+fn a_worm_that_nobody_sees_goes_as_far_as_its_current_says_and_a_mark_knows_better() {
+    let mut bench = unseen();
+    bench.infer(f64::NAN, 1.0).run(7.8);
+    let model_m = bench.guide.place.m / 3.0;
+    assert!((model_m - ADVANCE_M).abs() < 1e-4, "by the model alone: {model_m} m");
+    // A tenth less than the model's, from here on.
+    let halfway_m = bench.guide.place.m;
+    bench.infer(0.9 * model_m, 1.02).run(5.0);
+    let (place_m, sigma_m) = (bench.guide.place.m, bench.guide.place.sigma_m());
+    // The cycle that shows it is still counted as before.
+    let expected_m = halfway_m + 1.9 * model_m;
+    assert!((place_m - expected_m).abs() < 1e-5, "{place_m}, {expected_m}");
+    assert!((0.001..0.01).contains(&sigma_m), "{sigma_m}");
+    bench.mark(1.040, 1e-5);
+    assert!((bench.guide.place.m - 0.040).abs() < 1e-6);
+    assert!(bench.guide.place.sigma_m() <= 1e-5);
+    // A mark that is no better than what is known hardly moves it.
+    bench.mark(1.060, 10.0);
+    assert!((bench.guide.place.m - 0.040).abs() < 1e-6);
+    bench.run(100.0).is(TripPhase::Done, TripReason::Home);
+}
+
+#[test]
+fn a_mark_at_home_says_where_home_is_and_a_worm_that_is_seen_needs_none() {
+    let mut bench = unseen();
+    bench.infer(ADVANCE_M, 1.0).run(0.2);
+    bench.mark(7.0, 1e-5).run(7.6);
+    assert!((bench.guide.place.m - 3.0 * ADVANCE_M).abs() < 1e-3);
+    bench.mark(7.018, 1e-5);
+    assert!((bench.guide.place.m - 0.018).abs() < 1e-4);
+    // The tracker is back.
+    bench.advance_m = ADVANCE_M;
+    bench.run(2.5);
+    let place_m = bench.guide.place.m;
+    bench.mark(7.0, 1e-5);
+    assert_eq!(bench.guide.place.m, place_m);
 }

@@ -96,6 +96,50 @@ fn worms_come_home() {
     assert!(outcome.early * 10 <= outcome.by_energy, "{outcome:?}");
 }
 
+/// Worms that nobody sees come home alive as often, and are where they say, as far as they say.
+#[test]
+fn worms_without_a_tracker_come_home_within_their_error() {
+    let (mut worms, mut home, mut inside, mut turned) = (0_usize, 0, 0, 0);
+    let mut off_shares = Vec::new();
+    let mut seed = 0;
+    while worms < WORMS {
+        seed += 1;
+        let Some(mut world) = World::draw_without_tracker(seed, Trip::default()) else {
+            continue;
+        };
+        worms += 1;
+        let mut is_for_energy = false;
+        while !world.is_over() && world.now_ns < 1_000_000_000_000_000 {
+            world.step();
+            if world.now_ns % 10_000_000_000 == 0 {
+                is_for_energy |= world.status().reason == TripReason::Energy.code();
+            }
+        }
+        let status = world.status();
+        turned += usize::from(is_for_energy);
+        if world.is_dead || status.phase != TripPhase::Done.code() {
+            println!(
+                "seed {seed}: dead {}, phase {}, reason {}",
+                world.is_dead, status.phase, status.reason
+            );
+            continue;
+        }
+        home += 1;
+        let off_m = world.place_m - status.position_m;
+        inside += usize::from(off_m.abs() <= 1.645 * status.position_sigma_m);
+        off_shares.push(off_m.abs() / world.furthest_m);
+    }
+    off_shares.sort_by(f64::total_cmp);
+    println!(
+        "{home} of {worms} home, {turned} turned for energy; {inside} within 90 % intervals; off by {:.1} / {:.1} % of the way out (50, 95 % of them)",
+        100.0 * off_shares[off_shares.len() / 2],
+        100.0 * off_shares[off_shares.len() * 95 / 100],
+    );
+    assert!(home * 100 >= worms * 99);
+    assert!(turned * 4 >= worms, "the battery decides often");
+    assert!(inside * 100 >= home * 85, "stated errors are not too small");
+}
+
 /// What each reserve would do. Not a test: `cargo test --release -p worm-plan --test trips reserves -- --ignored --nocapture`.
 #[test]
 #[ignore = "prints a table for the choice of the reserve"]

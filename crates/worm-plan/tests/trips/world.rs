@@ -9,7 +9,9 @@ use std::path::Path;
 use worm_estimator::battery::{OpenCircuit, under_load};
 use worm_estimator::config::{Battery, Chemistry, Config, Limits, PerCell, Trip};
 use worm_estimator::estimate::RangeEstimator;
-use worm_estimator::message::{CommandOutcome, Cycle, Estimate, FieldAccess, HoldReason, Mode, State, TripStatus};
+use worm_estimator::message::{
+    CommandOutcome, Cycle, Estimate, FieldAccess, HoldReason, Inferred, Mode, State, TripStatus,
+};
 use worm_plan::guide::LIMIT_S;
 use worm_plan::itinerary::Itinerary;
 use worm_plan::{Action, Going, Guide, Heading, Route, Workbench};
@@ -47,12 +49,17 @@ impl Rng {
     }
 }
 
+/// Standard deviation of the advance that is inferred without a tracker, as a fraction of the true worm's by the model.
+const INFERRED_SIGMA: f64 = 0.03;
+
 /// A worm on its trip.
 pub struct World {
     pub guide: Guide,
     pub now_ns: u64,
     /// True distance from home, m.
     pub place_m: f64,
+    /// Furthest that it was, m.
+    pub furthest_m: f64,
     /// True share of the battery's energy.
     pub share: f64,
     pub is_dead: bool,
@@ -68,6 +75,8 @@ pub struct World {
     capacity_j: f64,
     hotel_w: f64,
     scatter: f64,
+    /// Inferred advance over the true worm's by the model; none with a tracker.
+    inferred: Option<f64>,
     /// Advance and energy over those of the true worm's model, out and home, for each leg.
     unmodelled: Vec<[[f64; 2]; 2]>,
     rng: Rng,
@@ -90,6 +99,15 @@ struct Draft {
 impl World {
     /// A worm on a route of one to five legs, for which its battery suffices, or not. None where it cannot crawl there as it truly is.
     pub fn draw(seed: u64, trip: Trip) -> Option<Self> {
+        Self::draw_with(seed, trip, true)
+    }
+
+    /// The same worm without a tracker.
+    pub fn draw_without_tracker(seed: u64, trip: Trip) -> Option<Self> {
+        Self::draw_with(seed, trip, false)
+    }
+
+    fn draw_with(seed: u64, trip: Trip, has_tracker: bool) -> Option<Self> {
         let mut rng = Rng::new(seed);
         let (chemistry, full_v, empty_v, lowest_v) = [
             (Chemistry::Linear, 5.6, 4.0, 3.7),
@@ -104,7 +122,7 @@ impl World {
             hotel_power_w: rng.between(0.1, 0.8),
             ..Battery::default()
         };
-        let config = Config {
+        let mut config = Config {
             limits: Limits {
                 voltage_v: lowest_v,
                 current_a: 1.5,
@@ -114,6 +132,7 @@ impl World {
             trip,
             ..Config::default()
         };
+        config.tracker.present = has_tracker;
         let bench = Workbench::new(&config).ok()?;
         let share = rng.between(0.5, 1.0);
         // Half of the routes are longer than the battery lasts.
@@ -145,10 +164,11 @@ impl World {
         let true_bench = Workbench::new(&truly).ok()?;
         let truth = Itinerary::new(&true_bench, &route(&true_text).ok()?, Going::Forward, true).ok()?;
         let guide = Guide::new(&bench, &config, &route(&text).ok()?, true, 0).ok()?;
-        Some(Self {
+        let mut world = Self {
             guide,
             now_ns: 0,
             place_m: 0.0,
+            furthest_m: 0.0,
             share,
             is_dead: false,
             link: true,
@@ -161,6 +181,7 @@ impl World {
             capacity_j: battery.capacity_j * (1.0 + battery.capacity_sigma_share * rng.normal()),
             hotel_w: battery.hotel_power_w * (1.0 + battery.hotel_power_sigma_share * rng.normal()).max(0.1),
             scatter: rng.between(0.005, 0.04),
+            inferred: None,
             unmodelled: (0..legs)
                 .map(|_| [[(); 2]; 2].map(|of| of.map(|()| (1.0 + LEG_SIGMA * rng.normal()).max(0.7))))
                 .collect(),
@@ -176,7 +197,17 @@ impl World {
                 index: 0,
             },
             config,
-        })
+        };
+        if !has_tracker {
+            world.inferred = Some(1.0 + INFERRED_SIGMA * world.rng.normal());
+            world.guide.note_inferred(&Inferred {
+                position_m: 0.0,
+                position_sigma_m: 0.0,
+                phase: 0.0,
+                ..Inferred::empty()
+            });
+        }
+        Some(world)
     }
 
     /// One step of time.
@@ -301,10 +332,26 @@ impl World {
         };
     }
 
+    /// What is inferred of a cycle that turned the cam forward: the true worm by the model, which is not all that it does.
+    fn infer(&mut self, ratio: f64) {
+        let leg = self.truth.leg_at(self.place_m, Heading::Out);
+        let Some(cost) = self.truth.cycle(leg, Heading::Out).filter(|_| self.cycles_per_s > 0.0) else {
+            return;
+        };
+        self.guide.note_inferred(&Inferred {
+            end_ns: self.now_ns,
+            cycles: 4.0,
+            advance_m: ratio * cost.advance_m,
+            advance_sigma_m: INFERRED_SIGMA * cost.advance_m,
+            ..Inferred::empty()
+        });
+    }
+
     fn finish_cycle(&mut self) {
         self.done = 0.0;
         self.place_m += self.cycle.advance_m;
-        let cycle = Cycle {
+        self.furthest_m = self.furthest_m.max(self.place_m);
+        let mut cycle = Cycle {
             index: self.cycle.index,
             end_ns: self.now_ns,
             duration_s: 1.0 / self.cycles_per_s.abs(),
@@ -319,6 +366,10 @@ impl World {
             direction: self.cycles_per_s.signum() as i32,
             ..Cycle::empty()
         };
+        if let Some(ratio) = self.inferred {
+            (cycle.advance_m, cycle.advance_sigma_m, cycle.settled) = (f64::NAN, f64::NAN, 0);
+            self.infer(ratio);
+        }
         self.guide.note_cycle(&cycle, self.now_ns);
         self.cycles.push(cycle);
         if let Some(range) = self.range.as_mut().and_then(|range| range.note_cycle(&cycle)) {
