@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import subprocess
 import types
 import typing
 from pathlib import Path
@@ -11,8 +13,10 @@ from typing import Any
 import pytest
 
 import wormd
+from wormd import _program
 from wormd._result import Result
 
+PROGRAM = _program.find()
 TABLE4 = Path(__file__).parents[2] / "examples" / "table4" / "campaign.toml"
 
 
@@ -46,6 +50,21 @@ def test_an_analysis_is_an_object(recordings: list[wormd.Run], tmp_path: Path) -
     assert analysis.mass_estimate_kg == pytest.approx(0.34, rel=0.1)
     assert 0 < analysis.mean.advance_m < 0.0115
     assert analysis.report is not None and analysis.report.stat().st_size > 1000
+
+
+def test_a_worm_that_nobody_saw_is_analysed_by_its_current(recordings: list[wormd.Run], tmp_path: Path) -> None:
+    config, log = tmp_path / "unseen.toml", tmp_path / "unseen.mcap"
+    config.write_text("[gait]\ncycle_s = 1.25\n[tracker]\npresent = false\n")
+    command = [PROGRAM, "up", "--json", "--duration", "8", "--name", f"unseen-{os.getpid() % 100_000}", "--config", str(config)]
+    subprocess.run([*command, "--record", str(log)], check=True, capture_output=True)
+    unseen = wormd.analyze_unseen(log, slope_deg=0, progress=False)
+    assert_complete(unseen)
+    assert (unseen.evidence, unseen.cells) == ("current", 4)
+    assert unseen.sigma.advance_m > 0 and len(unseen.cycles) >= 2
+    with pytest.raises(wormd.WormError, match="analyze_unseen"):
+        wormd.analyze(log, slope_deg=0, progress=False)
+    with pytest.raises(wormd.WormError, match="has positions"):
+        wormd.analyze_unseen(recordings[0].recording, slope_deg=0, progress=False)
 
 
 def test_runs_become_a_campaign(recordings: list[wormd.Run], tmp_path: Path) -> None:

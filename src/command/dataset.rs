@@ -121,8 +121,8 @@ impl SourceArgs {
     ///
     /// # Errors
     /// [`Failure::Unusable`] names the file, the place in it and the remedy.
-    pub(super) fn read(&self, path: &Path, progress: &mut Progress) -> Result<Dataset, Failure> {
-        let dataset = self.read_also_advances(path, Wanted::Positions, progress)?;
+    pub(super) fn read(&self, path: &Path, wanted: Wanted, progress: &mut Progress) -> Result<Dataset, Failure> {
+        let dataset = self.read_also_advances(path, wanted, progress)?;
         if dataset.advances.is_empty() {
             return Ok(dataset);
         }

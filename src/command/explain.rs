@@ -176,10 +176,11 @@ impl ExplainArgs {
 
     /// What is wanted of logs.
     fn wanted(&self) -> Wanted {
+        let window_s = Wanted::USUAL_WINDOW_S;
         match self.current {
             None => Wanted::Positions,
-            Some(Current::Beside) => Wanted::PositionsOrMotor,
-            Some(Current::Alone) => Wanted::Motor,
+            Some(Current::Beside) => Wanted::PositionsOrMotor { window_s },
+            Some(Current::Alone) => Wanted::Motor { window_s },
         }
     }
 

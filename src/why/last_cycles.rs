@@ -30,7 +30,12 @@ pub(crate) fn search(log: &Log, config: &Config, until_ns: u64, report: &mut dyn
     };
     let (wanted, evidence) = match span.clock {
         Clock::Tracker => (Wanted::Positions, Evidence::Positions),
-        Clock::Motor => (Wanted::Motor, Evidence::CurrentAlone),
+        Clock::Motor => (
+            Wanted::Motor {
+                window_s: Wanted::USUAL_WINDOW_S,
+            },
+            Evidence::CurrentAlone,
+        ),
     };
     let options = OpenOptions {
         from_s: Some(span.from_s),

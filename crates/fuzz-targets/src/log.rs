@@ -25,7 +25,12 @@ pub(crate) fn mcap_log(data: &[u8]) {
         Ok(read) => assert!(read.time_s.iter().all(|time_s| time_s.is_finite()), "a time"),
         Err(error) => drop(readable(error)),
     }
-    for wanted in [Wanted::Positions, Wanted::PositionsOrMotor, Wanted::Motor] {
+    let window_s = Wanted::USUAL_WINDOW_S;
+    for wanted in [
+        Wanted::Positions,
+        Wanted::PositionsOrMotor { window_s },
+        Wanted::Motor { window_s: 0.0 },
+    ] {
         let options = OpenOptions {
             wanted,
             ..OpenOptions::default()

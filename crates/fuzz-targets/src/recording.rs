@@ -91,7 +91,9 @@ pub(crate) fn check(recording: &Recording) {
     // What was accepted with longer gaps than usual is accepted again.
     let options = OpenOptions {
         max_gap_s: f64::MAX,
-        wanted: Wanted::PositionsOrMotor,
+        wanted: Wanted::PositionsOrMotor {
+            window_s: Wanted::USUAL_WINDOW_S,
+        },
         ..OpenOptions::default()
     };
     let again = read_bytes(&text, "again.csv", &options).expect("what was written can be read");

@@ -44,7 +44,7 @@ from ._messages import (
     TripStatus,
 )
 from ._relay import Answer, Driver
-from .analysis import Analysis, CampaignAnalysis, analyze, analyze_campaign
+from .analysis import Analysis, AnalysisByCurrent, CampaignAnalysis, analyze, analyze_campaign, analyze_unseen
 from .errors import (
     NotDriver,
     NotRunning,
@@ -70,6 +70,7 @@ __all__ = [
     "Alarm",
     "AlarmKind",
     "Analysis",
+    "AnalysisByCurrent",
     "Answer",
     "BlackBoxStatus",
     "CampaignAnalysis",
@@ -113,6 +114,7 @@ __all__ = [
     "alarms_of",
     "analyze",
     "analyze_campaign",
+    "analyze_unseen",
     "explain",
     "read",
     "simulate",

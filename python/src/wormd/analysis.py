@@ -9,6 +9,7 @@ from typing import Any
 
 from ._program import ProgressCallback, StrPath, call_json
 from ._result import Result
+from .errors import WormError
 
 
 @dataclass(frozen=True)
@@ -205,6 +206,84 @@ class CampaignAnalysis(Result):
     """The page with figures, where a folder was given for it."""
 
 
+@dataclass(frozen=True)
+class CycleByCurrent(Result):
+    """One gait cycle of a worm that nobody saw; advance and losses are those of the worm as it was known then."""
+
+    end_phase: float
+    """Gait phase at its end, cycles."""
+    end_s: float
+    """When it ended, s of the recording's time."""
+    is_odd: bool
+    """Whether it was set aside, because it is not like those before."""
+    advance_m: float
+    """Advance, m."""
+    advance_sigma_m: float
+    """Its standard error, m."""
+    energy_loss_j: float
+    """Energy by losses and weight (11), J."""
+    energy_loss_sigma_j: float
+    """Its standard error, J."""
+    energy_electrical_j: float
+    """Electrical energy of this cycle, measured, J."""
+
+
+@dataclass(frozen=True)
+class AnalysisByCurrent(Result):
+    """What the motor's current says of a recording in which nobody saw the worm. Tuples over cells begin with cell 1."""
+
+    recording: str
+    """The recording, as it was named."""
+    evidence: str
+    """``current``: nothing here was seen."""
+    slope_deg: float
+    """Slope of the canal, degrees."""
+    cells: int
+    """Number of cells."""
+    samples: int
+    """Number of readings of the motor."""
+    duration_s: float
+    """Time from the first to the last, s."""
+    cycle_s: float
+    """Mean time of a gait cycle, s."""
+    step_order: tuple[int, ...]
+    """The cells in the order in which they step, counted from 1."""
+    max_deformation_m: tuple[float, ...]
+    """Largest tip deformations, friction over stiffness, m."""
+    max_deformation_sigma_m: tuple[float, ...]
+    """Their standard errors, m."""
+    friction_n: tuple[float, ...]
+    """Friction forces, N."""
+    friction_sigma_n: tuple[float, ...]
+    """Their standard errors, N."""
+    stiffness_n_per_m: tuple[float, ...]
+    """Stiffnesses, N/m."""
+    stiffness_sigma_n_per_m: tuple[float, ...]
+    """Their standard errors, N/m."""
+    pull_n: float
+    """Pull on the body down the canal, N."""
+    pull_sigma_n: float
+    """Its standard error, N."""
+    cycles: tuple[CycleByCurrent, ...]
+    """Every whole gait cycle crawled forward, after the first."""
+    mean: CycleFigures
+    """A steady cycle of the worm found, by the model."""
+    sigma: CycleFigures
+    """Its standard errors."""
+    energy_electrical_j: float
+    """Mean electrical energy of a cycle, measured, J."""
+    rigid_energy_j: float
+    """Energy that rigid contacts would take over the same advance, J."""
+    theory: Theory
+    """What theory predicts; ``identified`` is None."""
+    warnings: tuple[str, ...]
+    """Limitations of these figures."""
+    torque_profile: TorqueProfile | None = None
+    """Torque at the cam over the phase of a cycle."""
+    report: Path | None = None
+    """The page with figures, where a folder was given for it."""
+
+
 def analyze(
     recording: StrPath,
     *,
@@ -236,15 +315,39 @@ def analyze(
 
     Raises:
         ProgramFailed: with the program's message.
+        WormError: where nobody saw the worm; `analyze_unseen` takes such a recording.
     """
-    arguments: list[StrPath] = ["analyze", recording, "--json", f"--slope={slope_deg}"]
-    arguments += options(
-        out=out,
-        config=config,
-        payload=payload_kg,
-        **{"from": from_s, "to": to_s, "max-gap": max_gap_s, "axis": axis},
-    )
-    return Analysis.of(call_json(wormd, arguments, progress), report=page(out))
+    given = {"from": from_s, "to": to_s, "max-gap": max_gap_s, "axis": axis}
+    arguments = _arguments(recording, slope_deg, out=out, config=config, payload=payload_kg, **given)
+    result = call_json(wormd, arguments, progress)
+    _refuse_unseen(result)
+    return Analysis.of(result, report=page(out))
+
+
+def analyze_unseen(
+    recording: StrPath,
+    *,
+    slope_deg: float,
+    out: StrPath | None = None,
+    config: StrPath | None = None,
+    payload_kg: float | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    progress: ProgressCallback | bool | None = None,
+    wormd: StrPath | None = None,
+) -> AnalysisByCurrent:
+    """Analyse a recording in which nobody saw the worm, by its motor's current. The arguments are those of `analyze`.
+
+    Raises:
+        ProgramFailed: with the program's message.
+        WormError: where somebody saw the worm.
+    """
+    given = {"from": from_s, "to": to_s}
+    arguments = _arguments(recording, slope_deg, out=out, config=config, payload=payload_kg, **given)
+    result = call_json(wormd, arguments, progress)
+    if result.get("evidence") != "current":
+        raise WormError(f"{recording}: has positions: use analyze")
+    return AnalysisByCurrent.of(result, report=page(out))
 
 
 def analyze_campaign(
@@ -258,9 +361,22 @@ def analyze_campaign(
 
     Raises:
         ProgramFailed: with the program's message.
+        WormError: where nobody saw the worm.
     """
     arguments: list[StrPath] = ["analyze", campaign, "--json", *options(out=out)]
-    return CampaignAnalysis.of(call_json(wormd, arguments, progress), report=page(out))
+    result = call_json(wormd, arguments, progress)
+    for run in result["runs"]:
+        _refuse_unseen(run)
+    return CampaignAnalysis.of(result, report=page(out))
+
+
+def _refuse_unseen(run: dict[str, Any]) -> None:
+    if run.get("evidence") == "current":
+        raise WormError(f"{run['recording']}: nobody saw the worm: use analyze_unseen, which goes by its motor's current")
+
+
+def _arguments(recording: StrPath, slope_deg: float, **given: Any) -> list[StrPath]:
+    return ["analyze", recording, "--json", f"--slope={slope_deg}", *options(**given)]
 
 
 def options(**given: Any) -> list[str]:

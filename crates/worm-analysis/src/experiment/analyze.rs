@@ -2,7 +2,7 @@
 
 mod theory;
 
-use self::theory::theory;
+pub(super) use self::theory::theory;
 use super::analysis::{Analysis, CycleResult, CycleValues, FirstEstimate, PaperSearch, PhaseSource, Theory};
 use super::energy_balance;
 use super::error::AnalysisError;
@@ -116,6 +116,37 @@ pub fn analyze(
     Ok(analyses)
 }
 
+/// Refuses conditions under which no worm crawls, and a recording of another worm.
+pub(super) fn check_conditions(run: &RecordedRun<'_>, base: &Worm) -> Result<(), AnalysisError> {
+    let name = || run.recording.source.display().to_string();
+    if !(-90.0..=90.0).contains(&run.slope_deg) {
+        return Err(AnalysisError::Slope {
+            recording: name(),
+            slope_deg: run.slope_deg,
+        });
+    }
+    if !PAYLOADS_KG.contains(&run.payload_kg) {
+        return Err(AnalysisError::Payload {
+            recording: name(),
+            payload_kg: run.payload_kg,
+        });
+    }
+    if run.recording.cells() != base.cells() {
+        return Err(AnalysisError::Cells {
+            recording: name(),
+            found: run.recording.cells(),
+            configured: base.cells(),
+        });
+    }
+    Ok(())
+}
+
+/// The configured worm under a run's conditions.
+pub(super) fn nominal_worm(run: &RecordedRun<'_>, base: &Worm) -> Result<Worm, AnalysisError> {
+    let worm = base.clone().with_slope_rad(run.slope_deg.to_radians())?;
+    Ok(worm.with_mass_kg(base.mass_kg() + run.payload_kg)?)
+}
+
 /// Where the search for the bounds begins: by inspection, by the paper's search, by the configuration.
 fn starts(base: &Worm, prepared: &[Prepared<'_>]) -> Vec<Vec<f64>> {
     let cells = base.cells();
@@ -143,25 +174,7 @@ impl<'a> Prepared<'a> {
     fn new(run: RecordedRun<'a>, base: &Worm, config: &Config) -> Result<Self, AnalysisError> {
         let recording = run.recording;
         let name = || recording.source.display().to_string();
-        if !(-90.0..=90.0).contains(&run.slope_deg) {
-            return Err(AnalysisError::Slope {
-                recording: name(),
-                slope_deg: run.slope_deg,
-            });
-        }
-        if !PAYLOADS_KG.contains(&run.payload_kg) {
-            return Err(AnalysisError::Payload {
-                recording: name(),
-                payload_kg: run.payload_kg,
-            });
-        }
-        if recording.cells() != base.cells() {
-            return Err(AnalysisError::Cells {
-                recording: name(),
-                found: recording.cells(),
-                configured: base.cells(),
-            });
-        }
+        check_conditions(&run, base)?;
         let prior = Prior {
             step_order: &config.worm.step_order_from_zero(),
             phase: recording.gait_phase.as_deref(),
@@ -229,10 +242,7 @@ impl<'a> Prepared<'a> {
             .mass_kg
             .filter(|_| pull_per_kg != 0.0)
             .map(|_| -carried_n / pull_per_kg - self.run.payload_kg);
-        let nominal = base
-            .clone()
-            .with_slope_rad(worm.slope_rad())?
-            .with_mass_kg(configured_kg)?;
+        let nominal = nominal_worm(&self.run, base)?;
         let durations_s: Vec<f64> = balance
             .cycles
             .iter()

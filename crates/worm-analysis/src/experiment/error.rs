@@ -22,6 +22,22 @@ pub enum AnalysisError {
         /// Cells of the configured worm.
         configured: usize,
     },
+    /// Neither positions nor current.
+    #[error(
+        "{recording}: holds neither positions nor the motor's current with its gait phase: record a worm that crawls"
+    )]
+    NoCurrent {
+        /// The recording.
+        recording: String,
+    },
+    /// Too little of a crawl for the current to say anything.
+    #[error(
+        "{recording}: holds no whole gait cycle crawled forward after the first, so its current says nothing: record for longer"
+    )]
+    NoCycle {
+        /// The recording.
+        recording: String,
+    },
     /// No gait was found in the recording.
     #[error("{recording}: {source}")]
     IdentifiedGait {

@@ -3,7 +3,7 @@
 mod motor;
 mod write;
 
-pub use motor::{read_motor, read_motor_from};
+pub use motor::read_motor_from;
 pub use write::write;
 
 use super::{Motor, Recording};
@@ -53,7 +53,7 @@ pub fn read_from(input: impl Read + Seek, path: &Path) -> Result<Recording, Read
 /// # Errors
 /// As [`read`].
 pub(super) fn read_seen(input: impl Read + Seek, path: &Path) -> Result<Option<Recording>, ReadError> {
-    let (runs, contents) = read_runs::<ControllerRun>(input, path)?;
+    let (runs, contents) = read_runs(input, path, ControllerRun::begin)?;
     let mut warnings = contents.warnings;
     let count = runs.len();
     let longest = runs.into_iter().max_by_key(|run| run.samples.len());
@@ -81,8 +81,6 @@ pub(super) fn read_seen(input: impl Read + Seek, path: &Path) -> Result<Option<R
 
 /// What is kept of a run of the controller, state by state.
 trait OfRun: Sized {
-    /// From its first state on.
-    fn begin(state: &State) -> Self;
     /// Whether a state belongs to the same run; a repeated tick does.
     fn continues_with(&self, state: &State) -> bool;
     /// Takes a state that does.
@@ -90,7 +88,11 @@ trait OfRun: Sized {
 }
 
 /// The runs of the controller in a log, and what else was found in it.
-fn read_runs<R: OfRun>(input: impl Read + Seek, path: &Path) -> Result<(Vec<R>, Contents), ReadError> {
+fn read_runs<R: OfRun>(
+    input: impl Read + Seek,
+    path: &Path,
+    begin: impl Fn(&State) -> R,
+) -> Result<(Vec<R>, Contents), ReadError> {
     let mut runs: Vec<R> = Vec::new();
     let contents = scan_from(input, path, |channel, payload| {
         if channel != Channel::State {
@@ -99,7 +101,7 @@ fn read_runs<R: OfRun>(input: impl Read + Seek, path: &Path) -> Result<(Vec<R>, 
         let state: State = payload.read()?;
         match runs.last_mut() {
             Some(run) if run.continues_with(&state) => run.push(&state),
-            _ => runs.push(R::begin(&state)),
+            _ => runs.push(begin(&state)),
         }
         Ok(())
     })?;
@@ -193,7 +195,8 @@ struct ControllerRun {
     without_time: usize,
 }
 
-impl OfRun for ControllerRun {
+impl ControllerRun {
+    /// From its first state on.
     fn begin(state: &State) -> Self {
         let mut run = Self {
             cells: state.cell_count as usize,
@@ -210,7 +213,9 @@ impl OfRun for ControllerRun {
         run.push(state);
         run
     }
+}
 
+impl OfRun for ControllerRun {
     fn continues_with(&self, state: &State) -> bool {
         state.sequence >= self.last_tick && state.sample >= self.last_sample && state.cell_count as usize == self.cells
     }

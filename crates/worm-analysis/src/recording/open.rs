@@ -92,12 +92,12 @@ pub fn read_from(
             input.rewind().map_err(cannot)?;
             match options.wanted {
                 Wanted::Positions => mcap::read_from(input, path)?,
-                Wanted::Motor => mcap::read_motor_from(input, path)?,
-                Wanted::PositionsOrMotor => match mcap::read_seen(&mut input, path)? {
+                Wanted::Motor { window_s } => mcap::read_motor_from(input, path, window_s)?,
+                Wanted::PositionsOrMotor { window_s } => match mcap::read_seen(&mut input, path)? {
                     Some(recording) => recording,
                     None => {
                         input.rewind().map_err(cannot)?;
-                        mcap::read_motor_from(input, path)?
+                        mcap::read_motor_from(input, path, window_s)?
                     }
                 },
             }

@@ -20,15 +20,26 @@ pub struct OpenOptions {
 }
 
 /// What is wanted of a log of the worm, which may be without a tracker.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Wanted {
     /// Positions: a log without them is refused.
     #[default]
     Positions,
     /// Positions with the motor at their times; where there is none, the motor's readings will do.
-    PositionsOrMotor,
+    PositionsOrMotor {
+        /// Time over which those are averaged, s; 0 for each as it is.
+        window_s: f64,
+    },
     /// All readings of the motor, and no positions.
-    Motor,
+    Motor {
+        /// Time over which they are averaged, s; 0 for each as it is.
+        window_s: f64,
+    },
+}
+
+impl Wanted {
+    /// The exposure of a usual camera, s: as dense as positions are.
+    pub const USUAL_WINDOW_S: f64 = 1.0 / 120.0;
 }
 
 impl Default for OpenOptions {

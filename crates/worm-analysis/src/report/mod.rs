@@ -9,9 +9,11 @@
 //! - [`page`]: the page, its figures, tables and tiles. Neither knows anything of worms.
 //! - `runs`, `summary`, `figure`, `tables`: the contents of this report.
 //! - `sheets` and [`mod@file`]: the CSV, and how files are replaced.
+//! - [`by_current`]: the same on recordings in which nobody saw the worm.
 //! - [`plan`]: a page on a trip and the design for it.
 //! - [`explain`]: another page, on the search for the effect that the model misses; [`servo`]: the same of a servo on a bench.
 
+pub mod by_current;
 pub mod explain;
 mod figure;
 pub mod file;

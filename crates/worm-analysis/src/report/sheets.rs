@@ -3,7 +3,7 @@
 //! `series.csv` names time, positions and gait phase as recordings do, so that it can be read as one. Numbers have all their
 //! digits; an unknown value is an empty field.
 
-use crate::experiment::{Analysis, CycleValues};
+use crate::experiment::{Analysis, AnalysisByCurrent, CycleValues};
 
 /// A cell without a value.
 const UNKNOWN: &str = "";
@@ -69,6 +69,34 @@ pub(super) fn cycles(run: &Analysis) -> Result<Vec<u8>, csv::Error> {
         ];
         row.extend(figures(&cycle.values, run.cells));
         writer.write_record(&row)?;
+    }
+    finished(writer)
+}
+
+/// Every cycle of a worm that nobody saw.
+pub(super) fn cycles_by_current(run: &AnalysisByCurrent) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record([
+        "end_phase",
+        "end_s",
+        "is_odd",
+        "advance_m",
+        "advance_sigma_m",
+        "energy_loss_j",
+        "energy_loss_sigma_j",
+        "energy_electrical_j",
+    ])?;
+    for cycle in &run.cycles {
+        writer.write_record([
+            field(cycle.end_phase),
+            field(cycle.end_s),
+            u8::from(cycle.is_odd).to_string(),
+            field(cycle.advance_m),
+            field(cycle.advance_sigma_m),
+            field(cycle.energy_loss_j),
+            field(cycle.energy_loss_sigma_j),
+            field(cycle.energy_electrical_j),
+        ])?;
     }
     finished(writer)
 }

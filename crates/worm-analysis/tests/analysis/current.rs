@@ -4,6 +4,7 @@ use testkit::hidden_effects::campaign::{HiddenCampaign, draw_with_phase_sized};
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::hidden::{Hidden, Twin};
 use testkit::hidden_effects::setting::CampaignSize;
+use worm_analysis::experiment::{AnalysisError, analyze, analyze_by_current};
 use worm_analysis::explain::answer::StageKind;
 use worm_analysis::explain::{Answer, Evidence, ExplainError, Options, Verdict, explain};
 use worm_analysis::report::explain::page;
@@ -87,18 +88,62 @@ fn current_tells_a_payload_from_softer_pads() {
     }
 }
 
-/// Of a worm that nobody sees: its positions are lost, so any that were looked at would show.
+/// A campaign in which nobody sees the worm: its positions are lost, so any that were looked at would show.
+fn unseen(hidden: Hidden) -> HiddenCampaign {
+    let mut campaign = draw_with_phase_sized(hidden, SEED, SIZE);
+    let positions = campaign
+        .recordings
+        .iter_mut()
+        .flat_map(|recording| &mut recording.position_m);
+    positions.for_each(|of_cell| of_cell.fill(f64::NAN));
+    campaign
+}
+
+/// The same crawl analysed by positions and by current agrees, and the worm is the one that was drawn.
+#[test]
+fn analysis_by_current_finds_what_positions_show() {
+    let seen = draw_with_phase_sized(Hidden::Clean, SEED, SIZE);
+    let by_positions = analyze(&seen.runs(&seen.recordings), &seen.config, &mut |_| ()).expect("an analysis");
+    let campaign = unseen(Hidden::Clean);
+    let by_current = analyze_by_current(&campaign.runs(&campaign.recordings), &campaign.config).expect("an analysis");
+    assert_eq!(by_current.len(), by_positions.len());
+    for (current, seen) in by_current.iter().zip(&by_positions) {
+        let advances = [&current.mean, &current.sigma, &seen.mean].map(|values| values.advance_m);
+        let energies = [&current.mean, &current.sigma, &seen.mean].map(|values| values.energy_loss_j);
+        println!(
+            "{}°: advance {advances:?} m, energy (11) {energies:?} J",
+            seen.slope_deg
+        );
+        assert!((advances[0] / advances[2] - 1.0).abs() < 0.05, "{advances:?}");
+        assert!((energies[0] / energies[2] - 1.0).abs() < 0.08, "{energies:?}");
+        let found = current.max_deformation_m.iter().zip(&current.max_deformation_sigma_m);
+        for ((found_m, sigma_m), seen_m) in found.zip(&seen.max_deformation_m) {
+            assert!(
+                (found_m - seen_m).abs() < 3.0 * sigma_m,
+                "{found_m} ± {sigma_m}, {seen_m}"
+            );
+        }
+        assert!((current.cycle_s / seen.cycle_s - 1.0).abs() < 0.01);
+        // The first cycle is left out, because the tips load up in it.
+        assert!(
+            current.cycles.len() + 2 >= seen.cycles.len(),
+            "{}",
+            current.cycles.len()
+        );
+        let theory = current.theory.nominal.as_ref().expect("it crawls");
+        assert_eq!(
+            theory.values.advance_m,
+            seen.theory.nominal.as_ref().expect("it crawls").values.advance_m
+        );
+    }
+    let mut blind = campaign.recordings.clone();
+    blind[0].motor = None;
+    let refused = analyze_by_current(&campaign.runs(&blind), &campaign.config).expect_err("nothing was recorded");
+    assert!(matches!(refused, AnalysisError::NoCurrent { .. }), "{refused}");
+}
+
 #[test]
 fn current_alone_shows_which_cell_holds_otherwise() {
-    let unseen = |hidden: Hidden| {
-        let mut campaign = draw_with_phase_sized(hidden, SEED, SIZE);
-        let positions = campaign
-            .recordings
-            .iter_mut()
-            .flat_map(|recording| &mut recording.position_m);
-        positions.for_each(|of_cell| of_cell.fill(f64::NAN));
-        campaign
-    };
     let softer = unseen(Hidden::Twin(Twin::SofterPads));
     let refused = asked(&softer, Evidence::Positions).expect_err("there is nothing to see");
     assert!(matches!(refused, ExplainError::NoPositions { .. }), "{refused}");

@@ -81,6 +81,7 @@ fn the_log_of_a_worm_that_nobody_sees_has_the_motor_alone() {
         state.motor_current_a = if tick % 7 == 3 { f64::NAN } else { state.phase };
         state.motor_is_new = u32::from(tick % 5 != 4);
     }
+    let window_s = Wanted::USUAL_WINDOW_S;
     let opened = |states: &[State], wanted: Wanted| {
         let options = OpenOptions {
             wanted,
@@ -95,7 +96,7 @@ fn the_log_of_a_worm_that_nobody_sees_has_the_motor_alone() {
         refused.contains("no sample of the tracker") && refused.contains("wormd explain --current"),
         "{refused}"
     );
-    for wanted in [Wanted::PositionsOrMotor, Wanted::Motor] {
+    for wanted in [Wanted::PositionsOrMotor { window_s }, Wanted::Motor { window_s }] {
         let recording = opened(&unseen, wanted).expect("the motor is there");
         assert!(!recording.has_positions() && recording.cells() == 4, "{wanted:?}");
         assert!((900..=996).contains(&recording.samples()), "{}", recording.samples());
@@ -111,9 +112,13 @@ fn the_log_of_a_worm_that_nobody_sees_has_the_motor_alone() {
         let unread = motor.current_a.iter().filter(|current_a| current_a.is_nan());
         assert!(unread.count() < 100);
     }
-    let recording = opened(&seen, Wanted::PositionsOrMotor).expect("a recording");
+    let recording = opened(&seen, Wanted::PositionsOrMotor { window_s }).expect("a recording");
     assert!(recording.has_positions() && recording.samples() == 996);
-    assert!(!opened(&seen, Wanted::Motor).expect("a recording").has_positions());
+    assert!(
+        !opened(&seen, Wanted::Motor { window_s })
+            .expect("a recording")
+            .has_positions()
+    );
 }
 
 #[test]

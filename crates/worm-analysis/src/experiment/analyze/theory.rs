@@ -4,7 +4,7 @@ use crate::experiment::analysis::{CycleValues, TheoryCycle};
 use worm_physics::{Cycle, Physics, rigid_energy_j, steady_cycle_of};
 
 /// What theory says of a worm's steady cycle, lengths as they are measured; none where it slides down.
-pub(super) fn theory(physics: &Physics, cycle_s: f64) -> Option<TheoryCycle> {
+pub(in crate::experiment) fn theory(physics: &Physics, cycle_s: f64) -> Option<TheoryCycle> {
     let outcome = steady_cycle_of(physics, cycle_s);
     let worm = physics.clamped_worm();
     let scale = physics.view.scale;

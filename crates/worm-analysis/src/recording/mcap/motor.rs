@@ -1,37 +1,25 @@
 //! The motor's readings in the log of a worm that nobody sees, as a recording without positions.
 //!
-//! The controller reads the motor in every tick; the readings within a window are averaged, as a camera's exposure does, which takes
+//! The controller reads the motor in every tick; the readings within a window may be averaged, as a camera's exposure does, which takes
 //! nothing from what their torque does along the way.
 
 use crate::recording::{Motor, Recording};
-use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 use worm_estimator::estimate::MotorTime;
 use worm_estimator::message::State;
 use worm_log::{ReadError, nothing};
 
-/// Time over which readings are averaged, s.
-const WINDOW_S: f64 = 1.0 / 120.0;
 /// The values of a reading: the gait phase, then the motor's.
 const VALUES: usize = 7;
 
-/// Reads a log's motor readings as a recording in which no cell is ever seen. Where the controller was restarted only the longest run is
-/// taken.
+/// Reads a log's motor readings as a recording in which no cell is ever seen, averaged over windows of `window_s`; 0 for each as it is. Where the
+/// controller was restarted only the longest run is taken. Errors call the input `path`.
 ///
 /// # Errors
-/// [`ReadError`] when the file cannot be read, is no log of a worm, or has no reading of the motor with its gait phase.
-pub fn read_motor(path: &Path) -> Result<Recording, ReadError> {
-    let file = File::open(path).map_err(|error| super::cannot_open(path, &error))?;
-    read_motor_from(file, path)
-}
-
-/// As [`read_motor`], from anything that can be read and rewound; errors call it `path`.
-///
-/// # Errors
-/// As [`read_motor`].
-pub fn read_motor_from(input: impl Read + Seek, path: &Path) -> Result<Recording, ReadError> {
-    let (mut runs, contents) = super::read_runs::<Readings>(input, path)?;
+/// [`ReadError`] when the input cannot be read, is no log of a worm, or has no reading of the motor with its gait phase.
+pub fn read_motor_from(input: impl Read + Seek, path: &Path, window_s: f64) -> Result<Recording, ReadError> {
+    let (mut runs, contents) = super::read_runs(input, path, |state| Readings::begin(state, window_s))?;
     runs.iter_mut().for_each(Readings::end_window);
     let count = runs.len();
     let longest = runs.into_iter().max_by_key(|run| run.time_s.len());
@@ -56,6 +44,7 @@ struct Readings {
     lived: MotorTime,
     time_s: Vec<f64>,
     values: [Vec<f64>; VALUES],
+    window_s: f64,
     window: Window,
 }
 
@@ -70,19 +59,6 @@ struct Window {
 }
 
 impl super::OfRun for Readings {
-    fn begin(state: &State) -> Self {
-        let mut run = Self {
-            cells: state.cell_count as usize,
-            last_tick: state.sequence,
-            lived: MotorTime::default(),
-            time_s: Vec::new(),
-            values: Default::default(),
-            window: Window::default(),
-        };
-        run.take(state);
-        run
-    }
-
     fn continues_with(&self, state: &State) -> bool {
         state.sequence >= self.last_tick && state.cell_count as usize == self.cells
     }
@@ -97,13 +73,28 @@ impl super::OfRun for Readings {
 }
 
 impl Readings {
+    /// From its first state on.
+    fn begin(state: &State, window_s: f64) -> Self {
+        let mut run = Self {
+            cells: state.cell_count as usize,
+            last_tick: state.sequence,
+            lived: MotorTime::default(),
+            time_s: Vec::new(),
+            values: Default::default(),
+            window_s,
+            window: Window::default(),
+        };
+        run.take(state);
+        run
+    }
+
     fn take(&mut self, state: &State) {
         let time_s = self.lived.update(state) as f64 * 1e-9;
         if state.motor_is_new != 1 || !state.phase.is_finite() {
             return;
         }
-        let number = (time_s / WINDOW_S).floor() as i64;
-        if number != self.window.number {
+        let number = (time_s / self.window_s).floor() as i64;
+        if number != self.window.number || self.window_s <= 0.0 {
             self.end_window();
             self.window.number = number;
         }

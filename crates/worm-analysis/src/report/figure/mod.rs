@@ -24,6 +24,7 @@ use worm_estimator::number::{fixed, mean};
 
 pub(super) use energy::rigid_ratio;
 pub(super) use schematic::schematic;
+pub(super) use torque::{Felt, torque_figure};
 
 /// Every figure of a report, in reading order.
 pub(super) fn all(runs: Runs<'_>) -> Result<Vec<Figure>, DrawError> {

@@ -1,31 +1,58 @@
 //! Torque at the cam over the phase of a cycle, by the motor's current, beside the model's.
 
-use crate::experiment::{Analysis, TorqueProfile};
+use crate::experiment::TorqueProfile;
 use crate::report::page::{Figure, Key, Mark, Panel};
 use crate::report::plot::{Axis, DrawError, INK, MUTED, Row, Sheet, Stroke, Svg, VERMILION, cell_colours, draw};
-use crate::report::runs::Runs;
+use crate::report::runs::{Runs, describe_each};
 use worm_estimator::number::fixed;
 
 /// Opacity of the bands that mark steps.
 const BAND: f64 = 0.09;
 
+/// What the motor felt in one run.
+pub(in crate::report) struct Felt<'a> {
+    /// The run's short name.
+    pub name: String,
+    /// Number of cells of its worm.
+    pub cells: usize,
+    /// The cells in the order in which they step, counted from 1.
+    pub step_order: &'a [usize],
+    /// The torque.
+    pub profile: &'a TorqueProfile,
+}
+
 /// The figure; none where no recording has the motor's current.
 pub(super) fn figure(runs: Runs<'_>) -> Result<Option<Figure>, DrawError> {
-    let panels = runs
+    let felt: Vec<Felt<'_>> = runs
         .named()
-        .filter_map(|(name, run)| Some((name, run, run.torque_profile.as_ref()?)))
-        .map(|(name, run, profile)| {
-            let svg = picture(&name, run, profile)?;
-            Ok(Panel::new(
+        .filter_map(|(name, run)| {
+            Some(Felt {
                 name,
+                cells: run.cells,
+                step_order: &run.step_order,
+                profile: run.torque_profile.as_ref()?,
+            })
+        })
+        .collect();
+    torque_figure(&felt)
+}
+
+/// The figure of these runs; none where there are none.
+pub(in crate::report) fn torque_figure(felt: &[Felt<'_>]) -> Result<Option<Figure>, DrawError> {
+    if felt.is_empty() {
+        return Ok(None);
+    }
+    let panels = felt
+        .iter()
+        .map(|run| {
+            let svg = picture(run)?;
+            Ok(Panel::new(
+                run.name.clone(),
                 "above: torque, mN m; below: what the model leaves",
                 svg,
             ))
         })
         .collect::<Result<Vec<_>, DrawError>>()?;
-    if panels.is_empty() {
-        return Ok(None);
-    }
     Ok(Some(Figure {
         id: "torque",
         title: "What the motor feels",
@@ -35,11 +62,12 @@ pub(super) fn figure(runs: Runs<'_>) -> Result<Option<Figure>, DrawError> {
             Key::new(Mark::Band, MUTED, "step of the cell of that colour"),
         ],
         panels,
-        caption: caption(runs),
+        caption: caption(felt),
     }))
 }
 
-fn picture(name: &str, run: &Analysis, profile: &TorqueProfile) -> Result<Svg, DrawError> {
+fn picture(run: &Felt<'_>) -> Result<Svg, DrawError> {
+    let profile = run.profile;
     let points = |values: &[f64]| -> Vec<(f64, f64)> {
         let scaled = values.iter().map(|n_m| n_m * 1e3);
         profile.phase.iter().copied().zip(scaled).collect()
@@ -53,7 +81,7 @@ fn picture(name: &str, run: &Analysis, profile: &TorqueProfile) -> Result<Svg, D
     let (measured, model, left) = (points(&profile.measured_n_m), points(&profile.model_n_m), points(&left));
     let heights = |points: &[(f64, f64)]| points.iter().map(|(_, mn_m)| *mn_m).collect::<Vec<_>>();
     let sheet = Sheet {
-        description: format!("Torque at the cam over the phase of a cycle at {name}"),
+        description: format!("Torque at the cam over the phase of a cycle at {}", run.name),
         x_label: Some("phase of the cycle".to_owned()),
         x: Axis::between(0.0, 1.0, 5),
         rows: vec![
@@ -82,9 +110,11 @@ fn picture(name: &str, run: &Analysis, profile: &TorqueProfile) -> Result<Svg, D
     })
 }
 
-fn caption(runs: Runs<'_>) -> String {
-    let of_profile =
-        |describe: &dyn Fn(&TorqueProfile) -> String| runs.describe(|run| run.torque_profile.as_ref().map(describe));
+fn caption(felt: &[Felt<'_>]) -> String {
+    let names: Vec<String> = felt.iter().map(|run| run.name.clone()).collect();
+    let of_profile = |describe: &dyn Fn(&TorqueProfile) -> String| {
+        describe_each(&names, felt.iter().map(|run| Some(describe(run.profile))))
+    };
     let left = of_profile(&|profile| format!("{} mN m", fixed(profile.residual_n_m * 1e3, 1)));
     let cycles = of_profile(&|profile| fixed(profile.cycles, 0));
     format!(
