@@ -1,7 +1,7 @@
 //! What waits for one laptop: bounded whatever the network does, and the newest first.
 //!
-//! Of each worm one frame waits at most. A newer one takes its place, with the cycles, alarms and events of the older one, and the lost
-//! frame is counted. So a slow or silent laptop costs memory that does not grow, and when it takes something again, it gets the worm
+//! Of each worm one frame waits at most. A newer one takes its place, with the cycles, alarms, commands and events of the older one, and the
+//! lost frame is counted. So a slow or silent laptop costs memory that does not grow, and when it takes something again, it gets the worm
 //! as it is now. How much may be under way without being confirmed is bounded too: what lies in buffers of the network is old.
 //!
 //! Pure: times are arguments, ns of one clock.
@@ -19,7 +19,7 @@ const HELD_UP_NS: u64 = 700_000_000;
 const STUCK_NS: u64 = 3_000_000_000;
 /// Answers that may wait.
 const MAX_ANSWERS: usize = 256;
-/// Gait cycles, alarms and events that are kept of lost frames; as many as a relay keeps.
+/// Gait cycles, alarms, commands and events that are kept of lost frames; as many as a relay keeps.
 const MAX_KEPT: usize = 256;
 /// Pieces whose time of sending is known.
 const MAX_TIMES: usize = 4096;
@@ -93,6 +93,7 @@ impl Backlog {
                 if let Some(older) = waiting.frame.take() {
                     put_before(older.cycles, &mut frame.cycles);
                     put_before(older.alarms, &mut frame.alarms);
+                    put_before(older.commands, &mut frame.commands);
                     put_before(older.events, &mut frame.events);
                     waiting.lost += 1;
                 }

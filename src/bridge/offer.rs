@@ -36,7 +36,9 @@ pub(crate) struct Offer {
 }
 
 struct Known {
+    robot: String,
     picture: Picture,
+    config: Option<String>,
     version: u32,
     wormd: String,
     pid: u32,
@@ -91,7 +93,7 @@ impl Offer {
     pub(crate) fn take_line(&mut self, line: Line, network: &Network, event: Option<Event>) -> Result<(), Failure> {
         match line {
             Line::Hello(hello) => {
-                self.take_hello(*hello);
+                self.take_hello(*hello, &network.robot);
                 for watcher in self.watchers.values_mut() {
                     watcher.is_greeted = false;
                 }
@@ -103,7 +105,7 @@ impl Offer {
         }
     }
 
-    fn take_hello(&mut self, hello: Hello) {
+    fn take_hello(&mut self, hello: Hello, robot: &str) {
         let subject = hello.worm.clone();
         let same_boot = self.known.take().filter(|known| known.boot_id == hello.boot_id);
         let (number, frames_lost) = match &same_boot {
@@ -111,6 +113,8 @@ impl Offer {
             None => (None, 0),
         };
         let mut known = Known {
+            robot: robot.to_owned(),
+            config: hello.config.clone(),
             // Times of another run of the computer do not compare.
             picture: same_boot.map_or_else(|| Picture::new(subject), |known| known.picture),
             version: hello.version,
@@ -323,6 +327,7 @@ impl Known {
         Seen {
             cycles: self.picture.cycles.total(),
             alarms: self.picture.alarms.total(),
+            commands: self.picture.commands.total(),
             events: self.picture.events.total(),
         }
     }
@@ -335,10 +340,13 @@ impl Known {
             pid: self.pid,
             boot_id: self.boot_id.clone(),
             time_ns: picture.time_ns,
+            robot: Some(self.robot.clone()),
             worm: picture.subject.clone(),
+            config: self.config.clone(),
             samples: picture.history.samples(),
             cycles: picture.cycles.iter().copied().map(Json).collect(),
             alarms: picture.alarms.iter().copied().map(Json).collect(),
+            commands: picture.commands.iter().copied().map(Json).collect(),
             events: picture.events.iter().cloned().collect(),
         }
     }
@@ -349,6 +357,7 @@ impl Known {
         Frame {
             cycles: picture.cycles.since(seen.cycles).copied().map(Json).collect(),
             alarms: picture.alarms.since(seen.alarms).copied().map(Json).collect(),
+            commands: picture.commands.since(seen.commands).copied().map(Json).collect(),
             events: picture.events.since(seen.events).cloned().collect(),
             ..frame.clone()
         }

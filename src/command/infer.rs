@@ -1,4 +1,7 @@
 //! `wormd infer`: what the motor's current in a log says of the worm, without looking at positions.
+//!
+//! A log that was recorded over a network has too few ticks of a cycle for that; but it has what the running estimator inferred of all of
+//! them, and that is told instead.
 
 use super::{Failure, print};
 use crate::watch::InferredSummary;
@@ -8,9 +11,9 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use worm_estimator::config::Config;
 use worm_estimator::estimate::Inference;
-use worm_estimator::message::{Cycle, Inferred};
+use worm_estimator::message::{Cycle, Inferred, State};
 use worm_estimator::self_sensing::{SelfSensed, Unknown};
-use worm_log::messages;
+use worm_log::{Log, messages};
 
 /// Most time between a cycle's end here and the end that the estimator measured, ns.
 const SAME_END_NS: u64 = 200_000_000;
@@ -41,45 +44,99 @@ pub fn run(args: &InferArgs) -> Result<(), Failure> {
     };
     let mut inference = Inference::by_current_alone(&config).map_err(Failure::unusable)?;
     let mut marks = log.commands.iter().peekable();
-    let mut cycles = Vec::new();
-    let mut last_ns = 0;
-    let mut take = |inferred: &Inferred| {
-        if inferred.end_ns != std::mem::replace(&mut last_ns, inferred.end_ns) {
-            let mut ends = log.cycles.iter();
-            let measured = ends.find(|cycle| cycle.end_ns.abs_diff(inferred.end_ns) < SAME_END_NS);
-            cycles.push(InferredCycle::new(inferred, measured));
-        }
-    };
+    let mut inferred = Vec::new();
     for state in &log.states {
-        if let Some(inferred) = inference.update(state) {
-            take(inferred);
-        }
+        inferred.extend(inference.update(state).copied());
         while let Some(record) = marks.next_if(|record| record.time_ns <= state.time_ns) {
             inference.note_command(record);
         }
     }
-    if let Some(inferred) = inference.finish() {
-        take(inferred);
-    }
-    let Some(sensed) = inference.sensing().sensed() else {
-        let file = args.log.display();
-        return Err(Failure::unusable(format!(
-            "{file}: holds no whole gait cycle crawled forward after the first: record for longer, or give a log with the topic `state`"
-        )));
-    };
-    let inferred = Answer {
-        cells: sensed.cells,
-        worm: InferredWorm::new(sensed),
-        cannot_tell: CannotTell::new(sensed),
-        cycles,
-        warnings: log.warnings,
+    inferred.extend(inference.finish().copied());
+    let answer = match (inference.sensing().sensed(), log.inferred.last()) {
+        (Some(sensed), _) => Answer {
+            cells: sensed.cells,
+            worm: InferredWorm::new(sensed),
+            cannot_tell: Some(CannotTell::new(sensed)),
+            cycles: cycles(&inferred, &log.cycles),
+            warnings: log.warnings,
+        },
+        (None, Some(last)) if last.end_ns != 0 && is_thin(&log.states) => told_live(&log, last),
+        (None, _) => {
+            let file = args.log.display();
+            let (problem, remedy) = match is_thin(&log.states) {
+                true => (
+                    "holds too few ticks of each cycle for the current, and nothing that the running estimator inferred",
+                    "record on the robot",
+                ),
+                false => (
+                    "holds no whole gait cycle crawled forward after the first",
+                    "record for longer, or give a log with the topic `state`",
+                ),
+            };
+            return Err(Failure::unusable(format!("{file}: {problem}: {remedy}")));
+        }
     };
     if args.json {
-        print::line(serde_json::to_string(&inferred).map_err(Failure::failed)?)?;
+        print::line(serde_json::to_string(&answer).map_err(Failure::failed)?)?;
     } else {
-        print::line(in_words(&inferred))?;
+        print::line(in_words(&answer))?;
     }
     Ok(())
+}
+
+/// The cycles of these messages, each once, beside those that were measured.
+fn cycles(inferred: &[Inferred], measured: &[Cycle]) -> Vec<InferredCycle> {
+    let mut cycles = Vec::new();
+    let mut last_ns = 0;
+    for inferred in inferred {
+        if inferred.end_ns != std::mem::replace(&mut last_ns, inferred.end_ns) {
+            let mut ends = measured.iter();
+            let measured = ends.find(|cycle| cycle.end_ns.abs_diff(inferred.end_ns) < SAME_END_NS);
+            cycles.push(InferredCycle::new(inferred, measured));
+        }
+    }
+    cycles
+}
+
+/// Whether a log has less than half of the ticks.
+fn is_thin(states: &[State]) -> bool {
+    let pairs = states.windows(2);
+    let missing = pairs.map(|pair| pair[1].sequence.saturating_sub(pair[0].sequence + 1));
+    missing.sum::<u64>() > states.len() as u64
+}
+
+/// What the estimator said while the worm ran.
+fn told_live(log: &Log, last: &Inferred) -> Answer {
+    let of_cells = |values: &[f64]| {
+        values
+            .iter()
+            .copied()
+            .take(last.cell_count as usize)
+            .collect::<Vec<_>>()
+    };
+    let note = "this log has too few ticks of each cycle for the current: what follows is what the estimator said while the worm ran, with the \
+                configuration of then";
+    Answer {
+        cells: of_cells(&last.friction_n).len(),
+        worm: InferredWorm {
+            friction_n: of_cells(&last.friction_n),
+            friction_sigma_n: of_cells(&last.friction_sigma_n),
+            stiffness_n_per_m: of_cells(&last.stiffness_n_per_m),
+            stiffness_sigma_n_per_m: of_cells(&last.stiffness_sigma_n_per_m),
+            pull_n: last.pull_n,
+            pull_sigma_n: last.pull_sigma_n,
+            slope_deg: last.slope_rad.to_degrees(),
+            slope_sigma_deg: last.slope_sigma_rad.to_degrees(),
+            slope_is_measured: last.slope_is_measured != 0,
+            residual_n_m: last.residual_n_m,
+        },
+        cannot_tell: None,
+        cycles: cycles(&log.inferred, &log.cycles),
+        warnings: [note.to_owned()]
+            .into_iter()
+            .chain(log.warnings.iter().cloned())
+            .collect(),
+    }
 }
 
 /// What `--json` prints. Cells count from 1.
@@ -87,7 +144,8 @@ pub fn run(args: &InferArgs) -> Result<(), Failure> {
 struct Answer {
     cells: usize,
     worm: InferredWorm,
-    cannot_tell: CannotTell,
+    /// None where that was not recorded.
+    cannot_tell: Option<CannotTell>,
     cycles: Vec<InferredCycle>,
     warnings: Vec<String>,
 }
@@ -201,6 +259,30 @@ impl CannotTell {
     }
 }
 
+impl CannotTell {
+    /// A line for each, with its beginning.
+    fn in_words(&self) -> String {
+        let mut text = String::new();
+        if let Some(other) = &self.other_pull {
+            text += &format!(
+                "\nor a pull of {:.2} N, with a probability of {:.0} %",
+                other.pull_n,
+                100.0 * other.probability
+            );
+        }
+        for twin in &self.twins {
+            text += &format!(
+                "\nhardly told apart: {}, {} ({:+.2})",
+                twin.one, twin.other, twin.correlation
+            );
+        }
+        if !self.not_learned.is_empty() {
+            text += &format!("\nnot learned: {}", self.not_learned.join(", "));
+        }
+        text
+    }
+}
+
 /// Each unknown once: a ripple is two.
 fn not_learned(unknowns: impl Iterator<Item = Unknown>) -> Vec<String> {
     let mut names: Vec<String> = unknowns.map(|unknown| unknown.to_string()).collect();
@@ -277,23 +359,8 @@ fn in_words(inferred: &Answer) -> String {
             false => " if all of it is the worm's own weight: a payload or a drag looks the same",
         }
     );
-    if let Some(other) = &inferred.cannot_tell.other_pull {
-        let _ = write!(
-            text,
-            "\nor a pull of {:.2} N, with a probability of {:.0} %",
-            other.pull_n,
-            100.0 * other.probability
-        );
-    }
-    for twin in &inferred.cannot_tell.twins {
-        let _ = write!(
-            text,
-            "\nhardly told apart: {}, {} ({:+.2})",
-            twin.one, twin.other, twin.correlation
-        );
-    }
-    if !inferred.cannot_tell.not_learned.is_empty() {
-        let _ = write!(text, "\nnot learned: {}", inferred.cannot_tell.not_learned.join(", "));
+    if let Some(cannot_tell) = &inferred.cannot_tell {
+        text += &cannot_tell.in_words();
     }
     for warning in &inferred.warnings {
         let _ = write!(text, "\nnote: {warning}");

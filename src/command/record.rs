@@ -1,13 +1,13 @@
-//! `wormd record`: the topics of a worm into a log, or its black box.
+//! `wormd record`: the topics of a worm into a log, or its black box; of a worm over a network what its relay sends.
 
 use super::recording_limits::RecordingLimits;
 use super::{Failure, WormArgs, end_on_signal, positive_seconds, print};
 use crate::attendance::{RoundCounter, ServiceManager, end_after_controller, end_with_parent};
 use crate::black_box::BlackBox;
-use crate::recorder::Recorder;
-use crate::topics::Instance;
+use crate::recorder::{FileOptions, NetworkRecorder, NetworkWorm, Recorder, record};
+use crate::topics::{Controller, Instance, RoleLock};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use worm_estimator::config::Config;
@@ -71,23 +71,71 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
         end_with_parent(&end)?;
     }
     let rounds = RoundCounter::default();
-    let _service = if args.supervised {
-        end_after_controller(&Instance::of(&config).map_err(Failure::unusable)?, &end)?;
-        None
+    let instance = Instance::of(&config).map_err(Failure::unusable)?;
+    let (_service, elsewhere) = if args.supervised {
+        end_after_controller(&instance, &end)?;
+        (None, None)
     } else {
-        Some(ServiceManager::inform_of_rounds(&end, &rounds)?)
+        let service = ServiceManager::inform_of_rounds(&end, &rounds)?;
+        (Some(service), NetworkWorm::find(&instance, args.worm.forward())?)
     };
     let Some(out) = &args.out else {
+        refuse_black_box(elsewhere.as_ref(), &config)?;
         return run_black_box(args, &config, text, &end, &rounds);
     };
+    if let Some(worm) = elsewhere {
+        return run_over_network(args, worm, text, (out, options), &end, &rounds);
+    }
     let mut recorder = Recorder::open(&config, text, &args.topics, out, args.force, options)?;
     let (worm, file) = (&config.worm.name, out.display());
     print::log_line(format_args!("recording {worm} to {file}, from its first message on"));
+    if !args.supervised && RoleLock::<Controller>::holder(&instance).is_none() {
+        print::log_line(format_args!(
+            "no worm {worm} is running yet: start it with `wormd up --name {worm}`; one of a robot elsewhere is recorded if `wormd fleet` \
+             offers it before this begins"
+        ));
+    }
     print::ready();
-    let outcome = recorder.run(args.duration, &end, &rounds);
+    let outcome = record(&mut recorder, args.duration, &end, &rounds);
     // The log is completed whatever ended the recording.
     print::log_line(recorder.close()?);
     outcome
+}
+
+fn run_over_network(
+    args: &RecordArgs,
+    worm: NetworkWorm,
+    text: Option<String>,
+    (out, options): (&Path, FileOptions),
+    end: &AtomicBool,
+    rounds: &RoundCounter,
+) -> Result<(), Failure> {
+    let robot = worm.robot().unwrap_or("a robot that was not heard yet").to_owned();
+    let mut recorder = NetworkRecorder::open(worm, text, &args.topics, out, args.force, options)?;
+    print::log_line(format_args!(
+        "recording from {robot} over the network to {}, 20 ticks a second: for every tick record on the robot and copy the file \
+         (`wormd black-box get`, scp)",
+        out.display()
+    ));
+    print::ready();
+    let outcome = record(&mut recorder, args.duration, end, rounds);
+    // The log is completed whatever ended the recording.
+    let Some(summary) = recorder.close()? else {
+        let nothing = "nothing came of the worm, so no log was written: `wormd fleet` says whether its robot is there";
+        return outcome.and(Err(Failure::failed(nothing)));
+    };
+    print::log_line(summary);
+    outcome
+}
+
+/// The moments around an alarm are worth every tick, and those are on the robot.
+fn refuse_black_box(elsewhere: Option<&NetworkWorm>, config: &Config) -> Result<(), Failure> {
+    let Some(worm) = elsewhere else { return Ok(()) };
+    let (name, robot) = (&config.worm.name, worm.robot().unwrap_or("a robot elsewhere"));
+    Err(Failure::unusable(format!(
+        "{name} is a worm of {robot}, and a black box belongs on the robot, where every tick is: run `wormd record --black-box DIR` there, \
+         and copy its boxes with `wormd black-box get`"
+    )))
 }
 
 fn run_black_box(

@@ -23,7 +23,7 @@ pub struct RelayArgs {
 /// topics or the socket fail.
 pub fn run(args: &RelayArgs) -> Result<(), Failure> {
     print::log_in_background()?;
-    let config = args.worm.load()?;
+    let (config, text) = args.worm.load_with_text()?;
     let end = end_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;
     let role = RoleLock::<Relay>::take(&instance).map_err(Failure::unusable)?;
@@ -31,5 +31,5 @@ pub fn run(args: &RelayArgs) -> Result<(), Failure> {
     if unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICENESS) } != 0 {
         tracing::debug!("the priority cannot be lowered: {}", std::io::Error::last_os_error());
     }
-    server::run(&config, &instance, &role, &end, print::ready)
+    server::run((&config, text), &instance, &role, &end, print::ready)
 }

@@ -338,6 +338,8 @@ impl Feed {
         let frame = Frame {
             cycles: cycles.into_iter().map(Json).collect(),
             alarms: picture.alarms.since(seen.alarms).copied().map(Json).collect(),
+            // Pages have them as events.
+            commands: Vec::new(),
             events: picture.events.since(seen.events).cloned().collect(),
             ..newest.clone()
         };

@@ -4,15 +4,15 @@
 //! message came, so no message is lost or written twice where one file ends and the next begins.
 
 use super::log_file::{LogFile, WrittenFile, problem_of};
+use super::log_head::LogHead;
 use super::progress::Progress;
-use crate::realtime::monotonic_ns;
 use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
-use worm_log::{Channel, Index, Logged, Origin, WriteError, Writer};
+use std::time::{Duration, Instant};
+use worm_log::{Channel, Index, Logged, Note, WriteError, Writer};
 
 /// What the files of a recording are like. By default there is one file, of any size, with an index.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -61,7 +61,7 @@ struct Current {
 pub(super) struct FileSeries {
     first: PathBuf,
     overwrite: bool,
-    origin: Origin,
+    head: LogHead,
     options: FileOptions,
     progress: Arc<Progress>,
     /// The number of the file in use.
@@ -82,7 +82,7 @@ impl FileSeries {
         first: &Path,
         file: LogFile,
         overwrite: bool,
-        origin: Origin,
+        head: LogHead,
         options: FileOptions,
         progress: &Arc<Progress>,
     ) -> Result<Self, WriteError> {
@@ -94,12 +94,12 @@ impl FileSeries {
             progress: Arc::clone(progress),
             number: 0,
             current: Current {
-                writer: Writer::with_index(BufWriter::new(file.clone()), first, &origin, options.index)?,
+                writer: begin_log(&file, first, &head, options.index)?,
                 file,
                 path: first.to_owned(),
                 first_message: None,
             },
-            origin,
+            head,
             kept,
             counts: Channel::ALL.iter().map(|&channel| (channel, 0)).collect(),
         })
@@ -115,7 +115,19 @@ impl FileSeries {
         let is_full = options.max_bytes.is_some_and(|max| self.current.file.bytes() >= max);
         let age = now.saturating_duration_since(first_message);
         let is_old = options.max_age.is_some_and(|max| age >= max);
-        if is_full || is_old { self.rotated(now) } else { Ok(self) }
+        if !is_full && !is_old {
+            return Ok(self);
+        }
+        let head = self.head.of_next();
+        self.rotated(head, Some(now))
+    }
+
+    /// Goes on in the next file, which has another head: its messages do not belong into one file with those before.
+    ///
+    /// # Errors
+    /// As [`FileSeries::prepared`].
+    pub(super) fn with_head(self, head: LogHead) -> Result<Self, SeriesError> {
+        self.rotated(head, None)
     }
 
     /// Writes messages into the file in use.
@@ -126,6 +138,14 @@ impl FileSeries {
         messages
             .iter()
             .try_for_each(|message| self.current.writer.write(message))
+    }
+
+    /// Writes a note into the file in use.
+    ///
+    /// # Errors
+    /// [`WriteError`] when it refuses.
+    pub(super) fn write_note(&mut self, note: &Note) -> Result<(), WriteError> {
+        self.current.writer.write_note(note)
     }
 
     /// Writes what is only in memory yet, and waits until it is on the disk.
@@ -153,7 +173,7 @@ impl FileSeries {
         Ok(counts)
     }
 
-    fn rotated(mut self, now: Instant) -> Result<Self, SeriesError> {
+    fn rotated(mut self, head: LogHead, first_message: Option<Instant>) -> Result<Self, SeriesError> {
         add_counts(&mut self.counts, &self.current.writer);
         // First the old file, so that it is complete whatever becomes of the next.
         let full = self.current.path.clone();
@@ -164,25 +184,16 @@ impl FileSeries {
             full.display(),
             next.path.display()
         );
-        let origin = Origin {
-            begun: SystemTime::now(),
-            begun_ns: monotonic_ns(),
-            ..self.origin.clone()
-        };
         self.kept.extend(next.file.identity(&next.path));
         let mut series = Self {
             number: next.number,
             current: Current {
-                writer: Writer::with_index(
-                    BufWriter::new(next.file.clone()),
-                    &next.path,
-                    &origin,
-                    self.options.index,
-                )?,
+                writer: begin_log(&next.file, &next.path, &head, self.options.index)?,
                 file: next.file,
                 path: next.path,
-                first_message: Some(now),
+                first_message,
             },
+            head,
             ..self
         };
         series.remove_oldest();
@@ -210,6 +221,18 @@ impl FileSeries {
             self.kept.push_front(oldest);
         }
     }
+}
+
+/// Begins a log in a file that was just created.
+fn begin_log(
+    file: &LogFile,
+    path: &Path,
+    head: &LogHead,
+    index: Index,
+) -> Result<Writer<BufWriter<LogFile>>, WriteError> {
+    let mut writer = Writer::with_index(BufWriter::new(file.clone()), path, &head.origin, index)?;
+    head.notes.iter().try_for_each(|note| writer.write_note(note))?;
+    Ok(writer)
 }
 
 /// The next file, created.

@@ -2,6 +2,7 @@
 
 use super::file_series::{FileOptions, FileSeries, SeriesError};
 use super::log_file::{LogFile, creation_failure};
+use super::log_head::LogHead;
 use super::progress::Progress;
 use super::recorded_topics::Batch;
 use crate::failure::Failure;
@@ -10,18 +11,28 @@ use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use worm_log::{Channel, Origin};
+use worm_log::{Channel, Note};
 
 /// Interval at which a chunk is finished and synchronised to disk: a killed recorder or a power loss costs at most this, and what is in the
 /// queue. Longer chunks compress better, by 5 % from 0.2 s to this, and hardly beyond.
 const SYNC_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Batches that may wait for the disk: 10 s of them. Beyond that the topics are not read, and in time lose their oldest messages.
+/// Entries that may wait for the disk: 10 s of batches. Beyond that the topics are not read, and in time lose their oldest messages.
 const QUEUE: usize = 500;
+
+/// What the thread is to write.
+enum Entry {
+    Batch(Batch),
+    Note(Note),
+    /// From here on, the next file.
+    Head(Box<LogHead>),
+}
 
 /// The writing thread.
 pub(super) struct LogWriter {
-    queue: Sender<Batch>,
+    queue: Sender<Entry>,
+    /// Whether another file can follow.
+    can_be_followed: bool,
     thread: JoinHandle<Result<Counts, SeriesError>>,
 }
 
@@ -37,23 +48,28 @@ impl LogWriter {
         path: &Path,
         force: bool,
         options: FileOptions,
-        origin: Origin,
+        head: LogHead,
         progress: &Arc<Progress>,
     ) -> Result<Self, Failure> {
         let file = LogFile::create(path, force, progress).map_err(|error| creation_failure(path, &error))?;
-        if options.is_rotating() && !file.is_regular() {
+        let can_be_followed = file.is_regular();
+        if options.is_rotating() && !can_be_followed {
             return Err(Failure::unusable(format!(
                 "{} is no ordinary file, which no other can follow: leave out --max-size and --max-age",
                 path.display()
             )));
         }
-        let series = FileSeries::begin(path, file, force, origin, options, progress).map_err(Failure::failed)?;
-        let (queue, batches) = bounded(QUEUE);
+        let series = FileSeries::begin(path, file, force, head, options, progress).map_err(Failure::failed)?;
+        let (queue, entries) = bounded(QUEUE);
         let thread = std::thread::Builder::new()
             .name("log".to_owned())
-            .spawn(move || write_batches(series, &batches))
+            .spawn(move || write_entries(series, &entries))
             .map_err(Failure::failed)?;
-        Ok(Self { queue, thread })
+        Ok(Self {
+            queue,
+            can_be_followed,
+            thread,
+        })
     }
 
     /// Queues a batch for the thread.
@@ -61,7 +77,32 @@ impl LogWriter {
     /// # Errors
     /// When the thread has ended; [`LogWriter::close`] returns why.
     pub(super) fn write(&self, batch: Batch) -> Result<(), Failure> {
-        self.queue.send(batch).map_err(|_| Self::stopped())
+        self.queue(Entry::Batch(batch))
+    }
+
+    /// Queues a note for the thread.
+    ///
+    /// # Errors
+    /// As [`LogWriter::write`].
+    pub(super) fn write_note(&self, note: Note) -> Result<(), Failure> {
+        self.queue(Entry::Note(note))
+    }
+
+    /// Goes on in the next file, with another head.
+    ///
+    /// # Errors
+    /// As [`LogWriter::write`]; and where no other file can follow this one.
+    pub(super) fn go_on_with(&self, head: LogHead) -> Result<(), Failure> {
+        if !self.can_be_followed {
+            return Err(Failure::failed(
+                "what comes now belongs into another file, and no other can follow this one: give an ordinary file with --out",
+            ));
+        }
+        self.queue(Entry::Head(Box::new(head)))
+    }
+
+    fn queue(&self, entry: Entry) -> Result<(), Failure> {
+        self.queue.send(entry).map_err(|_| Self::stopped())
     }
 
     /// Checks that the thread still writes, where there is nothing to write.
@@ -92,13 +133,18 @@ impl LogWriter {
     }
 }
 
-/// Writes batches until the queue is closed, and synchronises the file regularly.
-fn write_batches(mut series: FileSeries, batches: &Receiver<Batch>) -> Result<Counts, SeriesError> {
+/// Writes what comes until the queue is closed, and synchronises the file regularly.
+fn write_entries(mut series: FileSeries, entries: &Receiver<Entry>) -> Result<Counts, SeriesError> {
     let mut unsynced_since: Option<Instant> = None;
     loop {
         let left = unsynced_since.map_or(SYNC_INTERVAL, |since| SYNC_INTERVAL.saturating_sub(since.elapsed()));
-        match batches.recv_timeout(left) {
-            Ok(batch) => {
+        match entries.recv_timeout(left) {
+            Ok(Entry::Head(head)) => series = series.with_head(*head)?,
+            Ok(Entry::Note(note)) => {
+                series.write_note(&note)?;
+                unsynced_since.get_or_insert_with(Instant::now);
+            }
+            Ok(Entry::Batch(batch)) => {
                 series = series.prepared(Instant::now())?;
                 series.write(&batch.states)?;
                 series.write(&batch.timings)?;

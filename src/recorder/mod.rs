@@ -4,10 +4,14 @@
 //! overwrite their oldest messages, another ([`LogWriter`]) writes the files, so that a slow disk delays the log and not the
 //! reading. A full disk or another write error ends the recording and nothing else: [`StatusReporter`] reports it, the estimator raises
 //! the alarm `recording-stopped`, and what was written until then can be read.
+//!
+//! A worm of a robot elsewhere has no topics here: [`NetworkRecorder`] records what its relay sends.
 
 mod file_series;
 mod log_file;
+mod log_head;
 mod log_writer;
+mod network;
 mod progress;
 mod recorded_topics;
 mod status_reporter;
@@ -15,26 +19,59 @@ mod thin;
 
 pub(crate) use file_series::FileOptions;
 pub(crate) use log_file::problem_of;
+pub(crate) use network::{NetworkRecorder, NetworkWorm};
 pub(crate) use recorded_topics::{Batch, RecordedTopics};
 pub(crate) use thin::Thinner;
 
 use crate::attendance::RoundCounter;
 use crate::failure::Failure;
-use crate::realtime::monotonic_ns;
 use crate::topics::{Hub, Instance};
-use log_writer::LogWriter;
+use log_head::{LogClock, LogHead};
+use log_writer::{Counts, LogWriter};
 use progress::Progress;
 use status_reporter::{Figures, StatusReporter};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{RecordingProblem, State};
 use worm_log::{Channel, Origin};
 
 /// How often the topics are emptied. At 1 kHz even the fullest holds a second.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(20);
+
+/// What is recorded, bit by bit.
+pub(crate) trait Recording {
+    /// Reads what is new and queues it for writing; returns how many messages that are.
+    ///
+    /// # Errors
+    /// [`Failure::Failed`] when nothing more can be read or written.
+    fn poll(&mut self) -> Result<usize, Failure>;
+}
+
+/// Records until `end` is set, or until `duration` has passed since the first message, and counts how often it has looked for new ones.
+///
+/// # Errors
+/// As [`Recording::poll`].
+pub(crate) fn record(
+    recording: &mut impl Recording,
+    duration: Option<Duration>,
+    end: &AtomicBool,
+    rounds: &RoundCounter,
+) -> Result<(), Failure> {
+    let mut first_message: Option<Instant> = None;
+    let is_over = |first: Instant| duration.is_some_and(|duration| first.elapsed() >= duration);
+    while !first_message.is_some_and(is_over) && !end.load(Ordering::Relaxed) {
+        std::thread::sleep(POLL_INTERVAL);
+        rounds.count();
+        if recording.poll()? > 0 {
+            first_message.get_or_insert_with(Instant::now);
+        }
+    }
+    // What came before the signal to end belongs in the log.
+    recording.poll().map(drop)
+}
 
 /// The topics of a worm on their way into a log.
 pub(crate) struct Recorder {
@@ -73,19 +110,25 @@ impl Recorder {
         options: FileOptions,
     ) -> Result<Self, Failure> {
         let instance = Instance::of(config).map_err(Failure::unusable)?;
+        let clock = LogClock::Own;
+        let (begun, begun_ns) = clock.now();
         let origin = Origin {
             worm: config.worm.name.clone(),
             cells: config.worm.cells,
             config: text,
-            begun: SystemTime::now(),
-            begun_ns: monotonic_ns(),
+            begun,
+            begun_ns,
         };
-        // A limit on the size of files then is a write error like others, and does not kill the process.
-        signal_hook::flag::register(libc::SIGXFSZ, Arc::default()).map_err(Failure::failed)?;
+        let head = LogHead {
+            origin,
+            clock,
+            notes: Vec::new(),
+        };
+        take_full_files_as_errors()?;
         let hub = Hub::open(&instance).map_err(Failure::failed)?;
         let topics = RecordedTopics::open(&hub, topics)?;
         let progress = Arc::default();
-        let writer = LogWriter::open(out, force, options, origin, &progress)?;
+        let writer = LogWriter::open(out, force, options, head, &progress)?;
         Ok(Self {
             status: StatusReporter::open(&hub, &instance),
             topics,
@@ -94,29 +137,6 @@ impl Recorder {
             progress,
             messages: 0,
         })
-    }
-
-    /// Records until `end` is set, or until `duration` has passed since the first message, and counts how often it has read the topics.
-    ///
-    /// # Errors
-    /// As [`poll`](Self::poll).
-    pub(crate) fn run(
-        &mut self,
-        duration: Option<Duration>,
-        end: &AtomicBool,
-        rounds: &RoundCounter,
-    ) -> Result<(), Failure> {
-        let mut first_message: Option<Instant> = None;
-        let is_over = |first: Instant| duration.is_some_and(|duration| first.elapsed() >= duration);
-        while !first_message.is_some_and(is_over) && !end.load(Ordering::Relaxed) {
-            std::thread::sleep(POLL_INTERVAL);
-            rounds.count();
-            if self.poll()?.messages > 0 {
-                first_message.get_or_insert_with(Instant::now);
-            }
-        }
-        // What came before the signal to end belongs in the log.
-        self.poll().map(|_| ())
     }
 
     /// Reads what is new and queues it for writing. The topics hold at least a second of messages.
@@ -170,14 +190,31 @@ impl Recorder {
             ..figures
         };
         self.status.report_end(figures, self.progress.problem());
-        let counts = closed?;
-        let counts = counts.iter().map(|&(channel, count)| {
-            let lost = match self.topics.lost(channel) {
-                Some(lost) => format!(" ({lost} lost)"),
-                None => String::new(),
-            };
-            format!("{} {count}{lost}", channel.name())
-        });
-        Ok(format!("recorded: {}", counts.collect::<Vec<_>>().join(", ")))
+        Ok(summary(&closed?, |channel| self.topics.lost(channel)))
     }
+}
+
+impl Recording for Recorder {
+    fn poll(&mut self) -> Result<usize, Failure> {
+        Ok(Self::poll(self)?.messages)
+    }
+}
+
+/// A limit on the size of files then is a write error like others, and does not kill the process.
+fn take_full_files_as_errors() -> Result<(), Failure> {
+    signal_hook::flag::register(libc::SIGXFSZ, Arc::default())
+        .map(drop)
+        .map_err(Failure::failed)
+}
+
+/// What was recorded, for the operator; `lost` says of which topics how many messages were lost.
+fn summary(counts: &Counts, lost: impl Fn(Channel) -> Option<u64>) -> String {
+    let counts = counts.iter().map(|&(channel, count)| {
+        let lost = match lost(channel) {
+            Some(lost) => format!(" ({lost} lost)"),
+            None => String::new(),
+        };
+        format!("{} {count}{lost}", channel.name())
+    });
+    format!("recorded: {}", counts.collect::<Vec<_>>().join(", "))
 }

@@ -31,6 +31,23 @@ impl Batch {
             + self.trips.len()
             + self.inferred.len()
     }
+
+    /// Leaves out what is of other topics than these; never the commands.
+    pub(crate) fn keep_only(&mut self, topics: &[Channel]) {
+        fn keep<T: Logged>(topics: &[Channel], messages: &mut Vec<T>) {
+            if !topics.contains(&T::CHANNEL) {
+                messages.clear();
+            }
+        }
+        keep(topics, &mut self.states);
+        keep(topics, &mut self.timings);
+        keep(topics, &mut self.estimates);
+        keep(topics, &mut self.cycles);
+        keep(topics, &mut self.alarms);
+        keep(topics, &mut self.ranges);
+        keep(topics, &mut self.trips);
+        keep(topics, &mut self.inferred);
+    }
 }
 
 /// A topic, if it is recorded.

@@ -74,7 +74,6 @@ impl RelayLink {
     }
 
     /// Whether somebody is behind this watcher. Until it is told otherwise, it says so all the time.
-    #[cfg(feature = "bridge")]
     pub(crate) fn set_attending(&mut self, is_attending: bool) {
         self.is_attending = is_attending;
     }
@@ -139,6 +138,11 @@ impl RelayLink {
             }
         }
         received
+    }
+
+    /// Whether there is a connection.
+    pub(crate) fn is_connected(&self) -> bool {
+        self.connection.is_some()
     }
 
     /// Asks for something; false without a connection.

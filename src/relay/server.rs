@@ -31,19 +31,20 @@ const STALL_LIMIT: Duration = Duration::from_secs(30);
 /// How often a trip is told that somebody watches, ns.
 const ATTENDANCE_NS: u64 = 250_000_000;
 
-/// Serves until `end` is set, or nobody has watched for a while. Calls `ready` once watchers can connect.
+/// Serves the configured worm, whose configuration has this text, until `end` is set, or nobody has watched for a while. Calls `ready` once
+/// watchers can connect.
 ///
 /// # Errors
 /// [`Failure::Failed`] when the topics or the socket fail.
 pub(crate) fn run(
-    config: &Config,
+    (config, text): (&Config, Option<String>),
     instance: &Instance,
     _role: &RoleLock<Relay>,
     end: &AtomicBool,
     ready: impl FnOnce(),
 ) -> Result<(), Failure> {
     let hub = Hub::open(instance).map_err(Failure::failed)?;
-    let source = Source::open(&hub, config)?;
+    let source = Source::open(&hub, config, text)?;
     let commander = Commander::start(config, Hub::open(instance).map_err(Failure::failed)?)?;
     let listener = Listener::bind(instance).map_err(|error| {
         let path = instance.relay_socket();

@@ -25,6 +25,7 @@ const STATISTICS_INTERVAL_NS: u64 = 1_000_000_000;
 pub(crate) struct Seen {
     pub(crate) cycles: u64,
     pub(crate) alarms: u64,
+    pub(crate) commands: u64,
     pub(crate) events: u64,
 }
 
@@ -35,11 +36,14 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// Subscribes to all topics.
-    pub(super) fn open(hub: &Hub, config: &Config) -> Result<Self, Failure> {
+    /// Subscribes to all topics. `text` is that of the configuration, for watchers that record.
+    pub(super) fn open(hub: &Hub, config: &Config, text: Option<String>) -> Result<Self, Failure> {
         Ok(Self {
             receiver: TelemetryReceiver::open(hub)?,
-            worm: Worm::new(Subject::of(config)),
+            worm: Worm {
+                config: text,
+                ..Worm::new(Subject::of(config))
+            },
         })
     }
 
@@ -53,6 +57,8 @@ impl Source {
 /// A worm's telemetry and history, without the topics.
 pub(crate) struct Worm {
     subject: Subject,
+    /// The configuration's text.
+    config: Option<String>,
     boot_id: String,
     pub(crate) telemetry: Telemetry,
     history: History,
@@ -66,6 +72,7 @@ impl Worm {
         let boot_id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
         Self {
             subject,
+            config: None,
             boot_id: boot_id.trim().to_owned(),
             telemetry: Telemetry::with_limits(MAX_CYCLES, MAX_ALARMS),
             history: History::default(),
@@ -96,6 +103,7 @@ impl Worm {
         Seen {
             cycles: self.telemetry.cycles.total(),
             alarms: self.telemetry.alarms.total(),
+            commands: self.telemetry.commands.total(),
             events: self.events.total(),
         }
     }
@@ -108,10 +116,13 @@ impl Worm {
             pid: std::process::id(),
             boot_id: self.boot_id.clone(),
             time_ns: now_ns,
+            robot: None,
             worm: self.subject.clone(),
+            config: self.config.clone(),
             samples: self.history.samples(),
             cycles: self.telemetry.cycles.iter().copied().map(Json).collect(),
             alarms: self.telemetry.alarms.iter().copied().map(Json).collect(),
+            commands: self.telemetry.commands.iter().copied().map(Json).collect(),
             events: self.events.iter().cloned().collect(),
         }
     }
@@ -141,6 +152,7 @@ impl Worm {
             raised: telemetry.raised().into_iter().map(Json).collect(),
             cycles: telemetry.cycles.since(seen.cycles).copied().map(Json).collect(),
             alarms: telemetry.alarms.since(seen.alarms).copied().map(Json).collect(),
+            commands: telemetry.commands.since(seen.commands).copied().map(Json).collect(),
             events: self.events.since(seen.events).cloned().collect(),
             driver,
             network: None,

@@ -6,7 +6,7 @@ use crate::trip::wire::Ask;
 use serde::{Deserialize, Serialize};
 use worm_estimator::config::{Config, Direction};
 use worm_estimator::message::{
-    Alarm, CommandKind, Cycle, Estimate, Inferred, Range, RecordingStatus, State, Timing, TripStatus,
+    Alarm, CommandKind, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, State, Timing, TripStatus,
 };
 
 /// Version of this language. A higher one may have taken fields away or changed what they mean; new fields need no new version,
@@ -51,15 +51,24 @@ pub(crate) struct Hello {
     pub boot_id: String,
     /// Now, ns of `CLOCK_MONOTONIC`.
     pub time_ns: u64,
+    /// Over a network the robot, by its certificate; none on the worm's own computer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
     /// The worm, as far as a picture needs it.
     pub worm: Subject,
+    /// The text of the configuration file, as the relay read it when it began; none where it was given none. For who records.
+    #[serde(default)]
+    pub config: Option<String>,
     /// Samples of the last ten minutes, the oldest first.
     pub samples: Vec<Sample>,
     /// The newest gait cycles.
     pub cycles: Vec<Json<Cycle>>,
     /// The newest changes of alarms.
     pub alarms: Vec<Json<Alarm>>,
-    /// The newest commands and changes of the driver.
+    /// The newest commands, as the controller recorded them.
+    #[serde(default)]
+    pub commands: Vec<Json<CommandRecord>>,
+    /// The newest commands and changes of the driver, in words.
     pub events: Vec<Event>,
 }
 
@@ -175,7 +184,10 @@ pub(crate) struct Frame {
     pub cycles: Vec<Json<Cycle>>,
     /// Changes of alarms since the frame before.
     pub alarms: Vec<Json<Alarm>>,
-    /// Commands and changes of the driver since the frame before.
+    /// Commands since the frame before, as the controller recorded them.
+    #[serde(default)]
+    pub commands: Vec<Json<CommandRecord>>,
+    /// Commands and changes of the driver since the frame before, in words.
     pub events: Vec<Event>,
     /// Who drives, if anybody does.
     pub driver: Option<Driver>,

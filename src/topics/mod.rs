@@ -117,5 +117,6 @@ pub use role::{
 };
 pub use stale_resources::Peer;
 pub use start::StartError;
+pub(crate) use subscriber::Count;
 pub use subscriber::{ReceiveError, Sample, Subscriber};
 pub use topic::{Announced, Topic, TopicDescription, describe_topics};

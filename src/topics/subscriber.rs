@@ -118,7 +118,7 @@ impl<T: Topic> Sample<'_, T> {
 
 /// Counts the samples that arrived, and by the gaps in their numbers those that did not.
 #[derive(Debug, Default)]
-struct Count {
+pub(crate) struct Count {
     received: u64,
     lost: u64,
     last: Option<u64>,
@@ -126,7 +126,7 @@ struct Count {
 
 impl Count {
     /// Takes a sample that arrived; a number that goes back means that the publisher restarted.
-    fn add(&mut self, number: Option<u64>) {
+    pub(crate) fn add(&mut self, number: Option<u64>) {
         self.received += 1;
         if let (Some(number), Some(last)) = (number, self.last)
             && number > last
@@ -134,6 +134,11 @@ impl Count {
             self.lost += number - last - 1;
         }
         self.last = number.or(self.last);
+    }
+
+    /// Samples that did not arrive.
+    pub(crate) fn lost(&self) -> u64 {
+        self.lost
     }
 }
 

@@ -4,11 +4,13 @@ use super::recent::Recent;
 use crate::relay::History;
 use crate::relay::message_json::Json;
 use crate::relay::wire::{Ages, Driver, Event, Frame, Hello, Network, Statistics, Subject};
-use worm_estimator::message::{Alarm, Cycle, Estimate, Inferred, Range, RecordingStatus, State, Timing, TripStatus};
+use worm_estimator::message::{
+    Alarm, CommandRecord, Cycle, Estimate, Inferred, Range, RecordingStatus, State, Timing, TripStatus,
+};
 
 /// Gait cycles that are kept: an hour and a half of the usual gait, 1.5 MB.
 const MAX_CYCLES: usize = 2048;
-/// Changes of alarms, and events, that are kept.
+/// Changes of alarms, commands, and events, that are kept.
 const MAX_CHANGES: usize = 1024;
 
 /// So long after the last sample, ns, positions are not measured any more.
@@ -34,6 +36,7 @@ pub(crate) struct Picture {
     pub(crate) raised: Vec<Alarm>,
     pub(crate) cycles: Recent<Cycle>,
     pub(crate) alarms: Recent<Alarm>,
+    pub(crate) commands: Recent<CommandRecord>,
     pub(crate) events: Recent<Event>,
     pub(crate) history: History,
     pub(crate) driver: Option<Driver>,
@@ -60,6 +63,7 @@ impl Picture {
             raised: Vec::new(),
             cycles: Recent::with_limit(MAX_CYCLES),
             alarms: Recent::with_limit(MAX_CHANGES),
+            commands: Recent::with_limit(MAX_CHANGES),
             events: Recent::with_limit(MAX_CHANGES),
             history: History::default(),
             driver: None,
@@ -83,6 +87,11 @@ impl Picture {
             hello.alarms.into_iter().map(|Json(alarm)| alarm),
             |alarm| alarm.time_ns,
         );
+        merge(
+            &mut self.commands,
+            hello.commands.into_iter().map(|Json(record)| record),
+            |record| record.time_ns,
+        );
         merge(&mut self.events, hello.events.into_iter(), |event| event.time_ns);
     }
 
@@ -101,6 +110,8 @@ impl Picture {
         self.raised = frame.raised.into_iter().map(|Json(alarm)| alarm).collect();
         frame.cycles.into_iter().for_each(|Json(cycle)| self.cycles.push(cycle));
         frame.alarms.into_iter().for_each(|Json(alarm)| self.alarms.push(alarm));
+        let commands = frame.commands.into_iter();
+        commands.for_each(|Json(record)| self.commands.push(record));
         frame.events.into_iter().for_each(|event| self.events.push(event));
         self.driver = frame.driver;
         self.watchers = frame.watchers;

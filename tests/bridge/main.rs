@@ -1,6 +1,7 @@
 //! `wormd bridge` and `wormd fleet` from outside: real processes, real certificates, and a network between them that loses and delays.
 
 mod network;
+mod record;
 mod watcher;
 #[path = "../processes/worm.rs"]
 #[allow(
@@ -20,6 +21,9 @@ use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
 use zenoh::Wait;
 
 const PATIENCE: Duration = Duration::from_secs(40);
+
+/// Slow enough for a busy computer: what is tested is the network.
+const WORM_CONFIG: &str = "[control]\nrate_hz = 100.0\n";
 
 /// A robot with a worm at rest, and the files of all who may or may not watch it.
 struct Robot<'a> {
@@ -50,9 +54,9 @@ impl<'a> Robot<'a> {
         drop(free);
         let host = if network.is_some() { ROBOT } else { "127.0.0.1" };
         let config = files.path().join("bridge.toml");
-        std::fs::write(&config, bridge_toml(worm.name(), host, port)).expect("can be written");
-        // Slow enough for a busy computer: what is tested is the network.
-        let worm_config = worm.config("[control]\nrate_hz = 100.0\n");
+        let worm_config = worm.config(WORM_CONFIG);
+        let text = bridge_toml(worm.name(), host, port) + &format!("config = '{worm_config}'\n");
+        std::fs::write(&config, text).expect("can be written");
         let within = |invocation: Invocation| match network {
             Some(network) => invocation.in_network(&network.robot),
             None => invocation,
@@ -98,7 +102,7 @@ impl<'a> Robot<'a> {
         Laptop {
             socket: root.path().join(self.worm.name()).join("relay.sock"),
             process: fleet.start(),
-            _root: root,
+            root,
         }
     }
 
@@ -115,7 +119,7 @@ impl<'a> Robot<'a> {
 struct Laptop {
     socket: PathBuf,
     process: Process,
-    _root: tempfile::TempDir,
+    root: tempfile::TempDir,
 }
 
 impl Laptop {

@@ -4,7 +4,7 @@
 //! ([`ProtobufMessage`](worm_estimator::message::ProtobufMessage)) and their descriptor, so the official readers of any language, Foxglove
 //! and PlotJuggler read it as named series. Log time is the time in the message, ns of `CLOCK_MONOTONIC`. The metadata record `wormd` gives
 //! the corresponding wall-clock time, the worm and the version that wrote the file, and the attachment `worm.toml` is the configuration. So
-//! the file is all that an analysis needs. Logs of older versions hold JSON, and are read as well.
+//! the file is all that an analysis needs. A [`Note`] says what is special about it. Logs of older versions hold JSON, and are read as well.
 //!
 //! # How it works
 //! `writer` puts messages into zstd chunks, each written as a whole: if the writer is killed, the file ends after its last chunk, without a
@@ -22,6 +22,7 @@ mod compare;
 mod error;
 pub mod export;
 mod log;
+mod note;
 mod older;
 mod outline;
 mod payload;
@@ -37,6 +38,7 @@ pub use chunk_writer::{Chunk, ChunkWriter, head, metadata_record};
 pub use compare::{Comparison, compare};
 pub use error::ReadError;
 pub use log::{Log, messages, messages_from, nothing, without_messages};
+pub use note::Note;
 pub use outline::{Outline, complete, outline};
 pub use payload::{Payload, PayloadError};
 pub use replay::{Replay, replay};

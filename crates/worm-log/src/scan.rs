@@ -5,6 +5,7 @@
 //! of 128 kB, lz4 of 64) is read, too, up to the last whole message, and a warning says so.
 
 use super::channel::{CONFIG_ATTACHMENT, Channel, METADATA};
+use super::note::{NOTE, Note};
 use super::payload::{ENCODINGS, Encoding, Payload, PayloadError, Unknown};
 use super::shape::{are_whole_records, is_whole, uncompressed_records};
 use super::unpack::{BoundedZstd, MAX_RATIO};
@@ -32,6 +33,9 @@ const MAX_DAMAGED_NAMED: usize = 20;
 const MAX_FOREIGN_NAMED: usize = 20;
 /// Longest name from the file that is quoted, bytes.
 const MAX_NAME_LEN: usize = 200;
+/// Most notes that are repeated among the warnings, and how much of each, bytes.
+const MAX_NOTES_NAMED: usize = 20;
+const MAX_NOTE_LEN: usize = 400;
 
 /// The contents of a log besides its messages, and remarks on it.
 #[derive(Debug, Clone, Default)]
@@ -40,7 +44,9 @@ pub struct Contents {
     pub config: Option<String>,
     /// The metadata record `wormd`: worm, version, wall-clock time.
     pub metadata: BTreeMap<String, String>,
-    /// Remarks of the reader: a truncated end, messages of an older version.
+    /// What whoever wrote the log noted in it.
+    pub notes: Vec<Note>,
+    /// Remarks of the reader: a truncated end, messages of an older version; and the notes.
     pub warnings: Vec<String>,
 }
 
@@ -306,6 +312,9 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
                 self.latest_ns = self.latest_ns.max(header.log_time);
             }
             Record::Metadata(metadata) if metadata.name == METADATA => self.contents.metadata = metadata.metadata,
+            Record::Metadata(metadata) if metadata.name == NOTE => {
+                self.contents.notes.push(Note::from_entries(metadata.metadata));
+            }
             Record::Attachment { header, data, .. } if header.name == CONFIG_ATTACHMENT => {
                 let text = String::from_utf8(data.into_owned()).map_err(|_| {
                     let place = Some(format!("attachment {CONFIG_ATTACHMENT}"));
@@ -382,6 +391,15 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
         ));
     }
 
+    fn repeat_notes(&mut self) {
+        let Contents { notes, warnings, .. } = &mut self.contents;
+        let texts = notes.iter().take(MAX_NOTES_NAMED);
+        warnings.extend(texts.map(|note| abridged(note.text.clone(), MAX_NOTE_LEN)));
+        if notes.len() > MAX_NOTES_NAMED {
+            warnings.push(format!("the log has {} notes more", notes.len() - MAX_NOTES_NAMED));
+        }
+    }
+
     fn into_contents(mut self) -> Result<Contents, ReadError> {
         if self.damaged_chunks > MAX_DAMAGED_NAMED {
             let more = self.damaged_chunks - MAX_DAMAGED_NAMED;
@@ -395,6 +413,7 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
                     .warnings
                     .push(format!("channels that are not a worm's are ignored: {foreign}"));
             }
+            self.repeat_notes();
             return Ok(self.contents);
         }
         let problem = match self.contents.warnings.last() {

@@ -1,6 +1,7 @@
 //! Writing a log.
 
 use super::channel::{CONFIG_ATTACHMENT, Channel, Logged, METADATA, PROTOBUF};
+use super::note::{NOTE, Note};
 use super::scan::Contents;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -71,7 +72,7 @@ impl Origin {
         Contents {
             config: self.config.clone(),
             metadata: entries.map(|(key, value)| (key.to_owned(), value)).into(),
-            warnings: Vec::new(),
+            ..Contents::default()
         }
     }
 }
@@ -107,7 +108,7 @@ impl<W: Write> Writer<W> {
         Self::with_contents(out, file, &origin.contents(), index)
     }
 
-    /// Begins a log with the configuration and the metadata of another.
+    /// Begins a log with the configuration, the metadata and the notes of another.
     ///
     /// # Errors
     /// As [`Writer::new`].
@@ -128,10 +129,10 @@ impl<W: Write> Writer<W> {
                 .emit_chunk_indexes(is_indexed)
                 .library(concat!("wormd ", env!("CARGO_PKG_VERSION")))
                 .create(NoSeek::new(out))?;
-            mcap.write_metadata(&Metadata {
-                name: METADATA.to_owned(),
-                metadata: contents.metadata.clone(),
-            })?;
+            mcap.write_metadata(&metadata(METADATA, contents.metadata.clone()))?;
+            for note in &contents.notes {
+                mcap.write_metadata(&metadata(NOTE, note.entries()))?;
+            }
             if let Some(config) = &contents.config {
                 mcap.attach(&Attachment {
                     log_time: begun_ns,
@@ -198,10 +199,17 @@ impl<W: Write> Writer<W> {
     ///
     /// # Errors
     /// [`WriteError`] when the output refuses.
-    pub(super) fn write_metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result<(), WriteError> {
-        let name = name.to_owned();
-        let written = self.mcap.write_metadata(&Metadata { name, metadata });
+    pub(super) fn write_metadata(&mut self, name: &str, entries: BTreeMap<String, String>) -> Result<(), WriteError> {
+        let written = self.mcap.write_metadata(&metadata(name, entries));
         written.map_err(|error| refused(&self.file, error))
+    }
+
+    /// Appends a note.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the output refuses.
+    pub fn write_note(&mut self, note: &Note) -> Result<(), WriteError> {
+        self.write_metadata(NOTE, note.entries())
     }
 
     /// Finishes the chunk and writes it: everything so far can then be read, whatever happens later.
@@ -227,6 +235,11 @@ impl<W: Write> Writer<W> {
         finished.map_err(|error| refused(&self.file, error))?;
         Ok(self.mcap.into_inner().into_inner())
     }
+}
+
+fn metadata(name: &str, metadata: BTreeMap<String, String>) -> Metadata {
+    let name = name.to_owned();
+    Metadata { name, metadata }
 }
 
 fn refused(file: &Path, error: McapError) -> WriteError {

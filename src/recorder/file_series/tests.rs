@@ -1,6 +1,8 @@
+use super::super::log_head::LogClock;
 use super::*;
+use std::time::SystemTime;
 use worm_estimator::message::{RecordingProblem, State};
-use worm_log::messages;
+use worm_log::{Origin, messages};
 
 /// A recording of states in a folder of its own.
 struct Recording {
@@ -22,8 +24,13 @@ impl Recording {
             begun: SystemTime::now(),
             begun_ns: 0,
         };
+        let head = LogHead {
+            origin,
+            clock: LogClock::Own,
+            notes: Vec::new(),
+        };
         let file = LogFile::create(&first, false, &progress).expect("an empty folder");
-        let series = FileSeries::begin(&first, file, false, origin, limits, &progress).expect("there is room");
+        let series = FileSeries::begin(&first, file, false, head, limits, &progress).expect("there is room");
         Self {
             folder,
             series: Some(series),

@@ -222,6 +222,9 @@ impl OfRun for ControllerRun {
 
     fn push(&mut self, state: &State) {
         let is_repeated = state.sequence == self.last_tick && state.sequence != self.first_tick;
+        // Where ticks are missing, the one with which a sample came may be among them; the next one still has it.
+        let came_between = state.sequence > self.last_tick.saturating_add(1) && state.sample > self.last_sample;
+        let has_new_sample = state.sample_is_new == 1 || came_between;
         (self.last_tick, self.last_sample) = (state.sequence, state.sample);
         let time_s = self.lived.update(state) as f64 * 1e-9;
         if state.motor_is_new == 1 && !is_repeated {
@@ -230,7 +233,7 @@ impl OfRun for ControllerRun {
             }
             self.readings.push_back(Reading::of(state, time_s));
         }
-        if state.sample_is_new == 1 && !is_repeated {
+        if has_new_sample && !is_repeated {
             let (captured_s, _) = self.capture.place(state.sample_time_s, time_s, state.phase);
             let before_s = self.samples.last().map_or(f64::NEG_INFINITY, |sample| sample.time_s);
             if state.sample_time_s.is_finite() && state.sample_time_s > before_s {

@@ -70,6 +70,29 @@ fn a_recording_has_each_sample_with_its_position_and_time() {
     assert_eq!((motor.current_a[500], motor.voltage_v[500]), (0.2, 5.0));
 }
 
+/// As a log that was recorded over a network has them.
+#[test]
+fn of_a_log_with_few_of_the_ticks_each_has_its_sample() {
+    let (_, mut states) = states(8.3);
+    let mut tick = 0;
+    states.retain(|_| {
+        tick += 1;
+        tick % 7 == 3
+    });
+    let count = states.len();
+    let flagged = states.iter().filter(|state| state.sample_is_new == 1).count();
+    assert!(
+        flagged < count * 2 / 3,
+        "many come with ticks that are not there: {flagged} of {count}"
+    );
+    let recording = read_states(states).expect("a recording");
+    assert!(recording.samples() + 2 >= count, "{} of {count}", recording.samples());
+    let phase = recording.gait_phase.as_ref().expect("is recorded");
+    for (&time_s, &phase) in recording.time_s.iter().zip(phase) {
+        assert!((phase - 0.5 * (time_s - 77.0)).abs() < 3e-3, "{time_s} s: {phase}");
+    }
+}
+
 #[test]
 fn the_log_of_a_worm_that_nobody_sees_has_the_motor_alone() {
     let (_, seen) = states(8.3);

@@ -4,7 +4,7 @@ use super::text;
 use std::fs;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
 use worm_estimator::message::{Estimate, ProtobufMessage, State};
-use worm_log::{Channel, Index, Writer, messages};
+use worm_log::{Channel, Index, Note, Writer, messages, scan};
 
 #[test]
 fn a_log_holds_what_was_written() {
@@ -173,4 +173,36 @@ fn other_files_are_refused_with_what_to_do() {
     }
     let error = messages(&folder.path().join("none.mcap")).expect_err("is not there");
     assert!(error.to_string().contains("check that the file is there"), "{error}");
+}
+
+#[test]
+fn notes_are_repeated_among_the_warnings_and_stay_in_a_copy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [path, copied] = ["worm.mcap", "copy.mcap"].map(|name| folder.path().join(name));
+    let crawl = crawl(0.5);
+    let file = fs::File::create(&path).expect("can be made");
+    let mut writer = Writer::new(file, &path, &origin()).expect("there is room");
+    let states = crawl.states.iter().enumerate();
+    for (place, state) in states {
+        // In the middle of a chunk, too.
+        if place % 20 == 10 {
+            let text = format!("note {}", place / 20);
+            let values = [("place".to_owned(), place.to_string())].into();
+            writer.write_note(&Note { text, values }).expect("there is room");
+        }
+        writer.write(state).expect("there is room");
+    }
+    writer.write_note(&Note::of("x".repeat(5000))).expect("there is room");
+    writer.finish().expect("there is room");
+    worm_log::export::copy(&path, &copied, false).expect("can be copied");
+    for path in [&path, &copied] {
+        let log = messages(path).expect("a log");
+        assert_eq!(text(&log.states), text(&crawl.states));
+        assert_eq!((log.warnings.len(), log.warnings[0].as_str()), (21, "note 0"));
+        assert_eq!(log.warnings[20], "the log has 6 notes more");
+        let contents = scan(path, |_, _| Ok(())).expect("a log");
+        assert_eq!(contents.notes.len(), 26);
+        assert_eq!(contents.notes[24].values["place"], "490");
+        assert_eq!(contents.notes[25].text.len(), 5000);
+    }
 }
