@@ -18,6 +18,8 @@ use worm_physics::{Physics, Worm};
 const EVALUATIONS_PER_READING: u32 = 100;
 /// Readings that each bin of the torque's profile gets at least.
 const READINGS_PER_BIN: f64 = 4.0;
+/// Least readings in a step of a cell: with fewer the course of the torque is not seen. Tried down to 37.
+const MIN_READINGS_PER_STEP: f64 = 30.0;
 /// Longest turn of the cam between two readings that is bridged, cycles.
 const LONGEST_BRIDGED_TURN: f64 = 0.02;
 /// Cycles below which the intervals may be too narrow.
@@ -120,6 +122,15 @@ fn analyze_one(run: &RecordedRun<'_>, base: &Worm, config: &Config) -> Result<An
     let (Some(phase), Some(motor)) = (&recording.gait_phase, &recording.motor) else {
         return Err(AnalysisError::NoCurrent { recording: name() });
     };
+    let pace = Pace::of(&recording.time_s, phase);
+    let per_step = pace.readings / base.cells() as f64;
+    if per_step < MIN_READINGS_PER_STEP {
+        return Err(AnalysisError::FewReadings {
+            recording: name(),
+            per_step,
+            needed: MIN_READINGS_PER_STEP,
+        });
+    }
     let nominal = nominal_worm(run, base)?;
     let known = SelfSensingConfig {
         evaluations_per_reading: EVALUATIONS_PER_READING,
@@ -150,7 +161,6 @@ fn analyze_one(run: &RecordedRun<'_>, base: &Worm, config: &Config) -> Result<An
     let electrical_j: f64 = usual.iter().map(|cycle| cycle.energy_electrical_j).sum();
     let friction_n = of_cells(&sensed.friction_n);
     let mean = values(&sensed.figures, cells);
-    let cycle_s = mean_cycle_s(&recording.time_s, phase);
     let effects = config.effect_settings()?;
     Ok(AnalysisByCurrent {
         recording: name(),
@@ -159,7 +169,7 @@ fn analyze_one(run: &RecordedRun<'_>, base: &Worm, config: &Config) -> Result<An
         cells,
         samples: recording.samples(),
         duration_s: recording.time_s.last().unwrap_or(&0.0) - recording.time_s.first().unwrap_or(&0.0),
-        cycle_s,
+        cycle_s: pace.cycle_s,
         step_order: config.worm.step_order.clone(),
         max_deformation_m,
         max_deformation_sigma_m,
@@ -174,7 +184,7 @@ fn analyze_one(run: &RecordedRun<'_>, base: &Worm, config: &Config) -> Result<An
         mean,
         sigma: values(&sensed.figures_sigma, cells),
         theory: NominalTheory {
-            nominal: theory(&Physics::of(nominal).with(&effects), cycle_s),
+            nominal: theory(&Physics::of(nominal).with(&effects), pace.cycle_s),
         },
         warnings: warnings(recording, sensed, &cycles),
         torque_profile: TorqueProfile::of(&sensing),
@@ -285,16 +295,28 @@ fn values(figures: &CycleFigures, cells: usize) -> CycleValues {
     }
 }
 
-/// Time in which the cam turned forward, over how far it turned.
-fn mean_cycle_s(time_s: &[f64], phase: &[f64]) -> f64 {
-    let (mut turned, mut took_s) = (0.0, 0.0);
-    for (times, phases) in time_s.windows(2).zip(phase.windows(2)) {
-        let by = phases[1] - phases[0];
-        if by > 0.0 {
-            (turned, took_s) = (turned + by, took_s + times[1] - times[0]);
+/// How a recording follows the cam while it turns forward.
+struct Pace {
+    /// Mean time of a cycle, s.
+    cycle_s: f64,
+    /// Readings in a cycle.
+    readings: f64,
+}
+
+impl Pace {
+    fn of(time_s: &[f64], phase: &[f64]) -> Self {
+        let (mut turned, mut took_s, mut readings) = (0.0, 0.0, 0.0);
+        for (times, phases) in time_s.windows(2).zip(phase.windows(2)) {
+            let by = phases[1] - phases[0];
+            if by > 0.0 {
+                (turned, took_s, readings) = (turned + by, took_s + times[1] - times[0], readings + 1.0);
+            }
+        }
+        Self {
+            cycle_s: took_s / turned,
+            readings: readings / turned,
         }
     }
-    took_s / turned
 }
 
 fn warnings(recording: &Recording, sensed: &SelfSensed, cycles: &[CycleByCurrent]) -> Vec<String> {

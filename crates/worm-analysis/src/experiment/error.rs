@@ -30,6 +30,18 @@ pub enum AnalysisError {
         /// The recording.
         recording: String,
     },
+    /// Too few readings for the course of the torque to be seen.
+    #[error(
+        "{recording}: nobody saw the worm in it, and {per_step:.0} readings of the motor in a step are too few for its current to say anything: record at least {needed} (on the robot `wormd record` has every tick)"
+    )]
+    FewReadings {
+        /// The recording.
+        recording: String,
+        /// Readings in a step of a cell.
+        per_step: f64,
+        /// How many are needed.
+        needed: f64,
+    },
     /// Too little of a crawl for the current to say anything.
     #[error(
         "{recording}: holds no whole gait cycle crawled forward after the first, so its current says nothing: record for longer"

@@ -136,6 +136,20 @@ fn analysis_by_current_finds_what_positions_show() {
             seen.theory.nominal.as_ref().expect("it crawls").values.advance_m
         );
     }
+    let mut sparse = campaign.recordings.clone();
+    for recording in &mut sparse {
+        let thinned = |series: &[f64]| series.iter().copied().step_by(3).collect::<Vec<f64>>();
+        recording.time_s = thinned(&recording.time_s);
+        recording.gait_phase = recording.gait_phase.as_deref().map(thinned);
+        if let Some(motor) = &mut recording.motor {
+            motor.current_a = thinned(&motor.current_a);
+        }
+    }
+    let refused = analyze_by_current(&campaign.runs(&sparse), &campaign.config).expect_err("too few readings");
+    assert!(
+        refused.to_string().contains("13 readings of the motor in a step"),
+        "{refused}"
+    );
     let mut blind = campaign.recordings.clone();
     blind[0].motor = None;
     let refused = analyze_by_current(&campaign.runs(&blind), &campaign.config).expect_err("nothing was recorded");
