@@ -123,8 +123,13 @@ fn a_worm_without_a_tracker_arms_crawls_holds_and_stops() {
         (advance_m - LEVEL_ADVANCE_M).abs() < 1.645 * sigma_m,
         "{advance_m} ± {sigma_m} m"
     );
+    // 8 % is what the model leaves of any worm; the rest is the fit's, of a few cycles.
     assert!(
-        sigma_m < 0.15 * advance_m && (forward.range_m / (forward.cycles * advance_m) - 1.0).abs() < 1e-9,
+        (0.08..0.2).contains(&(sigma_m / advance_m)),
+        "{advance_m} ± {sigma_m} m"
+    );
+    assert!(
+        (forward.range_m / (forward.cycles * advance_m) - 1.0).abs() < 1e-9,
         "{forward:?}"
     );
     // What a cycle backward advances, the current does not say.
