@@ -74,7 +74,12 @@ fn a_worm_over_a_network_is_recorded_and_an_outage_costs_states_and_no_cycle() {
             && gap.contains("no cycle and no change of an alarm of it is missing"),
         "{gap}"
     );
-    other_commands_say_what_is_missing(&robot, &run);
+    let outage = log
+        .states
+        .windows(2)
+        .max_by_key(|pair| pair[1].time_ns.saturating_sub(pair[0].time_ns))
+        .expect("states");
+    other_commands_say_what_is_missing(&robot, &run, outage[0].sample_time_s);
 }
 
 /// A configuration that says where the fleet offers its worms, and nothing of the worm.
@@ -173,11 +178,12 @@ fn are_all_of<T: JsonMessage + Copy>(some: &[T], all: &[T], span: &std::ops::Ran
     assert_eq!(texts(&found), texts(&expected), "{}", T::TYPE_NAME);
 }
 
-fn other_commands_say_what_is_missing(robot: &Robot<'_>, run: &Path) {
-    let run = path(run);
+/// `until_s` is when the tracker's last sample before the outage was taken: what an outage left out, nobody analyses.
+fn other_commands_say_what_is_missing(robot: &Robot<'_>, run: &Path, until_s: f64) {
+    let (run, until) = (path(run), until_s.to_string());
     let copy = run.replace("run.mcap", "copy.mcap");
     for arguments in [
-        &["analyze", "--slope", "0", "--max-gap", "60", run][..],
+        &["analyze", "--slope", "0", "--to", &until, run][..],
         &["infer", run],
         &["export", "--mcap", &copy, run],
         &["replay", run],
