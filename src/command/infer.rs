@@ -53,13 +53,12 @@ pub fn run(args: &InferArgs) -> Result<(), Failure> {
     }
     inferred.extend(inference.finish().copied());
     let answer = match (inference.sensing().sensed(), log.inferred.last()) {
-        (Some(sensed), _) => Answer {
-            cells: sensed.cells,
-            worm: InferredWorm::new(sensed),
-            cannot_tell: Some(CannotTell::new(sensed)),
-            cycles: cycles(&inferred, &log.cycles),
-            warnings: log.warnings,
-        },
+        (Some(sensed), _) => Answer::new(
+            inference.latest(),
+            Some(CannotTell::new(sensed)),
+            cycles(&inferred, &log.cycles),
+            log.warnings,
+        ),
         (None, Some(last)) if last.end_ns != 0 && is_thin(&log.states) => told_live(&log, last),
         (None, _) => {
             let file = args.log.display();
@@ -100,43 +99,20 @@ fn cycles(inferred: &[Inferred], measured: &[Cycle]) -> Vec<InferredCycle> {
 
 /// Whether a log has less than half of the ticks.
 fn is_thin(states: &[State]) -> bool {
-    let pairs = states.windows(2);
-    let missing = pairs.map(|pair| pair[1].sequence.saturating_sub(pair[0].sequence + 1));
-    missing.sum::<u64>() > states.len() as u64
+    let gaps = states
+        .windows(2)
+        .map(|pair| pair[1].sequence.saturating_sub(pair[0].sequence));
+    // A log may hold any numbers.
+    let missing = gaps.fold(0_u64, |missing, gap| missing.saturating_add(gap.saturating_sub(1)));
+    missing > states.len() as u64
 }
 
 /// What the estimator said while the worm ran.
 fn told_live(log: &Log, last: &Inferred) -> Answer {
-    let of_cells = |values: &[f64]| {
-        values
-            .iter()
-            .copied()
-            .take(last.cell_count as usize)
-            .collect::<Vec<_>>()
-    };
     let note = "this log has too few ticks of each cycle for the current: what follows is what the estimator said while the worm ran, with the \
                 configuration of then";
-    Answer {
-        cells: of_cells(&last.friction_n).len(),
-        worm: InferredWorm {
-            friction_n: of_cells(&last.friction_n),
-            friction_sigma_n: of_cells(&last.friction_sigma_n),
-            stiffness_n_per_m: of_cells(&last.stiffness_n_per_m),
-            stiffness_sigma_n_per_m: of_cells(&last.stiffness_sigma_n_per_m),
-            pull_n: last.pull_n,
-            pull_sigma_n: last.pull_sigma_n,
-            slope_deg: last.slope_rad.to_degrees(),
-            slope_sigma_deg: last.slope_sigma_rad.to_degrees(),
-            slope_is_measured: last.slope_is_measured != 0,
-            residual_n_m: last.residual_n_m,
-        },
-        cannot_tell: None,
-        cycles: cycles(&log.inferred, &log.cycles),
-        warnings: [note.to_owned()]
-            .into_iter()
-            .chain(log.warnings.iter().cloned())
-            .collect(),
-    }
+    let warnings = std::iter::once(note.to_owned()).chain(log.warnings.iter().cloned());
+    Answer::new(last, None, cycles(&log.inferred, &log.cycles), warnings.collect())
 }
 
 /// What `--json` prints. Cells count from 1.
@@ -204,20 +180,38 @@ struct OtherPull {
     probability: f64,
 }
 
-impl InferredWorm {
-    fn new(sensed: &SelfSensed) -> Self {
-        let of_cells = |values: &[f64]| values[..sensed.cells].to_vec();
+impl Answer {
+    fn new(
+        last: &Inferred,
+        cannot_tell: Option<CannotTell>,
+        cycles: Vec<InferredCycle>,
+        warnings: Vec<String>,
+    ) -> Self {
+        let worm = InferredWorm::new(last);
         Self {
-            friction_n: of_cells(&sensed.friction_n),
-            friction_sigma_n: of_cells(&sensed.friction_sigma_n),
-            stiffness_n_per_m: of_cells(&sensed.stiffness_n_per_m),
-            stiffness_sigma_n_per_m: of_cells(&sensed.stiffness_sigma_n_per_m),
-            pull_n: sensed.pull_n,
-            pull_sigma_n: sensed.pull_sigma_n,
-            slope_deg: sensed.slope_rad.to_degrees(),
-            slope_sigma_deg: sensed.slope_sigma_rad.to_degrees(),
-            slope_is_measured: sensed.slope_is_measured,
-            residual_n_m: sensed.residual_n_m,
+            cells: worm.friction_n.len(),
+            worm,
+            cannot_tell,
+            cycles,
+            warnings,
+        }
+    }
+}
+
+impl InferredWorm {
+    fn new(last: &Inferred) -> Self {
+        let of_cells = |values: &[f64]| values.iter().copied().take(last.cell_count as usize).collect();
+        Self {
+            friction_n: of_cells(&last.friction_n),
+            friction_sigma_n: of_cells(&last.friction_sigma_n),
+            stiffness_n_per_m: of_cells(&last.stiffness_n_per_m),
+            stiffness_sigma_n_per_m: of_cells(&last.stiffness_sigma_n_per_m),
+            pull_n: last.pull_n,
+            pull_sigma_n: last.pull_sigma_n,
+            slope_deg: last.slope_rad.to_degrees(),
+            slope_sigma_deg: last.slope_sigma_rad.to_degrees(),
+            slope_is_measured: last.slope_is_measured != 0,
+            residual_n_m: last.residual_n_m,
         }
     }
 }
