@@ -46,7 +46,10 @@ export class WormPicture {
     const known = positions.filter(isKnown);
     this.#canal.toggleAttribute("hidden", known.length === 0);
     if (known.length === 0) {
-      setText(byId("canal-text"), "no positions: they are inferred from the motor's current after some gait cycles");
+      const why = frame.inferred
+        ? "they are inferred from the motor's current after some gait cycles"
+        : "there is no tracker, and nothing is inferred from the motor's current";
+      setText(byId("canal-text"), `no positions: ${why}`);
       return;
     }
     const [rear, front] = [Math.min(...known), Math.max(...known)];

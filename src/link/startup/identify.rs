@@ -46,7 +46,17 @@ pub(super) fn identify<P: Port>(
     id: DeviceId,
     expected: u16,
 ) -> Result<Identity, StartupError> {
-    match bus.ask_again(|bus, deadline| bus.ping(id, deadline)) {
+    let mut asked = bus.ask_again(|bus, deadline| bus.ping(id, deadline));
+    let mut present = Vec::new();
+    if matches!(asked, Err(TransactionError::Silent(_) | TransactionError::Damaged(_))) {
+        present = who_is_there(bus);
+        if present.iter().any(|(there, _)| *there == id) {
+            // It was only late, as behind a computer that paused.
+            bus.settle(Instant::now() + QUIET_TIME)?;
+            asked = bus.ask_again(|bus, deadline| bus.ping(id, deadline));
+        }
+    }
+    match asked {
         Ok(identity) if identity.model == expected => Ok(identity),
         Ok(Identity { model: found, .. }) => Err(StartupError::WrongModel {
             device,
@@ -59,19 +69,28 @@ pub(super) fn identify<P: Port>(
             device,
             id,
             baud: settings.baud,
-            present: who_is_there(bus),
+            present: in_words(&present),
         }),
     }
 }
 
-/// For an error: who answers a broadcast ping.
-fn who_is_there<P: Port>(bus: &mut WormBus<P>) -> String {
+/// IDs and models of all that answer a broadcast ping; nobody where the port fails, of which the next thing to be asked will tell.
+fn who_is_there<P: Port>(bus: &mut WormBus<P>) -> Vec<(DeviceId, u16)> {
     let mut present = Vec::new();
     let listened = bus.broadcast_ping(Instant::now() + 4 * REPLY_TIME, |id, who| {
-        present.push(format!("{id} (model {})", who.model))
+        present.push((id, who.model));
     });
-    match (listened, present.as_slice()) {
-        (Ok(_), [_, ..]) => format!("these IDs do: {}", present.join(", ")),
-        _ => "nobody does".into(),
+    listened.map_or_else(|_| Vec::new(), |_| present)
+}
+
+/// For an error.
+fn in_words(present: &[(DeviceId, u16)]) -> String {
+    if present.is_empty() {
+        return "nobody does".into();
     }
+    let each: Vec<String> = present
+        .iter()
+        .map(|(id, model)| format!("{id} (model {model})"))
+        .collect();
+    format!("these IDs do: {}", each.join(", "))
 }

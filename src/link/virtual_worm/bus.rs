@@ -52,7 +52,7 @@ impl Bus {
             faults_changed: false,
             conditions: Conditions::default(),
             plant: Plant::with_step(config, options.seed, options.step_s.unwrap_or(DEFAULT_STEP_S))?,
-            servo: Servo::new(config, options.baud),
+            servo: Servo::new(config, options.baud, seed),
             has_tracker: config.tracker.present || config.inertial_sensor.is_some(),
             tracker: Tracker::new(config, seed),
             line: Line::new(derived_seed(seed)),

@@ -7,6 +7,7 @@
 //! - In the position modes the duty is the error in counts times the P gain over 256 · 885, as recordings of a real one show. A profile
 //!   velocity moves the goal; I and D gain are kept and not used. The profile acceleration ramps velocity mode; profiles by time are
 //!   not followed.
+//! - The velocity that it reports scatters while it turns, as in recordings of a real one.
 //! - An overload is a motor that stands at its greatest duty for 2 s; an input voltage error is one that lasts 0.1 s.
 //! - A backup holds the EEPROM, gains and profiles; the startup configuration brings back the latter two.
 //! - Below 2.8 V it does not run, and comes up as after a reboot.
@@ -16,12 +17,15 @@ mod instructions;
 
 use super::conditions::ServoConditions;
 use super::control_table::{Area, ControlTable};
+use super::line::derived_seed;
 use super::motor::{Drive, Gains};
 use super::plant::Plant;
 use super::servo_table::*;
 use crate::link::servo::register::*;
 use crate::link::servo::{BAUD_RATES, HardwareErrors, VELOCITY_MODE, WATCHDOG_LATCHED, scale};
 use dynamixel_bus::packet::DeviceId;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
 use std::f64::consts::TAU;
 use worm_estimator::config::{Config, PresentCurrent};
 use worm_physics::servo::COUNT_RAD;
@@ -72,6 +76,8 @@ pub(super) struct Servo {
     ramped_goal: f64,      // the velocity goal behind the profile acceleration, counts
     moved_goal: f64,       // the position goal behind the profile velocity, counts
     present_current: PresentCurrent,
+    velocity_noise_rad_s: f64,
+    rng: Xoshiro256PlusPlus,
     duty_limit: f64, // the smaller of PWM limit and goal PWM
     conditions: ServoConditions,
     starved: bool, // below the brownout voltage
@@ -86,7 +92,7 @@ pub(super) struct Servo {
 
 impl Servo {
     /// As it comes from the factory but for ID and baud rate, at the home position.
-    pub(super) fn new(config: &Config, baud: Option<u32>) -> Self {
+    pub(super) fn new(config: &Config, baud: Option<u32>, seed: u64) -> Self {
         let mut table = factory_new();
         table.set(ID, i64::from(config.servo.id));
         let code = baud.and_then(|baud| BAUD_RATES.iter().position(|&known| known == baud));
@@ -103,6 +109,8 @@ impl Servo {
             ramped_goal: 0.0,
             moved_goal: 0.0,
             present_current: config.virtual_worm.present_current,
+            velocity_noise_rad_s: config.virtual_worm.velocity_noise_rad_s,
+            rng: Xoshiro256PlusPlus::seed_from_u64(derived_seed(seed ^ 0x5e7f)),
             duty_limit: 1.0,
             conditions: ServoConditions::default(),
             starved: false,

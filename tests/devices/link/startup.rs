@@ -226,6 +226,16 @@ fn read_mode_is_the_fastest_that_both_know() {
     );
 }
 
+/// As behind a computer that pauses: a device that the broadcast ping finds is asked again, not reported as missing and as there at once.
+#[test]
+fn a_servo_that_was_late_is_asked_again() {
+    let mut worm = Worm::new(5);
+    worm.quirks.unheard_pings = 3;
+    let (prepared, _) = prepare_worm(&mut worm, &settings());
+    assert!(prepared.is_ok(), "{prepared:?}");
+    assert_eq!(worm.quirks.unheard_pings, 0);
+}
+
 #[test]
 fn refusals_say_what_is_wrong_and_what_to_do() {
     type Spoil = fn(&mut Worm, &mut LinkSettings);

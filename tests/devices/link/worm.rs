@@ -25,6 +25,8 @@ pub struct Quirks {
     pub knows_no_bulk: bool,
     pub tracker_silent: bool,
     pub servo_silent: bool,
+    /// So many pings to a single device that follow are not heard.
+    pub unheard_pings: u32,
     /// The servo obeys, but only its answers to pings arrive.
     pub answers_pings_only: bool,
     /// The answers in which the servo names its hardware errors do not arrive.
@@ -216,6 +218,7 @@ impl Worm {
 
     fn obey(&mut self, recipient: Recipient, instruction: Instruction<'_>) {
         match (recipient, instruction) {
+            (Recipient::One(_), Instruction::Ping) if self.quirks.unheard_pings > 0 => self.quirks.unheard_pings -= 1,
             (Recipient::One(id), Instruction::Ping) => self.ping(id),
             (Recipient::All, Instruction::Ping) => [SERVO, TRACKER].map(id).into_iter().for_each(|id| self.ping(id)),
             (Recipient::One(id), Instruction::Read { address, length }) => self.read(id, address, length),

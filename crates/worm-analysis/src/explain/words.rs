@@ -236,8 +236,8 @@ pub(super) fn warnings(
         .fold(f64::INFINITY, f64::min);
     if !worm.sees_positions() && fastest_s < FAST_GAIT_S {
         warnings.push(format!(
-            "at {fastest_s:.1} s a cycle the coarse steps in which a servo reports its velocity look like torques, and what is named may be false: \
-             record a crawl of 2.5 s a cycle",
+            "at {fastest_s:.1} s a cycle the current alone says too much friction, of sound virtual worms up to 1.4 times what they had, and what \
+             is named may be false: record a crawl of 2.5 s a cycle",
         ));
     }
     if worm.counts_current() && !gears_calibrated {

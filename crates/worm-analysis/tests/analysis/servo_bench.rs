@@ -8,6 +8,7 @@ use worm_analysis::bench::{BenchCampaign, BenchRun, ServoRecording};
 use worm_analysis::explain::servo::answer::ServoAnswer;
 use worm_analysis::explain::servo::{Bench, Measures, explain_servo, prediction_errors};
 use worm_analysis::explain::{Options, Verdict};
+use worm_estimator::config::VirtualWorm;
 use worm_physics::effect::{Setting, named_of_servo};
 use worm_physics::servo::{COUNT_RAD, Command, LONGEST_STEP_S, SPEED_COUNT_RAD_S, ServoMotion, ServoPhysics};
 
@@ -57,6 +58,56 @@ fn friction_by_the_load_is_named_on_the_real_servo() {
     assert!(
         errors.iter().all(|run| run.mean_absolute_error_a < 0.1),
         "the duty follows from the position"
+    );
+}
+
+/// How the velocity of the real servo scatters while its arm moves, rad/s, at speeds in a range: what readings that bend little leave of a
+/// parabola over thirteen of them, without what rounding makes of that.
+fn velocity_scatter_rad_s(recordings: &[ServoRecording], speeds_rad_s: std::ops::Range<f64>) -> (f64, usize) {
+    const BESIDE: i32 = 6;
+    const MOST_BENT: f64 = 0.05; // counts for each reading squared
+    let beside = || (-BESIDE..=BESIDE).map(f64::from);
+    let count = f64::from(2 * BESIDE + 1);
+    let sum_of = |power: i32| beside().map(|at| at.powi(power)).sum::<f64>();
+    let (second, fourth) = (sum_of(2), sum_of(4));
+    let determinant = count * fourth - second * second;
+    let (mut squares, mut readings) = (0.0, 0);
+    for recording in recordings {
+        let counts: Vec<f64> = recording.velocity_rad_s.iter().map(|v| v / SPEED_COUNT_RAD_S).collect();
+        let windows = counts
+            .windows(count as usize)
+            .zip(recording.torque_enabled.windows(count as usize));
+        for (window, _) in windows.filter(|(_, enabled)| enabled.iter().all(|on| *on)) {
+            let sum: f64 = window.iter().sum();
+            let by_square: f64 = window.iter().zip(beside()).map(|(v, at)| v * at * at).sum();
+            let middle = (sum * fourth - by_square * second) / determinant;
+            let bends = 2.0 * (count * by_square - second * sum) / determinant;
+            if bends.abs() < MOST_BENT && speeds_rad_s.contains(&(middle * SPEED_COUNT_RAD_S).abs()) {
+                squares += (window[BESIDE as usize] - middle).powi(2);
+                readings += 1;
+            }
+        }
+    }
+    // Of white noise a parabola takes the share that its own middle reading has in it.
+    let left = 1.0 - fourth / determinant;
+    let of_rounding = 1.0 / 12.0;
+    let variance = squares / readings as f64 / left - of_rounding;
+    (variance.max(0.0).sqrt() * SPEED_COUNT_RAD_S, readings)
+}
+
+/// The virtual worm's servo reports its velocity no better than the real one, and hardly worse.
+#[test]
+fn the_virtual_servos_velocity_scatters_like_the_real_ones() {
+    let (_, recordings) = real();
+    let [slow, medium, fast] = [0.12..0.72, 0.72..1.92, 1.92..3.6].map(|speeds_rad_s: std::ops::Range<f64>| {
+        let (scatter_rad_s, readings) = velocity_scatter_rad_s(&recordings, speeds_rad_s.clone());
+        println!("{speeds_rad_s:?} rad/s: {scatter_rad_s:.4} rad/s, {readings} readings");
+        scatter_rad_s
+    });
+    let virtual_rad_s = VirtualWorm::default().velocity_noise_rad_s;
+    assert!(
+        slow < virtual_rad_s && virtual_rad_s < fast,
+        "{slow}, {medium}, {fast} rad/s"
     );
 }
 

@@ -15,6 +15,8 @@ pub struct VirtualWorm {
     pub seed: u64,
     /// Standard deviation of one position measured by its tracker, m.
     pub noise_m: f64,
+    /// Standard deviation of the velocity that its servo reports while it turns, before it is rounded, rad/s.
+    pub velocity_noise_rad_s: f64,
     /// Fraction of positions that its tracker does not see.
     pub dropout_share: f64,
     /// Its true largest tip deformations, m, where they differ from `worm.max_deformation_m`.
@@ -44,6 +46,7 @@ impl Default for VirtualWorm {
         Self {
             seed: 1,
             noise_m: 1e-4,
+            velocity_noise_rad_s: 0.008,
             dropout_share: 0.0,
             max_deformation_m: None,
             scatter_share: 0.01,
@@ -146,6 +149,12 @@ impl VirtualWorm {
 
     pub(super) fn check(&self, cells: usize, checker: &mut Checker) {
         checker.range("virtual_worm.noise_m", self.noise_m, 0.0..=5e-3, "m");
+        checker.range(
+            "virtual_worm.velocity_noise_rad_s",
+            self.velocity_noise_rad_s,
+            0.0..=0.1,
+            "rad/s",
+        );
         checker.range("virtual_worm.dropout_share", self.dropout_share, 0.0..=0.9, "");
         if let Some(bounds) = &self.max_deformation_m {
             bounds.check("virtual_worm.max_deformation_m", cells, 1e-6..=0.1, "m", checker);

@@ -8,6 +8,7 @@ use crate::link::Register;
 use crate::link::servo::register::*;
 use crate::link::servo::{POSITION_MODE, WATCHDOG_LATCHED, scale};
 use dynamixel_bus::packet::{BackupAction, ResetScope, StatusError};
+use rand_distr::{Distribution, StandardNormal};
 use worm_estimator::config::PresentCurrent;
 
 impl Servo {
@@ -26,7 +27,13 @@ impl Servo {
     fn refresh(&mut self, plant: &Plant, now_s: f64) {
         let motor = plant.motor();
         let sign = self.sign();
-        let velocity = scale::velocity_counts(sign * motor.velocity_rad_per_s());
+        let turning = motor.velocity_rad_per_s() != 0.0;
+        let error: f64 = if turning {
+            StandardNormal.sample(&mut self.rng)
+        } else {
+            0.0
+        };
+        let velocity = scale::velocity_counts(sign * motor.velocity_rad_per_s() + self.velocity_noise_rad_s * error);
         let counts = |value: f64, unit: f64| (value / unit).round() as i64;
         let moving = velocity.unsigned_abs() > self.table.get(MOVING_THRESHOLD);
         let position = i64::from(self.position_counts(plant));
