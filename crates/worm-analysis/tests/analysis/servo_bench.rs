@@ -95,7 +95,7 @@ fn velocity_scatter_rad_s(recordings: &[ServoRecording], speeds_rad_s: std::ops:
     (variance.max(0.0).sqrt() * SPEED_COUNT_RAD_S, readings)
 }
 
-/// The virtual worm's servo reports its velocity no better than the real one, and hardly worse.
+/// The velocity of the virtual worm's servo scatters by less than that of the real one at fast turns, and by more than at slow ones.
 #[test]
 fn the_virtual_servos_velocity_scatters_like_the_real_ones() {
     let (_, recordings) = real();
