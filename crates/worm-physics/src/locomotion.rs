@@ -7,7 +7,8 @@ use super::motion::Motion;
 use super::physics::Physics;
 use super::worm::{SlidesDown, Worm};
 
-/// A worm in motion under its [`Physics`], quasi-static: the exact [`Motion`] while they are piecewise linear, else a [`Crawl`].
+/// A worm in motion under its [`Physics`]. Quasi-static: the exact [`Motion`] while they are piecewise linear, else a [`Crawl`]. With mass:
+/// always a [`Crawl`].
 #[derive(Debug, Clone)]
 pub struct Locomotion(MotionKind);
 
@@ -40,6 +41,19 @@ impl Locomotion {
             let crawl = Crawl::at_rest(&mechanics, 0.0, first_positions_m, None)?;
             MotionKind::Incremental { mechanics, crawl }
         }))
+    }
+
+    /// As [`at_rest`](Self::at_rest), but the body has its mass in motion as well, and this damping ratio on its pads.
+    ///
+    /// # Errors
+    /// [`SlidesDown`] when they cannot.
+    ///
+    /// # Panics
+    /// When there is not one position for each cell.
+    pub fn with_mass(physics: &Physics, first_positions_m: &[f64], damping_ratio: f64) -> Result<Self, SlidesDown> {
+        let mechanics = Mechanics::new(physics);
+        let crawl = Crawl::at_rest(&mechanics, 0.0, first_positions_m, Some(damping_ratio))?;
+        Ok(Self(MotionKind::Incremental { mechanics, crawl }))
     }
 
     /// Changes the physics at the present phase; cells step on from where they are. The exact motion lets the body give way at once, the
@@ -88,7 +102,7 @@ impl Locomotion {
         }
     }
 
-    /// Whether it is exact: under the paper's laws alone.
+    /// Whether it is exact: under the paper's laws alone, without mass.
     pub fn is_exact(&self) -> bool {
         matches!(self.0, MotionKind::Exact { .. })
     }

@@ -77,7 +77,7 @@ impl Body {
             scatter_share: config.virtual_worm.scatter_share,
             scatter: [1.0; MAX_CELLS],
             conditions: PlantConditions::default(),
-            motion: Locomotion::at_rest(&relieved(&physics, relief_n)?, &positions_m)?,
+            motion: at_rest(&relieved(&physics, relief_n)?, &positions_m, config)?,
             physics,
             relief_n,
             dragged_m: 0.0,
@@ -218,6 +218,14 @@ impl Body {
     /// Velocity of the slide of a body that its tips cannot hold, m/s; 0 while they hold.
     pub fn slide_m_per_s(&self) -> f64 {
         -self.relief_n / SLIDE_DRAG_N_S_PER_M
+    }
+}
+
+/// The motion of a body with or without mass, before it moves.
+fn at_rest(physics: &Physics, positions_m: &[f64], config: &Config) -> Result<Locomotion, SlidesDown> {
+    match config.virtual_worm.body_damping_ratio {
+        Some(damping_ratio) => Locomotion::with_mass(physics, positions_m, damping_ratio),
+        None => Locomotion::at_rest(physics, positions_m),
     }
 }
 

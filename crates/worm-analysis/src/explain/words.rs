@@ -6,6 +6,7 @@ use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::judge::decision::Selected;
 use crate::explain::search::parameter::{Free, What};
 use crate::explain::worm::nuisance::Nuisance;
+use crate::explain::worm::predict::FAST_GAIT_S;
 use crate::explain::worm::recorded_worm::RecordedWorm;
 use crate::recording::Repair;
 use worm_estimator::number::percent;
@@ -13,8 +14,6 @@ use worm_physics::effect::{LIBRARY, Visible};
 
 /// Probability from which an effect that is not named is mentioned.
 const WORTH_A_WORD: f64 = 0.1;
-/// Time of a gait cycle below which the current alone misleads, s: it was tried at 2.5 s, where it does not, and at 1.27 s, where it does.
-const FAST_GAIT_S: f64 = 2.0;
 /// Standard deviations from which a deviation is no chance.
 const SURE: f64 = 3.0;
 
@@ -236,8 +235,8 @@ pub(super) fn warnings(
         .fold(f64::INFINITY, f64::min);
     if !worm.sees_positions() && fastest_s < FAST_GAIT_S {
         warnings.push(format!(
-            "at {fastest_s:.1} s a cycle the current alone says too much friction, of sound virtual worms up to 1.4 times what they had, and what \
-             is named may be false: record a crawl of 2.5 s a cycle",
+            "at {fastest_s:.1} s a cycle work by the current alone comes out too large, of sound virtual worms by up to two fifths: record a crawl of \
+             2.5 s a cycle",
         ));
     }
     if worm.counts_current() && !gears_calibrated {

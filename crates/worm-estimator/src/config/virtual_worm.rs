@@ -21,6 +21,8 @@ pub struct VirtualWorm {
     pub dropout_share: f64,
     /// Its true largest tip deformations, m, where they differ from `worm.max_deformation_m`.
     pub max_deformation_m: Option<PerCell>,
+    /// Damping of its body on its pads, over the critical damping. Without it the body is moved as if it had no mass.
+    pub body_damping_ratio: Option<f64>,
     /// Standard deviation of the largest tip deformations from one cycle to the next, as a fraction.
     pub scatter_share: f64,
     /// Dry friction inside the device, N m at the cam.
@@ -49,6 +51,7 @@ impl Default for VirtualWorm {
             velocity_noise_rad_s: 0.008,
             dropout_share: 0.0,
             max_deformation_m: None,
+            body_damping_ratio: None,
             scatter_share: 0.01,
             inner_friction_n_m: XL330_IDENTIFIED.dry_n_m,
             inner_viscous_n_m_s_per_rad: XL330_IDENTIFIED.viscous_n_m_s,
@@ -158,6 +161,9 @@ impl VirtualWorm {
         checker.range("virtual_worm.dropout_share", self.dropout_share, 0.0..=0.9, "");
         if let Some(bounds) = &self.max_deformation_m {
             bounds.check("virtual_worm.max_deformation_m", cells, 1e-6..=0.1, "m", checker);
+        }
+        if let Some(ratio) = self.body_damping_ratio {
+            checker.range("virtual_worm.body_damping_ratio", ratio, 0.02..=5.0, "");
         }
         checker.range("virtual_worm.scatter_share", self.scatter_share, 0.0..=0.3, "");
         checker.range(
