@@ -48,7 +48,7 @@ pub(super) fn identify<P: Port>(
 ) -> Result<Identity, StartupError> {
     let mut asked = bus.ask_again(|bus, deadline| bus.ping(id, deadline));
     let mut present = Vec::new();
-    if matches!(asked, Err(TransactionError::Silent(_) | TransactionError::Damaged(_))) {
+    if !matches!(asked, Ok(_) | Err(TransactionError::Port(_))) {
         present = who_is_there(bus);
         if present.iter().any(|(there, _)| *there == id) {
             // It was only late, as behind a computer that paused.
