@@ -2,17 +2,20 @@
 
     cargo build --release --features bridge
     python3 benches/everything.py --minutes 10        # one run with everything: samples lost, processor time of each process
-    python3 benches/everything.py --pairs 6           # and 20 s with and without it in turns: wake lateness
+    python3 benches/everything.py --pairs 6           # 20 s with and without it in turns: wake lateness
+    python3 benches/everything.py --pairs 6 --pages stream   # the same with pages that nobody draws on this computer
 
 Everything is: a recording, a black box, a dashboard with three pages in headless Chromium, a scrape of its metrics every two seconds, and a bridge
 with a laptop on the loopback interface. The processor time of Chromium, of the virtual worm, of controller and estimator is not counted.
-Needs Linux, openssl, and `chromium` (without it the pages are connections that read the same stream).
+A browser draws on a laptop or a phone, not on the robot; with `--pages stream` a page is what the robot has of it, a connection that reads the
+same stream. Needs Linux, openssl, and `chromium` for `--pages browser`.
 """
 
 import argparse
+import contextlib
+import http.client
 import json
 import os
-import shutil
 import signal
 import statistics
 import subprocess
@@ -54,7 +57,7 @@ def children(pid):
 class Everything:
     """What watches, from when it has started to its end."""
 
-    def __init__(self, name, folder, config):
+    def __init__(self, folder, config, pages):
         self.folder, self.processes, self.end = folder, {}, threading.Event()
         keys = folder / "keys"
         if not keys.exists():
@@ -75,10 +78,9 @@ class Everything:
         self.start("bridge", "--config", folder / "bridge.toml")
         self.start("fleet", "--config", folder / "fleet.toml")
         self.pages = []
-        chromium = shutil.which("chromium")
         for number in range(3):
-            if chromium:
-                command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"]
+            if pages == "browser":
+                command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"]
                 command += [f"--user-data-dir={folder}/page{number}", address]
                 quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
                 self.pages.append(subprocess.Popen(command, **quiet))
@@ -96,7 +98,8 @@ class Everything:
             urllib.request.urlopen(url, timeout=10).read()
 
     def read(self, url):
-        with urllib.request.urlopen(url) as stream:
+        # The dashboard ends the stream in the middle of a chunk when it is stopped.
+        with contextlib.suppress(http.client.IncompleteRead), urllib.request.urlopen(url) as stream:
             while not self.end.is_set() and stream.read(4096):
                 pass
 
@@ -110,21 +113,21 @@ class Everything:
             process.wait()
 
 
-def run(seconds, with_everything, number):
-    """The summary of `up`, and the processor time by process."""
+def run(seconds, pages, number):
+    """The summary of `up`, and the processor time by process; with everything, unless `pages` is None."""
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         name = f"ev{os.getpid() % 10000}-{number}"
         config = folder / "worm.toml"
         config.write_text(f'[worm]\nname = "{name}"\n')
         command = [WORMD, "up", "--config", config, "--json", "--duration", str(seconds)]
-        if with_everything:
+        if pages:
             command += ["--record", folder / "run.mcap", "--black-box", folder / "boxes"]
         up = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         time.sleep(3)
         used = {}
-        if with_everything:
-            everything = Everything(name, folder, config)
+        if pages:
+            everything = Everything(folder, config, pages)
             time.sleep(5)
             pids = {name: process.pid for name, process in everything.processes.items()} | children(up.pid)
             pgrep = ["pgrep", "-f", f"wormd relay.*{folder}"]
@@ -139,7 +142,7 @@ def run(seconds, with_everything, number):
                 if after is not None and before[name] is not None:
                     used[name] = (after - before[name]) / took_s
         summary = json.loads(up.communicate()[0])
-        if with_everything:
+        if pages:
             everything.stop()
         return summary, used
 
@@ -148,9 +151,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=0)
     parser.add_argument("--pairs", type=int, default=0)
+    parser.add_argument("--pages", choices=("browser", "stream"), default="browser")
     arguments = parser.parse_args()
     if arguments.minutes:
-        summary, used = run(60 * arguments.minutes, True, 0)
+        summary, used = run(60 * arguments.minutes, arguments.pages, 0)
         print(f"{summary['ticks']} ticks, {summary['samples_lost']} samples lost")
         for name, share in sorted(used.items(), key=lambda entry: -entry[1]):
             print(f"  {name}: {100 * share:.2f} % of a core")
@@ -159,7 +163,7 @@ def main():
     wake = {False: [], True: []}
     for pair in range(arguments.pairs):
         for kind in (False, True):
-            summary, _ = run(20, kind, f"{pair}{int(kind)}")
+            summary, _ = run(20, arguments.pages if kind else None, f"{pair}{int(kind)}")
             wake[kind].append(summary["timing"]["wake_us"])
             print(f"{'with' if kind else 'without'} everything: {summary['timing']['wake_us']}")
     for quantile in ("p50", "p99") if arguments.pairs else ():

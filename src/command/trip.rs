@@ -113,7 +113,8 @@ fn travel(args: &TripArgs, file: &Path) -> Result<(), Failure> {
     let config = args.config()?;
     if !config.tracker.present && !config.self_sensing.enabled {
         return Err(Failure::unusable(
-            "nobody would know where the worm is on its trip: tracker.present and self_sensing.enabled are both false. Enable self-sensing,              or make it crawl for a while with `wormd command crawl`",
+            "nobody would know where the worm is on its trip: tracker.present and self_sensing.enabled are both false. Enable self-sensing, \
+             or make it crawl for a while with `wormd command crawl`",
         ));
     }
     let bench = Workbench::new(&config).map_err(Failure::unusable)?;

@@ -57,7 +57,7 @@ pub use drive::{DriveLoad, Motor, MotorCycle, driven_cycle};
 pub use ledger::Ledger;
 pub use locomotion::Locomotion;
 pub use mechanics::Mechanics;
-pub use motion::Motion;
+pub use motion::{Motion, Piece};
 pub use physics::{Laws, Patch, Physics, View};
 pub use table::{ActsOn, Axis, MAX_POINTS, MAX_TABLES, Table, TableError, Tables};
 pub use worm::{Contact, SlidesDown, Worm, WormError};

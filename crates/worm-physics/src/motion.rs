@@ -30,6 +30,17 @@ const BALANCE_FRACTION: f64 = 1e-14;
 /// Largest phase, cycles: beyond it f64 does not resolve a piece of a step.
 const MAX_PHASE: f64 = 1e12;
 
+/// A part of a step without events: over it the stepping cell extends, and the force of its actuator changes linearly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piece {
+    /// How long it is, in steps; negative in reverse.
+    pub steps: f64,
+    /// How far the stepping cell extends, m; negative in reverse.
+    pub extension_m: f64,
+    /// Force of its actuator at the beginning and at the end, N, as [`Motion::actuator_force_n`].
+    pub force_n: [f64; 2],
+}
+
 /// A worm in motion: positions, deformations, phase and ledger. Fixed size, no heap.
 ///
 /// Every method takes the [`Worm`] it describes, so that the worm may change while it moves. Cells are counted from 0.
@@ -129,14 +140,27 @@ impl Motion {
     ) -> Result<(), SlidesDown> {
         self.rebalance(worm)?;
         for phase in phases {
-            self.run_to(worm, phase);
+            self.run_to(worm, phase, |_| {});
             each(self);
         }
         Ok(())
     }
 
+    /// Advances as [`advance_to`](Self::advance_to) does, and shows every piece of the way in its order.
+    ///
+    /// # Errors
+    /// [`SlidesDown`] when the tips cannot hold the worm. Nothing has moved then.
+    ///
+    /// # Panics
+    /// As [`advance_to`](Self::advance_to).
+    pub fn advance_in_pieces(&mut self, worm: &Worm, phase: f64, each: impl FnMut(&Piece)) -> Result<(), SlidesDown> {
+        self.rebalance(worm)?;
+        self.run_to(worm, phase, each);
+        Ok(())
+    }
+
     /// Runs to a phase from a balanced instant.
-    fn run_to(&mut self, worm: &Worm, phase: f64) {
+    fn run_to(&mut self, worm: &Worm, phase: f64, mut each: impl FnMut(&Piece)) {
         assert!(
             phase.abs() <= MAX_PHASE,
             "the gait phase must be finite and within ±{MAX_PHASE} cycles, not {phase}"
@@ -150,7 +174,7 @@ impl Motion {
             } else {
                 (at.ceil() - 1.0, (at.ceil() - 1.0).max(target))
             };
-            self.extend(worm, cell_of_step(worm, step), end - at);
+            self.extend(worm, cell_of_step(worm, step), end - at, &mut each);
             at = end;
         }
         self.phase = phase;
@@ -295,7 +319,7 @@ impl Motion {
     }
 
     /// Runs a part of one cell's step, in steps, negative in reverse, from event to event.
-    fn extend(&mut self, worm: &Worm, stepping: usize, steps: f64) {
+    fn extend(&mut self, worm: &Worm, stepping: usize, steps: f64, each: &mut impl FnMut(&Piece)) {
         let sign = steps.signum();
         let extension_per_step_m = worm.stroke_of_m(stepping);
         let mut left = steps.abs();
@@ -331,13 +355,20 @@ impl Motion {
             if others_stiffness_n_per_m > 0.0 {
                 piece = piece.min(steps_to_go(others_room_m, others_fraction * extension_per_step_m));
             }
-            self.run_piece(worm, stepping, sign * piece, stepping_fraction, others_fraction);
+            each(&self.run_piece(worm, stepping, sign * piece, stepping_fraction, others_fraction));
             left -= piece;
         }
     }
 
     /// Runs a piece without events: the stepping cell takes its part of the extension, the others theirs backward.
-    fn run_piece(&mut self, worm: &Worm, stepping: usize, steps: f64, stepping_fraction: f64, others_fraction: f64) {
+    fn run_piece(
+        &mut self,
+        worm: &Worm,
+        stepping: usize,
+        steps: f64,
+        stepping_fraction: f64,
+        others_fraction: f64,
+    ) -> Piece {
         let extension_m = steps * worm.stroke_of_m(stepping);
         let force_before_n = self.extending_force_n(worm, stepping);
         let deformation_before_m: f64 = self.deformations_m().iter().sum();
@@ -355,6 +386,11 @@ impl Motion {
         let force_after_n = self.extending_force_n(worm, stepping);
         self.ledger
             .add_actuator_work(force_before_n, force_after_n, extension_m);
+        Piece {
+            steps,
+            extension_m,
+            force_n: [force_before_n, force_after_n],
+        }
     }
 
     /// How far a cell can still load when it moves in the given direction, m; 0 once it slides. A contact within rounding of its bound

@@ -7,7 +7,8 @@
 //!
 //! # In small pieces
 //! A cycle takes some hundred evaluations of the model, and more than a thousand where everything is searched. The estimator must not
-//! be late, so [`Fit::take`] only says what is to be done, and each [`Fit::step`] does one evaluation, or one piece of algebra that takes no longer.
+//! be late, so [`Fit::take`] only says what is to be done, and each [`Fit::step`] does one evaluation, or one piece of algebra that takes no longer;
+//! an evaluation whose crawl is long in becoming periodic takes several.
 //!
 //! [`work`] is the order of these pieces, [`linearise`] and [`descent`] a Gauss-Newton step, [`search`] the place where this begins,
 //! [`uncertainty`] the standard errors.
@@ -26,6 +27,7 @@ use super::parameters::{MAX_UNKNOWNS, Matrix, Parameters, Vector};
 use super::profile::{BINS_PER_STEP, MAX_BINS};
 use linearise::{Linearisation, dot};
 use std::f64::consts::{PI, TAU};
+use std::task::Poll;
 use uncertainty::Slopes;
 use work::Work;
 use worm_physics::{MAX_CELLS, Worm};
@@ -42,6 +44,9 @@ const STEPS: [f64; 3] = [0.01, 0.02, 0.03];
 /// Cycles after which everything is searched anew, because the mean profile has become much better.
 const SEARCHED_ANEW: f64 = 3.0;
 
+/// Means of each ripple's sine and cosine over each bin.
+type Ripples = [[(f64, f64); MAX_BINS]; MAX_RIPPLES];
+
 /// The fit and everything that it keeps between cycles.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
@@ -49,8 +54,8 @@ pub(super) struct Fit {
     unknowns: usize,
     forgetting: f64,
     model: CycleModel,
-    waves: [f64; MAX_RIPPLES],
-    ripples: usize,
+    ripples: Box<Ripples>,
+    ripple_count: usize,
     gear: GearModel,
     velocity_rad_per_s: f64,
     bins_per_s: f64,
@@ -73,6 +78,7 @@ pub(super) struct Fit {
     single: Matrix, // M
     covariance: Matrix,
     column: Box<[[f64; MAX_BINS]; MAX_UNKNOWNS]>,
+    trial_n_m: Box<[f64; MAX_BINS]>,     // of the worm alone, where a descent would go
     predicted_n_m: Box<[f64; MAX_BINS]>, // at the parameters of the linearisation
     fitted_n_m: Box<[f64; MAX_BINS]>,    // at `at`
     cycle_n_m: Box<[f64; MAX_BINS]>,     // the cycle that was taken last
@@ -108,26 +114,29 @@ impl Fit {
         sigma[gears + 2] = gear.load_friction_sigma;
         at.values[gears + 3] = LEAD_S[0];
         sigma[gears + 3] = LEAD_S[1];
-        let mut waves = [0.0; MAX_RIPPLES];
-        let mut ripples = 0;
+        let bins = cells * BINS_PER_STEP;
+        let mut ripples: Box<Ripples> = Box::new([[(0.0, 0.0); MAX_BINS]; MAX_RIPPLES]);
+        let mut ripple_count = 0;
         for term in gear.ripple.iter().filter(|term| term.waves != 0.0) {
-            waves[ripples] = term.waves;
-            sigma[gears + 4 + 2 * ripples] = gear.ripple_sigma_n_m;
-            sigma[gears + 5 + 2 * ripples] = gear.ripple_sigma_n_m;
-            ripples += 1;
+            for (bin, means) in ripples[ripple_count][..bins].iter_mut().enumerate() {
+                *means = ripple_over_bin(term.waves, bin, bins);
+            }
+            sigma[gears + 4 + 2 * ripple_count] = gear.ripple_sigma_n_m;
+            sigma[gears + 5 + 2 * ripple_count] = gear.ripple_sigma_n_m;
+            ripple_count += 1;
         }
         let mut model = CycleModel::new(worm);
-        model.begin_at(&at);
+        while model.begin_at(&at).is_pending() {}
         let mut fit = Self {
-            bins: cells * BINS_PER_STEP,
-            unknowns: gears + 4 + 2 * ripples,
+            bins,
+            unknowns: gears + 4 + 2 * ripple_count,
             forgetting: 1.0 - 1.0 / config.memory_cycles.max(1.0),
             model,
-            waves,
             ripples,
+            ripple_count,
             gear: *gear,
             velocity_rad_per_s: TAU / config.cycle_s,
-            bins_per_s: (cells * BINS_PER_STEP) as f64 / config.cycle_s,
+            bins_per_s: bins as f64 / config.cycle_s,
             stroke_m: worm.stroke_m(),
             force_per_torque: TAU / (cells as f64 * worm.stroke_m()),
             prior: at.values,
@@ -147,6 +156,7 @@ impl Fit {
             single: Matrix::zeros(),
             covariance: Matrix::from_diagonal(&sigma.map(|sigma| sigma * sigma)),
             column: Box::new([[0.0; MAX_BINS]; MAX_UNKNOWNS]),
+            trial_n_m: Box::new([0.0; MAX_BINS]),
             predicted_n_m: Box::new([0.0; MAX_BINS]),
             fitted_n_m: Box::new([0.0; MAX_BINS]),
             cycle_n_m: Box::new([0.0; MAX_BINS]),
@@ -232,8 +242,8 @@ impl Fit {
             let worm_n_m = plain[bin];
             let led_n_m = worm_n_m + values[gears + 3] * self.bins_per_s * rise(&plain, bin);
             *torque_n_m = gain * led_n_m + offset + load * self.load_on_gears_n_m(worm_n_m);
-            for ripple in 0..self.ripples {
-                let (sine, cosine) = self.ripple_of(ripple, bin);
+            for (ripple, means) in self.ripples[..self.ripple_count].iter().enumerate() {
+                let (sine, cosine) = means[bin];
                 *torque_n_m += values[gears + 4 + 2 * ripple] * sine + values[gears + 5 + 2 * ripple] * cosine;
             }
         }
@@ -246,33 +256,24 @@ impl Fit {
         (share * motor_n_m + (1.0 - share) * cam_n_m).abs()
     }
 
-    /// Means of a ripple's sine and cosine over a bin.
-    fn ripple_of(&self, ripple: usize, bin: usize) -> (f64, f64) {
-        let half = PI * self.waves[ripple] / self.bins as f64;
-        let (sine, cosine) = (TAU * self.waves[ripple] * (bin as f64 + 0.5) / self.bins as f64).sin_cos();
-        let mean = half.sin() / half;
-        (mean * sine, mean * cosine)
+    /// The profile of a worm before the gears, into `trial_n_m`.
+    fn evaluate(&mut self, parameters: &Parameters) -> Poll<Option<()>> {
+        self.model.profile(parameters, &mut self.trial_n_m[..self.bins])
     }
 
-    fn predict(&self, parameters: &Parameters, bins: &mut [f64]) -> Option<()> {
-        self.model.profile(parameters, bins)?;
-        self.through_gears(parameters, bins);
-        Some(())
-    }
-
-    /// What is minimised; `None` where no such worm holds.
-    fn cost(&self, parameters: &Parameters) -> Option<f64> {
-        let mut predicted = [0.0; MAX_BINS];
-        self.predict(parameters, &mut predicted[..self.bins])?;
+    /// What is minimised, at parameters that were evaluated.
+    fn cost(&self, parameters: &Parameters) -> f64 {
+        let mut predicted = *self.trial_n_m;
+        self.through_gears(parameters, &mut predicted[..self.bins]);
         let squares: f64 = (0..self.bins)
             .map(|bin| Self::bin_weight(bin) * (self.mean_n_m[bin] - predicted[bin]).powi(2))
             .sum();
         let off = parameters.values - self.prior;
-        Some(self.weight() / self.variance * squares + off.component_mul(&self.prior_information).dot(&off))
+        self.weight() / self.variance * squares + off.component_mul(&self.prior_information).dot(&off)
     }
 
     /// Σ over bins of derivative × weight × (`torque` − `from`) / R.
-    fn score(&self, torque_n_m: &[f64], from_n_m: &[f64]) -> Vector {
+    pub(super) fn score(&self, torque_n_m: &[f64], from_n_m: &[f64]) -> Vector {
         let bins = self.bins;
         let mut weighted = [0.0; MAX_BINS];
         for (bin, weighted) in weighted[..bins].iter_mut().enumerate() {
@@ -285,27 +286,28 @@ impl Fit {
         score
     }
 
-    /// One cycle's difference to another profile, by a step from the present parameters in which each unknown may change by about
-    /// `sigma` (0: not at all), and its standard errors.
-    pub(super) fn change(&self, torque_n_m: &[f64], from_n_m: &[f64], sigma: &Vector) -> Option<(Vector, Vector)> {
-        let gradient = self.score(torque_n_m, from_n_m);
-        let mut information = self.single;
-        for unknown in 0..self.unknowns {
-            information[(unknown, unknown)] += if sigma[unknown] > 0.0 {
-                1.0 / (sigma[unknown] * sigma[unknown])
+    /// One cycle's difference to another profile, of which it has this [`score`](Self::score): by a step from the present parameters in which
+    /// each unknown may change by about `sigma` (0: not at all), and its standard errors. Uses the scratch matrices.
+    pub(super) fn change(&mut self, score: &Vector, sigma: &Vector) -> Option<(Vector, Vector)> {
+        let [information, inverse] = &mut *self.scratch;
+        for column in 0..self.unknowns {
+            for row in column..self.unknowns {
+                information[(row, column)] = self.single[(row, column)];
+            }
+            information[(column, column)] += if sigma[column] > 0.0 {
+                1.0 / (sigma[column] * sigma[column])
             } else {
                 1e12
             };
         }
-        if !leading::cholesky(&mut information, self.unknowns) {
+        if !leading::cholesky(information, self.unknowns) {
             return None;
         }
-        let mut inverse = Matrix::zeros();
-        leading::inverse(&information, self.unknowns, &mut inverse);
+        leading::inverse(information, self.unknowns, inverse);
         let (mut change, mut error) = (Vector::zeros(), Vector::zeros());
         for unknown in 0..self.unknowns {
             change[unknown] = (0..self.unknowns)
-                .map(|other| inverse[(unknown, other)] * gradient[other])
+                .map(|other| inverse[(unknown, other)] * score[other])
                 .sum();
             error[unknown] = inverse[(unknown, unknown)].sqrt();
         }
@@ -374,6 +376,14 @@ impl Fit {
     pub(super) fn profiles_n_m(&self) -> (&[f64], &[f64]) {
         (&self.mean_n_m[..self.bins], &self.fitted_n_m[..self.bins])
     }
+}
+
+/// Means of the sine and cosine of so many waves a turn over one of the bins.
+fn ripple_over_bin(waves: f64, bin: usize, bins: usize) -> (f64, f64) {
+    let half = PI * waves / bins as f64;
+    let (sine, cosine) = (TAU * waves * (bin as f64 + 0.5) / bins as f64).sin_cos();
+    let mean = half.sin() / half;
+    (mean * sine, mean * cosine)
 }
 
 /// By how much the torque rises from bin to bin, within its step.

@@ -35,8 +35,13 @@ pub(super) fn cholesky(matrix: &mut Matrix, size: usize) -> bool {
 
 /// Solves A x = b by the factor of A, in place.
 pub(super) fn solve(factor: &Matrix, size: usize, x: &mut Vector) {
+    solve_below(factor, size, 0, x);
+}
+
+/// The entries of x from one on, where those of b before it are 0.
+fn solve_below(factor: &Matrix, size: usize, first: usize, x: &mut Vector) {
     let x = &mut x.as_mut_slice()[..size];
-    for at in 0..size {
+    for at in first..size {
         let known = column(factor, at, size);
         let solved = x[at] / known[at];
         x[at] = solved;
@@ -44,7 +49,7 @@ pub(super) fn solve(factor: &Matrix, size: usize, x: &mut Vector) {
             *value -= known * solved;
         }
     }
-    for at in (0..size).rev() {
+    for at in (first..size).rev() {
         let known = column(factor, at, size);
         let below: f64 = x[at + 1..]
             .iter()
@@ -55,13 +60,16 @@ pub(super) fn solve(factor: &Matrix, size: usize, x: &mut Vector) {
     }
 }
 
-/// The inverse of A by its factor.
+/// The inverse of A by its factor. It is symmetric, so of each column what lies below the diagonal is enough.
 pub(super) fn inverse(factor: &Matrix, size: usize, into: &mut Matrix) {
     for at in 0..size {
         let mut unit = Vector::zeros();
         unit[at] = 1.0;
-        solve(factor, size, &mut unit);
-        into.as_mut_slice()[at * ROWS..at * ROWS + size].copy_from_slice(&unit.as_slice()[..size]);
+        solve_below(factor, size, at, &mut unit);
+        for other in at..size {
+            into[(other, at)] = unit[other];
+            into[(at, other)] = unit[other];
+        }
     }
 }
 

@@ -195,11 +195,12 @@ impl SelfSensing {
     /// Takes a reading; those of which a value is missing are left out. Returns what is known after a cycle, once it is fitted: some
     /// readings after its end.
     pub fn update(&mut self, sample: &MotorSample) -> Option<&SelfSensed> {
-        self.take(sample);
+        // First, so that the reading which ends a cycle does not compare it as well.
         let mut is_new = false;
         for _ in 0..self.evaluations {
             is_new |= self.work();
         }
+        self.take(sample);
         if is_new { self.sensed.as_ref() } else { None }
     }
 
@@ -353,19 +354,17 @@ impl SelfSensing {
         }
         let Some(cycle) = self.waiting.take() else { return false };
         let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
-        let seen = self
-            .fit
-            .change(torque_n_m, self.fit.profiles_n_m().0, &self.allowed)
-            .map_or(Seen::Usual, |change| {
-                self.detector.compare(&ComparedCycle {
-                    usual: self.fit.parameters(),
-                    weight_n: self.fit.known_pull_n(),
-                    cycles: self.fit.cycles(),
-                    change,
-                    torque_n_m,
-                    mean_n_m: self.fit.profiles_n_m().0,
-                })
-            });
+        let score = self.fit.score(torque_n_m, self.fit.profiles_n_m().0);
+        let seen = self.fit.change(&score, &self.allowed).map_or(Seen::Usual, |change| {
+            self.detector.compare(&ComparedCycle {
+                usual: self.fit.parameters(),
+                weight_n: self.fit.known_pull_n(),
+                cycles: self.fit.cycles(),
+                change,
+                torque_n_m,
+                mean_n_m: self.fit.profiles_n_m().0,
+            })
+        });
         self.has_changed = matches!(seen, Seen::Changed);
         match seen {
             Seen::Usual => {}
@@ -388,9 +387,10 @@ impl SelfSensing {
     }
 
     /// By how much the unknowns of the newest cycle differ from those of the worm before it changed.
-    fn difference(&self) -> Option<Vector> {
+    fn difference(&mut self) -> Option<Vector> {
         let usual_n_m = self.detector.reference_n_m()?;
-        let (difference, _) = self.fit.change(self.fit.cycle_n_m(), usual_n_m, &self.allowed)?;
+        let score = self.fit.score(self.fit.cycle_n_m(), usual_n_m);
+        let (difference, _) = self.fit.change(&score, &self.allowed)?;
         Some(difference)
     }
 

@@ -1,16 +1,19 @@
 //! The torque profile that the exact quasi-static cycle gives, and what else it gives: advance, slides, energies.
 //!
-//! The mean torque of a bin is the actuator work (13) in it over its angle. The work comes from the ledger of the exact motion, so a bin is
+//! The mean torque of a bin is the actuator work (13) in it over its angle. The work is that of the pieces of the exact motion, so a bin is
 //! exact whatever happens in it.
 
 use super::parameters::Parameters;
 use std::f64::consts::TAU;
-use worm_physics::{Contact, MAX_CELLS, Motion, Worm};
+use std::task::Poll;
+use worm_physics::{Contact, MAX_CELLS, Motion, Piece, Worm};
 
 /// Change of a deformation over a cycle, as a share of the stroke, below which the crawl counts as periodic.
 const PERIODIC_SHARE: f64 = 1e-7;
 /// Cycles after which the search for the periodic crawl ends; from a neighbouring worm's it takes two or three.
 const MAX_CYCLES: u32 = 12;
+/// Most cycles of it in one call.
+const CYCLES_AT_ONCE: u32 = 3;
 
 /// What a steady cycle gives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -59,10 +62,48 @@ impl CycleFigures {
 }
 
 /// The exact cycle of any parameters, begun from where the last one ended.
+///
+/// What takes long returns [`Poll::Pending`] after a while, and goes on when it is asked for the same again; `Ready(None)` is a worm that
+/// cannot be, or that the tips could not hold.
 #[derive(Debug, Clone)]
 pub(super) struct CycleModel {
     worm: Worm, // level, without resisting force
     deformation_m: [f64; MAX_CELLS],
+    settling: Option<Settling>,
+}
+
+/// Which way the worm crawls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Heading {
+    Forward,
+    Backward,
+}
+
+/// A worm on its way to the periodic crawl.
+#[derive(Debug, Clone)]
+struct Settling {
+    parameters: Parameters,
+    heading: Heading,
+    worm: Worm,
+    motion: Motion,
+    cycles: u32,
+}
+
+impl Settling {
+    /// Runs a cycle. Whether the crawl is periodic, or close enough; `None` when the tips cannot hold the worm.
+    fn run_cycle(&mut self) -> Option<bool> {
+        let cells = self.worm.cells();
+        let mut before_m = [0.0; MAX_CELLS];
+        before_m[..cells].copy_from_slice(self.motion.deformations_m());
+        self.cycles += 1;
+        self.motion.advance_to(&self.worm, f64::from(self.cycles)).ok()?;
+        let apart_m = before_m
+            .iter()
+            .zip(self.motion.deformations_m())
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        Some(apart_m < PERIODIC_SHARE * self.worm.stroke_m() || self.cycles == MAX_CYCLES)
+    }
 }
 
 impl CycleModel {
@@ -75,6 +116,7 @@ impl CycleModel {
         Self {
             worm: level.unwrap_or_else(|_| worm.clone()),
             deformation_m: [0.0; MAX_CELLS],
+            settling: None,
         }
     }
 
@@ -94,79 +136,171 @@ impl CycleModel {
         Some(worm)
     }
 
-    /// The periodic crawl at phase 0.
-    fn settle(&self, worm: &Worm) -> Option<Motion> {
-        let cells = worm.cells();
-        let mut motion = Motion::under_way(worm, 0.0, &[0.0; MAX_CELLS][..cells], &self.deformation_m[..cells]);
-        for cycle in 0..MAX_CYCLES {
-            let mut before_m = [0.0; MAX_CELLS];
-            before_m[..cells].copy_from_slice(motion.deformations_m());
-            motion.advance_to(worm, f64::from(cycle + 1)).ok()?;
-            let apart_m = before_m
-                .iter()
-                .zip(motion.deformations_m())
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
-            if apart_m < PERIODIC_SHARE * worm.stroke_m() {
-                break;
-            }
-        }
-        Some(Motion::under_way(
-            worm,
-            0.0,
-            &[0.0; MAX_CELLS][..cells],
-            motion.deformations_m(),
-        ))
-    }
-
-    /// Mean torque of every bin, N m. `None` when the tips could not hold such a worm.
-    pub(super) fn profile(&self, parameters: &Parameters, bins: &mut [f64]) -> Option<()> {
+    fn begin_settling(&self, parameters: &Parameters, heading: Heading) -> Option<Settling> {
         let worm = self.worm_of(parameters)?;
-        let mut motion = self.settle(&worm)?;
-        let per_bin = bins.len() as f64 / TAU;
-        let count = bins.len() as f64;
-        let ends = (1..=bins.len()).map(|end| end as f64 / count);
-        let (mut done_j, mut bin) = (0.0, bins.iter_mut());
-        let held = motion.advance_through(&worm, ends, |motion| {
-            let work_j = motion.ledger().actuator_net_j;
-            if let Some(torque_n_m) = bin.next() {
-                *torque_n_m = (work_j - done_j) * per_bin;
-            }
-            done_j = work_j;
-        });
-        held.ok()
+        let (worm, deformation_m) = match heading {
+            Heading::Forward => (worm, self.deformation_m),
+            Heading::Backward => (worm.mirrored(), [0.0; MAX_CELLS]),
+        };
+        Some(Settling {
+            parameters: *parameters,
+            heading,
+            motion: under_way(&worm, &deformation_m[..worm.cells()]),
+            worm,
+            cycles: 0,
+        })
     }
 
-    /// Begins later searches at the periodic crawl of these parameters.
-    pub(super) fn begin_at(&mut self, parameters: &Parameters) {
-        if let Some(motion) = self.worm_of(parameters).and_then(|worm| self.settle(&worm)) {
-            self.deformation_m[..motion.deformations_m().len()].copy_from_slice(motion.deformations_m());
+    /// The worm of some parameters in its periodic crawl, at phase 0.
+    fn settle(&mut self, parameters: &Parameters, heading: Heading) -> Poll<Option<(Worm, Motion)>> {
+        let of_these = |settling: &Settling| settling.parameters == *parameters && settling.heading == heading;
+        let begun = self.settling.take().filter(of_these);
+        let Some(mut settling) = begun.or_else(|| self.begin_settling(parameters, heading)) else {
+            return Poll::Ready(None);
+        };
+        for _ in 0..CYCLES_AT_ONCE {
+            match settling.run_cycle() {
+                None => return Poll::Ready(None),
+                Some(true) => {
+                    let motion = under_way(&settling.worm, settling.motion.deformations_m());
+                    return Poll::Ready(Some((settling.worm, motion)));
+                }
+                Some(false) => {}
+            }
+        }
+        self.settling = Some(settling);
+        Poll::Pending
+    }
+
+    /// Mean torque of every bin, N m.
+    pub(super) fn profile(&mut self, parameters: &Parameters, bins: &mut [f64]) -> Poll<Option<()>> {
+        self.settle(parameters, Heading::Forward).map(|settled| {
+            let (worm, mut motion) = settled?;
+            let mut work = WorkInBins::new(bins, worm.cells());
+            motion.advance_in_pieces(&worm, 1.0, |piece| work.add(piece)).ok()?;
+            let per_rad = bins.len() as f64 / TAU;
+            bins.iter_mut().for_each(|bin| *bin *= per_rad);
+            Some(())
+        })
+    }
+
+    /// Begins later searches at the periodic crawl of these parameters, where there is one.
+    pub(super) fn begin_at(&mut self, parameters: &Parameters) -> Poll<()> {
+        self.settle(parameters, Heading::Forward).map(|settled| {
+            if let Some((_, motion)) = settled {
+                self.deformation_m[..motion.deformations_m().len()].copy_from_slice(motion.deformations_m());
+            }
+        })
+    }
+
+    /// Figures of the steady cycle; distances are along the crawl.
+    pub(super) fn figures(&mut self, parameters: &Parameters, heading: Heading) -> Poll<Option<CycleFigures>> {
+        self.settle(parameters, heading).map(|settled| {
+            let (worm, mut motion) = settled?;
+            let from_m = motion.mean_position_m();
+            motion.advance_to(&worm, 1.0).ok()?;
+            let ledger = motion.ledger();
+            Some(CycleFigures {
+                advance_m: motion.mean_position_m() - from_m,
+                energy_loss_j: ledger.loss_j(),
+                energy_net_j: ledger.actuator_net_j,
+                energy_positive_j: ledger.actuator_positive_j,
+                forward_slide_m: ledger.forward_slide_m,
+                backward_slide_m: ledger.backward_slide_m,
+            })
+        })
+    }
+}
+
+/// A worm at phase 0 with these deformations.
+fn under_way(worm: &Worm, deformations_m: &[f64]) -> Motion {
+    Motion::under_way(worm, 0.0, &[0.0; MAX_CELLS][..worm.cells()], deformations_m)
+}
+
+/// Spreads the work of a cycle's pieces over bins of the same length.
+struct WorkInBins<'b> {
+    bins_j: &'b mut [f64],
+    bins_per_step: f64,
+    at: f64, // in bins
+}
+
+impl<'b> WorkInBins<'b> {
+    fn new(bins_j: &'b mut [f64], steps: usize) -> Self {
+        bins_j.fill(0.0);
+        Self {
+            bins_per_step: bins_j.len() as f64 / steps as f64,
+            bins_j,
+            at: 0.0,
         }
     }
 
-    /// Figures of the steady cycle, of the crawl forward or backward; distances are along the crawl.
-    pub(super) fn figures(&self, parameters: &Parameters, backward: bool) -> Option<CycleFigures> {
-        let mut worm = self.worm_of(parameters)?;
-        let mut motion = if backward {
-            worm = worm.mirrored();
-            let from_rest = Self {
-                deformation_m: [0.0; MAX_CELLS],
-                ..self.clone()
+    /// Adds the piece that comes next, of a worm that crawls forward.
+    fn add(&mut self, piece: &Piece) {
+        let width = piece.steps * self.bins_per_step;
+        let (begin, end) = (self.at, self.at + width);
+        let [force_n, end_n] = piece.force_n;
+        let rise_n = (end_n - force_n) / width;
+        let extension_m = piece.extension_m / width;
+        let mut from = begin;
+        while from < end {
+            let to = (from.floor() + 1.0).min(end);
+            // A force that is linear has its mean in the middle.
+            let mean_n = force_n + rise_n * (0.5 * (from + to) - begin);
+            if let Some(work_j) = self.bins_j.get_mut(from as usize) {
+                *work_j += mean_n * extension_m * (to - from);
+            }
+            from = to;
+        }
+        self.at = end;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::self_sensing::parameters::Vector;
+
+    /// Against the ledger of a motion that stops at the end of every bin.
+    #[test]
+    fn the_work_of_a_bin_is_what_the_ledger_has_of_it() {
+        for (pull_n, friction_n) in [
+            (0.0, [0.98, 0.9, 1.1, 1.0]),
+            (1.9, [1.2, 0.7, 1.0, 1.3]),
+            (-0.4, [1.0; 4]),
+        ] {
+            let mut parameters = Parameters {
+                cells: 4,
+                values: Vector::zeros(),
             };
-            from_rest.settle(&worm)?
-        } else {
-            self.settle(&worm)?
-        };
-        let from_m = motion.mean_position_m();
-        motion.advance_to(&worm, 1.0).ok()?;
-        let ledger = motion.ledger();
-        Some(CycleFigures {
-            advance_m: motion.mean_position_m() - from_m,
-            energy_loss_j: ledger.loss_j(),
-            energy_net_j: ledger.actuator_net_j,
-            energy_positive_j: ledger.actuator_positive_j,
-            forward_slide_m: ledger.forward_slide_m,
-            backward_slide_m: ledger.backward_slide_m,
-        })
+            for (cell, friction_n) in friction_n.into_iter().enumerate() {
+                parameters.values[cell] = f64::ln(friction_n);
+                parameters.values[4 + cell] = f64::ln(800.0 + 100.0 * cell as f64);
+            }
+            let pull_at = parameters.pull_at();
+            parameters.values[pull_at] = pull_n;
+            let mut model = CycleModel::new(&Worm::paper());
+            let mut bins_n_m = [0.0; 128];
+            while model
+                .profile(&parameters, &mut bins_n_m)
+                .map(|held| held.expect("a worm that holds"))
+                .is_pending()
+            {}
+            let (worm, mut motion) = loop {
+                if let Poll::Ready(settled) = model.settle(&parameters, Heading::Forward) {
+                    break settled.expect("a worm that holds");
+                }
+            };
+            for (bin, torque_n_m) in bins_n_m.into_iter().enumerate() {
+                let before_j = motion.ledger().actuator_net_j;
+                motion
+                    .advance_to(&worm, (bin + 1) as f64 / 128.0)
+                    .expect("a worm that holds");
+                let by_ledger_n_m = (motion.ledger().actuator_net_j - before_j) * 128.0 / TAU;
+                assert!(
+                    (torque_n_m - by_ledger_n_m).abs() < 1e-12,
+                    "bin {bin} under {pull_n} N: {torque_n_m}, not {by_ledger_n_m} N m"
+                );
+            }
+        }
     }
 }

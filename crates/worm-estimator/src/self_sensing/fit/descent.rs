@@ -4,6 +4,7 @@ use super::super::leading;
 use super::super::parameters::{Parameters, Vector};
 use super::Fit;
 use super::linearise::Linearised;
+use std::task::Poll;
 
 /// Longest step: of a logarithm, and of the pull, N.
 const LONGEST: [f64; 2] = [0.4, 0.8];
@@ -22,14 +23,20 @@ pub(super) struct Descent {
     rounds: usize, // left
     damping: f64,
     gradient: Vector,
+    tried: Parameters, // where the present step would lead
     stage: Stage,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
+    /// The profile where it begins, and what is minimised there.
     Begin,
+    BeginCost,
     Linearise,
+    /// A step with the damping of this try, the profile where it leads, and what is minimised there.
+    Step(usize),
     Try(usize),
+    TryCost(usize),
 }
 
 impl Descent {
@@ -41,6 +48,7 @@ impl Descent {
             rounds,
             damping: 1e-3,
             gradient: Vector::zeros(),
+            tried: at,
             stage: Stage::Begin,
         }
     }
@@ -48,19 +56,45 @@ impl Descent {
     /// The next piece; true at the end.
     pub(super) fn step(&mut self, fit: &mut Fit) -> bool {
         match self.stage {
-            Stage::Begin => {
-                self.cost = fit.cost(&self.at);
-                self.cost.is_none() || self.begin_round(fit)
+            Stage::Begin => match fit.evaluate(&self.at) {
+                Poll::Pending => false,
+                Poll::Ready(None) => true,
+                Poll::Ready(Some(())) => {
+                    self.stage = Stage::BeginCost;
+                    false
+                }
+            },
+            Stage::BeginCost => {
+                self.cost = Some(fit.cost(&self.at));
+                self.begin_round(fit)
             }
             Stage::Linearise => match fit.linearise(&self.at) {
                 Linearised::Further => false,
                 Linearised::Impossible => true,
                 Linearised::Done => {
-                    self.stage = Stage::Try(0);
+                    self.stage = Stage::Step(0);
                     false
                 }
             },
-            Stage::Try(tried) => self.try_step(fit, tried),
+            Stage::Step(of_tries) => self.solve_step(fit, of_tries),
+            Stage::Try(of_tries) => match fit.evaluate(&self.tried) {
+                Poll::Pending => false,
+                Poll::Ready(None) => self.try_shorter(of_tries),
+                Poll::Ready(Some(())) => {
+                    self.stage = Stage::TryCost(of_tries);
+                    false
+                }
+            },
+            Stage::TryCost(of_tries) => {
+                let tried = fit.cost(&self.tried);
+                if self.cost.is_some_and(|cost| tried < cost) {
+                    (self.at, self.cost) = (self.tried, Some(tried));
+                    self.damping *= 0.2;
+                    self.begin_round(fit)
+                } else {
+                    self.try_shorter(of_tries)
+                }
+            }
         }
     }
 
@@ -74,9 +108,8 @@ impl Descent {
         false
     }
 
-    fn try_step(&mut self, fit: &mut Fit, tried: usize) -> bool {
-        let Some(cost) = self.cost else { return true };
-        if tried == 0 {
+    fn solve_step(&mut self, fit: &mut Fit, of_tries: usize) -> bool {
+        if of_tries == 0 {
             self.gradient = fit.gradient(&self.at);
         }
         fit.fill_information();
@@ -97,20 +130,17 @@ impl Descent {
             .map(|unknown| step[unknown].abs() / LONGEST[usize::from(unknown == pull_at)])
             .fold(1.0, f64::max);
         step /= too_long;
-        let mut moved = self.at;
-        moved.values += step;
-        match fit.cost(&moved) {
-            Some(lower) if lower < cost => {
-                (self.at, self.cost) = (moved, Some(lower));
-                self.damping *= 0.2;
-                self.begin_round(fit)
-            }
-            _ => {
-                self.damping = (self.damping * 8.0).max(1e-2);
-                self.stage = Stage::Try(tried + 1);
-                tried + 1 == TRIES
-            }
-        }
+        self.tried = self.at;
+        self.tried.values += step;
+        self.stage = Stage::Try(of_tries);
+        false
+    }
+
+    /// Ends the descent after the last try.
+    fn try_shorter(&mut self, of_tries: usize) -> bool {
+        self.damping = (self.damping * 8.0).max(1e-2);
+        self.stage = Stage::Step(of_tries + 1);
+        of_tries + 1 == TRIES
     }
 }
 

@@ -3,6 +3,7 @@
 use super::super::parameters::{MAX_UNKNOWNS, Parameters};
 use super::super::profile::MAX_BINS;
 use super::{Fit, moved, rise};
+use std::task::Poll;
 
 /// How far a linearisation has come.
 #[derive(Debug, Clone)]
@@ -40,39 +41,40 @@ impl Linearisation {
 }
 
 impl Fit {
-    /// The next piece: the profile itself, then two evaluations for each unknown of the worm, then the gears' unknowns one by one.
+    /// The next piece: the profile of the worm, then through the gears, two evaluations for each unknown of the worm, and the gears' unknowns
+    /// one by one.
     pub(super) fn linearise(&mut self, at: &Parameters) -> Linearised {
         let of_worm = at.of_worm();
         let next = self.linearisation.next;
-        self.linearisation.next += 1;
-        if next == 0 {
-            return self.linearise_profile(at);
-        }
-        if next <= 2 * of_worm {
-            let (unknown, is_second) = ((next - 1) / 2, (next - 1) % 2 == 1);
-            return self.linearise_worm(at, unknown, is_second);
-        }
-        let unknown = next - of_worm - 1;
-        self.linearise_gears(at, unknown);
-        if unknown + 1 < self.unknowns {
-            Linearised::Further
-        } else {
-            Linearised::Done
+        let piece = match next {
+            0 => self.model.profile(at, &mut self.linearisation.plain[..self.bins]),
+            1 => {
+                let mut predicted = *self.linearisation.plain;
+                self.through_gears(at, &mut predicted[..self.bins]);
+                *self.predicted_n_m = predicted;
+                Poll::Ready(Some(()))
+            }
+            _ if next - 2 < 2 * of_worm => self.linearise_worm(at, (next - 2) / 2, next % 2 == 1),
+            _ => {
+                self.linearise_gears(at, next - 2 - of_worm);
+                Poll::Ready(Some(()))
+            }
+        };
+        match piece {
+            Poll::Pending => Linearised::Further,
+            Poll::Ready(None) => Linearised::Impossible,
+            Poll::Ready(Some(())) => {
+                self.linearisation.next += 1;
+                if next + 1 < 2 + of_worm + self.unknowns {
+                    Linearised::Further
+                } else {
+                    Linearised::Done
+                }
+            }
         }
     }
 
-    fn linearise_profile(&mut self, at: &Parameters) -> Linearised {
-        let bins = self.bins;
-        if self.model.profile(at, &mut self.linearisation.plain[..bins]).is_none() {
-            return Linearised::Impossible;
-        }
-        let mut predicted = *self.linearisation.plain;
-        self.through_gears(at, &mut predicted[..bins]);
-        *self.predicted_n_m = predicted;
-        Linearised::Further
-    }
-
-    fn linearise_worm(&mut self, at: &Parameters, unknown: usize, is_second: bool) -> Linearised {
+    fn linearise_worm(&mut self, at: &Parameters, unknown: usize, is_second: bool) -> Poll<Option<()>> {
         let bins = self.bins;
         let (moved, step) = moved(at, unknown, is_second);
         let Linearisation {
@@ -81,25 +83,30 @@ impl Fit {
         let into = if is_second {
             &mut other[..bins]
         } else {
-            *width = 2.0 * step;
             &mut self.column[unknown][..bins]
         };
-        if self.model.profile(&moved, into).is_none() {
+        let Poll::Ready(held) = self.model.profile(&moved, into) else {
+            return Poll::Pending;
+        };
+        if !is_second {
+            *width = 2.0 * step;
+        }
+        if held.is_none() {
             into.copy_from_slice(&plain[..bins]);
             *width -= step;
         }
         if !is_second {
-            return Linearised::Further;
+            return Poll::Ready(Some(()));
         }
         if *width <= 0.0 {
-            return Linearised::Impossible;
+            return Poll::Ready(None);
         }
         let scale = (1.0 + at.values[at.gears_at() + 1]) / *width;
         for (forward, backward) in self.column[unknown][..bins].iter_mut().zip(&other[..bins]) {
             *forward = scale * (*forward - backward);
         }
         self.fill_single(unknown);
-        Linearised::Further
+        Poll::Ready(Some(()))
     }
 
     fn linearise_gears(&mut self, at: &Parameters, unknown: usize) {
@@ -113,7 +120,7 @@ impl Fit {
                 2 => self.load_on_gears_n_m(plain[bin]),
                 3 => gain * self.bins_per_s * rise(&plain[..], bin),
                 of_ripple => {
-                    let (sine, cosine) = self.ripple_of((of_ripple - 4) / 2, bin);
+                    let (sine, cosine) = self.ripples[(of_ripple - 4) / 2][bin];
                     if of_ripple % 2 == 0 { sine } else { cosine }
                 }
             };

@@ -11,8 +11,9 @@
 //! What the prior leaves uncertain (torque constant, friction of the gears) is in A⁻¹ Λ A⁻¹.
 
 use super::super::leading;
-use super::super::model::{CycleFigures, FIGURES};
+use super::super::model::{CycleFigures, FIGURES, Heading};
 use super::{FLOOR_N_M, Fit, moved};
+use std::task::Poll;
 use worm_physics::MAX_CELLS;
 
 /// Gait-to-gait scatter of a cell's friction that is assumed before it is measured, as a share.
@@ -41,13 +42,18 @@ impl Assessment {
                 fit.gather_scatter();
                 false
             }
+            2 => !fit.factor_information(),
             // The inverse of A in the second scratch matrix.
-            2 => !fit.invert_information(),
             3 => {
-                fit.fill_meat();
+                let [factor, inverse] = &mut *fit.scratch;
+                leading::inverse(factor, fit.unknowns, inverse);
                 false
             }
             4 => {
+                fit.fill_meat();
+                false
+            }
+            5 => {
                 let [meat, inverse] = &*fit.scratch;
                 leading::multiply(inverse, meat, fit.unknowns, &mut fit.covariance);
                 false
@@ -97,15 +103,10 @@ impl Fit {
         self.misfit = MISFIT_BINS * left / self.variance;
     }
 
-    fn invert_information(&mut self) -> bool {
+    /// Whether A is definite; its factor is in the first scratch matrix then.
+    fn factor_information(&mut self) -> bool {
         self.fill_information();
-        let size = self.unknowns;
-        let [factor, inverse] = &mut *self.scratch;
-        let is_definite = leading::cholesky(factor, size);
-        if is_definite {
-            leading::inverse(factor, size, inverse);
-        }
-        is_definite
+        leading::cholesky(&mut self.scratch[0], self.unknowns)
     }
 
     /// B + Λ, into the first scratch matrix.
@@ -173,51 +174,54 @@ impl FigureDerivatives {
 
     /// The next piece; true at the end.
     pub(super) fn step(&mut self, fit: &mut Fit) -> bool {
-        let next = self.next;
-        self.next += 1;
-        if next == 0 {
-            match fit.model.figures(&fit.at, false) {
-                Some(centre) => self.centre = centre,
-                None => {
+        let of_worm = fit.at.of_worm();
+        let piece = match self.next {
+            0 => fit.model.figures(&fit.at, Heading::Forward).map(|centre| {
+                if centre.is_none() {
                     fit.figures = None;
-                    return true;
                 }
+                self.centre = centre?;
+                Some(())
+            }),
+            next if next <= 2 * of_worm => self.differentiate(fit, (next - 1) / 2, next % 2 == 0).map(Some),
+            next if next == 2 * of_worm + 1 => fit.model.figures(&fit.at, Heading::Backward).map(|backward| {
+                fit.backward_advance_m = backward.map(|backward| backward.advance_m);
+                Some(())
+            }),
+            _ => {
+                fit.figures = Some(self.with_errors(fit));
+                Poll::Ready(None)
             }
-            return false;
-        }
-        if next <= 2 * fit.at.of_worm() {
-            let (unknown, is_second) = ((next - 1) / 2, (next - 1) % 2 == 1);
-            self.differentiate(fit, unknown, is_second);
-            return false;
-        }
-        fit.backward_advance_m = fit.model.figures(&fit.at, true).map(|backward| backward.advance_m);
-        fit.figures = Some(self.with_errors(fit));
-        true
+        };
+        self.next += usize::from(piece.is_ready());
+        piece == Poll::Ready(None)
     }
 
-    fn differentiate(&mut self, fit: &mut Fit, unknown: usize, is_second: bool) {
+    fn differentiate(&mut self, fit: &mut Fit, unknown: usize, is_second: bool) -> Poll<()> {
         let (moved, step) = moved(&fit.at, unknown, is_second);
-        let figures = fit.model.figures(&moved, false).unwrap_or(self.centre).flat();
-        if !is_second {
-            self.up = figures;
-            return;
-        }
-        for (slope, (up, down)) in fit.slopes[unknown].iter_mut().zip(self.up.iter().zip(figures)) {
-            *slope = (up - down) / (2.0 * step);
-        }
+        fit.model.figures(&moved, Heading::Forward).map(|figures| {
+            let figures = figures.unwrap_or(self.centre).flat();
+            if !is_second {
+                self.up = figures;
+                return;
+            }
+            for (slope, (up, down)) in fit.slopes[unknown].iter_mut().zip(self.up.iter().zip(figures)) {
+                *slope = (up - down) / (2.0 * step);
+            }
+        })
     }
 
     fn with_errors(&self, fit: &Fit) -> (CycleFigures, CycleFigures) {
-        let mut sigma = [0.0; FIGURES];
-        for (figure, sigma) in sigma.iter_mut().enumerate() {
-            let mut variance = 0.0;
-            for a in 0..fit.at.of_worm() {
-                for b in 0..fit.at.of_worm() {
-                    variance += fit.slopes[a][figure] * fit.covariance[(a, b)] * fit.slopes[b][figure];
+        let mut variance = [0.0; FIGURES];
+        for (a, of_a) in fit.slopes[..fit.at.of_worm()].iter().enumerate() {
+            for (b, of_b) in fit.slopes[..fit.at.of_worm()].iter().enumerate() {
+                let covariance = fit.covariance[(a, b)];
+                for ((variance, of_a), of_b) in variance.iter_mut().zip(of_a).zip(of_b) {
+                    *variance += of_a * covariance * of_b;
                 }
             }
-            *sigma = variance.max(0.0).sqrt();
         }
+        let sigma = variance.map(|variance| variance.max(0.0).sqrt());
         let mut centre = self.centre;
         let damping_j = fit.damping_j();
         centre.energy_net_j += damping_j;

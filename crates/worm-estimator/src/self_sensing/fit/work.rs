@@ -72,9 +72,12 @@ impl Fit {
             }
             Work::Begin => {
                 let at = self.at;
-                self.model.begin_at(&at);
-                self.linearisation.begin();
-                Work::Linearise
+                if self.model.begin_at(&at).is_pending() {
+                    Work::Begin
+                } else {
+                    self.linearisation.begin();
+                    Work::Linearise
+                }
             }
             Work::Linearise => {
                 let at = self.at;
