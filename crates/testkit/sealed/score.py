@@ -112,6 +112,10 @@ def main() -> None:
         these = [one for one in stated if low <= one[0] < high]
         mean = sum(one[0] for one in these) / max(len(these), 1)
         say(f"stated at {low} or more, {mean:.3f} in the mean: right", (one[1] for one in these))
+    for verdict, words in [("nothing", "agrees"), ("outside", "outside the library")]:
+        these = [line for line in lines if line["verdict"] == verdict and line["probability"]]
+        mean = sum(float(line["probability"]) for line in these) / max(len(these), 1)
+        say(f"{words}, {mean:.3f} in the mean: right", (flag(line, "probability_right") for line in these))
 
 
 if __name__ == "__main__":

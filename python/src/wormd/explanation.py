@@ -322,9 +322,9 @@ class Explanation(Result):
     threshold: float
     """Improvement that the best of the library stays below in 99 of 100 worms without an effect."""
     null_probability: float
-    """Posterior probability that nothing is missing that matters."""
+    """Probability that nothing is missing that matters, counting what recalibration can hide."""
     other_probability: float
-    """Posterior probability that something else is missing."""
+    """Probability that something else is missing, counting effects that are unlike their laws."""
     agrees_within_m: float
     """Measured and modelled advance differ by no more than this, m, with a probability of 95 %."""
     agrees_within_j: float | None

@@ -92,9 +92,9 @@ impl Answer {
 /// How probable it is that none of the effects is the answer, and what that rests on; `NaN` where it is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Doubt {
-    /// Posterior probability that no effect is missing that changes what matters.
+    /// Probability that no effect is missing that changes what matters: the posterior one, less what recalibration can hide.
     pub null_probability: f64,
-    /// Posterior probability that something else is missing, alone or beside an effect.
+    /// Probability that something else is missing, alone or beside an effect: the posterior one, less effects that are unlike their laws.
     pub other_probability: f64,
     /// The measured advance of a cycle and that of the model in the answer differ on no run by more than this, m, with a probability
     /// of 95 %.

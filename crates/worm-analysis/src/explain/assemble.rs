@@ -162,8 +162,8 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         screening: screening::of_worm(&found.screened, selected, speed_droop.is_some()),
         threshold: found.threshold,
         doubt: Doubt {
-            null_probability: selected.null_probability,
-            other_probability: selected.other_probability,
+            null_probability: selected.null_probability(),
+            other_probability: selected.other_probability(),
             agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
             agrees_within_j: agrees_within_j(worm, &runs, final_fit, !named.is_empty()),
             discrepancy_m: parts.discrepancy_m,

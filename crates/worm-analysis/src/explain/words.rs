@@ -29,8 +29,9 @@ pub(super) fn sentence(
 ) -> String {
     match verdict {
         Verdict::Agrees => format!(
-            "Model and data agree once the model is recalibrated within its priors: that nothing which matters is missing has a probability of {}.{}",
-            percent(selected.null_probability),
+            "Model and data agree once the model is recalibrated within its priors: that nothing which matters is missing has a probability of {}, \
+             counting what recalibration can hide.{}",
+            percent(selected.null_probability()),
             not_sure_enough(selected)
         ),
         Verdict::Explained => format!("{} explains the data{}.", names(effects), closing(effects, held_out)),
@@ -39,8 +40,8 @@ pub(super) fn sentence(
              else is one of {}.",
             names(effects),
             closing(effects, held_out),
-            percent(selected.null_probability),
-            percent(selected.other_probability)
+            percent(selected.null_probability()),
+            percent(selected.other_probability())
         ),
         Verdict::Ambiguous => format!(
             "{} explains the data{}, but so does {}: these data cannot decide between them.",
@@ -65,7 +66,7 @@ pub(super) fn sentence(
             format!(
                 "Model and data disagree, and no effect of the library, alone or in a pair, explains how: {nearest}.{changes} That \
                  something else is missing has a probability of {}.",
-                percent(selected.other_probability)
+                percent(selected.other_probability())
             )
         }
     }
@@ -73,7 +74,7 @@ pub(super) fn sentence(
 
 /// What was not named though it may well be there, or is there and does not matter, as a further sentence.
 fn not_sure_enough(selected: &Selected) -> String {
-    let beyond_none = 1.0 - selected.null_probability;
+    let beyond_none = selected.visible_probability();
     match (selected.candidates.first(), selected.probability.first()) {
         (Some(candidate), Some(&probability)) if probability > beyond_none.max(WORTH_A_WORD) => format!(
             " What is left looks like {} (probability {}), which changes nothing that matters.",

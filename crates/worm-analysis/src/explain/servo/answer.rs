@@ -33,9 +33,9 @@ pub struct ServoAnswer {
     pub screening: Vec<Screened>,
     /// Improvement that the best of the whole library stays below in 99 of a hundred servos without an effect, drawn for this campaign.
     pub threshold: f64,
-    /// Posterior probability that no effect is missing that changes what matters.
+    /// Probability that no effect is missing that changes what matters: the posterior one, less what recalibration can hide.
     pub null_probability: f64,
-    /// Posterior probability that something else is missing, alone or beside an effect.
+    /// Probability that something else is missing, alone or beside an effect: the posterior one, less effects that are unlike their laws.
     pub other_probability: f64,
     /// The mean absolute error of the answer's model is on no run larger than this, rad: as fitted.
     pub agrees_within_rad: f64,
