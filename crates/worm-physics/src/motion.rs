@@ -140,7 +140,7 @@ impl Motion {
     ) -> Result<(), SlidesDown> {
         self.rebalance(worm)?;
         for phase in phases {
-            self.run_to(worm, phase, |_| {});
+            self.run_to(worm, phase, &mut |_| {});
             each(self);
         }
         Ok(())
@@ -153,14 +153,19 @@ impl Motion {
     ///
     /// # Panics
     /// As [`advance_to`](Self::advance_to).
-    pub fn advance_in_pieces(&mut self, worm: &Worm, phase: f64, each: impl FnMut(&Piece)) -> Result<(), SlidesDown> {
+    pub fn advance_in_pieces(
+        &mut self,
+        worm: &Worm,
+        phase: f64,
+        mut each: impl FnMut(&Piece),
+    ) -> Result<(), SlidesDown> {
         self.rebalance(worm)?;
-        self.run_to(worm, phase, each);
+        self.run_to(worm, phase, &mut each);
         Ok(())
     }
 
     /// Runs to a phase from a balanced instant.
-    fn run_to(&mut self, worm: &Worm, phase: f64, mut each: impl FnMut(&Piece)) {
+    fn run_to(&mut self, worm: &Worm, phase: f64, each: &mut dyn FnMut(&Piece)) {
         assert!(
             phase.abs() <= MAX_PHASE,
             "the gait phase must be finite and within ±{MAX_PHASE} cycles, not {phase}"
@@ -174,7 +179,7 @@ impl Motion {
             } else {
                 (at.ceil() - 1.0, (at.ceil() - 1.0).max(target))
             };
-            self.extend(worm, cell_of_step(worm, step), end - at, &mut each);
+            self.extend(worm, cell_of_step(worm, step), end - at, each);
             at = end;
         }
         self.phase = phase;
@@ -319,7 +324,7 @@ impl Motion {
     }
 
     /// Runs a part of one cell's step, in steps, negative in reverse, from event to event.
-    fn extend(&mut self, worm: &Worm, stepping: usize, steps: f64, each: &mut impl FnMut(&Piece)) {
+    fn extend(&mut self, worm: &Worm, stepping: usize, steps: f64, each: &mut dyn FnMut(&Piece)) {
         let sign = steps.signum();
         let extension_per_step_m = worm.stroke_of_m(stepping);
         let mut left = steps.abs();
