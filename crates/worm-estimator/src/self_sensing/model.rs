@@ -63,8 +63,8 @@ impl CycleFigures {
 
 /// The exact cycle of any parameters, begun from where the last one ended.
 ///
-/// What takes long returns [`Poll::Pending`] after a while, and goes on when it is asked for the same again; `Ready(None)` is a worm that
-/// cannot be, or that the tips could not hold.
+/// A long computation is split: it returns [`Poll::Pending`], and continues when it is called again with the same arguments. `Ready(None)`
+/// means that there is no such worm, or that its tips cannot hold it.
 #[derive(Debug, Clone)]
 pub(super) struct CycleModel {
     worm: Worm, // level, without resisting force

@@ -175,6 +175,7 @@ impl FigureDerivatives {
     /// The next piece; true at the end.
     pub(super) fn step(&mut self, fit: &mut Fit) -> bool {
         let of_worm = fit.at.of_worm();
+        // `Ready(None)` ends it: no such worm holds, or everything is done.
         let piece = match self.next {
             0 => fit.model.figures(&fit.at, Heading::Forward).map(|centre| {
                 if centre.is_none() {

@@ -102,31 +102,14 @@ pub(in crate::explain) struct Selected {
     /// Probability of each candidate's class.
     pub probability: Vec<f64>,
     /// Posterior probability that nothing which matters is missing, and that something else is: of what the search can tell apart.
-    null_probability: f64,
-    other_probability: f64,
+    pub(super) null_probability: f64,
+    pub(super) other_probability: f64,
     /// What changes in mid-run, where that is the most probable part of something else.
     pub change: Option<Change>,
     /// The best effect of another kind that is no candidate.
     pub best_wrong: Option<Candidate>,
     /// Every effect and pair that was fitted.
     pub all: Vec<Candidate>,
-}
-
-impl Selected {
-    /// Probability that nothing which matters is missing, what recalibration can hide counted.
-    pub fn null_probability(&self) -> f64 {
-        self.null_probability * prior::share_not_hidden()
-    }
-
-    /// Probability that something is missing that is no effect of the library, effects unlike their laws counted.
-    pub fn other_probability(&self) -> f64 {
-        self.other_probability * prior::share_not_unlike()
-    }
-
-    /// Probability of what can be told from nothing.
-    pub fn visible_probability(&self) -> f64 {
-        1.0 - self.null_probability
-    }
 }
 
 /// A class: hypotheses that are alike up to twins and cells.

@@ -9,6 +9,7 @@
 //! - `chance`: how large the evidence for the best of the library becomes where there is none.
 //! - `ln_sum`: sums of probabilities by their logarithms.
 //! - `decision`: the posterior, and the verdict.
+//! - `stated_probability`: what a posterior probability is worth, by the test beds.
 
 mod beside;
 pub(in crate::explain) mod candidate;
@@ -18,4 +19,5 @@ pub(in crate::explain) mod evidence;
 pub(in crate::explain) mod ln_sum;
 pub(in crate::explain) mod prior;
 mod repetition;
+mod stated_probability;
 pub(in crate::explain) mod structural_change;

@@ -20,17 +20,10 @@ use worm_physics::effect::{Effect, Parameter, Scope, Sense};
 pub(in crate::explain) const NONE: f64 = 0.5;
 pub(in crate::explain) const OTHER: f64 = 0.1;
 pub(in crate::explain) const SINGLE: f64 = 0.35;
-const PAIR: f64 = 0.05;
+pub(in crate::explain) const PAIR: f64 = 0.05;
 /// Part of what is something else that leaves nothing beside an effect of the library, or a pair: no data of the same kind could tell. Of
 /// 25 strangers of both test beds' development splits 6 did.
 pub(in crate::explain) const IMITATED: f64 = 0.25;
-/// Part of what matters (an effect, a pair, something else) of which nothing is left to see once the model is recalibrated: of 37 worms of
-/// both test beds' development splits that had something which matters 4 were taken for agreement.
-const HIDDEN: f64 = by_succession(4.0, 37.0);
-/// Part of what is something else that is found to be so, of 8 there 7; and of the library's own effects, which do not always follow its
-/// laws, of 29 there 2.
-const FOUND: f64 = by_succession(7.0, 8.0);
-const UNLIKE: f64 = by_succession(2.0, 29.0);
 /// Standard deviation of the logarithm of the impact.
 const LN_IMPACT: f64 = 0.9;
 /// Impacts from which the median is interpolated, and the severity without any, in notable changes.
@@ -43,21 +36,6 @@ const BEGINS: f64 = 0.3;
 const ENDS: f64 = 0.1;
 /// Nodes of the integral that normalises the density of one sense.
 const NODES: usize = 60;
-
-/// Laplace's rule of succession: the probability that it happens the next time.
-const fn by_succession(hits: f64, of: f64) -> f64 {
-    (hits + 1.0) / (of + 2.0)
-}
-
-/// What is left of the probability that nothing which matters is missing: what is hidden looks the same.
-pub(super) fn share_not_hidden() -> f64 {
-    NONE / (NONE + HIDDEN * (1.0 - NONE))
-}
-
-/// What is left of the probability that something else is missing: an effect of the library that is unlike its law looks the same.
-pub(super) fn share_not_unlike() -> f64 {
-    OTHER * FOUND / (OTHER * FOUND + UNLIKE * (SINGLE + PAIR))
-}
 
 /// The prior of an effect's severity.
 #[derive(Debug, Clone, Copy)]
