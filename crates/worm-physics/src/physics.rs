@@ -176,7 +176,7 @@ impl Physics {
     pub fn mirrored(mut self) -> Self {
         self.worm = self.worm.mirrored();
         self.laws.patch.from_m = -(self.laws.patch.from_m + self.laws.patch.length_m);
-        self.tables = self.tables.mirrored();
+        self.tables = self.tables.mirrored(self.worm.cells());
         self
     }
 

@@ -1,11 +1,13 @@
-//! A law that nobody derived: a force, or a factor on friction, given at the points of a grid.
+//! A law that nobody derived: a force, a factor on friction or a displacement in the body, given at the points of a grid.
 //!
 //! A table depends on one or two quantities of a cell ([`Axis`]). Between the points of its grid it is linear, and beyond them it stays as
-//! it is at the last one, unless it repeats with a period. It either pushes a cell or scales the friction of its tip ([`ActsOn`]).
+//! it is at the last one, unless it repeats with a period. It pushes a cell, scales the friction of its tip, or moves where the drive holds
+//! it ([`ActsOn`]).
 //!
 //! # When it is evaluated
 //! A force that depends on the deformation, its rate, the speed or the load is taken at the end of each increment, as every other force
-//! is; all else, and what friction depends on, is taken at its start.
+//! is; all else, and what friction depends on, is taken at its start. A displacement by one of these four goes half of its way in each
+//! increment: so drives that yield by up to 3/k under load, with k the stiffness of the pad, are stable.
 
 mod axis;
 mod error;
@@ -90,7 +92,7 @@ impl Table {
                 acts_on: acts_on.name(),
                 min,
                 max,
-                unit: if acts_on.unit().is_empty() { "" } else { " N" },
+                unit: acts_on.unit(),
             });
         }
         Ok(Self { acts_on, grids, value })
@@ -141,25 +143,30 @@ impl Table {
         )
     }
 
-    /// The same law for the worm seen from the other end of the canal.
-    fn mirrored(&self) -> Self {
+    /// The same law for a worm of some cells seen from the other end of the canal.
+    fn mirrored(&self, cells: usize) -> Self {
         let mut table = self.clone();
-        let width = self.grids.get(1).map_or(1, |grid| grid.at.len());
-        let mut rows: Vec<Vec<f64>> = table.value.chunks(width).map(<[f64]>::to_vec).collect();
-        for (number, grid) in table.grids.iter_mut().enumerate() {
-            if grid.axis.is_signed() {
-                grid.at.reverse();
-                grid.at.iter_mut().for_each(|at| *at = -*at);
-                match number {
-                    0 => rows.reverse(),
-                    _ => rows.iter_mut().for_each(|row| row.reverse()),
-                }
-            }
-        }
-        table.value = rows.concat();
-        if self.acts_on == ActsOn::ContactForce {
-            table.value.iter_mut().for_each(|value| *value = -*value);
-        }
+        // For each axis the points in their new order, by the old number.
+        let orders = table.grids.iter_mut().map(|grid| {
+            let there = |at: &f64| grid.axis.mirrored(*at, cells);
+            let mirrored: Vec<f64> = grid.at.iter().map(there).collect();
+            let mut order: Vec<usize> = (0..mirrored.len()).collect();
+            order.sort_by(|&a, &b| mirrored[a].total_cmp(&mirrored[b]));
+            grid.at = order.iter().map(|&point| mirrored[point]).collect();
+            order
+        });
+        let orders: Vec<Vec<usize>> = orders.collect();
+        let across = orders.get(1).map_or(&[0][..], Vec::as_slice);
+        let sign = match self.acts_on {
+            ActsOn::ContactForce | ActsOn::DriveDisplacement => -1.0,
+            ActsOn::FrictionFactor => 1.0,
+        };
+        let points = orders[0]
+            .iter()
+            .flat_map(|row| across.iter().map(move |column| (row, column)));
+        table.value = points
+            .map(|(row, column)| sign * self.value[row * across.len() + column])
+            .collect();
         table
     }
 }
@@ -209,10 +216,10 @@ mod tests {
     fn seen_from_the_other_end_twice_it_is_itself() {
         let axes = [(Axis::Place, vec![0.0, 1.0, 3.0]), (Axis::Speed, vec![-1.0, 10.0])];
         let one = table(&axes, &[0.0, 1.0, 2.0, 5.0, -3.0, 7.0], None).expect("a table");
-        let there = one.mirrored();
+        let there = one.mirrored(4);
         let at = |table: &Table, sign: f64| table.at(|axis| sign * if axis == Axis::Place { 0.7 } else { 4.0 }).0;
         assert!((at(&one, 1.0) + at(&there, -1.0)).abs() < 1e-12);
-        assert_eq!(there.mirrored(), one);
+        assert_eq!(there.mirrored(4), one);
     }
 
     #[test]

@@ -260,7 +260,7 @@ class LawOver(Result):
     """What a law is about."""
 
     acts_on: str
-    """``contact-force``, N, or ``friction-factor``."""
+    """``contact-force``, N, ``friction-factor``, or ``drive-displacement``, m."""
     axis: str | list[str]
     """What it depends on; two as a list."""
     cell: int | None

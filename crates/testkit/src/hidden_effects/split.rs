@@ -216,14 +216,18 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
             .map(|&effect| Hidden::Single(effect, SeverityRange::UPPER_HALF))
     };
     let strangers = || split.stranger_kinds().into_iter().map(Hidden::Outside);
+    let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     if split == Split::Laws {
-        let clean = std::iter::repeat_n(Hidden::Clean, LAWS_CLEAN);
-        return numbered(&mut singles().chain(strangers()).chain(clean));
+        // Each round has seeds of its own: the second is of worms on which nothing was tuned.
+        let round = |_| {
+            let clean = std::iter::repeat_n(Hidden::Clean, LAWS_CLEAN);
+            singles().chain(strangers()).chain(clean)
+        };
+        return numbered(&mut (0..count(1)).flat_map(round));
     }
     if split == Split::CurrentLibrary {
         return numbered(&mut singles().chain(singles()).chain(strangers()));
     }
-    let count = |count: usize| ((count as f64 * scale).round() as usize).max(1);
     if split == Split::Current {
         let kinds = [
             Hidden::Single(Effect::Payload, FROM_30_G),

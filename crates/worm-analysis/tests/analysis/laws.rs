@@ -62,21 +62,28 @@ fn a_law_takes_the_place_of_an_effect_that_the_search_may_not_know() {
     }
 }
 
-/// Friction that swings slowly, as `write_campaigns laws` writes it; the library is left out, to be quick.
+/// Strangers as `write_campaigns laws` writes them: friction that swings over some cycles, the friction of one cell that comes and goes,
+/// and strokes of the first two cells that alternate, which no force can imitate: the law is of one of them. The library is left out, to be quick.
 #[test]
 fn a_law_is_found_for_what_nobody_listed() {
-    let campaign = draw(Hidden::Outside(1), 57_300_023);
     let library: Vec<&'static str> = LIBRARY.iter().map(|effect| effect.name).collect();
-    let answer = answer(&campaign, &library);
-    assert_eq!(answer.verdict, Verdict::OutsideLibrary);
-    let law = answer.law.expect("a law");
-    assert_eq!((law.over.acts_on, *law.over.axis.first()), ("friction-factor", "time"));
-    assert!(
-        law.over.period.is_some_and(|cycles| (3.0..3.2).contains(&cycles)),
-        "{law:?}"
-    );
-    assert!(law.closure_interval[0] > 0.8, "{law:?}");
-    assert_eq!(law.value.len(), law.band.len());
+    for (kind, seed, acts_on, cells, period) in [
+        (1, 57_300_023, "friction-factor", [None; 2], 3.0..3.2),
+        (8, 57_300_027, "friction-factor", [Some(3); 2], 3.7..3.85),
+        (11, 57_300_030, "drive-displacement", [Some(1), Some(2)], 1.95..2.05),
+    ] {
+        let answer = answer(&draw(Hidden::Outside(kind), seed), &library);
+        assert_eq!(answer.verdict, Verdict::OutsideLibrary);
+        let law = answer.law.expect("a law");
+        assert_eq!((law.over.acts_on, *law.over.axis.first()), (acts_on, "time"));
+        assert!(cells.contains(&law.over.cell), "{law:?}");
+        assert!(
+            law.over.period.is_some_and(|cycles| period.contains(&cycles)),
+            "{law:?}"
+        );
+        assert!(law.closure_interval[0] > 0.8, "{law:?}");
+        assert_eq!(law.value.len(), law.band.len());
+    }
 }
 
 #[test]

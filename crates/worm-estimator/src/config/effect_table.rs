@@ -7,7 +7,7 @@ use worm_physics::{ActsOn, Axis, Table, TableError};
 /// A law at the points of a grid, as in the file; all fields are none for an effect of the library.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 pub struct TableFields {
-    /// What it gives: a `contact-force` in N, or a `friction-factor`.
+    /// What it gives: a `contact-force` in N, a `friction-factor`, or a `drive-displacement` in m.
     #[serde(default)]
     pub acts_on: Option<String>,
     /// What it depends on.
@@ -72,10 +72,9 @@ impl TableFields {
     /// The law as a setting of the physics, on one cell (from 0) or all.
     pub(super) fn setting(&self, cell: Option<usize>, cells: usize) -> Result<Setting, SettingError> {
         let missing = SettingError::TableMissing;
-        let acts_on = self
-            .acts_on
-            .as_deref()
-            .ok_or(missing("`acts_on`: \"contact-force\" or \"friction-factor\""))?;
+        let acts_on = self.acts_on.as_deref().ok_or(missing(
+            "`acts_on`: \"contact-force\", \"friction-factor\" or \"drive-displacement\"",
+        ))?;
         let axes = match self.axis.as_ref().ok_or(missing("`axis`: what it depends on"))? {
             OneOrTwo::One(axis) => vec![axis.clone()],
             OneOrTwo::List(axes) => axes.clone(),

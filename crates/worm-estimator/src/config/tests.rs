@@ -219,7 +219,7 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         ),
         (
             "[[effect]]\nname = \"table\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\n",
-            "worm.toml: effect = \"table\": effect `table` needs `acts_on`: \"contact-force\" or \"friction-factor\"",
+            "worm.toml: effect = \"table\": effect `table` needs `acts_on`: \"contact-force\", \"friction-factor\" or \"drive-displacement\"",
         ),
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"colour\"\ngrid = [0.0]\nvalue = [1.0]\n",

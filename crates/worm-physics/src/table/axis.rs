@@ -2,9 +2,10 @@
 
 use super::TableError;
 
-/// Largest force of a table, N, and largest factor.
+/// Largest force of a table, N, largest factor, and largest displacement, m.
 const MAX_FORCE_N: f64 = 100.0;
 const MAX_FACTOR: f64 = 20.0;
+const MAX_DISPLACEMENT_M: f64 = 0.1;
 
 /// What a table depends on, for each cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,7 +78,7 @@ impl Axis {
         })
     }
 
-    /// Whether a force over it must be balanced together with the motion: both change within an increment.
+    /// Whether it changes with the motion within an increment: a force over it is balanced together with the motion.
     pub(super) fn changes_with_motion(self) -> bool {
         matches!(
             self,
@@ -90,9 +91,14 @@ impl Axis {
         matches!(self, Self::Place | Self::Time)
     }
 
-    /// Whether it changes its sign for a worm that is seen from the other end of the canal.
-    pub(super) fn is_signed(self) -> bool {
-        !matches!(self, Self::Phase | Self::Time)
+    /// Where a point of it lies for a worm of some cells that is seen from the other end of the canal. In reverse a step ends where it
+    /// began.
+    pub(super) fn mirrored(self, at: f64, cells: usize) -> f64 {
+        match self {
+            Self::Time => at,
+            Self::Phase => ((cells as f64).recip() - at).rem_euclid(1.0),
+            _ => -at,
+        }
     }
 }
 
@@ -103,17 +109,20 @@ pub enum ActsOn {
     ContactForce,
     /// A factor on the friction of each tip.
     FrictionFactor,
+    /// How far ahead of where its cam has it the drive holds each cell, m.
+    DriveDisplacement,
 }
 
 impl ActsOn {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::ContactForce, Self::FrictionFactor];
+    /// Everything that there is.
+    pub const ALL: [Self; 3] = [Self::ContactForce, Self::FrictionFactor, Self::DriveDisplacement];
 
     /// Its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::ContactForce => "contact-force",
             Self::FrictionFactor => "friction-factor",
+            Self::DriveDisplacement => "drive-displacement",
         }
     }
 
@@ -122,13 +131,14 @@ impl ActsOn {
         match self {
             Self::ContactForce => "N",
             Self::FrictionFactor => "",
+            Self::DriveDisplacement => "m",
         }
     }
 
     /// The value that changes nothing.
     pub fn neutral(self) -> f64 {
         match self {
-            Self::ContactForce => 0.0,
+            Self::ContactForce | Self::DriveDisplacement => 0.0,
             Self::FrictionFactor => 1.0,
         }
     }
@@ -138,6 +148,7 @@ impl ActsOn {
         match self {
             Self::ContactForce => [-MAX_FORCE_N, MAX_FORCE_N],
             Self::FrictionFactor => [0.0, MAX_FACTOR],
+            Self::DriveDisplacement => [-MAX_DISPLACEMENT_M, MAX_DISPLACEMENT_M],
         }
     }
 

@@ -14,7 +14,9 @@ pub enum TableError {
         names: String,
     },
     /// Nothing that a table can act on.
-    #[error("acts_on = \"{name}\": give \"contact-force\" (values in N) or \"friction-factor\"")]
+    #[error(
+        "acts_on = \"{name}\": give \"contact-force\" (values in N), \"friction-factor\" or \"drive-displacement\" (values in m)"
+    )]
     ActsOn {
         /// What was given.
         name: String,
@@ -41,7 +43,7 @@ pub enum TableError {
         two_axes: bool,
     },
     /// A value out of range.
-    #[error("value {value} of {acts_on}: must be from {min} to {max}{unit}")]
+    #[error("value {value} of {acts_on}: must be from {min} to {max}{}{unit}", if unit.is_empty() { "" } else { " " })]
     Value {
         /// The one given.
         value: f64,
@@ -51,7 +53,7 @@ pub enum TableError {
         min: f64,
         /// Largest value.
         max: f64,
-        /// Its unit, with a space before it; empty for none.
+        /// Its unit; empty for none.
         unit: &'static str,
     },
     /// A period that cannot be one.

@@ -123,6 +123,21 @@ impl Tables {
         })
     }
 
+    /// How far ahead of its cam the drive holds a cell, m: by what does not change with the motion, and by what does.
+    pub(crate) fn displacement_m(&self, cell: usize, here: &Whereabouts) -> [f64; 2] {
+        let mine = self
+            .of_cell(cell)
+            .filter(|table| table.acts_on == ActsOn::DriveDisplacement);
+        mine.fold([0.0; 2], |[standing_m, moving_m], table| {
+            let by_m = table.at(|axis| here.on(axis)).0;
+            if table.axes().any(Axis::changes_with_motion) {
+                [standing_m, moving_m + by_m]
+            } else {
+                [standing_m + by_m, moving_m]
+            }
+        })
+    }
+
     /// The largest force that the tables of all cells may have together, N.
     pub(crate) fn full_force_n(&self, cells: usize) -> f64 {
         debug_assert!(cells <= MAX_CELLS, "no worm has more");
@@ -135,11 +150,11 @@ impl Tables {
             .sum()
     }
 
-    /// The same for the worm seen from the other end of the canal.
-    pub(crate) fn mirrored(&self) -> Self {
+    /// The same for the worm, of some cells, seen from the other end of the canal.
+    pub(crate) fn mirrored(&self, cells: usize) -> Self {
         let mut mirrored = Self::default();
         for (table, cell) in self.iter() {
-            mirrored.push(&Arc::new(table.mirrored()), cell);
+            mirrored.push(&Arc::new(table.mirrored(cells)), cell);
         }
         mirrored
     }

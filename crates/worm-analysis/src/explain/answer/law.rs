@@ -32,7 +32,7 @@ impl<T> LawAxes<T> {
 /// What a law is about.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawOver {
-    /// What it gives: a `contact-force`, N, or a `friction-factor`.
+    /// What it gives: a `contact-force`, N, a `friction-factor`, or a `drive-displacement`, m.
     pub acts_on: &'static str,
     /// What it depends on, by the names that a table of the configuration has.
     pub axis: LawAxes<&'static str>,

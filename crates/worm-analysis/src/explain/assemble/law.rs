@@ -3,6 +3,7 @@
 use crate::explain::answer::{FoundLaw, LawAxes, LawOver};
 use crate::explain::search::fit::Fit;
 use crate::explain::search::law::find;
+use crate::explain::search::law::formula::Formula;
 use crate::explain::search::law::shape::LawShape;
 use crate::explain::worm::gap::{Measured, clusters};
 use crate::explain::worm::recorded_worm::RecordedWorm;
@@ -30,7 +31,7 @@ pub(super) fn law(
     let over = over(&law.shape);
     let rivals: Vec<LawOver> = found.rivals.iter().map(|shape| self::over(shape)).collect();
     Some(FoundLaw {
-        sentence: sentence(&over, &rivals, closure),
+        sentence: sentence(&over, found.formula.as_ref(), &rivals, closure),
         grid: axes(&law.shape, |(_, grid)| grid.clone()),
         value: law.value.clone(),
         band: law.band.clone(),
@@ -61,11 +62,14 @@ fn axes<T>(shape: &LawShape, of: impl Fn(&(Axis, Vec<f64>)) -> T) -> LawAxes<T> 
 }
 
 /// What a law says, in a sentence.
-fn sentence(over: &LawOver, rivals: &[LawOver], closure: f64) -> String {
+fn sentence(over: &LawOver, formula: Option<&Formula>, rivals: &[LawOver], closure: f64) -> String {
+    let says = match formula.filter(|formula| formula.is_constant) {
+        Some(constant) => format!("{} is the same everywhere, {}", subject(over), constant.text),
+        None => format!("{}{}", subject(over), dependence(over)),
+    };
     let mut text = format!(
-        "{}{}: it closes {} of the gap on cycles that it was not fitted to.",
-        capitalised(&subject(over)),
-        dependence(over),
+        "{}: it closes {} of the gap on cycles that it was not fitted to.",
+        capitalised(&says),
         percent(closure)
     );
     if !rivals.is_empty() {
@@ -79,17 +83,15 @@ fn sentence(over: &LawOver, rivals: &[LawOver], closure: f64) -> String {
 }
 
 fn subject(over: &LawOver) -> String {
-    let what = match ActsOn::named(over.acts_on) {
-        Ok(ActsOn::FrictionFactor) => "the friction",
-        _ => "a force on",
+    let whom = |every: &str| {
+        over.cell
+            .map_or_else(|| every.to_owned(), |cell| format!("cell {cell}"))
     };
-    let whom = match (over.cell, what) {
-        (Some(cell), "the friction") => format!(" of cell {cell}"),
-        (Some(cell), _) => format!(" cell {cell}"),
-        (None, "the friction") => " of every tip".to_owned(),
-        (None, _) => " each cell".to_owned(),
-    };
-    format!("{what}{whom}")
+    match ActsOn::named(over.acts_on) {
+        Ok(ActsOn::FrictionFactor) => format!("the friction of {}", whom("every tip")),
+        Ok(ActsOn::DriveDisplacement) => format!("where the drive holds {}", whom("each cell")),
+        Ok(ActsOn::ContactForce) | Err(_) => format!("a force on {}", whom("each cell")),
+    }
 }
 
 fn dependence(over: &LawOver) -> String {

@@ -25,9 +25,10 @@ const NEAR_REST: [f64; 3] = [0.02, 0.07, 0.2];
 const TURN: f64 = 0.05;
 /// Shortest periods, in points of a grid.
 const OF_PERIOD: f64 = 2.2;
-/// Scales of a force, as a fraction of the friction of a tip, and of a factor on friction.
+/// Scales of a force, as a fraction of the friction of a tip, of a factor on friction, and of a displacement, as a fraction of the stroke.
 const FORCES: [f64; 4] = [0.02, 0.06, 0.2, 0.5];
 const FACTORS: [f64; 4] = [0.04, 0.1, 0.25, 0.5];
+const DISPLACEMENTS: [f64; 4] = [0.005, 0.015, 0.05, 0.15];
 /// Most coordinates that are kept of where the data are.
 const SEEN: usize = 600;
 
@@ -47,11 +48,17 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
         visit(worm, run, recalibrated, &mut visited);
     }
     let friction_n = friction_n(worm);
+    let stroke_m = worm.scene.nominal[0].worm.stroke_m();
     let offer = |acts_on: ActsOn, axis: Axis, cell: Option<usize>, grid: Vec<f64>, seen: &[f64]| {
         let scaled = scaled(axis, &grid);
         let sigmas = match acts_on {
             ActsOn::ContactForce => FORCES.map(|fraction| fraction * friction_n),
             ActsOn::FrictionFactor => FACTORS,
+            ActsOn::DriveDisplacement => {
+                // What a cell loses of its strokes adds up over time.
+                let strokes = if axis == Axis::Time { grid[grid.len() - 1] } else { 1.0 };
+                DISPLACEMENTS.map(|fraction| fraction * strokes * stroke_m)
+            }
         };
         let spacing = grid.get(1).map_or(0.0, |second| second - grid[0]);
         let width = grid[grid.len() - 1] - grid[0];
@@ -80,6 +87,7 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
         .collect();
     let force = ActsOn::ContactForce;
     let friction = ActsOn::FrictionFactor;
+    let displacement = ActsOn::DriveDisplacement;
     let evenly_of = |seen: &[f64], points: usize| ends(seen).map(|(from, to)| evenly(from, to, points));
     for (axis, seen) in [
         (Axis::Deformation, &visited.deformation_m),
@@ -99,17 +107,22 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
     offers.extend(grid.map(|grid| offer(friction, Axis::Speed, None, grid, &visited.speed_m_s)));
     let grid = evenly_of(&visited.load_n, POINTS);
     offers.extend(grid.map(|grid| offer(friction, Axis::Load, None, grid, &visited.load_n)));
+    // What does not change within a run, and the same displacement of every cell, are nothing that can be seen.
+    offers.push(offer(displacement, Axis::Phase, None, phases.clone(), &phases));
+    offers.extend(
+        evenly_of(&visited.load_n, POINTS).map(|grid| offer(displacement, Axis::Load, None, grid, &visited.load_n)),
+    );
+    let time_grid = with_spacing(0.0, cycles, SPACING_CYCLES);
+    for cell in 0..worm.channels() {
+        offers.push(offer(displacement, Axis::Phase, Some(cell), phases.clone(), &phases));
+        offers.push(offer(displacement, Axis::Time, Some(cell), time_grid.clone(), &times));
+        offers.push(offer(friction, Axis::Time, Some(cell), time_grid.clone(), &times));
+    }
     for acts_on in [force, friction] {
         let place_grid = with_spacing(place_m.0, place_m.1, SPACING_M);
         offers.push(offer(acts_on, Axis::Place, None, place_grid, &places_m));
         offers.push(offer(acts_on, Axis::Phase, None, phases.clone(), &phases));
-        offers.push(offer(
-            acts_on,
-            Axis::Time,
-            None,
-            with_spacing(0.0, cycles, SPACING_CYCLES),
-            &times,
-        ));
+        offers.push(offer(acts_on, Axis::Time, None, time_grid.clone(), &times));
         if slopes_deg.len() > 1 {
             offers.push(offer(acts_on, Axis::Slope, None, slopes_deg.clone(), &slopes_deg));
         }

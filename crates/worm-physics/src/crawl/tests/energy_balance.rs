@@ -52,7 +52,12 @@ fn the_energy_balance_closes_for_tables_over_every_axis() {
         for acts_on in ActsOn::ALL {
             let neutral = acts_on.neutral();
             let grid = [(axis, vec![-width, 0.0, 0.5 * width, width])];
-            let value = [-0.1, 0.02, 0.1, 0.2].map(|value| neutral + value).to_vec();
+            let unit = if acts_on == ActsOn::DriveDisplacement {
+                1e-2
+            } else {
+                1.0
+            };
+            let value = [-0.1, 0.02, 0.1, 0.2].map(|value| neutral + unit * value).to_vec();
             let grid = if axis == Axis::Phase {
                 [(axis, vec![0.0, 0.2, 0.3, 0.6])]
             } else {

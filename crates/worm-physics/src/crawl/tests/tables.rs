@@ -114,13 +114,109 @@ fn a_second_axis_and_a_cell_only_select() {
     assert_eq!(error.to_string(), "effect `table`: cell 5 of 4: give 1 to 4");
 }
 
-/// What goes forward in a mirrored worm goes backward in the worm.
+/// A displacement over the load is the drive's compliance, one over the phase a stroke that is shorter: positions and torque at the cam.
+/// That by the load follows one to two increments late, of a hundred in a step.
 #[test]
-fn a_table_seen_from_the_other_end_acts_the_other_way() {
-    let drag = |sign: f64| table(ActsOn::ContactForce, Axis::Slope, &[-30.0, 30.0], &[0.05, sign * 0.1]);
-    let physics = Physics::of(paper(30.0)).with(&[drag(1.0)]);
-    let there = steady_cycle_of(&physics.clone().mirrored().mirrored(), CYCLE_S);
-    let here = steady_cycle_of(&physics, CYCLE_S);
-    let [there, here] = [there, here].map(|outcome| outcome.cycle().expect("it crawls").advance_m);
-    assert!((there - here).abs() < 1e-12, "{there} and {here}");
+fn a_displacement_gives_the_motion_of_the_effect_that_it_reproduces() {
+    let (compliance_m_per_n, lost, stroke_m) = (1e-4, 0.05, 11.5e-3);
+    let yielding_m = [5.0, -5.0].map(|force_n: f64| compliance_m_per_n * force_n);
+    // Ahead in its body at the start of its step, and back as far at its end, as every cell is that steps by less than its stroke.
+    let shorter_m = [0.0, -lost * stroke_m * 0.75, 0.0];
+    let pairs = [
+        (
+            effect("actuator-compliance", &[compliance_m_per_n]),
+            table(ActsOn::DriveDisplacement, Axis::Load, &[-5.0, 5.0], &yielding_m),
+        ),
+        (
+            effect("lost-stroke", &[lost]),
+            table(
+                ActsOn::DriveDisplacement,
+                Axis::Phase,
+                &[0.0, 0.25, 0.999_999],
+                &shorter_m,
+            ),
+        ),
+    ];
+    for slope_deg in [0.0, 25.0] {
+        for (named, by_table) in &pairs {
+            let name = named.effect().name;
+            let physics = |with: &[Setting]| Physics::of(paper(slope_deg)).with(with);
+            let [plain, named, by_table] =
+                [&[][..], std::slice::from_ref(named), std::slice::from_ref(by_table)].map(|with| load(&physics(with)));
+            let difference = |one: &[f64], other: &[f64]| {
+                let squares = one.iter().zip(other).map(|(one, other)| (one - other).powi(2));
+                squares.sum::<f64>().sqrt()
+            };
+            let (apart, changed) = (difference(&named.0, &by_table.0), difference(&named.0, &plain.0));
+            assert!(
+                apart < 0.05 * changed,
+                "{name}, {slope_deg}°: {apart} m of {changed} m apart"
+            );
+            let (apart, changed) = (difference(&named.1, &by_table.1), difference(&named.1, &plain.1));
+            assert!(
+                apart < 0.1 * changed,
+                "{name}, {slope_deg}°: {apart} J of {changed} J apart"
+            );
+        }
+    }
+}
+
+/// Distances between cells and the drive's load at places in the third cycle.
+fn load(physics: &Physics) -> (Vec<f64>, Vec<f64>) {
+    let mechanics = Mechanics::new(physics);
+    let mut crawl = Crawl::at_rest(&mechanics, 0.0, &[0.0; 4], None).expect("it holds");
+    let mut found = (Vec::new(), Vec::new());
+    for place in 0..200 {
+        let phase = 0.02 * (f64::from(place) + 0.3); // never where one step ends and the next begins
+        crawl.advance_to(&mechanics, phase, 0.02 * CYCLE_S).expect("it holds");
+        if phase > 2.0 {
+            let at_m = crawl.positions_m();
+            found.0.extend(at_m.iter().map(|cell_m| cell_m - at_m[0]));
+            found.1.push(crawl.drive_load_j(&mechanics));
+        }
+    }
+    found
+}
+
+/// What goes forward in a mirrored worm goes backward in the worm, over every axis and of everything that a table acts on.
+#[test]
+fn a_table_seen_from_the_other_end_is_the_crawl_in_reverse() {
+    for (acts_on, axis, grid, value) in [
+        (ActsOn::ContactForce, Axis::Slope, [-30.0, 0.0, 30.0], [0.05, 0.0, 0.3]),
+        (ActsOn::ContactForce, Axis::Phase, [0.0, 0.1, 0.4], [0.0, 0.3, -0.1]),
+        (ActsOn::FrictionFactor, Axis::Phase, [0.1, 0.2, 0.7], [0.8, 1.0, 0.9]),
+        (ActsOn::FrictionFactor, Axis::Place, [-0.02, 0.0, 0.02], [0.8, 1.0, 0.9]),
+        (
+            ActsOn::DriveDisplacement,
+            Axis::Phase,
+            [0.0, 0.25, 0.5],
+            [0.0, -1e-3, 0.5e-3],
+        ),
+        (
+            ActsOn::DriveDisplacement,
+            Axis::Load,
+            [-3.0, 0.0, 3.0],
+            [2e-4, 0.0, -5e-4],
+        ),
+    ] {
+        let law = table(acts_on, axis, &grid, &value);
+        let name = format!("{} over {}", acts_on.name(), axis.name());
+        let physics = Physics::of(paper(20.0)).with(&[law]);
+        let back = Mechanics::new(&physics);
+        let there = Mechanics::new(&physics.mirrored());
+        let first_m = [0.0, 0.04, 0.08, 0.12];
+        let mut backward = Crawl::at_rest(&back, 0.0, &first_m, None).expect("it holds");
+        let mut forward = Crawl::at_rest(&there, 0.0, &first_m.map(|at_m| -at_m), None).expect("it holds");
+        for tenth in 1..=30 {
+            let cycles = 0.1 * f64::from(tenth);
+            backward.advance_to(&back, -cycles, 0.1 * CYCLE_S).expect("it holds");
+            forward.advance_to(&there, cycles, 0.1 * CYCLE_S).expect("it holds");
+            for (one_m, other_m) in backward.positions_m().iter().zip(forward.positions_m()) {
+                assert!(
+                    (one_m + other_m).abs() < 1e-8,
+                    "{name}, {cycles} cycles: {one_m} and {other_m} m"
+                );
+            }
+        }
+    }
 }

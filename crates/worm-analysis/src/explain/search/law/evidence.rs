@@ -6,6 +6,9 @@
 //! ```text
 //! ln B = −½ ln det(1 + LᵀGL) + ½ sᵀL (1 + LᵀGL)⁻¹ Lᵀs
 //! ```
+//!
+//! Far from no law the derivatives are others: about values v that were found, s is −Dᵀr + G v, and the law is found anew.
+//!
 //! The directions in which LᵀGL is large are those that the data determine: they are the columns with which the law is fitted.
 
 use super::super::directions::Projector;
@@ -15,15 +18,16 @@ use super::super::hypothesis::Hypothesis;
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;
 use super::kernel::Prior;
+use super::offer::Offer;
 use super::shape::LawShape;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::sync::Arc;
 
 /// Information, in units of that of the prior, from which a direction is fitted; and most of them.
 const DETERMINED: f64 = 0.3;
 const MOST: usize = 10;
-/// Steps of the derivatives: by a value beyond neutral.
-const STEP: f64 = 0.02;
+/// Steps of the derivatives by the value at a point, as a fraction of the second scale of what is offered.
+const STEP: f64 = 0.2;
 
 /// What the data say of the values at the points of a grid, to first order.
 pub(super) struct Scores {
@@ -48,15 +52,19 @@ pub(super) struct Determined {
 }
 
 impl Scores {
-    /// About a fit of the plant without a law, which has its derivatives; none where those are singular.
-    pub fn of<P: Plant>(
+    /// About a fit of the plant, which has its derivatives, where the law has some values beyond its neutral one at the points of the
+    /// offered grid; none where the derivatives are singular. The scores are those of the whole values.
+    pub fn about<P: Plant>(
         problem: &FitProblem<'_, P>,
         discrepancy: &Discrepancy,
         fit: &Fit,
-        shape: &LawShape,
+        offer: &Offer,
+        beyond: &[f64],
     ) -> Option<Self> {
-        let hypothesis = fit.hypothesis.with_law(Arc::new(shape.clone().with_each_point()), STEP);
-        let points = shape.centre.len();
+        let step = STEP * offer.sigmas[1];
+        let shape = offer.shape.clone().about(beyond).with_each_point();
+        let hypothesis = fit.hypothesis.with_law(Arc::new(shape), step);
+        let points = beyond.len();
         let mut at = fit.at.clone();
         at.extend(vec![0.0; points]);
         let of_law: Vec<usize> = (fit.at.len()..at.len()).collect();
@@ -64,24 +72,31 @@ impl Scores {
         let projector = Projector::new(discrepancy, fit)?;
         let mut directions = projector.none();
         projector.append(derivatives.clone(), &mut directions);
+        let products = directions.products();
         Some(Self {
-            scores: DVector::from_vec(directions.scores.clone()),
-            products: directions.products(),
+            scores: DVector::from_vec(directions.scores) + &products * DVector::from_column_slice(beyond),
+            products,
             derivatives,
         })
     }
 
     /// Logarithm of the Bayes factor of a law against none.
     pub fn ln_bayes(&self, root: &DMatrix<f64>) -> f64 {
-        let mut inner = root.transpose() * &self.products * root;
-        for row in 0..inner.nrows() {
-            inner[(row, row)] += 1.0;
-        }
-        let along = root.transpose() * &self.scores;
-        let Some(factor) = inner.cholesky() else {
-            return f64::NEG_INFINITY;
-        };
-        0.5 * along.dot(&factor.solve(&along)) - 0.5 * factor.ln_determinant()
+        self.posterior(root).map_or(f64::NEG_INFINITY, |(factor, along)| {
+            0.5 * along.dot(&factor.solve(&along)) - 0.5 * factor.ln_determinant()
+        })
+    }
+
+    /// The most probable coefficients of some columns, to first order; 0 where they are singular.
+    pub fn most_probable(&self, root: &DMatrix<f64>) -> Vec<f64> {
+        let found = self.posterior(root).map(|(factor, along)| factor.solve(&along));
+        found.map_or_else(|| vec![0.0; root.ncols()], |found| found.as_slice().to_vec())
+    }
+
+    /// 1 + LᵀGL and Lᵀs; none where the former is singular.
+    fn posterior(&self, root: &DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+        let inner = DMatrix::identity(root.ncols(), root.ncols()) + root.transpose() * &self.products * root;
+        Some((inner.cholesky()?, root.transpose() * &self.scores))
     }
 
     /// The directions that the data determine, strongest first.

@@ -17,6 +17,9 @@ use std::sync::Arc;
 
 /// Laws that are fitted to the end: those of most evidence.
 const FITTED: usize = 5;
+/// Those of them that are fitted anew about what was found, the best; and how often.
+const ANEW: usize = 2;
+const PASSES: usize = 2;
 /// Logarithm of the Bayes factor from which a law is fitted at all, and below the best of all up to which.
 const WORTH: f64 = 2.0;
 const NEAR: f64 = 60.0;
@@ -55,17 +58,31 @@ pub(in crate::explain) fn find<P: Plant>(
     let mut weighed: Vec<Weighed<'_>> = Vec::new();
     for (done, offer) in offers.iter().enumerate() {
         report(0.5 * done as f64 / count);
-        weighed.extend(weigh(problem, discrepancy, recalibrated, offer));
+        let neutral = vec![0.0; offer.shape.centre.len()];
+        weighed.extend(weigh(problem, discrepancy, recalibrated, offer, &neutral));
     }
     weighed.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
     let best = weighed.first()?.ln_bayes;
     weighed.retain(|one| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
     weighed.truncate(FITTED);
     let folds = problem.plant.folds();
-    let mut fitted: Vec<(FittedLaw, &Weighed<'_>)> = Vec::new();
-    for (done, one) in weighed.iter().enumerate() {
-        report(0.5 + 0.4 * done as f64 / weighed.len() as f64);
-        fitted.push((fit(problem, recalibrated, without, &folds, one), one));
+    let search = Search {
+        problem,
+        discrepancy,
+        recalibrated,
+        without,
+        folds: &folds,
+    };
+    let mut fitted: Vec<(FittedLaw, Weighed<'_>)> = Vec::new();
+    let tried = weighed.len() as f64;
+    for (done, one) in weighed.into_iter().enumerate() {
+        report(0.5 + 0.3 * done as f64 / tried);
+        fitted.push((search.fit(recalibrated, &one), one));
+    }
+    fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+    for (done, (law, of)) in fitted.iter_mut().take(ANEW).enumerate() {
+        report(0.8 + 0.15 * done as f64 / ANEW as f64);
+        search.fit_anew(law, of);
     }
     fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
     let (law, of) = fitted.first()?;
@@ -80,14 +97,15 @@ pub(in crate::explain) fn find<P: Plant>(
     Some(FoundLaw { law, rivals, formula })
 }
 
-/// What the data say of an offer, to first order.
+/// What the data say of an offer, to first order about a fit at some values of the law beyond neutral.
 fn weigh<'o, P: Plant>(
     problem: &FitProblem<'_, P>,
     discrepancy: &Discrepancy,
-    recalibrated: &Fit,
+    about: &Fit,
     offer: &'o Offer,
+    beyond: &[f64],
 ) -> Option<Weighed<'o>> {
-    let scores = Scores::of(problem, discrepancy, recalibrated, &offer.shape)?;
+    let scores = Scores::about(problem, discrepancy, about, offer, beyond)?;
     let kinds = priors(offer).map(|priors| {
         let each: Vec<f64> = priors.iter().map(|prior| scores.ln_bayes(&prior.on_grid)).collect();
         let best = (0..each.len()).max_by(|&a, &b| each[a].total_cmp(&each[b]));
@@ -102,34 +120,57 @@ fn weigh<'o, P: Plant>(
     })
 }
 
-/// Fits a law to the end, and holds data out.
-fn fit<P: Plant>(
-    problem: &FitProblem<'_, P>,
-    recalibrated: &Fit,
-    without: &HeldOut,
-    folds: &Folds,
-    weighed: &Weighed<'_>,
-) -> FittedLaw {
-    let determined = weighed.scores.determined(&weighed.prior);
-    let mut shape = weighed.offer.shape.clone();
-    if let Some((period, within)) = &weighed.prior.period {
-        shape.period = Some(*period);
-        shape.axes[0].1.clone_from(within);
-        shape.centre = vec![shape.acts_on.neutral(); within.len()];
+/// What every law is fitted with and held against.
+struct Search<'s, 'p, P> {
+    problem: &'s FitProblem<'p, P>,
+    discrepancy: &'s Discrepancy,
+    recalibrated: &'s Fit,
+    without: &'s HeldOut,
+    folds: &'s Folds,
+}
+
+impl<P: Plant> Search<'_, '_, P> {
+    /// Fits a law to the end from a fit of what is free besides, and holds data out.
+    fn fit(&self, from: &Fit, weighed: &Weighed<'_>) -> FittedLaw {
+        let determined = weighed.scores.determined(&weighed.prior);
+        let mut shape = weighed.offer.shape.clone();
+        if let Some((period, within)) = &weighed.prior.period {
+            shape.period = Some(*period);
+            shape.axes[0].1.clone_from(within);
+            shape.centre = vec![shape.acts_on.neutral(); within.len()];
+        }
+        shape.columns.clone_from(&determined.columns);
+        let known = weighed.scores.by_columns(&determined.on_grid);
+        fit_shape(
+            self.problem,
+            self.recalibrated,
+            self.without,
+            self.folds,
+            Start {
+                from,
+                shape,
+                at: determined.at,
+                known,
+                on_grid: determined.on_grid,
+                left: determined.left,
+                seen: weighed.offer.seen.clone(),
+            },
+        )
     }
-    shape.columns.clone_from(&determined.columns);
-    let known = weighed.scores.by_columns(&determined.on_grid);
-    fit_shape(
-        problem,
-        recalibrated,
-        without,
-        folds,
-        Start {
-            shape,
-            at: determined.at,
-            known,
-            left: determined.left,
-            seen: weighed.offer.seen.clone(),
-        },
-    )
+
+    /// Fits a law anew about what was found, as long as it predicts better then: far from no law other directions are determined.
+    fn fit_anew<'o>(&self, law: &mut FittedLaw, weighed: &mut Weighed<'o>) {
+        let offer: &'o Offer = weighed.offer;
+        for _ in 0..PASSES {
+            let about = law.besides(self.problem, offer.shape.clone().about(&law.beyond));
+            let Some(anew) = weigh(self.problem, self.discrepancy, &about, offer, &law.beyond) else {
+                return;
+            };
+            let better = self.fit(&about, &anew);
+            if better.gain <= law.gain {
+                return;
+            }
+            (*law, *weighed) = (better, anew);
+        }
+    }
 }

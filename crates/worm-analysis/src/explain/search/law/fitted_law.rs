@@ -26,19 +26,38 @@ pub(in crate::explain) struct FittedLaw {
     pub gain: f64,
     pub shape: Arc<LawShape>,
     pub value: Vec<f64>,
+    /// Values beyond neutral at the points of the offered grid.
+    pub beyond: Vec<f64>,
     /// 90 % band at every point.
     pub band: Vec<[f64; 2]>,
     /// Where the data are on the first axis.
     pub seen: Vec<f64>,
 }
 
+impl FittedLaw {
+    /// The fit of what is free besides, with derivatives, the law as it is at the points of some grid.
+    pub fn besides<P: Plant>(&self, problem: &FitProblem<'_, P>, on_grid: LawShape) -> Fit {
+        let mut hypothesis = self.fit.hypothesis.clone();
+        hypothesis.free.retain(|free| !matches!(free.what, What::Law(_)));
+        hypothesis.law = Some(Arc::new(on_grid));
+        let count = hypothesis.free.len();
+        let mut fit = problem.evaluate(&hypothesis, self.fit.at[..count].to_vec());
+        fit.jacobian = self.fit.jacobian[..count].to_vec();
+        fit
+    }
+}
+
 /// Where a fit of a law starts.
-pub(super) struct Start {
+pub(super) struct Start<'f> {
+    /// What is free without the law, with derivatives.
+    pub from: &'f Fit,
     pub shape: LawShape,
     /// Coefficients to first order.
     pub at: Vec<f64>,
     /// Derivatives of the residuals by them.
     pub known: Vec<Vec<f64>>,
+    /// The columns at the points of the offered grid: `[coefficient][point]`.
+    pub on_grid: Vec<Vec<f64>>,
     /// Variance of the values that no column has.
     pub left: Vec<f64>,
     pub seen: Vec<f64>,
@@ -50,24 +69,33 @@ pub(super) fn fit_shape<P: Plant>(
     recalibrated: &Fit,
     without: &HeldOut,
     folds: &Folds,
-    start: Start,
+    start: Start<'_>,
 ) -> FittedLaw {
     let shape = Arc::new(start.shape);
     let hypothesis = recalibrated.hypothesis.with_law(Arc::clone(&shape), STEP);
-    let from = [&recalibrated.at[..], &start.at].concat();
-    let mut known = recalibrated.clone();
+    let from = [&start.from.at[..], &start.at].concat();
+    let mut known = start.from.clone();
     known.jacobian.extend(start.known);
     let mut fit = problem.fit(&hypothesis, from, Some(&known));
     problem.compute_jacobian(&mut fit);
     let held_out = held_out(problem, &fit, folds);
     let gain = without.chi_squared - held_out.chi_squared - problem.excess_of_repeating(recalibrated, &fit);
     let (value, band) = with_band(&fit, &shape, &start.left);
+    let coefficients = fit.hypothesis.law_coefficients(&fit.at);
+    let mut beyond = vec![0.0; start.on_grid.first().map_or(0, Vec::len)];
+    for (column, by) in start.on_grid.iter().zip(coefficients) {
+        beyond
+            .iter_mut()
+            .zip(column)
+            .for_each(|(beyond, at)| *beyond += by * at);
+    }
     FittedLaw {
         fit,
         held_out,
         gain,
         shape,
         value,
+        beyond,
         band,
         seen: start.seen,
     }

@@ -34,6 +34,8 @@ const TURN: f64 = 0.05;
 pub(in crate::explain) struct Formula {
     /// In words and figures, in SI units.
     pub text: String,
+    /// Whether it says that the law is the same everywhere.
+    pub is_constant: bool,
     /// Fall of the score on data held out.
     pub gain: f64,
 }
@@ -183,11 +185,8 @@ pub(super) fn nearest<P: Plant>(
         let of = |(term, part): (&Term, usize)| grid.iter().map(|at| sigma * term.parts(*at, scale)[part]).collect();
         parts.map(of).collect()
     };
-    let ln_bayes = |terms: &[Term]| {
-        let columns = columns(terms);
-        let root = DMatrix::from_fn(grid.len(), columns.len(), |row, column| columns[column][row]);
-        scores.ln_bayes(&root)
-    };
+    let root = |columns: &[Vec<f64>]| DMatrix::from_fn(grid.len(), columns.len(), |row, column| columns[column][row]);
+    let ln_bayes = |terms: &[Term]| scores.ln_bayes(&root(&columns(terms)));
     let mut chosen: Vec<Term> = Vec::new();
     let mut best = 0.0;
     while chosen.len() < TERMS {
@@ -208,8 +207,10 @@ pub(super) fn nearest<P: Plant>(
     let mut shape = offer.shape.clone();
     shape.columns.clone_from(&columns);
     let start = Start {
-        at: vec![0.0; columns.len()],
+        from: recalibrated,
+        at: scores.most_probable(&root(&columns)),
         known: scores.by_columns(&columns),
+        on_grid: columns,
         left: Vec::new(),
         seen: Vec::new(),
         shape,
@@ -235,6 +236,14 @@ pub(super) fn nearest<P: Plant>(
     let most = of_terms.iter().map(|(_, _, most)| *most).fold(0.0, f64::max);
     // What the fit to the end leaves nothing of is not written.
     of_terms.retain(|(_, _, of_term)| *of_term > NEGLIGIBLE * most);
+    let is_constant = of_terms.iter().all(|(term, _, _)| *term == Term::Constant);
+    // The values are those beyond neutral.
+    let neutral = law.shape.acts_on.neutral();
+    if neutral != 0.0 {
+        let constant = of_terms.iter().position(|(term, _, _)| *term == Term::Constant);
+        let beyond = constant.map_or(0.0, |place| of_terms.remove(place).1[0]);
+        of_terms.insert(0, (Term::Constant, vec![neutral + beyond], neutral));
+    }
     for (term, by, _) in &of_terms {
         let part = term.text(by, scale, *axis, law.shape.acts_on.unit());
         text += &match (text.is_empty(), part.strip_prefix('−')) {
@@ -243,14 +252,9 @@ pub(super) fn nearest<P: Plant>(
             (false, None) => format!(" + {part}"),
         };
     }
-    if law.shape.acts_on.neutral() != 0.0 {
-        text = match text.strip_prefix('−') {
-            Some(rest) => format!("{} − {rest}", law.shape.acts_on.neutral()),
-            None => format!("{} + {text}", law.shape.acts_on.neutral()),
-        };
-    }
     Some(Formula {
         text,
+        is_constant,
         gain: fitted.gain,
     })
 }

@@ -37,6 +37,14 @@ impl LawShape {
         .with_each_point()
     }
 
+    /// The same about some values beyond neutral, without coefficients.
+    pub fn about(mut self, beyond: &[f64]) -> Self {
+        let neutral = self.acts_on.neutral();
+        self.centre = beyond.iter().map(|beyond| neutral + beyond).collect();
+        self.columns = Vec::new();
+        self
+    }
+
     /// The same with a coefficient for the value at each point.
     pub fn with_each_point(mut self) -> Self {
         let points = self.centre.len();

@@ -29,14 +29,20 @@ fn drawn(axis: &str) -> (f64, String) {
     }
 }
 
+/// What a law gives, by name and as it is drawn, and the scale on which that is.
+fn drawn_of(law: &FoundLaw) -> (&'static str, &'static str, f64) {
+    match ActsOn::named(law.over.acts_on) {
+        Ok(ActsOn::FrictionFactor) => ("the friction", "friction over that of the model", 1.0),
+        Ok(ActsOn::DriveDisplacement) => ("the displacement", "displacement ahead of the cam, mm", 1e3),
+        Ok(ActsOn::ContactForce) | Err(_) => ("the force", "force on each cell towards smaller positions, N", 1.0),
+    }
+}
+
 pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let laws = answer.law.iter().filter(|law| law.grid.all().len() == 1);
     let panels: Result<Vec<Panel>, DrawError> = laws
         .map(|law| {
-            let (name, quantity) = match ActsOn::named(law.over.acts_on) {
-                Ok(ActsOn::FrictionFactor) => ("the friction", "friction over that of the model"),
-                _ => ("the force", "force on each cell towards smaller positions, N"),
-            };
+            let (name, quantity, _) = drawn_of(law);
             let name = match law.over.cell {
                 Some(cell) => format!("{name}, cell {cell}"),
                 None => name.to_owned(),
@@ -60,12 +66,13 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
 
 fn picture(law: &FoundLaw) -> Result<Svg, DrawError> {
     let (scale, label) = drawn(law.over.axis.first());
+    let unit = drawn_of(law).2;
     let grid = law.grid.first();
     let mut points: Vec<(f64, f64, [f64; 2])> = grid
         .iter()
         .zip(&law.value)
         .zip(&law.band)
-        .map(|((at, value), band)| (*at, *value, *band))
+        .map(|((at, value), band)| (*at, unit * value, band.map(|end| unit * end)))
         .collect();
     // A law that repeats is drawn over one period, its end followed by its beginning.
     if let (Some(period), Some(&(first, value, band))) = (law.over.period, points.first()) {
