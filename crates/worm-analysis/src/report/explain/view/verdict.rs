@@ -242,7 +242,10 @@ pub(super) fn note(answer: &Answer) -> String {
              weaker ones.",
             evidence(answer)
         ),
-        (_, true) => "No value is given, for no effect is named.".to_owned(),
+        (_, true) => match &answer.law {
+            Some(law) => format!("No effect is named, but there is a law. {}", law.sentence),
+            None => "No value is given, for no effect is named.".to_owned(),
+        },
         (_, false) if answer.is_by_advances() => {
             "± is one standard error. So few scalars leave much open: each value is what this effect would need if it alone were \
              missing."
