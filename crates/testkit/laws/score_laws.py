@@ -18,8 +18,9 @@ import sys
 import tomllib
 from pathlib import Path
 
-# What each effect depends on, decided before any law was fitted; that of a lost stroke and of a scale before any displacement in the body
-# was, for there was none at first. "cell" is the cell that it concerns.
+# What each effect depends on, decided before any law was fitted. At first there was no displacement in the body, and nothing was right for a
+# lost stroke and a scale: theirs was decided when those of the first round of worms had been seen, and none of the second.
+# "cell" is the cell that it concerns.
 AXES = {
     "unequal-clamping": {"cell"},
     "unequal-stiffness": {"cell"},

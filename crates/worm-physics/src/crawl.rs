@@ -91,9 +91,7 @@ struct Trial {
     /// Force of tables that does not change within the increment, and of all, N.
     standing_n: f64,
     pushed_n: f64,
-    /// Displacement by tables at the end, and what this increment adds to it.
-    displaced_m: Displacement,
-    displaced_by_m: Displacement,
+    displaced_m: Displacement, // by tables, at the end
 }
 
 /// The constants of one increment's equation.
@@ -363,10 +361,10 @@ impl Crawl {
                 cell.trial.standing_n = tables.standing_n(index, &cell.trial.here);
                 let target_m = tables.displacement_m(index, &cell.trial.here);
                 let before_m = cell.displaced_m.unwrap_or(target_m);
-                let by_m = [target_m[0] - before_m[0], FOLLOWS * (target_m[1] - before_m[1])];
-                cell.trial.displaced_m = [before_m[0] + by_m[0], before_m[1] + by_m[1]];
-                cell.trial.displaced_by_m = by_m;
-                cell.trial.driven_m += by_m[0] + by_m[1];
+                let follows_m = FOLLOWS * (target_m[1] - before_m[1]);
+                cell.displaced_m = Some(before_m);
+                cell.trial.displaced_m = [target_m[0], before_m[1] + follows_m];
+                cell.trial.driven_m += target_m[0] - before_m[0] + follows_m;
             }
             cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction, step_s);
         }
@@ -448,11 +446,13 @@ impl Crawl {
             if has_tables {
                 cell.speed_m_s = shift_m / increment.step_s;
                 cell.strain_m_s = (loaded.deformation_m - before_m) / increment.step_s;
-                let [by_phase_m, by_motion_m] = cell.trial.displaced_by_m;
+                let after_m = cell.trial.displaced_m;
+                let before_m = cell.displaced_m.replace(after_m).unwrap_or(after_m);
                 let turned = phase - self.phase;
+                let by_phase_m = after_m[0] - before_m[0];
                 cell.turned_m_per_cycle = if turned == 0.0 { 0.0 } else { by_phase_m / turned };
-                cell.drive_m -= by_phase_m + by_motion_m;
-                cell.displaced_m = Some(cell.trial.displaced_m);
+                // What is left is the cam's part.
+                cell.drive_m -= by_phase_m + after_m[1] - before_m[1];
             }
         }
         self.ledger.deformation_integral_m += deformation_m * (phase - self.phase).abs();

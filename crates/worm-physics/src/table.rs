@@ -7,7 +7,7 @@
 //! # When it is evaluated
 //! A force that depends on the deformation, its rate, the speed or the load is taken at the end of each increment, as every other force
 //! is; all else, and what friction depends on, is taken at its start. A displacement by one of these four goes half of its way in each
-//! increment: so drives that yield by up to 3/k under load, with k the stiffness of the pad, are stable.
+//! increment, so that a drive which yields under load as much as its pad does is still stable.
 
 mod axis;
 mod error;

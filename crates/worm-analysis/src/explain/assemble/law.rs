@@ -65,7 +65,7 @@ fn axes<T>(shape: &LawShape, of: impl Fn(&(Axis, Vec<f64>)) -> T) -> LawAxes<T> 
 fn sentence(over: &LawOver, formula: Option<&Formula>, rivals: &[LawOver], closure: f64) -> String {
     let says = match formula.filter(|formula| formula.is_constant) {
         Some(constant) => format!("{} is the same everywhere, {}", subject(over), constant.text),
-        None => format!("{}{}", subject(over), dependence(over)),
+        None => depends(over),
     };
     let mut text = format!(
         "{}: it closes {} of the gap on cycles that it was not fitted to.",
@@ -73,10 +73,7 @@ fn sentence(over: &LawOver, formula: Option<&Formula>, rivals: &[LawOver], closu
         percent(closure)
     );
     if !rivals.is_empty() {
-        let others: Vec<String> = rivals
-            .iter()
-            .map(|rival| format!("{}{}", subject(rival), dependence(rival)))
-            .collect();
+        let others: Vec<String> = rivals.iter().map(depends).collect();
         text += &format!(" As well does {}.", others.join("; or "));
     }
     text
@@ -94,9 +91,14 @@ fn subject(over: &LawOver) -> String {
     }
 }
 
-fn dependence(over: &LawOver) -> String {
+/// That it depends on what it does.
+fn depends(over: &LawOver) -> String {
     let names = over.axis.all().into_iter().map(|name| axis_in_words(name));
-    let mut text = format!(" depends on {}", names.collect::<Vec<_>>().join(" and on "));
+    let mut text = format!(
+        "{} depends on {}",
+        subject(over),
+        names.collect::<Vec<_>>().join(" and on ")
+    );
     let first = *over.axis.first();
     if let Some(period) = over.period.filter(|_| first != Axis::Phase.name()) {
         text += &match Axis::named(first) {
