@@ -129,8 +129,9 @@ impl Motor {
     pub fn cycle(&self, load: &DriveLoad, cycle_s: f64) -> MotorCycle {
         let velocity_rad_per_s = TAU / cycle_s;
         let constant = self.servo.torque_constant;
-        // Ripple returns its work, and heats the winding.
-        let mut mean_square = load.mean_square_n2_m2 + 0.5 * self.laws.ripple_n_m * self.laws.ripple_n_m;
+        // Ripple returns its work but for its mean, and heats the winding.
+        let (helps_n_m, ripple_n2_m2, ripple_n_m) = self.laws.ripple_of_a_turn();
+        let mut mean_square = load.mean_square_n2_m2 + ripple_n2_m2;
         let mut friction_j = 0.0;
         for &torque_n_m in &load.parts_n_m {
             let friction_n_m = self.friction_n_m(torque_n_m, velocity_rad_per_s);
@@ -141,12 +142,11 @@ impl Motor {
         let warmer_k = self.laws.heat_k_per_j * self.laws.cooling_s * cold_copper_j / cycle_s;
         let winding_ohm = self.servo.winding_ohm * (1.0 + COPPER_PER_K * warmer_k);
         let copper_j = cold_copper_j * (winding_ohm / self.servo.winding_ohm);
-        let ripple_n_m = self.laws.ripple_n_m.abs();
         let at = |torque_n_m: f64| torque_n_m + self.friction_n_m(torque_n_m, velocity_rad_per_s);
         let driving_n_m = at(load.max_torque_n_m) + ripple_n_m;
         let strongest_n_m = driving_n_m.max(ripple_n_m - at(load.min_torque_n_m));
         MotorCycle {
-            energy_j: (copper_j + load.work_j + friction_j).max(0.0),
+            energy_j: (copper_j + load.work_j + friction_j - TAU * helps_n_m).max(0.0),
             copper_j,
             friction_j,
             peak_current_a: strongest_n_m / constant,

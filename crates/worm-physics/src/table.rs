@@ -1,8 +1,9 @@
-//! A law that nobody derived: a force, a factor on friction or a displacement in the body, given at the points of a grid.
+//! A law that nobody derived: a force, a factor on friction, a displacement in the body, or a torque in the motor, given at the points of a
+//! grid.
 //!
-//! A table depends on one or two quantities of a cell ([`Axis`]). Between the points of its grid it is linear, and beyond them it stays as
-//! it is at the last one, unless it repeats with a period. It pushes a cell, scales the friction of its tip, or moves where the drive holds
-//! it ([`ActsOn`]).
+//! A table depends on one or two quantities of a cell, or of the motor ([`Axis`]). Between the points of its grid it is linear, and beyond
+//! them it stays as it is at the last one, unless it repeats with a period. It pushes a cell, scales the friction of its tip, moves where
+//! the drive holds it, or turns and brakes the motor ([`ActsOn`]); those of the motor stand in [`crate::servo::ServoLaws`].
 //!
 //! # When it is evaluated
 //! A force that depends on the deformation, its rate, the speed or the load is taken at the end of each increment, as every other force
@@ -49,6 +50,14 @@ impl Table {
         let is_twice = axes.len() == 2 && axes[0].0 == axes[1].0;
         if !(1..=2).contains(&axes.len()) || is_twice {
             return Err(TableError::Axes(axes.len()));
+        }
+        if let Some((axis, _)) = axes.iter().find(|(axis, _)| !acts_on.may_depend_on(*axis)) {
+            let may = Axis::ALL.into_iter().filter(|axis| acts_on.may_depend_on(*axis));
+            return Err(TableError::Dependence {
+                acts_on: acts_on.name(),
+                axis: axis.name(),
+                names: may.map(Axis::name).collect::<Vec<_>>().join(", "),
+            });
         }
         let mut grids = Vec::with_capacity(axes.len());
         for (number, (axis, at)) in axes.iter().enumerate() {
@@ -124,7 +133,7 @@ impl Table {
     }
 
     /// The value at a place on each axis, and its derivatives.
-    pub(super) fn at(&self, place: impl Fn(Axis) -> f64) -> (f64, [f64; 2]) {
+    pub(crate) fn at(&self, place: impl Fn(Axis) -> f64) -> (f64, [f64; 2]) {
         let (low, high, part, per_unit) = self.grids[0].about(place(self.grids[0].axis));
         let Some(second) = self.grids.get(1) else {
             let (from, to) = (self.value[low], self.value[high]);
@@ -159,7 +168,7 @@ impl Table {
         let across = orders.get(1).map_or(&[0][..], Vec::as_slice);
         let sign = match self.acts_on {
             ActsOn::ContactForce | ActsOn::DriveDisplacement => -1.0,
-            ActsOn::FrictionFactor => 1.0,
+            ActsOn::FrictionFactor | ActsOn::MotorFriction | ActsOn::MotorTorque => 1.0,
         };
         let points = orders[0]
             .iter()
@@ -263,6 +272,13 @@ mod tests {
                 vec![0.0],
                 Some(0.5),
                 "period = 0.5: a phase has the period 1: leave it out",
+            ),
+            (
+                vec![(Axis::GearLoad, vec![0.0])],
+                vec![0.0],
+                None,
+                "acts_on = \"contact-force\" cannot depend on gear-load: give deformation, deformation-rate, speed, load, place, phase, \
+                 slope, time",
             ),
         ] {
             let error = table(&axes, &value, period).expect_err(expected).to_string();

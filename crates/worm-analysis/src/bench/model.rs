@@ -17,12 +17,12 @@
 //! motor_share = 0.9
 //! ```
 
+use crate::explain::model_update::table_fields;
 use crate::explain::servo::Measures;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
-use worm_estimator::config::read_text;
+use worm_estimator::config::{ServoEffect, read_text};
 use worm_log::ReadError;
 use worm_physics::effect::Setting;
 use worm_physics::servo::{Pendulum, ServoMotor, ServoPhysics};
@@ -52,7 +52,7 @@ pub struct ServoModel {
 struct File {
     servo: Servo,
     #[serde(default)]
-    effect: Vec<Effect>,
+    effect: Vec<ServoEffect>,
 }
 
 #[derive(Deserialize)]
@@ -67,13 +67,6 @@ struct Servo {
     #[serde(default)]
     zero_rad: f64,
     current: Option<Measures>,
-}
-
-#[derive(Deserialize)]
-struct Effect {
-    name: String,
-    #[serde(flatten)]
-    parameters: BTreeMap<String, f64>,
 }
 
 impl ServoModel {
@@ -134,7 +127,8 @@ impl ServoModel {
             ));
         }
         let effects = file.effect.iter().map(|effect| {
-            Setting::of_servo_by_names(&effect.name, &effect.parameters)
+            effect
+                .setting()
                 .map_err(|error| ReadError::whole(path, error.to_string(), REMEDY))
         });
         Ok(Self {
@@ -178,6 +172,14 @@ impl ServoModel {
             );
             for (parameter, value) in setting.effect().parameters.iter().zip(setting.values()) {
                 let _ = writeln!(text, "{} = {value:?}", parameter.name);
+            }
+            if let Some(table) = setting.table() {
+                let axes: Vec<(&str, &[f64])> = table
+                    .axes()
+                    .enumerate()
+                    .map(|(number, axis)| (axis.name(), table.grid(number)))
+                    .collect();
+                text += &table_fields(table.acts_on().name(), &axes, table.period(), table.value());
             }
         }
         text

@@ -228,6 +228,8 @@ pub enum StageKind {
     Step,
     /// The effect named, or the best of several candidates.
     Named,
+    /// A law that nobody listed, where no effect explains the data.
+    Law,
     /// A correction of any form: about as much as any model could explain.
     FreeForm,
     /// The noise floor, which no model can fall below.
@@ -359,6 +361,7 @@ mod tests {
             (StageKind::BestWrong, "best-wrong"),
             (StageKind::Step, "step"),
             (StageKind::Named, "named"),
+            (StageKind::Law, "law"),
             (StageKind::FreeForm, "free-form"),
             (StageKind::Floor, "floor"),
         ]);

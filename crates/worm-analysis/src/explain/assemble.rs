@@ -25,6 +25,7 @@ use crate::explain::worm::speed_droop::SpeedDroop;
 use crate::explain::worm::torque_cycle::torque_cycles;
 pub(super) use calibration::calibration;
 pub(super) use effects::named_effects;
+pub(super) use law::law as law_in_words;
 pub(super) use screening::{add_unscreened, screening};
 use worm_estimator::config::Config;
 
@@ -61,7 +62,12 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         Verdict::Explained | Verdict::Ambiguous => &selected.candidates,
         Verdict::Agrees | Verdict::OutsideLibrary => &[],
     };
-    let gap = stages::Gap::measure(worm, parts, named);
+    let of_law = parts.law.as_ref().and_then(|found| {
+        let without = &parts.found.recalibrated_held_out;
+        let closure = law::closure_of_worm(worm, &parts.recalibrated, without, &found.law);
+        Some((&found.law, law::law(found, closure, "cycles")?))
+    });
+    let gap = stages::Gap::measure(worm, parts, named, of_law.as_ref().map(|(law, _)| *law));
     let verdict = match (selected.verdict, speed_droop) {
         (Verdict::Agrees, Some(_)) => Verdict::Explained,
         (verdict, _) => verdict,
@@ -129,15 +135,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         _ => None,
     };
     let runs = runs::runs(worm, parts, named.first());
-    let with_law = parts.law.as_ref().filter(|_| verdict == Verdict::OutsideLibrary);
-    let with_law = with_law.and_then(|law| {
-        let found = law::law(worm, &parts.recalibrated, &parts.found.recalibrated_held_out, law)?;
-        Some((found, as_written(problem, &law.law.fit)))
-    });
-    let written_back = match &with_law {
-        Some((_, fit)) => calibration(fit, config),
-        None => calibration(&as_written(problem, final_fit), config),
-    };
+    let written_back = as_written(problem, of_law.as_ref().map_or(final_fit, |(law, _)| &law.fit));
     let verdict_in_words = words::sentence(
         verdict,
         &effects,
@@ -157,8 +155,8 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         remainder,
         next_experiment,
         calibration: calibration(final_fit, config),
-        written_back,
-        law: with_law.map(|(law, _)| law),
+        written_back: calibration(&written_back, config),
+        law: of_law.map(|(_, law)| law),
         screening: screening::of_worm(&found.screened, selected, speed_droop.is_some()),
         threshold: found.threshold,
         doubt: Doubt {

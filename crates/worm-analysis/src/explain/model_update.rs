@@ -12,6 +12,7 @@ mod entry;
 mod figure;
 
 use super::answer::{Answer, Calibrated};
+pub(crate) use entry::table_fields;
 use figure::Figure;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, TomlError, Value};

@@ -5,8 +5,8 @@ use super::assemble::{Parts, assemble};
 use super::error::ExplainError;
 use super::search::find::{Options, find};
 use super::search::hypothesis::Hypothesis;
-use super::search::law;
-use super::search::plant::Plant;
+use super::search::law::find::LawSearch;
+use super::search::plant::{Plant, Recorded};
 use super::search::recalibrate::{measure_noise, recalibrate};
 use super::worm::prepare::prepare;
 use super::worm::recorded_worm::RecordedWorm;
@@ -33,9 +33,15 @@ pub fn explain(
     let (problem, discrepancy, recalibrated) = recalibrate(&worm, &base, at, options.discrepancy);
     let found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
     let law = (found.selected.verdict == Verdict::OutsideLibrary).then(|| {
-        let mut part = |fraction: f64| report("law", 0.92 + 0.05 * fraction);
-        let without = &found.recalibrated_held_out;
-        law::find::find(&problem, &discrepancy, &recalibrated, without, &mut part)
+        let search = LawSearch {
+            problem: &problem,
+            discrepancy: &discrepancy,
+            recalibrated: &recalibrated,
+            without: &found.recalibrated_held_out,
+            folds: &worm.folds(),
+        };
+        let laws = search.fit(&mut |fraction| report("law", 0.92 + 0.03 * fraction));
+        search.best(laws, &mut |fraction| report("law", 0.95 + 0.02 * fraction))
     });
     let cycles_s: Vec<f64> = runs
         .iter()

@@ -17,6 +17,7 @@ pub mod by_current;
 pub mod explain;
 mod figure;
 pub mod file;
+mod law;
 
 pub mod page;
 pub mod plan;

@@ -4,7 +4,7 @@ mod figure;
 
 use super::page::{Page, Table};
 use super::plot::DrawError;
-use super::{ReportError, file};
+use super::{ReportError, file, law};
 use crate::explain::Verdict;
 use crate::explain::answer::StageKind;
 use crate::explain::servo::answer::{FrictionPlace, ServoAnswer, ServoStage};
@@ -44,6 +44,11 @@ pub fn page(answer: &ServoAnswer, title: &str) -> Result<String, DrawError> {
         match section.heading {
             MAP => page.figure(&figure::friction_map(answer)?),
             GAP => page.figure(&figure::runs(answer)?),
+            LAW => {
+                if let Some(law) = &answer.law {
+                    page.figure(&law::figure(law)?);
+                }
+            }
             _ => {}
         }
     }
@@ -90,6 +95,7 @@ pub fn write(answer: &ServoAnswer, title: &str, dir: &Path) -> Result<PathBuf, R
 }
 
 const GAP: &str = "How the gap closes";
+const LAW: &str = "A law that nobody listed";
 const MAP: &str = "Where friction is wrong";
 
 fn badge(verdict: Verdict) -> &'static str {
@@ -132,6 +138,18 @@ fn sections(answer: &ServoAnswer) -> Vec<Section> {
             heading: "The effects",
             text: "The severity's error counts what its law may be wrong by.".to_owned(),
             table: Some(effects_table(answer)),
+        });
+    }
+    if answer.verdict == Verdict::OutsideLibrary {
+        sections.push(Section {
+            heading: LAW,
+            text: match &answer.law {
+                Some(law) => law::paragraphs(law).join(" "),
+                None => "There is no law to report: no friction over speed and loads and no torque over the angle predicts trajectories \
+                         and gains that it was not fitted to."
+                    .to_owned(),
+            },
+            table: None,
         });
     }
     sections.push(Section {
@@ -189,6 +207,7 @@ fn stage_name(stage: &ServoStage) -> String {
         StageKind::Step => "a step: with",
         StageKind::BestWrong => "best rival:",
         StageKind::Named => "with",
+        StageKind::Law => "with a law,",
         StageKind::FreeForm => "any friction over speed and load",
         StageKind::Floor => "noise",
     };

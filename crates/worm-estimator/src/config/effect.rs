@@ -6,7 +6,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 use worm_physics::MAX_CELLS;
-use worm_physics::effect::{Setting, SettingError, TABLE};
+use worm_physics::effect::{Setting, SettingError};
 
 /// An effect that is switched on, as in the file.
 ///
@@ -109,14 +109,8 @@ impl Effect {
         // Cell 0 becomes one beyond the last, which is refused.
         let cell = self.cell.map(|cell| cell.wrapping_sub(1));
         if TableFields::is_of(&self.name) {
-            if let Some(parameter) = self.parameters.keys().next() {
-                return Err(SettingError::NoParameter {
-                    effect: TABLE.name,
-                    parameter: parameter.clone(),
-                    names: "acts_on, axis, grid, value, period and cell".to_owned(),
-                });
-            }
-            return self.table.setting(cell, cells);
+            TableFields::refuse_parameters(&self.parameters, "acts_on, axis, grid, value, period and cell")?;
+            return Setting::of_table(self.table.table()?, cell, cells);
         }
         self.table.refuse_in(&self.name)?;
         Setting::by_names(&self.name, cell, &self.parameters, cells)

@@ -1,13 +1,15 @@
 //! The law of an `[[effect]]` with `name = "table"`.
 
 use serde::Deserialize;
-use worm_physics::effect::{Setting, SettingError, TABLE};
+use std::collections::BTreeMap;
+use worm_physics::effect::{SettingError, TABLE};
 use worm_physics::{ActsOn, Axis, Table, TableError};
 
 /// A law at the points of a grid, as in the file; all fields are none for an effect of the library.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 pub struct TableFields {
-    /// What it gives: a `contact-force` in N, a `friction-factor`, or a `drive-displacement` in m.
+    /// What it gives: a `contact-force` in N, a `friction-factor`, a `drive-displacement` in m, or, of a servo, a `motor-friction` or a
+    /// `motor-torque` in N m.
     #[serde(default)]
     pub acts_on: Option<String>,
     /// What it depends on.
@@ -69,20 +71,25 @@ impl TableFields {
         self.first_given().map_or(Ok(()), |field| Err(refuse(field)))
     }
 
-    /// The law as a setting of the physics, on one cell (from 0) or all.
-    pub(super) fn setting(&self, cell: Option<usize>, cells: usize) -> Result<Setting, SettingError> {
-        let missing = SettingError::TableMissing;
-        let acts_on = self.acts_on.as_deref().ok_or(missing(
-            "`acts_on`: \"contact-force\", \"friction-factor\" or \"drive-displacement\"",
-        ))?;
-        let axes = match self.axis.as_ref().ok_or(missing("`axis`: what it depends on"))? {
+    /// The law, whatever it acts on.
+    pub(super) fn table(&self) -> Result<Table, SettingError> {
+        let missing = |what: &str| SettingError::TableMissing(what.to_owned());
+        let acts_on = self
+            .acts_on
+            .as_deref()
+            .ok_or_else(|| SettingError::TableMissing(format!("`acts_on`: {}", ActsOn::names_with_units())))?;
+        let axes = match self
+            .axis
+            .as_ref()
+            .ok_or_else(|| missing("`axis`: what it depends on"))?
+        {
             OneOrTwo::One(axis) => vec![axis.clone()],
             OneOrTwo::List(axes) => axes.clone(),
         };
         let grids = match self
             .grid
             .as_ref()
-            .ok_or(missing("`grid`: points of the axis, in ascending order"))?
+            .ok_or_else(|| missing("`grid`: points of the axis, in ascending order"))?
         {
             Rows::One(grid) => vec![grid.clone()],
             Rows::Several(grids) => grids.clone(),
@@ -90,7 +97,7 @@ impl TableFields {
         let value = match self
             .value
             .as_ref()
-            .ok_or(missing("`value`: one for each point of the grid"))?
+            .ok_or_else(|| missing("`value`: one for each point of the grid"))?
         {
             Rows::One(value) => value.clone(),
             Rows::Several(rows) => {
@@ -117,12 +124,22 @@ impl TableFields {
         }
         let axes: Result<Vec<Axis>, TableError> = axes.iter().map(|name| Axis::named(name)).collect();
         let with_grids: Vec<(Axis, Vec<f64>)> = axes?.into_iter().zip(grids).collect();
-        let table = Table::new(ActsOn::named(acts_on)?, &with_grids, value, self.period)?;
-        Setting::of_table(table, cell, cells)
+        Ok(Table::new(ActsOn::named(acts_on)?, &with_grids, value, self.period)?)
     }
 
     /// Whether an effect is a table.
     pub(super) fn is_of(name: &str) -> bool {
         name == TABLE.name
+    }
+
+    /// Refuses parameters of an effect in a table.
+    pub(super) fn refuse_parameters(parameters: &BTreeMap<String, f64>, names: &str) -> Result<(), SettingError> {
+        parameters.keys().next().map_or(Ok(()), |parameter| {
+            Err(SettingError::NoParameter {
+                effect: TABLE.name,
+                parameter: parameter.clone(),
+                names: names.to_owned(),
+            })
+        })
     }
 }

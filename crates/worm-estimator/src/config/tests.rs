@@ -219,11 +219,11 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         ),
         (
             "[[effect]]\nname = \"table\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\n",
-            "worm.toml: effect = \"table\": effect `table` needs `acts_on`: \"contact-force\", \"friction-factor\" or \"drive-displacement\"",
+            "worm.toml: effect = \"table\": effect `table` needs `acts_on`: \"contact-force\" (values in N), \"friction-factor\", \"drive-displacement\" (values in m), \"motor-friction\" (values in N m) or \"motor-torque\" (values in N m)",
         ),
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"colour\"\ngrid = [0.0]\nvalue = [1.0]\n",
-            "effect `table`: axis \"colour\": give one of deformation, deformation-rate, speed, load, place, phase, slope, time",
+            "effect `table`: axis \"colour\": give one of deformation, deformation-rate, speed, load, place, phase, slope, time, motor-speed, gear-load, output-load, motor-angle",
         ),
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.1, 0.0]\nvalue = [1.0, 2.0]\n",
@@ -240,6 +240,22 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\nforce_n = 1.0\n",
             "effect `table` has no parameter `force_n`: it has acts_on, axis, grid, value, period and cell",
+        ),
+        (
+            "[[effect]]\nname = \"table\"\nacts_on = \"motor-friction\"\naxis = \"gear-load\"\ngrid = [0.0]\nvalue = [0.1]\n",
+            "effect `table`: acts_on = \"motor-friction\" is a law of the servo: give it in [[virtual_worm.servo_effect]], or as an [[effect]] of a servo's model",
+        ),
+        (
+            "[[virtual_worm.servo_effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\n",
+            "effect `table`: acts_on = \"contact-force\" is a law of the worm's cells: give it as an [[effect]] of the worm",
+        ),
+        (
+            "[[virtual_worm.servo_effect]]\nname = \"table\"\nacts_on = \"motor-torque\"\naxis = \"gear-load\"\ngrid = [0.0]\nvalue = [0.1]\n",
+            "effect `table`: acts_on = \"motor-torque\" cannot depend on gear-load: give motor-angle",
+        ),
+        (
+            "[[virtual_worm.servo_effect]]\nname = \"load-friction\"\ncoefficient = 0.1\nmotor_share = 0.5\nvalue = [0.1]\n",
+            "effect `load-friction` has no `value`: only `table` has, the library's effects have parameters",
         ),
         (
             "[[effect]]\nname = \"wear\"\nloss_per_cycle = 0.01\ngrid = [0.0]\n",

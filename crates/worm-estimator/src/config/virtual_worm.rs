@@ -1,6 +1,7 @@
 //! The simulated devices.
 
 use super::check::Checker;
+use super::effect_table::TableFields;
 use super::worm::PerCell;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -86,6 +87,9 @@ const NOT_OF_A_WORM: [(&str, &str); 3] = [
 pub struct ServoEffect {
     /// Its name in the library.
     pub name: String,
+    /// Its law, where it is a table.
+    #[serde(flatten)]
+    pub table: TableFields,
     /// Its parameters by name.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, f64>,
@@ -99,6 +103,7 @@ impl ServoEffect {
             .flat_map(|effect| effect.parameters);
         Self {
             name: name.to_owned(),
+            table: TableFields::default(),
             parameters: parameters
                 .zip(values)
                 .map(|(parameter, value)| (parameter.name.to_owned(), value))
@@ -111,6 +116,11 @@ impl ServoEffect {
     /// # Errors
     /// [`SettingError`] for an unknown name or parameter, and a value out of range.
     pub fn setting(&self) -> Result<Setting, SettingError> {
+        if TableFields::is_of(&self.name) {
+            TableFields::refuse_parameters(&self.parameters, "acts_on, axis, grid, value and period")?;
+            return Setting::of_servo_table(self.table.table()?);
+        }
+        self.table.refuse_in(&self.name)?;
         Setting::of_servo_by_names(&self.name, &self.parameters)
     }
 

@@ -57,7 +57,15 @@ pub enum SettingError {
     Table(#[from] TableError),
     /// A table by parameters, or with something left out.
     #[error("effect `table` needs {0}")]
-    TableMissing(&'static str),
+    TableMissing(String),
+    /// A law of the servo among those of the worm, or the other way round.
+    #[error("effect `table`: acts_on = \"{acts_on}\" {belongs}")]
+    Elsewhere {
+        /// What it acts on.
+        acts_on: &'static str,
+        /// Where it belongs.
+        belongs: &'static str,
+    },
     /// A grid for an effect that has none.
     #[error("effect `{effect}` has no `{field}`: only `table` has, the library's effects have parameters")]
     NoTable {

@@ -74,7 +74,7 @@ impl Setting {
         cells: usize,
     ) -> Result<Self, SettingError> {
         if name == TABLE.name {
-            return Err(SettingError::TableMissing(TABLE_NEEDS));
+            return Err(SettingError::TableMissing(TABLE_NEEDS.to_owned()));
         }
         Self::of_values(named(name)?, cell, parameters, cells)
     }
@@ -132,13 +132,37 @@ impl Setting {
     /// A law at the points of a grid, on one cell (from 0) of a worm of `cells` or on all of them.
     ///
     /// # Errors
-    /// [`SettingError::Cell`].
+    /// [`SettingError::Cell`], and [`SettingError::Elsewhere`] for a law of the motor.
     pub fn of_table(table: Table, cell: Option<usize>, cells: usize) -> Result<Self, SettingError> {
         TABLE.check_cell(cell, cells)?;
-        Ok(Self {
+        if table.acts_on().is_of_motor() {
+            return Err(SettingError::Elsewhere {
+                acts_on: table.acts_on().name(),
+                belongs: "is a law of the servo: give it in [[virtual_worm.servo_effect]], or as an [[effect]] of a servo's model",
+            });
+        }
+        Ok(Self::with_table(table, cell))
+    }
+
+    /// A law of a servo at the points of a grid.
+    ///
+    /// # Errors
+    /// [`SettingError::Elsewhere`] for a law of a worm's cells.
+    pub fn of_servo_table(table: Table) -> Result<Self, SettingError> {
+        if !table.acts_on().is_of_motor() {
+            return Err(SettingError::Elsewhere {
+                acts_on: table.acts_on().name(),
+                belongs: "is a law of the worm's cells: give it as an [[effect]] of the worm",
+            });
+        }
+        Ok(Self::with_table(table, None))
+    }
+
+    fn with_table(table: Table, cell: Option<usize>) -> Self {
+        Self {
             table: Some(Arc::new(table)),
             ..Self::within(&TABLE, cell, &[])
-        })
+        }
     }
 
     /// Checks that a worm of `cells` has the cell it acts on.
@@ -170,7 +194,7 @@ impl Setting {
     }
 
     fn apply(&self, physics: &mut Physics) {
-        if let Some(table) = &self.table {
+        if let Some(table) = self.table.as_ref().filter(|table| !table.acts_on().is_of_motor()) {
             physics.tables.push(table, self.cell);
         }
         if let Apply::Worm(apply) = self.effect.apply {
@@ -179,6 +203,9 @@ impl Setting {
     }
 
     fn apply_to_servo(&self, physics: &mut ServoPhysics) {
+        if let Some(table) = self.table.as_ref().filter(|table| table.acts_on().is_of_motor()) {
+            physics.laws.tables.push(Arc::clone(table));
+        }
         if let Apply::Servo(apply) = self.effect.apply {
             apply(physics, self.values());
         }

@@ -1,7 +1,12 @@
 //! What a plain model of a servo leaves out; neutral by default. The bench, the virtual worm's motor and the energy of a gait cycle all take
 //! their friction from here.
 
+use crate::table::{ActsOn, Axis, Table};
 use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Parts of a turn at which a torque over the angle is taken for its mean.
+const PARTS_OF_TURN: u32 = 720;
 
 /// Laws beyond dry and viscous friction, a winding and a stiff supply.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,8 +43,8 @@ pub struct ServoLaws {
     pub delay_s: f64,
     /// Duty below which the bridge does nothing.
     pub dead_duty: f64,
-    /// Any other friction over speed and load.
-    pub table: Option<Box<FrictionTable>>,
+    /// Laws that nobody derived, of the motor: friction over its speed and loads, and a torque over its angle.
+    pub tables: Vec<Arc<Table>>,
 }
 
 impl Default for ServoLaws {
@@ -61,7 +66,7 @@ impl Default for ServoLaws {
             cooling_s: 10.0,
             delay_s: 0.0,
             dead_duty: 0.0,
-            table: None,
+            tables: Vec::new(),
         }
     }
 }
@@ -82,8 +87,14 @@ impl ServoLaws {
         if self.stribeck_n_m != 0.0 {
             friction += self.stribeck_n_m * (-(velocity_rad_s / self.stribeck_rad_s).powi(2)).exp();
         }
-        if let Some(table) = &self.table {
-            friction += table.friction_n_m(velocity_rad_s.abs(), on_gears(0.5));
+        for table in self.tables_of(ActsOn::MotorFriction) {
+            friction += table
+                .at(|axis| match axis {
+                    Axis::MotorSpeed => velocity_rad_s.abs(),
+                    Axis::GearLoad => on_gears(0.5),
+                    _ => load_n_m * velocity_rad_s.signum(), // the load on the output
+                })
+                .0;
         }
         if self.back_driving != 1.0 && load_n_m * velocity_rad_s < 0.0 {
             friction *= self.back_driving;
@@ -93,47 +104,40 @@ impl ServoLaws {
 
     /// The torque that returns with the angle, N m, in the direction of the motor's.
     pub fn ripple_at_n_m(&self, angle_rad: f64) -> f64 {
+        let of_tables = self
+            .tables_of(ActsOn::MotorTorque)
+            .map(|table| table.at(|_| angle_rad).0);
+        let other_n_m: f64 = of_tables.sum();
         if self.ripple_n_m == 0.0 {
-            return 0.0;
+            return other_n_m;
         }
         let wave = self.ripple_waves * angle_rad / TAU + self.ripple_phase;
-        self.ripple_n_m * (TAU * wave).sin()
+        other_n_m + self.ripple_n_m * (TAU * wave).sin()
+    }
+
+    /// Of that torque over a whole turn: its mean, N m, its mean square, N² m², and its largest magnitude, N m.
+    pub fn ripple_of_a_turn(&self) -> (f64, f64, f64) {
+        if self.tables_of(ActsOn::MotorTorque).next().is_none() {
+            return (0.0, 0.5 * self.ripple_n_m * self.ripple_n_m, self.ripple_n_m.abs());
+        }
+        let count = f64::from(PARTS_OF_TURN);
+        let all = (0..PARTS_OF_TURN).map(|part| self.ripple_at_n_m(TAU * f64::from(part) / count));
+        all.fold((0.0, 0.0, 0.0), |(mean, mean_square, largest), n_m| {
+            (
+                mean + n_m / count,
+                mean_square + n_m * n_m / count,
+                f64::max(largest, n_m.abs()),
+            )
+        })
+    }
+
+    fn tables_of(&self, acts_on: ActsOn) -> impl Iterator<Item = &Table> {
+        let all = self.tables.iter().map(|table| &**table);
+        all.filter(move |table| table.acts_on() == acts_on)
     }
 
     /// The duty that the bridge applies when this one is commanded.
     pub fn duty(&self, wanted: f64) -> f64 {
         if wanted.abs() < self.dead_duty { 0.0 } else { wanted }
     }
-}
-
-/// Speeds and loads at which a [`FrictionTable`] has its entries: rad/s and N m.
-pub const TABLE_SPEEDS_RAD_S: [f64; 5] = [0.0, 0.4, 1.5, 4.0, 10.0];
-/// See [`TABLE_SPEEDS_RAD_S`].
-pub const TABLE_LOADS_N_M: [f64; 4] = [0.0, 0.15, 0.35, 0.7];
-/// Entries of a [`FrictionTable`].
-pub const TABLE_ENTRIES: usize = TABLE_SPEEDS_RAD_S.len() * TABLE_LOADS_N_M.len();
-
-/// Friction in addition to every law, N m, over speed and load: bilinear between its entries, constant beyond them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrictionTable {
-    /// `[speed][load]`, flat, N m.
-    pub entries_n_m: [f64; TABLE_ENTRIES],
-}
-
-impl FrictionTable {
-    /// Friction at a speed and a load, both without sign, N m.
-    pub fn friction_n_m(&self, speed_rad_s: f64, load_n_m: f64) -> f64 {
-        let (speed, of_speed) = place(&TABLE_SPEEDS_RAD_S, speed_rad_s);
-        let (load, of_load) = place(&TABLE_LOADS_N_M, load_n_m);
-        let at = |speed: usize, load: usize| self.entries_n_m[speed * TABLE_LOADS_N_M.len() + load];
-        let along = |speed: usize| at(speed, load) + of_load * (at(speed, load + 1) - at(speed, load));
-        along(speed) + of_speed * (along(speed + 1) - along(speed))
-    }
-}
-
-/// The node below a value, and how far the value is on the way to the next, 0 to 1.
-fn place(nodes: &[f64], value: f64) -> (usize, f64) {
-    let above = nodes.partition_point(|node| *node <= value).clamp(1, nodes.len() - 1);
-    let (from, to) = (nodes[above - 1], nodes[above]);
-    (above - 1, ((value - from) / (to - from)).clamp(0.0, 1.0))
 }

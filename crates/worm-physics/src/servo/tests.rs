@@ -1,4 +1,6 @@
 use super::*;
+use crate::effect::Setting;
+use crate::{ActsOn, Axis, Table};
 
 fn bench() -> ServoPhysics {
     let pendulum = Pendulum {
@@ -128,13 +130,66 @@ fn load_on_the_gears_costs_what_the_law_says() {
     );
 }
 
+/// What the library's laws say, said by tables: the same motion.
 #[test]
-fn a_table_is_linear_between_its_entries() {
-    let mut table = FrictionTable {
-        entries_n_m: [0.0; laws::TABLE_ENTRIES],
+fn a_table_does_what_the_effect_does_that_it_is_read_from() {
+    let grid = |from: f64, to: f64, points: u32| -> Vec<f64> {
+        (0..=points)
+            .map(|at| from + (to - from) * f64::from(at) / f64::from(points))
+            .collect()
     };
-    table.entries_n_m[5] = 0.4; // at 0.4 rad/s and 0.15 N m
-    assert!((table.friction_n_m(0.4, 0.15) - 0.4).abs() < 1e-12);
-    assert!((table.friction_n_m(0.2, 0.075) - 0.1).abs() < 1e-12);
-    assert_eq!(table.friction_n_m(50.0, 9.0), 0.0);
+    let loads = grid(0.0, 1.0, 250);
+    let speeds = grid(0.0, 12.0, 250);
+    let turn = grid(0.0, 0.5 * std::f64::consts::TAU * (1.0 - 1.0 / 250.0), 249);
+    let over_load = loads.iter().map(|load| load * (0.2 + 0.5 * load)).collect();
+    let over_speed = speeds
+        .iter()
+        .map(|speed| 0.03 * (-(speed / 1.5).powi(2)).exp())
+        .collect();
+    let over_angle = turn.iter().map(|angle| 0.03 * (2.0 * angle + 0.6).sin()).collect();
+    let half_turn = Some(0.5 * std::f64::consts::TAU);
+    let tables = [
+        (ActsOn::MotorFriction, Axis::GearLoad, loads, over_load, None),
+        (ActsOn::MotorFriction, Axis::MotorSpeed, speeds, over_speed, None),
+        (ActsOn::MotorTorque, Axis::MotorAngle, turn, over_angle, half_turn),
+    ];
+    let by_tables = tables.map(|(acts_on, axis, grid, value, period)| {
+        let table = Table::new(acts_on, &[(axis, grid)], value, period).expect("a table");
+        Setting::of_servo_table(table).expect("of the motor")
+    });
+    let by_laws = with(|laws| {
+        (laws.load_friction, laws.load_squared_per_n_m) = (0.2, 0.5);
+        (laws.stribeck_n_m, laws.stribeck_rad_s) = (0.03, 1.5);
+        (laws.ripple_n_m, laws.ripple_waves) = (0.03, 2.0);
+        laws.ripple_phase = 0.6 / std::f64::consts::TAU;
+    });
+    let plain = swing(&bench(), 1e-3);
+    let [law, table] = [&by_laws, &bench().with(&by_tables)].map(|physics| swing(physics, 1e-3));
+    let largest = |one: &[f64], other: &[f64]| {
+        let apart = one.iter().zip(other).map(|(one, other)| (one - other).abs());
+        apart.fold(0.0, f64::max)
+    };
+    assert!(largest(&law, &plain) > 0.1, "they do something");
+    assert!(largest(&law, &table) < 2e-3, "{} rad", largest(&law, &table));
+}
+
+/// The load on the output is above 0 where it resists the motion: friction over it tells lifting from lowering.
+#[test]
+fn friction_over_the_load_on_the_output_tells_driving_from_being_driven() {
+    let axis = [(Axis::OutputLoad, vec![-1.0, 0.0, 1.0])];
+    let table = Table::new(ActsOn::MotorFriction, &axis, vec![0.3, 0.0, 0.1], None).expect("a table");
+    let setting = Setting::of_servo_table(table).expect("of the motor");
+    let physics = bench().with(&[setting]);
+    for (load_n_m, velocity, more) in [
+        (0.5, 1.0, 0.05),
+        (0.5, -1.0, 0.15),
+        (-0.5, -1.0, 0.05),
+        (-0.5, 1.0, 0.15),
+    ] {
+        let friction = physics.friction_n_m(0.2, load_n_m, velocity) - physics.motor.dry_n_m;
+        assert!(
+            (friction - more).abs() < 1e-12,
+            "{load_n_m} N m at {velocity} rad/s: {friction}"
+        );
+    }
 }

@@ -14,12 +14,22 @@ pub enum TableError {
         names: String,
     },
     /// Nothing that a table can act on.
-    #[error(
-        "acts_on = \"{name}\": give \"contact-force\" (values in N), \"friction-factor\" or \"drive-displacement\" (values in m)"
-    )]
+    #[error("acts_on = \"{name}\": give {names}")]
     ActsOn {
         /// What was given.
         name: String,
+        /// All that there are, with their units.
+        names: String,
+    },
+    /// A quantity of a cell for something of the motor, or the other way round.
+    #[error("acts_on = \"{acts_on}\" cannot depend on {axis}: give {names}")]
+    Dependence {
+        /// What it acts on.
+        acts_on: &'static str,
+        /// The axis that was given.
+        axis: &'static str,
+        /// What it may depend on.
+        names: String,
     },
     /// None or more than two axes, or one of them twice.
     #[error("{0} axes: give one, or two different ones")]

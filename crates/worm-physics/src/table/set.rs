@@ -34,6 +34,8 @@ impl Whereabouts {
             Axis::Phase => self.phase,
             Axis::Slope => self.slope_deg,
             Axis::Time => self.cycles,
+            // A table of a worm depends on none of these.
+            Axis::MotorSpeed | Axis::GearLoad | Axis::OutputLoad | Axis::MotorAngle => 0.0,
         }
     }
 }
@@ -56,7 +58,14 @@ impl Slopes {
             Axis::DeformationRate => self.deformation * self.per_s,
             Axis::Speed => self.per_s,
             Axis::Load => self.load_n_per_m,
-            Axis::Place | Axis::Phase | Axis::Slope | Axis::Time => 0.0,
+            Axis::Place
+            | Axis::Phase
+            | Axis::Slope
+            | Axis::Time
+            | Axis::MotorSpeed
+            | Axis::GearLoad
+            | Axis::OutputLoad
+            | Axis::MotorAngle => 0.0,
         }
     }
 }

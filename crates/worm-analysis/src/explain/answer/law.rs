@@ -32,7 +32,8 @@ impl<T> LawAxes<T> {
 /// What a law is about.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawOver {
-    /// What it gives: a `contact-force`, N, a `friction-factor`, or a `drive-displacement`, m.
+    /// What it gives: a `contact-force`, N, a `friction-factor`, or a `drive-displacement`, m; of a servo, a `motor-friction` or a
+    /// `motor-torque`, N m.
     pub acts_on: &'static str,
     /// What it depends on, by the names that a table of the configuration has.
     pub axis: LawAxes<&'static str>,
@@ -58,7 +59,7 @@ pub struct FoundLaw {
     pub band: Vec<[f64; 2]>,
     /// The nearest formula of few terms, in SI units, where one predicts as well.
     pub formula: Option<String>,
-    /// Fraction of the squared gap after recalibration that it closes, down to the noise floor, on cycles that it was not fitted to.
+    /// Fraction of the squared gap after recalibration that it closes, down to the noise floor, on data that it was not fitted to.
     pub closure: f64,
     /// 90 % interval of that.
     pub closure_interval: [f64; 2],

@@ -1,8 +1,10 @@
 //! A law that nobody listed, as people read it.
 
 use crate::explain::answer::{FoundLaw, LawAxes, LawOver};
+use crate::explain::search::cross_validation::HeldOut;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::law::find;
+use crate::explain::search::law::fitted_law::FittedLaw;
 use crate::explain::search::law::formula::Formula;
 use crate::explain::search::law::shape::LawShape;
 use crate::explain::worm::gap::{Measured, clusters};
@@ -13,25 +15,33 @@ use worm_physics::{ActsOn, Axis};
 /// Fraction of the gap that a law must close on data held out.
 const CLOSES: f64 = 0.25;
 
-/// A law that was found; none where it closes too little of the gap to be one.
-pub(super) fn law(
+/// Fraction of a worm's gap that a law closes on data held out, with its 90 % interval.
+pub(super) fn closure_of_worm(
     worm: &RecordedWorm<'_>,
     recalibrated: &Fit,
-    without: &crate::explain::search::cross_validation::HeldOut,
-    found: &find::FoundLaw,
-) -> Option<FoundLaw> {
-    let law = &found.law;
+    without: &HeldOut,
+    law: &FittedLaw,
+) -> (f64, [f64; 2]) {
     let (left, open) = law.held_out.determined_beside(without);
     let floor = Measured::new(worm, &law.fit).floor_of_closure();
     let left = clusters(worm, &law.fit, &left);
-    let (closure, closure_interval) = clusters(worm, recalibrated, &open).closure(&left, floor);
+    clusters(worm, recalibrated, &open).closure(&left, floor)
+}
+
+/// A law that was found, as people read it; none where it closes too little of the gap to be one. `held_out` says what it was judged on.
+pub(in crate::explain) fn law(
+    found: &find::FoundLaw,
+    (closure, closure_interval): (f64, [f64; 2]),
+    held_out: &str,
+) -> Option<FoundLaw> {
+    let law = &found.law;
     if closure.is_nan() || closure < CLOSES || closure_interval[0] <= 0.0 {
         return None;
     }
     let over = over(&law.shape);
     let rivals: Vec<LawOver> = found.rivals.iter().map(|shape| self::over(shape)).collect();
     Some(FoundLaw {
-        sentence: sentence(&over, found.formula.as_ref(), &rivals, closure),
+        sentence: sentence(&over, found.formula.as_ref(), &rivals, closure, held_out),
         grid: axes(&law.shape, |(_, grid)| grid.clone()),
         value: law.value.clone(),
         band: law.band.clone(),
@@ -62,13 +72,13 @@ fn axes<T>(shape: &LawShape, of: impl Fn(&(Axis, Vec<f64>)) -> T) -> LawAxes<T> 
 }
 
 /// What a law says, in a sentence.
-fn sentence(over: &LawOver, formula: Option<&Formula>, rivals: &[LawOver], closure: f64) -> String {
+fn sentence(over: &LawOver, formula: Option<&Formula>, rivals: &[LawOver], closure: f64, held_out: &str) -> String {
     let says = match formula.filter(|formula| formula.is_constant) {
         Some(constant) => format!("{} is the same everywhere, {}", subject(over), constant.text),
         None => depends(over),
     };
     let mut text = format!(
-        "{}: it closes {} of the gap on cycles that it was not fitted to.",
+        "{}: it closes {} of the gap on {held_out} that it was not fitted to.",
         capitalised(&says),
         percent(closure)
     );
@@ -87,6 +97,8 @@ fn subject(over: &LawOver) -> String {
     match ActsOn::named(over.acts_on) {
         Ok(ActsOn::FrictionFactor) => format!("the friction of {}", whom("every tip")),
         Ok(ActsOn::DriveDisplacement) => format!("where the drive holds {}", whom("each cell")),
+        Ok(ActsOn::MotorFriction) => "the friction of the gears".to_owned(),
+        Ok(ActsOn::MotorTorque) => "a torque on the output".to_owned(),
         Ok(ActsOn::ContactForce) | Err(_) => format!("a force on {}", whom("each cell")),
     }
 }
@@ -121,6 +133,10 @@ fn axis_in_words(name: &str) -> &str {
         Ok(Axis::Phase) => "the phase of the gait",
         Ok(Axis::Slope) => "the slope",
         Ok(Axis::Time) => "the time since the start of the run",
+        Ok(Axis::MotorSpeed) => "the speed",
+        Ok(Axis::GearLoad) => "the torque on the gears",
+        Ok(Axis::OutputLoad) => "the load on the output, against the motion or with it",
+        Ok(Axis::MotorAngle) => "the angle",
         Err(_) => name,
     }
 }

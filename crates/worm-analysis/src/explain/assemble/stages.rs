@@ -3,6 +3,7 @@
 use super::Parts;
 use crate::explain::answer::{Stage, StageKind};
 use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::search::law::fitted_law::FittedLaw;
 use crate::explain::worm::gap::{Measured, clusters};
 use crate::explain::worm::recorded_worm::RecordedWorm;
 
@@ -15,7 +16,7 @@ pub(super) struct Gap {
 }
 
 impl Gap {
-    pub fn measure(worm: &RecordedWorm<'_>, parts: &Parts, named: &[Candidate]) -> Self {
+    pub fn measure(worm: &RecordedWorm<'_>, parts: &Parts, named: &[Candidate], law: Option<&FittedLaw>) -> Self {
         let selected = &parts.found.selected;
         let best = selected
             .candidates
@@ -63,6 +64,14 @@ impl Gap {
         ];
         stages.extend(wrong);
         stages.extend(of_named.into_iter().next());
+        stages.extend(law.map(|law| {
+            measured.stage(
+                StageKind::Law,
+                Some(law.shape.to_string()),
+                &law.fit,
+                &law.held_out.fits,
+            )
+        }));
         stages.push(measured.free_form_stage(&parts.recalibrated));
         stages.push(measured.floor_stage());
         Self {

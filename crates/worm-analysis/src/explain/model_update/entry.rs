@@ -50,6 +50,30 @@ fn undecided(answer: &Answer) -> String {
 
 /// A law that nobody listed.
 fn table(law: &FoundLaw) -> String {
+    let mut text = format!(
+        "\n# Found by `wormd explain` where no effect of the library explains the data: a law at the points of a grid.\n# {}\n",
+        law.sentence
+    );
+    if let Some(formula) = &law.formula {
+        text += &format!("# Nearest formula: {formula}.\n");
+    }
+    text += "[[effect]]\nname = \"table\"\n";
+    if let Some(cell) = law.over.cell {
+        text += &format!("cell = {cell}\n");
+    }
+    let axes: Vec<(&str, &[f64])> = law
+        .over
+        .axis
+        .all()
+        .into_iter()
+        .copied()
+        .zip(law.grid.all().into_iter().map(Vec::as_slice))
+        .collect();
+    text + &table_fields(law.over.acts_on, &axes, law.over.period, &law.value)
+}
+
+/// What a table is given by, as lines of a file: what it acts on, its axes with the points of their grids, its period and its values.
+pub(crate) fn table_fields(acts_on: &str, axes: &[(&str, &[f64])], period: Option<f64>, value: &[f64]) -> String {
     let list = |values: &[f64]| {
         let digits = values.iter().map(|&value| without_error(value));
         format!("[{}]", digits.collect::<Vec<_>>().join(", "))
@@ -58,33 +82,19 @@ fn table(law: &FoundLaw) -> String {
         [one] => one.clone(),
         several => format!("[{}]", several.join(", ")),
     };
-    let grids = law.grid.all();
-    let names = law
-        .over
-        .axis
-        .all()
-        .into_iter()
-        .map(|name| format!("\"{name}\""))
-        .collect();
-    let width = grids.get(1).map_or(law.value.len(), |second| second.len());
-    let rows: Vec<String> = law.value.chunks(width).map(list).collect();
-    let mut text = format!(
-        "\n# Found by `wormd explain` where no effect of the library explains the data: a law at the points of a grid.\n# {}\n",
-        law.sentence
-    );
-    if let Some(formula) = &law.formula {
-        text += &format!("# Nearest formula: {formula}.\n");
-    }
-    text += &format!("[[effect]]\nname = \"table\"\nacts_on = \"{}\"\n", law.over.acts_on);
-    if let Some(cell) = law.over.cell {
-        text += &format!("cell = {cell}\n");
-    }
-    text += &format!("axis = {}\n", lists(names));
-    if let Some(period) = law.over.period.filter(|_| *law.over.axis.first() != "phase") {
-        text += &format!("period = {}\n", without_error(period));
-    }
-    text += &format!("grid = {}\n", lists(grids.into_iter().map(|grid| list(grid)).collect()));
-    text + &format!("value = {}\n", lists(rows))
+    let names = axes.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+    let grids = axes.iter().map(|(_, grid)| list(grid)).collect();
+    let width = axes.get(1).map_or(value.len(), |(_, second)| second.len());
+    let rows: Vec<String> = value.chunks(width).map(list).collect();
+    // That of a phase goes without saying.
+    let period = period.filter(|_| axes.first().is_none_or(|(name, _)| *name != "phase"));
+    let period = period.map_or_else(String::new, |period| format!("period = {}\n", without_error(period)));
+    format!(
+        "acts_on = \"{acts_on}\"\naxis = {}\n{period}grid = {}\nvalue = {}\n",
+        lists(names),
+        lists(grids),
+        lists(rows)
+    )
 }
 
 /// A number in the digits that it needs.

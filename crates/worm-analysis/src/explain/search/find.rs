@@ -8,6 +8,7 @@ use super::judge::decision::{Selected, decide};
 use super::judge::evidence::{InTime, evidence};
 use super::judge::prior;
 use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
+use super::law::find::{FittedLaws, LawSearch};
 use super::onset::{mean_cycles, with_onsets};
 use super::parameter::Hypothesised;
 use super::plant::Plant;
@@ -73,6 +74,8 @@ pub(in crate::explain) struct Found {
     pub open_share: f64,
     /// Improvement that the best of the library reaches by chance in one campaign of a hundred.
     pub threshold: f64,
+    /// Laws that nobody listed, where the plant has them weighed against the library.
+    pub laws: Option<FittedLaws>,
 }
 
 /// Searches for the effect that the model of a plant lacks, beside a discrepancy; the recalibrated fit has its derivatives. Reports each
@@ -180,7 +183,20 @@ pub(in crate::explain) fn find<P: Plant>(
         .filter(|screening| !fitted.contains(&&screening.hypothesised))
         .map(|screening| judge.none.usual + judge.ln_prior(&[screening.hypothesised]) + screening.ln_bayes.min(0.0))
         .collect();
-    let mut selected = decide(judge.none, judged, &unfitted);
+    let laws = plant.weighs_laws().then(|| {
+        let search = LawSearch {
+            problem,
+            discrepancy,
+            recalibrated,
+            without: &recalibrated_held_out,
+            folds: &folds,
+        };
+        search.fit(&mut |fraction| report("laws", 0.9 + 0.05 * fraction))
+    });
+    let none = judge
+        .none
+        .with_law(laws.as_ref().and_then(|laws| laws.ln_evidence(discrepancy)));
+    let mut selected = decide(none, judged, &unfitted);
     for candidate in &mut selected.candidates {
         candidate.fit = plant.with_whole_effects(candidate.fit.clone());
     }
@@ -201,5 +217,6 @@ pub(in crate::explain) fn find<P: Plant>(
         selected,
         open_share,
         threshold,
+        laws,
     }
 }

@@ -9,6 +9,7 @@ use super::fit::{Fit, FitWithout};
 use super::folds::Folds;
 use super::hypothesis::Hypothesis;
 use super::impact::Impact;
+use super::law::fitted_law::FittedLaw;
 use super::law::offer::Offer;
 use super::parameter::{Free, Hypothesised};
 use crate::explain::error::ExplainError;
@@ -131,6 +132,15 @@ pub(in crate::explain) trait Plant: Recorded {
     /// What a law may depend on where the library does not explain the data; nothing unless the plant says so.
     fn laws(&self, _recalibrated: &Fit) -> Vec<Offer> {
         Vec::new()
+    }
+    /// Whether such laws are weighed against the library as what else may be missing, and not only looked for where the library does not
+    /// explain the data: where the discrepancy that every model has could hide them.
+    fn weighs_laws(&self) -> bool {
+        false
+    }
+    /// A law with what nuisances have of it moved into it, or the other way round; it predicts the same.
+    fn with_whole_law(&self, law: FittedLaw) -> FittedLaw {
+        law
     }
     /// What the discrepancy's scale is a fraction of: for a worm, the mean largest deformation of its tips, m.
     fn discrepancy_unit(&self) -> f64;

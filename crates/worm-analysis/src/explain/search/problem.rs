@@ -261,16 +261,22 @@ impl<'p, P: Plant> FitProblem<'p, P> {
         fit
     }
 
-    /// Fits from some values. Columns of `known`, a fit nearby, serve as first derivatives of the quantities that both have.
+    /// Fits from some values, and from where a plant with many minima would start besides. Columns of `known`, a fit nearby, serve as
+    /// first derivatives of the quantities that both have.
     pub fn fit(&self, hypothesis: &Hypothesis, at: Vec<f64>, known: Option<&Fit>) -> Fit {
-        let mut best = self.fit_by(&TO_THE_END, hypothesis, at, known);
+        let mut best = self.fit_from(hypothesis, at, known);
         for start in self.plant.other_starts(hypothesis, &best.at) {
-            let fit = self.fit_by(&TO_THE_END, hypothesis, start, None);
+            let fit = self.fit_from(hypothesis, start, None);
             if fit.chi_squared < best.chi_squared {
                 best = fit;
             }
         }
         best
+    }
+
+    /// The same from these values alone.
+    pub fn fit_from(&self, hypothesis: &Hypothesis, at: Vec<f64>, known: Option<&Fit>) -> Fit {
+        self.fit_by(&TO_THE_END, hypothesis, at, known)
     }
 
     /// A few steps of a fit with the derivatives that are there: enough to see what it is worth.

@@ -1,7 +1,7 @@
 //! The result of the search on a servo: its JSON contract, with the names of a worm's answer where they mean the same.
 
 use crate::bench::ServoModel;
-use crate::explain::answer::{Calibrated, NamedEffect, Screened, StageKind, Verdict};
+use crate::explain::answer::{Calibrated, FoundLaw, NamedEffect, Screened, StageKind, Verdict};
 use crate::recording::Repair;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,8 @@ pub struct ServoAnswer {
     /// The gap, stage by stage.
     #[serde(rename = "gap")]
     pub stages: Vec<ServoStage>,
+    /// A law that nobody listed, where no effect of the library explains the data and one predicts what it was not fitted to.
+    pub law: Option<FoundLaw>,
     /// What is left, where nothing explains it.
     pub remainder: Option<FrictionRemainder>,
     /// The run that would best decide between what is left open.
@@ -212,9 +214,10 @@ pub struct ServoRun {
     pub readings: usize,
     /// Duration, s.
     pub duration_s: f64,
-    /// Mean absolute error of the positions, rad: of the nominal, the recalibrated, and the named model, where there is one.
+    /// Mean absolute error of the positions, rad: of the nominal, the recalibrated, and the named model or the one with the law, where there
+    /// is one.
     pub mean_absolute_error_rad: [f64; 3],
-    /// Electrical energy, J, by the recalibrated and by the named model.
+    /// Electrical energy, J, by the recalibrated and by the named model or the one with the law.
     pub electrical_j: [f64; 2],
 }
 
@@ -225,7 +228,7 @@ pub struct ServoFigures {
     pub map_before: Vec<FrictionCell>,
     /// See `map_before`.
     pub map_after: Vec<FrictionCell>,
-    /// Each run: time, s, and positions, rad: goal, measured, recalibrated, named (empty without one).
+    /// Each run: time, s, and positions, rad: goal, measured, recalibrated, by the named model or the law (empty without one).
     pub runs: Vec<RunSeries>,
     /// The servo's model with the answer in it.
     pub model: ServoModel,

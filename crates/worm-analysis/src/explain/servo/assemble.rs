@@ -10,24 +10,30 @@ use super::present_current::decide;
 use super::recorded_servo::{RecordedServo, ServoProblem};
 use crate::bench::ServoModel;
 use crate::explain::answer::{Calibrated, FoundOnset, NamedEffect, StageKind, Verdict};
-use crate::explain::assemble::{named_effects, screening};
+use crate::explain::assemble::{law_in_words, named_effects, screening};
 use crate::explain::search::cross_validation::hold_out;
 use crate::explain::search::find::Found;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::folds::Folds;
 use crate::explain::search::judge::candidate::Candidate;
+use crate::explain::search::law::find::FoundLaw;
+use crate::explain::search::law::fitted_law::FittedLaw;
 use crate::explain::search::parameter::{Onset, What};
 use crate::explain::words;
 use worm_estimator::number::significant;
 
 /// Places listed at most.
 const PLACES: usize = 12;
+/// What everything is judged on.
+const HELD_OUT: &str = "trajectories and gains";
 
 /// Everything that the answer is made of.
 pub(super) struct Parts {
     pub folds: Folds,
     pub recalibrated: Fit,
     pub found: Found,
+    /// Where no effect explains the data.
+    pub law: Option<FoundLaw>,
     /// Standard deviation of the discrepancy, rad.
     pub discrepancy_rad: f64,
 }
@@ -85,18 +91,30 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
     if of_each.len() > 1 && rivals.is_empty() {
         rivals = of_each[1..].concat();
     }
+    let of_law = parts.law.as_ref().and_then(|found| {
+        let (left, open) = found.law.held_out.determined_beside(without);
+        let closure = closed(servo, (recalibrated, &open), (&found.law.fit, &left), servo.scatter_rad);
+        Some((&found.law, law_in_words(found, closure, HELD_OUT)?))
+    });
+    let fitted_law = of_law.as_ref().map(|(law, _)| *law);
     let verdict = selected.verdict;
     let best = selected.candidates.first().map(|candidate| &candidate.fit);
-    let final_fit = named.first().map_or(recalibrated, |candidate| &candidate.fit);
+    // What the answer adds to the model: an effect, or a law.
+    let with_answer = named
+        .first()
+        .map(|candidate| &candidate.fit)
+        .or(fitted_law.map(|law| &law.fit));
+    let final_fit = with_answer.unwrap_or(recalibrated);
     let map_before = map(servo, &servo.physics(recalibrated));
-    let map_after = match (verdict, best) {
+    let map_after = match (verdict, with_answer.or(best)) {
         (Verdict::Agrees, _) | (_, None) => Vec::new(),
         (_, Some(best)) => map(servo, &servo.physics(best)),
     };
     let mut where_before = places(servo, &map_before);
     where_before.truncate(PLACES);
     let remainder = (verdict == Verdict::OutsideLibrary).then(|| {
-        let mut places = places(servo, &map_after);
+        let best = map(servo, &servo.physics(best.unwrap_or(recalibrated)));
+        let mut places = places(servo, &best);
         places.truncate(PLACES);
         FrictionRemainder {
             description: remainder_in_words(found.open_share, &places),
@@ -105,19 +123,11 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
         }
     });
     let current = decide(&servo.observed, &servo.physics(final_fit));
-    let runs = runs(servo, parts, named.first());
-    let agrees = |run: &ServoRun| run.mean_absolute_error_rad[if named.is_empty() { 1 } else { 2 }];
-    let mut sentence = words::sentence(
-        verdict,
-        &effects,
-        &rivals,
-        selected,
-        found.open_share,
-        None,
-        "trajectories and gains",
-    );
+    let runs = runs(servo, parts, with_answer);
+    let agrees = |run: &ServoRun| run.mean_absolute_error_rad[if with_answer.is_none() { 1 } else { 2 }];
+    let mut sentence = words::sentence(verdict, &effects, &rivals, selected, found.open_share, None, HELD_OUT);
     sentence = format!("{sentence} {}", current.sentence);
-    let mut model = written(servo, nominal, final_fit, named.first());
+    let mut model = written(servo, nominal, final_fit);
     model.current = current.measures.unwrap_or(nominal.current);
     ServoAnswer {
         plant: "servo-bench",
@@ -126,7 +136,8 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
         r#where: where_before,
         effects,
         rivals,
-        stages: stages(problem, parts, named),
+        stages: stages(problem, parts, named, fitted_law),
+        law: of_law.map(|(_, law)| law),
         remainder,
         next_experiment: match verdict {
             Verdict::Ambiguous => propose(servo, named, parts.discrepancy_rad),
@@ -150,7 +161,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
         figures: ServoFigures {
             map_before,
             map_after,
-            runs: series(servo, recalibrated, named.first().map(|candidate| &candidate.fit)),
+            runs: series(servo, recalibrated, with_answer),
             model_diff: Vec::new(),
             model,
         },
@@ -159,7 +170,12 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
 }
 
 /// The gap in the order in which it closes: the effects of a pair alone come before it.
-fn stages(problem: &ServoProblem<'_, '_>, parts: &Parts, named: &[Candidate]) -> Vec<ServoStage> {
+fn stages(
+    problem: &ServoProblem<'_, '_>,
+    parts: &Parts,
+    named: &[Candidate],
+    law: Option<&FittedLaw>,
+) -> Vec<ServoStage> {
     let servo = problem.plant;
     let (found, selected) = (&parts.found, &parts.found.selected);
     let measured = Stages::new(servo, &parts.folds);
@@ -201,17 +217,21 @@ fn stages(problem: &ServoProblem<'_, '_>, parts: &Parts, named: &[Candidate]) ->
         .min_by(|a, b| a.fit.chi_squared.total_cmp(&b.fit.chi_squared));
     stages.extend(wrong.map(|wrong| stage(StageKind::BestWrong, wrong)));
     stages.extend(named.first().map(|candidate| stage(StageKind::Named, candidate)));
+    stages.extend(law.map(|law| {
+        let name = Some(law.shape.to_string());
+        measured.stage(StageKind::Law, name, &law.fit, Some(&law.held_out))
+    }));
     stages.push(measured.free_form(problem, &parts.recalibrated, &parts.folds));
     stages.push(measured.floor());
     stages
 }
 
-fn runs(servo: &RecordedServo<'_>, parts: &Parts, named: Option<&Candidate>) -> Vec<ServoRun> {
+fn runs(servo: &RecordedServo<'_>, parts: &Parts, with_answer: Option<&Fit>) -> Vec<ServoRun> {
     let of_run = |run: usize| {
         let observed = &servo.observed[run];
         let error = |fit: &Fit| mean_absolute(&residual_rad(servo, run, fit));
         let energy = |fit: &Fit| predict(observed, &servo.physics(fit)).energy.electrical_j;
-        let of_named = |of: &dyn Fn(&Fit) -> f64| named.map_or(f64::NAN, |candidate| of(&candidate.fit));
+        let of_answer = |of: &dyn Fn(&Fit) -> f64| with_answer.map_or(f64::NAN, of);
         ServoRun {
             recording: observed.name(),
             trajectory: observed.trajectory_name.clone(),
@@ -221,22 +241,22 @@ fn runs(servo: &RecordedServo<'_>, parts: &Parts, named: Option<&Candidate>) -> 
             mean_absolute_error_rad: [
                 error(&parts.found.nominal),
                 error(&parts.recalibrated),
-                of_named(&error),
+                of_answer(&error),
             ],
-            electrical_j: [energy(&parts.recalibrated), of_named(&energy)],
+            electrical_j: [energy(&parts.recalibrated), of_answer(&energy)],
         }
     };
     (0..servo.observed.len()).map(of_run).collect()
 }
 
-fn series(servo: &RecordedServo<'_>, recalibrated: &Fit, named: Option<&Fit>) -> Vec<RunSeries> {
+fn series(servo: &RecordedServo<'_>, recalibrated: &Fit, with_answer: Option<&Fit>) -> Vec<RunSeries> {
     let of_run = |observed: &super::observed::Observed<'_>| RunSeries {
         name: format!("{}, gain {}", observed.trajectory_name, observed.gain),
         time_s: observed.recording.time_s.clone(),
         goal_rad: observed.recording.goal_rad.clone(),
         measured_rad: observed.recording.position_rad.clone(),
         recalibrated_rad: predict(observed, &servo.physics(recalibrated)).angle_rad,
-        named_rad: named.map_or_else(Vec::new, |fit| predict(observed, &servo.physics(fit)).angle_rad),
+        named_rad: with_answer.map_or_else(Vec::new, |fit| predict(observed, &servo.physics(fit)).angle_rad),
     };
     servo.observed.iter().map(of_run).collect()
 }
@@ -275,9 +295,10 @@ fn calibration(servo: &RecordedServo<'_>, fit: &Fit) -> Vec<Calibrated> {
 }
 
 /// The model with a fit in it.
-fn written(servo: &RecordedServo<'_>, nominal: &ServoModel, fit: &Fit, named: Option<&Candidate>) -> ServoModel {
+fn written(servo: &RecordedServo<'_>, nominal: &ServoModel, fit: &Fit) -> ServoModel {
     let mut plain = fit.hypothesis.clone();
     plain.hypothesised.clear();
+    plain.law = None;
     let (free, at): (Vec<_>, Vec<f64>) = fit
         .hypothesis
         .free
@@ -289,7 +310,7 @@ fn written(servo: &RecordedServo<'_>, nominal: &ServoModel, fit: &Fit, named: Op
     plain.free = free;
     let physics = super::predict::physics(&servo.nominal, &plain, &at);
     let mut effects = nominal.effects.clone();
-    effects.extend(named.map_or_else(Vec::new, |_| fit.hypothesis.settings(&fit.at)));
+    effects.extend(fit.hypothesis.settings(&fit.at));
     ServoModel {
         name: nominal.name.clone(),
         motor: physics.motor,

@@ -6,10 +6,12 @@ use super::observed::Observed;
 use super::recorded_servo::RecordedServo;
 use crate::bench::{BenchCampaign, ServoModel, ServoRecording};
 use crate::experiment::Progress;
+use crate::explain::answer::Verdict;
 use crate::explain::error::ExplainError;
 use crate::explain::recorded::left_out;
 use crate::explain::search::find::{Options, find};
 use crate::explain::search::hypothesis::Hypothesis;
+use crate::explain::search::law::find::LawSearch;
 use crate::explain::search::plant::{Plant, Recorded};
 use crate::explain::search::recalibrate::{measure_noise, recalibrate};
 use worm_physics::servo::Pendulum;
@@ -128,10 +130,26 @@ pub fn explain_servo(
     let base = Hypothesis::new(&servo.nuisances(), &[]);
     let at = measure_noise(&mut servo, &base)?;
     let (problem, discrepancy, recalibrated) = recalibrate(&servo, &base, at, options.discrepancy);
-    let found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
-    report("stages", 0.93);
+    let mut found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
+    let folds = servo.folds();
+    let laws = found
+        .laws
+        .take()
+        .filter(|_| found.selected.verdict == Verdict::OutsideLibrary);
+    let law = laws.and_then(|laws| {
+        let search = LawSearch {
+            problem: &problem,
+            discrepancy: &discrepancy,
+            recalibrated: &recalibrated,
+            without: &found.recalibrated_held_out,
+            folds: &folds,
+        };
+        search.best(laws, &mut |fraction| report("law", 0.95 + 0.03 * fraction))
+    });
+    report("stages", 0.98);
     let parts = Parts {
-        folds: servo.folds(),
+        law,
+        folds,
         recalibrated,
         found,
         discrepancy_rad: discrepancy.scale_m,

@@ -1,10 +1,8 @@
 //! Friction over speed and load by the torque balance, and what the model makes of it.
-//!
-//! The duty follows from goal, gain and position, the motor's torque from that and from the velocity; what neither the arm's weight nor
-//! the inertia takes is friction. It is seen where the arm moves; a resting arm only bounds it.
 
 use super::answer::{FrictionCell, FrictionPlace};
 use super::recorded_servo::RecordedServo;
+use super::torque_balance::moments;
 use std::collections::BTreeMap;
 use worm_physics::servo::ServoPhysics;
 
@@ -29,38 +27,27 @@ struct Second {
 /// The cells that the campaign shows, by some physics.
 pub(super) fn map(servo: &RecordedServo<'_>, physics: &ServoPhysics) -> Vec<FrictionCell> {
     let mut seconds: BTreeMap<(usize, usize), BTreeMap<(usize, usize), Second>> = BTreeMap::new();
-    let inertia = physics.motor.rotor_inertia_kg_m2 + physics.pendulum.inertia_kg_m2();
-    for (run, observed) in servo.observed.iter().enumerate() {
-        let recording = observed.recording;
-        let case_c = recording.temperature_c.first().copied().unwrap_or(25.0);
-        for bin in &observed.bins.bins {
-            for reading in bin.samples.clone().skip(usize::from(bin.samples.start == 0)) {
-                let speed = observed.velocity_rad_s[reading];
-                let command = observed.command(reading - 1);
-                let angle = recording.position_rad[reading];
-                let motor = if command.torque_enabled {
-                    let duty = physics.duty(command.gain, command.goal_rad, angle);
-                    physics.motor.torque_constant * physics.current_a(duty, speed, case_c)
-                } else {
-                    0.0
-                };
-                let arm = physics.pendulum.torque_n_m(angle);
-                let load = 0.5 * (motor + arm).abs();
-                let place = |edges: &[f64], value: f64| {
-                    let above = edges.partition_point(|edge| *edge <= value);
-                    (1..edges.len()).contains(&above).then(|| above - 1)
-                };
-                let cell = place(&SPEEDS_RAD_S, speed.abs()).zip(place(&LOADS_N_M, load));
-                let Some(cell) = cell else {
-                    continue;
-                };
-                let second = seconds.entry(cell).or_default().entry((run, bin.cycle)).or_default();
-                let balance = motor - arm - inertia * observed.acceleration_rad_s2[reading];
-                second.readings += 1.0;
-                second.measured += balance * speed.signum();
-                second.model += physics.friction_n_m(motor, arm, speed) + physics.motor.viscous_n_m_s * speed.abs();
-                second.load += load;
-            }
+    for (run, _) in servo.observed.iter().enumerate() {
+        for moment in moments(servo, run, physics) {
+            let place = |edges: &[f64], value: f64| {
+                let above = edges.partition_point(|edge| *edge <= value);
+                (1..edges.len()).contains(&above).then(|| above - 1)
+            };
+            let speed = moment.velocity_rad_s.abs();
+            let load = moment.on_gears_n_m();
+            let Some(cell) = place(&SPEEDS_RAD_S, speed).zip(place(&LOADS_N_M, load)) else {
+                continue;
+            };
+            let second = seconds
+                .entry(cell)
+                .or_default()
+                .entry((run, moment.second))
+                .or_default();
+            second.readings += 1.0;
+            second.measured += moment.friction_n_m;
+            second.model += physics.friction_n_m(moment.motor_n_m, moment.arm_n_m, moment.velocity_rad_s)
+                + physics.motor.viscous_n_m_s * speed;
+            second.load += load;
         }
     }
     let cells = seconds.into_iter().filter_map(|((speed, load), seconds)| {

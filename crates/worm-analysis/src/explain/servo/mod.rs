@@ -5,7 +5,8 @@
 //! - `observed`: a recording as the search sees it; `nuisance`: what is not known exactly; `predict`: the motion that a hypothesis predicts.
 //! - `discrepancy`: by how much any model of a servo is wrong; `supply`: what the readings of the voltage say of the supply.
 //! - `explain`: the search on a campaign from beginning to end, and `assemble` its answer ([`answer`]).
-//! - `gap`: how far a model is off, stage by stage; `friction_map`: where, by the torque balance over speed and load.
+//! - `gap`: how far a model is off, stage by stage; `friction_map`: where, by the torque balance over speed and load (`torque_balance`).
+//! - `laws`: what a law that nobody listed may depend on.
 //! - `present_current`: what the servo reports as its current.
 //! - `next_experiment`: which run would decide; `model_update`: the model's file with the answer in it.
 
@@ -15,6 +16,7 @@ mod discrepancy;
 mod explain;
 mod friction_map;
 mod gap;
+mod laws;
 pub mod model_update;
 mod next_experiment;
 mod nuisance;
@@ -25,6 +27,7 @@ mod prediction;
 mod present_current;
 mod recorded_servo;
 mod supply;
+mod torque_balance;
 
 pub use answer::{Measures, ServoAnswer};
 pub use explain::{Bench, explain_servo};

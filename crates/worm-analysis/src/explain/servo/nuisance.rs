@@ -2,8 +2,9 @@
 
 use crate::explain::search::parameter::{Free, What};
 use crate::least_squares::Quantity;
-use worm_physics::servo::laws::{FrictionTable, TABLE_ENTRIES};
+use std::sync::Arc;
 use worm_physics::servo::{ServoMotor, ServoPhysics};
+use worm_physics::{ActsOn, Axis, Table};
 
 /// A quantity of the servo that is not known exactly and that no effect is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +45,10 @@ const DRY_N_M: (f64, f64) = (0.2, 5e-4);
 const VISCOUS_N_M_S: (f64, f64) = (0.1, 2e-4);
 /// Standard deviation, largest value and step of an entry of the free friction table, N m.
 const TABLE_N_M: (f64, f64, f64) = (0.1, 0.5, 1e-3);
+/// Speeds and loads at which it has its entries.
+const TABLE_SPEEDS_RAD_S: [f64; 5] = [0.0, 0.4, 1.5, 4.0, 10.0];
+const TABLE_LOADS_N_M: [f64; 4] = [0.0, 0.15, 0.35, 0.7];
+const TABLE_ENTRIES: usize = TABLE_SPEEDS_RAD_S.len() * TABLE_LOADS_N_M.len();
 
 impl Nuisance {
     /// Everything that the recalibration may change.
@@ -106,7 +111,7 @@ impl Nuisance {
         }
     }
 
-    /// Gives a servo this value.
+    /// Gives a servo this value; an entry of the free table counts in [`free_table`] alone.
     pub fn apply(self, value: f64, physics: &mut ServoPhysics) {
         let motor = &mut physics.motor;
         match self {
@@ -116,14 +121,17 @@ impl Nuisance {
             Self::Dry => motor.dry_n_m = value,
             Self::Viscous => motor.viscous_n_m_s = value,
             Self::Zero => physics.pendulum.zero_rad += value,
-            Self::Table(entry) => {
-                let table = physics.laws.table.get_or_insert_with(|| {
-                    Box::new(FrictionTable {
-                        entries_n_m: [0.0; TABLE_ENTRIES],
-                    })
-                });
-                table.entries_n_m[entry] = value;
-            }
+            Self::Table(_) => {}
         }
     }
+}
+
+/// Friction over speed and load with these entries, N m: for each speed those of the loads; none without entries.
+pub(super) fn free_table(entries_n_m: Vec<f64>) -> Option<Arc<Table>> {
+    let axes = [
+        (Axis::MotorSpeed, TABLE_SPEEDS_RAD_S.to_vec()),
+        (Axis::GearLoad, TABLE_LOADS_N_M.to_vec()),
+    ];
+    let table = Table::new(ActsOn::MotorFriction, &axes, entries_n_m, None);
+    table.ok().map(Arc::new)
 }

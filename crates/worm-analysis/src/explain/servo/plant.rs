@@ -1,6 +1,7 @@
 //! A servo as a plant: what it predicts, its nuisances and its effects.
 
 use super::gap::closed;
+use super::laws::laws;
 use super::nuisance::Nuisance;
 use super::predict::{physics, predict};
 use super::recorded_servo::RecordedServo;
@@ -9,8 +10,11 @@ use crate::explain::error::ExplainError;
 use crate::explain::search::fit::{Fit, FitWithout};
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::impact::Impact;
+use crate::explain::search::law::fitted_law::FittedLaw;
+use crate::explain::search::law::offer::Offer;
 use crate::explain::search::parameter::{Free, Hypothesised, What};
 use crate::explain::search::plant::{Plant, PredictedRun};
+use worm_physics::ActsOn;
 use worm_physics::effect::SERVO_LIBRARY;
 use worm_physics::servo::COUNT_RAD;
 
@@ -209,6 +213,33 @@ impl Plant for RecordedServo<'_> {
             .collect()
         };
         STARTS.iter().map(start).collect()
+    }
+
+    fn laws(&self, recalibrated: &Fit) -> Vec<Offer> {
+        laws(self, recalibrated)
+    }
+
+    /// What any model of a servo is wrong by is a tenth of its motion, in which a wrong friction hides.
+    fn weighs_laws(&self) -> bool {
+        true
+    }
+
+    /// Friction that is the same everywhere is dry friction: a law begins with none, as far as dry friction can take it.
+    fn with_whole_law(&self, mut law: FittedLaw) -> FittedLaw {
+        let is_dry = |free: &Free| Nuisance::of(free.what) == Some(Nuisance::Dry);
+        let dry = law.fit.hypothesis.free.iter().position(is_dry);
+        if let (ActsOn::MotorFriction, Some(dry)) = (law.shape.acts_on, dry) {
+            let least_n_m = law.fit.hypothesis.free[dry].quantity.min;
+            let first_n_m = law
+                .value
+                .first()
+                .copied()
+                .unwrap_or(0.0)
+                .max(least_n_m - law.fit.at[dry]);
+            law.fit.at[dry] += first_n_m;
+            law.shift(-first_n_m);
+        }
+        law
     }
 
     fn discrepancy_unit(&self) -> f64 {

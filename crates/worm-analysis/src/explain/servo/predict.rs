@@ -1,6 +1,6 @@
 //! The motion that a hypothesis predicts for a run: from its first reading on, never reset.
 
-use super::nuisance::Nuisance;
+use super::nuisance::{Nuisance, free_table};
 use super::observed::Observed;
 use crate::explain::search::hypothesis::Hypothesis;
 use worm_physics::servo::{Energy, LONGEST_STEP_S, ServoMotion, ServoPhysics};
@@ -23,11 +23,15 @@ pub(super) struct Predicted {
 /// The physics of a hypothesis.
 pub(super) fn physics(nominal: &ServoPhysics, hypothesis: &Hypothesis, at: &[f64]) -> ServoPhysics {
     let mut physics = nominal.clone();
+    let mut entries_n_m = Vec::new();
     for (free, &value) in hypothesis.free.iter().zip(at) {
-        if let Some(nuisance) = Nuisance::of(free.what) {
-            nuisance.apply(value, &mut physics);
+        match Nuisance::of(free.what) {
+            Some(Nuisance::Table(_)) => entries_n_m.push(value),
+            Some(nuisance) => nuisance.apply(value, &mut physics),
+            None => {}
         }
     }
+    physics.laws.tables.extend(free_table(entries_n_m));
     physics.with(&hypothesis.settings(at))
 }
 

@@ -1,10 +1,10 @@
 //! What a law of a worm may depend on: the quantities of its cells, over the ranges that they go through.
 //!
-//! The ranges are those of a crawl of the recalibrated model in every run, and for the place those of the recordings. Speeds crowd about
-//! rest and about that of a step, so there a law may change within a fraction of the largest.
+//! The ranges are those of a crawl of the recalibrated model in every run, and for the place those of the recordings.
 
 use super::recorded_worm::RecordedWorm;
 use crate::explain::search::fit::Fit;
+use crate::explain::search::law::grid::{about_rest, ends, evenly, scaled, thinned, with_spacing};
 use crate::explain::search::law::offer::Offer;
 use crate::explain::search::law::shape::LawShape;
 use crate::explain::search::plant::{Plant, Recorded};
@@ -13,24 +13,20 @@ use worm_physics::{ActsOn, Axis, Crawl, Mechanics};
 /// Cycles that are run before a crawl is looked at, and the parts of the one that is.
 const LEAD_CYCLES: f64 = 3.0;
 const PARTS: usize = 240;
-/// Points along an axis; along a place and a time the most, and what lies between them at least: m, and cycles.
+/// Points along an axis; along a place and a time, what lies between them at least: m, and cycles.
 const POINTS: usize = 9;
 const POINTS_OF_CELL: usize = 5;
 const POINTS_OF_PHASE: usize = 16;
-const MOST_POINTS: usize = 80;
 const SPACING_M: f64 = 3.5e-3;
 const SPACING_CYCLES: f64 = 0.5;
-/// Speeds about which there are points, as a fraction of the largest, and that within which a law over a speed may turn.
-const NEAR_REST: [f64; 3] = [0.02, 0.07, 0.2];
-const TURN: f64 = 0.05;
 /// Shortest periods, in points of a grid.
 const OF_PERIOD: f64 = 2.2;
 /// Scales of a force, as a fraction of the friction of a tip, of a factor on friction, and of a displacement, as a fraction of the stroke.
 const FORCES: [f64; 4] = [0.02, 0.06, 0.2, 0.5];
 const FACTORS: [f64; 4] = [0.04, 0.1, 0.25, 0.5];
 const DISPLACEMENTS: [f64; 4] = [0.005, 0.015, 0.05, 0.15];
-/// Most coordinates that are kept of where the data are.
-const SEEN: usize = 600;
+/// Times within a run that are kept as where the data are.
+const TIMES: usize = 600;
 
 /// Where the cells of a worm are on the axes that a crawl shows.
 #[derive(Default)]
@@ -59,6 +55,8 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
                 let strokes = if axis == Axis::Time { grid[grid.len() - 1] } else { 1.0 };
                 DISPLACEMENTS.map(|fraction| fraction * strokes * stroke_m)
             }
+            // Nothing of a worm's motor is offered.
+            ActsOn::MotorFriction | ActsOn::MotorTorque => [0.0; 4],
         };
         let spacing = grid.get(1).map_or(0.0, |second| second - grid[0]);
         let width = grid[grid.len() - 1] - grid[0];
@@ -68,6 +66,7 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
             period: (axis == Axis::Phase).then_some(1.0),
             periods: may_repeat.then_some([OF_PERIOD * spacing, 0.7 * width]),
             sigmas,
+            constant: Offer::CONSTANT,
             seen: thinned(seen),
             shape: LawShape::of_points(acts_on, vec![(axis, grid)], cell),
         }
@@ -80,7 +79,7 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
         phase[phase.len() - 1] - phase[0]
     });
     let cycles = cycles.fold(0.0, f64::max);
-    let times: Vec<f64> = (0..SEEN).map(|at| cycles * at as f64 / SEEN as f64).collect();
+    let times: Vec<f64> = (0..TIMES).map(|at| cycles * at as f64 / TIMES as f64).collect();
     let slopes_deg = slopes_deg(worm);
     let phases: Vec<f64> = (0..POINTS_OF_PHASE)
         .map(|point| point as f64 / POINTS_OF_PHASE as f64)
@@ -198,56 +197,4 @@ fn slopes_deg(worm: &RecordedWorm<'_>) -> Vec<f64> {
 fn seen_places_m(worm: &RecordedWorm<'_>) -> Vec<f64> {
     let all = worm.scene.observed.iter().flat_map(|observed| &observed.position_m);
     all.flatten().copied().filter(|at_m| at_m.is_finite()).collect()
-}
-
-/// The ends of what was gone through; none where that is a single place.
-fn ends(seen: &[f64]) -> Option<(f64, f64)> {
-    let (min, max) = seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), &at| {
-        (f64::min(min, at), f64::max(max, at))
-    });
-    (max > min).then_some((min, max))
-}
-
-fn evenly(from: f64, to: f64, points: usize) -> Vec<f64> {
-    (0..points)
-        .map(|point| from + (to - from) * point as f64 / (points - 1) as f64)
-        .collect()
-}
-
-/// Points with a spacing, or a larger one where there would be too many.
-fn with_spacing(from: f64, to: f64, spacing: f64) -> Vec<f64> {
-    let points = ((to - from) / spacing).ceil() as usize + 1;
-    evenly(from, to, points.clamp(2, MOST_POINTS))
-}
-
-/// Points that lie close about rest.
-fn about_rest(from: f64, to: f64) -> Vec<f64> {
-    let largest = from.abs().max(to.abs());
-    let near = NEAR_REST.iter().flat_map(|part| [-part * largest, part * largest]);
-    let mut points: Vec<f64> = near.chain([0.0, from, to, 0.45 * to, 0.75 * to]).collect();
-    points.retain(|at| (from..=to).contains(at));
-    points.sort_by(f64::total_cmp);
-    points.dedup_by(|a, b| (*a - *b).abs() < 5e-3 * largest);
-    points
-}
-
-/// The scale on which a law is smooth.
-fn scaled(axis: Axis, grid: &[f64]) -> Vec<f64> {
-    let (first, last) = (grid[0], grid[grid.len() - 1]);
-    let width = if grid.len() > 1 { last - first } else { 1.0 };
-    match axis {
-        Axis::Phase => grid.to_vec(),
-        Axis::DeformationRate | Axis::Speed => {
-            let turn = TURN * first.abs().max(last.abs());
-            let bent = |at: f64| (at / turn).asinh();
-            let width = bent(last) - bent(first);
-            grid.iter().map(|at| (bent(*at) - bent(first)) / width).collect()
-        }
-        _ => grid.iter().map(|at| (at - first) / width).collect(),
-    }
-}
-
-/// At most so many, evenly.
-fn thinned(seen: &[f64]) -> Vec<f64> {
-    seen.iter().copied().step_by(seen.len().div_ceil(SEEN).max(1)).collect()
 }

@@ -41,7 +41,11 @@ pub fn page(answer: &Answer, title: &str) -> Result<String, DrawError> {
             match block {
                 Block::Paragraph(text) => page.paragraph(text),
                 Block::Table(table) | Block::LongTable(table) => page.add(table),
-                Block::Figure(drawn) => page.figure(&figure::draw(*drawn, answer)?),
+                Block::Figure(kind) => {
+                    if let Some(drawn) = figure::draw(*kind, answer)? {
+                        page.figure(&drawn);
+                    }
+                }
                 Block::Difference(lines) => page.add(html! {
                     pre.diff {
                         @for line in lines {

@@ -41,15 +41,15 @@ fn the_energy_balance_closes_for_every_effect_and_for_all_together() {
 
 #[test]
 fn the_energy_balance_closes_for_tables_over_every_axis() {
-    for axis in Axis::ALL {
+    for axis in Axis::ALL.into_iter().filter(|axis| !axis.is_of_motor()) {
         let width = match axis {
             Axis::Deformation => 1e-3,
             Axis::DeformationRate | Axis::Speed | Axis::Place => 1e-2,
             Axis::Phase => 0.3,
-            Axis::Load | Axis::Time => 1.0,
             Axis::Slope => 30.0,
+            _ => 1.0,
         };
-        for acts_on in ActsOn::ALL {
+        for acts_on in ActsOn::ALL.into_iter().filter(|acts_on| !acts_on.is_of_motor()) {
             let neutral = acts_on.neutral();
             let grid = [(axis, vec![-width, 0.0, 0.5 * width, width])];
             let unit = if acts_on == ActsOn::DriveDisplacement {

@@ -61,6 +61,7 @@ impl Judged {
             of_usual: [f64::NEG_INFINITY; 4],
             changing: None,
             repeating: None,
+            of_law: None,
         })
     }
 
@@ -123,6 +124,9 @@ struct Class {
 pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: &[f64]) -> Selected {
     let singles = judged.iter().filter(|one| !one.is_pair());
     let best_single = singles.max_by(|a, b| a.ln_weight().total_cmp(&b.ln_weight()));
+    // An effect whose law is a little wrong is no reason for another law.
+    let strongest = judged.iter().map(|one| one.candidate.improvement).fold(0.0, f64::max);
+    let none = none.with_law(none.of_law.map(|ln| ln - 0.5 * LAW_KNOWN * LAW_KNOWN * strongest));
     let (ln_single, gain) = best_single.map_or((f64::NEG_INFINITY, 0.0), |best| {
         (best.ln_weight(), best.candidate.improvement)
     });
@@ -262,6 +266,7 @@ mod tests {
             of_usual: [usual - 4.0_f64.ln(); 4],
             changing: None,
             repeating: None,
+            of_law: None,
         }
     }
 

@@ -54,6 +54,8 @@ pub(in crate::explain) struct Evidence {
     /// With a discrepancy of a₀ and something that repeats after some cycles, or of a₀ at most and a rhythm of the body; none where it was not
     /// asked.
     pub repeating: Option<f64>,
+    /// With a law that nobody listed, and a discrepancy of the usual size; none where none was weighed.
+    pub of_law: Option<f64>,
 }
 
 /// What may be in the data beside any hypothesis, and shows in time.
@@ -73,11 +75,17 @@ impl InTime {
 }
 
 impl Evidence {
-    /// With something else wrong: a large discrepancy, a change in the middle of a run, or a rhythm, each as probable before.
+    /// With something else wrong: a large discrepancy, a change in the middle of a run or a law, or a rhythm, each as probable before. Laws
+    /// are weighed where nothing is asked about the time.
     pub fn other(&self) -> f64 {
-        let changing = self.changing.map_or(f64::NEG_INFINITY, |(ln, _)| ln);
-        let repeating = self.repeating.unwrap_or(f64::NEG_INFINITY);
-        ln_sum([self.large, changing, repeating]) - 3.0_f64.ln()
+        let changing = self.changing.map(|(ln, _)| ln);
+        let kinds = [Some(self.large), changing, self.repeating, self.of_law];
+        ln_sum(kinds.into_iter().flatten()) - 3.0_f64.ln()
+    }
+
+    /// The same with a law that nobody listed.
+    pub fn with_law(self, of_law: Option<f64>) -> Self {
+        Self { of_law, ..self }
     }
 
     /// The same with the Bayes factors of a rhythm of the body, from cycle to cycle and within the cycles, of which as much is expected.
@@ -107,6 +115,7 @@ impl Evidence {
             of_usual: self.of_usual.map(|of_scale| of_scale - excess),
             changing: self.changing.map(|(ln, change)| (ln - excess, change)),
             repeating: self.repeating.map(|ln| ln - excess),
+            of_law: self.of_law.map(|ln| ln - excess),
         }
     }
 
@@ -242,6 +251,7 @@ pub(in crate::explain) fn evidence(
         repeating: repeating.map(|ln_bayes| at_unit + ln_bayes),
         large: ln_sum(LARGE.map(at_scale)) - (LARGE.len() as f64).ln(),
         of_usual,
+        of_law: None,
     }
 }
 

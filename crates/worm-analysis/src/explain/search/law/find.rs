@@ -4,7 +4,8 @@ use super::super::cross_validation::HeldOut;
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
 use super::super::folds::Folds;
-use super::super::judge::ln_sum::ln_mean;
+use super::super::judge::evidence::evidence;
+use super::super::judge::ln_sum::{ln_mean, ln_sum};
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;
 use super::evidence::Scores;
@@ -37,101 +38,111 @@ pub(in crate::explain) struct FoundLaw {
     pub formula: Option<Formula>,
 }
 
-/// Candidates: an offer with what the data say of it, its most probable form, and the logarithm of its Bayes factor.
-struct Weighed<'o> {
-    offer: &'o Offer,
+/// An offer with what the data say of it, and its most probable form.
+struct Weighed {
+    offer: Offer,
     scores: Scores,
     prior: Prior,
+    /// Logarithm of its Bayes factor, to first order, and of the part of it that its most probable form has.
     ln_bayes: f64,
+    ln_form: f64,
 }
 
-/// Searches for a law that closes the gap of a recalibrated plant; none where nothing predicts better than no law.
-pub(in crate::explain) fn find<P: Plant>(
-    problem: &FitProblem<'_, P>,
-    discrepancy: &Discrepancy,
-    recalibrated: &Fit,
-    without: &HeldOut,
-    report: &mut dyn FnMut(f64),
-) -> Option<FoundLaw> {
-    let offers = problem.plant.laws(recalibrated);
-    let count = offers.len() as f64;
-    let mut weighed: Vec<Weighed<'_>> = Vec::new();
-    for (done, offer) in offers.iter().enumerate() {
-        report(0.5 * done as f64 / count);
-        let neutral = vec![0.0; offer.shape.centre.len()];
-        weighed.extend(weigh(problem, discrepancy, recalibrated, offer, &neutral));
-    }
-    weighed.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
-    let best = weighed.first()?.ln_bayes;
-    weighed.retain(|one| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
-    weighed.truncate(FITTED);
-    let folds = problem.plant.folds();
-    let search = Search {
-        problem,
-        discrepancy,
-        recalibrated,
-        without,
-        folds: &folds,
-    };
-    let mut fitted: Vec<(FittedLaw, Weighed<'_>)> = Vec::new();
-    let tried = weighed.len() as f64;
-    for (done, one) in weighed.into_iter().enumerate() {
-        report(0.5 + 0.3 * done as f64 / tried);
-        fitted.push((search.fit(recalibrated, &one), one));
-    }
-    fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
-    for (done, (law, of)) in fitted.iter_mut().take(ANEW).enumerate() {
-        report(0.8 + 0.15 * done as f64 / ANEW as f64);
-        search.fit_anew(law, of);
-    }
-    fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
-    let (law, of) = fitted.first()?;
-    if law.gain < CLAIMS {
-        return None;
-    }
-    let law = law.clone();
-    let near = fitted[1..].iter().filter(|(other, _)| other.gain > law.gain - RIVAL);
-    let rivals = near.map(|(other, _)| Arc::clone(&other.shape)).collect();
-    report(0.95);
-    let formula = nearest(problem, recalibrated, without, &folds, &law, (of.offer, &of.scores));
-    Some(FoundLaw { law, rivals, formula })
+/// Laws that were fitted, each over another quantity.
+pub(in crate::explain) struct FittedLaws {
+    each: Vec<(FittedLaw, Weighed)>,
+    /// How many were offered.
+    offered: usize,
 }
 
-/// What the data say of an offer, to first order about a fit at some values of the law beyond neutral.
-fn weigh<'o, P: Plant>(
-    problem: &FitProblem<'_, P>,
-    discrepancy: &Discrepancy,
-    about: &Fit,
-    offer: &'o Offer,
-    beyond: &[f64],
-) -> Option<Weighed<'o>> {
-    let scores = Scores::about(problem, discrepancy, about, offer, beyond)?;
-    let kinds = priors(offer).map(|priors| {
-        let each: Vec<f64> = priors.iter().map(|prior| scores.ln_bayes(&prior.on_grid)).collect();
-        let best = (0..each.len()).max_by(|&a, &b| each[a].total_cmp(&each[b]));
-        Some((priors.into_iter().nth(best?)?, ln_mean(&each)?))
-    });
-    let (prior, ln_bayes) = kinds.into_iter().flatten().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(Weighed {
-        offer,
-        scores,
-        prior,
-        ln_bayes,
-    })
+impl FittedLaws {
+    /// Logarithm of the probability of the data under some law, whichever; none where no law is worth a look.
+    pub fn ln_evidence(&self, discrepancy: &Discrepancy) -> Option<f64> {
+        let of_each = self
+            .each
+            .iter()
+            .map(|(law, of)| evidence(discrepancy, None, &law.fit, &|_| None).usual + of.ln_form);
+        let all: Vec<f64> = of_each.collect();
+        (!all.is_empty()).then(|| ln_sum(all) - (self.offered as f64).ln())
+    }
 }
 
 /// What every law is fitted with and held against.
-struct Search<'s, 'p, P> {
-    problem: &'s FitProblem<'p, P>,
-    discrepancy: &'s Discrepancy,
-    recalibrated: &'s Fit,
-    without: &'s HeldOut,
-    folds: &'s Folds,
+pub(in crate::explain) struct LawSearch<'s, 'p, P> {
+    pub problem: &'s FitProblem<'p, P>,
+    pub discrepancy: &'s Discrepancy,
+    /// Without a law, with derivatives; and on data held out.
+    pub recalibrated: &'s Fit,
+    pub without: &'s HeldOut,
+    pub folds: &'s Folds,
 }
 
-impl<P: Plant> Search<'_, '_, P> {
+impl<P: Plant> LawSearch<'_, '_, P> {
+    /// Fits the laws of most evidence, of all that the plant offers.
+    pub fn fit(&self, report: &mut dyn FnMut(f64)) -> FittedLaws {
+        let offers = self.problem.plant.laws(self.recalibrated);
+        let offered = offers.len();
+        let mut weighed: Vec<Weighed> = Vec::new();
+        for (done, offer) in offers.into_iter().enumerate() {
+            report(0.6 * done as f64 / offered as f64);
+            let neutral = vec![0.0; offer.shape.centre.len()];
+            weighed.extend(self.weigh(self.recalibrated, &offer, &neutral));
+        }
+        weighed.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
+        let best = weighed.first().map_or(0.0, |best| best.ln_bayes);
+        weighed.retain(|one| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
+        weighed.truncate(FITTED);
+        let tried = weighed.len() as f64;
+        let mut each: Vec<(FittedLaw, Weighed)> = Vec::new();
+        for (done, one) in weighed.into_iter().enumerate() {
+            report(0.6 + 0.4 * done as f64 / tried);
+            each.push((self.fit_to_the_end(self.recalibrated, &one), one));
+        }
+        FittedLaws { each, offered }
+    }
+
+    /// The law that closes the gap of a recalibrated plant; none where nothing predicts better than no law.
+    pub fn best(&self, laws: FittedLaws, report: &mut dyn FnMut(f64)) -> Option<FoundLaw> {
+        let mut fitted = laws.each;
+        fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+        for (done, (law, of)) in fitted.iter_mut().take(ANEW).enumerate() {
+            report(0.8 * done as f64 / ANEW as f64);
+            self.fit_anew(law, of);
+        }
+        fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+        let (law, of) = fitted.first()?;
+        if law.gain < CLAIMS {
+            return None;
+        }
+        let near = fitted[1..].iter().filter(|(other, _)| other.gain > law.gain - RIVAL);
+        let rivals = near.map(|(other, _)| Arc::clone(&other.shape)).collect();
+        let law = self.problem.plant.with_whole_law(law.clone());
+        report(0.8);
+        let formula = nearest(self, &law, (&of.offer, &of.scores));
+        Some(FoundLaw { law, rivals, formula })
+    }
+
+    /// What the data say of an offer, to first order about a fit at some values of the law beyond neutral.
+    fn weigh(&self, about: &Fit, offer: &Offer, beyond: &[f64]) -> Option<Weighed> {
+        let scores = Scores::about(self.problem, self.discrepancy, about, offer, beyond)?;
+        let kinds = priors(offer).map(|priors| {
+            let each: Vec<f64> = priors.iter().map(|prior| scores.ln_bayes(&prior.on_grid)).collect();
+            let best = (0..each.len()).max_by(|&a, &b| each[a].total_cmp(&each[b]))?;
+            let mean = ln_mean(&each)?;
+            Some((priors.into_iter().nth(best)?, mean, (mean - each[best]).min(0.0)))
+        });
+        let (prior, ln_bayes, ln_form) = kinds.into_iter().flatten().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(Weighed {
+            offer: offer.clone(),
+            scores,
+            prior,
+            ln_bayes,
+            ln_form,
+        })
+    }
+
     /// Fits a law to the end from a fit of what is free besides, and holds data out.
-    fn fit(&self, from: &Fit, weighed: &Weighed<'_>) -> FittedLaw {
+    fn fit_to_the_end(&self, from: &Fit, weighed: &Weighed) -> FittedLaw {
         let determined = weighed.scores.determined(&weighed.prior);
         let mut shape = weighed.offer.shape.clone();
         if let Some((period, within)) = &weighed.prior.period {
@@ -142,10 +153,7 @@ impl<P: Plant> Search<'_, '_, P> {
         shape.columns.clone_from(&determined.columns);
         let known = weighed.scores.by_columns(&determined.on_grid);
         fit_shape(
-            self.problem,
-            self.recalibrated,
-            self.without,
-            self.folds,
+            self,
             Start {
                 from,
                 shape,
@@ -159,14 +167,14 @@ impl<P: Plant> Search<'_, '_, P> {
     }
 
     /// Fits a law anew about what was found, as long as it predicts better then: far from no law other directions are determined.
-    fn fit_anew<'o>(&self, law: &mut FittedLaw, weighed: &mut Weighed<'o>) {
-        let offer: &'o Offer = weighed.offer;
+    fn fit_anew(&self, law: &mut FittedLaw, weighed: &mut Weighed) {
         for _ in 0..PASSES {
+            let offer = &weighed.offer;
             let about = law.besides(self.problem, offer.shape.clone().about(&law.beyond));
-            let Some(anew) = weigh(self.problem, self.discrepancy, &about, offer, &law.beyond) else {
+            let Some(anew) = self.weigh(&about, offer, &law.beyond) else {
                 return;
             };
-            let better = self.fit(&about, &anew);
+            let better = self.fit_to_the_end(&about, &anew);
             if better.gain <= law.gain {
                 return;
             }

@@ -2,17 +2,17 @@
 
 use super::super::cross_validation::HeldOut;
 use super::super::fit::Fit;
-use super::super::folds::Folds;
 use super::super::judgement::held_out;
 use super::super::parameter::What;
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;
+use super::find::LawSearch;
 use super::shape::LawShape;
 use crate::least_squares::{standard_errors, submatrix};
 use std::sync::Arc;
 
 /// Step of the derivatives by a coefficient.
-const STEP: f64 = 0.1;
+pub(super) const STEP: f64 = 0.1;
 /// Standard errors to either end of a 90 % interval.
 const NINETY: f64 = 1.645;
 
@@ -35,6 +35,17 @@ pub(in crate::explain) struct FittedLaw {
 }
 
 impl FittedLaw {
+    /// Adds the same to the law everywhere.
+    pub fn shift(&mut self, by: f64) {
+        let mut shape = (*self.shape).clone();
+        shape.centre.iter_mut().for_each(|centre| *centre += by);
+        self.shape = Arc::new(shape);
+        self.fit.hypothesis.law = Some(Arc::clone(&self.shape));
+        self.value.iter_mut().for_each(|value| *value += by);
+        self.beyond.iter_mut().for_each(|beyond| *beyond += by);
+        self.band.iter_mut().flatten().for_each(|end| *end += by);
+    }
+
     /// The fit of what is free besides, with derivatives, the law as it is at the points of some grid.
     pub fn besides<P: Plant>(&self, problem: &FitProblem<'_, P>, on_grid: LawShape) -> Fit {
         let mut hypothesis = self.fit.hypothesis.clone();
@@ -64,22 +75,17 @@ pub(super) struct Start<'f> {
 }
 
 /// Fits a law from a start.
-pub(super) fn fit_shape<P: Plant>(
-    problem: &FitProblem<'_, P>,
-    recalibrated: &Fit,
-    without: &HeldOut,
-    folds: &Folds,
-    start: Start<'_>,
-) -> FittedLaw {
+pub(super) fn fit_shape<P: Plant>(search: &LawSearch<'_, '_, P>, start: Start<'_>) -> FittedLaw {
+    let (problem, recalibrated) = (search.problem, search.recalibrated);
     let shape = Arc::new(start.shape);
     let hypothesis = recalibrated.hypothesis.with_law(Arc::clone(&shape), STEP);
     let from = [&start.from.at[..], &start.at].concat();
     let mut known = start.from.clone();
     known.jacobian.extend(start.known);
-    let mut fit = problem.fit(&hypothesis, from, Some(&known));
+    let mut fit = problem.fit_from(&hypothesis, from, Some(&known));
     problem.compute_jacobian(&mut fit);
-    let held_out = held_out(problem, &fit, folds);
-    let gain = without.chi_squared - held_out.chi_squared - problem.excess_of_repeating(recalibrated, &fit);
+    let held_out = held_out(problem, &fit, search.folds);
+    let gain = search.without.chi_squared - held_out.chi_squared - problem.excess_of_repeating(recalibrated, &fit);
     let (value, band) = with_band(&fit, &shape, &start.left);
     let coefficients = fit.hypothesis.law_coefficients(&fit.at);
     let mut beyond = vec![0.0; start.on_grid.first().map_or(0, Vec::len)];

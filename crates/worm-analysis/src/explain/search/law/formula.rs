@@ -3,20 +3,21 @@
 //! Terms are added one after the other as long as the evidence grows, each with a prior as wide as that of the law. The formula stands where
 //! it predicts data held out as well as the law does.
 
-use super::super::cross_validation::HeldOut;
 use super::super::fit::Fit;
-use super::super::folds::Folds;
 use super::super::plant::Plant;
-use super::super::problem::FitProblem;
 use super::evidence::Scores;
-use super::fitted_law::{FittedLaw, Start, fit_shape};
+use super::find::LawSearch;
+use super::fitted_law::{FittedLaw, STEP, Start, fit_shape};
 use super::offer::Offer;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use worm_physics::Axis;
 
 /// Part of the largest term below which a term is left out of the text.
 const NEGLIGIBLE: f64 = 0.02;
+/// Singular values, as a fraction of the largest, below which a combination of terms is nothing.
+const NEGLIGIBLE_PART: f64 = 1e-9;
 /// Most terms.
 const TERMS: usize = 3;
 /// Logarithm of the Bayes factor that a further term must bring.
@@ -26,6 +27,8 @@ const AS_GOOD: f64 = 4.0;
 /// Steps along a place or a time that are tried, and time constants as a fraction of its width.
 const STEPS: usize = 12;
 const DECAYS: [f64; 3] = [0.1, 0.3, 0.7];
+/// The same of a speed and a load of a motor: friction changes near rest.
+const DECAYS_OF_MOTOR: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
 /// Width of the turn of a force that has the sign of its axis, as a fraction of the largest.
 const TURN: f64 = 0.05;
 
@@ -158,6 +161,13 @@ fn terms(axis: Axis, grid: &[f64], period: Option<f64>) -> Vec<Term> {
             Term::SignedSquare,
             Term::Sign,
         ]),
+        Axis::OutputLoad => terms.extend([Term::Power(1), Term::Power(2), Term::Magnitude, Term::Sign]),
+        // These two have no sign.
+        Axis::MotorSpeed | Axis::GearLoad => {
+            terms.extend([Term::Power(1), Term::Power(2)]);
+            terms.extend(DECAYS_OF_MOTOR.map(|part| Term::Decay(part * width)));
+        }
+        Axis::MotorAngle => terms.extend([Term::Power(1), Term::Wave(TAU), Term::Wave(0.5 * TAU)]),
     }
     terms.extend(period.filter(|_| axis != Axis::Phase).map(Term::Wave));
     terms
@@ -165,10 +175,7 @@ fn terms(axis: Axis, grid: &[f64], period: Option<f64>) -> Vec<Term> {
 
 /// The formula that comes nearest to a fitted law, of one axis; none where none predicts as well.
 pub(super) fn nearest<P: Plant>(
-    problem: &FitProblem<'_, P>,
-    recalibrated: &Fit,
-    without: &HeldOut,
-    folds: &Folds,
+    search: &LawSearch<'_, '_, P>,
     law: &FittedLaw,
     (offer, scores): (&Offer, &Scores),
 ) -> Option<Formula> {
@@ -206,16 +213,33 @@ pub(super) fn nearest<P: Plant>(
     let columns = columns(&chosen);
     let mut shape = offer.shape.clone();
     shape.columns.clone_from(&columns);
-    let start = Start {
-        from: recalibrated,
-        at: scores.most_probable(&root(&columns)),
-        known: scores.by_columns(&columns),
-        on_grid: columns,
-        left: Vec::new(),
-        seen: Vec::new(),
-        shape,
+    let as_law = law.besides(search.problem, shape.clone());
+    let starts = [
+        (search.recalibrated, scores.most_probable(&root(&columns))),
+        (&as_law, nearest_to(&law.beyond, &columns)),
+    ];
+    let chi_squared = |(from, at): &(&Fit, Vec<f64>)| {
+        let hypothesis = search.recalibrated.hypothesis.with_law(Arc::new(shape.clone()), STEP);
+        search
+            .problem
+            .evaluate(&hypothesis, [&from.at[..], at].concat())
+            .chi_squared
     };
-    let fitted = fit_shape(problem, recalibrated, without, folds, start);
+    let start = starts
+        .into_iter()
+        .min_by(|a, b| chi_squared(a).total_cmp(&chi_squared(b)))?;
+    let fitted = fit_shape(
+        search,
+        Start {
+            from: start.0,
+            at: start.1,
+            known: scores.by_columns(&columns),
+            on_grid: columns,
+            left: Vec::new(),
+            seen: Vec::new(),
+            shape,
+        },
+    );
     if fitted.gain < law.gain - AS_GOOD {
         return None;
     }
@@ -257,6 +281,15 @@ pub(super) fn nearest<P: Plant>(
         is_constant,
         gain: fitted.gain,
     })
+}
+
+/// The coefficients with which columns come nearest to some values.
+fn nearest_to(values: &[f64], columns: &[Vec<f64>]) -> Vec<f64> {
+    let matrix = DMatrix::from_fn(values.len(), columns.len(), |row, column| columns[column][row]);
+    let solved = matrix
+        .svd(true, true)
+        .solve(&DVector::from_column_slice(values), NEGLIGIBLE_PART);
+    solved.map_or_else(|_| vec![0.0; columns.len()], |solved| solved.as_slice().to_vec())
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Gaussian processes over an axis: how smooth a law is, and whether it repeats.
 //!
-//! k = σ² (½ + ½ exp(−d²/2ℓ²)), where it does not repeat, and σ² (½ + ½ exp(−2 sin²(πd/p)/ℓ²)), where it does: half of the variance is a
-//! value that is the same everywhere. Of two axes the kernels are multiplied.
+//! k = σ² (c + (1 − c) exp(−d²/2ℓ²)), where it does not repeat, and σ² (c + (1 − c) exp(−2 sin²(πd/p)/ℓ²)), where it does: a part c of the
+//! variance is a value that is the same everywhere. Of two axes the kernels are multiplied.
 
 use super::offer::Offer;
 use nalgebra::DMatrix;
@@ -69,7 +69,7 @@ fn of_period(offer: &Offer, first: f64, period: f64) -> Vec<Prior> {
         for length in LENGTHS_OF_PERIOD {
             let covariance = DMatrix::from_fn(POINTS_OF_PERIOD, POINTS_OF_PERIOD, |row, column| {
                 let sine = (PI * (row as f64 - column as f64) / POINTS_OF_PERIOD as f64).sin();
-                sigma * sigma * (0.5 + 0.5 * (-2.0 * (sine / length).powi(2)).exp())
+                variance(offer, sigma, (-2.0 * (sine / length).powi(2)).exp())
             });
             let root = root(&covariance);
             all.push(Prior {
@@ -113,8 +113,13 @@ fn covariance(offer: &Offer, sigma: f64, length: f64) -> DMatrix<f64> {
         if widths.len() > 1 {
             product *= along(1, row % second, column % second);
         }
-        sigma * sigma * (0.5 + 0.5 * product)
+        variance(offer, sigma, product)
     })
+}
+
+/// Covariance of two values with a scale and a likeness in what changes along the axis.
+fn variance(offer: &Offer, sigma: f64, alike: f64) -> f64 {
+    sigma * sigma * (offer.constant + (1.0 - offer.constant) * alike)
 }
 
 /// A root of a covariance: its product with its transpose is the covariance.

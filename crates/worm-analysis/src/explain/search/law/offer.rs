@@ -15,6 +15,13 @@ pub(in crate::explain) struct Offer {
     pub periods: Option<[f64; 2]>,
     /// What is typical of the values beyond the neutral one: four scales.
     pub sigmas: [f64; 4],
+    /// What part of its variance is a value that is the same everywhere.
+    pub constant: f64,
     /// Where the data are on the first axis.
     pub seen: Vec<f64>,
+}
+
+impl Offer {
+    /// That part where nothing else is known of it.
+    pub const CONSTANT: f64 = 0.5;
 }

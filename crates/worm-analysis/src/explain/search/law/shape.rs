@@ -1,5 +1,6 @@
 //! The form of a law of which some coefficients are open.
 
+use std::fmt;
 use worm_physics::effect::Setting;
 use worm_physics::{ActsOn, Axis, MAX_CELLS, Table};
 
@@ -78,6 +79,20 @@ impl LawShape {
 
     /// The law as a setting of the physics.
     pub fn setting(&self, coefficients: &[f64]) -> Option<Setting> {
-        Setting::of_table(self.table(coefficients)?, self.cell, MAX_CELLS).ok()
+        let table = self.table(coefficients)?;
+        let setting = if self.acts_on.is_of_motor() {
+            Setting::of_servo_table(table)
+        } else {
+            Setting::of_table(table, self.cell, MAX_CELLS)
+        };
+        setting.ok()
+    }
+}
+
+/// What it acts on, over what.
+impl fmt::Display for LawShape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let axes: Vec<&str> = self.axes.iter().map(|(axis, _)| axis.name()).collect();
+        write!(f, "{} over {}", self.acts_on.name(), axes.join(" and "))
     }
 }

@@ -24,7 +24,7 @@ fn style(stage: &StageView) -> (Mark, Colour) {
         StageKind::Baseline => (Mark::Box, MID),
         StageKind::Recalibrated => (Mark::Box, SHADE),
         StageKind::BestWrong => (Mark::Box, LIGHT),
-        StageKind::Named => (Mark::Box, ACCENT),
+        StageKind::Named | StageKind::Law => (Mark::Box, ACCENT),
         _ => (Mark::Frame, MUTED),
     }
 }

@@ -43,6 +43,11 @@ pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &St
         stage_view(StageKind::BestWrong, "best rival", "the best effect of another kind"),
         stage_view(StageKind::Named, named.0, named.1),
         stage_view(
+            StageKind::Law,
+            "with the law",
+            "the model with the law, which no effect describes",
+        ),
+        stage_view(
             StageKind::FreeForm,
             "free-form correction",
             "a correction of any form, fitted freely: about as much as can be closed",

@@ -212,7 +212,7 @@ fn gap(answer: &Answer) -> Option<TileRow> {
     let shown = stages(answer).into_iter().chain(floor).filter(|(view, stage)| {
         let is_shown = matches!(
             view.key,
-            StageKind::Baseline | StageKind::Recalibrated | StageKind::Named | StageKind::Floor
+            StageKind::Baseline | StageKind::Recalibrated | StageKind::Named | StageKind::Law | StageKind::Floor
         );
         is_shown && (!answer.is_by_advances() || stage.held_out_rms_m.is_finite())
     });
