@@ -9,7 +9,7 @@
 use super::cycle::{Cycle, crawl_until_periodic};
 use super::physics::Physics;
 use super::servo::physics::COPPER_PER_K;
-use super::servo::{ServoLaws, ServoMotor};
+use super::servo::{Ripple, ServoLaws, ServoMotor};
 use super::worm::SlidesDown;
 use std::f64::consts::TAU;
 
@@ -129,11 +129,16 @@ impl Motor {
     pub fn cycle(&self, load: &DriveLoad, cycle_s: f64) -> MotorCycle {
         let velocity_rad_per_s = TAU / cycle_s;
         let constant = self.servo.torque_constant;
-        // Ripple returns its work but for its mean, and heats the winding.
-        let (helps_n_m, ripple_n2_m2, ripple_n_m) = self.laws.ripple_of_a_turn();
-        let mut mean_square = load.mean_square_n2_m2 + ripple_n2_m2;
+        // Ripple returns its work but for its mean, which is one of the loads, and heats the winding.
+        let Ripple {
+            mean_n_m: helps_n_m,
+            mean_square_n2_m2: ripple_n2_m2,
+            largest_n_m: ripple_n_m,
+        } = self.laws.ripple_of_a_turn();
+        let work_j = load.work_j - TAU * helps_n_m;
+        let mut mean_square = load.mean_square_n2_m2 - 2.0 * helps_n_m * load.work_j / TAU + ripple_n2_m2;
         let mut friction_j = 0.0;
-        for &torque_n_m in &load.parts_n_m {
+        for torque_n_m in load.parts_n_m.iter().map(|torque_n_m| torque_n_m - helps_n_m) {
             let friction_n_m = self.friction_n_m(torque_n_m, velocity_rad_per_s);
             mean_square += friction_n_m * (2.0 * torque_n_m + friction_n_m) / PARTS as f64;
             friction_j += friction_n_m * TAU / PARTS as f64;
@@ -142,11 +147,14 @@ impl Motor {
         let warmer_k = self.laws.heat_k_per_j * self.laws.cooling_s * cold_copper_j / cycle_s;
         let winding_ohm = self.servo.winding_ohm * (1.0 + COPPER_PER_K * warmer_k);
         let copper_j = cold_copper_j * (winding_ohm / self.servo.winding_ohm);
-        let at = |torque_n_m: f64| torque_n_m + self.friction_n_m(torque_n_m, velocity_rad_per_s);
+        let at = |torque_n_m: f64| {
+            let left_n_m = torque_n_m - helps_n_m;
+            left_n_m + self.friction_n_m(left_n_m, velocity_rad_per_s)
+        };
         let driving_n_m = at(load.max_torque_n_m) + ripple_n_m;
         let strongest_n_m = driving_n_m.max(ripple_n_m - at(load.min_torque_n_m));
         MotorCycle {
-            energy_j: (copper_j + load.work_j + friction_j - TAU * helps_n_m).max(0.0),
+            energy_j: (copper_j + work_j + friction_j).max(0.0),
             copper_j,
             friction_j,
             peak_current_a: strongest_n_m / constant,
@@ -177,7 +185,8 @@ pub fn driven_cycle(physics: &Physics, cycle_s: f64) -> Result<(Cycle, DriveLoad
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Worm;
+    use crate::{ActsOn, Axis, Table, Worm};
+    use std::sync::Arc;
 
     /// On the level, with equal cells, the force on the stepping cell rises linearly from −F to F while it travels 2 δmax n/(n−1), and stays
     /// at F: mean and mean square are known.
@@ -233,6 +242,54 @@ mod tests {
         assert!((needs.peak_current_a - gives_n_m / 0.39).abs() < 1e-7);
         motor.laws.load_friction = 1.1;
         assert!(motor.cycle(&DriveLoad::constant(0.012), 2.5).peak_current_a > 1e3);
+    }
+
+    /// A table costs what the effect costs that it is read from; and the mean of a torque over the angle, once around, helps.
+    #[test]
+    fn laws_at_the_points_of_a_grid_cost_what_they_say() {
+        let table = |acts_on, axis, grid: Vec<f64>, value: Vec<f64>, period| {
+            let table = Table::new(acts_on, &[(axis, grid)], value, period).expect("a table");
+            vec![Arc::new(table)]
+        };
+        let load = DriveLoad::constant(0.2);
+        let cycle = |change: &dyn Fn(&mut ServoLaws)| {
+            let mut motor = plain();
+            change(&mut motor.laws);
+            motor.cycle(&load, 2.5)
+        };
+        let by_law = cycle(&|laws| laws.load_friction = 0.3);
+        let by_table = cycle(&|laws| {
+            laws.tables = table(
+                ActsOn::MotorFriction,
+                Axis::GearLoad,
+                vec![0.0, 1.0],
+                vec![0.0, 0.3],
+                None,
+            );
+        });
+        assert!(
+            (by_law.energy_j / by_table.energy_j - 1.0).abs() < 1e-6,
+            "{by_law:?} {by_table:?}"
+        );
+        let turn: Vec<f64> = (0..200).map(|at| TAU * f64::from(at) / 200.0).collect();
+        let wave = |mean: f64| {
+            let value = turn.iter().map(|angle| mean + 0.05 * (3.0 * angle).sin()).collect();
+            table(ActsOn::MotorTorque, Axis::MotorAngle, turn.clone(), value, Some(TAU))
+        };
+        let by_law = cycle(&|laws| (laws.ripple_n_m, laws.ripple_waves) = (0.05, 3.0));
+        let by_table = cycle(&|laws| laws.tables = wave(0.0));
+        assert!(
+            (by_law.energy_j / by_table.energy_j - 1.0).abs() < 1e-3,
+            "{by_law:?} {by_table:?}"
+        );
+        assert!((by_law.peak_current_a / by_table.peak_current_a - 1.0).abs() < 1e-3);
+        let helped = cycle(&|laws| laws.tables = wave(0.1));
+        let lighter = plain().cycle(&DriveLoad::constant(0.1), 2.5);
+        let ripple_j = 3.4 * 0.5 * 0.05 * 0.05 / (0.39 * 0.39) * 2.5;
+        assert!(
+            (helped.energy_j / (lighter.energy_j + ripple_j) - 1.0).abs() < 1e-3,
+            "{helped:?} {lighter:?}"
+        );
     }
 
     #[test]

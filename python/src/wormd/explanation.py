@@ -110,7 +110,7 @@ class Stage(Result):
     """A model in the order in which the gap between model and data shrinks."""
 
     stage: str
-    """Which: ``baseline``, ``recalibrated``, ``best-wrong``, ``named``, ``free-form`` or ``floor``."""
+    """Which: ``baseline``, ``recalibrated``, ``best-wrong``, ``named``, ``law``, ``free-form`` or ``floor``."""
     effect: str | None
     """The effect, where the stage has one."""
     fit_rms_m: float

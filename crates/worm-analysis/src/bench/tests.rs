@@ -127,9 +127,26 @@ fn the_plant_is_told_from_the_campaign() {
 fn a_model_that_was_written_is_read_as_the_same() {
     use std::collections::BTreeMap;
     use worm_physics::effect::Setting;
+    use worm_physics::{ActsOn, Axis, Table};
+    let axes = [
+        (Axis::GearLoad, vec![0.0, 0.25]),
+        (Axis::MotorSpeed, vec![0.0, 1.5, 12.0]),
+    ];
+    let value = vec![0.0, 0.0625, 0.125, 0.25, 0.375, 0.5];
+    let law = Table::new(ActsOn::MotorFriction, &axes, value, None).expect("a table");
+    let turn = Table::new(
+        ActsOn::MotorTorque,
+        &[(Axis::MotorAngle, vec![0.0, 0.5])],
+        vec![-0.125, 0.125],
+        Some(1.25),
+    );
     let values = BTreeMap::from([("coefficient".to_owned(), 0.25), ("motor_share".to_owned(), 0.75)]);
     let model = ServoModel {
-        effects: vec![Setting::of_servo_by_names("load-friction", &values).expect("an effect")],
+        effects: vec![
+            Setting::of_servo_by_names("load-friction", &values).expect("an effect"),
+            Setting::of_servo_table(law).expect("of the motor"),
+            Setting::of_servo_table(turn.expect("a table")).expect("of the motor"),
+        ],
         ..ServoModel::xl330_m288_t()
     };
     let text = model.to_toml();
@@ -145,6 +162,13 @@ fn a_model_that_was_written_is_read_as_the_same() {
         ),
         ("load-friction", "load-frictio", "did you mean `load-friction`?"),
         ("motor_share", "share", "share"),
+        (
+            "\"gear-load\"",
+            "\"load\"",
+            "acts_on = \"motor-friction\" cannot depend on load: give motor-speed, gear-load, output-load",
+        ),
+        ("motor-torque", "motor-friction", "cannot depend on motor-angle"),
+        ("[-0.125, 0.125]", "[-0.125, 12.5]", "must be from -10 to 10 N m"),
         ("current = \"winding\"", "current = \"rotor\"", "unknown variant"),
     ] {
         let error = ServoModel::from_toml(&text.replace(from, to), Path::new("model.toml")).expect_err(said);

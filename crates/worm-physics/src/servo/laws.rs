@@ -71,6 +71,17 @@ impl Default for ServoLaws {
     }
 }
 
+/// A torque that returns with the angle, over a whole turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ripple {
+    /// Its mean, N m, in the direction of the motor's.
+    pub mean_n_m: f64,
+    /// Its mean square, N² m².
+    pub mean_square_n2_m2: f64,
+    /// How far it is from its mean at most, N m.
+    pub largest_n_m: f64,
+}
+
 impl ServoLaws {
     /// Friction against the motion, N m, but for the viscous part: the torque on the gears presses their teeth together. At rest it is the
     /// most that friction can hold. `dry_n_m` is the friction without load, `motor_n_m` what the motor gives, `load_n_m` what holds the
@@ -115,20 +126,23 @@ impl ServoLaws {
         other_n_m + self.ripple_n_m * (TAU * wave).sin()
     }
 
-    /// Of that torque over a whole turn: its mean, N m, its mean square, N² m², and its largest magnitude, N m.
-    pub fn ripple_of_a_turn(&self) -> (f64, f64, f64) {
+    /// That torque over a whole turn.
+    pub fn ripple_of_a_turn(&self) -> Ripple {
         if self.tables_of(ActsOn::MotorTorque).next().is_none() {
-            return (0.0, 0.5 * self.ripple_n_m * self.ripple_n_m, self.ripple_n_m.abs());
+            return Ripple {
+                mean_n_m: 0.0,
+                mean_square_n2_m2: 0.5 * self.ripple_n_m * self.ripple_n_m,
+                largest_n_m: self.ripple_n_m.abs(),
+            };
         }
         let count = f64::from(PARTS_OF_TURN);
-        let all = (0..PARTS_OF_TURN).map(|part| self.ripple_at_n_m(TAU * f64::from(part) / count));
-        all.fold((0.0, 0.0, 0.0), |(mean, mean_square, largest), n_m| {
-            (
-                mean + n_m / count,
-                mean_square + n_m * n_m / count,
-                f64::max(largest, n_m.abs()),
-            )
-        })
+        let all = || (0..PARTS_OF_TURN).map(|part| self.ripple_at_n_m(TAU * f64::from(part) / count));
+        let mean_n_m = all().sum::<f64>() / count;
+        Ripple {
+            mean_n_m,
+            mean_square_n2_m2: all().map(|n_m| n_m * n_m).sum::<f64>() / count,
+            largest_n_m: all().map(|n_m| (n_m - mean_n_m).abs()).fold(0.0, f64::max),
+        }
     }
 
     fn tables_of(&self, acts_on: ActsOn) -> impl Iterator<Item = &Table> {

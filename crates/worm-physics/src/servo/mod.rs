@@ -24,6 +24,6 @@ pub mod physics;
 #[cfg(test)]
 mod tests;
 
-pub use laws::ServoLaws;
+pub use laws::{Ripple, ServoLaws};
 pub use motion::{Command, Energy, LONGEST_STEP_S, ServoMotion};
 pub use physics::{COUNT_RAD, COUNTS_PER_TURN, Pendulum, SPEED_COUNT_RAD_S, ServoMotor, ServoPhysics};

@@ -193,9 +193,13 @@ pub(in crate::explain) fn find<P: Plant>(
         };
         search.fit(&mut |fraction| report("laws", 0.9 + 0.05 * fraction))
     });
-    let none = judge
-        .none
-        .with_law(laws.as_ref().and_then(|laws| laws.ln_evidence(discrepancy)));
+    let gains = judged
+        .iter()
+        .filter(|one| one.holds)
+        .filter_map(|one| Some(recalibrated_held_out.chi_squared - one.candidate.held_out.as_ref()?.chi_squared));
+    let gain = gains.fold(0.0, f64::max);
+    let of_law = laws.as_ref().and_then(|laws| laws.ln_evidence(discrepancy, gain));
+    let none = judge.none.with_law(of_law);
     let mut selected = decide(none, judged, &unfitted);
     for candidate in &mut selected.candidates {
         candidate.fit = plant.with_whole_effects(candidate.fit.clone());

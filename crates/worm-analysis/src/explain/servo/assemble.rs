@@ -126,6 +126,9 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
     let runs = runs(servo, parts, with_answer);
     let agrees = |run: &ServoRun| run.mean_absolute_error_rad[if with_answer.is_none() { 1 } else { 2 }];
     let mut sentence = words::sentence(verdict, &effects, &rivals, selected, found.open_share, None, HELD_OUT);
+    if let Some((_, law)) = &of_law {
+        sentence = format!("{sentence} {}", law.sentence);
+    }
     sentence = format!("{sentence} {}", current.sentence);
     let mut model = written(servo, nominal, final_fit);
     model.current = current.measures.unwrap_or(nominal.current);

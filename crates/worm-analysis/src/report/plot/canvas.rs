@@ -23,6 +23,7 @@ const NAME_CHARACTER: f64 = 0.53 * TEXT;
 const BESIDE_NAME: f64 = 14.0;
 const RIGHT: f64 = 10.0;
 const ROW_LABEL: f64 = 44.0;
+const BOLD_CHARACTER: f64 = 0.65 * TEXT;
 const TOP: f64 = 20.0;
 const TICK_LABELS: f64 = 24.0;
 const X_LABEL: f64 = 20.0;
@@ -296,11 +297,10 @@ pub fn draw(
     let left = (NAME_CHARACTER * longest_name as f64 + BESIDE_NAME).clamp(LEFT, 0.5 * WIDTH);
     let foot = TICK_LABELS + if sheet.x_label.is_some() { X_LABEL } else { 0.0 };
     let height = TOP + rows_height - BETWEEN_ROWS + foot;
-    let right = if sheet.rows.iter().any(|row| row.label.is_some()) {
-        ROW_LABEL
-    } else {
-        RIGHT
-    };
+    let labels = sheet.rows.iter().filter_map(|row| row.label.as_ref());
+    let right = labels
+        .map(|(label, _)| ROW_LABEL.max(BOLD_CHARACTER * label.chars().count() as f64 + BESIDE_NAME))
+        .fold(RIGHT, f64::max);
     Raw::picture(&sheet.description, WIDTH, height, |raw| {
         let mut top = TOP;
         for (number, row) in sheet.rows.iter().enumerate() {

@@ -56,12 +56,11 @@ pub(in crate::explain) struct FittedLaws {
 }
 
 impl FittedLaws {
-    /// Logarithm of the probability of the data under some law, whichever; none where no law is worth a look.
-    pub fn ln_evidence(&self, discrepancy: &Discrepancy) -> Option<f64> {
-        let of_each = self
-            .each
-            .iter()
-            .map(|(law, of)| evidence(discrepancy, None, &law.fit, &|_| None).usual + of.ln_form);
+    /// Logarithm of the probability of the data under some law, whichever, of those whose score on data held out falls by more than that of
+    /// the library; none without such a law.
+    pub fn ln_evidence(&self, discrepancy: &Discrepancy, of_library: f64) -> Option<f64> {
+        let better = self.each.iter().filter(|(law, _)| law.gain > CLAIMS.max(of_library));
+        let of_each = better.map(|(law, of)| evidence(discrepancy, None, &law.fit, &|_| None).usual + of.ln_form);
         let all: Vec<f64> = of_each.collect();
         (!all.is_empty()).then(|| ln_sum(all) - (self.offered as f64).ln())
     }

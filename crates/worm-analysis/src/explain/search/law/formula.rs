@@ -89,9 +89,11 @@ impl Term {
             let space = if unit.is_empty() { "" } else { " " };
             format!("{}{space}{unit}{rest}", figure(value))
         };
-        let per = |power: i32| match power {
-            1 => format!("{unit}/({})", axis.unit()),
-            _ => format!("{unit}/({})²", axis.unit()),
+        let per = |power: i32| match (power, unit == axis.unit()) {
+            (1, true) => String::new(),
+            (1, false) => format!("{unit}/({})", axis.unit()),
+            (_, true) => format!("/({})", axis.unit()),
+            (_, false) => format!("{unit}/({})²", axis.unit()),
         };
         let whole = unit.to_owned();
         match self {
@@ -303,6 +305,14 @@ mod tests {
             (Term::Power(1), 0.2, Axis::Speed, "N", "20.0 N/(m/s) · speed"),
             (Term::Power(1), -0.3, Axis::Time, "", "−30.0 1/(cycles) · time"),
             (Term::Step(0.05), -0.4, Axis::Place, "", "−0.400 from place 0.0500 m on"),
+            (Term::Power(1), 3e-3, Axis::GearLoad, "N m", "0.300 · gear load"),
+            (
+                Term::Power(2),
+                2e-5,
+                Axis::GearLoad,
+                "N m",
+                "0.200 1/(N m) · gear load²",
+            ),
         ] {
             let text = term.text(&[by], 0.01, axis, unit);
             assert_eq!(text, expected);
