@@ -284,7 +284,7 @@ class Law(LawOver):
     formula: str | None
     """The nearest formula of few terms, in SI units, where one predicts as well."""
     closure: float
-    """Fraction of the squared gap that it closes on cycles that it was not fitted to."""
+    """Fraction of the squared gap that it closes on data that it was not fitted to."""
     closure_interval: tuple[float, ...]
     """90 % interval of that."""
     improvement: float

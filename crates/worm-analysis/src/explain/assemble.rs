@@ -25,7 +25,7 @@ use crate::explain::worm::speed_droop::SpeedDroop;
 use crate::explain::worm::torque_cycle::torque_cycles;
 pub(super) use calibration::calibration;
 pub(super) use effects::named_effects;
-pub(super) use law::law as law_in_words;
+pub(super) use law::law_that_outdid;
 pub(super) use screening::{add_unscreened, screening};
 use worm_estimator::config::Config;
 

@@ -48,11 +48,15 @@ fn drawn_of(law: &FoundLaw) -> (&'static str, &'static str, f64) {
 /// What there is to say of a law: what it says, how sure that is, and the nearest formula.
 pub(super) fn paragraphs(law: &FoundLaw) -> Vec<String> {
     let [low, high] = law.closure_interval.map(percent);
+    let closure = match law.closure.is_nan() {
+        true => String::new(),
+        false => format!("The closure lies between {low} and {high} (90 %). "),
+    };
     let mut all = vec![
         law.sentence.clone(),
         format!(
-            "The closure lies between {low} and {high} (90 %). The law stands in the model as an effect named table, which every \
-             simulation and prediction obeys. It is no cause: what lies beyond the data that carry it is not known."
+            "{closure}The law stands in the model as an effect named table, which every simulation and prediction obeys. It is no cause: \
+             what lies beyond the data that carry it is not known."
         ),
     ];
     let formula = law.formula.as_ref();

@@ -59,7 +59,8 @@ pub struct FoundLaw {
     pub band: Vec<[f64; 2]>,
     /// The nearest formula of few terms, in SI units, where one predicts as well.
     pub formula: Option<String>,
-    /// Fraction of the squared gap after recalibration that it closes, down to the noise floor, on data that it was not fitted to.
+    /// Fraction of the squared gap after recalibration that it closes, down to the noise floor, on data that it was not fitted to; `NaN`, null in
+    /// the JSON, where that is within its error.
     pub closure: f64,
     /// 90 % interval of that.
     pub closure_interval: [f64; 2],

@@ -29,13 +29,27 @@ pub(super) fn closure_of_worm(
 }
 
 /// A law that was found, as people read it; none where it closes too little of the gap to be one. `held_out` says what it was judged on.
+/// A closure that is not known is that of no law.
 pub(in crate::explain) fn law(
     found: &find::FoundLaw,
     (closure, closure_interval): (f64, [f64; 2]),
     held_out: &str,
 ) -> Option<FoundLaw> {
+    if closure.is_nan() {
+        return None;
+    }
+    law_that_outdid(found, (closure, closure_interval), held_out)
+}
+
+/// The same of a law that was held against the library, and is more probable and predicts better: how much of the gap it closes may be
+/// within its error, as an effect's may, and is `NaN` then.
+pub(in crate::explain) fn law_that_outdid(
+    found: &find::FoundLaw,
+    (closure, closure_interval): (f64, [f64; 2]),
+    held_out: &str,
+) -> Option<FoundLaw> {
     let law = &found.law;
-    if closure.is_nan() || closure < CLOSES || closure_interval[0] <= 0.0 {
+    if closure < CLOSES || closure_interval[0] <= 0.0 {
         return None;
     }
     let over = over(&law.shape);
@@ -77,11 +91,16 @@ fn sentence(over: &LawOver, formula: Option<&Formula>, rivals: &[LawOver], closu
         Some(constant) => format!("{} is the same everywhere, {}", subject(over), constant.text),
         None => depends(over),
     };
-    let mut text = format!(
-        "{}: it closes {} of the gap on {held_out} that it was not fitted to.",
-        capitalised(&says),
-        percent(closure)
-    );
+    let says = capitalised(&says);
+    let mut text = match closure.is_nan() {
+        true => format!(
+            "{says}: with it {held_out} that it was not fitted to are more probable; how much of the gap it closes there is within its error."
+        ),
+        false => format!(
+            "{says}: it closes {} of the gap on {held_out} that it was not fitted to.",
+            percent(closure)
+        ),
+    };
     if !rivals.is_empty() {
         let others: Vec<String> = rivals.iter().map(depends).collect();
         text += &format!(" As well does {}.", others.join("; or "));

@@ -10,7 +10,7 @@ use super::present_current::decide;
 use super::recorded_servo::{RecordedServo, ServoProblem};
 use crate::bench::ServoModel;
 use crate::explain::answer::{Calibrated, FoundOnset, NamedEffect, StageKind, Verdict};
-use crate::explain::assemble::{law_in_words, named_effects, screening};
+use crate::explain::assemble::{law_that_outdid, named_effects, screening};
 use crate::explain::search::cross_validation::hold_out;
 use crate::explain::search::find::Found;
 use crate::explain::search::fit::Fit;
@@ -94,7 +94,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
     let of_law = parts.law.as_ref().and_then(|found| {
         let (left, open) = found.law.held_out.determined_beside(without);
         let closure = closed(servo, (recalibrated, &open), (&found.law.fit, &left), servo.scatter_rad);
-        Some((&found.law, law_in_words(found, closure, HELD_OUT)?))
+        Some((&found.law, law_that_outdid(found, closure, HELD_OUT)?))
     });
     let fitted_law = of_law.as_ref().map(|(law, _)| *law);
     let verdict = selected.verdict;

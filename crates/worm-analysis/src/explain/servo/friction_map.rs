@@ -45,8 +45,7 @@ pub(super) fn map(servo: &RecordedServo<'_>, physics: &ServoPhysics) -> Vec<Fric
                 .or_default();
             second.readings += 1.0;
             second.measured += moment.friction_n_m;
-            second.model += physics.friction_n_m(moment.motor_n_m, moment.arm_n_m, moment.velocity_rad_s)
-                + physics.motor.viscous_n_m_s * speed;
+            second.model += moment.friction_of(physics);
             second.load += load;
         }
     }

@@ -4,10 +4,12 @@
 use super::recorded_servo::RecordedServo;
 use super::torque_balance::{Moment, moments};
 use crate::explain::search::fit::Fit;
-use crate::explain::search::law::grid::{about_rest, ends, evenly, scaled, thinned, with_spacing};
+use crate::explain::search::law::grid::{about_rest, ends, evenly, parts, scaled, thinned, with_spacing};
 use crate::explain::search::law::offer::Offer;
 use crate::explain::search::law::shape::LawShape;
 use crate::explain::search::plant::Recorded;
+use nalgebra::{DMatrix, DVector};
+use worm_physics::servo::ServoPhysics;
 use worm_physics::{ActsOn, Axis};
 
 /// Points along a load, where there is one axis and where there are two; and what lies between those along the angle at least, rad.
@@ -20,21 +22,27 @@ const LONGEST_PERIOD: f64 = 0.7;
 /// Scales of a torque, as a fraction of the largest on the gears.
 const TORQUES: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
 
+/// Speed from which a reading shows friction, rad/s; and readings that a point of a grid must have to be far from nothing.
+const MOVES_RAD_S: f64 = 0.1;
+const FEW: f64 = 5.0;
+
+/// Where a reading is on an axis.
+fn on(axis: Axis, moment: &Moment) -> f64 {
+    match axis {
+        Axis::MotorSpeed => moment.velocity_rad_s.abs(),
+        Axis::GearLoad => moment.on_gears_n_m(),
+        Axis::OutputLoad => moment.against_n_m(),
+        _ => moment.angle_rad,
+    }
+}
+
 /// Every law that is tried.
 pub(super) fn laws(servo: &RecordedServo<'_>, recalibrated: &Fit) -> Vec<Offer> {
     let physics = servo.physics(recalibrated);
     let all: Vec<Moment> = (0..servo.runs())
         .flat_map(|run| moments(servo, run, &physics))
         .collect();
-    let seen = |axis: Axis| -> Vec<f64> {
-        let of = |moment: &Moment| match axis {
-            Axis::MotorSpeed => moment.velocity_rad_s.abs(),
-            Axis::GearLoad => moment.on_gears_n_m(),
-            Axis::OutputLoad => moment.against_n_m(),
-            _ => moment.angle_rad,
-        };
-        all.iter().map(of).collect()
-    };
+    let seen = |axis: Axis| -> Vec<f64> { all.iter().map(|moment| on(axis, moment)).collect() };
     let largest_n_m = seen(Axis::GearLoad).into_iter().fold(0.0, f64::max);
     let grid = |axis: Axis, points: usize| -> Option<Vec<f64>> {
         let (from, to) = ends(&seen(axis))?;
@@ -63,6 +71,7 @@ pub(super) fn laws(servo: &RecordedServo<'_>, recalibrated: &Fit) -> Vec<Offer> 
                 ActsOn::MotorFriction => 0.0,
                 _ => Offer::CONSTANT,
             },
+            guess: by_torque_balance(&all, &physics, acts_on, &axes),
             shape: LawShape::of_points(acts_on, axes, None),
         })
     };
@@ -78,4 +87,48 @@ pub(super) fn laws(servo: &RecordedServo<'_>, recalibrated: &Fit) -> Vec<Offer> 
     .into_iter()
     .flatten()
     .collect()
+}
+
+/// What the torque balance shows of a law beyond the model, at the points of its grid: where an arm comes to rest changes by leaps, so a law
+/// that is far from none is not found from there. Least squares over the readings in motion; none without such readings.
+fn by_torque_balance(
+    all: &[Moment],
+    physics: &ServoPhysics,
+    acts_on: ActsOn,
+    axes: &[(Axis, Vec<f64>)],
+) -> Option<Vec<f64>> {
+    let second = axes.get(1).map_or(1, |(_, grid)| grid.len());
+    let points = axes[0].1.len() * second;
+    let mut normal = DMatrix::identity(points, points) * FEW;
+    let mut along = DVector::zeros(points);
+    for moment in all.iter().filter(|moment| moment.velocity_rad_s.abs() > MOVES_RAD_S) {
+        let beyond_n_m = moment.friction_n_m - moment.friction_of(physics);
+        let value = match acts_on {
+            // What turns the motor on is no friction.
+            ActsOn::MotorTorque => -beyond_n_m * moment.velocity_rad_s.signum(),
+            _ => beyond_n_m,
+        };
+        let along_axis = |axis: usize| match axes.get(axis) {
+            Some((axis, grid)) => parts(grid, on(*axis, moment)),
+            None => [(0, 1.0), (0, 0.0)],
+        };
+        let (rows, columns) = (along_axis(0), along_axis(1));
+        let hats: Vec<(usize, f64)> = rows
+            .iter()
+            .flat_map(|(row, of_row)| {
+                columns
+                    .iter()
+                    .map(move |(column, part)| (row * second + column, of_row * part))
+            })
+            .collect();
+        for &(one, by) in &hats {
+            along[one] += by * value;
+            for &(other, of_other) in &hats {
+                normal[(one, other)] += by * of_other;
+            }
+        }
+    }
+    let [least, most] = acts_on.range();
+    let found = normal.cholesky()?.solve(&along);
+    Some(found.iter().map(|value| value.clamp(least, most)).collect())
 }

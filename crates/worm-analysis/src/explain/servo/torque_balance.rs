@@ -28,6 +28,12 @@ impl Moment {
         0.5 * (self.motor_n_m + self.arm_n_m).abs()
     }
 
+    /// The same friction by some physics.
+    pub fn friction_of(&self, physics: &ServoPhysics) -> f64 {
+        physics.friction_n_m(self.motor_n_m, self.arm_n_m, self.velocity_rad_s)
+            + physics.motor.viscous_n_m_s * self.velocity_rad_s.abs()
+    }
+
     /// Torque that holds the arm, N m: below 0 where it drives the motor.
     pub fn against_n_m(&self) -> f64 {
         self.arm_n_m * self.velocity_rad_s.signum()

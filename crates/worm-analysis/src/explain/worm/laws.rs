@@ -67,6 +67,7 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
             periods: may_repeat.then_some([OF_PERIOD * spacing, 0.7 * width]),
             sigmas,
             constant: Offer::CONSTANT,
+            guess: None,
             seen: thinned(seen),
             shape: LawShape::of_points(acts_on, vec![(axis, grid)], cell),
         }

@@ -56,10 +56,10 @@ pub(in crate::explain) struct FittedLaws {
 }
 
 impl FittedLaws {
-    /// Logarithm of the probability of the data under some law, whichever, of those whose score on data held out falls by more than that of
-    /// the library; none without such a law.
+    /// Logarithm of the probability of the data under some law, whichever, of those whose score on data held out falls by so much more than
+    /// that of the library (0 where nothing of it holds) that there is a law; none without such a law.
     pub fn ln_evidence(&self, discrepancy: &Discrepancy, of_library: f64) -> Option<f64> {
-        let better = self.each.iter().filter(|(law, _)| law.gain > CLAIMS.max(of_library));
+        let better = self.each.iter().filter(|(law, _)| law.gain > of_library + CLAIMS);
         let of_each = better.map(|(law, of)| evidence(discrepancy, None, &law.fit, &|_| None).usual + of.ln_form);
         let all: Vec<f64> = of_each.collect();
         (!all.is_empty()).then(|| ln_sum(all) - (self.offered as f64).ln())
@@ -81,21 +81,21 @@ impl<P: Plant> LawSearch<'_, '_, P> {
     pub fn fit(&self, report: &mut dyn FnMut(f64)) -> FittedLaws {
         let offers = self.problem.plant.laws(self.recalibrated);
         let offered = offers.len();
-        let mut weighed: Vec<Weighed> = Vec::new();
+        let mut weighed: Vec<(Weighed, Fit)> = Vec::new();
         for (done, offer) in offers.into_iter().enumerate() {
             report(0.6 * done as f64 / offered as f64);
-            let neutral = vec![0.0; offer.shape.centre.len()];
-            weighed.extend(self.weigh(self.recalibrated, &offer, &neutral));
+            let (about, beyond) = self.start(&offer);
+            weighed.extend(self.weigh(&about, &offer, &beyond).map(|weighed| (weighed, about)));
         }
-        weighed.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
-        let best = weighed.first().map_or(0.0, |best| best.ln_bayes);
-        weighed.retain(|one| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
+        weighed.sort_by(|(a, _), (b, _)| b.ln_bayes.total_cmp(&a.ln_bayes));
+        let best = weighed.first().map_or(0.0, |(best, _)| best.ln_bayes);
+        weighed.retain(|(one, _)| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
         weighed.truncate(FITTED);
         let tried = weighed.len() as f64;
         let mut each: Vec<(FittedLaw, Weighed)> = Vec::new();
-        for (done, one) in weighed.into_iter().enumerate() {
+        for (done, (one, about)) in weighed.into_iter().enumerate() {
             report(0.6 + 0.4 * done as f64 / tried);
-            each.push((self.fit_to_the_end(self.recalibrated, &one), one));
+            each.push((self.fit_to_the_end(&about, &one), one));
         }
         FittedLaws { each, offered }
     }
@@ -119,6 +119,23 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         report(0.8);
         let formula = nearest(self, &law, (&of.offer, &of.scores));
         Some(FoundLaw { law, rivals, formula })
+    }
+
+    /// The fit about which an offer is weighed, with derivatives, and the values of the law in it beyond neutral: those of its guess, where
+    /// they are nearer to the data than none.
+    fn start(&self, offer: &Offer) -> (Fit, Vec<f64>) {
+        if let Some(guess) = &offer.guess {
+            let mut hypothesis = self.recalibrated.hypothesis.clone();
+            hypothesis.law = Some(Arc::new(offer.shape.clone().about(guess)));
+            let mut fit = self
+                .problem
+                .fit_from(&hypothesis, self.recalibrated.at.clone(), Some(self.recalibrated));
+            if fit.chi_squared < self.recalibrated.chi_squared {
+                self.problem.compute_jacobian(&mut fit);
+                return (fit, guess.clone());
+            }
+        }
+        (self.recalibrated.clone(), vec![0.0; offer.shape.centre.len()])
     }
 
     /// What the data say of an offer, to first order about a fit at some values of the law beyond neutral.

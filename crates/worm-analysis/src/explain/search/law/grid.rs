@@ -60,6 +60,14 @@ pub(in crate::explain) fn scaled(axis: Axis, grid: &[f64]) -> Vec<f64> {
     }
 }
 
+/// The points of a grid about a place, with the part that each has in a value there that is linear between points and flat beyond them.
+pub(in crate::explain) fn parts(grid: &[f64], at: f64) -> [(usize, f64); 2] {
+    let above = grid.partition_point(|point| *point <= at).clamp(1, grid.len() - 1);
+    let (from, to) = (grid[above - 1], grid[above]);
+    let part = ((at - from) / (to - from)).clamp(0.0, 1.0);
+    [(above - 1, 1.0 - part), (above, part)]
+}
+
 /// At most so many, evenly.
 pub(in crate::explain) fn thinned(seen: &[f64]) -> Vec<f64> {
     seen.iter().copied().step_by(seen.len().div_ceil(SEEN).max(1)).collect()

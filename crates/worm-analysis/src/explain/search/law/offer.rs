@@ -17,6 +17,9 @@ pub(in crate::explain) struct Offer {
     pub sigmas: [f64; 4],
     /// What part of its variance is a value that is the same everywhere.
     pub constant: f64,
+    /// Values beyond the neutral one, at the points of its grid, from which it is looked for where they do better than none: what can be read
+    /// from the recordings without a fit.
+    pub guess: Option<Vec<f64>>,
     /// Where the data are on the first axis.
     pub seen: Vec<f64>,
 }
