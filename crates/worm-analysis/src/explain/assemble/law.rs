@@ -30,7 +30,7 @@ pub(super) fn closure_of_worm(
 
 /// A law that was found, as people read it; none where it closes too little of the gap to be one. `held_out` says what it was judged on.
 /// A closure that is not known is that of no law.
-pub(in crate::explain) fn law(
+pub(super) fn law(
     found: &find::FoundLaw,
     (closure, closure_interval): (f64, [f64; 2]),
     held_out: &str,

@@ -416,6 +416,19 @@ mod tests {
         assert_eq!(strong.verdict, Verdict::Explained, "its law may be wrong by that");
     }
 
+    /// A law that nobody listed is something else, too: it stands against the best effect, whose own law may be a little wrong.
+    #[test]
+    fn a_law_that_is_more_probable_than_every_effect_is_outside_the_library() {
+        let with = |ln_law: f64, ln_bayes: f64| {
+            let none = of(NONE_AT, NONE_AT - 10.0).with_law(Some(NONE_AT + ln_law));
+            decide(none, vec![judged(&["pad-creep"], ln_bayes, 20.0)], &[]).verdict
+        };
+        assert_eq!(with(80.0, 40.0), Verdict::OutsideLibrary);
+        assert_eq!(with(30.0, 40.0), Verdict::Explained);
+        assert_eq!(with(4020.0, 4000.0), Verdict::Explained, "its law may be wrong by that");
+        assert_eq!(with(4080.0, 4000.0), Verdict::OutsideLibrary);
+    }
+
     #[test]
     fn what_does_not_matter_or_is_within_chance_is_as_good_as_none() {
         for spoil in [
