@@ -5,7 +5,7 @@ use super::assemble::{Parts, assemble};
 use super::error::ExplainError;
 use super::search::find::{Options, find};
 use super::search::hypothesis::Hypothesis;
-use super::search::law::find::LawSearch;
+use super::search::law::fit::LawSearch;
 use super::search::plant::{Plant, Recorded};
 use super::search::recalibrate::{measure_noise, recalibrate};
 use super::worm::prepare::prepare;

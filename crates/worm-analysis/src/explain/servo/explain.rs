@@ -11,7 +11,7 @@ use crate::explain::error::ExplainError;
 use crate::explain::recorded::left_out;
 use crate::explain::search::find::{Options, find};
 use crate::explain::search::hypothesis::Hypothesis;
-use crate::explain::search::law::find::LawSearch;
+use crate::explain::search::law::fit::LawSearch;
 use crate::explain::search::plant::{Plant, Recorded};
 use crate::explain::search::recalibrate::{measure_noise, recalibrate};
 use worm_physics::servo::Pendulum;

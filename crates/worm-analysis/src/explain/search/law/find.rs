@@ -1,15 +1,13 @@
 //! The search for a law: over which quantity, of what form, and whether it predicts what it was not fitted to.
 
-use super::super::cross_validation::HeldOut;
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
-use super::super::folds::Folds;
 use super::super::judge::evidence::evidence;
 use super::super::judge::ln_sum::{ln_mean, ln_sum};
 use super::super::plant::Plant;
-use super::super::problem::FitProblem;
 use super::evidence::Scores;
-use super::fitted_law::{FittedLaw, Start, fit_shape};
+use super::fit::{LawSearch, Start, fit_shape};
+use super::fitted_law::FittedLaw;
 use super::formula::{Formula, nearest};
 use super::kernel::{Prior, priors};
 use super::offer::Offer;
@@ -64,16 +62,6 @@ impl FittedLaws {
         let all: Vec<f64> = of_each.collect();
         (!all.is_empty()).then(|| ln_sum(all) - (self.offered as f64).ln())
     }
-}
-
-/// What every law is fitted with and held against.
-pub(in crate::explain) struct LawSearch<'s, 'p, P> {
-    pub problem: &'s FitProblem<'p, P>,
-    pub discrepancy: &'s Discrepancy,
-    /// Without a law, with derivatives; and on data held out.
-    pub recalibrated: &'s Fit,
-    pub without: &'s HeldOut,
-    pub folds: &'s Folds,
 }
 
 impl<P: Plant> LawSearch<'_, '_, P> {

@@ -6,8 +6,8 @@
 use super::super::fit::Fit;
 use super::super::plant::Plant;
 use super::evidence::Scores;
-use super::find::LawSearch;
-use super::fitted_law::{FittedLaw, STEP, Start, fit_shape};
+use super::fit::{LawSearch, STEP, Start, fit_shape};
+use super::fitted_law::FittedLaw;
 use super::offer::Offer;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
