@@ -22,7 +22,7 @@ use worm_analysis::explain::{Answer, Evidence, ExplainError, Options, explain, e
 use worm_analysis::recording::Wanted;
 use worm_analysis::report;
 use worm_estimator::config::Config;
-use worm_physics::effect::{named, named_of_servo};
+use worm_physics::effect::named_of_either;
 
 /// Arguments of `wormd explain`.
 #[derive(Debug, Args)]
@@ -145,8 +145,8 @@ fn print_answer(
 
 /// The name of an effect of either library.
 fn effect_name(text: &str) -> Result<&'static str, String> {
-    let effect = named(text).or_else(|error| named_of_servo(text).map_err(|_| error));
-    effect.map(|effect| effect.name).map_err(|error| error.to_string())
+    let effect = named_of_either(text).map_err(|error| error.to_string())?;
+    Ok(effect.name)
 }
 
 /// A number in a range.

@@ -131,8 +131,8 @@ fn it_crawls_and_is_recorded_and_its_log_says_what_the_current_shows() {
         (&false.into(), &serde_json::Value::Null)
     );
     let shown_j = run["current"]["work_j"][0].as_f64().expect("a work");
-    // Of the level's 46.7 mJ, as far as the friction of the gears is known.
-    assert!((0.03..0.06).contains(&shown_j), "{run}");
+    // Of the level's 46.7 mJ; wherever in its gait the worm was stopped, which is no evidence.
+    assert!((0.042..0.052).contains(&shown_j), "{run}");
     let stages = explained["gap"].as_array().expect("a list");
     assert!(
         stages

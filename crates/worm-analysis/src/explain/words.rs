@@ -6,7 +6,6 @@ use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::judge::decision::Selected;
 use crate::explain::search::parameter::{Free, What};
 use crate::explain::worm::nuisance::Nuisance;
-use crate::explain::worm::predict::FAST_GAIT_S;
 use crate::explain::worm::recorded_worm::RecordedWorm;
 use crate::recording::Repair;
 use worm_estimator::number::percent;
@@ -16,6 +15,8 @@ use worm_physics::effect::{LIBRARY, Visible};
 const WORTH_A_WORD: f64 = 0.1;
 /// Standard deviations from which a deviation is no chance.
 const SURE: f64 = 3.0;
+/// Time of a gait cycle below which the current alone overstates the work, s: at 1.8 s by a fiftieth, at 1.3 s by more.
+const FAST_GAIT_S: f64 = 1.8;
 
 /// The verdict in a sentence or two; `held_out` is what the effects were judged on that they were not fitted to.
 pub(super) fn sentence(
@@ -236,7 +237,7 @@ pub(super) fn warnings(
         .fold(f64::INFINITY, f64::min);
     if !worm.sees_positions() && fastest_s < FAST_GAIT_S {
         warnings.push(format!(
-            "at {fastest_s:.1} s a cycle work by the current alone comes out too large, of sound virtual worms by up to two fifths: record a crawl of \
+            "at {fastest_s:.1} s a cycle work by the current alone comes out too large, of sound virtual worms by up to a seventh: record a crawl of \
              2.5 s a cycle",
         ));
     }

@@ -36,6 +36,6 @@ mod table;
 pub use definition::{Effect, MAX_PARAMETERS, Parameter, Scope, Sense, ShapeStarts, Visible};
 pub use error::SettingError;
 pub use library::{LIBRARY, MOTOR_DROOP, named};
-pub use servo_library::{SERVO_LIBRARY, named_of_servo};
+pub use servo_library::{SERVO_LIBRARY, named_of_either, named_of_servo};
 pub use setting::Setting;
 pub use table::TABLE;

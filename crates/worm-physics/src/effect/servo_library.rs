@@ -2,7 +2,7 @@
 
 use super::definition::Effect;
 use super::error::SettingError;
-use super::library::unknown;
+use super::library::{LIBRARY, unknown};
 use super::servo;
 
 /// Every effect of a servo on a bench, in the order in which reports list them.
@@ -29,10 +29,20 @@ pub fn named_of_servo(name: &str) -> Result<&'static Effect, SettingError> {
     found.copied().ok_or_else(|| unknown(name, &SERVO_LIBRARY))
 }
 
+/// The effect of a name, of a worm or of a servo: no name is in both libraries.
+///
+/// # Errors
+/// [`SettingError::Unknown`] with the nearest name, where one is near, and all that there are.
+pub fn named_of_either(name: &str) -> Result<&'static Effect, SettingError> {
+    let both: Vec<&'static Effect> = LIBRARY.iter().chain(&SERVO_LIBRARY).copied().collect();
+    let found = both.iter().find(|effect| effect.name == name);
+    found.copied().ok_or_else(|| unknown(name, &both))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{LIBRARY, Setting};
+    use crate::effect::Setting;
     use crate::servo::{Pendulum, ServoMotor, ServoPhysics};
 
     fn bench() -> ServoPhysics {
@@ -73,7 +83,9 @@ mod tests {
         for effect in SERVO_LIBRARY {
             assert!(LIBRARY.iter().all(|other| other.name != effect.name), "{}", effect.name);
         }
-        let error = named_of_servo("load-frictoin").expect_err("mistyped").to_string();
-        assert!(error.contains("did you mean `load-friction`?"), "{error}");
+        for (name, meant) in [("load-frictoin", "load-friction"), ("paylaod", "payload")] {
+            let error = named_of_either(name).expect_err("mistyped").to_string();
+            assert!(error.contains(&format!("did you mean `{meant}`?")), "{error}");
+        }
     }
 }

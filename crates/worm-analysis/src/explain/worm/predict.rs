@@ -10,9 +10,6 @@ use super::walk::Walk;
 use crate::explain::search::hypothesis::Hypothesis;
 use worm_physics::{Mechanics, Physics, Worm};
 
-/// Time of a gait cycle below which a gait is fast for the current alone, s: at 2.5 s it makes no difference, at 1.3 s it does.
-pub(in crate::explain) const FAST_GAIT_S: f64 = 2.0;
-
 /// The runs, and the nominal worm in each.
 pub(in crate::explain) struct Scene<'a> {
     pub observed: Vec<Observed<'a>>,
@@ -67,11 +64,7 @@ impl Scene<'_> {
     /// Whether the crawl of a run is simulated for some cycles and then repeated.
     pub fn repeats(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> bool {
         let is_steady = !hypothesis.throughout && hypothesis.changes_at(run).is_none();
-        let observed = &self.observed[run];
-        // By the current alone the torque has to be right to a per cent, and at a fast gait a cycle at the mean pace leaves more of it than
-        // one at the pace of each: 0.4 instead of 0.15 mN m on the virtual worm, which then seemed to have 1.4 times its friction.
-        let is_fast_unseen = !observed.sees_positions && observed.cycle_s < FAST_GAIT_S;
-        is_steady && !is_fast_unseen && !observed.pauses && self.physics(run, hypothesis, at).0.is_periodic()
+        is_steady && !self.observed[run].pauses && self.physics(run, hypothesis, at).0.is_periodic()
     }
 
     /// Settles the crawls that were under way when their recordings began, under a hypothesis near all that will be predicted.

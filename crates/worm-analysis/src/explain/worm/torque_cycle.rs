@@ -1,6 +1,7 @@
 //! The mean cycle of the torque for the page: by the current, and as models have the current show it.
 
 use super::recorded_worm::RecordedWorm;
+use super::torque_noise::TorqueNoise;
 use super::torque_residual::in_bins;
 use crate::explain::answer::TorqueSeries;
 use crate::explain::search::bins::Bins;
@@ -17,7 +18,8 @@ pub(in crate::explain) fn torque_cycles(
         let cycles = |fit: &Fit| {
             let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at)?;
             let pairs_n_m = in_bins(observed, bins, &predicted);
-            (!pairs_n_m.is_empty()).then(|| [0, 1].map(|of| mean_cycle(bins, |bin| pairs_n_m[bin][of])))
+            (!pairs_n_m.is_empty())
+                .then(|| [0, 1].map(|of| mean_cycle(bins, &worm.torque_noise[run], |bin| pairs_n_m[bin][of])))
         };
         let [measured, modelled] = cycles(recalibrated)?;
         let named = named.and_then(cycles).map_or_else(Vec::new, |[_, named]| named);
@@ -39,10 +41,10 @@ pub(in crate::explain) fn torque_cycles(
     (0..worm.scene.observed.len()).filter_map(of_run).collect()
 }
 
-/// Mean at each place of the cycle; `NaN` beside the jump from one step to the next, and where nothing was seen.
-fn mean_cycle(bins: &Bins, torque_n_m: impl Fn(usize) -> f64) -> Vec<f64> {
+/// Mean at each place of the cycle of the bins that are evidence; `NaN` where none is.
+fn mean_cycle(bins: &Bins, noise: &TorqueNoise, torque_n_m: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut sums = vec![[0.0; 2]; bins.per_cycle() as usize];
-    for bin in (0..bins.len()).filter(|&bin| !super::torque_noise::is_at_jump(bins, bin)) {
+    for bin in (0..bins.len()).filter(|&bin| noise.counts(bin)) {
         let torque_n_m = torque_n_m(bin);
         if torque_n_m.is_finite() {
             let [sum, count] = &mut sums[bins.place(bin)];

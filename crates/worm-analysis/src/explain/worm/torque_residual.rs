@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// The samples at the ends of a bin: its first, and the first of the next.
-fn ends(observed: &Observed<'_>, samples: &Range<usize>) -> Range<usize> {
+pub(super) fn ends(observed: &Observed<'_>, samples: &Range<usize>) -> Range<usize> {
     samples.start..samples.end.min(observed.samples() - 1)
 }
 

@@ -8,7 +8,6 @@ use crate::explain::search::fit::Fit;
 use crate::explain::search::squares::{Clusters, Squares};
 use crate::explain::worm::recorded_worm::RecordedWorm;
 use crate::explain::worm::settled_cycles::settled_cycles;
-use crate::explain::worm::torque_noise::is_at_jump;
 use crate::explain::worm::torque_residual;
 
 /// Consecutive cycles that are held out together.
@@ -74,7 +73,7 @@ fn table(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<Table> {
     let mut table = vec![vec![f64::NAN; bins.per_cycle() as usize]; cycles.len()];
     for (bin, residual_n_m) in residual_n_m.iter().enumerate() {
         let cycle = cycles.iter().position(|cycle| cycle.index == bins.bins[bin].cycle);
-        if let Some(cycle) = cycle.filter(|_| !is_at_jump(bins, bin)) {
+        if let Some(cycle) = cycle.filter(|_| worm.torque_noise[run].counts(bin)) {
             table[cycle][bins.place(bin)] = *residual_n_m;
         }
     }
