@@ -127,6 +127,9 @@ fn the_virtual_servos_velocity_scatters_like_the_real_ones() {
     );
 }
 
+/// Scatter of the voltage that a real servo reports, V and V/A: 0.09 V up to 50 mA and 0.58 V beyond 600 mA in its recordings.
+const VOLTAGE_SCATTER: (f64, f64) = (0.1, 0.6);
+
 /// The goals of the real recordings, with the readings of a simulated servo whose constants wander by some per cent, as no model's do.
 fn simulated(
     (campaign, recordings): &(BenchCampaign, Vec<ServoRecording>),
@@ -137,8 +140,9 @@ fn simulated(
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000).wrapping_add(number as u64));
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let (mut of_dry, mut of_torque) = (0.0, 0.0);
+        let mut of_voltage =
+            Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000).wrapping_add(500 + number as u64));
         let mut simulated = recording.clone();
-        simulated.input_v.clear();
         let mut motion = ServoMotion::new(recording.position_rad[0], 0.0, 30.0);
         let mut wandering = physics.clone();
         for reading in 0..recording.readings() {
@@ -161,7 +165,12 @@ fn simulated(
             simulated.position_rad[reading] = (motion.angle_rad() / COUNT_RAD).round() * COUNT_RAD;
             simulated.velocity_rad_s[reading] =
                 (motion.velocity_rad_s() / SPEED_COUNT_RAD_S).round() * SPEED_COUNT_RAD_S;
-            simulated.current_a[reading] = (1e3 * motion.current_a(physics, &command)).round() * 1e-3;
+            let current_a = motion.current_a(physics, &command);
+            simulated.current_a[reading] = (1e3 * current_a).round() * 1e-3;
+            let scatter: f64 = StandardNormal.sample(&mut of_voltage);
+            let scatter_v = (VOLTAGE_SCATTER.0 + VOLTAGE_SCATTER.1 * current_a.abs()) * scatter;
+            let at_servo_v = physics.supply_v - physics.laws.supply_ohm * motion.duty() * current_a;
+            simulated.input_v[reading] = (10.0 * (at_servo_v + scatter_v)).round() / 10.0;
         }
         simulated
     };
