@@ -109,10 +109,13 @@ fn names(effects: &[NamedEffect]) -> String {
 
 fn closing(effects: &[NamedEffect], held_out: &str) -> String {
     match effects.first() {
-        Some(effect) if effect.closure.is_finite() => format!(
-            ": it closes {:.0} % of the gap on {held_out} that it was not fitted to",
-            100.0 * effect.closure
-        ),
+        Some(effect) if effect.closure.is_finite() => {
+            let only = if effect.closure < 0.5 { "only " } else { "" };
+            format!(
+                ": it closes {only}{:.0} % of the gap on {held_out} that it was not fitted to",
+                100.0 * effect.closure
+            )
+        }
         _ => String::new(),
     }
 }
