@@ -1,7 +1,6 @@
 //! What an effect is.
 
 use super::error::SettingError;
-use super::sensor;
 use crate::physics::Physics;
 use crate::servo::ServoPhysics;
 
@@ -142,12 +141,6 @@ impl Effect {
             Visible::RecordedPhase => phase_recorded,
             Visible::PhaseTime => false,
         }
-    }
-
-    /// Whether the forces on the cells show it: what a tracker does to positions moves nothing.
-    pub fn is_visible_in_forces(&self) -> bool {
-        let of_tracker = [&sensor::SCALE, &sensor::LATENCY];
-        !self.shows_in_time_alone() && of_tracker.iter().all(|effect| effect.name != self.name)
     }
 
     /// Whether it changes when things happen and not where.

@@ -55,3 +55,11 @@ pub(super) static LATENCY: Effect = Effect {
     may_begin: false,
     apply: Apply::Worm(|physics, _, values| physics.view.latency_s += values[0]),
 };
+
+impl Effect {
+    /// Whether the forces on the cells show it: what a tracker does to positions moves nothing.
+    pub fn is_visible_in_forces(&self) -> bool {
+        let of_tracker = [&SCALE, &LATENCY];
+        !self.shows_in_time_alone() && of_tracker.iter().all(|effect| effect.name != self.name)
+    }
+}

@@ -1,8 +1,8 @@
 //! A law that nobody listed, as people read it.
 
 use crate::explain::answer::{FoundLaw, LawAxes, LawOver};
-use crate::explain::search::cross_validation::HeldOut;
 use crate::explain::search::fit::Fit;
+use crate::explain::search::held_out::HeldOut;
 use crate::explain::search::law::find;
 use crate::explain::search::law::fitted_law::FittedLaw;
 use crate::explain::search::law::formula::Formula;

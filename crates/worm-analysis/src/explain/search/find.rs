@@ -1,8 +1,8 @@
 //! The search itself, step by step.
 
-use super::cross_validation::HeldOut;
 use super::discrepancy::Discrepancy;
 use super::fit::Fit;
+use super::held_out::HeldOut;
 use super::judge::candidate::{Candidate, kinds};
 use super::judge::decision::{Selected, decide};
 use super::judge::evidence::{InTime, evidence};

@@ -1,9 +1,10 @@
 //! Weighs candidates: their evidence, their odds, and everything else that the decision asks of them.
 
-use super::cross_validation::{self, HeldOut};
+use super::cross_validation;
 use super::discrepancy::Discrepancy;
 use super::fit::Fit;
 use super::folds::Folds;
+use super::held_out::HeldOut;
 use super::judge::candidate::Candidate;
 use super::judge::chance::Chance;
 use super::judge::decision::{Judged, MATTERS};

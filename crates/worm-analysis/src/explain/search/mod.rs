@@ -10,7 +10,7 @@
 //! - `problem`: a plant's recordings as a problem of least squares, `fit`: a solution of it; `discrepancy`: by how much a model is wrong everywhere.
 //! - `score_test`: screens all effects, by their `directions`; `refit`: fits them to the end, `local_restart`: from one local minimum to
 //!   another; `onset`: effects that begin in mid-run.
-//! - `judge`: priors, evidence, chance and the verdict; `judgement`: weighs the candidates by them; `cross_validation`: held-out data,
+//! - `judge`: priors, evidence, chance and the verdict; `judgement`: weighs the candidates by them; `cross_validation`, `held_out`: held-out data,
 //!   which may veto, by `folds`; `squares`: what fraction of a gap is closed there.
 //! - `law`: a law that nobody listed, where no effect of the library explains the data.
 
@@ -21,6 +21,7 @@ pub(in crate::explain) mod discrepancy;
 pub(in crate::explain) mod find;
 pub(in crate::explain) mod fit;
 pub(in crate::explain) mod folds;
+pub(in crate::explain) mod held_out;
 pub(in crate::explain) mod hypothesis;
 pub(in crate::explain) mod impact;
 pub(in crate::explain) mod judge;

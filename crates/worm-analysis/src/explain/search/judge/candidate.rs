@@ -1,7 +1,7 @@
 //! A fitted effect, or a pair, that may be the answer.
 
-use super::super::cross_validation::HeldOut;
 use super::super::fit::Fit;
+use super::super::held_out::HeldOut;
 use super::super::parameter::{Hypothesised, What};
 use super::super::plant::Plant;
 use super::super::problem::FitProblem;

@@ -1,9 +1,9 @@
 //! Fitting a law to the end, together with everything that is free besides.
 
-use super::super::cross_validation::HeldOut;
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
 use super::super::folds::Folds;
+use super::super::held_out::HeldOut;
 use super::super::judgement::held_out;
 use super::super::parameter::What;
 use super::super::plant::Plant;

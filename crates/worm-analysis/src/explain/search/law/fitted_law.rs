@@ -1,7 +1,7 @@
 //! A law fitted to the end, with what it does on data held out and its band.
 
-use super::super::cross_validation::HeldOut;
 use super::super::fit::Fit;
+use super::super::held_out::HeldOut;
 use super::shape::LawShape;
 use std::sync::Arc;
 
