@@ -210,7 +210,7 @@ class Screened(Result):
     improvement: float | None
     """Rise by the refit; None where it was not refitted."""
     outcome: str
-    """``screened-out``, ``refitted``, ``did-not-converge`` or ``not-visible``."""
+    """``screened-out``, ``refitted``, ``did-not-converge``, ``not-visible`` or ``left-out``."""
 
 
 @dataclass(frozen=True)

@@ -320,6 +320,8 @@ pub enum ScreeningOutcome {
     DidNotConverge,
     /// These data cannot show it.
     NotVisible,
+    /// The user left it out of the search.
+    LeftOut,
 }
 
 /// One effect's score at zero severity, other parameters projected out.
@@ -379,6 +381,7 @@ mod tests {
             (ScreeningOutcome::Refitted, "refitted"),
             (ScreeningOutcome::DidNotConverge, "did-not-converge"),
             (ScreeningOutcome::NotVisible, "not-visible"),
+            (ScreeningOutcome::LeftOut, "left-out"),
         ]);
     }
 }

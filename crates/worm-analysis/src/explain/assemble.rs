@@ -26,7 +26,7 @@ use crate::explain::worm::torque_cycle::torque_cycles;
 pub(super) use calibration::calibration;
 pub(super) use effects::named_effects;
 pub(super) use law::law_that_outdid;
-pub(super) use screening::{add_unscreened, screening};
+pub(super) use screening::{add_unscreened, of_servo as screening_of_servo};
 use worm_estimator::config::Config;
 
 /// Places listed at most.
@@ -157,7 +157,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         calibration: calibration(final_fit, config),
         written_back: calibration(&written_back, config),
         law: of_law.map(|(_, law)| law),
-        screening: screening::of_worm(&found.screened, selected, speed_droop.is_some()),
+        screening: screening::of_worm(found, speed_droop.is_some()),
         threshold: found.threshold,
         doubt: Doubt {
             null_probability: selected.null_probability(),

@@ -34,7 +34,7 @@ use model_selection::{AdvanceKind, Selected};
 use rayon::prelude::*;
 use table::Table;
 use worm_estimator::config::Config;
-use worm_physics::effect::Effect;
+use worm_physics::effect::{Effect, LIBRARY};
 
 /// Fewest advances that depend on more than the stroke.
 const MIN_ADVANCES: usize = 2;
@@ -173,7 +173,7 @@ fn screening(hypothesised: &[Hypothesised], candidates: &[Option<Candidate>]) ->
         })
         .collect();
     rows.sort_by(|a, b| b.score.total_cmp(&a.score));
-    add_unscreened(&mut rows, |_| ScreeningOutcome::NotVisible);
+    add_unscreened(&mut rows, &LIBRARY, |_| ScreeningOutcome::NotVisible);
     rows
 }
 

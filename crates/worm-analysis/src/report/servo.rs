@@ -2,6 +2,7 @@
 
 mod figure;
 
+use super::explain::view::outcome;
 use super::page::{Page, Table};
 use super::plot::DrawError;
 use super::{ReportError, file, law};
@@ -326,10 +327,12 @@ fn library_table(answer: &ServoAnswer) -> Table {
             one.name.clone(),
             fixed(one.score, 1),
             fixed(one.improvement.unwrap_or(f64::NAN), 1),
+            outcome(one).to_owned(),
         ]
     };
+    let head = ["", "expected", "refitted", "what became of it"];
     Table {
         rows: answer.screening.iter().map(row).collect(),
-        ..Table::new("Rise of twice the log likelihood", ["", "expected", "refitted"])
+        ..Table::new("Rise of twice the log likelihood", head)
     }
 }

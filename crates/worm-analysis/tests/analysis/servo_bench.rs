@@ -297,7 +297,12 @@ fn hidden_effects_of_simulated_servos() {
         let given = std::env::var("WORMD_SEEDS").ok();
         given.and_then(|text| text.parse().ok()).unwrap_or(usual)
     };
-    for (name, values, besides) in effects {
+    let only = std::env::var("WORMD_EFFECTS").ok();
+    let is_wanted = |name: &str| {
+        only.as_deref()
+            .is_none_or(|only| only.split(',').any(|one| one == name))
+    };
+    for (name, values, besides) in effects.into_iter().filter(|(name, ..)| is_wanted(name)) {
         for seed in 1..=if name == "none" { seeds(6) } else { seeds(2) } {
             let mut physics = off_nominal(&real.0, seed);
             if name != "none" {

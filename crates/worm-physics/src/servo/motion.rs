@@ -37,8 +37,9 @@ pub struct Energy {
 pub struct ServoMotion {
     angle_rad: f64,
     velocity_rad_s: f64,
-    /// The rotor's, which differ where there is play.
-    rotor_rad: f64,
+    /// How far the rotor is ahead of the arm within the play, rad, and its velocity. The difference itself is kept: that of two angles
+    /// would be rounded, and gears that touch would not always be seen to.
+    ahead_rad: f64,
     rotor_rad_s: f64,
     winding_c: f64,
     case_c: f64,
@@ -62,7 +63,7 @@ impl ServoMotion {
         Self {
             angle_rad,
             velocity_rad_s,
-            rotor_rad: angle_rad,
+            ahead_rad: 0.0,
             rotor_rad_s: velocity_rad_s,
             winding_c: case_c,
             case_c,
@@ -143,7 +144,7 @@ impl ServoMotion {
             let before = self.velocity_rad_s;
             self.velocity_rad_s = turned(physics, &torques, torques.arm_n_m, before, inertia, dt_s);
             self.angle_rad += 0.5 * dt_s * (before + self.velocity_rad_s);
-            (self.rotor_rad, self.rotor_rad_s) = (self.angle_rad, self.velocity_rad_s);
+            self.rotor_rad_s = self.velocity_rad_s;
         }
         if command.torque_enabled {
             let current_a = physics.current_a(self.duty, self.rotor_rad_s, self.winding_c);
@@ -163,10 +164,9 @@ impl ServoMotion {
         let arm_kg_m2 = physics.pendulum.inertia_kg_m2();
         let half = 0.5 * physics.laws.play_rad;
         let (arm_before, rotor_before) = (self.velocity_rad_s, self.rotor_rad_s);
-        let gap = self.rotor_rad - self.angle_rad;
-        let side = if gap >= half {
+        let side = if self.ahead_rad >= half {
             1.0
-        } else if gap <= -half {
+        } else if self.ahead_rad <= -half {
             -1.0
         } else {
             0.0
@@ -180,7 +180,7 @@ impl ServoMotion {
             if pushed_n_m * side >= 0.0 {
                 (self.velocity_rad_s, self.rotor_rad_s) = (end, end);
                 self.angle_rad += 0.5 * dt_s * (together + end);
-                self.rotor_rad = self.angle_rad + side * half;
+                self.ahead_rad = side * half;
                 return;
             }
             (self.velocity_rad_s, self.rotor_rad_s) = (together, together);
@@ -188,9 +188,10 @@ impl ServoMotion {
         let (arm_before, rotor_before) = (self.velocity_rad_s, self.rotor_rad_s);
         self.velocity_rad_s -= dt_s * torques.arm_n_m / arm_kg_m2;
         self.rotor_rad_s = turned(physics, torques, 0.0, rotor_before, rotor_kg_m2, dt_s);
-        self.angle_rad += 0.5 * dt_s * (arm_before + self.velocity_rad_s);
-        self.rotor_rad += 0.5 * dt_s * (rotor_before + self.rotor_rad_s);
-        self.rotor_rad = self.rotor_rad.clamp(self.angle_rad - half, self.angle_rad + half);
+        let arm_moves_rad = 0.5 * dt_s * (arm_before + self.velocity_rad_s);
+        let rotor_moves_rad = 0.5 * dt_s * (rotor_before + self.rotor_rad_s);
+        self.angle_rad += arm_moves_rad;
+        self.ahead_rad = (self.ahead_rad + rotor_moves_rad - arm_moves_rad).clamp(-half, half);
     }
 }
 

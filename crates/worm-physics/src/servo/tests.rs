@@ -62,6 +62,24 @@ fn the_step_hardly_matters() {
     }
 }
 
+/// Gears that touch push, at any play: how far the arm goes grows with the play, without a jump.
+#[test]
+fn a_little_more_play_moves_the_arm_a_little_further() {
+    let of_play = |play_rad: f64| swing(&with(|laws| laws.play_rad = play_rad), LONGEST_STEP_S);
+    let mut before = (0.0, swing(&bench(), LONGEST_STEP_S));
+    for play_rad in (1..=40).map(|step| 1e-3 * f64::from(step)) {
+        let angles = of_play(play_rad);
+        let apart = before.1.iter().zip(&angles).map(|(one, other)| (one - other).abs());
+        let mean_rad = apart.sum::<f64>() / angles.len() as f64;
+        assert!(
+            mean_rad < 2.0 * (play_rad - before.0),
+            "{play_rad} rad of play moves it {mean_rad} rad further than {} rad",
+            before.0
+        );
+        before = (play_rad, angles);
+    }
+}
+
 #[test]
 fn an_arm_that_sticks_rests_exactly_and_starts_beyond_friction() {
     let physics = bench();

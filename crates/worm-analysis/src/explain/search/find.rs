@@ -70,6 +70,8 @@ pub(in crate::explain) struct Found {
     pub recalibrated_held_out: HeldOut,
     /// Every effect that was screened, most probable first.
     pub screened: Vec<Screening>,
+    /// Names of the effects that the user left out.
+    pub left_out: Vec<&'static str>,
     pub selected: Selected,
     /// Fraction of the gap that the best candidate leaves open.
     pub open_share: f64,
@@ -219,6 +221,7 @@ pub(in crate::explain) fn find<P: Plant>(
         nominal,
         recalibrated_held_out,
         screened,
+        left_out: options.without.clone(),
         selected,
         open_share,
         threshold,

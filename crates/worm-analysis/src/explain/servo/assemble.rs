@@ -10,7 +10,7 @@ use super::present_current::decide;
 use super::recorded_servo::{RecordedServo, ServoProblem};
 use crate::bench::ServoModel;
 use crate::explain::answer::{Calibrated, FoundOnset, NamedEffect, StageKind, Verdict};
-use crate::explain::assemble::{law_that_outdid, named_effects, screening};
+use crate::explain::assemble::{law_that_outdid, named_effects, screening_of_servo};
 use crate::explain::search::cross_validation::hold_out;
 use crate::explain::search::find::Found;
 use crate::explain::search::fit::Fit;
@@ -147,7 +147,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
             _ => None,
         },
         calibration: calibration(servo, final_fit),
-        screening: screening(&found.screened, selected),
+        screening: screening_of_servo(found),
         threshold: found.threshold,
         null_probability: selected.null_probability(),
         other_probability: selected.other_probability(),

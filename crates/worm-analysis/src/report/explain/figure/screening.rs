@@ -1,6 +1,6 @@
 //! How much each effect of the library improves the fit.
 
-use super::super::view::{best_of_each, is_visible, outcome, reached};
+use super::super::view::{best_of_each, is_tried, outcome, reached};
 use crate::explain::answer::{Screened, ScreeningOutcome};
 use crate::explain::{Answer, Verdict};
 use crate::report::page::{Figure, Key, Mark, Panel};
@@ -71,7 +71,7 @@ fn picture(answer: &Answer) -> Result<Svg, DrawError> {
     draw(&sheet, |_, plot| {
         for (number, bar) in bars.iter().enumerate() {
             let row = (bars.len() - 1 - number) as f64;
-            if !is_visible(bar) {
+            if !is_tried(bar) {
                 plot.text_beside(MIN_IMPROVEMENT, row, MUTED, outcome(bar))?;
                 continue;
             }
@@ -89,8 +89,8 @@ fn picture(answer: &Answer) -> Result<Svg, DrawError> {
             }
             plot.text_beside(end, row, INK, &significant(reached(bar), 2))?;
         }
-        let invisible = bars.iter().filter(|bar| !is_visible(bar)).count() as f64;
-        let height = [invisible - 0.5, bars.len() as f64 - 0.5];
+        let untried = bars.iter().filter(|bar| !is_tried(bar)).count() as f64;
+        let height = [untried - 0.5, bars.len() as f64 - 0.5];
         let name = format!("chance: {}", fixed(answer.threshold, 1));
         plot.threshold(answer.threshold, height, MID, &name)
     })

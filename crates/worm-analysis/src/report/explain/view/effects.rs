@@ -163,22 +163,23 @@ pub(in crate::report::explain) fn reached(entry: &Screened) -> f64 {
     entry.improvement.unwrap_or(entry.score)
 }
 
-/// Whether an effect can be seen in the data at all.
-pub(in crate::report::explain) fn is_visible(entry: &Screened) -> bool {
-    entry.outcome != ScreeningOutcome::NotVisible
+/// Whether an effect can be seen in the data, and was looked for.
+pub(in crate::report::explain) fn is_tried(entry: &Screened) -> bool {
+    !matches!(entry.outcome, ScreeningOutcome::NotVisible | ScreeningOutcome::LeftOut)
 }
 
 /// What became of an effect, in words.
-pub(in crate::report::explain) const fn outcome(entry: &Screened) -> &'static str {
+pub(in crate::report) const fn outcome(entry: &Screened) -> &'static str {
     match entry.outcome {
         ScreeningOutcome::ScreenedOut => "not refitted, others promised more",
         ScreeningOutcome::Refitted => "refitted",
         ScreeningOutcome::DidNotConverge => "the fit did not converge",
         ScreeningOutcome::NotVisible => "not visible in these data",
+        ScreeningOutcome::LeftOut => "left out of the search",
     }
 }
 
-/// The best entry of each effect, best first; those not visible last.
+/// The best entry of each effect, best first; those not tried last.
 pub(in crate::report::explain) fn best_of_each(answer: &Answer) -> Vec<&Screened> {
     let mut sorted: Vec<&Screened> = answer.screening.iter().collect();
     let rank = |entry: &Screened| match reached(entry) {
@@ -186,8 +187,8 @@ pub(in crate::report::explain) fn best_of_each(answer: &Answer) -> Vec<&Screened
         reached => reached,
     };
     sorted.sort_by(|one, other| {
-        let visible = is_visible(other).cmp(&is_visible(one));
-        visible.then(rank(other).total_cmp(&rank(one)))
+        let tried = is_tried(other).cmp(&is_tried(one));
+        tried.then(rank(other).total_cmp(&rank(one)))
     });
     let mut names = HashSet::new();
     sorted.retain(|entry| names.insert(&entry.name));

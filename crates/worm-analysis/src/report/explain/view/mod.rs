@@ -12,7 +12,8 @@ mod runs;
 mod verdict;
 
 pub(super) use distance::Distance;
-pub(super) use effects::{best_of_each, is_visible, named_model, outcome, reached};
+pub(in crate::report) use effects::outcome;
+pub(super) use effects::{best_of_each, is_tried, named_model, reached};
 pub(super) use gap::{StageView, stage_of, stages};
 pub(super) use quantity::{cells, mm};
 
