@@ -4,6 +4,7 @@
 
 use super::harness::{self, Obeying, config, wired};
 use std::fmt::Write;
+use worm_estimator::estimate::alarm::Coverage;
 use worm_estimator::message::{Alarm, AlarmKind, CommandKind};
 use worm_physics::{Physics, steady_cycle_of};
 use wormd::link::virtual_worm::Options;
@@ -238,6 +239,32 @@ fn what_the_model_does_not_know_is_reported() {
     );
     assert!(wrongs.is_empty(), "{wrongs}");
     assert!(misnamed.is_empty(), "{misnamed:?}");
+}
+
+/// What `explain` has written back is no mismatch any more: effects of the configuration are part of the model. Where the exact motion does
+/// not know one, the alarm is off and says so.
+#[test]
+fn effects_of_the_configuration_are_no_mismatch() {
+    let effect = |entry: &str| format!("{}[[effect]]\n{entry}\n", World::of(EQUAL, 15.0).toml());
+    for (entry, is_exact) in [
+        ("name = \"constant-drag\"\nforce_n = 0.6", true),
+        ("name = \"unequal-clamping\"\ncell = 2\nfriction_factor = 0.7", true),
+        ("name = \"pad-creep\"\ncreep_share = 0.2\ntime_constant_s = 0.3", false),
+    ] {
+        let config = config(&effect(entry));
+        let options = Options {
+            seed: Some(1),
+            step_s: Some(1e-3),
+            ..Options::default()
+        };
+        let mut session = harness::crawling(&config, wired(&config, &options), RATE_HZ);
+        session.run_s(20.0 * CYCLE_S, |_| {});
+        let entries = session.observer.residual_map().entries();
+        let is_seen = entries.map(|entry| entry.mean_m).any(f64::is_finite);
+        assert_eq!((told(&session), is_seen), (None, is_exact), "{entry}");
+        let coverage = Coverage::of(AlarmKind::ModelMismatch, &config);
+        assert_eq!(coverage == Coverage::Full, is_exact, "{entry}: {coverage:?}");
+    }
 }
 
 /// A slope of 3° makes 0.23 mm on the level, against a threshold of 0.16 mm and a scatter of 0.03 mm from cycle to cycle.

@@ -61,6 +61,73 @@ fn the_virtual_worm_is_known_by_its_current() {
     }
 }
 
+/// A cam that turns so slowly that most ticks see it at the same count of the encoder takes as much energy as it does.
+#[test]
+fn no_tick_of_a_slow_cycle_loses_its_electrical_energy() {
+    for cycle_s in [5.0, 10.0] {
+        let config = config(&format!("gait.cycle_s = {cycle_s}\n"));
+        let worm = Worm::try_from(&config).expect("the worm of the paper");
+        let mut sensing = SelfSensing::new(&worm, &config.self_sensing());
+        let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
+        session.run_s(3.5 * cycle_s, |tick| {
+            if tick.state.motor_is_new == 1 {
+                sensing.update(&MotorSample::from(&tick.state));
+            }
+        });
+        let truth_j = session
+            .machine
+            .plant()
+            .ledger()
+            .cycles()
+            .back()
+            .map(|cycle| cycle.electrical_j);
+        let truth_j = truth_j.expect("cycles were seen");
+        let inferred_j = sensing.sensed().expect("cycles were fitted").electrical_j;
+        println!("{cycle_s} s: {inferred_j:.4} of {truth_j:.4} J");
+        assert!(
+            (inferred_j / truth_j - 1.0).abs() < 0.02,
+            "{cycle_s} s: {inferred_j} of {truth_j} J"
+        );
+    }
+}
+
+/// Nothing is 0 before it is known, and what is left at the end of a recording is known where the recording ends.
+#[test]
+fn what_is_not_known_yet_is_no_number_and_the_last_message_is_of_the_last_state() {
+    let config = config("");
+    let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
+    let mut inference = Inference::by_current_alone(&config).expect("a valid configuration");
+    let (mut before, mut last) = (None, None);
+    // The end of the sixth cycle is the last that is seen, and it is not fitted yet.
+    session.run_s(60.0, |tick| {
+        let is_over = last.is_some_and(|state: State| state.phase >= 6.0);
+        if !is_over {
+            let message = inference.update(&tick.state).copied();
+            before = before.or(message);
+            last = Some(tick.state);
+        }
+    });
+    let before = before.expect("a message with the first state");
+    for value in [
+        before.advance_m,
+        before.advance_sigma_m,
+        before.pull_n,
+        before.energy_loss_j,
+        before.energy_electrical_j,
+        before.energy_electrical_sigma_j,
+        before.friction_loss_share,
+    ] {
+        assert!(value.is_nan(), "{before:?}");
+    }
+    let (last, earlier) = (last.expect("states"), *inference.latest());
+    let message = *inference.finish().expect("a cycle was waiting");
+    assert!(message.end_phase > earlier.end_phase);
+    assert_eq!(
+        (message.phase, message.time_ns, message.state_sequence, message.sequence),
+        (last.phase, last.time_ns, last.sequence, earlier.sequence + 1)
+    );
+}
+
 /// The estimator beside its positions says the same of the worm as self-sensing without them, to the last bit; and the same again from the
 /// same states and commands.
 #[test]

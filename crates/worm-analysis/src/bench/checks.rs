@@ -91,6 +91,11 @@ fn velocity_over_slope(recording: &ServoRecording) -> Option<f64> {
     let mut from = 0;
     let mut integral_rad = 0.0;
     for at in 1..time_s.len() {
+        if time_s[at] - time_s[at - 1] > OVER_S {
+            // Over a hole nobody knows how fast it was.
+            (from, integral_rad) = (at, 0.0);
+            continue;
+        }
         // The velocity lags, so a stretch begins and ends later for it; on the whole that only lowers the correlation.
         integral_rad += recording.velocity_rad_s[at] * (time_s[at] - time_s[at - 1]);
         if time_s[at] - time_s[from] >= OVER_S + LAG_S {

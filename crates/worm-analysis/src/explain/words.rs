@@ -53,12 +53,15 @@ pub(super) fn sentence(
         Verdict::OutsideLibrary => {
             let nearest = selected.candidates.first().map_or_else(
                 || "none comes near".to_owned(),
-                |candidate| {
-                    format!(
-                        "{} comes nearest and leaves {:.0} % of the gap open",
-                        of_library(candidate),
+                |candidate| match of_library(candidate) {
+                    // Less than a per cent would read as an explanation.
+                    nearest if open_share < 0.01 => format!(
+                        "{nearest} comes nearest and leaves no more than any model may be wrong by, but is not sure enough for a name"
+                    ),
+                    nearest => format!(
+                        "{nearest} comes nearest and leaves {:.0} % of the gap open",
                         100.0 * open_share
-                    )
+                    ),
                 },
             );
             let changes = change.map_or_else(String::new, |change| {
@@ -258,6 +261,13 @@ pub(super) fn warnings(
         warnings.push(format!(
             "{at_limit} of the recalibrated values lie at the end of what their priors allow: see the calibration"
         ));
+        if !worm.sees_positions() {
+            warnings.push(
+                "so work and advance may be far off, as where several tips hold unlike the others: `wormd infer` on the log gives every tip a \
+                 friction of its own"
+                    .to_owned(),
+            );
+        }
     }
     let trace = named.and_then(|candidate| Some(&candidate.hypothesised[candidate.trace?]));
     warnings.extend(trace.map(|trace| {

@@ -280,13 +280,14 @@ fn without_the_loads_effects_a_law_over_the_load_is_found_on_the_real_servo() {
 fn hidden_effects_of_simulated_servos() {
     let real = real();
     // With what is left out of the library besides, for it does nearly the same.
-    let effects: [(&str, &[f64], &[&str]); 11] = [
+    let effects: [(&str, &[f64], &[&str]); 12] = [
         ("none", &[], &[]),
         ("stribeck-friction", &[0.06, 0.5], &[]),
         ("load-friction", &[0.35, 0.7], &["load-squared-friction"]),
         ("load-squared-friction", &[0.9, 0.5], &["load-friction"]),
         ("back-driving-friction", &[3.5], &[]),
         ("gear-backlash", &[0.03], &[]),
+        ("gear-backlash", &[0.1], &[]),
         ("gear-ripple", &[0.05, 12.0, 0.3], &[]),
         ("supply-sag", &[1.5], &[]),
         ("winding-heat", &[3.0, 30.0], &[]),

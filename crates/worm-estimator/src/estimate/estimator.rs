@@ -110,7 +110,11 @@ impl Estimator {
             energy_integrator: EnergyIntegrator::new(cells, fit.unknowns()),
             fit,
             identification: identified.then(|| Identification::new(&tips)),
-            mismatch: Mismatch::new(predictor.worm(), config.alarms.model_mismatch.threshold),
+            mismatch: Mismatch::new(
+                predictor.worm(),
+                predictor.exact_worm(),
+                config.alarms.model_mismatch.threshold,
+            ),
             predictor,
             cycle_start: CycleStart {
                 time_s: 0.0,

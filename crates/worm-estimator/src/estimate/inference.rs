@@ -32,13 +32,22 @@ struct WaitingMark {
     mark: Mark,
 }
 
+/// Of the state before.
+#[derive(Debug, Clone, Copy)]
+struct LastState {
+    sequence: u64,
+    time_ns: u64,
+    /// Gait phase, the last that was known.
+    phase: f64,
+}
+
 /// Self-sensing on a worm's states.
 #[derive(Debug, Clone)]
 pub struct Inference {
     sensing: SelfSensing,
     uses_positions: bool,
     first_sequence: Option<u64>,
-    last: Option<(u64, f64)>,   // sequence and phase of the last state
+    last: Option<LastState>,
     sample: Option<(u64, f64)>, // time, ns, and mean position, m, of the newest tracker sample with all cells
     is_placed: bool,            // a sample has said where the worm begins
     waiting: [Option<WaitingMark>; MAX_WAITING],
@@ -55,9 +64,6 @@ impl Inference {
     /// [`EstimatorError`] where the model refuses the worm.
     pub fn new(config: &Config) -> Result<Self, EstimatorError> {
         let worm = Worm::try_from(config).map_err(PhysicsError::from)?;
-        let mut inferred = Inferred::empty();
-        inferred.cell_count = worm.cells() as u32;
-        inferred.standing = InferredStanding::WarmingUp.code();
         Ok(Self {
             sensing: SelfSensing::new(&worm, &config.self_sensing()),
             uses_positions: true,
@@ -69,7 +75,7 @@ impl Inference {
             made: 0,
             marks: 0,
             tracker_marks: 0,
-            inferred,
+            inferred: nothing_known(worm.cells()),
         })
     }
 
@@ -108,7 +114,7 @@ impl Inference {
     /// with the first state.
     pub fn update(&mut self, state: &State) -> Option<&Inferred> {
         let is_first = self.first_sequence.is_none();
-        let has_restarted = self.last.is_some_and(|(sequence, _)| state.sequence <= sequence);
+        let has_restarted = self.last.is_some_and(|last| state.sequence <= last.sequence);
         if is_first || has_restarted {
             self.first_sequence = Some(state.sequence);
             for place in &mut self.waiting {
@@ -135,35 +141,40 @@ impl Inference {
         let phase = if state.phase.is_finite() {
             state.phase
         } else {
-            self.last.map_or(f64::NAN, |(_, phase)| phase)
+            self.last.map_or(f64::NAN, |last| last.phase)
         };
-        self.last = Some((state.sequence, phase));
-        if !is_new {
-            return None;
-        }
-        self.fill_place();
-        let inferred = &mut self.inferred;
-        inferred.sequence = self.made;
-        inferred.time_ns = state.time_ns;
-        inferred.state_sequence = state.sequence;
-        inferred.phase = phase;
-        inferred.marks = self.marks;
-        inferred.tracker_marks = self.tracker_marks;
-        self.made += 1;
-        Some(&self.inferred)
+        let last = LastState {
+            sequence: state.sequence,
+            time_ns: state.time_ns,
+            phase,
+        };
+        self.last = Some(last);
+        is_new.then(|| self.message(last))
     }
 
     /// Does the work that is left at the end of a recording. Returns what is known, where that is new.
     pub fn finish(&mut self) -> Option<&Inferred> {
         let sensed = self.sensing.finish()?;
         fill(&mut self.inferred, sensed);
-        self.fill_place();
-        Some(&self.inferred)
+        self.last.map(|last| self.message(last))
     }
 
-    fn fill_place(&mut self) {
+    /// Where the worm is with the last state, and how the message is numbered.
+    fn message(&mut self, last: LastState) -> &Inferred {
         let reckoned = self.sensing.reckoned();
-        (self.inferred.position_m, self.inferred.position_sigma_m) = (reckoned.position_m, reckoned.sigma_m);
+        // What the samples at the ends of cycles are off by is much the same each time, so it is no smaller for many of them.
+        let of_tracker_m = if self.tracker_marks > 0 { TRACKER_SIGMA_M } else { 0.0 };
+        let inferred = &mut self.inferred;
+        inferred.position_m = reckoned.position_m;
+        inferred.position_sigma_m = reckoned.sigma_m.hypot(of_tracker_m);
+        inferred.sequence = self.made;
+        inferred.time_ns = last.time_ns;
+        inferred.state_sequence = last.sequence;
+        inferred.phase = last.phase;
+        inferred.marks = self.marks;
+        inferred.tracker_marks = self.tracker_marks;
+        self.made += 1;
+        inferred
     }
 
     /// The newest message.
@@ -197,7 +208,7 @@ impl Inference {
         }
         let ends_cycle = self
             .last
-            .is_some_and(|(_, phase)| state.phase.is_finite() && phase.floor() != state.phase.floor());
+            .is_some_and(|last| state.phase.is_finite() && last.phase.floor() != state.phase.floor());
         let age_s = state.time_ns.saturating_sub(time_ns) as f64 * 1e-9;
         if ends_cycle && age_s < FRESH_S {
             self.tracker_marks = self.tracker_marks.saturating_add(1);
@@ -224,6 +235,37 @@ impl Inference {
             is_new = true;
         }
         is_new
+    }
+}
+
+/// Before the first cycle: where the worm begins is 0 by definition, and everything else is open.
+fn nothing_known(cells: usize) -> Inferred {
+    const UNKNOWN: f64 = f64::NAN;
+    Inferred {
+        cell_count: cells as u32,
+        standing: InferredStanding::WarmingUp.code(),
+        end_phase: UNKNOWN,
+        pull_n: UNKNOWN,
+        pull_sigma_n: UNKNOWN,
+        slope_rad: UNKNOWN,
+        slope_sigma_rad: UNKNOWN,
+        other_pull_n: UNKNOWN,
+        other_probability: UNKNOWN,
+        advance_m: UNKNOWN,
+        advance_sigma_m: UNKNOWN,
+        energy_loss_j: UNKNOWN,
+        energy_loss_sigma_j: UNKNOWN,
+        energy_actuator_net_j: UNKNOWN,
+        energy_actuator_net_sigma_j: UNKNOWN,
+        energy_electrical_j: UNKNOWN,
+        energy_electrical_sigma_j: UNKNOWN,
+        residual_n_m: UNKNOWN,
+        phase: UNKNOWN,
+        friction_loss_share: UNKNOWN,
+        load_rise_n: UNKNOWN,
+        change_friction_sigma: UNKNOWN,
+        change_pull_sigma_n: UNKNOWN,
+        ..Inferred::empty()
     }
 }
 

@@ -5,7 +5,7 @@ use crate::config::{Config, PhysicsError};
 use worm_physics::MAX_CELLS;
 use worm_physics::effect::Setting;
 use worm_physics::worm::GRAVITY_M_PER_S2;
-use worm_physics::{Motion, Physics, Worm, WormError, steady_cycle_of};
+use worm_physics::{Motion, Physics, View, Worm, WormError, steady_cycle_of};
 
 /// The model's steady cycle, along the canal.
 #[derive(Debug, Clone, Copy)]
@@ -68,6 +68,13 @@ impl Predictor {
         &self.worm
     }
 
+    /// The worm that moves as the model does with all its effects, by the exact motion; none where that does not know one of them.
+    pub(super) fn exact_worm(&self) -> Option<Worm> {
+        let physics = physics(&self.worm, &self.effects, self.is_found);
+        let is_exact = physics.is_piecewise_linear() && physics.view == View::default();
+        is_exact.then(|| physics.clamped_worm())
+    }
+
     /// Weight of the worm, N.
     pub(super) fn weight_n(&self) -> f64 {
         self.worm.weight_n()
@@ -92,15 +99,20 @@ impl Predictor {
             (&mut self.forward, 1.0)
         };
         *kept.get_or_insert_with(|| {
-            let physics = Physics::of(self.worm.clone());
-            let physics = if self.is_found {
-                physics.found_with(&self.effects)
-            } else {
-                physics.with(&self.effects)
-            };
+            let physics = physics(&self.worm, &self.effects, self.is_found);
             let physics = if direction < 0 { physics.mirrored() } else { physics };
             predict(&physics, sign, self.cycle_s)
         })
+    }
+}
+
+/// A worm with its effects, its bounds as configured or as found.
+fn physics(worm: &Worm, effects: &[Setting], is_found: bool) -> Physics {
+    let physics = Physics::of(worm.clone());
+    if is_found {
+        physics.found_with(effects)
+    } else {
+        physics.with(effects)
     }
 }
 

@@ -238,6 +238,8 @@ impl SelfSensing {
         };
         let Some(last) = self.last.replace(reading) else { return };
         let turned = sample.phase - last.sample.phase;
+        // Also where a slow cam has not reached the next count of its encoder.
+        self.add_energy(&last.sample, sample);
         if turned == 0.0 {
             if sample.time_s - self.turned_s > LONGEST_REST_S {
                 (self.whole, self.loaded_cycles) = (false, 0.0);
@@ -247,7 +249,6 @@ impl SelfSensing {
         self.turned_s = sample.time_s;
         self.loaded_cycles = if turned > 0.0 { self.loaded_cycles + turned } else { 0.0 };
         self.reckon(turned);
-        self.add_energy(&last.sample, sample);
         if !(0.0..=LONGEST_TURN).contains(&turned) {
             self.whole = false;
             return;

@@ -91,11 +91,15 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
     if of_each.len() > 1 && rivals.is_empty() {
         rivals = of_each[1..].concat();
     }
-    let of_law = parts.law.as_ref().and_then(|found| {
-        let (left, open) = found.law.held_out.determined_beside(without);
-        let closure = closed(servo, (recalibrated, &open), (&found.law.fit, &left), servo.scatter_rad);
-        Some((&found.law, law_that_outdid(found, closure, HELD_OUT)?))
-    });
+    let of_law = parts
+        .law
+        .as_ref()
+        .filter(|found| found.law.says_something())
+        .and_then(|found| {
+            let (left, open) = found.law.held_out.determined_beside(without);
+            let closure = closed(servo, (recalibrated, &open), (&found.law.fit, &left), servo.scatter_rad);
+            Some((&found.law, law_that_outdid(found, closure, HELD_OUT)?))
+        });
     let fitted_law = of_law.as_ref().map(|(law, _)| *law);
     let verdict = selected.verdict;
     let best = selected.candidates.first().map(|candidate| &candidate.fit);

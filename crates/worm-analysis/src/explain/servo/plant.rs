@@ -130,7 +130,12 @@ impl Plant for RecordedServo<'_> {
         discrepancy_rad: f64,
     ) -> Option<[f64; 2]> {
         let (_, interval) = closed(self, open, left, self.noise_rad.hypot(discrepancy_rad));
-        interval.iter().all(|end| end.is_finite()).then_some(interval)
+        if interval.iter().all(|end| end.is_finite()) {
+            return Some(interval);
+        }
+        // All of the gap may be what any model is wrong by. Then an effect must close some of it at least, beyond its error.
+        let (_, of_noise) = closed(self, open, left, self.scatter_rad);
+        (of_noise[0] <= 0.0).then_some([0.0, 0.0])
     }
 
     /// The offset of the zero angle is a nuisance and an effect.

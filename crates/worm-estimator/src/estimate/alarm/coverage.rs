@@ -1,6 +1,7 @@
 //! What each alarm can watch on a worm with these sensors: so that nobody relies on an alarm that cannot speak.
 
 use crate::config::{Config, PositionSource};
+use crate::estimate::prediction::Predictor;
 use crate::message::AlarmKind;
 
 /// How far an alarm watches what it is for.
@@ -25,6 +26,9 @@ impl Coverage {
             }
             AlarmKind::BatteryLow if config.battery.is_none() => Self::Off("no [battery] is configured"),
             AlarmKind::BatteryLow if !has_positions => Self::Partial("by the reserve: how far it is home is not known"),
+            AlarmKind::ModelMismatch if has_positions && has_more_effects_than_the_exact_motion(config) => Self::Off(
+                "an [[effect]] of the configuration is beyond the exact motion, with which this alarm compares",
+            ),
             _ if has_positions => Self::Full,
             AlarmKind::JammedCell => {
                 Self::Off("it needs cell positions; `inferred-jam` watches by the motor's current")
@@ -54,4 +58,8 @@ impl Coverage {
             Self::Partial(reason) | Self::Off(reason) => Some(reason),
         }
     }
+}
+
+fn has_more_effects_than_the_exact_motion(config: &Config) -> bool {
+    Predictor::new(config).is_ok_and(|predictor| predictor.exact_worm().is_none())
 }

@@ -135,7 +135,8 @@ impl Estimator {
             }
             self.contacts.set_tips(&self.tips);
             let standard_error = |weights: &[f64; MAX_CELLS]| identification.standard_error(weights);
-            self.mismatch.set_identified(self.predictor.worm(), standard_error);
+            self.mismatch
+                .set_identified(self.predictor.exact_worm(), standard_error);
             // With new bounds the contact points at the window's start have to be found anew.
             self.window_contact_m = [f64::NAN; MAX_CELLS];
             self.show_bounds();

@@ -75,6 +75,7 @@ const SIDE: usize = PIECES / 2;
 #[derive(Debug, Clone)]
 pub(super) struct Mismatch {
     model: ReferenceModel,
+    is_whole: bool, // whether that model has every effect of the configuration
     map: ResidualMap,
     disturbed: bool,            // the open cycle
     was_undisturbed: bool,      // the cycle before it
@@ -83,11 +84,13 @@ pub(super) struct Mismatch {
 }
 
 impl Mismatch {
-    /// For the configured worm, in forward direction, against a threshold in m a cycle.
-    pub(super) fn new(worm: &Worm, threshold_m: f64) -> Self {
+    /// For the configured worm, in forward direction, against a threshold in m a cycle. `exact` is the worm that moves as the model does
+    /// with all effects; without one the map stays empty, for it would only show the effects that are known.
+    pub(super) fn new(worm: &Worm, exact: Option<Worm>, threshold_m: f64) -> Self {
         let map = ResidualMap::new(worm.cells(), threshold_m);
         let mut new = Self {
-            model: ReferenceModel::new(worm),
+            is_whole: exact.is_some(),
+            model: ReferenceModel::new(exact.as_ref().unwrap_or(worm)),
             step: vec![f64::NAN; map.size()],
             map,
             disturbed: true,
@@ -99,8 +102,10 @@ impl Mismatch {
     }
 
     /// Starts over with bounds that were identified in the present direction; `standard_error` is that of Σ wᵢ δmaxᵢ.
-    pub(super) fn set_identified(&mut self, worm: &Worm, standard_error: impl Fn(&[f64; MAX_CELLS]) -> f64) {
-        self.model.set_worm(worm);
+    pub(super) fn set_identified(&mut self, exact: Option<Worm>, standard_error: impl Fn(&[f64; MAX_CELLS]) -> f64) {
+        if let Some(exact) = exact {
+            self.model.set_worm(&exact);
+        }
         self.identified_in = Some(self.map.direction());
         self.clear(self.map.direction());
         self.map.set_uncertainty(&self.model, standard_error);
@@ -147,7 +152,7 @@ impl Mismatch {
         let bounds_are_known = self
             .identified_in
             .is_none_or(|direction| direction == self.map.direction());
-        if !bounds_are_known
+        if !(self.is_whole && bounds_are_known)
             || self.model.run_cycle().is_err()
             || !both_undisturbed
             || window.cycles() < 2

@@ -83,7 +83,7 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         let mut each: Vec<(FittedLaw, Weighed)> = Vec::new();
         for (done, (one, about)) in weighed.into_iter().enumerate() {
             report(0.6 + 0.4 * done as f64 / tried);
-            each.push((self.fit_to_the_end(&about, &one), one));
+            each.extend(self.fit_to_the_end(&about, &one).map(|law| (law, one)));
         }
         FittedLaws { each, offered }
     }
@@ -145,9 +145,13 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         })
     }
 
-    /// Fits a law to the end from a fit of what is free besides, and holds data out.
-    fn fit_to_the_end(&self, from: &Fit, weighed: &Weighed) -> FittedLaw {
+    /// Fits a law to the end from a fit of what is free besides, and holds data out; none where the data determine nothing of it, for
+    /// such a law could only gain by what is free besides.
+    fn fit_to_the_end(&self, from: &Fit, weighed: &Weighed) -> Option<FittedLaw> {
         let determined = weighed.scores.determined(&weighed.prior);
+        if determined.columns.is_empty() {
+            return None;
+        }
         let mut shape = weighed.offer.shape.clone();
         if let Some((period, within)) = &weighed.prior.period {
             shape.period = Some(*period);
@@ -156,7 +160,7 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         }
         shape.columns.clone_from(&determined.columns);
         let known = weighed.scores.by_columns(&determined.on_grid);
-        fit_shape(
+        let law = fit_shape(
             self,
             Start {
                 from,
@@ -167,7 +171,8 @@ impl<P: Plant> LawSearch<'_, '_, P> {
                 left: determined.left,
                 seen: weighed.offer.seen.clone(),
             },
-        )
+        );
+        Some(law)
     }
 
     /// Fits a law anew about what was found, as long as it predicts better then: far from no law other directions are determined.
@@ -178,10 +183,12 @@ impl<P: Plant> LawSearch<'_, '_, P> {
             let Some(anew) = self.weigh(&about, offer, &law.beyond) else {
                 return;
             };
-            let better = self.fit_to_the_end(&about, &anew);
-            if better.gain <= law.gain {
+            let Some(better) = self
+                .fit_to_the_end(&about, &anew)
+                .filter(|better| better.gain > law.gain)
+            else {
                 return;
-            }
+            };
             (*law, *weighed) = (better, anew);
         }
     }

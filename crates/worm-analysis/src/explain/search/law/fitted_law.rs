@@ -24,6 +24,12 @@ pub(in crate::explain) struct FittedLaw {
 }
 
 impl FittedLaw {
+    /// Whether its 90 % band is away from no law anywhere: else what is free besides does what it seems to do.
+    pub fn says_something(&self) -> bool {
+        let neutral = self.shape.acts_on.neutral();
+        self.band.iter().any(|[low, high]| *low > neutral || *high < neutral)
+    }
+
     /// Adds the same to the law everywhere.
     pub fn shift(&mut self, by: f64) {
         let mut shape = (*self.shape).clone();
