@@ -1,6 +1,7 @@
 //! `wormd dashboard` from outside: real processes, requests as bytes, and a real headless Chromium where there is one.
 
 mod boxes;
+mod crowd;
 mod fleet;
 mod http;
 mod without_tracker;
