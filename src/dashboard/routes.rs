@@ -56,6 +56,7 @@ pub(super) fn router(app: Arc<App>) -> Router {
         .route("/api/reports", get(list_reports))
         .route("/api/boxes", get(list_boxes))
         .route("/boxes/{name}", get(download_box))
+        .route("/api/command/hold", post(commands::hold))
         .route("/api/command/{command}", post(commands::command))
         .route("/api/fleet", get(fleet))
         .route("/api/fleet/hold", post(commands::hold_fleet))

@@ -245,6 +245,14 @@ fn one_drives_with_the_token_and_anyone_may_halt() {
         "/assets/../../Cargo.toml",
         "/assets/%2e%2e/Cargo.toml",
         "/etc/passwd",
+    let large = "x".repeat(300_000);
+    for path in ["/api/command/hold", "/api/fleet/hold"] {
+        let held = request(watched.address, "POST", path, &[], &large);
+        assert!(
+            [200, 422].contains(&held.status),
+            "the controller has answered: {path}: {held:?}"
+        );
+    }
     ] {
         assert_eq!(watched.get(path).status, 404, "{path}");
     }
@@ -353,7 +361,20 @@ fn in_a_browser_nothing_moves_by_itself_and_old_values_are_grey() {
     browser.open(&format!("{url}#token={TOKEN}"));
     browser.wait_for("!document.getElementById('drive').hidden");
     assert_eq!(browser.run("return location.hash"), "");
-    assert!(events(&watched).is_empty(), "logging in commands nothing");
+    // Whoever is about to log in can still make it hold, by what a click at the button really hits.
+    browser.run("document.getElementById('log-in').click()");
+    browser.run(
+        "const box = document.getElementById('login-hold').getBoundingClientRect();
+         document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2).click()",
+    );
+    browser.wait_for("/^hold: /.test(document.getElementById('login-message').textContent)");
+    assert_eq!(browser.run("return document.activeElement.id"), "who");
+    browser.run("document.getElementById('login-cancel').click()");
+
+    assert!(
+        events(&watched).iter().all(|text| text.contains("hold")),
+        "logging in commands nothing"
+    );
     browser.run("document.getElementById('arm').click()");
     watched.wait_for_mode("armed");
     let position = "return Number(document.querySelector('#worm .cell').dataset.positionMm)";

@@ -90,12 +90,15 @@ function drawControls() {
 
 let messageTimer = 0;
 
+/** Says it where the buttons are; those of the log-in lie over the others. */
 function say(text, isRefusal) {
-  const message = byId("message");
-  setText(message, text);
-  message.classList.toggle("refused", isRefusal);
+  const messages = [byId("message"), byId("login-message")];
+  for (const message of messages) {
+    setText(message, text);
+    message.classList.toggle("refused", isRefusal);
+  }
   clearTimeout(messageTimer);
-  messageTimer = setTimeout(() => setText(message, ""), MESSAGE_MS);
+  messageTimer = setTimeout(() => messages.forEach((message) => setText(message, "")), MESSAGE_MS);
 }
 
 async function command(name, details = null) {
@@ -130,6 +133,8 @@ async function logIn(event) {
 for (const name of ["hold", "arm", "crawl", "stop", "reset", "take_over", "trip_pause", "trip_resume", "trip_return"]) {
   byId(name).addEventListener("click", () => command(name));
 }
+// An open dialogue covers the page's own.
+byId("login-hold").addEventListener("click", () => command("hold"));
 byId("log-in").addEventListener("click", openLogin);
 byId("log-out").addEventListener("click", () => driver.logOut());
 byId("login-form").addEventListener("submit", logIn);
