@@ -3,6 +3,7 @@
 use super::{TableCell, alarm_line, cell_number, fitting, number, table};
 use crate::remedy;
 use crate::watch::breakdown::Breakdown;
+use crate::watch::fault::LatchedFault;
 use crate::watch::picture::Picture;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -139,7 +140,18 @@ pub(super) fn draw_energy(frame: &mut Frame<'_>, area: Rect, picture: &Picture) 
 /// What is raised with what to do, and the changes before.
 pub(super) fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
     let mut lines = Vec::new();
-    if picture.raised.is_empty() {
+    if let Some(fault) = LatchedFault::of(picture) {
+        let off = Line::raw(format!("fault, and the motor is off: {}", fault.details));
+        lines.push(off.fg(Color::Red).bold());
+        lines.push(Line::from(vec!["  Do: ".bold(), Span::raw(fault.remedy)]));
+        lines.push(Line::from(vec![
+            "  Then: ".bold(),
+            Span::raw("r twice resets; nothing moves before"),
+        ]));
+    }
+    if picture.raised.is_empty() && !lines.is_empty() {
+        lines.push(Line::raw("no alarm is raised now").fg(Color::DarkGray));
+    } else if picture.raised.is_empty() {
         lines.push(Line::raw("no alarm is raised").fg(Color::Green));
     }
     let acknowledged = picture.state.map_or(0, |state| state.acknowledged_mask);
