@@ -1,8 +1,9 @@
 //! What the screen says where a worm is stopped, or where little is known of it.
 
 use super::super::app::Seat;
+use super::super::*;
 use super::fixture::{NOW_NS, alarm, drawn, received, screen};
-use worm_estimator::message::{AlarmKind, Fault, Mode, State};
+use worm_estimator::message::{AlarmKind, Fault, Mode, Range, State};
 
 /// Pages of a worm with this fault.
 fn pages_of(fault: Fault, width: u16) -> [String; 2] {
@@ -58,4 +59,51 @@ fn a_latched_fault_says_why_and_what_to_do_when_its_alarm_has_cleared() {
     }
     let [overview, _] = pages_of(Fault::Alarm, 80);
     assert!(overview.contains("r twice: reset. nobody drives"), "{overview}");
+}
+
+#[test]
+fn distance_time_and_one_charge_are_in_the_edge_of_the_canal() {
+    let mut telemetry = received(3.4);
+    let estimate = telemetry.estimate.as_mut().expect("an estimate");
+    estimate.battery_fraction = 1.0;
+    telemetry.ranges.push(Range {
+        index: 1,
+        end_ns: 5_000_000_000,
+        charge_share: 0.99,
+        charge_sigma_share: 0.01,
+        energy_left_j: 2800.0,
+        energy_left_low_j: 2700.0,
+        energy_left_high_j: 2900.0,
+        energy_per_cycle_j: 0.7,
+        energy_per_cycle_sigma_j: 0.01,
+        advance_per_cycle_m: 0.0067,
+        advance_per_cycle_sigma_m: 1e-4,
+        cycles: 4000.0,
+        cycles_low: 3900.0,
+        cycles_high: 4100.0,
+        range_m: 26.0,
+        range_low_m: 24.1,
+        range_high_m: 27.3,
+        time_s: 3540.0,
+        time_low_s: 3300.0,
+        time_high_s: 3780.0,
+        gauge_share: f64::NAN,
+        cycles_used: 4,
+        direction: 1,
+    });
+    for (width, edge) in [
+        (120, "range 24.1 to 27.3 m, 55 to 63 min, battery 99 % "),
+        (80, " goes on  range 24.1 to 27.3 m, 55 to 63 min, battery 99 % ┘"),
+        (70, "─ 24.1 to 27.3 m, 55 to 63 min ┘"),
+        (80, "? shows the keys ┐"),
+    ] {
+        let picture = painted_by_watcher(width, &telemetry);
+        assert!(picture.contains(edge), "{edge:?} is missing in\n{picture}");
+        assert!(!picture.contains("battery 100 %"), "one charge:\n{picture}");
+    }
+}
+
+fn painted_by_watcher(width: u16, telemetry: &Telemetry) -> String {
+    let app = screen(Seat::Watch, telemetry, None);
+    drawn(width, 34, &app, NOW_NS).backend().to_string()
 }
