@@ -12,7 +12,8 @@ pub(crate) fn text(ghost: &Prediction) -> String {
         Doing::Holds => "holds by now",
         Doing::Arrived => "has arrived",
     };
-    let [low_mm, high_mm] = [ghost.moved_m.low, ghost.moved_m.high].map(|m| 1e3 * m);
+    // Rounded, what is little less than nothing is nothing: adding zero takes its sign.
+    let [low_mm, high_mm] = [ghost.moved_m.low, ghost.moved_m.high].map(|m| (1e3 * m).round() + 0.0);
     let mut text = format!("predicted: {doing}, moved by {low_mm:.0} to {high_mm:.0} mm");
     if let Some(place_m) = ghost.place_m {
         text += &format!(

@@ -57,11 +57,17 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
     let cells = picture.subject.cells.min(worm_physics::MAX_CELLS) as u16;
     let trip_lines = u16::from(picture.trip.is_some());
     let heights = Heights::of(frame.area().height.saturating_sub(trip_lines), cells);
+    let rows_below = frame.area().height.saturating_sub(2 + trip_lines + heights.canal);
+    // The keys are worth more than the worm to whoever asks for them.
+    let canal_lines = match view.panel {
+        Panel::Help if rows_below < panels::HELP_LINES => 0,
+        _ => heights.canal,
+    };
     let [head, status, trip, canal, below] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(1),
         Constraint::Length(trip_lines),
-        Constraint::Length(heights.canal),
+        Constraint::Length(canal_lines),
         Constraint::Min(0),
     ])
     .areas(frame.area());
@@ -326,11 +332,12 @@ fn draw_inferred_tips(frame: &mut Frame<'_>, area: Rect, block: Block<'_>, pictu
             } else {
                 "–".to_owned()
             },
-            format!(
-                "~{:.1}/{:.1}",
-                inferred.forward_slide_m[cell] * 1e3,
-                inferred.backward_slide_m[cell] * 1e3
-            ),
+            match [inferred.forward_slide_m[cell], inferred.backward_slide_m[cell]].map(|m| m * 1e3) {
+                [forward, backward] if forward.is_finite() && backward.is_finite() => {
+                    format!("~{forward:.1}/{backward:.1}")
+                }
+                _ => "–".to_owned(),
+            },
         ];
         Row::new(
             fields

@@ -2,8 +2,8 @@
 
 use super::super::app::Seat;
 use super::super::*;
-use super::fixture::{NOW_NS, alarm, drawn, received, screen};
-use worm_estimator::message::{AlarmKind, Fault, Mode, Range, State};
+use super::fixture::{NOW_NS, alarm, drawn, inferred, painted, received, screen};
+use worm_estimator::message::{AlarmKind, Fault, Inferred, Mode, Range, State};
 
 /// Pages of a worm with this fault.
 fn pages_of(fault: Fault, width: u16) -> [String; 2] {
@@ -106,4 +106,36 @@ fn distance_time_and_one_charge_are_in_the_edge_of_the_canal() {
 fn painted_by_watcher(width: u16, telemetry: &Telemetry) -> String {
     let app = screen(Seat::Watch, telemetry, None);
     drawn(width, 34, &app, NOW_NS).backend().to_string()
+}
+
+#[test]
+fn what_the_current_does_not_tell_yet_is_no_number() {
+    let mut telemetry = received(1.4);
+    telemetry.take_inferred(&Inferred {
+        position_m: f64::NAN,
+        position_sigma_m: 0.0,
+        pull_n: f64::NAN,
+        ..inferred()
+    });
+    let picture = painted(110, 34, &telemetry);
+    assert!(!picture.contains("NaN"), "{picture}");
+    let words = "position not yet known, ~6.7±0.2 mm and ~47±2 mJ a cycle";
+    assert!(picture.contains(words), "{picture}");
+}
+
+/// Without colours the parts of a bar are still told apart; on a low screen no key is lost.
+#[test]
+fn neither_colour_nor_height_is_needed() {
+    let telemetry = received(3.4);
+    let page = |key: char, height: u16| {
+        let mut app = screen(Seat::Watch, &telemetry, None);
+        app.key(key, NOW_NS);
+        drawn(80, height, &app, NOW_NS).backend().to_string()
+    };
+    let energy = page('e', 24);
+    assert!(energy.contains("█▓") && energy.contains("░ weight"), "{energy}");
+    let help = page('?', 20);
+    for part in ["a          alarms", "?          these", "q, Ctrl-C"] {
+        assert!(help.contains(part), "{part:?} is missing in\n{help}");
+    }
 }
