@@ -84,7 +84,7 @@ pub(super) async fn command(
     let details = if body.is_empty() {
         Details::default()
     } else {
-        match serde_json::from_slice(&body) {
+        match details_of(&body) {
             Ok(details) => details,
             Err(error) => {
                 let why = format!("the body is no JSON object with cycles_per_s or alarms: {error}");
@@ -142,6 +142,12 @@ pub(super) async fn login(State(app): State<Arc<App>>, headers: HeaderMap) -> Re
         Some(refusal) => refusal,
         None => StatusCode::NO_CONTENT.into_response(),
     }
+}
+
+/// A list would be taken for the fields in their order.
+fn details_of(body: &[u8]) -> Result<Details, serde_json::Error> {
+    let object: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(body)?;
+    serde_json::from_value(object.into())
 }
 
 fn request(command: &str, details: Details) -> Option<Request> {

@@ -69,6 +69,12 @@ pub(super) fn router(app: Arc<App>) -> Router {
                 "there is nothing here; docs/dashboard.md says what there is",
             )
         })
+        .method_not_allowed_fallback(async || {
+            refused(
+                StatusCode::METHOD_NOT_ALLOWED,
+                "this is not asked for in this way: the header Allow says how",
+            )
+        })
         .layer(DefaultBodyLimit::max(MAX_BODY))
         .layer(from_fn_with_state(Arc::clone(&app), guard))
         .with_state(app)

@@ -1,6 +1,6 @@
 // The page: listens, draws, and gives commands when somebody presses a button. Loading it, or its connecting again, sends nothing.
 
-import { loadBoxes } from "./boxes.js";
+import { Boxes } from "./boxes.js";
 import { Charts } from "./charts.js";
 import { byId, setText, show } from "./dom.js";
 import { Driver } from "./drive.js";
@@ -21,6 +21,7 @@ const store = new Store();
 const driver = new Driver(store, drawControls);
 const picture = new WormPicture();
 const charts = new Charts(store);
+const boxes = new Boxes();
 const stream = new Stream({
   hello: (hello) => {
     store.takeHello(hello);
@@ -72,6 +73,7 @@ function draw() {
     panels.drawTiming(store);
     panels.drawRecording(store);
     panels.drawEvents(store);
+    boxes.note(store);
     charts.draw();
   }
   drawOld();
@@ -81,6 +83,7 @@ function drawOld() {
   const why = panels.staleness(store, stream);
   panels.drawAges(store, why);
   panels.drawTitle(store, why);
+  boxes.drawAge();
 }
 
 function drawControls() {
@@ -140,7 +143,7 @@ byId("log-out").addEventListener("click", () => driver.logOut());
 byId("login-form").addEventListener("submit", logIn);
 byId("login-cancel").addEventListener("click", () => byId("login").close());
 byId("reports-again").addEventListener("click", loadReports);
-byId("boxes-again").addEventListener("click", loadBoxes);
+byId("boxes-again").addEventListener("click", () => boxes.load());
 document.addEventListener("keydown", (event) => {
   const isTyping = event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey || event.altKey;
   if (event.key === "h" && !isTyping && !event.repeat) command("hold");
@@ -152,4 +155,4 @@ drawControls();
 drawOld();
 setInterval(drawOld, AGE_MS);
 loadReports();
-loadBoxes();
+boxes.load();
