@@ -39,3 +39,25 @@ pub(crate) fn score_text(score: &Score) -> String {
         if score.is_inside { "inside" } else { "outside" },
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use worm_plan::ghost::Expected;
+
+    #[test]
+    fn little_less_than_nothing_is_nothing() {
+        let rests = Prediction {
+            silent_s: 2.0,
+            doing: Doing::Rests,
+            moved_m: Expected {
+                mean: 0.0,
+                low: -2e-4,
+                high: 2e-4,
+            },
+            place_m: None,
+            left_s: None,
+        };
+        assert_eq!(text(&rests), "predicted: rests, moved by 0 to 0 mm");
+    }
+}
