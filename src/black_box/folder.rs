@@ -201,8 +201,10 @@ impl Folder {
             let Some((kind, number, is_part)) = name.to_str().and_then(parse) else {
                 continue;
             };
-            // One that is removed meanwhile is not there.
-            if let Ok(metadata) = found.metadata() {
+            // One that is removed meanwhile is not there. Links are no files of a black box: what they lead to may be anything.
+            if let Ok(metadata) = found.metadata()
+                && metadata.is_file()
+            {
                 files.push(Named {
                     number,
                     kind,

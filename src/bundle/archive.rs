@@ -124,6 +124,14 @@ impl Archive {
         Ok(())
     }
 
+    /// Removes what is left of the archive that would have been `path`: its part takes room that may be needed.
+    pub(crate) fn abandon(path: &Path) {
+        let part = part_path(path);
+        if let Err(error) = std::fs::remove_file(&part) {
+            tracing::warn!("{}: cannot be removed: {error}", part.display());
+        }
+    }
+
     /// Completes the archive; returns what it lacks, and its length.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ use super::redact::redacted;
 use crate::black_box::folder::{FileKind, Folder};
 use crate::preflight::{CheckReport, Trials};
 use crate::topics::{Controller, Hub, Instance, RoleLock};
+use crate::why::newest_stop::newest_stop;
 use crate::why::{explain_stop, text};
 use serde_json::json;
 use std::fs;
@@ -268,7 +269,7 @@ fn program(name: &str, arguments: &[&str], may_fail: bool) -> Result<Vec<u8>, St
     Ok(redacted(&String::from_utf8_lossy(&out)).into_bytes())
 }
 
-/// The newest box with its explanation, and the end of the thin log.
+/// The newest box with a stop and its explanation, the newest of all where that is a later one, and the end of the thin log.
 fn add_black_box(archive: &mut Archive, subject: &Subject) -> io::Result<()> {
     let folder = Folder::new(&subject.black_box);
     let entries = match folder.list() {
@@ -283,11 +284,12 @@ fn add_black_box(archive: &mut Archive, subject: &Subject) -> io::Result<()> {
         "black-box/list.json",
         serde_json::to_vec_pretty(&entries).map_err(|error| error.to_string()),
     )?;
-    match folder.newest_box().map_err(io::Error::other)? {
-        Some(newest) => {
-            let path = folder.path().join(&newest.name);
-            archive.add_file(&format!("black-box/{}", newest.name), &path)?;
-            archive.add("black-box/why.txt", why(&path))?;
+    match newest_stop(&folder).map_err(io::Error::other)? {
+        Some(found) => {
+            for entry in std::iter::once(&found.entry).chain(found.later.last()) {
+                archive.add_file(&format!("black-box/{}", entry.name), &folder.path().join(&entry.name))?;
+            }
+            archive.add("black-box/why.txt", why(&folder.path().join(&found.entry.name)))?;
         }
         None => archive.add("black-box/box", Err("there is no box: nothing has happened".to_owned()))?,
     }

@@ -114,14 +114,17 @@ impl PlaceArgs {
             return folder.find(name).map_err(Failure::unusable);
         }
         let newest = folder.newest_box().map_err(Failure::unusable)?;
-        let newest = newest.ok_or_else(|| {
-            Failure::unusable(format!(
-                "{}: there is no box yet: nothing has happened",
-                folder.path().display()
-            ))
-        })?;
+        let newest = newest.ok_or_else(|| no_box(&folder))?;
         Ok(folder.path().join(newest.name))
     }
+}
+
+/// There is no box to speak of.
+pub(super) fn no_box(folder: &Folder) -> Failure {
+    Failure::unusable(format!(
+        "{}: there is no box yet: nothing has happened",
+        folder.path().display()
+    ))
 }
 
 fn list(args: &ListArgs) -> Result<(), Failure> {

@@ -32,12 +32,23 @@ pub fn run(args: &BundleArgs) -> Result<(), Failure> {
             "{out} exists already: choose another name with --out, or overwrite it with --force"
         )));
     }
+    // One that is there but wrong is part of what the bundle shows; one that is not was meant otherwise.
+    if let Some(config) = &args.place.worm.config {
+        let readable = std::fs::File::open(config);
+        readable.map_err(|error| {
+            Failure::unusable(format!(
+                "{}: cannot be read: {error}: check the path given with --config",
+                config.display()
+            ))
+        })?;
+    }
     let subject = subject(&args.place);
     let mut archive = Archive::begin(&args.out, &subject.worm)
         .map_err(|error| Failure::unusable(format!("{out}: cannot be written: {error}: choose another place")))?;
     let tell = |what: &str| tracing::info!("{what}");
     let written = add_all(&mut archive, &subject, status::as_json(), tell);
     let (missing, bytes) = written.and_then(|()| archive.finish()).map_err(|error| {
+        Archive::abandon(&args.out);
         Failure::failed(format!(
             "{out}: cannot be written: {error}: make room or choose another place"
         ))

@@ -1,11 +1,11 @@
 //! `wormd why`: why a worm stopped, from a box or any other log.
 
-use super::black_box::PlaceArgs;
+use super::black_box::{PlaceArgs, no_box};
 #[cfg(feature = "analysis")]
 use super::progress::Progress;
 use super::{Failure, log_line, print};
 use crate::black_box::trigger;
-use crate::why::{Explanation, explain_stop, text};
+use crate::why::{Explanation, explain_stop, newest_stop, text};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use worm_estimator::config::Config;
@@ -14,7 +14,7 @@ use worm_log::{Log, messages};
 /// Arguments of `wormd why`.
 #[derive(Debug, Args)]
 pub struct WhyArgs {
-    /// A box of the black box or another log (MCAP), complete or not; without it, the newest box
+    /// A box of the black box or another log (MCAP), complete or not; without it, the newest box with a stop
     #[arg(value_name = "LOG")]
     log: Option<PathBuf>,
     /// Folder for why.html and why.json
@@ -40,7 +40,7 @@ pub struct WhyArgs {
 pub fn run(args: &WhyArgs) -> Result<(), Failure> {
     let path = match &args.log {
         Some(log) => log.clone(),
-        None => args.place.find("last")?,
+        None => stop_box(&args.place)?,
     };
     let log = messages(&path).map_err(Failure::unusable)?;
     if log.states.is_empty() {
@@ -78,6 +78,22 @@ pub fn run(args: &WhyArgs) -> Result<(), Failure> {
         log_line(format_args!("{}: look at it in a browser", page.display()));
     }
     Ok(())
+}
+
+/// The newest box with a stop, or else the newest. Later ones are named.
+fn stop_box(place: &PlaceArgs) -> Result<PathBuf, Failure> {
+    let folder = place.folder()?;
+    let found = newest_stop::newest_stop(&folder).map_err(Failure::unusable)?;
+    let found = found.ok_or_else(|| no_box(&folder))?;
+    for later in &found.later {
+        let reason = later.reason.as_deref().unwrap_or("its beginning is not known");
+        log_line(format_args!(
+            "note: a later box, in which nothing stopped: {} ({reason}): `wormd why {}` says more",
+            later.name,
+            folder.path().join(&later.name).display()
+        ));
+    }
+    Ok(folder.path().join(&found.entry.name))
 }
 
 #[cfg(feature = "analysis")]

@@ -3,15 +3,12 @@
 use super::Token;
 use super::access::Hosts;
 use super::fleet::FleetThread;
+use super::places::Places;
 use super::relay_thread::{RelayThread, Shared};
 use crate::black_box::folder::Folder;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
-use tokio::sync::Semaphore;
-
-/// Most streams of events at a time.
-pub(super) const MAX_PAGES: usize = 64;
 
 /// The address of who asks.
 #[derive(Debug, Clone, Copy)]
@@ -26,6 +23,5 @@ pub(super) struct App {
     pub(super) hosts: Hosts,
     pub(super) reports: Option<PathBuf>,
     pub(super) boxes: Folder,
-    /// Places for streams of events.
-    pub(super) pages: Arc<Semaphore>,
+    pub(super) places: Arc<Places>,
 }

@@ -11,8 +11,11 @@ use axum::http::header::{
 use axum::http::{HeaderMap, HeaderName, StatusCode};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream::unfold;
+use nix::errno::Errno;
+use nix::fcntl::OFlag;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
+use std::os::unix::fs::OpenOptionsExt;
 use std::time::UNIX_EPOCH;
 
 /// How much is read at a time, bytes.
@@ -45,8 +48,17 @@ pub(super) fn open(folder: &Folder, wanted: &str) -> io::Result<Option<BoxFile>>
     if !name.ends_with(".mcap") {
         return Ok(None);
     }
-    let file = File::open(&path)?;
+    // Nor what a link in the folder leads to: it may lie anywhere.
+    let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
+    let opened = File::options().read(true).custom_flags(flags.bits()).open(&path);
+    let file = match opened {
+        Err(error) if error.raw_os_error() == Some(Errno::ELOOP as i32) => return Ok(None),
+        opened => opened?,
+    };
     let about = file.metadata()?;
+    if !about.is_file() {
+        return Ok(None);
+    }
     let modified = about.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default();
     Ok(Some(BoxFile {
         tag: format!("\"{name}-{}-{}\"", about.len(), modified.as_nanos()),
@@ -71,7 +83,8 @@ impl BoxFile {
             Wanted::Part(bytes) => (StatusCode::PARTIAL_CONTENT, bytes),
             Wanted::Beyond => {
                 let all = format!("bytes */{}", self.length);
-                return (StatusCode::RANGE_NOT_SATISFIABLE, [(CONTENT_RANGE, all)]).into_response();
+                let why = format!("{} has {} bytes", self.name, self.length);
+                return ([(CONTENT_RANGE, all)], refused(StatusCode::RANGE_NOT_SATISFIABLE, &why)).into_response();
             }
         };
         let head = [

@@ -7,18 +7,24 @@ use super::fleet::Held;
 use super::response::{refused, to_json};
 use crate::relay::wire::{Answer, Request};
 use crate::trip::wire::Ask;
-use axum::body::Bytes;
+use axum::body::{Body, Bytes};
 use axum::extract::{Extension, Path, State};
 use axum::http::header::{AUTHORIZATION, USER_AGENT, WWW_AUTHENTICATE};
 use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
+use futures_util::StreamExt;
 use serde::Deserialize;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Tells the pages of one browser apart.
 const CLIENT: &str = "x-wormd-client";
 /// The name of who uses the page, percent-encoded.
 const NAME: &str = "x-wormd-name";
+
+/// How much of a body that nobody needs is read, bytes, and for how long.
+const MAX_FORGOTTEN: usize = 1 << 20;
+const FORGET_TIME: Duration = Duration::from_millis(200);
 
 /// The commands that there are.
 const COMMANDS: &str =
@@ -35,7 +41,35 @@ struct Details {
     alarms: Vec<String>,
 }
 
-/// `POST /api/command/{command}`.
+/// `POST /api/command/hold`. Whatever else is in the request: nothing keeps anybody from this.
+pub(super) async fn hold(
+    State(app): State<Arc<App>>,
+    Extension(peer): Extension<Peer>,
+    headers: HeaderMap,
+    body: Body,
+) -> Response {
+    let answer = app.relay.anyone(caller(peer, &headers), Request::Hold).await;
+    forget(body).await;
+    answered(answer)
+}
+
+/// Reads and drops a body, within limits: an answer beside bytes that nobody has read may not arrive.
+async fn forget(body: Body) {
+    let mut pieces = body.into_data_stream();
+    let mut room = MAX_FORGOTTEN;
+    let read = async {
+        while let Some(Ok(piece)) = pieces.next().await {
+            match room.checked_sub(piece.len()) {
+                Some(left) => room = left,
+                None => break,
+            }
+        }
+    };
+    // What has not come by then is not waited for.
+    let _ = tokio::time::timeout(FORGET_TIME, read).await;
+}
+
+/// `POST /api/command/{command}`, other than `hold`.
 pub(super) async fn command(
     State(app): State<Arc<App>>,
     Extension(peer): Extension<Peer>,
@@ -44,17 +78,13 @@ pub(super) async fn command(
     body: Bytes,
 ) -> Response {
     let caller = caller(peer, &headers);
-    // Whatever else is in the request: nothing keeps anybody from this.
-    if command == "hold" {
-        return answered(app.relay.anyone(caller, Request::Hold).await);
-    }
     if let Some(refusal) = unauthorised(&app, &headers) {
         return refusal;
     }
     let details = if body.is_empty() {
         Details::default()
     } else {
-        match serde_json::from_slice(&body) {
+        match details_of(&body) {
             Ok(details) => details,
             Err(error) => {
                 let why = format!("the body is no JSON object with cycles_per_s or alarms: {error}");
@@ -80,8 +110,10 @@ pub(super) async fn hold_fleet(
     State(app): State<Arc<App>>,
     Extension(peer): Extension<Peer>,
     headers: HeaderMap,
+    body: Body,
 ) -> Response {
     let held = app.fleet.hold(caller(peer, &headers)).await;
+    forget(body).await;
     let status = match held.iter().all(Held::is_answered) {
         true => StatusCode::OK,
         false => StatusCode::SERVICE_UNAVAILABLE,
@@ -110,6 +142,12 @@ pub(super) async fn login(State(app): State<Arc<App>>, headers: HeaderMap) -> Re
         Some(refusal) => refusal,
         None => StatusCode::NO_CONTENT.into_response(),
     }
+}
+
+/// A list would be taken for the fields in their order.
+fn details_of(body: &[u8]) -> Result<Details, serde_json::Error> {
+    let object: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(body)?;
+    serde_json::from_value(object.into())
 }
 
 fn request(command: &str, details: Details) -> Option<Request> {

@@ -6,7 +6,7 @@ use crate::realtime::monotonic_ns;
 use axum::body::{Body, Bytes};
 use futures_util::stream::unfold;
 use std::convert::Infallible;
-use tokio::sync::{OwnedSemaphorePermit, watch};
+use tokio::sync::watch;
 
 /// Begins each stream: a browser that connects again by itself waits so long, ms.
 const PREAMBLE: &[u8] = b"retry: 1000\n\n";
@@ -17,17 +17,15 @@ struct Page {
     changed: watch::Receiver<()>,
     cursor: Cursor,
     has_begun: bool,
-    _place: OwnedSemaphorePermit,
 }
 
 /// The body of the answer: goes on for as long as the page is there. What is sent is made when there is room for it.
-pub(super) fn body(shared: &Shared, place: OwnedSemaphorePermit) -> Body {
+pub(super) fn body(shared: &Shared) -> Body {
     let page = Page {
         changed: shared.subscribe(),
         shared: shared.clone(),
         cursor: Cursor::default(),
         has_begun: false,
-        _place: place,
     };
     Body::from_stream(unfold(page, |mut page| async move {
         let event = page.next_event().await?;

@@ -33,6 +33,7 @@ mod fleet;
 mod listen;
 mod metrics;
 mod paced_stream;
+mod places;
 mod relay_thread;
 mod reports;
 mod response;

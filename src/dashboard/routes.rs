@@ -1,14 +1,15 @@
 //! What can be asked for, and the rules that hold for all of it.
 
 use super::access::Source;
-use super::app::{App, MAX_PAGES};
+use super::app::App;
 use super::assets::{self, Asset};
+use super::places::Place;
 use super::response::{refused, to_json};
 use super::{boxes, commands, events, metrics, reports};
 use crate::realtime::monotonic_ns;
 use axum::Router;
 use axum::body::Body;
-use axum::extract::{DefaultBodyLimit, Path, Request, State};
+use axum::extract::{DefaultBodyLimit, Extension, Path, Request, State};
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, HOST, HeaderName, IF_NONE_MATCH, ORIGIN,
     REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
@@ -55,6 +56,7 @@ pub(super) fn router(app: Arc<App>) -> Router {
         .route("/api/reports", get(list_reports))
         .route("/api/boxes", get(list_boxes))
         .route("/boxes/{name}", get(download_box))
+        .route("/api/command/hold", post(commands::hold))
         .route("/api/command/{command}", post(commands::command))
         .route("/api/fleet", get(fleet))
         .route("/api/fleet/hold", post(commands::hold_fleet))
@@ -65,6 +67,12 @@ pub(super) fn router(app: Arc<App>) -> Router {
             refused(
                 StatusCode::NOT_FOUND,
                 "there is nothing here; docs/dashboard.md says what there is",
+            )
+        })
+        .method_not_allowed_fallback(async || {
+            refused(
+                StatusCode::METHOD_NOT_ALLOWED,
+                "this is not asked for in this way: the header Allow says how",
             )
         })
         .layer(DefaultBodyLimit::max(MAX_BODY))
@@ -130,17 +138,16 @@ fn asset(asset: &Asset, headers: &HeaderMap) -> Response {
     }
 }
 
-async fn event_stream(State(app): State<Arc<App>>) -> Response {
-    let Ok(place) = Arc::clone(&app.pages).try_acquire_owned() else {
-        let why = format!("{MAX_PAGES} pages are open already: close some");
+async fn event_stream(State(app): State<Arc<App>>, Extension(place): Extension<Arc<Place>>) -> Response {
+    if let Err(why) = place.begin_stream() {
         return refused(StatusCode::SERVICE_UNAVAILABLE, &why);
-    };
+    }
     let head = [
         (CONTENT_TYPE, "text/event-stream"),
         // A proxy that collects what is sent would make it old.
         (HeaderName::from_static("x-accel-buffering"), "no"),
     ];
-    (head, events::body(&app.shared, place)).into_response()
+    (head, events::body(&app.shared)).into_response()
 }
 
 async fn state(State(app): State<Arc<App>>) -> Response {
@@ -171,7 +178,7 @@ async fn health(State(app): State<Arc<App>>) -> Response {
         "name": feed.picture.subject.name,
         "state_age_ms": feed.ages(now_ns).state,
         "relay": feed.connection(),
-        "pages": MAX_PAGES - app.pages.available_permits(),
+        "pages": app.places.streams(),
     });
     to_json(StatusCode::OK, &health)
 }
@@ -181,7 +188,7 @@ async fn fleet(State(app): State<Arc<App>>) -> Response {
 }
 
 async fn metrics_text(State(app): State<Arc<App>>) -> Response {
-    let pages = MAX_PAGES - app.pages.available_permits();
+    let pages = app.places.streams();
     let text = metrics::text(&app.shared.feed(), monotonic_ns(), pages);
     ([(CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response()
 }

@@ -2,10 +2,11 @@
 
 use super::Token;
 use super::access::Hosts;
-use super::app::{App, MAX_PAGES, Peer};
+use super::app::{App, Peer};
 use super::feed::Feed;
 use super::fleet::FleetThread;
 use super::paced_stream::PacedStream;
+use super::places::{Place, Places, Stage};
 use super::relay_thread::{RelayThread, Shared};
 use super::routes::router;
 use crate::black_box::folder::Folder;
@@ -14,23 +15,24 @@ use crate::relay::client::RelayLink;
 use crate::relay::wire::Subject;
 use crate::topics::Instance;
 use axum::Router;
+use axum::body::Bytes;
+use futures_util::future::{Either, select};
+use hyper::body::{Body, Frame, SizeHint};
 use hyper::server::conn::http1;
 use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use std::collections::HashMap;
+use std::convert::Infallible;
 use std::ffi::OsString;
-use std::net::{IpAddr, TcpListener};
+use std::net::TcpListener;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::net::TcpStream;
-use tokio::sync::Semaphore;
 use worm_estimator::config::Config;
 
-/// Most connections, and most of one address. A browser opens six.
-const MAX_CONNECTIONS: usize = 256;
-const MAX_OF_ONE: usize = 64;
 /// How long the head of a request may take, and how long a connection may wait for its next one.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 /// Most lines in the head of a request.
@@ -73,6 +75,7 @@ pub(crate) fn run(settings: Settings, end: std::os::unix::net::UnixStream) -> Re
     let shared = Shared::new(Feed::new(Subject::of(&settings.config)));
     let link = RelayLink::new(&settings.instance, settings.arguments, "dashboard".to_owned());
     let address = settings.listener.local_addr().map_err(Failure::failed)?;
+    let places = Arc::new(Places::default());
     let app = Arc::new(App {
         relay: RelayThread::start(&settings.instance, link, shared.clone())?,
         fleet: FleetThread::start(&settings.instance, &settings.config.topics.root)?,
@@ -81,66 +84,57 @@ pub(crate) fn run(settings: Settings, end: std::os::unix::net::UnixStream) -> Re
         hosts: Hosts::new(address.ip(), settings.hosts),
         reports: settings.reports,
         boxes: settings.boxes,
-        pages: Arc::new(Semaphore::new(MAX_PAGES)),
+        places: Arc::clone(&places),
     });
     runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(settings.listener).map_err(Failure::failed)?;
         end.set_nonblocking(true).map_err(Failure::failed)?;
         let end = tokio::net::UnixStream::from_std(end).map_err(Failure::failed)?;
-        let serve = std::pin::pin!(accept(listener, router(app)));
+        let serve = std::pin::pin!(accept(listener, places, router(app)));
         let ended = std::pin::pin!(end.readable());
-        futures_util::future::select(serve, ended).await;
+        select(serve, ended).await;
         Ok(())
     })
 }
 
-/// Connections of each address.
-#[derive(Debug, Default)]
-struct Places(Mutex<HashMap<IpAddr, usize>>);
-
-/// The place of one connection.
-struct Place {
-    places: Arc<Places>,
-    address: IpAddr,
+/// The body of an answer: when it is sent, its connection waits for the next request.
+struct Sent {
+    body: axum::body::Body,
+    place: Arc<Place>,
 }
 
-impl Places {
-    /// A place for a connection; none when there are too many.
-    fn take(self: &Arc<Self>, address: IpAddr) -> Option<Place> {
-        let mut counts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let all: usize = counts.values().sum();
-        let count = counts.entry(address).or_default();
-        if all >= MAX_CONNECTIONS || *count >= MAX_OF_ONE {
-            return None;
-        }
-        *count += 1;
-        Some(Place {
-            places: Arc::clone(self),
-            address,
-        })
+impl Body for Sent {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
     }
 }
 
-impl Drop for Place {
+impl Drop for Sent {
     fn drop(&mut self) {
-        let mut counts = self.places.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(count) = counts.get_mut(&self.address) {
-            *count -= 1;
-            if *count == 0 {
-                counts.remove(&self.address);
-            }
-        }
+        self.place.enter(Stage::Waiting);
     }
 }
 
-async fn accept(listener: tokio::net::TcpListener, router: Router) {
-    let places = Arc::new(Places::default());
+async fn accept(listener: tokio::net::TcpListener, places: Arc<Places>, router: Router) {
     loop {
         match listener.accept().await {
             Ok((stream, peer)) => {
-                // One too many is closed at once: its browser tries again.
                 if let Some(place) = places.take(peer.ip()) {
-                    tokio::spawn(serve(stream, Peer(peer.ip()), router.clone(), place));
+                    tokio::spawn(serve(stream, Peer(peer.ip()), router.clone(), Arc::new(place)));
                 }
             }
             Err(error) => {
@@ -152,14 +146,23 @@ async fn accept(listener: tokio::net::TcpListener, router: Router) {
     }
 }
 
-async fn serve(stream: TcpStream, peer: Peer, router: Router, _place: Place) {
+async fn serve(stream: TcpStream, peer: Peer, router: Router, place: Arc<Place>) {
     if let Err(error) = stream.set_nodelay(true) {
         tracing::debug!("a connection that waits to fill its packets: {error}");
     }
     let inner = TowerToHyperService::new(router);
+    let of_requests = Arc::clone(&place);
     let service = service_fn(move |mut request: hyper::Request<hyper::body::Incoming>| {
+        let place = Arc::clone(&of_requests);
+        place.enter(Stage::Asked);
         request.extensions_mut().insert(peer);
-        inner.call(request)
+        request.extensions_mut().insert(Arc::clone(&place));
+        let answer = inner.call(request);
+        async move {
+            let answer = answer.await?;
+            place.enter(Stage::Answered);
+            Ok::<_, Infallible>(answer.map(|body| Sent { body, place }))
+        }
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
@@ -167,7 +170,9 @@ async fn serve(stream: TcpStream, peer: Peer, router: Router, _place: Place) {
         .max_headers(MAX_HEADERS)
         .max_buf_size(MAX_BUFFER)
         .serve_connection(TokioIo::new(PacedStream::new(stream)), service);
-    if let Err(error) = connection.await {
-        tracing::debug!("a connection ended: {error}");
+    match select(std::pin::pin!(connection), std::pin::pin!(place.closed())).await {
+        Either::Left((Ok(()), _)) => {}
+        Either::Left((Err(error), _)) => tracing::debug!("a connection ended: {error}"),
+        Either::Right(_) => tracing::debug!("a connection of {} was closed for another", peer.0),
     }
 }

@@ -1,5 +1,6 @@
 //! The watch screen: keys become requests, lines of the relay become the picture. Pure: times are arguments, ns of one clock.
 
+use super::fault::LatchedFault;
 use super::ghost;
 use super::picture::Picture;
 use super::view::{self, Panel, View};
@@ -312,8 +313,22 @@ impl App {
             let colour = if *is_refusal { Color::Red } else { Color::Green };
             return Line::from(format!(" {text}")).fg(colour);
         }
+        let drivers = self.drivers();
+        match LatchedFault::of(&self.picture) {
+            Some(fault) => Line::from(vec![
+                format!(" fault {}; a: what to do, r twice: reset. ", fault.cause)
+                    .fg(Color::Red)
+                    .bold(),
+                drivers.fg(Color::DarkGray),
+            ]),
+            None => Line::from(format!(" {drivers}")).fg(Color::DarkGray),
+        }
+    }
+
+    /// Who drives.
+    fn drivers(&self) -> String {
         let Some(driver) = &self.picture.driver else {
-            return Line::from(" nobody drives").fg(Color::DarkGray);
+            return "nobody drives".to_owned();
         };
         let name = if self.drives() {
             "you drive"
@@ -327,6 +342,6 @@ impl App {
         };
         let verb = if self.drives() { "" } else { " drives" };
         let since_s = driver.since_ms / 1000;
-        Line::from(format!(" {name}{verb} since {since_s} s ago{attends}")).fg(Color::DarkGray)
+        format!("{name}{verb} since {since_s} s ago{attends}")
     }
 }

@@ -12,7 +12,8 @@ pub(crate) fn text(ghost: &Prediction) -> String {
         Doing::Holds => "holds by now",
         Doing::Arrived => "has arrived",
     };
-    let [low_mm, high_mm] = [ghost.moved_m.low, ghost.moved_m.high].map(|m| 1e3 * m);
+    // Rounded, what is little less than nothing is nothing: adding zero takes its sign.
+    let [low_mm, high_mm] = [ghost.moved_m.low, ghost.moved_m.high].map(|m| (1e3 * m).round() + 0.0);
     let mut text = format!("predicted: {doing}, moved by {low_mm:.0} to {high_mm:.0} mm");
     if let Some(place_m) = ghost.place_m {
         text += &format!(
@@ -37,4 +38,26 @@ pub(crate) fn score_text(score: &Score) -> String {
         score.error_sigmas,
         if score.is_inside { "inside" } else { "outside" },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use worm_plan::ghost::Expected;
+
+    #[test]
+    fn little_less_than_nothing_is_nothing() {
+        let rests = Prediction {
+            silent_s: 2.0,
+            doing: Doing::Rests,
+            moved_m: Expected {
+                mean: 0.0,
+                low: -2e-4,
+                high: 2e-4,
+            },
+            place_m: None,
+            left_s: None,
+        };
+        assert_eq!(text(&rests), "predicted: rests, moved by 0 to 0 mm");
+    }
 }

@@ -80,24 +80,24 @@ impl InferredSummary {
         };
         // So that a small error does not look like none.
         let digits = usize::from(self.position_sigma_m < 1e-3);
+        let place = about(1e3 * self.position_m, 1e3 * self.position_sigma_m, digits);
+        let advance = about(1e3 * self.advance_m, 1e3 * self.advance_sigma_m, 1);
+        let energy = about(1e3 * self.energy_loss_j, 1e3 * self.energy_loss_sigma_j, 0);
+        let pull = about(self.pull_n, self.pull_sigma_n, 1);
         let slope = match self.slope_is_measured {
             true => format!(", slope {:.1}±{:.1}°", self.slope_deg, self.slope_sigma_deg),
             false => String::new(),
         };
-        self.advance_m.is_finite().then(|| {
-            format!(
-                "at ~{:.digits$}±{:.digits$} mm, ~{:.1}±{:.1} mm and ~{:.0}±{:.0} mJ a cycle, pull ~{:.1}±{:.1} N{slope}{standing}",
-                1e3 * self.position_m,
-                1e3 * self.position_sigma_m,
-                1e3 * self.advance_m,
-                1e3 * self.advance_sigma_m,
-                1e3 * self.energy_loss_j,
-                1e3 * self.energy_loss_sigma_j,
-                self.pull_n,
-                self.pull_sigma_n,
-            )
-        })
+        let place = place.map_or_else(|| "position not yet known".to_owned(), |place| format!("at {place} mm"));
+        let energy = energy.map_or_else(String::new, |energy| format!(" and {energy} mJ"));
+        let pull = pull.map_or_else(String::new, |pull| format!(", pull {pull} N"));
+        advance.map(|advance| format!("{place}, {advance} mm{energy} a cycle{pull}{slope}{standing}"))
     }
+}
+
+/// A value with its standard error; none before both are known.
+fn about(value: f64, sigma: f64, digits: usize) -> Option<String> {
+    (value.is_finite() && sigma.is_finite()).then(|| format!("~{value:.digits$}±{sigma:.digits$}"))
 }
 
 /// Which changes would be seen, and how sure one cycle is.

@@ -1,4 +1,5 @@
 mod fixture;
+mod words;
 
 use super::app::Seat;
 use super::*;

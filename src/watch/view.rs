@@ -1,10 +1,12 @@
 //! The live picture in a terminal: the worm in its canal, each tip, cycles, alarms and loop health.
 
 mod canal;
+mod health;
 mod panels;
+mod titles;
 
 use super::picture::Picture;
-use super::{InferredSummary, alarm_text, inferred, recording};
+use super::{InferredSummary, alarm_text, inferred};
 use crate::relay::wire::Subject;
 use crate::trip::words;
 use ratatui::Frame;
@@ -55,11 +57,17 @@ pub(crate) fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
     let cells = picture.subject.cells.min(worm_physics::MAX_CELLS) as u16;
     let trip_lines = u16::from(picture.trip.is_some());
     let heights = Heights::of(frame.area().height.saturating_sub(trip_lines), cells);
+    let rows_below = frame.area().height.saturating_sub(2 + trip_lines + heights.canal);
+    // The keys are worth more than the worm to whoever asks for them.
+    let canal_lines = match view.panel {
+        Panel::Help if rows_below < panels::HELP_LINES => 0,
+        _ => heights.canal,
+    };
     let [head, status, trip, canal, below] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(1),
         Constraint::Length(trip_lines),
-        Constraint::Length(heights.canal),
+        Constraint::Length(canal_lines),
         Constraint::Min(0),
     ])
     .areas(frame.area());
@@ -114,7 +122,7 @@ fn draw_overview(frame: &mut Frame<'_>, area: Rect, view: &View<'_>, heights: &H
     draw_tips(frame, tips, view.picture);
     draw_alarms(frame, alarms, view.picture);
     draw_cycles(frame, cycles, view.picture);
-    draw_health(frame, health, view.picture);
+    health::draw(frame, health, view.picture);
     let lines: Vec<Line<'_>> = view
         .log
         .iter()
@@ -324,11 +332,12 @@ fn draw_inferred_tips(frame: &mut Frame<'_>, area: Rect, block: Block<'_>, pictu
             } else {
                 "–".to_owned()
             },
-            format!(
-                "~{:.1}/{:.1}",
-                inferred.forward_slide_m[cell] * 1e3,
-                inferred.backward_slide_m[cell] * 1e3
-            ),
+            match [inferred.forward_slide_m[cell], inferred.backward_slide_m[cell]].map(|m| m * 1e3) {
+                [forward, backward] if forward.is_finite() && backward.is_finite() => {
+                    format!("~{forward:.1}/{backward:.1}")
+                }
+                _ => "–".to_owned(),
+            },
         ];
         Row::new(
             fields
@@ -450,49 +459,4 @@ fn draw_cycles(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
     };
     let rows = newest.map(row).collect();
     frame.render_widget(table(rows, &columns).block(block), area);
-}
-
-fn draw_health(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
-    let held_hz = picture.timing.map(|timing| (1e9 / timing.period_ns as f64).round());
-    let rate_hz = held_hz.filter(|hz| hz.is_finite()).unwrap_or(picture.subject.rate_hz);
-    let mut lines = vec![
-        Line::raw(format!("{} ticks at {rate_hz} Hz", picture.ticks())),
-        Line::raw(format!(
-            "{} overruns, {} link faults",
-            picture.timing.map_or(0, |timing| timing.overruns),
-            picture.state.map_or(0, |state| state.link_failures),
-        )),
-        Line::raw("µs         p50     p99      max").bold(),
-    ];
-    let durations = picture
-        .statistics
-        .map(|it| [("wake", it.wake_us), ("bus", it.bus_us), ("compute", it.compute_us)]);
-    for (name, us) in durations.into_iter().flatten() {
-        lines.push(Line::raw(format!(
-            "{name:<8}{:>6.0}{:>8.0}{:>9.0}",
-            us.p50, us.p99, us.max
-        )));
-    }
-    if let Some(statistics) = picture.statistics.filter(|it| it.host_pauses > 0) {
-        lines.push(Line::raw(format!(
-            "{} host pauses, {:.2} s",
-            statistics.host_pauses, statistics.host_paused_s
-        )));
-    }
-    lines.extend(picture.recording.as_ref().map(|status| {
-        let line = Line::raw(recording::progress_text(status));
-        if recording::has_stopped(status) {
-            line.fg(Color::Red)
-        } else {
-            line
-        }
-    }));
-    if let Some(fraction) = picture
-        .estimate
-        .map(|estimate| estimate.battery_fraction)
-        .filter(|fraction| fraction.is_finite())
-    {
-        lines.push(Line::raw(format!("battery {:.0} %", fraction * 100.0)));
-    }
-    frame.render_widget(Paragraph::new(lines).block(Block::bordered().title(" loop ")), area);
 }

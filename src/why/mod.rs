@@ -6,12 +6,13 @@
 //! - [`timeline`]: what happened in a log, event by event. Pure.
 //! - [`stops`]: where the worm stopped, and by what. Pure.
 //! - [`explanation`]: both together, with the remedy. Its JSON names are a contract.
-//! - `text`: for the terminal; `page`: for a browser, with the feature `analysis`.
+//! - `newest_stop`: which box has one. `text`: for the terminal; `page`: for a browser, with the feature `analysis`.
 //! - `last_cycles`: what `explain` makes of the gait cycles before it, with the feature `analysis`.
 
 pub mod explanation;
 #[cfg(feature = "analysis")]
 pub(crate) mod last_cycles;
+pub(crate) mod newest_stop;
 #[cfg(feature = "analysis")]
 pub(crate) mod page;
 pub mod stops;

@@ -83,6 +83,10 @@ fn unusable_input_is_named_and_ends_with_status_2() {
             &["record", "--out", "x.mcap", "--max-total", "1GB", "--keep", "3"],
             &["--max-total", "--keep"],
         ),
+        (
+            &["bundle", "--config", "no/such.toml", "--out", "no/such.tar.zst"],
+            &["no/such.toml: cannot be read", "--config"],
+        ),
         (&["virtual-worm"], &["--link"]),
         (
             &["virtual-worm", "--link", "/no/such/folder/port"],
@@ -104,6 +108,25 @@ fn unusable_input_is_named_and_ends_with_status_2() {
         }
         assert!(output.stdout.is_empty(), "{arguments:?} wrote to standard output");
     }
+}
+
+/// A disk that is full is not made fuller: what was written of a bundle goes again.
+#[test]
+fn a_bundle_that_has_no_room_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("bundle.tar.zst");
+    // No file may be larger than a block.
+    let limited = "trap '' XFSZ; ulimit -f 1; exec \"$0\" bundle --name cl-bundle --out \"$1\"";
+    let output = Command::new("bash")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_wormd")])
+        .arg(&out)
+        .output()
+        .expect("bash runs");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("bundle.tar.zst: cannot be written"), "{error}");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).expect("a folder").collect();
+    assert!(left.is_empty(), "{left:?}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! `wormd dashboard` from outside: real processes, requests as bytes, and a real headless Chromium where there is one.
 
 mod boxes;
+mod crowd;
 mod fleet;
 mod http;
 mod without_tracker;
@@ -174,6 +175,11 @@ fn one_drives_with_the_token_and_anyone_may_halt() {
         );
     }
     assert_eq!(watched.post("dance", &[BEARER]).status, 404);
+    let list = request(watched.address, "POST", "/api/command/crawl", &[BEARER, ANN], "[0.1]");
+    assert_eq!(list.status, 400, "{list:?}");
+    let asked_wrongly = watched.get("/api/command/hold");
+    assert_eq!(asked_wrongly.status, 405, "{asked_wrongly:?}");
+    assert!(asked_wrongly.json()["error"].is_string() && asked_wrongly.head.to_lowercase().contains("allow: post"));
     watched.arm(ANN);
     assert_eq!(watched.post("crawl", &[BEARER, ANN, "X-Wormd-Name: ann"]).status, 200);
     let second = watched.post("crawl", &[BEARER, BEN]);
@@ -239,6 +245,14 @@ fn one_drives_with_the_token_and_anyone_may_halt() {
         &"x".repeat(5000),
     );
     assert_eq!(large.status, 413, "{large:?}");
+    let large = "x".repeat(300_000);
+    for path in ["/api/command/hold", "/api/fleet/hold"] {
+        let held = request(watched.address, "POST", path, &[], &large);
+        assert!(
+            [200, 422].contains(&held.status),
+            "the controller has answered: {path}: {held:?}"
+        );
+    }
     for path in [
         "/reports/../Cargo.toml",
         "/assets/../../Cargo.toml",
@@ -347,12 +361,25 @@ fn in_a_browser_nothing_moves_by_itself_and_old_values_are_grey() {
         events(&watched)
     );
 
+    // Whoever is about to log in can still make it hold, by what a click at the button really hits.
+    browser.run("document.getElementById('log-in').click()");
+    browser.run(
+        "const box = document.getElementById('login-hold').getBoundingClientRect();
+         document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2).click()",
+    );
+    browser.wait_for("/^hold: /.test(document.getElementById('login-message').textContent)");
+    assert_eq!(browser.run("return document.activeElement.id"), "who");
+    browser.run("document.getElementById('login-cancel').click()");
+
     // Logged in by the address, which forgets the token.
     browser.open("about:blank");
     browser.open(&format!("{url}#token={TOKEN}"));
     browser.wait_for("!document.getElementById('drive').hidden");
     assert_eq!(browser.run("return location.hash"), "");
-    assert!(events(&watched).is_empty(), "logging in commands nothing");
+    assert!(
+        events(&watched).iter().all(|text| text.contains("hold")),
+        "logging in commands nothing"
+    );
     browser.run("document.getElementById('arm').click()");
     watched.wait_for_mode("armed");
     let position = "return Number(document.querySelector('#worm .cell').dataset.positionMm)";
@@ -450,6 +477,21 @@ fn on_a_phone_a_stall_is_shown_with_what_to_do() {
     });
     browser.wait_for("/Do: .*wormd command reset/.test(document.getElementById('alarm-banner').textContent)");
     browser.wait_for("/motor-stall/.test(document.title)");
+    // There may be a box of it.
+    let looked = "performance.getEntriesByType('resource').filter((it) => it.name.endsWith('/api/boxes')).length > 1";
+    browser.wait_for(looked);
+    browser.wait_for("/^[\\d.]+ s old$/.test(document.getElementById('boxes-age').textContent)");
+    let title = browser.run(
+        "return import('/assets/panels.js').then((panels) => {
+             const raised = [{ kind: 'motor-stall' }];
+             panels.drawTitle({ worm: { name: 'worm1' }, frame: { raised, state: { acknowledged_mask: 0 } } }, 'no state');
+             return document.title;
+         })",
+    );
+    assert_eq!(
+        title, "(old) ⚠ motor-stall – worm1",
+        "old, also where an alarm is raised"
+    );
     assert_eq!(watched.post("acknowledge", &[BEARER, ANN]).status, 200);
     browser.wait_for("document.getElementById('alarm-banner').hidden");
     assert!(

@@ -4,14 +4,15 @@ import { byId, fillRows, make, setText } from "./dom.js";
 
 /**
  * Fills the list `id` with what `url` answers: `entries(answer)` are its entries, `describe(entry)` is an entry's link as
- * `{ url, title, note }`, and `none(answer)` says why there are no entries.
+ * `{ url, title, note }`, and `none(answer)` says why there are no entries. Returns the answer, or null where there was none.
  */
 export async function loadListing(id, url, { entries, describe, none, download = false }) {
   let rows = [];
   let text = "";
+  let answer = null;
   try {
     const response = await fetch(url, { cache: "no-store" });
-    const answer = await response.json();
+    answer = await response.json();
     rows = (entries(answer) ?? []).map(describe);
     text = answer.error ?? (rows.length === 0 ? none(answer) : "");
   } catch {
@@ -36,6 +37,7 @@ export async function loadListing(id, url, { entries, describe, none, download =
       setText(note, entry.note);
     },
   );
+  return answer;
 }
 
 /** A wall-clock time of the server, s since 1970, as people read it here. */

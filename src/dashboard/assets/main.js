@@ -1,6 +1,6 @@
 // The page: listens, draws, and gives commands when somebody presses a button. Loading it, or its connecting again, sends nothing.
 
-import { loadBoxes } from "./boxes.js";
+import { Boxes } from "./boxes.js";
 import { Charts } from "./charts.js";
 import { byId, setText, show } from "./dom.js";
 import { Driver } from "./drive.js";
@@ -21,6 +21,7 @@ const store = new Store();
 const driver = new Driver(store, drawControls);
 const picture = new WormPicture();
 const charts = new Charts(store);
+const boxes = new Boxes();
 const stream = new Stream({
   hello: (hello) => {
     store.takeHello(hello);
@@ -72,6 +73,7 @@ function draw() {
     panels.drawTiming(store);
     panels.drawRecording(store);
     panels.drawEvents(store);
+    boxes.note(store);
     charts.draw();
   }
   drawOld();
@@ -81,6 +83,7 @@ function drawOld() {
   const why = panels.staleness(store, stream);
   panels.drawAges(store, why);
   panels.drawTitle(store, why);
+  boxes.drawAge();
 }
 
 function drawControls() {
@@ -90,12 +93,15 @@ function drawControls() {
 
 let messageTimer = 0;
 
+/** Says it where the buttons are; those of the log-in lie over the others. */
 function say(text, isRefusal) {
-  const message = byId("message");
-  setText(message, text);
-  message.classList.toggle("refused", isRefusal);
+  const messages = [byId("message"), byId("login-message")];
+  for (const message of messages) {
+    setText(message, text);
+    message.classList.toggle("refused", isRefusal);
+  }
   clearTimeout(messageTimer);
-  messageTimer = setTimeout(() => setText(message, ""), MESSAGE_MS);
+  messageTimer = setTimeout(() => messages.forEach((message) => setText(message, "")), MESSAGE_MS);
 }
 
 async function command(name, details = null) {
@@ -130,12 +136,14 @@ async function logIn(event) {
 for (const name of ["hold", "arm", "crawl", "stop", "reset", "take_over", "trip_pause", "trip_resume", "trip_return"]) {
   byId(name).addEventListener("click", () => command(name));
 }
+// An open dialogue covers the page's own.
+byId("login-hold").addEventListener("click", () => command("hold"));
 byId("log-in").addEventListener("click", openLogin);
 byId("log-out").addEventListener("click", () => driver.logOut());
 byId("login-form").addEventListener("submit", logIn);
 byId("login-cancel").addEventListener("click", () => byId("login").close());
 byId("reports-again").addEventListener("click", loadReports);
-byId("boxes-again").addEventListener("click", loadBoxes);
+byId("boxes-again").addEventListener("click", () => boxes.load());
 document.addEventListener("keydown", (event) => {
   const isTyping = event.target instanceof HTMLInputElement || event.ctrlKey || event.metaKey || event.altKey;
   if (event.key === "h" && !isTyping && !event.repeat) command("hold");
@@ -147,4 +155,4 @@ drawControls();
 drawOld();
 setInterval(drawOld, AGE_MS);
 loadReports();
-loadBoxes();
+boxes.load();

@@ -74,8 +74,9 @@ export function drawHead(store, driver) {
 export function drawTitle(store, why) {
   const raised = unacknowledged(store).map(({ alarm }) => alarm.kind);
   const name = store.worm?.name ?? "wormd";
-  const prefix = raised.length > 0 ? `⚠ ${raised[0]} – ` : why ? "(old) " : "";
-  const title = `${prefix}${name}`;
+  const old = why ? "(old) " : "";
+  const alarm = raised.length > 0 ? `⚠ ${raised[0]} – ` : "";
+  const title = `${old}${alarm}${name}`;
   if (document.title !== title) document.title = title;
 }
 
@@ -283,7 +284,7 @@ export function drawTiming({ frame, worm }) {
 
 export function drawRecording({ frame }) {
   const element = byId("recording");
-  setText(element, frame.recording_text ?? "nothing is recorded: `wormd record` would");
+  setText(element, frame.recording_text ?? "no recording of everything: `wormd record` makes one; what the black box keeps is listed below");
   element.classList.toggle("refused", frame.recording?.state === "stopped");
 }
 

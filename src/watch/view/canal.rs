@@ -1,7 +1,7 @@
 //! The worm in its canal: cells, the points where their tips touch, and a ruler.
 
-use super::{View, cell_label, known_positions, tip_style};
-use crate::watch::{ghost, inferred};
+use super::{View, cell_label, known_positions, tip_style, titles};
+use crate::watch::{RangeSummary, ghost, inferred};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -32,17 +32,18 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, view: &View<'_>) {
         Some(ghost) => format!(" {} ", ghost::text(ghost)),
         None => title,
     };
-    let range = picture.range.as_ref().map(|range| {
-        let charge = 100.0 * range.charge_share;
-        format!(
-            " range {:.1} to {:.1} m, battery {charge:.0} % ",
-            range.range_low_m, range.range_high_m
-        )
-    });
+    let range = picture
+        .range
+        .as_ref()
+        .map(|range| titles::of_range(&RangeSummary::of(range)));
+    let leaving = format!(" {} ", view.leaving);
+    let columns = usize::from(area.width.saturating_sub(2));
+    let keys = [" ? shows the keys ", " ? keys "].map(str::to_owned);
     let block = Block::bordered()
+        .title(titles::beside(&title, columns, keys))
         .title(title)
-        .title_bottom(Line::from(range.unwrap_or_default()).right_aligned())
-        .title_bottom(format!(" {}, ? shows the keys ", view.leaving));
+        .title_bottom(titles::beside(&leaving, columns, range.into_iter().flatten()))
+        .title_bottom(leaving);
     let block = match (&view.stale, &view.ghost) {
         (_, Some(_)) => block.fg(GHOST),
         (Some(_), None) => block.fg(Color::DarkGray),

@@ -3,6 +3,7 @@
 use super::{TableCell, alarm_line, cell_number, fitting, number, table};
 use crate::remedy;
 use crate::watch::breakdown::Breakdown;
+use crate::watch::fault::LatchedFault;
 use crate::watch::picture::Picture;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -68,26 +69,26 @@ fn draw_chart(frame: &mut Frame<'_>, area: Rect, title: String, points: &[(f64, 
     frame.render_widget(chart, area);
 }
 
-/// The parts of a breakdown with their colours.
-fn parts(energy: &Breakdown) -> [(f64, Color); 4] {
+/// The parts of a breakdown with their colours, and what tells them apart without.
+fn parts(energy: &Breakdown) -> [(f64, Color, &'static str); 4] {
     [
-        (energy.copper_j, Color::Red),
-        (energy.gears_j, Color::Yellow),
-        (energy.sliding_j, Color::Green),
-        (energy.weight_j, Color::Blue),
+        (energy.copper_j, Color::Red, "█"),
+        (energy.gears_j, Color::Yellow, "▓"),
+        (energy.sliding_j, Color::Green, "▒"),
+        (energy.weight_j, Color::Blue, "░"),
     ]
 }
 
 /// A bar of so many columns, the parts side by side.
 fn bar(energy: &Breakdown, columns: usize) -> Line<'static> {
-    let spans = parts(energy).map(|(part_j, colour)| {
+    let spans = parts(energy).map(|(part_j, colour, fill)| {
         let fraction = (part_j / energy.electrical_j).clamp(0.0, 1.0);
         let width = if fraction.is_finite() {
             (fraction * columns as f64).round() as usize
         } else {
             0
         };
-        Span::from("█".repeat(width)).fg(colour)
+        Span::from(fill.repeat(width)).fg(colour)
     });
     Line::from(spans.to_vec())
 }
@@ -121,15 +122,15 @@ pub(super) fn draw_energy(frame: &mut Frame<'_>, area: Rect, picture: &Picture) 
         ];
         fields.extend(
             parts(&energy)
-                .map(|(part_j, colour)| TableCell::from(number(part_j * 1e3, 1)).style(Style::new().fg(colour))),
+                .map(|(part_j, colour, _)| TableCell::from(number(part_j * 1e3, 1)).style(Style::new().fg(colour))),
         );
         fields.push(TableCell::from(bar(&energy, bar_width)));
         fields.truncate(columns.len());
         Row::new(fields)
     };
     frame.render_widget(table(newest.map(row).collect(), &columns), list);
-    let legend = "copper: heat of the winding. gears: friction inside. sliding: the tips, by (11). weight: lifted up the slope. What \
-                  is missing in a bar is work that the tips have not spent yet, or error.";
+    let legend = "█ copper: heat of the winding. ▓ gears: friction inside. ▒ sliding: the tips. ░ weight: lifted. What a bar lacks is \
+                  work not spent yet, or error.";
     frame.render_widget(
         Paragraph::new(legend).fg(Color::DarkGray).wrap(Wrap { trim: true }),
         note,
@@ -139,7 +140,18 @@ pub(super) fn draw_energy(frame: &mut Frame<'_>, area: Rect, picture: &Picture) 
 /// What is raised with what to do, and the changes before.
 pub(super) fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) {
     let mut lines = Vec::new();
-    if picture.raised.is_empty() {
+    if let Some(fault) = LatchedFault::of(picture) {
+        let off = Line::raw(format!("fault, and the motor is off: {}", fault.details));
+        lines.push(off.fg(Color::Red).bold());
+        lines.push(Line::from(vec!["  Do: ".bold(), Span::raw(fault.remedy)]));
+        lines.push(Line::from(vec![
+            "  Then: ".bold(),
+            Span::raw("r twice resets; nothing moves before"),
+        ]));
+    }
+    if picture.raised.is_empty() && !lines.is_empty() {
+        lines.push(Line::raw("no alarm is raised now").fg(Color::DarkGray));
+    } else if picture.raised.is_empty() {
         lines.push(Line::raw("no alarm is raised").fg(Color::Green));
     }
     let acknowledged = picture.state.map_or(0, |state| state.acknowledged_mask);
@@ -169,6 +181,9 @@ pub(super) fn draw_alarms(frame: &mut Frame<'_>, area: Rect, picture: &Picture) 
         .title_bottom(" k acknowledges them ");
     frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }).block(block), area);
 }
+
+/// Lines of the page of the keys in the usual width: the keys, and who may do what.
+pub(super) const HELP_LINES: u16 = KEYS.len() as u16 + 3 + 2;
 
 /// The keys.
 const KEYS: [(&str, &str); 12] = [
