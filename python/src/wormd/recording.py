@@ -182,7 +182,7 @@ def read(path: StrPath, *, wormd: StrPath | None = None) -> Recording:
         return Recording(path, _PositionTables(path))
     folder: tempfile.TemporaryDirectory[str] = tempfile.TemporaryDirectory(prefix="wormd-")
     try:
-        _, notes = call(wormd, ["export", path, "--parquet", folder.name, "--force"], progress=False)
+        _, notes = call(wormd, ["export", "--parquet", folder.name, "--force", "--", path], progress=False)
         return Recording(path, _LogTables(folder), tuple(notes))
     except BaseException:
         folder.cleanup()
