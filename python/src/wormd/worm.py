@@ -32,7 +32,7 @@ from ._messages import (
 from ._program import StrPath, call_json, find
 from ._relay import Answer, Driver, RelayLink
 from ._topic import Message, Topic
-from .errors import ProgramFailed, Refused, RelayLost, Silent, WormError
+from .errors import NotRunning, ProgramFailed, Refused, RelayLost, Silent, WormError
 from .stream import Ports, Stream
 
 M = TypeVar("M", bound=Message)
@@ -314,6 +314,8 @@ class Worm:
     def _without_relay(self, command: str, error: WormError) -> Answer:
         if isinstance(error, Refused) or self._is_closed:
             raise error
+        if self._instance.holder("controller") is None:
+            raise NotRunning(f"{self.name} has ended: there is nothing left to {command}") from error
         arguments = ["command", command, "--json", "--name", self.name]
         if self._config is not None:
             arguments.append(f"--config={os.fspath(self._config)}")
