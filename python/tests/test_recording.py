@@ -43,6 +43,7 @@ def test_a_log_becomes_frames(up: Up, log: Path) -> None:
     assert "kind" in run.alarms and run.range.empty and "range_m" in run.range
     assert "state" in repr(run)
 
+    assert run.trip.empty and "phase" in run.trip and "standing" in run.inferred
 
 def test_a_log_that_was_cut_is_read_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"

@@ -38,6 +38,9 @@ def test_a_stream_survives_a_restart_and_reports_the_end(tmp_path: Path) -> None
     with pytest.raises(wormd.NotRunning, match="has ended|no worm"):
         states.next()
     assert time.monotonic() - begun < 10
+    for command in (worm.hold, worm.stop):
+        with pytest.raises(wormd.NotRunning, match="has ended"):
+            command()
     with pytest.raises(wormd.NotRunning):
         worm.crawl(0.3)
     worm.close()

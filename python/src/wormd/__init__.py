@@ -46,6 +46,7 @@ from ._messages import (
 from ._relay import Answer, Driver
 from .analysis import Analysis, AnalysisByCurrent, CampaignAnalysis, analyze, analyze_campaign, analyze_unseen
 from .errors import (
+    BadName,
     NotDriver,
     NotRunning,
     OtherVersion,
@@ -72,6 +73,7 @@ __all__ = [
     "Analysis",
     "AnalysisByCurrent",
     "Answer",
+    "BadName",
     "BlackBoxStatus",
     "CampaignAnalysis",
     "CommandKind",

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import NotRunning, WormError
+from .errors import BadName, NotRunning, WormError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -67,9 +67,9 @@ class Instance:
 def locate(name: str | None, config: str | os.PathLike[str] | None) -> Instance:
     """Find a worm as its own processes do: by the configuration's ``worm.name`` and ``topics.root``."""
     settings = _read_config(Path(config)) if config is not None else {}
-    worm = name or str(settings.get("worm", {}).get("name", "worm1"))
+    worm = name if name is not None else str(settings.get("worm", {}).get("name", "worm1"))
     if not re.fullmatch(r"[a-z][a-z0-9-]{0,15}", worm):
-        raise ValueError(f"{worm!r} is no worm's name: 1 to 16 of a-z, 0-9 and '-', beginning with a letter")
+        raise BadName(f"{worm!r} is no worm's name: 1 to 16 of a-z, 0-9 and '-', beginning with a letter")
     root = str(settings.get("topics", {}).get("root", _AUTO))
     return Instance(worm, _auto_root(worm) if root == _AUTO else Path(root).resolve())
 

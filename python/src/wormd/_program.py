@@ -55,8 +55,16 @@ def find(given: StrPath | None = None, worm_process: int | None = None) -> str:
 
 
 def call_json(program: StrPath | None, arguments: Sequence[StrPath], progress: ProgressCallback | bool | None = None) -> Any:
-    """Call the program, and return the JSON that it prints."""
-    return json.loads(call(program, arguments, progress)[0])
+    """Call the program, and return the JSON that it prints.
+
+    Raises:
+        ProgramFailed: it ended with an error, or printed something else.
+    """
+    printed = call(program, arguments, progress)[0]
+    try:
+        return json.loads(printed)
+    except json.JSONDecodeError as error:
+        raise ProgramFailed(f"wormd {os.fspath(arguments[0])} printed what is no JSON ({error}): {printed[:200]!r}", 0) from error
 
 
 def call(

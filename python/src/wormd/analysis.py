@@ -363,7 +363,7 @@ def analyze_campaign(
         ProgramFailed: with the program's message.
         WormError: where nobody saw the worm.
     """
-    arguments: list[StrPath] = ["analyze", campaign, "--json", *options(out=out)]
+    arguments: list[StrPath] = ["analyze", "--json", *options(out=out), "--", campaign]
     result = call_json(wormd, arguments, progress)
     for run in result["runs"]:
         _refuse_unseen(run)
@@ -376,7 +376,7 @@ def _refuse_unseen(run: dict[str, Any]) -> None:
 
 
 def _arguments(recording: StrPath, slope_deg: float, **given: Any) -> list[StrPath]:
-    return ["analyze", recording, "--json", f"--slope={slope_deg}", *options(**given)]
+    return ["analyze", "--json", f"--slope={slope_deg}", *options(**given), "--", recording]
 
 
 def options(**given: Any) -> list[str]:

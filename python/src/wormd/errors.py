@@ -11,6 +11,10 @@ class NotRunning(WormError):
     """There is no such worm, or it has ended."""
 
 
+class BadName(WormError, ValueError):
+    """No worm can have this name."""
+
+
 class OtherVersion(WormError):
     """The worm runs a version of wormd with other messages than this package knows."""
 

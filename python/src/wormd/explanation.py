@@ -405,7 +405,7 @@ def explain(
             more += options(config=config)
         else:
             source = write_campaign(campaign, Path(folder if out is None else out) / "campaign.toml", config=config)
-        answer: dict[str, Any] = call_json(wormd, ["explain", source, "--json", *more], progress)
+        answer: dict[str, Any] = call_json(wormd, ["explain", "--json", *more, "--", source], progress)
     model = None if out is None else Path(out) / "model.toml"
     return Explanation.of(answer, report=page(out), model=model)
 

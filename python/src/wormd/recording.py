@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._messages import MAX_CELLS, Alarm, CommandRecord, Cycle, Estimate, Range, State, Timing
+from ._messages import MAX_CELLS, Alarm, CommandRecord, Cycle, Estimate, Inferred, Range, State, Timing, TripStatus
 from ._program import StrPath, call
 from ._topic import Topic
 from .errors import WormError
@@ -79,6 +79,16 @@ class Recording:
     def commands(self) -> pandas.DataFrame:
         """What the controller was told, by whom, and what it made of it."""
         return self._frame(CommandRecord.TOPIC)
+
+    @cached_property
+    def trip(self) -> pandas.DataFrame:
+        """How a trip stood, as it went on."""
+        return self._frame(TripStatus.TOPIC)
+
+    @cached_property
+    def inferred(self) -> pandas.DataFrame:
+        """What the motor's current alone says, after each gait cycle."""
+        return self._frame(Inferred.TOPIC)
 
     def __repr__(self) -> str:
         return f"<Recording {self.path}: {', '.join(self._tables.names) or 'no messages'}>"
@@ -182,7 +192,7 @@ def read(path: StrPath, *, wormd: StrPath | None = None) -> Recording:
         return Recording(path, _PositionTables(path))
     folder: tempfile.TemporaryDirectory[str] = tempfile.TemporaryDirectory(prefix="wormd-")
     try:
-        _, notes = call(wormd, ["export", path, "--parquet", folder.name, "--force"], progress=False)
+        _, notes = call(wormd, ["export", "--parquet", folder.name, "--force", "--", path], progress=False)
         return Recording(path, _LogTables(folder), tuple(notes))
     except BaseException:
         folder.cleanup()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -30,10 +29,10 @@ from ._messages import (
     Timing,
     TripStatus,
 )
-from ._program import StrPath, call, find
+from ._program import StrPath, call_json, find
 from ._relay import Answer, Driver, RelayLink
 from ._topic import Message, Topic
-from .errors import ProgramFailed, Refused, RelayLost, Silent, WormError
+from .errors import NotRunning, ProgramFailed, Refused, RelayLost, Silent, WormError
 from .stream import Ports, Stream
 
 M = TypeVar("M", bound=Message)
@@ -258,9 +257,9 @@ class Worm:
             force: replace a file that is there.
         """
         command = [find(self._program, self._instance.holder("controller")), "record", "--end-with-stdin", "--name", self.name]
-        command += ["--out", os.fspath(out)]
+        command.append(f"--out={os.fspath(out)}")
         if self._config is not None:
-            command += ["--config", os.fspath(self._config)]
+            command.append(f"--config={os.fspath(self._config)}")
         if names := ",".join(topics):
             command += ["--topics", names]
         if force:
@@ -315,12 +314,14 @@ class Worm:
     def _without_relay(self, command: str, error: WormError) -> Answer:
         if isinstance(error, Refused) or self._is_closed:
             raise error
+        if self._instance.holder("controller") is None:
+            raise NotRunning(f"{self.name} has ended: there is nothing left to {command}") from error
         arguments = ["command", command, "--json", "--name", self.name]
         if self._config is not None:
-            arguments += ["--config", os.fspath(self._config)]
+            arguments.append(f"--config={os.fspath(self._config)}")
         program = find(self._program, self._instance.holder("controller"))
         try:
-            answer = json.loads(call(program, arguments, progress=False)[0])
+            answer = call_json(program, arguments, progress=False)
         except ProgramFailed as failure:
             raise failure from error
         return Answer(command, answer.get("mode"), answer.get("fault"), answer.get("tick"))
