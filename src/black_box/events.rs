@@ -3,9 +3,10 @@
 //! Pure: messages and time in, events out. Times are ns of `CLOCK_MONOTONIC`; the wall clock decides nothing.
 
 use crate::recorder::Batch;
+use crate::relay::departure::Departure;
 use std::fmt;
 use std::time::Duration;
-use worm_estimator::message::{Alarm, AlarmKind, Fault, HoldReason, Mode, State};
+use worm_estimator::message::{Alarm, AlarmKind, CommandOutcome, CommandRecord, Fault, HoldReason, Mode, State};
 
 /// Silence of a controller that had torque on after which it counts as gone.
 const SILENCE: Duration = Duration::from_secs(1);
@@ -21,6 +22,8 @@ pub(super) enum Cause {
     Fault(Fault, Option<AlarmKind>),
     /// Whoever made the worm crawl is gone.
     LeaseLapsed,
+    /// The watcher that drove fell silent.
+    DriverSilent,
     /// The controller fell silent with torque on.
     ControllerSilent,
     /// A controller started anew where one had torque on a moment ago.
@@ -43,6 +46,7 @@ impl Cause {
             Self::Alarm(alarm) | Self::Fault(Fault::Alarm, Some(alarm)) => alarm.name(),
             Self::Fault(fault, _) => fault.name(),
             Self::LeaseLapsed => HoldReason::LeaseLapsed.name(),
+            Self::DriverSilent => "driver-silent",
             Self::ControllerSilent => "controller-silent",
             Self::ControllerRestarted => "controller-restarted",
         }
@@ -55,7 +59,7 @@ impl fmt::Display for Cause {
             Self::Alarm(alarm) => write!(f, "alarm {alarm}"),
             Self::Fault(Fault::Alarm, Some(alarm)) => write!(f, "fault alarm {alarm}"),
             Self::Fault(fault, _) => write!(f, "fault {fault}"),
-            Self::LeaseLapsed => f.write_str("hold lease-lapsed"),
+            Self::LeaseLapsed | Self::DriverSilent => write!(f, "hold {}", self.short_name()),
             Self::ControllerSilent | Self::ControllerRestarted => f.write_str(self.short_name()),
         }
     }
@@ -89,6 +93,7 @@ impl EventWatch {
             events.extend(self.take_state(state));
         }
         events.extend(batch.alarms.iter().filter_map(|alarm| self.take_alarm(alarm)));
+        events.extend(batch.commands.iter().filter_map(|record| self.take_command(record)));
         events.sort_by_key(|event| event.time_ns);
         if batch.states.is_empty() {
             self.silent += looked.min(LONGEST_LOOK);
@@ -112,6 +117,15 @@ impl EventWatch {
         counts.then_some(Event {
             time_ns: alarm.time_ns,
             cause: Cause::Alarm(kind),
+        })
+    }
+
+    fn take_command(&self, record: &CommandRecord) -> Option<Event> {
+        let is_silence = Departure::of(record).is_some_and(|departure| departure.is_silence());
+        let is_taken = record.outcome == CommandOutcome::Accepted.code();
+        (is_silence && is_taken && record.time_ns >= self.begun_ns).then_some(Event {
+            time_ns: record.time_ns,
+            cause: Cause::DriverSilent,
         })
     }
 
@@ -144,6 +158,7 @@ fn has_torque(state: &State) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use worm_estimator::message::{Command, CommandKind, Reply, ShortText};
 
     const LOOK: Duration = Duration::from_millis(20);
 
@@ -204,6 +219,37 @@ mod tests {
         };
         let cause = Cause::Alarm(AlarmKind::JammedCell);
         assert_eq!(watch.update(&batch, LOOK, 900), [Event { time_ns: 800, cause }]);
+    }
+
+    #[test]
+    fn a_driver_that_falls_silent_counts_and_one_that_leaves_does_not() {
+        let hold = |time_ns, sender| {
+            let command = Command {
+                sender: ShortText::new(sender),
+                ..Command::new(CommandKind::Hold)
+            };
+            let reply = Reply {
+                sequence: 1,
+                verdict: CommandOutcome::Accepted.code(),
+                mode: Mode::Holding.code(),
+                fault: Fault::None.code(),
+                alarm_mask: 0,
+            };
+            CommandRecord::new(0, (time_ns, 0.0), false, &command, &reply)
+        };
+        let batch = Batch {
+            commands: vec![
+                hold(400, "relay: Zoe silent 0.8 s"),
+                hold(600, "Zoe"),
+                hold(700, "relay: Zoe left"),
+                hold(800, "relay: Zoe silent 0.8 s"),
+            ],
+            ..Batch::default()
+        };
+        let cause = Cause::DriverSilent;
+        let events = EventWatch::new(500).update(&batch, LOOK, 900);
+        assert_eq!(events, [Event { time_ns: 800, cause }]);
+        assert_eq!(cause.to_string(), "hold driver-silent");
     }
 
     #[test]

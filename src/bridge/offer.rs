@@ -4,6 +4,8 @@
 //! late gets the history from what has passed.
 
 use crate::failure::Failure;
+use crate::realtime::monotonic_ns;
+use crate::relay::lateness;
 use crate::relay::message_json::Json;
 use crate::relay::outbox::SharedLine;
 use crate::relay::socket::Listener;
@@ -291,13 +293,20 @@ impl LocalWatcher {
         if self.inner.is_refused {
             return Ok(());
         }
-        let line: RequestLine = match serde_json::from_slice(line) {
+        let mut line: RequestLine = match serde_json::from_slice(line) {
             Ok(line) => line,
             Err(error) => {
                 let refusal = format!("this is no request: {error}");
                 return self.inner.answer(Answer::own(id, None, "", "unusable", Some(refusal)));
             }
         };
+        // It is of this computer's clock; over the network the link says how late it is.
+        if let Some(sent_ns) = line.sent_ns.take()
+            && let Some(refusal) = lateness::refusal(&line.request, sent_ns, monotonic_ns())
+        {
+            let answer = Answer::own(id, line.id, line.request.name(), "stale", Some(refusal));
+            return self.inner.answer(answer);
+        }
         match &line.request {
             Request::Hello { version, .. } if *version > VERSION => {
                 let own = env!("CARGO_PKG_VERSION");

@@ -98,6 +98,8 @@ pub(super) async fn command(
             &format!("there is no such command: there are {COMMANDS}"),
         );
     };
+    // The connection looks meanwhile whether its client is still there. Where that has gone, the request ends here.
+    tokio::task::yield_now().await;
     let answer = match request {
         Request::Acknowledge { .. } => app.relay.anyone(caller, request).await,
         _ => app.relay.drive(caller, request).await,
@@ -207,7 +209,7 @@ fn status_of(answer: &Answer) -> StatusCode {
         "not-driver" => StatusCode::CONFLICT,
         "unusable" => StatusCode::BAD_REQUEST,
         "busy" => StatusCode::SERVICE_UNAVAILABLE,
-        "no-answer" => StatusCode::GATEWAY_TIMEOUT,
+        "no-answer" | "stale" => StatusCode::GATEWAY_TIMEOUT,
         // The controller's own: the worm stands in the way of it, and not another driver.
         _ => StatusCode::UNPROCESSABLE_ENTITY,
     }

@@ -8,19 +8,19 @@ use super::caller::Caller;
 use crate::attendance::{Request as StopRequest, ask};
 use crate::failure::Failure;
 use crate::relay::connection::Connection;
+use crate::relay::direct_hold;
 use crate::relay::message_json::Json;
 use crate::relay::wire::{Ages, Answer, Frame, Line, Network, Request, VERSION};
-use crate::supervisor::controller;
-use crate::topics::{Controller, Hub, Instance, RoleLock};
+use crate::topics::{Controller, Instance, RoleLock};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, AlarmKind, CommandKind, Fault, Mode, Range, Severity};
+use worm_estimator::message::{Alarm, AlarmKind, Fault, Mode, Range, Severity};
 
 /// How often the thread reads.
 const TURN: Duration = Duration::from_millis(50);
@@ -169,7 +169,12 @@ struct PendingHold {
     /// The number of the request to each worm.
     waiting: BTreeMap<String, u64>,
     held: Vec<Held>,
-    /// What became of the worms without a relay.
+    /// Who asks, by name.
+    sender: String,
+    /// Worms that were told past their relay, or that have none.
+    past_relay: BTreeSet<String>,
+    tell: Sender<Held>,
+    /// What became of those.
     direct: Receiver<Held>,
     reply: oneshot::Sender<Vec<Held>>,
 }
@@ -269,8 +274,11 @@ impl Fleet {
     }
 
     fn hold(&mut self, caller: &Caller, reply: oneshot::Sender<Vec<Held>>) {
-        let (sender, direct) = channel();
+        let (tell, direct) = channel();
         let mut hold = PendingHold {
+            sender: caller.name.clone(),
+            past_relay: BTreeSet::new(),
+            tell,
             since: Instant::now(),
             waiting: BTreeMap::new(),
             held: Vec::new(),
@@ -288,13 +296,8 @@ impl Fleet {
             });
             hold.waiting.insert(name.clone(), self.last_id);
             if !is_sent {
-                // One that hangs must not hold up the others.
-                let (name, instance, caller) = (name.clone(), watched.instance.clone(), caller.name.clone());
-                let sender = sender.clone();
-                let order = move || drop(sender.send(hold_directly(&name, &instance, &caller)));
-                if let Err(error) = std::thread::Builder::new().name("fleet-hold".to_owned()).spawn(order) {
-                    tracing::error!("a worm cannot be told to hold: {error}");
-                }
+                hold.past_relay.insert(name.clone());
+                order_directly(name, &watched.instance, &caller.name, &hold.tell);
             }
         }
         self.holds.push(hold);
@@ -304,8 +307,18 @@ impl Fleet {
     fn end_holds(&mut self) {
         for mut hold in std::mem::take(&mut self.holds) {
             for held in hold.direct.try_iter() {
-                hold.waiting.remove(&held.name);
-                hold.held.push(held);
+                // A relay may have answered after all.
+                if hold.waiting.remove(&held.name).is_some() {
+                    hold.held.push(held);
+                }
+            }
+            if hold.since.elapsed() >= direct_hold::PATIENCE {
+                let silent = hold.waiting.keys().filter_map(|name| self.worms.get_key_value(name));
+                for (name, watched) in silent.filter(|(_, watched)| direct_hold::is_possible(&watched.instance)) {
+                    if hold.past_relay.insert(name.clone()) {
+                        order_directly(name, &watched.instance, &hold.sender, &hold.tell);
+                    }
+                }
             }
             if !hold.waiting.is_empty() && hold.since.elapsed() < HOLD_TIMEOUT && !hold.reply.is_closed() {
                 self.holds.push(hold);
@@ -455,20 +468,23 @@ fn elapsed_ms(since: Instant) -> u64 {
 
 /// Makes a worm hold that no relay serves.
 fn hold_directly(name: &str, instance: &Instance, sender: &str) -> Held {
-    let outcome = Hub::open(instance).map_err(Failure::failed).and_then(|hub| {
-        let client = hub.command_client().map_err(Failure::failed)?;
-        controller::send(&client, controller::command(CommandKind::Hold, sender))
-    });
-    let (verdict, refusal) = match outcome {
-        Ok(answer) => match answer.refusal() {
-            None => ("accepted".to_owned(), None),
-            Some(refusal) => ("refused".to_owned(), Some(refusal)),
-        },
-        Err(failure) => ("no-answer".to_owned(), Some(failure.to_string())),
+    let answer = direct_hold::hold(instance, sender);
+    let verdict = match answer.verdict.as_str() {
+        verdict @ ("accepted" | "no-answer") => verdict,
+        _ => "refused",
     };
     Held {
         name: name.to_owned(),
-        verdict,
-        refusal,
+        verdict: verdict.to_owned(),
+        refusal: answer.refusal,
+    }
+}
+
+/// The same from a thread: one that hangs must not hold up the others.
+fn order_directly(name: &str, instance: &Instance, sender: &str, held: &Sender<Held>) {
+    let (name, instance, sender, held) = (name.to_owned(), instance.clone(), sender.to_owned(), held.clone());
+    let order = move || drop(held.send(hold_directly(&name, &instance, &sender)));
+    if let Err(error) = std::thread::Builder::new().name("fleet-hold".to_owned()).spawn(order) {
+        tracing::error!("a worm cannot be told to hold: {error}");
     }
 }

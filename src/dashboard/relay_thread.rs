@@ -9,6 +9,7 @@ use super::seat::{Reply, Seat};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::relay::client::{Received, RelayLink};
+use crate::relay::direct_hold::HoldWatch;
 use crate::relay::wire::{Answer, Line, Request, VERSION};
 use crate::topics::Instance;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
@@ -26,15 +27,17 @@ use tokio::sync::{oneshot, watch};
 const POLL_MS: u16 = 100;
 /// Most pages that may want to drive at a time.
 const MAX_SEATS: usize = 16;
+/// How long a request other than a hold may wait for this thread.
+const ORDER_PATIENCE: Duration = Duration::from_secs(1);
 /// How long a hold waits for a relay that is just starting.
 const HOLD_PATIENCE: Duration = Duration::from_secs(3);
 
 /// What pages want.
 enum Order {
-    /// What only the driver may do.
-    Drive(Caller, Request, Reply),
-    /// What anyone may do.
-    Anyone(Caller, Request, Reply),
+    /// What only the driver may do, asked for then.
+    Drive(Instant, Caller, Request, Reply),
+    /// What anyone may do, asked for then.
+    Anyone(Instant, Caller, Request, Reply),
     /// The page with this key is there. True when it has a seat.
     Alive(String, oneshot::Sender<bool>),
     End,
@@ -95,6 +98,7 @@ impl RelayThread {
             woken,
             seats: BTreeMap::new(),
             pending: BTreeMap::new(),
+            holds: HoldWatch::new(instance),
             waiting: Vec::new(),
             last_id: 0,
         };
@@ -111,12 +115,14 @@ impl RelayThread {
 
     /// Asks for what only the driver may do.
     pub(super) async fn drive(&self, caller: Caller, request: Request) -> Result<Answer, String> {
-        self.ask(|reply| Order::Drive(caller, request, reply)).await
+        let asked = Instant::now();
+        self.ask(|reply| Order::Drive(asked, caller, request, reply)).await
     }
 
     /// Asks for what anyone may do.
     pub(super) async fn anyone(&self, caller: Caller, request: Request) -> Result<Answer, String> {
-        self.ask(|reply| Order::Anyone(caller, request, reply)).await
+        let asked = Instant::now();
+        self.ask(|reply| Order::Anyone(asked, caller, request, reply)).await
     }
 
     /// Says that a page is there; false where it does not drive.
@@ -151,6 +157,25 @@ impl Drop for RelayThread {
     }
 }
 
+/// Gives the reply back to what is still to be done: somebody waits for it, and not for too long.
+fn still_wanted(asked: Instant, reply: Reply) -> Option<Reply> {
+    if reply.is_closed() {
+        tracing::info!("a request is dropped: whoever asked has gone");
+        return None;
+    }
+    let waited = asked.elapsed();
+    if waited <= ORDER_PATIENCE {
+        return Some(reply);
+    }
+    let refusal = format!(
+        "asked for {:.0} s ago, when the dashboard stood still: ask again",
+        waited.as_secs_f64()
+    );
+    // Who asked may have gone.
+    let _ = reply.send(Err(refusal));
+    None
+}
+
 /// What the thread has.
 struct Exchange {
     instance: Instance,
@@ -161,6 +186,8 @@ struct Exchange {
     seats: BTreeMap<String, Seat>,
     /// Requests over the link that are not answered yet.
     pending: BTreeMap<u64, Reply>,
+    /// Those of them that are holds.
+    holds: HoldWatch,
     /// Holds that wait for a connection, since when.
     waiting: Vec<(Instant, Caller, Reply)>,
     last_id: u64,
@@ -174,8 +201,17 @@ impl Exchange {
         let orders: Vec<_> = self.orders.try_iter().collect();
         for order in orders {
             match order {
-                Order::Drive(caller, request, reply) => self.drive(&caller, request, reply),
-                Order::Anyone(caller, request, reply) => self.anyone(caller, request, reply),
+                Order::Drive(asked, caller, request, reply) => {
+                    if let Some(reply) = still_wanted(asked, reply) {
+                        self.drive(&caller, request, reply);
+                    }
+                }
+                Order::Anyone(_, caller, Request::Hold, reply) => self.anyone(caller, Request::Hold, reply),
+                Order::Anyone(asked, caller, request, reply) => {
+                    if let Some(reply) = still_wanted(asked, reply) {
+                        self.anyone(caller, request, reply);
+                    }
+                }
                 Order::Alive(key, reply) => {
                     let seat = self.seats.get_mut(&key);
                     let _ = reply.send(seat.map(Seat::alive).is_some());
@@ -184,9 +220,19 @@ impl Exchange {
             }
         }
         self.send_waiting();
+        for answer in self.holds.poll() {
+            self.reply(answer);
+        }
         self.seats.retain(|_, seat| seat.exchange());
         self.pending.retain(|_, reply| !reply.is_closed());
         true
+    }
+
+    fn reply(&mut self, answer: Answer) {
+        if let Some(reply) = answer.id.and_then(|id| self.pending.remove(&id)) {
+            // Who asked may have gone.
+            let _ = reply.send(Ok(answer));
+        }
     }
 
     fn wait(&mut self) {
@@ -208,6 +254,7 @@ impl Exchange {
         let now_ns = monotonic_ns();
         let mut feed = self.shared.feed();
         let mut is_new = false;
+        let mut answers = Vec::new();
         for received in received {
             match received {
                 Received::Line(Line::Hello(hello)) => {
@@ -219,10 +266,10 @@ impl Exchange {
                     is_new = true;
                 }
                 Received::Line(Line::Answer(answer)) => {
-                    if let Some(reply) = answer.id.and_then(|id| self.pending.remove(&id)) {
-                        // Who asked may have gone.
-                        let _ = reply.send(Ok(answer));
+                    if let Some(id) = answer.id {
+                        self.holds.answered(id);
                     }
+                    answers.push(answer);
                 }
                 Received::Line(Line::Lost { frames }) => tracing::debug!("{frames} frames of the relay were lost"),
                 Received::Line(Line::Refused { reason }) | Received::Lost(reason) => {
@@ -240,6 +287,7 @@ impl Exchange {
         }
         is_new |= feed.is_silent(now_ns);
         drop(feed);
+        answers.into_iter().for_each(|answer| self.reply(answer));
         if is_new {
             self.shared.changed.send_replace(());
         }
@@ -276,11 +324,16 @@ impl Exchange {
         self.last_id += 1;
         let hello = Request::Hello {
             version: VERSION,
-            name: caller.name,
+            name: caller.name.clone(),
         };
+        let is_hold = request == Request::Hold;
+        if is_hold {
+            self.holds.asked(self.last_id, &caller.name);
+        }
         // The name first: the relay records the request under it.
         let is_sent = self.link.send(0, hello) && self.link.send(self.last_id, request);
-        match is_sent {
+        // A hold that the relay does not take goes past it.
+        match is_sent || is_hold {
             true => drop(self.pending.insert(self.last_id, reply)),
             false => drop(reply.send(Err("the relay does not read: try again".to_owned()))),
         }

@@ -1,8 +1,10 @@
 //! The thread that gives the controller commands and waits for its answers, so that no watcher has to.
 
 use super::drive::{LIMIT_S, WatcherId};
+use super::lateness;
 use super::wire::{Answer, Request};
 use crate::failure::Failure;
+use crate::realtime::monotonic_ns;
 use crate::supervisor::controller::{self, command};
 use crate::topics::{CommandClient, Hub};
 use crate::trip::{self, wire::Question};
@@ -30,10 +32,12 @@ pub(super) enum Job {
         /// Its name, for the same.
         name: String,
         id: Option<u64>,
+        /// When it was asked for, ns of `CLOCK_MONOTONIC`.
+        sent_ns: u64,
         request: Request,
     },
-    /// Hold, because nobody attends any more.
-    Hold,
+    /// Hold, because nobody attends any more. The sender says who did.
+    Hold(ShortText),
     /// Go on crawling for a moment.
     Renew,
 }
@@ -139,15 +143,25 @@ fn carry_out(client: &CommandClient, config: &Config, job: Job) -> Option<Outcom
             user,
             name,
             id,
+            sent_ns,
             request,
         } => {
+            // It may have waited here for the answers to others.
+            if let Some(refusal) = lateness::refusal(&request, sent_ns, monotonic_ns()) {
+                let answer = Answer::own(watcher, id, request.name(), "stale", Some(refusal));
+                return Some(Outcome::Answer(answer));
+            }
             let command = controllers_command(&request, user, &name);
             Some(Outcome::Answer(answer(
                 client, config, watcher, id, &request, &name, command,
             )))
         }
-        Job::Hold => {
-            let refusal = match controller::send(client, command(CommandKind::Hold, SENDER)) {
+        Job::Hold(sender) => {
+            let hold = Command {
+                sender,
+                ..command(CommandKind::Hold, SENDER)
+            };
+            let refusal = match controller::send(client, hold) {
                 Ok(answer) => answer.refusal()?,
                 Err(failure) => failure.to_string(),
             };
@@ -206,12 +220,7 @@ fn answer(
         _ => controller::send(client, command),
     };
     match sent {
-        Ok(answer) => Answer {
-            mode: Some(answer.mode().to_owned()),
-            fault: Some(answer.fault().to_owned()),
-            tick: Some(answer.tick()),
-            ..Answer::own(watcher, id, request.name(), answer.verdict(), answer.refusal())
-        },
+        Ok(answer) => Answer::of_controller(watcher, id, request.name(), &answer),
         Err(failure) => refused("no-answer", failure.to_string()),
     }
 }

@@ -1,6 +1,7 @@
 //! One connection to a relay: lines out and in, without waiting for either.
 
 use super::wire::{AnyHello, Line, Request, RequestLine, VERSION, to_bytes};
+use crate::realtime::monotonic_ns;
 use crate::topics::Instance;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -46,7 +47,13 @@ impl Connection {
 
     /// Queues a request; false when the relay does not read.
     pub(crate) fn send(&mut self, id: Option<u64>, request: Request) -> bool {
-        let Ok(line) = to_bytes(&RequestLine { id, request }) else {
+        let line = RequestLine {
+            id,
+            // Now, and not when it is written: the relay may read it much later.
+            sent_ns: Some(monotonic_ns()),
+            request,
+        };
+        let Ok(line) = to_bytes(&line) else {
             return false;
         };
         let has_room = self.output.len() + line.len() <= MAX_OUTPUT;
@@ -220,7 +227,7 @@ mod tests {
     fn requests_are_what_the_documentation_says() {
         for (text, request) in [
             (r#"{"command":"alive"}"#, Request::Alive),
-            (r#"{"command":"take_over"}"#, Request::TakeOver),
+            (r#"{"sent_ns":7,"command":"take_over"}"#, Request::TakeOver),
             (r#"{"command":"crawl"}"#, Request::Crawl { cycles_per_s: None }),
             (
                 r#"{"command":"crawl","cycles_per_s":-0.25}"#,

@@ -6,6 +6,8 @@
 //!
 //! Pure: times are arguments, ns of one clock.
 
+use super::departure::Departure;
+use super::lateness;
 use super::wire::{self, Request};
 use crate::trip::wire::Ask;
 use std::collections::BTreeMap;
@@ -44,13 +46,15 @@ pub(super) enum Decision {
     Done(Option<String>),
     /// Not the driver.
     Refused(String),
+    /// It came too late.
+    Stale(String),
 }
 
 /// What the controller is to be told without a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Effect {
     /// Hold, for this reason.
-    Hold(String),
+    Hold(Departure),
     /// The crawl may go on for [`LIMIT_S`].
     Renew,
 }
@@ -84,9 +88,7 @@ impl Drive {
         self.heard_ns.remove(&id);
         let name = self.watchers.remove(&id)?.name;
         let driver = self.driver.take_if(|driver| driver.id == id)?;
-        driver
-            .permitted_ns
-            .map(|_| Effect::Hold(format!("{name}, who drove, has left")))
+        driver.permitted_ns.map(|_| Effect::Hold(Departure::left(name)))
     }
 
     /// A watcher was heard.
@@ -105,9 +107,12 @@ impl Drive {
         heard.any(|heard_ns| now_ns.saturating_sub(*heard_ns) < SILENCE_NS)
     }
 
-    /// Decides on a request.
-    pub(super) fn request(&mut self, id: WatcherId, request: &Request, now_ns: u64) -> Decision {
+    /// Decides on a request that was asked for at `sent_ns`.
+    pub(super) fn request(&mut self, id: WatcherId, request: &Request, sent_ns: u64, now_ns: u64) -> Decision {
         self.heard(id, now_ns);
+        if let Some(refusal) = lateness::refusal(request, sent_ns, now_ns) {
+            return Decision::Stale(refusal);
+        }
         match request {
             Request::Hello { name, .. } => {
                 // It goes to logs and terminals of others.
@@ -162,12 +167,8 @@ impl Drive {
         let silent_ns = now_ns.saturating_sub(driver.heard_ns);
         if silent_ns >= SILENCE_NS {
             let name = name_of(&self.watchers, driver.id);
-            let reason = format!(
-                "nothing was heard for {:.1} s from {name}, who drove",
-                seconds(silent_ns)
-            );
             let attended = self.driver.take()?.permitted_ns;
-            return attended.map(|_| Effect::Hold(reason));
+            return attended.map(|_| Effect::Hold(Departure::silent(name, silent_ns)));
         }
         let permitted_ns = driver.permitted_ns.as_mut()?;
         if now_ns.saturating_sub(*permitted_ns) < RENEWAL_NS {
@@ -260,6 +261,8 @@ mod tests {
     /// What happens, and what follows from it.
     enum Step {
         Ask(WatcherId, Request, Outcome),
+        /// It was asked for at this time, ms, and is read only now.
+        AskedAt(u64, WatcherId, Request, Outcome),
         Leave(WatcherId, Option<&'static str>),
         /// Alive is heard.
         Alive(WatcherId),
@@ -273,6 +276,7 @@ mod tests {
         Sent,
         Done,
         Refused,
+        Stale,
     }
 
     #[derive(Debug, PartialEq, Eq)]
@@ -298,6 +302,21 @@ mod tests {
         drive
     }
 
+    fn ask(drive: &mut Drive, id: WatcherId, request: &Request, sent_ns: u64, now_ns: u64) -> Outcome {
+        match drive.request(id, request, sent_ns, now_ns) {
+            Decision::Send => Outcome::Sent,
+            Decision::Done(_) => Outcome::Done,
+            Decision::Refused(why) => {
+                assert!(why.contains("drives since"), "{why}");
+                Outcome::Refused
+            }
+            Decision::Stale(why) => {
+                assert!(why.contains("ask again"), "{why}");
+                Outcome::Stale
+            }
+        }
+    }
+
     fn play(name: &str, steps: Vec<(u64, Step)>) -> Drive {
         let mut drive = two_watchers();
         for (number, (at_ms, step)) in steps.into_iter().enumerate() {
@@ -305,19 +324,15 @@ mod tests {
             let here = format!("{name}, step {number} at {at_ms} ms");
             match step {
                 Step::Ask(id, request, expected) => {
-                    let outcome = match drive.request(id, &request, now_ns) {
-                        Decision::Send => Outcome::Sent,
-                        Decision::Done(_) => Outcome::Done,
-                        Decision::Refused(why) => {
-                            assert!(why.contains("drives since"), "{here}: {why}");
-                            Outcome::Refused
-                        }
-                    };
+                    assert_eq!(ask(&mut drive, id, &request, now_ns, now_ns), expected, "{here}");
+                }
+                Step::AskedAt(sent_ms, id, request, expected) => {
+                    let outcome = ask(&mut drive, id, &request, sent_ms * MS, now_ns);
                     assert_eq!(outcome, expected, "{here}");
                 }
                 Step::Leave(id, expected) => match (drive.leave(id), expected) {
                     (None, None) => {}
-                    (Some(Effect::Hold(why)), Some(part)) => assert!(why.contains(part), "{here}: {why}"),
+                    (Some(Effect::Hold(why)), Some(part)) => assert!(why.to_string().contains(part), "{here}: {why}"),
                     (found, _) => panic!("{here}: {found:?}"),
                 },
                 Step::Alive(id) => drive.heard(id, now_ns),
@@ -410,6 +425,18 @@ mod tests {
                 (760, CrawlEnded),
                 (1100, due(Due::Nothing)),
                 (1200, Leave(1, None)),
+            ],
+        );
+        assert_eq!(driver(&drive), None);
+
+        let drive = play(
+            "what comes late begins nothing and takes no seat, and a hold is never late",
+            vec![
+                (13_000, Step::AskedAt(0, 1, crawl(), Outcome::Stale)),
+                (13_000, Step::AskedAt(0, 2, Request::TakeOver, Outcome::Stale)),
+                (13_010, Step::AskedAt(0, 2, Request::Hold, Sent)),
+                (13_300, due(Due::Nothing)),
+                (13_310, Leave(1, None)),
             ],
         );
         assert_eq!(driver(&drive), None);

@@ -7,21 +7,26 @@
 //!
 //! - [`wire`]: what both sides say; [`message_json`] puts the messages of the topics into it.
 //! - [`history`]: ten minutes of samples.
-//! - [`drive`]: who drives, as a pure state machine.
+//! - [`drive`]: who drives, as a pure state machine; [`lateness`]: what comes too late for it; [`departure`]: a driver
+//!   that is gone.
 //! - [`source`]: the topics, gathered into frames.
 //! - [`event_log`]: what happened, in words.
 //! - [`commander`]: the thread that waits for the controller's answers.
 //! - [`outbox`]: what waits for one watcher; [`watcher`]: its connection.
 //! - [`server`]: the process.
 //! - [`socket`]: where it listens, and who may connect.
+//! - [`direct_hold`]: the way past a relay that does not answer.
 //! - [`client`]: the other end: connects by a [`connection`], and starts a relay where there is none.
 
 pub(crate) mod client;
 mod commander;
 pub(crate) mod connection;
+pub(crate) mod departure;
+pub(crate) mod direct_hold;
 mod drive;
 mod event_log;
 mod history;
+pub(crate) mod lateness;
 pub(crate) mod message_json;
 pub(crate) mod outbox;
 pub(crate) mod server;

@@ -238,13 +238,15 @@ impl Server {
         if watcher.is_refused {
             return Ok(());
         }
-        let RequestLine { id: number, request } = match serde_json::from_slice(line) {
+        let now_ns = monotonic_ns();
+        let line: RequestLine = match serde_json::from_slice(line) {
             Ok(line) => line,
             Err(error) => {
                 let refusal = format!("this is no request: {error}");
                 return watcher.answer(Answer::own(id, None, "", "unusable", Some(refusal)));
             }
         };
+        let (number, request, sent_ns) = (line.id, line.request, line.sent_ns.unwrap_or(now_ns));
         if let Request::Hello { version, .. } = request
             && version > VERSION
         {
@@ -256,10 +258,9 @@ impl Server {
             ));
             return Ok(());
         }
-        let now_ns = monotonic_ns();
         let (name, user) = (request.name(), watcher.user);
         let refused = |verdict, refusal| Answer::own(id, number, name, verdict, Some(refusal));
-        let answer = match self.drive.request(id, &request, now_ns) {
+        let answer = match self.drive.request(id, &request, sent_ns, now_ns) {
             Decision::Done(_) if request == Request::Alive => return Ok(()),
             Decision::Done(event) => {
                 if let Some(event) = event {
@@ -268,12 +269,14 @@ impl Server {
                 Answer::own(id, number, name, "accepted", None)
             }
             Decision::Refused(refusal) => refused("not-driver", refusal),
+            Decision::Stale(refusal) => refused("stale", refusal),
             Decision::Send => {
                 let job = Job::Request {
                     watcher: id,
                     user,
                     name: self.drive.name(id),
                     id: number,
+                    sent_ns,
                     request,
                 };
                 match self.commander.order(job) {
@@ -386,7 +389,7 @@ impl Server {
             Some(Effect::Renew) => Job::Renew,
             Some(Effect::Hold(reason)) => {
                 self.note(format!("the worm is to hold: {reason}"));
-                Job::Hold
+                Job::Hold(reason.sender())
             }
         };
         // Without a place in the queue the permission lapses, and the worm holds.

@@ -2,6 +2,7 @@
 
 use super::message_json::Json;
 use crate::latency::Percentiles;
+use crate::supervisor::controller;
 use crate::trip::wire::Ask;
 use serde::{Deserialize, Serialize};
 use worm_estimator::config::{Config, Direction};
@@ -271,6 +272,9 @@ pub(crate) struct RequestLine {
     /// Comes back in the answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u64>,
+    /// When it was asked for, ns of `CLOCK_MONOTONIC` of the computer on which it is read; without it, when it is read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sent_ns: Option<u64>,
     /// What the watcher wants.
     #[serde(flatten)]
     pub request: Request,
@@ -371,10 +375,13 @@ pub(crate) struct Answer {
     pub watcher: u64,
     /// What was asked for.
     pub command: String,
-    /// `accepted`; the controller's verdict; `not-driver`, `no-answer`, `busy` or `unusable`.
+    /// `accepted`; the controller's verdict; `not-driver`, `no-answer`, `busy`, `stale` or `unusable`.
     pub verdict: String,
     /// Why not, and what to do; none when it was accepted.
     pub refusal: Option<String>,
+    /// What else there is to say: that a hold went past a relay that did not answer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
     /// The controller's mode after the command, where it answered.
     pub mode: Option<String>,
     /// Its fault.
@@ -392,9 +399,20 @@ impl Answer {
             command: command.to_owned(),
             verdict: verdict.to_owned(),
             refusal,
+            note: None,
             mode: None,
             fault: None,
             tick: None,
+        }
+    }
+
+    /// The controller's answer.
+    pub(crate) fn of_controller(watcher: u64, id: Option<u64>, command: &str, answer: &controller::Answer) -> Self {
+        Self {
+            mode: Some(answer.mode().to_owned()),
+            fault: Some(answer.fault().to_owned()),
+            tick: Some(answer.tick()),
+            ..Self::own(watcher, id, command, answer.verdict(), answer.refusal())
         }
     }
 }

@@ -140,6 +140,14 @@ impl App {
         }
     }
 
+    /// Takes the answer to a hold that went past the relay.
+    pub(crate) fn take_direct(&mut self, answer: &Answer, now_ns: u64) {
+        let more = answer.refusal.as_deref().or(answer.note.as_deref());
+        let text = format!("hold {}: {}", answer.verdict, more.unwrap_or_default());
+        self.note(text.clone());
+        self.say(text, answer.refusal.is_some(), now_ns);
+    }
+
     /// The connection is gone.
     pub(crate) fn lose(&mut self, reason: String, now_ns: u64) {
         self.note(reason.clone());

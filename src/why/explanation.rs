@@ -2,6 +2,7 @@
 
 use super::stops::{Cause, Stop, standing, stops};
 use super::timeline::{Moment, MomentKind, command_in_words, figure, moments};
+use crate::relay::departure::{Departure, Way};
 use crate::remedy;
 use serde::Serialize;
 use worm_estimator::config::{Config, Policy};
@@ -62,7 +63,7 @@ pub struct Explanation {
 /// The first reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reason {
-    /// `alarm`, `fault`, `command`, `lease-lapsed`, `time-limit`, `controller-gone`, `unknown` or `none`.
+    /// `alarm`, `fault`, `command`, `driver-silent`, `lease-lapsed`, `time-limit`, `controller-gone`, `unknown` or `none`.
     pub kind: &'static str,
     /// Its name: of the alarm, the fault or the command.
     pub name: String,
@@ -76,7 +77,7 @@ pub struct Reason {
     pub value: Option<f64>,
     /// Its threshold.
     pub threshold: Option<f64>,
-    /// Who sent it, of a command.
+    /// Who sent it, of a command and of the hold for a silent driver.
     pub sender: Option<String>,
     /// The sender's user id.
     pub user: Option<u32>,
@@ -270,16 +271,33 @@ fn reason(subject: &Subject, config: &Config) -> Reason {
                 format!("The controller latched the fault {fault}: {}", as_sentence(&meaning)),
             )
         }
-        Cause::Command(record) => Reason {
-            time_s: relative_s(record.time_ns, stop.time_ns),
-            sender: Some(record.sender.as_str().to_owned()),
-            user: Some(record.user),
-            ..plain(
-                "command",
-                CommandKind::try_from(record.kind).map_or("unknown", CommandKind::name),
-                format!("Somebody wanted it: {}.", command_in_words(record)),
-            )
-        },
+        Cause::Command(record) | Cause::DriverSilent(record) => {
+            let kind = CommandKind::try_from(record.kind).map_or("unknown", CommandKind::name);
+            let by_command = match Departure::of(record) {
+                Some(Departure {
+                    name,
+                    way: Way::Silent(s),
+                }) => plain(
+                    "driver-silent",
+                    "driver-silent",
+                    format!(
+                        "{name}, who drove, was not heard for {s} s: the page was closed, or its network was gone."
+                    ),
+                ),
+                Some(departure) => plain("command", kind, format!("{departure}: so the worm holds.")),
+                None => plain(
+                    "command",
+                    kind,
+                    format!("Somebody wanted it: {}.", command_in_words(record)),
+                ),
+            };
+            Reason {
+                time_s: relative_s(record.time_ns, stop.time_ns),
+                sender: Some(record.sender.as_str().to_owned()),
+                user: Some(record.user),
+                ..by_command
+            }
+        }
         Cause::LeaseLapsed => plain(
             "lease-lapsed",
             "lease-lapsed",
@@ -387,6 +405,9 @@ fn remedy_for(subject: &Subject, config: &Config) -> String {
             format!("{todo} Nothing moves until `wormd command reset --name {name}`.")
         }
         Cause::Command(_) | Cause::TimeLimit => format!("Nothing is wrong: `wormd command crawl --name {name}` goes on."),
+        Cause::DriverSilent(_) => format!(
+            "Crawl again when somebody watches: with the page, `wormd watch --name {name}`, or on board `wormd command crawl --attend`."
+        ),
         Cause::LeaseLapsed => format!(
             "Find out why `wormd up`, the driving screen or the script ended; `wormd command crawl --name {name}` goes on. On board, crawl \
              with --attend or --for."

@@ -1,5 +1,6 @@
 //! Where a worm stopped in a log, and by what.
 
+use crate::relay::departure::Departure;
 use worm_estimator::config::{Config, Policy};
 use worm_estimator::message::{
     Alarm, AlarmKind, CommandKind, CommandOutcome, CommandRecord, Fault, HoldReason, Mode, State,
@@ -18,6 +19,8 @@ pub enum Cause {
     Fault(Fault),
     /// A command.
     Command(CommandRecord),
+    /// The relay's hold, because nothing was heard of the watcher that drove.
+    DriverSilent(CommandRecord),
     /// Whoever made it crawl is gone.
     LeaseLapsed,
     /// The time for which it was to crawl was over.
@@ -156,7 +159,10 @@ fn last_command(log: &Log, time_ns: u64) -> Cause {
     commands
         .filter(|record| record.time_ns <= time_ns)
         .max_by_key(|record| record.time_ns)
-        .map_or(Cause::Unknown, |record| Cause::Command(*record))
+        .map_or(Cause::Unknown, |record| match Departure::of(record) {
+            Some(departure) if departure.is_silence() => Cause::DriverSilent(*record),
+            _ => Cause::Command(*record),
+        })
 }
 
 /// The alarms that stand at a moment, as they were raised, the oldest first.

@@ -3,6 +3,7 @@
 mod boxes;
 mod crowd;
 mod fleet;
+mod frozen;
 mod http;
 mod without_tracker;
 #[path = "../processes/worm.rs"]
@@ -59,7 +60,7 @@ fn start(mut command: Command) -> (Dashboard, SocketAddr) {
 
 /// A worm, at rest and disarmed, with a dashboard.
 struct Watched {
-    _dashboard: Dashboard,
+    dashboard: Dashboard,
     address: SocketAddr,
     controller: Process,
     _estimator: Process,
@@ -83,7 +84,7 @@ impl Watched {
         let port = worm.port();
         let controller = worm.wormd(&["control", "--port", &port]).start();
         let watched = Self {
-            _dashboard: dashboard,
+            dashboard,
             address,
             controller,
             _estimator: estimator,

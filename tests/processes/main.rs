@@ -9,6 +9,7 @@ mod black_box;
 mod calibration;
 mod explaining;
 mod faulting;
+mod frozen_relay;
 mod inferring;
 mod kills;
 mod latency;

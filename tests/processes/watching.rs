@@ -98,7 +98,7 @@ impl Client {
 }
 
 /// A worm at work, and its relay.
-fn crawling_with_relay(name: &str) -> (Process, Crawling) {
+pub fn crawling_with_relay(name: &str) -> (Process, Crawling) {
     let crawling = Crawling::start_again(Worm::on_a_steady_computer(name));
     (crawling.worm.wormd(&["relay"]).start_with_log(), crawling)
 }
@@ -231,14 +231,14 @@ fn fifty_watchers_are_served_though_one_of_them_never_reads() {
 }
 
 /// `wormd watch` in a terminal of its own, which somebody reads and types into.
-struct Terminal {
+pub struct Terminal {
     process: Process,
     keyboard: File,
     seen: Arc<Mutex<String>>,
 }
 
 impl Terminal {
-    fn watch(worm: &Worm) -> Self {
+    pub fn watch(worm: &Worm) -> Self {
         let pty = stalled_terminal();
         let process = worm.wormd(&["watch"]).start_in(pty.slave);
         let keyboard = File::from(pty.master.try_clone().expect("a descriptor is free"));
@@ -261,7 +261,7 @@ impl Terminal {
         terminal
     }
 
-    fn press(&mut self, keys: &str) {
+    pub fn press(&mut self, keys: &str) {
         self.keyboard
             .write_all(keys.as_bytes())
             .expect("the terminal takes keys");
@@ -269,7 +269,7 @@ impl Terminal {
 
     /// Waits until the words of a text are shown. Only what changes is painted, so for each look the terminal gets another size, and
     /// with it the whole picture.
-    fn wait_for(&self, text: &str) {
+    pub fn wait_for(&self, text: &str) {
         let mut columns = 200;
         wait_for(text, PATIENCE, || {
             columns = 399 - columns;

@@ -20,8 +20,10 @@ enum Done {
     Fault(&'static str),
     Pause(Paused, u64),
     Command(CommandKind),
+    /// Its driver falls silent, and the relay makes it hold.
+    DriverSilent,
 }
-use Done::{Command as Told, Fault, Pause};
+use Done::{Command as Told, DriverSilent, Fault, Pause};
 
 /// What is done, for how long it lasts, how the worm differs, whether the worm stops, and what the reason must be.
 type Case = (Done, f64, &'static str, bool, &'static [&'static str]);
@@ -111,6 +113,7 @@ const CASES: &[Case] = &[
     (Pause(Paused::Controller, 300), 1.0, LEVEL, true, &["fault host-paused"]),
     (Told(CommandKind::Hold), 2.0, LEVEL, true, &["command hold"]),
     (Told(CommandKind::Stop), 2.0, LEVEL, true, &["command stop"]),
+    (DriverSilent, 2.0, LEVEL, true, &["driver-silent driver-silent"]),
     // What is noticed and stops nothing, and what is not even noticed.
     (Fault("noise:m=0.0003"), 3.0, LEVEL, false, &["none none"]),
     (Fault("drop:share=0.02"), 3.0, LEVEL, false, &["none none"]),
@@ -138,10 +141,14 @@ fn explained((done, lasts_s, toml, ..): &Case) -> Explanation {
             .switch_on(spec.parse().expect("a fault"))
             .expect("it can be switched on"),
         Pause(paused, ms) => session.pause(*paused, *ms),
-        Told(kind) => {
+        Told(_) | DriverSilent => {
+            let (kind, sender) = match done {
+                Told(kind) => (kind, "ops"),
+                _ => (&CommandKind::Hold, "relay: Zoe silent 0.8 s"),
+            };
             let tick = session.send(*kind, 0.0);
             let told = Command {
-                sender: ShortText::new("ops"),
+                sender: ShortText::new(sender),
                 user: 1000,
                 ..Command::new(*kind)
             };
@@ -189,6 +196,7 @@ fn the_first_reason_is_the_right_one_for_every_fault() {
                 Fault(spec) => (*spec).to_owned(),
                 Pause(paused, ms) => format!("{paused:?} paused for {ms} ms"),
                 Told(kind) => format!("command {kind}"),
+                DriverSilent => "a silent driver".to_owned(),
             };
             println!("{name}: {reason}: {}", found.reason.sentence);
             if found.stopped != *stops || !wanted.contains(&reason.as_str()) {
@@ -217,6 +225,13 @@ fn who_wanted_it_and_which_cell_are_named() {
         (told.from, told.to),
         (Some(Mode::Crawling.name()), Some(Mode::Stopping.name()))
     );
+    let silent = explained(&(DriverSilent, 1.0, LEVEL, true, &[]));
+    let sentence = &silent.reason.sentence;
+    assert!(
+        sentence.starts_with("Zoe, who drove, was not heard for 0.8 s"),
+        "{sentence}"
+    );
+    assert!(silent.remedy.contains("when somebody watches"), "{}", silent.remedy);
     let jammed = explained(&(Fault("jam:cell=2,share=0"), 4.0, LEVEL, true, &[]));
     assert_eq!(jammed.reason.cell, Some(2));
     assert!(

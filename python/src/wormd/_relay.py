@@ -143,7 +143,8 @@ class RelayLink:
         self._socket.close()
 
     def _send(self, request: Json) -> None:
-        line = json.dumps(request).encode() + b"\n"
+        # The relay reads CLOCK_MONOTONIC, too, and refuses what was asked for too long ago.
+        line = json.dumps({**request, "sent_ns": time.monotonic_ns()}).encode() + b"\n"
         with self._sending:
             self._socket.sendall(line)
 

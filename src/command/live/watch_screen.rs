@@ -4,7 +4,8 @@ use super::Painter;
 use crate::command::{Failure, print};
 use crate::realtime::monotonic_ns;
 use crate::relay::client::{Received, RelayLink};
-use crate::relay::wire::{Request, Subject};
+use crate::relay::direct_hold::HoldWatch;
+use crate::relay::wire::{Answer, Line, Request, Subject};
 use crate::supervisor::child_process::LogLines;
 use crate::topics::{Instance, Relay, RoleLock};
 use crate::watch::app::{App, Seat};
@@ -22,6 +23,8 @@ pub(crate) struct WatchScreen {
     terminal: Option<Box<DefaultTerminal>>,
     app: App,
     link: RelayLink,
+    /// Holds that the relay has not answered yet.
+    holds: HoldWatch,
     seat: Seat,
     instance: Instance,
     /// Log lines of the worm's own processes, for `wormd up`.
@@ -32,11 +35,7 @@ pub(crate) struct WatchScreen {
 impl WatchScreen {
     /// The link of a screen. `arguments` select the worm for a relay.
     pub(crate) fn link(instance: &Instance, arguments: Vec<OsString>, seat: Seat) -> RelayLink {
-        let name = match seat {
-            Seat::Up => "wormd up".to_owned(),
-            Seat::Watch => own_name(),
-        };
-        RelayLink::new(instance, arguments, name)
+        RelayLink::new(instance, arguments, name_of(seat))
     }
 
     /// Takes the terminal.
@@ -54,6 +53,7 @@ impl WatchScreen {
             terminal: Some(Box::new(init(seat)?)),
             app: App::new(seat, Subject::of(config)),
             link,
+            holds: HoldWatch::new(instance),
             seat,
             instance: instance.clone(),
             log,
@@ -68,7 +68,14 @@ impl WatchScreen {
         let now_ns = monotonic_ns();
         for received in self.link.poll() {
             match received {
-                Received::Line(line) => self.app.take(line, now_ns),
+                Received::Line(line) => {
+                    let is_stale = matches!(&line, Line::Answer(it) if it.command == "drive" && it.verdict == "stale");
+                    self.is_greeted &= !is_stale;
+                    if let Line::Answer(Answer { id: Some(id), .. }) = &line {
+                        self.holds.answered(*id);
+                    }
+                    self.app.take(line, now_ns);
+                }
                 // What is of interest in it comes with the frames, too.
                 Received::Log(line) => tracing::debug!("relay: {line}"),
                 Received::Lost(reason) => {
@@ -76,6 +83,9 @@ impl WatchScreen {
                     self.app.lose(reason, now_ns);
                 }
             }
+        }
+        for answer in self.holds.poll() {
+            self.app.take_direct(&answer, now_ns);
         }
         if let Some(problem) = self.link.problem() {
             self.app.explain(problem, now_ns);
@@ -115,9 +125,13 @@ impl WatchScreen {
 impl Painter for WatchScreen {
     fn key(&mut self, key: char) {
         let now_ns = monotonic_ns();
-        if let Some((id, request)) = self.app.key(key, now_ns)
-            && !self.link.send(id, request)
-        {
+        let Some((id, request)) = self.app.key(key, now_ns) else {
+            return;
+        };
+        if request == Request::Hold {
+            self.holds.asked(id, &name_of(self.seat));
+        }
+        if !self.link.send(id, request) {
             self.app.not_sent(now_ns);
         }
     }
@@ -161,6 +175,14 @@ fn init(seat: Seat) -> Result<DefaultTerminal, Failure> {
         Seat::Watch => "`wormd watch` needs a terminal; for scripts there is the relay's socket, see docs/relay.md",
     };
     ratatui::try_init().map_err(|error| Failure::failed(format!("the terminal cannot be used ({error}): {remedy}")))
+}
+
+/// The name under which a screen watches.
+fn name_of(seat: Seat) -> String {
+    match seat {
+        Seat::Up => "wormd up".to_owned(),
+        Seat::Watch => own_name(),
+    }
 }
 
 /// A name by which the others may know who this is: user, and over ssh from where.
