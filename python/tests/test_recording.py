@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from itertools import islice
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from conftest import Up
 
 import wormd
+from wormd import recording
 
 pandas = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
@@ -41,9 +43,9 @@ def test_a_log_becomes_frames(up: Up, log: Path) -> None:
     assert cycles.index[-1] <= states.index[-1] + 0.5, "one clock for all frames"
     assert len(run.estimates) > 100 and len(run.timing) > 0.99 * len(states)
     assert "kind" in run.alarms and run.range.empty and "range_m" in run.range
+    assert run.trip.empty and "phase" in run.trip and "standing" in run.inferred
     assert "state" in repr(run)
 
-    assert run.trip.empty and "phase" in run.trip and "standing" in run.inferred
 
 def test_a_log_that_was_cut_is_read_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
@@ -56,6 +58,15 @@ def test_a_log_that_was_cut_is_read_as_far_as_it_goes(log: Path, tmp_path: Path)
     with pytest.raises(wormd.ProgramFailed) as failed:
         wormd.read(no_log)
     assert failed.value.status == 2 and "none.mcap" in str(failed.value)
+
+
+def test_estimates_before_the_first_state_have_no_place_in_time() -> None:
+    folder: tempfile.TemporaryDirectory[str] = tempfile.TemporaryDirectory()
+    times = pandas.Series([None, 5_000_000_000, 6_000_000_000], dtype="Int64")
+    pandas.DataFrame({"time_ns": times}).to_parquet(Path(folder.name) / "estimate.parquet")
+    estimates = recording.Recording(Path("x.mcap"), recording._LogTables(folder)).estimates
+    assert list(estimates.index) == [0.0, 1.0]
+    assert list(estimates["time_ns"]) == [5_000_000_000, 6_000_000_000]
 
 
 def test_a_recorder_says_why_it_cannot(up: Up, log: Path) -> None:

@@ -8,13 +8,13 @@ use super::folder::{BoxEvent, FileKind, OwnFolder, box_record, events_text};
 use super::part_file::PartFile;
 use super::ring::{Held, Ring};
 use super::{BOX_RECORD, END_RECORD};
-use crate::recorder::{Batch, Thinner, problem_of};
+use crate::recorder::{Batch, Finding, Thinner, problem_of};
 use std::collections::BTreeMap;
 use std::io;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use worm_estimator::config::BlackBox as Settings;
 use worm_estimator::message::RecordingProblem;
-use worm_log::{Chunk, ChunkWriter, Logged, Origin, WriteError, head, metadata_record};
+use worm_log::{Chunk, ChunkWriter, Logged, Note, Origin, WriteError, head, metadata_record};
 
 /// Length of a chunk: a killed black box loses at most this.
 const CHUNK_NS: u64 = 1_000_000_000;
@@ -70,6 +70,8 @@ struct ThinLog {
 pub(super) struct Keeper {
     folder: OwnFolder,
     origin: Origin,
+    /// What each file says of the worm's configuration.
+    notes: Vec<Note>,
     after_ns: u64,
     before_ns: u64,
     longest_ns: u64,
@@ -99,6 +101,7 @@ impl Keeper {
         let max_bytes = (settings.memory_mb * 1e6) as usize / 2;
         let keeper = Self {
             origin,
+            notes: Vec::new(),
             after_ns: ns(settings.after_s),
             before_ns: ns(settings.before_s),
             longest_ns: ns(settings.longest_s),
@@ -133,6 +136,11 @@ impl Keeper {
             memory_bytes: (self.ring.bytes() + waiting + current) as u64,
             ..self.figures
         }
+    }
+
+    /// Takes in what was found out about the worm's configuration, for the files that begin from now on.
+    pub(super) fn take_in(&mut self, finding: &Finding) {
+        finding.note_in(&mut self.origin, &mut self.notes);
     }
 
     /// Takes the messages that came since the last call, `looked` ago; writes what is due.
@@ -227,7 +235,7 @@ impl Keeper {
         let unix = now.wall.duration_since(UNIX_EPOCH).unwrap_or_default();
         let event_unix_ns = unix.as_nanos().saturating_sub(u128::from(ago_ns));
         let about = box_record(&event.cause.to_string(), event.time_ns, event_unix_ns);
-        let head = head(&self.origin_at(now), &[(BOX_RECORD, about)])?;
+        let head = self.head(now, Some((BOX_RECORD, about)))?;
         let path = self.folder.next_path(FileKind::Box, event.cause.short_name(), now.wall);
         // The ring fits in once, and as much again of what comes after.
         let mut part = PartFile::new(path, head, 2 * self.max_bytes);
@@ -235,6 +243,12 @@ impl Keeper {
             part.push(held.chunk.bytes());
         }
         Ok(part)
+    }
+
+    /// What each file begins with.
+    fn head(&self, now: Now, about: Option<(&'static str, BTreeMap<String, String>)>) -> Result<Vec<u8>, WriteError> {
+        let records: Vec<_> = about.into_iter().chain(self.notes.iter().map(Note::record)).collect();
+        head(&self.origin_at(now), &records)
     }
 
     /// The clocks as they stand now: the wall clock may have been set since the start.
@@ -288,7 +302,7 @@ impl Keeper {
             self.retry_ns = 0;
         }
         self.folder.keep_within(self.quota);
-        let head = head(&self.origin_at(now), &[])?;
+        let head = self.head(now, None)?;
         let path = self.folder.next_path(FileKind::Thin, "", now.wall);
         let mut part = PartFile::new(path, head, SMALLEST_THIN_PART as usize);
         part.push(chunk.bytes());

@@ -7,7 +7,7 @@ use super::status::{Received, Reporter};
 use crate::attendance::RoundCounter;
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
-use crate::recorder::{Batch, POLL_INTERVAL, RecordedTopics};
+use crate::recorder::{Batch, CarriedConfiguration, Finding, POLL_INTERVAL, RecordedTopics};
 use crate::topics::{BlackBox as Role, Hub, Instance, RoleLock};
 use crossbeam::channel::{Receiver, Sender, bounded};
 use std::path::Path;
@@ -24,6 +24,8 @@ const QUEUE: usize = 500;
 /// One look at the topics.
 struct Look {
     batch: Batch,
+    /// What was found out about the worm's configuration.
+    finding: Option<Finding>,
     /// How long ago the one before was.
     since: Duration,
     now: Now,
@@ -39,11 +41,12 @@ pub(crate) struct BlackBox {
     thread: JoinHandle<Result<(), WriteError>>,
     figures: Arc<Mutex<Figures>>,
     looked: Instant,
+    configuration: CarriedConfiguration,
     messages: u64,
 }
 
 impl BlackBox {
-    /// Begins to listen; `text` is that of the configuration, which each file carries.
+    /// Begins to listen; `text` is that of the configuration, which each file carries; without one it is that of the running worm.
     ///
     /// # Errors
     /// [`Failure::Unusable`] for a worm that has a black box already, and a folder that cannot be used; [`Failure::Failed`] when the topics fail.
@@ -51,6 +54,7 @@ impl BlackBox {
         let instance = Instance::of(config).map_err(Failure::unusable)?;
         let settings = config.black_box.clone().unwrap_or_default();
         let now = now();
+        let mut configuration = CarriedConfiguration::new(&instance, text.as_ref().map(|_| config));
         let origin = Origin {
             worm: config.worm.name.clone(),
             cells: config.worm.cells,
@@ -65,7 +69,10 @@ impl BlackBox {
         let hub = Hub::open(&instance).map_err(Failure::failed)?;
         let topics = RecordedTopics::open(&hub, Channel::ALL)?;
         let reporter = Reporter::open(&hub, role).map_err(Failure::failed)?;
-        let keeper = Keeper::new(folder, &settings, origin, now).map_err(Failure::failed)?;
+        let mut keeper = Keeper::new(folder, &settings, origin, now).map_err(Failure::failed)?;
+        if let Some(finding) = configuration.look(false) {
+            keeper.take_in(&finding);
+        }
         let (queue, looks) = bounded(QUEUE);
         let figures = Arc::default();
         let shared = Arc::clone(&figures);
@@ -81,6 +88,7 @@ impl BlackBox {
             thread,
             figures,
             looked: Instant::now(),
+            configuration,
             messages: 0,
         })
     }
@@ -105,6 +113,7 @@ impl BlackBox {
         let since = self.looked.elapsed();
         self.looked = Instant::now();
         let look = Look {
+            finding: self.configuration.look(batch.len() > 0),
             batch,
             since,
             now: now(),
@@ -166,6 +175,9 @@ fn now() -> Now {
 fn keep(mut keeper: Keeper, looks: &Receiver<Look>, figures: &Mutex<Figures>) -> Result<(), WriteError> {
     let share = |newest: Figures| *figures.lock().unwrap_or_else(PoisonError::into_inner) = newest;
     for look in looks {
+        if let Some(finding) = &look.finding {
+            keeper.take_in(finding);
+        }
         keeper.take(&look.batch, look.since, look.now)?;
         share(keeper.figures());
     }

@@ -3,7 +3,7 @@
 use super::{Failure, WormArgs, end_on_signal, print, report_advice, report_grants};
 use crate::attendance::{Attendance, LockWatch, ParentPipe, ProcessStatus, ServiceManager, Standing, StopSocket};
 use crate::control::{self, Drive, link_settings};
-use crate::topics::{Controller, Hub, Instance, RoleLock};
+use crate::topics::{Controller, Hub, Instance, RoleLock, SharedConfiguration};
 use clap::Args;
 use std::path::Path;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub struct ControlArgs {
 /// cannot be opened, or were removed while the worm ran.
 pub fn run(args: &ControlArgs) -> Result<(), Failure> {
     print::log_in_background()?;
-    let config = args.worm.load()?;
+    let (config, text) = args.worm.load_with_text()?;
     let Some(port) = &config.port else {
         return Err(Failure::unusable(
             "no serial port: name one in the section [port] or with --port; `wormd up` brings a virtual worm of its own",
@@ -41,6 +41,11 @@ pub fn run(args: &ControlArgs) -> Result<(), Failure> {
     let end = end_on_signal()?;
     let instance = Instance::of(&config).map_err(Failure::unusable)?;
     let role = RoleLock::<Controller>::take(&instance).map_err(Failure::unusable)?;
+    let _shared = SharedConfiguration::leave(&role, text.as_deref())
+        .inspect_err(|error| {
+            tracing::warn!("who records this worm by its name will not know its configuration: {error}")
+        })
+        .ok();
     let place = role.place().map_err(Failure::failed)?;
     let lock_watch = LockWatch::start(place, &end)?;
     // Before the devices: from here on the worm can be stopped, and a parent that dies is noticed.

@@ -74,6 +74,6 @@ pub fn run(args: &ExportArgs) -> Result<(), Failure> {
 fn failure(error: ExportError) -> Failure {
     match error {
         ExportError::Read(_) | ExportError::Output(OutputError::Exists(_)) => Failure::unusable(error),
-        ExportError::Output(_) | ExportError::Write(_) => Failure::failed(error),
+        ExportError::Output(_) => Failure::failed(error),
     }
 }

@@ -3,6 +3,7 @@
 //! Each is a whole log with schemas and configuration. Which file a message is in depends only on how full or old the file was when the
 //! message came, so no message is lost or written twice where one file ends and the next begins.
 
+use super::carried::Finding;
 use super::log_file::{LogFile, WrittenFile, problem_of};
 use super::log_head::LogHead;
 use super::progress::Progress;
@@ -146,6 +147,18 @@ impl FileSeries {
     /// [`WriteError`] when it refuses.
     pub(super) fn write_note(&mut self, note: &Note) -> Result<(), WriteError> {
         self.current.writer.write_note(note)
+    }
+
+    /// Writes what was found out about the configuration into the file in use and those that follow.
+    ///
+    /// # Errors
+    /// [`WriteError`] when it refuses.
+    pub(super) fn write_finding(&mut self, finding: &Finding) -> Result<(), WriteError> {
+        self.head.take_in(finding);
+        match finding {
+            Finding::Configuration { .. } => self.current.writer.write_origin(&self.head.origin),
+            Finding::Note(note) => self.current.writer.write_note(note),
+        }
     }
 
     /// Writes what is only in memory yet, and waits until it is on the disk.

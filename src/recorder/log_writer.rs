@@ -1,5 +1,6 @@
 //! The thread that writes the log, with a queue in front of it for as long as a disk may stall.
 
+use super::carried::Finding;
 use super::file_series::{FileOptions, FileSeries, SeriesError};
 use super::log_file::{LogFile, creation_failure};
 use super::log_head::LogHead;
@@ -24,6 +25,7 @@ const QUEUE: usize = 500;
 enum Entry {
     Batch(Batch),
     Note(Note),
+    Finding(Finding),
     /// From here on, the next file.
     Head(Box<LogHead>),
 }
@@ -88,6 +90,14 @@ impl LogWriter {
         self.queue(Entry::Note(note))
     }
 
+    /// Queues what was found out about the configuration.
+    ///
+    /// # Errors
+    /// As [`LogWriter::write`].
+    pub(super) fn write_finding(&self, finding: Finding) -> Result<(), Failure> {
+        self.queue(Entry::Finding(finding))
+    }
+
     /// Goes on in the next file, with another head.
     ///
     /// # Errors
@@ -142,6 +152,10 @@ fn write_entries(mut series: FileSeries, entries: &Receiver<Entry>) -> Result<Co
             Ok(Entry::Head(head)) => series = series.with_head(*head)?,
             Ok(Entry::Note(note)) => {
                 series.write_note(&note)?;
+                unsynced_since.get_or_insert_with(Instant::now);
+            }
+            Ok(Entry::Finding(finding)) => {
+                series.write_finding(&finding)?;
                 unsynced_since.get_or_insert_with(Instant::now);
             }
             Ok(Entry::Batch(batch)) => {

@@ -7,6 +7,7 @@
 //!
 //! A worm of a robot elsewhere has no topics here: [`NetworkRecorder`] records what its relay sends.
 
+mod carried;
 mod file_series;
 mod log_file;
 mod log_head;
@@ -17,6 +18,7 @@ mod recorded_topics;
 mod status_reporter;
 mod thin;
 
+pub(crate) use carried::{CarriedConfiguration, Finding};
 pub(crate) use file_series::FileOptions;
 pub(crate) use log_file::problem_of;
 pub(crate) use network::{NetworkRecorder, NetworkWorm};
@@ -81,6 +83,9 @@ pub(crate) struct Recorder {
     hub: Hub,
     writer: LogWriter,
     progress: Arc<Progress>,
+    configuration: CarriedConfiguration,
+    /// Results that were over before this time are of another run, ns of `CLOCK_MONOTONIC`.
+    results_from_ns: u64,
     messages: u64,
 }
 
@@ -97,7 +102,7 @@ pub(crate) struct Polled {
 }
 
 impl Recorder {
-    /// Begins a log that carries the configuration's text; `force` overwrites existing files.
+    /// Begins a log that carries the configuration's text, or without one that of the running worm; `force` overwrites existing files.
     ///
     /// # Errors
     /// [`Failure::Unusable`] for a worm or file that cannot be used; [`Failure::Failed`] when the topics fail.
@@ -112,6 +117,7 @@ impl Recorder {
         let instance = Instance::of(config).map_err(Failure::unusable)?;
         let clock = LogClock::Own;
         let (begun, begun_ns) = clock.now();
+        let mut configuration = CarriedConfiguration::new(&instance, text.as_ref().map(|_| config));
         let origin = Origin {
             worm: config.worm.name.clone(),
             cells: config.worm.cells,
@@ -119,11 +125,14 @@ impl Recorder {
             begun,
             begun_ns,
         };
-        let head = LogHead {
+        let mut head = LogHead {
             origin,
             clock,
             notes: Vec::new(),
         };
+        if let Some(finding) = configuration.look(false) {
+            head.take_in(&finding);
+        }
         take_full_files_as_errors()?;
         let hub = Hub::open(&instance).map_err(Failure::failed)?;
         let topics = RecordedTopics::open(&hub, topics)?;
@@ -135,6 +144,8 @@ impl Recorder {
             hub,
             writer,
             progress,
+            configuration,
+            results_from_ns: begun_ns,
             messages: 0,
         })
     }
@@ -144,15 +155,22 @@ impl Recorder {
     /// # Errors
     /// [`Failure::Failed`] when the topics fail or the log cannot be written.
     pub(crate) fn poll(&mut self) -> Result<Polled, Failure> {
-        let batch = self
+        let mut batch = self
             .topics
             .read()
             .inspect_err(|_| self.progress.note_problem(RecordingProblem::TopicsUnreadable))?;
+        // A state of before may be the first one that is recorded, and what was made with it then belongs to it.
+        let first_ns = batch.states.first().map_or(u64::MAX, |state| state.time_ns);
+        self.results_from_ns = self.results_from_ns.min(first_ns);
+        batch.leave_out_results_before(self.results_from_ns);
         let polled = Polled {
             messages: batch.len(),
             state: batch.states.last().copied(),
         };
         if polled.messages > 0 {
+            if let Some(finding) = self.configuration.look(true) {
+                self.writer.write_finding(finding)?;
+            }
             self.writer.write(batch)?;
             self.messages += polled.messages as u64;
         }

@@ -32,6 +32,14 @@ impl Batch {
             + self.inferred.len()
     }
 
+    /// Leaves out the results that were over before this time, ns of `CLOCK_MONOTONIC`: topics give their last messages to who joins late, and
+    /// those are of another run. Alarms, commands and trips of before may still hold, and stay.
+    pub(crate) fn leave_out_results_before(&mut self, time_ns: u64) {
+        self.cycles.retain(|cycle| cycle.end_ns >= time_ns);
+        self.ranges.retain(|range| range.end_ns >= time_ns);
+        self.inferred.retain(|inferred| inferred.time_ns >= time_ns);
+    }
+
     /// Leaves out what is of other topics than these; never the commands.
     pub(crate) fn keep_only(&mut self, topics: &[Channel]) {
         fn keep<T: Logged>(topics: &[Channel], messages: &mut Vec<T>) {
@@ -130,5 +138,26 @@ impl RecordedTopics {
             Channel::TripStatus => self.trip.as_ref().map(Subscriber::lost),
             Channel::Inferred => self.inferred.as_ref().map(Subscriber::lost),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use testkit::log_sample::crawl;
+
+    #[test]
+    fn results_of_before_the_recording_are_left_out_and_what_may_still_hold_stays() {
+        let crawled = crawl(6.0);
+        let begun_ns = crawled.cycles[0].end_ns + 1;
+        let mut batch = Batch {
+            cycles: crawled.cycles.clone(),
+            alarms: vec![Alarm::NONE],
+            ..Batch::default()
+        };
+        batch.leave_out_results_before(begun_ns);
+        assert!(!batch.cycles.is_empty() && batch.cycles.len() == crawled.cycles.len() - 1);
+        assert!(batch.cycles.iter().all(|cycle| cycle.end_ns >= begun_ns));
+        assert_eq!(batch.alarms.len(), 1);
     }
 }

@@ -87,6 +87,7 @@
 //! guard. After an orderly exit of the last process nothing remains of the instance's folder or in `/dev/shm`.
 
 mod command;
+mod configuration;
 mod error;
 mod event;
 mod folder;
@@ -105,6 +106,7 @@ mod subscriber;
 mod topic;
 
 pub use command::{AnswerError, CommandClient, CommandError, CommandServer, Responder};
+pub(crate) use configuration::{RunningConfiguration, SharedConfiguration};
 pub use error::{InstanceError, PortError};
 pub use event::{Listener, Notifier, NotifyError, WaitError};
 pub use hub::Hub;

@@ -1,5 +1,6 @@
 //! Roles that only one process of a worm can have.
 
+use super::configuration;
 use super::instance::Instance;
 use super::lock::{LockError, LockFile, LockKind, LockPlace};
 use super::lock_holder;
@@ -145,6 +146,9 @@ pub(super) fn remove_abandoned(instance: &Instance) {
         if instance.lock_path(name).exists()
             && let Ok(Some(file)) = LockFile::try_lock(instance, name, LockKind::Exclusive)
         {
+            if *name == Controller::NAME {
+                configuration::remove_abandoned(instance);
+            }
             file.remove();
         }
     }

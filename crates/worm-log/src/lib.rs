@@ -8,8 +8,8 @@
 //!
 //! # How it works
 //! `writer` puts messages into zstd chunks, each written as a whole: if the writer is killed, the file ends after its last chunk, without a
-//! summary. `scan` therefore reads from the front and never uses the index; of a truncated file it reads all that is there, even within a
-//! chunk, and reports how far it came. [`messages`] returns the contents of a log. [`replay`] feeds the states to the estimator again, and
+//! summary. `scan` therefore reads from the front; of a truncated file it reads all that is there, even within a
+//! chunk, and reports how far it came. In a complete one the summary says where each chunk is, whatever is damaged before it. [`messages`] returns the contents of a log. [`replay`] feeds the states to the estimator again, and
 //! [`compare`] says whether the results are the same as live. [`ChunkWriter`] makes the chunks of a log without a file, for a black box;
 //! [`outline()`] says what is in a file without unpacking it, and [`complete`] finishes one that was cut off. [`export`] makes whole logs of damaged or old ones, and tables.
 //!
@@ -30,6 +30,7 @@ mod recorder_alarm;
 mod replay;
 mod scan;
 mod shape;
+mod summary;
 mod unpack;
 mod writer;
 

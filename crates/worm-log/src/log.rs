@@ -33,7 +33,7 @@ pub struct Log {
     pub trips: Vec<TripStatus>,
     /// What the motor's current alone said; none where self-sensing was off, and in logs of older versions.
     pub inferred: Vec<Inferred>,
-    /// The text of the worm's configuration; none if it ran on defaults.
+    /// The text of the worm's configuration; none if it ran on defaults, or, as a warning says, it is not known.
     pub config: Option<String>,
     /// Worm, cells, version, and when the log was begun.
     pub metadata: BTreeMap<String, String>,

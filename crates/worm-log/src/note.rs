@@ -32,6 +32,12 @@ impl Note {
         entries
     }
 
+    /// As a metadata record: its name and its entries.
+    #[must_use]
+    pub fn record(&self) -> (&'static str, BTreeMap<String, String>) {
+        (NOTE, self.entries())
+    }
+
     /// The note in a metadata record.
     pub(super) fn from_entries(mut values: BTreeMap<String, String>) -> Self {
         let text = values.remove(TEXT).unwrap_or_default();

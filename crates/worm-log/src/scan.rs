@@ -1,13 +1,17 @@
 //! Reading a log from the front, to wherever it ends.
 //!
-//! A file that was not finished has no index, so none is used. The checksum of each chunk is verified before its
+//! A complete log says at its end where each chunk stands: then damage costs no more than the chunk that it is in. A file that was not
+//! finished says nothing of it, and is read record by record. The checksum of each chunk is verified before its
 //! messages are used. The beginning of one more chunk may follow the last whole record: what can be unpacked of it (zstd works in blocks
 //! of 128 kB, lz4 of 64) is read, too, up to the last whole message, and a warning says so.
+
+mod by_index;
 
 use super::channel::{CONFIG_ATTACHMENT, Channel, METADATA};
 use super::note::{NOTE, Note};
 use super::payload::{ENCODINGS, Encoding, Payload, PayloadError, Unknown};
 use super::shape::{are_whole_records, is_whole, uncompressed_records};
+use super::summary::summary;
 use super::unpack::{BoundedZstd, MAX_RATIO};
 use crate::ReadError;
 use mcap::records::{Channel as FileChannel, Record, op};
@@ -74,6 +78,20 @@ pub fn scan_from(
 ) -> Result<Contents, ReadError> {
     let length = skip_magic(&mut input, path)?;
     let mut scanner = Scanner::new(path, take);
+    let summary = summary(&mut input, length).map_err(|error| unreadable(path, &error))?;
+    if let Some(mut summary) = summary {
+        scanner.definitions = std::mem::take(&mut summary.definitions);
+        if !summary.chunks.is_empty() {
+            return match scanner.take_between(&mut input, summary) {
+                Err(Trouble::Refused(error)) => Err(error),
+                Err(Trouble::Unreadable(error)) => Err(unreadable(path, &error)),
+                Ok(()) | Err(Trouble::Broken(_)) => scanner.into_contents(),
+            };
+        }
+    }
+    input
+        .seek(SeekFrom::Start(MAGIC.len() as u64))
+        .map_err(|error| unreadable(path, &error))?;
     // Where the last whole record ends.
     let mut at = MAGIC.len() as u64;
     let framing = LinearReaderOptions::default()
@@ -217,6 +235,8 @@ struct Scanner<'a, F> {
     /// The channels of the file by their IDs, with the encoding of their messages; none for unknown channels.
     channels: HashMap<u16, Option<(Channel, Encoding)>>,
     foreign: Vec<String>,
+    /// Schemas and channels as the summary repeats them, for when those in the first chunk are damaged.
+    definitions: Vec<(u8, Vec<u8>)>,
     damaged_chunks: usize,
     contents: Contents,
     count: u64,
@@ -231,6 +251,7 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
             schemas: HashMap::new(),
             channels: HashMap::new(),
             foreign: Vec::new(),
+            definitions: Vec::new(),
             damaged_chunks: 0,
             contents: Contents::default(),
             count: 0,
@@ -245,7 +266,7 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
         }
         if uncompressed_records(content).is_some_and(|records| !are_whole_records(records)) {
             self.warn_of_a_chunk(at, &McapError::UnexpectedEoc);
-            return Ok(());
+            return self.take_definitions();
         }
         let mut head = [opcode; RECORD_HEAD as usize];
         head[1..].copy_from_slice(&(content.len() as u64).to_le_bytes());
@@ -259,7 +280,7 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
         match taken {
             Err(Trouble::Broken(error)) => {
                 self.warn_of_a_chunk(at, &error);
-                Ok(())
+                self.take_definitions()
             }
             taken => taken,
         }

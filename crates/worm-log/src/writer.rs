@@ -134,13 +134,7 @@ impl<W: Write> Writer<W> {
                 mcap.write_metadata(&metadata(NOTE, note.entries()))?;
             }
             if let Some(config) = &contents.config {
-                mcap.attach(&Attachment {
-                    log_time: begun_ns,
-                    create_time: begun_ns,
-                    name: CONFIG_ATTACHMENT.to_owned(),
-                    media_type: "application/toml".to_owned(),
-                    data: config.as_bytes().into(),
-                })?;
+                mcap.attach(&attachment(config, begun_ns))?;
             }
             let mut channels = Vec::new();
             for channel in Channel::ALL {
@@ -212,6 +206,18 @@ impl<W: Write> Writer<W> {
         self.write_metadata(NOTE, note.entries())
     }
 
+    /// Appends what the log has at its beginning as well, where it was found out later; readers take the later.
+    ///
+    /// # Errors
+    /// [`WriteError`] when the output refuses.
+    pub fn write_origin(&mut self, origin: &Origin) -> Result<(), WriteError> {
+        let contents = origin.contents();
+        self.write_metadata(METADATA, contents.metadata)?;
+        let Some(config) = &contents.config else { return Ok(()) };
+        let attached = self.mcap.attach(&attachment(config, origin.begun_ns));
+        attached.map_err(|error| refused(&self.file, error))
+    }
+
     /// Finishes the chunk and writes it: everything so far can then be read, whatever happens later.
     ///
     /// # Errors
@@ -234,6 +240,16 @@ impl<W: Write> Writer<W> {
         let finished = self.mcap.finish();
         finished.map_err(|error| refused(&self.file, error))?;
         Ok(self.mcap.into_inner().into_inner())
+    }
+}
+
+fn attachment(config: &str, begun_ns: u64) -> Attachment<'_> {
+    Attachment {
+        log_time: begun_ns,
+        create_time: begun_ns,
+        name: CONFIG_ATTACHMENT.to_owned(),
+        media_type: "application/toml".to_owned(),
+        data: config.as_bytes().into(),
     }
 }
 

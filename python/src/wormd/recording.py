@@ -38,7 +38,7 @@ class Recording:
     metadata: dict[str, str]
     """Which worm, and what wrote it; empty for a CSV."""
     config: str | None
-    """The worm's configuration, TOML; None where it was the worm of the paper."""
+    """The worm's configuration, TOML; None where it was the worm of the paper, or, as a note says, is not known."""
 
     def __init__(self, path: Path, tables: _Tables, notes: tuple[str, ...] = ()) -> None:
         self.path, self.notes = path, notes
@@ -127,8 +127,10 @@ class _LogTables(_Tables):
         file = self._files.get(topic.name)
         if file is None:
             return super().frame(topic)
-        frame = _pandas().read_parquet(file)
-        seconds = (frame[_TIMES.get(topic.name, "time_ns")] - self._begun_ns) * 1e-9
+        time = _TIMES.get(topic.name, "time_ns")
+        # An estimate before the first state has no time, and no place in a frame by time.
+        frame = _pandas().read_parquet(file, filters=[(time, ">=", 0)])
+        seconds = (frame[time] - self._begun_ns) * 1e-9
         indexed: pandas.DataFrame = frame.set_index(seconds.rename(_INDEX))
         return indexed
 
@@ -149,7 +151,7 @@ class _LogTables(_Tables):
         firsts = []
         for name, file in self._files.items():
             column = _TIMES.get(name, "time_ns")
-            firsts += _pandas().read_parquet(file, columns=[column])[column].head(1).tolist()
+            firsts += _pandas().read_parquet(file, columns=[column])[column].dropna().head(1).tolist()
         return int(min(firsts, default=0))
 
 

@@ -27,8 +27,13 @@ pub enum ExportError {
     Read(#[from] ReadError),
     /// A file cannot be made.
     Output(#[from] OutputError),
-    /// A log cannot be written.
-    Write(#[from] WriteError),
+}
+
+impl From<WriteError> for ExportError {
+    /// Unlike a recording, a copy that is not whole is removed.
+    fn from(WriteError { file, problem }: WriteError) -> Self {
+        OutputError::of(&file, problem).into()
+    }
 }
 
 /// Writes the messages of a log into a new one, in their order, with its configuration and metadata: complete, indexed, and in the encoding

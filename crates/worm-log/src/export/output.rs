@@ -49,10 +49,7 @@ impl Output {
         if !overwrite && target.symlink_metadata().is_ok() {
             return Err(OutputError::Exists(target.to_owned()));
         }
-        let mut part = OsString::from(target);
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let file = File::create(&part).map_err(|error| OutputError::of(target, error))?;
+        let (file, part) = create_part(target).map_err(|error| OutputError::of(target, error))?;
         Ok(Self {
             file: BufWriter::new(file),
             part,
@@ -61,20 +58,43 @@ impl Output {
         })
     }
 
+    /// Waits until the file is safe on the disk: then only its name can fail.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the operating system refuses.
+    pub(super) fn sync(&mut self) -> Result<(), OutputError> {
+        let synced = self.file.flush().and_then(|()| self.file.get_ref().sync_all());
+        synced.map_err(|error| OutputError::of(&self.target, error))
+    }
+
     /// Gives the file its name, once it is safe on the disk.
     ///
     /// # Errors
     /// [`OutputError`] when the operating system refuses.
     pub(super) fn keep(mut self) -> Result<(), OutputError> {
-        let kept = self
-            .file
-            .flush()
-            .and_then(|()| self.file.get_ref().sync_all())
-            .and_then(|()| std::fs::rename(&self.part, &self.target));
+        self.sync()?;
+        let kept = std::fs::rename(&self.part, &self.target);
         self.is_kept = kept.is_ok();
         kept.map_err(|error| OutputError::of(&self.target, error))
     }
 }
+
+/// Creates a file beside `target`, of a name that no other has.
+fn create_part(target: &Path) -> io::Result<(File, PathBuf)> {
+    let mut number = 0_u32;
+    loop {
+        let mut part = OsString::from(target);
+        part.push(format!(".{}-{number}.part", std::process::id()));
+        let part = PathBuf::from(part);
+        match File::create_new(&part) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && number < MOST_PARTS => number += 1,
+            created => return created.map(|file| (file, part)),
+        }
+    }
+}
+
+/// So many unfinished files of one name may be there.
+const MOST_PARTS: u32 = 1000;
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

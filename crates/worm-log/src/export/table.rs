@@ -4,7 +4,7 @@
 //! - `wall_time` comes first: the message's time as wall-clock time, by the moment at which the log was begun. It is missing in logs
 //!   without that moment.
 //! - Whole numbers are signed 64-bit ones, so that differences of times come out right. Codes are names.
-//! - A value that is not known has no entry, neither zero nor `NaN`.
+//! - A value that is not known has no entry, neither zero nor `NaN`; nor has the time of an estimate before the first state.
 
 mod csv;
 mod parquet;
@@ -103,8 +103,15 @@ pub fn tables(
     if let Some(error) = refused {
         return Err(error.into());
     }
-    let tables = open.into_iter().flatten().map(OpenTable::finish);
-    Ok((tables.collect::<Result<_, _>>()?, contents.warnings))
+    // All of them first, so that a disk that is full leaves no tables of two logs in one folder.
+    let finished = open.into_iter().flatten().map(OpenTable::finish);
+    let finished: Vec<_> = finished.collect::<Result<_, _>>()?;
+    let mut tables = Vec::new();
+    for (output, table) in finished {
+        output.keep()?;
+        tables.push(table);
+    }
+    Ok((tables, contents.warnings))
 }
 
 /// How large a table becomes.
@@ -203,6 +210,10 @@ fn entries<T: Logged>(message: &T, cells: usize, clock: Option<WallClock>, row: 
             }
             (FieldKind::Text, _) => row.push(Entry::Text(None)),
             (FieldKind::Number, Some(FieldValue::Number(value))) => row.push(known(value)),
+            // The time of an estimate that rests on no state.
+            (_, Some(FieldValue::U64(0))) if made_ns.is_none() && field.name == "time_ns" => {
+                row.push(Entry::Whole(None))
+            }
             (_, value) => row.push(Entry::Whole(match value {
                 // No count or time of a worm comes near.
                 Some(FieldValue::U64(value)) => i64::try_from(value).ok(),
@@ -304,18 +315,19 @@ impl OpenTable {
         Ok(added.err().map(|problem| OutputError::of(&self.file, problem)))
     }
 
-    fn finish(self) -> Result<Table, OutputError> {
+    /// The whole table on the disk, which has no name yet.
+    fn finish(self) -> Result<(Output, Table), OutputError> {
         let finished = match self.rows {
             Rows::Parquet(rows) => rows.finish(),
             Rows::Csv(rows) => rows.finish(),
         };
-        finished
-            .map_err(|problem| OutputError::of(&self.file, problem))?
-            .keep()?;
-        Ok(Table {
+        let mut output = finished.map_err(|problem| OutputError::of(&self.file, problem))?;
+        output.sync()?;
+        let table = Table {
             file: self.file,
             rows: self.count,
-        })
+        };
+        Ok((output, table))
     }
 }
 

@@ -120,6 +120,18 @@ fn a_damaged_byte_costs_its_chunk_and_no_value_is_wrong() {
             }
         }
     }
+    // What is complete says at its end what stands where: one bit in the data costs one chunk, be it in the schemas or in a length.
+    for at in (8..chunks[4].0).step_by(7) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 4;
+        let log = messages(&Patient::new(&damaged).path).expect("the rest is there");
+        assert!(log.states.len() >= 30, "byte {at}: {:?}", log.warnings);
+    }
+    let mut zeroed = bytes.clone();
+    zeroed[chunks[1].0 - 50..chunks[2].0 - 50].fill(0);
+    let log = messages(&Patient::new(&zeroed).path).expect("the rest is there");
+    assert_eq!(log.states.len(), 30, "{:?}", log.warnings);
+    assert!(log.warnings[0].contains("damaged"), "{:?}", log.warnings);
     // In the middle of the second chunk's compressed data.
     let mut damaged = bytes.clone();
     damaged[(chunks[1].0 + chunks[2].0) / 2] ^= 0x15;

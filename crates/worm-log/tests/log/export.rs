@@ -282,3 +282,26 @@ mod tables {
         }
     }
 }
+
+#[cfg(feature = "tables")]
+#[test]
+fn exports_at_once_leave_whole_tables_and_no_other_file_is_touched() {
+    use worm_log::Channel;
+    use worm_log::export::{TableFormat, tables};
+    let folder = tempfile::tempdir().expect("a folder");
+    let (log, out) = (folder.path().join("worm.mcap"), folder.path().join("tables"));
+    let telemetry = crawl(1.0);
+    write_log(&log, &telemetry);
+    fs::create_dir(&out).expect("room");
+    let own = out.join("state.csv.part");
+    fs::write(&own, "mine").expect("room");
+    let export = || tables(&log, &out, TableFormat::Csv, Channel::ALL, true).map(drop);
+    let outcomes = std::thread::scope(|scope| {
+        let exports = [scope.spawn(export), scope.spawn(export)];
+        exports.map(|export| export.join().expect("no panic"))
+    });
+    assert!(outcomes.iter().all(Result::is_ok), "{outcomes:?}");
+    assert_eq!(fs::read_to_string(&own).expect("is there"), "mine");
+    let states = fs::read_to_string(out.join("state.csv")).expect("a table");
+    assert_eq!(states.lines().count(), telemetry.states.len() + 1);
+}

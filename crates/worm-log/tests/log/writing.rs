@@ -2,9 +2,10 @@
 
 use super::text;
 use std::fs;
+use std::io::Cursor;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
 use worm_estimator::message::{Estimate, ProtobufMessage, State};
-use worm_log::{Channel, Index, Note, Writer, messages, scan};
+use worm_log::{Channel, Index, Note, Origin, Writer, messages, messages_from, scan};
 
 #[test]
 fn a_log_holds_what_was_written() {
@@ -205,4 +206,22 @@ fn notes_are_repeated_among_the_warnings_and_stay_in_a_copy() {
         assert_eq!(contents.notes[24].values["place"], "490");
         assert_eq!(contents.notes[25].text.len(), 5000);
     }
+}
+
+#[test]
+fn what_was_found_out_later_of_a_worm_replaces_what_the_log_began_with() {
+    let sink = Sink::default();
+    let unknown = Origin {
+        config: None,
+        ..origin()
+    };
+    let mut writer = Writer::new(sink.clone(), "x".as_ref(), &unknown).expect("memory takes all");
+    let known = Origin { cells: 5, ..origin() };
+    writer.write_origin(&known).expect("memory takes all");
+    writer.write(&crawl(0.1).states[0]).expect("memory takes all");
+    writer.finish().expect("memory takes all");
+    let log = messages_from(Cursor::new(sink.bytes()), "x".as_ref()).expect("a log");
+    assert_eq!(log.config.as_deref(), Some(ORIGIN_CONFIG));
+    assert_eq!((log.metadata["cells"].as_str(), log.states.len()), ("5", 1));
+    assert_eq!(log.warnings, Vec::<String>::new());
 }
