@@ -38,7 +38,7 @@ pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
         Some(file) => Config::load(file)?,
         None => log.config()?,
     };
-    let replayed = replay(&log, &config).map_err(|error| refused(args, &log, &error))?;
+    let replayed = replay(&log, &config).map_err(|error| refused(args, &log, error))?;
     let comparison = compare(&log, &replayed);
     if args.json {
         print::line(serde_json::to_string(&comparison).map_err(Failure::failed)?)?;
@@ -54,7 +54,7 @@ pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
 }
 
 /// Where another worm than the configured one made the log, `worm.cells` of the log cannot be corrected, but another configuration given.
-fn refused(args: &ReplayArgs, log: &Log, error: &EstimatorError) -> Failure {
+fn refused(args: &ReplayArgs, log: &Log, error: EstimatorError) -> Failure {
     let EstimatorError::CellCount { states, configured } = error else {
         return Failure::unusable(error);
     };

@@ -116,7 +116,7 @@ mod tests {
     use super::*;
     use crate::topics::{Controller, RoleLock, SharedConfiguration};
 
-    const FIVE_CELLS: &str = "[worm]\ncells = 5\n";
+    const FIVE_CELLS: &str = "[worm]\ncells = 5\nstep_order = [1, 2, 3, 4, 5]\n";
 
     fn note(finding: Option<Finding>) -> String {
         match finding {

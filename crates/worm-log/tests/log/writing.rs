@@ -68,7 +68,7 @@ fn a_log_without_an_index_is_smaller_and_says_as_much() {
 
 /// A log of one message that another program wrote.
 fn foreign(topic: &str, type_name: &str, encoding: &str, message: impl AsRef<[u8]>) -> Vec<u8> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut bytes = Cursor::new(Vec::new());
     let options = mcap::WriteOptions::new().compression(None);
     let mut writer = options.create(&mut bytes).expect("memory takes all");
     let schema = writer.add_schema(type_name, "jsonschema", b"{}").expect("a schema");
