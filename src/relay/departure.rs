@@ -50,8 +50,10 @@ impl Departure {
             Some((user, _)) if self.name.len() > room => user,
             _ => &self.name,
         };
-        let end = name.floor_char_boundary(room);
-        ShortText::new(&format!("{RELAY}{}{what}", &name[..end]))
+        // As many whole letters as there is room for.
+        let fits = |(at, letter): &(usize, char)| at + letter.len_utf8() <= room;
+        let name: String = name.char_indices().take_while(fits).map(|(_, letter)| letter).collect();
+        ShortText::new(&format!("{RELAY}{name}{what}"))
     }
 
     /// What a recorded hold says of the driver; none for another command.
