@@ -1,7 +1,7 @@
 //! The configuration of a running worm, as its controller leaves it in the worm's folder for others: a recorder that knows only the worm's
 //! name writes it into its log.
 
-use super::instance::Instance;
+use super::instance::{CONFIGURATION, Instance};
 use super::role::{Controller, RoleLock};
 use nix::fcntl::{OFlag, openat};
 use nix::sys::stat::Mode;
@@ -9,9 +9,6 @@ use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::PathBuf;
-
-/// Name of the file.
-const NAME: &str = "configuration.json";
 
 /// What stands in the file.
 #[derive(Debug, Serialize, Deserialize)]
@@ -40,9 +37,9 @@ impl SharedConfiguration {
         };
         let folder = role.instance().open_folder().map_err(io::Error::other)?;
         let flags = OFlag::O_WRONLY | OFlag::O_CREAT | OFlag::O_TRUNC | OFlag::O_NOFOLLOW | OFlag::O_CLOEXEC;
-        let file = openat(&folder, NAME, flags, Mode::from_bits_truncate(0o600))?;
+        let file = openat(&folder, CONFIGURATION, flags, Mode::from_bits_truncate(0o600))?;
         let shared = Self {
-            path: role.instance().folder().join(NAME),
+            path: role.instance().configuration_path(),
         };
         File::from(file).write_all(&serde_json::to_vec(&content)?)?;
         Ok(shared)
@@ -70,16 +67,10 @@ impl RunningConfiguration {
     /// That of the worm which runs now; `None` where none runs, or its controller does not say.
     pub(crate) fn of(instance: &Instance) -> Option<Self> {
         let controller = RoleLock::<Controller>::holder(instance)?;
-        let text = fs::read_to_string(instance.folder().join(NAME)).ok()?;
+        let text = fs::read_to_string(instance.configuration_path()).ok()?;
         let content: Content = serde_json::from_str(&text).ok()?;
         (content.pid == controller).then(|| content.text.map_or(Self::Paper, Self::Text))
     }
-}
-
-/// Removes what a killed controller left behind. Only for one who has its lock.
-pub(super) fn remove_abandoned(instance: &Instance) {
-    // There is none where the controller ended in order.
-    let _ = fs::remove_file(instance.folder().join(NAME));
 }
 
 #[cfg(test)]
@@ -108,7 +99,7 @@ mod tests {
 
         // What a killed controller leaves behind is nobody's.
         instance.open_folder().expect("it is made again");
-        let left = instance.folder().join(NAME);
+        let left = instance.configuration_path();
         let content = Content { pid: 1, text: None };
         fs::write(&left, serde_json::to_vec(&content).expect("JSON")).expect("can be written");
         fs::write(instance.lock_path("controller"), "1\n").expect("can be written");

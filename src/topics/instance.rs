@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use worm_estimator::config::{Config, Topics};
 
+/// Name of the file in which a controller leaves its configuration.
+pub(super) const CONFIGURATION: &str = "configuration.json";
+
 /// Longest path of a unix socket, bytes, without the closing zero.
 const SOCKET_PATH_MAX: usize = 107;
 /// What iceoryx2 adds to folder and prefix in a listener's socket: a slash, 39 digits and `.event`.
@@ -96,6 +99,11 @@ impl Instance {
 
     pub(crate) fn iceoryx(&self) -> &IoxConfig {
         &self.iceoryx
+    }
+
+    /// The file in which the controller leaves its configuration.
+    pub(super) fn configuration_path(&self) -> PathBuf {
+        self.folder().join(CONFIGURATION)
     }
 
     pub(super) fn lock_path(&self, name: &str) -> PathBuf {

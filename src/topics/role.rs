@@ -1,6 +1,5 @@
 //! Roles that only one process of a worm can have.
 
-use super::configuration;
 use super::instance::Instance;
 use super::lock::{LockError, LockFile, LockKind, LockPlace};
 use super::lock_holder;
@@ -147,7 +146,8 @@ pub(super) fn remove_abandoned(instance: &Instance) {
             && let Ok(Some(file)) = LockFile::try_lock(instance, name, LockKind::Exclusive)
         {
             if *name == Controller::NAME {
-                configuration::remove_abandoned(instance);
+                // There is none where the controller ended in order.
+                let _ = std::fs::remove_file(instance.configuration_path());
             }
             file.remove();
         }

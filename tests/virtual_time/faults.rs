@@ -2,7 +2,7 @@
 
 use super::harness::{self, Obeying, config, crawling, wired};
 use std::fmt::Write;
-use worm_estimator::message::{AlarmKind, CommandKind, Fault, Mode};
+use worm_estimator::message::{Alarm, AlarmKind, CommandKind, Fault, Mode};
 use wormd::control::{Service, ServiceOutcome};
 use wormd::link::virtual_worm::Options;
 use wormd::soak::Machine;
@@ -251,6 +251,15 @@ fn run(case: &Case) -> (String, String) {
                 wrong += "an unrelated alarm; ";
             }
         }
+    }
+    let is_share = |alarm: &&Alarm| [LinkFault.code(), TrackerFault.code()].contains(&alarm.kind);
+    if session
+        .raised
+        .iter()
+        .filter(is_share)
+        .any(|alarm| alarm.value <= alarm.threshold)
+    {
+        wrong += "raised below its threshold; ";
     }
     if (session.mode(), session.fault()) != (case.ends_in, case.by) {
         write!(wrong, "not {} ({})", case.ends_in.name(), case.by.name()).expect("text has room");

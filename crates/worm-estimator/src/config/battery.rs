@@ -111,6 +111,14 @@ impl Battery {
             self.empty_v,
             "must be below battery.full_v",
         );
+        if let Some(cut_off_v) = self.cut_off_v {
+            checker.require(
+                cut_off_v < self.full_v,
+                "battery.cut_off_v",
+                cut_off_v,
+                "must be below battery.full_v: the battery would never give anything",
+            );
+        }
         self.check_curve(checker);
         if let Some(gauge) = &self.gauge {
             checker.require(

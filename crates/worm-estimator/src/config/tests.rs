@@ -128,6 +128,10 @@ fn bad_values_are_named_with_file_place_and_remedy() {
             "worm.toml: battery.open_circuit_v = [3.0, 4.2]: must begin with battery.empty_v",
         ),
         (
+            "[battery]\nfull_v = 5.6\ncut_off_v = 5.7\n",
+            "worm.toml: battery.cut_off_v = 5.7: must be below battery.full_v",
+        ),
+        (
             "[battery]\ngauge = \"BAT0\"\n",
             "worm.toml: battery.gauge = \"BAT0\": must be the absolute path",
         ),

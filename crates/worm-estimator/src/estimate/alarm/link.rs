@@ -73,7 +73,8 @@ impl LinkFault {
             ReadingState::Between
         };
         DetectorOutput::Measured(Reading {
-            value: fraction,
+            // One that is lost failed altogether, whatever the window still holds.
+            value: if lost { 1.0 } else { fraction },
             threshold: self.threshold,
             verdict,
             since_ns: self.since_ns,

@@ -78,7 +78,8 @@ impl TrackerFault {
             self.since_ns = tick.now_ns;
         }
         DetectorOutput::Measured(Reading {
-            value: fraction,
+            // A silent one gives nothing, whatever the window still holds.
+            value: if silent { 1.0 } else { fraction },
             threshold: self.threshold,
             verdict,
             since_ns: self.since_ns,
