@@ -37,7 +37,7 @@ fn assert_does_not_crawl(crawling: &Crawling) {
 
 #[test]
 fn what_was_asked_of_a_frozen_relay_is_not_done_when_it_goes_on() {
-    let (relay, crawling) = crawling_with_relay("w-late");
+    let (relay, crawling) = crawling_with_relay("w-frozen");
     crawling.worm.order(CommandKind::Hold);
     crawling.wait_for_mode(Mode::Holding);
     let mut terminal = Terminal::watch(&crawling.worm);
