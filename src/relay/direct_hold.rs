@@ -31,7 +31,7 @@ struct Direct {
 }
 
 impl HoldWatch {
-    /// Nothing is asked for yet.
+    /// No hold has been asked for.
     pub(crate) fn new(instance: &Instance) -> Self {
         Self {
             instance: instance.clone(),

@@ -1,7 +1,7 @@
 //! Boxes of the black box, as a browser and `curl -C -` download them.
 
 use super::http::request;
-use super::start;
+use super::watched::start;
 use super::worm::Worm;
 use testkit::log_sample::{crawl, write_log};
 

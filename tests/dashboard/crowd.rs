@@ -1,7 +1,8 @@
 //! Many connections of one address, as all users behind a tunnel or a proxy are: none of them keeps the others from HOLD.
 
+use super::PATIENCE;
 use super::http::request;
-use super::{PATIENCE, Watched};
+use super::watched::Watched;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 

@@ -1,8 +1,9 @@
 //! The page about all worms.
 
+use super::PATIENCE;
 use super::http::{Browser, request};
+use super::watched::start;
 use super::worm::{Process, Worm, wait_for};
-use super::{PATIENCE, start};
 use nix::sys::signal::Signal;
 use serde_json::json;
 

@@ -1,11 +1,12 @@
 //! A relay or a dashboard that stands still, as one that is suspended: a hold gets through, and nothing is done late.
 
-use super::{ANN, BEARER, PATIENCE, Watched};
+use super::watched::{Watched, events};
+use super::{ANN, BEARER, PATIENCE};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::io::Write;
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
 
 /// Longer than a request may wait.
@@ -54,15 +55,6 @@ fn wait_until_it_holds(watched: &Watched) {
     });
 }
 
-fn assert_does_not_crawl(watched: &Watched) {
-    let begun = Instant::now();
-    while begun.elapsed() < Duration::from_millis(1_500) {
-        let mode = watched.worm.state().map(|state| state.mode);
-        assert_ne!(mode, Some(Mode::Crawling.code()));
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
 #[test]
 fn a_frozen_relay_or_dashboard_does_nothing_late() {
     let watched = Watched::start("d-late");
@@ -80,7 +72,7 @@ fn a_frozen_relay_or_dashboard_does_nothing_late() {
     });
     assert_eq!((refused.status, &refused.json()["verdict"]), (504, &"stale".into()));
     assert!(refused.body.contains("ask again"), "{refused:?}");
-    assert_does_not_crawl(&watched);
+    watched.worm.assert_does_not_crawl();
 
     // The client has gone before the dashboard goes on.
     let frozen = Frozen::new(watched.dashboard.0.id() as i32);
@@ -95,8 +87,8 @@ fn a_frozen_relay_or_dashboard_does_nothing_late() {
     drop(client);
     std::thread::sleep(FROZEN);
     drop(frozen);
-    assert_does_not_crawl(&watched);
-    let events = super::events(&watched);
+    watched.worm.assert_does_not_crawl();
+    let events = events(&watched);
     let accepted = events.iter().filter(|event| event.contains("crawl accepted"));
     assert!(accepted.clone().all(|event| !event.contains("ann")), "{events:?}");
 }

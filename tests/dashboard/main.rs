@@ -5,6 +5,7 @@ mod crowd;
 mod fleet;
 mod frozen;
 mod http;
+mod watched;
 mod without_tracker;
 #[path = "../processes/worm.rs"]
 #[allow(
@@ -13,150 +14,21 @@ mod without_tracker;
 )]
 mod worm;
 
-use http::{Browser, Reply, request};
+use http::{Browser, request};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpStream};
-use std::process::{Child, Command, Stdio};
+use std::io::Write;
+use std::net::TcpStream;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use worm::{Process, Worm, wait_for};
+use watched::{Watched, events, start};
+use worm::{Worm, wait_for};
 
 const TOKEN: &str = "a-token-for-tests-0123";
 const BEARER: &str = "Authorization: Bearer a-token-for-tests-0123";
 const ANN: &str = "X-Wormd-Client: ann";
 const BEN: &str = "X-Wormd-Client: ben";
 const PATIENCE: Duration = Duration::from_secs(30);
-
-/// A dashboard that ends with the test, however that ends.
-struct Dashboard(Child);
-
-impl Dashboard {
-    /// Ends it; its exit status.
-    fn end(&mut self) -> Option<i32> {
-        let _ = nix::sys::signal::kill(nix::unistd::Pid::from_raw(self.0.id() as i32), Signal::SIGTERM);
-        self.0.wait().ok()?.code()
-    }
-}
-
-impl Drop for Dashboard {
-    fn drop(&mut self) {
-        self.end();
-    }
-}
-
-/// Starts a dashboard, of whose output only the first line is read: it says where it listens.
-fn start(mut command: Command) -> (Dashboard, SocketAddr) {
-    let mut dashboard = command.stdout(Stdio::piped()).spawn().expect("the binary starts");
-    let mut line = String::new();
-    BufReader::new(dashboard.stdout.take().expect("is piped"))
-        .read_line(&mut line)
-        .expect("it says where it is");
-    let address = line
-        .split_once("http://")
-        .and_then(|(_, rest)| rest.trim().trim_end_matches('/').parse().ok());
-    (Dashboard(dashboard), address.unwrap_or_else(|| panic!("{line:?}")))
-}
-
-/// A worm, at rest and disarmed, with a dashboard.
-struct Watched {
-    dashboard: Dashboard,
-    address: SocketAddr,
-    controller: Process,
-    _estimator: Process,
-    _virtual_worm: Process,
-    worm: Worm,
-}
-
-impl Watched {
-    /// The dashboard is there before its worm.
-    fn start(name: &str) -> Self {
-        let worm = Worm::on_a_steady_computer(name);
-        let arguments = ["dashboard", "--listen", "127.0.0.1:0"];
-        let (dashboard, address) = start(
-            worm.wormd(&arguments)
-                .with_environment("WORMD_DASHBOARD_TOKEN", TOKEN)
-                .into_command(),
-        );
-        assert_eq!(request(address, "GET", "/api/health", &[], "").json()["worm"], "absent");
-        let virtual_worm = worm.virtual_worm(&["--allow-faults"]);
-        let estimator = worm.wormd(&["estimate"]).start();
-        let port = worm.port();
-        let controller = worm.wormd(&["control", "--port", &port]).start();
-        let watched = Self {
-            dashboard,
-            address,
-            controller,
-            _estimator: estimator,
-            _virtual_worm: virtual_worm,
-            worm,
-        };
-        watched.wait_for_health("live");
-        watched
-    }
-
-    fn get(&self, path: &str) -> Reply {
-        request(self.address, "GET", path, &[], "")
-    }
-
-    fn post(&self, command: &str, headers: &[&str]) -> Reply {
-        request(self.address, "POST", &format!("/api/command/{command}"), headers, "")
-    }
-
-    fn wait_for_health(&self, worm: &str) {
-        wait_for(worm, PATIENCE, || self.get("/api/health").json()["worm"] == worm);
-    }
-
-    fn mode(&self) -> String {
-        self.get("/api/state").json()["state"]["mode"]
-            .as_str()
-            .unwrap_or_default()
-            .to_owned()
-    }
-
-    fn wait_for_mode(&self, mode: &str) {
-        wait_for(mode, PATIENCE, || self.mode() == mode);
-    }
-
-    fn arm(&self, client: &str) {
-        assert_eq!(self.post("arm", &[BEARER, client]).status, 200);
-        self.wait_for_mode("armed");
-    }
-}
-
-/// Everything that was done, in words.
-fn events(state: &Watched) -> Vec<String> {
-    let hello = first_event(state.address);
-    let events = hello["events"].as_array().expect("a list");
-    events
-        .iter()
-        .filter_map(|event| event["text"].as_str().map(str::to_owned))
-        .collect()
-}
-
-/// The history, which comes first in the stream.
-fn first_event(address: SocketAddr) -> Value {
-    let mut stream = TcpStream::connect(address).expect("listens");
-    stream.set_read_timeout(Some(PATIENCE)).expect("can be set");
-    stream
-        .write_all(format!("GET /api/events HTTP/1.1\r\nHost: {address}\r\n\r\n").as_bytes())
-        .expect("reads");
-    let mut bytes = Vec::new();
-    let mut piece = [0; 65_536];
-    loop {
-        let count = stream.read(&mut piece).expect("events");
-        assert!(count > 0, "the stream goes on");
-        bytes.extend_from_slice(&piece[..count]);
-        let text = String::from_utf8_lossy(&bytes);
-        let Some((_, rest)) = text.split_once("event: hello\ndata: ") else {
-            continue;
-        };
-        // Each event is a chunk of its own.
-        if let Some((data, _)) = rest.split_once("\n\n") {
-            return serde_json::from_str(data).expect("JSON on one line");
-        }
-    }
-}
 
 #[test]
 fn one_drives_with_the_token_and_anyone_may_halt() {

@@ -1,7 +1,7 @@
 //! The page of a worm that nobody sees.
 
 use super::http::Browser;
-use super::start;
+use super::watched::start;
 use super::worm::Worm;
 
 #[test]

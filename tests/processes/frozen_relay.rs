@@ -1,7 +1,7 @@
 //! A relay that is there and does nothing, as one that is suspended: anyone can still halt the worm, and nothing is done late.
 
 use super::watching::{Terminal, crawling_with_relay};
-use super::{Crawling, PATIENCE, Process};
+use super::{PATIENCE, Process};
 use nix::sys::signal::Signal;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{CommandKind, Mode};
@@ -25,16 +25,6 @@ impl Drop for Frozen<'_> {
     }
 }
 
-/// The worm stays where it is for a while.
-fn assert_does_not_crawl(crawling: &Crawling) {
-    let begun = Instant::now();
-    while begun.elapsed() < Duration::from_millis(1_500) {
-        let mode = crawling.worm.state().map(|state| state.mode);
-        assert_ne!(mode, Some(Mode::Crawling.code()));
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
 #[test]
 fn what_was_asked_of_a_frozen_relay_is_not_done_when_it_goes_on() {
     let (relay, crawling) = crawling_with_relay("w-frozen");
@@ -45,7 +35,7 @@ fn what_was_asked_of_a_frozen_relay_is_not_done_when_it_goes_on() {
     terminal.press("cc");
     std::thread::sleep(FROZEN);
     drop(frozen);
-    assert_does_not_crawl(&crawling);
+    crawling.worm.assert_does_not_crawl();
     terminal.wait_for("ago, when nobody answered: ask again");
 }
 

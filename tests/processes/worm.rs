@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use testkit::process_pauses::{HostPauses, Pause};
 use worm_estimator::config::Config;
-use worm_estimator::message::{Command as Order, CommandKind, CommandOutcome, State};
+use worm_estimator::message::{Command as Order, CommandKind, CommandOutcome, Mode, State};
 use wormd::link::{Tty, WormBus};
 use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
 
@@ -149,6 +149,16 @@ impl Worm {
             }
             receiver.newest
         })
+    }
+
+    /// The worm does not crawl for a while.
+    pub fn assert_does_not_crawl(&self) {
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_millis(1_500) {
+            let mode = self.state().map(|state| state.mode);
+            assert_ne!(mode, Some(Mode::Crawling.code()));
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     /// The folder of its topics.
