@@ -35,6 +35,15 @@ impl Interval {
             high: mean + INTERVAL_SIGMAS * sigma,
         }
     }
+
+    /// Of a charge: no trip fills the battery.
+    fn of_charge(mean: f64, sigma: f64, start_share: f64) -> Self {
+        let interval = Self::new(mean, sigma);
+        Self {
+            high: interval.high.min(start_share),
+            ..interval
+        }
+    }
 }
 
 /// One leg of a trip. What follows a leg that fails is not known.
@@ -170,7 +179,7 @@ pub fn trip(bench: &Workbench, design: &Design, route: &Route, start_share: f64)
                     cycles: Some(spent.cycles),
                     time_s: Some(spent.time()),
                     energy_j: Some(spent.energy(bench)),
-                    charge_left_share: Some(Interval::new(left, sigma)),
+                    charge_left_share: Some(Interval::of_charge(left, sigma, start_share)),
                     arrival_probability: arrival(&sums),
                     failure: None,
                 }
@@ -216,7 +225,7 @@ pub fn trip(bench: &Workbench, design: &Design, route: &Route, start_share: f64)
         time_s: arrives.then(|| sums.time()),
         energy_j: arrives.then(|| sums.energy(bench)),
         charge_used_share: arrives.then_some(used),
-        charge_left_share: arrives.then(|| Interval::new(left, sigma)),
+        charge_left_share: arrives.then(|| Interval::of_charge(left, sigma, start_share)),
         cycles: arrives.then_some(sums.cycles),
         range_m: arrives.then(|| Interval::new(range_m, range_sigma * range_m)),
         legs,
@@ -330,6 +339,11 @@ mod tests {
         assert!((trip.time_s.expect("it arrives").mean - 2.5 * trip.cycles.expect("it arrives")).abs() < 1e-6);
         let left = trip.charge_left_share.expect("it arrives");
         assert!((left.mean - (1.0 - energy_j / 9000.0)).abs() < 1e-12 && left.low < left.mean && left.mean < left.high);
+        assert!(
+            trip.legs
+                .iter()
+                .all(|leg| leg.charge_left_share.is_some_and(|left| left.high <= 1.0))
+        );
         // Hotel power alone is 1.25 J a cycle, and the identified motor takes some 0.42 J.
         let cycle_j = trip.legs[0].energy_per_cycle_j.expect("it crawls");
         assert!((1.6..1.75).contains(&cycle_j), "{cycle_j}");

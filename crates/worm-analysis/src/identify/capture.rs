@@ -14,6 +14,8 @@ const MAX_KNOCKS: usize = 3;
 
 /// Fraction of the first estimate of a marker's move that the cycles around it must confirm.
 const CONFIRMED: f64 = 0.5;
+/// Longest time of a gait cycle, s: `gait.cycle_s` at most, of a motor that droops by a fifth.
+const LONGEST_CYCLE_S: f64 = 150.0;
 
 /// A shift of some cells from one sample on.
 ///
@@ -47,7 +49,7 @@ pub struct Steadied<'a> {
 /// Finds the gait of a recording by `find_gait` from measured and filled positions, and takes out the shifts of markers and camera.
 ///
 /// # Errors
-/// [`GaitError`] of `find_gait`, or that there are too many knocks.
+/// [`GaitError`] of `find_gait`, that no worm crawls so slowly, or that there are too many knocks.
 pub fn steady<'a>(
     recording: &'a Recording,
     find_gait: impl Fn(&[Vec<f64>], &[Vec<f64>]) -> Result<IdentifiedGait, GaitError>,
@@ -67,6 +69,7 @@ pub fn steady<'a>(
         .collect();
     let mut steadied = without(Cow::Borrowed(recording), &shifts);
     let mut gait = gait_of(&steadied)?;
+    check_clock(time_s, &gait.phase)?;
     if !shifts.is_empty() {
         let first_m: Vec<f64> = shifts.iter().map(|shift| shift.shift_m).collect();
         for shift in &mut shifts {
@@ -115,6 +118,22 @@ pub fn steady<'a>(
         shifts,
         repairs,
     })
+}
+
+/// Refuses times of which even the fastest cycle takes too many. Others may hold rests.
+fn check_clock(time_s: &[f64], phase: &[f64]) -> Result<(), GaitError> {
+    let mut fastest_s = f64::INFINITY;
+    let mut from = 0;
+    for sample in 0..phase.len() {
+        if phase[sample] - phase[from] >= 1.0 {
+            fastest_s = fastest_s.min(time_s[sample] - time_s[from]);
+            from = sample;
+        }
+    }
+    if fastest_s.is_finite() && fastest_s > LONGEST_CYCLE_S {
+        return Err(GaitError::Clock { cycle_s: fastest_s });
+    }
+    Ok(())
 }
 
 /// The shift of a marker that moved on its cell.

@@ -51,6 +51,14 @@ pub enum GaitError {
         /// When, s.
         at_s: Vec<f64>,
     },
+    /// No worm crawls so slowly.
+    #[error(
+        "every gait cycle takes {cycle_s:.0} s and longer, and gait.cycle_s goes to 120 s: the times seem to be in milliseconds: divide them by 1000"
+    )]
+    Clock {
+        /// Time of the fastest cycle, s.
+        cycle_s: f64,
+    },
     /// The recorded phase contradicts the positions.
     #[error("the recorded gait phase and the positions contradict each other: {0}")]
     Phase(String),

@@ -2,10 +2,12 @@
 //!
 //! Every cycle is compared with the mean of those before: by how much would friction of single cells, the pull and the friction of the
 //! gears have to differ? One cycle may be an accident (a lost reading, a bump), so two in a row count. Then the fit begins anew, because
-//! the worm is another now. What it finds is compared with the worm before, and the alarms stand until cycles are again like those.
+//! the worm is another now. What it finds is compared with the worm before. The alarms stand until two cycles in a row have the profile of
+//! before, or until the fit differs no more. Where no alarm has a name for the change (less load, or what looks like it), the worm before is
+//! remembered for a while all the same: its return is no change of the other one.
 
 use super::parameters::{Parameters, Vector};
-use super::profile::{BINS_PER_STEP, MAX_BINS};
+use super::profile::BINS_PER_STEP;
 use std::f64::consts::TAU;
 use worm_physics::{MAX_CELLS, Worm};
 
@@ -13,6 +15,8 @@ use worm_physics::{MAX_CELLS, Worm};
 const KNOWN_CYCLES: f64 = 3.0;
 /// Cycles in a row that must differ.
 const IN_A_ROW: u32 = 2;
+/// Cycles for which the worm before is remembered where a change raises no alarm; then the changed one is the usual one.
+const REMEMBERED: u32 = 20;
 /// Change of ln friction that counts: a loss of 16 %.
 const FRICTION_CHANGE: f64 = 0.175;
 /// Change of the torque of a whole cycle that counts, as pull on the body, N …
@@ -81,8 +85,9 @@ pub(super) struct ChangeDetector {
     gear_friction_n_m: f64,
     pull_per_torque: f64, // 1/m: a pull on the body that raises the mean torque as much as friction in the gears
     in_a_row: u32,
+    as_before_in_a_row: u32,
+    without_alarm: u32, // cycles of the changed worm
     reference: Option<Reference>,
-    reference_n_m: Box<[f64; MAX_BINS]>, // its mean profile
     changes: Changes,
     armed: Armed,
 }
@@ -122,8 +127,12 @@ pub(super) enum Seen {
     Usual,
     /// Not like them; it may be an accident.
     Odd,
-    /// Like the odd one before it: the worm has changed.
+    /// Like the odd one before it: the worm has changed …
+    FirstChanged,
+    /// … and now again, while it is another than it was.
     Changed,
+    /// Like the one before it, and like those before the worm changed.
+    AsBefore,
 }
 
 impl ChangeDetector {
@@ -138,8 +147,9 @@ impl ChangeDetector {
             gear_friction_n_m,
             pull_per_torque: TAU / worm.stroke_m(),
             in_a_row: 0,
+            as_before_in_a_row: 0,
+            without_alarm: 0,
             reference: None,
-            reference_n_m: Box::new([0.0; MAX_BINS]),
             changes: Changes::default(),
             armed: Armed::default(),
         }
@@ -174,11 +184,13 @@ impl ChangeDetector {
             torque_n_m,
             mean_n_m,
         } = cycle;
+        self.as_before_in_a_row = 0;
         let gear_friction_n_m = self.gear_friction_n_m;
         let step_order = self.step_order;
         let step_order = &step_order[..self.cells];
-        // While a change stands, one cycle of the changed worm is enough to see that it is over; that one scatters as well.
-        let is_enough = *cycles >= KNOWN_CYCLES || self.reference.is_some();
+        self.remember();
+        // While an alarm stands, one cycle of the changed worm is enough to see that it is over; that one scatters as well.
+        let is_enough = *cycles >= KNOWN_CYCLES || self.changes.any();
         let widened = if *cycles < KNOWN_CYCLES { 2f64.sqrt() } else { 1.0 };
         let sigma_of = |index: usize, scatter: f64| widened * (sigma[index].powi(2) + scatter * scatter).sqrt();
         let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
@@ -213,17 +225,38 @@ impl ChangeDetector {
             return Seen::Odd;
         }
         self.in_a_row = 0;
-        if self.reference.is_none() {
-            self.reference = Some(before);
-            self.reference_n_m[..mean_n_m.len()].copy_from_slice(mean_n_m);
+        if self.reference.is_some() {
+            return Seen::Changed;
         }
-        Seen::Changed
+        self.reference = Some(before);
+        self.without_alarm = 0;
+        Seen::FirstChanged
     }
 
-    /// Mean profile of the worm before it changed, while it is another.
-    pub(super) fn reference_n_m(&self) -> Option<&[f64]> {
-        self.reference
-            .map(|_| &self.reference_n_m[..self.cells * BINS_PER_STEP])
+    /// Counts the cycles for which the worm before is remembered.
+    fn remember(&mut self) {
+        self.without_alarm = if self.changes.any() { 0 } else { self.without_alarm + 1 };
+        if self.without_alarm > REMEMBERED {
+            self.reference = None;
+        }
+    }
+
+    /// Whether the worm differs from one before it.
+    pub(super) fn is_another(&self) -> bool {
+        self.reference.is_some()
+    }
+
+    /// While the worm is another: takes a cycle that is like those before it changed. After another such cycle the change is over.
+    pub(super) fn see_one_as_before(&mut self) -> Seen {
+        self.in_a_row = 0;
+        self.as_before_in_a_row += 1;
+        if self.as_before_in_a_row < IN_A_ROW {
+            return Seen::Odd;
+        }
+        self.as_before_in_a_row = 0;
+        self.reference = None;
+        self.changes = Changes::default();
+        Seen::AsBefore
     }
 
     /// Says in what a changed worm differs from the one before, once it is fitted anew.
@@ -231,12 +264,8 @@ impl ChangeDetector {
     /// `difference` is what the cycle's profile says directly, by one step from the fit. Where a profile has two answers, the fits before and
     /// after may be at different ones, and differ although the profiles do not.
     pub(super) fn judge(&mut self, changed: WormNow<'_>, torque_n_m: &[f64], difference: Option<&Vector>) {
-        let Some(changes) = self.changes_of(changed, torque_n_m, difference) else {
-            return;
-        };
-        self.changes = changes;
-        if !changes.any() {
-            self.reference = None;
+        if let Some(changes) = self.changes_of(changed, torque_n_m, difference) {
+            self.changes = changes;
         }
     }
 

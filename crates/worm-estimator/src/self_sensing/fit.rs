@@ -11,8 +11,9 @@
 //! an evaluation whose crawl is long in becoming periodic takes several.
 //!
 //! [`work`] is the order of these pieces, [`linearise`] and [`descent`] a Gauss-Newton step, [`search`] the place where this begins,
-//! [`uncertainty`] the standard errors.
+//! [`uncertainty`] the standard errors. [`before`] keeps the worm before it changed.
 
+mod before;
 mod descent;
 mod linearise;
 mod search;
@@ -25,6 +26,7 @@ use super::leading;
 use super::model::{CycleFigures, CycleModel, FIGURES};
 use super::parameters::{MAX_UNKNOWNS, Matrix, Parameters, Vector};
 use super::profile::{BINS_PER_STEP, MAX_BINS};
+use before::Before;
 use linearise::{Linearisation, dot};
 use std::f64::consts::{PI, TAU};
 use std::task::Poll;
@@ -87,6 +89,7 @@ pub(super) struct Fit {
     linearisation: Linearisation,
     slopes: Box<Slopes>, // of the figures
     scratch: Box<[Matrix; 2]>,
+    before: Before,
     work: Work,
 }
 
@@ -165,6 +168,7 @@ impl Fit {
             linearisation: Linearisation::new(),
             slopes: Box::new([[0.0; FIGURES]; 2 * MAX_CELLS + 1]),
             scratch: Box::new([Matrix::zeros(); 2]),
+            before: Before::new(at),
             work: Work::Idle,
         };
         // What is known before the first cycle.

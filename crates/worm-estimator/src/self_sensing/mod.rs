@@ -355,27 +355,38 @@ impl SelfSensing {
         }
         let Some(cycle) = self.waiting.take() else { return false };
         let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
-        let score = self.fit.score(torque_n_m, self.fit.profiles_n_m().0);
-        let seen = self.fit.change(&score, &self.allowed).map_or(Seen::Usual, |change| {
-            self.detector.compare(&ComparedCycle {
-                usual: self.fit.parameters(),
-                weight_n: self.fit.known_pull_n(),
-                cycles: self.fit.cycles(),
-                change,
-                torque_n_m,
-                mean_n_m: self.fit.profiles_n_m().0,
+        let seen = if self.detector.is_another() && self.fit.is_as_before(torque_n_m) {
+            self.detector.see_one_as_before()
+        } else {
+            let score = self.fit.score(torque_n_m, self.fit.profiles_n_m().0);
+            self.fit.change(&score, &self.allowed).map_or(Seen::Usual, |change| {
+                self.detector.compare(&ComparedCycle {
+                    usual: self.fit.parameters(),
+                    weight_n: self.fit.known_pull_n(),
+                    cycles: self.fit.cycles(),
+                    change,
+                    torque_n_m,
+                    mean_n_m: self.fit.profiles_n_m().0,
+                })
             })
-        });
-        self.has_changed = matches!(seen, Seen::Changed);
+        };
+        self.has_changed = matches!(seen, Seen::FirstChanged | Seen::Changed);
+        if matches!(seen, Seen::FirstChanged) {
+            self.fit.set_aside(torque_n_m);
+        }
         match seen {
             Seen::Usual => {}
             Seen::Odd => {
                 self.show(&cycle, Standing::Odd);
                 return true;
             }
-            Seen::Changed => {
+            Seen::FirstChanged | Seen::Changed => {
                 self.reckoning.begin_anew();
                 self.fit.forget();
+            }
+            Seen::AsBefore => {
+                self.reckoning.begin_anew();
+                self.fit.go_on_as_before();
             }
         }
         let pull_n = cycle.pitch_sine.map(|sine| {
@@ -389,8 +400,10 @@ impl SelfSensing {
 
     /// By how much the unknowns of the newest cycle differ from those of the worm before it changed.
     fn difference(&mut self) -> Option<Vector> {
-        let usual_n_m = self.detector.reference_n_m()?;
-        let score = self.fit.score(self.fit.cycle_n_m(), usual_n_m);
+        if !self.detector.is_another() {
+            return None;
+        }
+        let score = self.fit.score(self.fit.cycle_n_m(), self.fit.before_n_m());
         let (difference, _) = self.fit.change(&score, &self.allowed)?;
         Some(difference)
     }

@@ -2,6 +2,7 @@
 
 use super::{Steadied, steady};
 use crate::experiment::{Simulation, simulate};
+use crate::identify::GaitError;
 use crate::identify::gait::{self, Prior};
 use crate::recording::{OpenOptions, Recording, Repair, RepairKind};
 use std::borrow::Cow;
@@ -12,6 +13,10 @@ fn crawl() -> Recording {
 }
 
 fn steadied(recording: &Recording) -> Steadied<'_> {
+    steadied_or_not(recording).expect("a gait")
+}
+
+fn steadied_or_not(recording: &Recording) -> Result<Steadied<'_>, GaitError> {
     let find_gait = |measured_m: &[Vec<f64>], filled_m: &[Vec<f64>]| {
         let prior = Prior {
             step_order: &[0, 1, 2, 3],
@@ -19,7 +24,15 @@ fn steadied(recording: &Recording) -> Steadied<'_> {
         };
         gait::find(&recording.time_s, measured_m, filled_m, prior)
     };
-    steady(recording, find_gait).expect("a gait")
+    steady(recording, find_gait)
+}
+
+#[test]
+fn times_in_milliseconds_are_refused() {
+    let mut recording = crawl();
+    recording.time_s.iter_mut().for_each(|time_s| *time_s *= 1e3);
+    let refused = steadied_or_not(&recording).err().map(|error| error.to_string());
+    assert!(refused.is_some_and(|text| text.contains("in milliseconds")));
 }
 
 #[test]
