@@ -11,7 +11,7 @@
 //! - [`remote`]: a laptop from the robot's side: its connections to the relays, and what it may ask.
 //! - [`clock`]: what the robot's clocks are worth.
 //! - [`robot`]: the process on the robot.
-//! - [`offer`]: a worm from the laptop's side; [`laptop`]: the process on the laptop.
+//! - [`offer`]: a worm from the laptop's side, [`offers`]: those of one robot; [`laptop`]: the process on the laptop.
 //!
 //! No message of a laptop is believed to be fresh because of a clock. It names the newest piece that it has received, and the bridge
 //! knows when it sent that: so much time at most has passed since the message was sent.
@@ -21,6 +21,7 @@ mod clock;
 pub(crate) mod laptop;
 mod network;
 mod offer;
+mod offers;
 mod pieces;
 mod remote;
 pub(crate) mod robot;

@@ -1,5 +1,9 @@
 //! `wormd bridge` and `wormd fleet` from outside: real processes, real certificates, and a network between them that loses and delays.
 
+mod fleet_page;
+#[path = "../dashboard/http.rs"]
+#[allow(dead_code, reason = "of another test binary, without its browser")]
+mod http;
 mod network;
 mod record;
 mod watcher;
@@ -49,9 +53,7 @@ impl<'a> Robot<'a> {
         ] {
             make_keys(files.path(), arguments);
         }
-        let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port is free");
-        let port = free.local_addr().expect("is bound").port();
-        drop(free);
+        let port = free_port();
         let host = if network.is_some() { ROBOT } else { "127.0.0.1" };
         let config = files.path().join("bridge.toml");
         let worm_config = worm.config(WORM_CONFIG);
@@ -78,16 +80,16 @@ impl<'a> Robot<'a> {
 
     /// A laptop with these files, whose worms are in a folder of its own.
     fn laptop(&self, keys: &str, certificate: &str) -> Laptop {
-        self.laptop_with(keys, certificate, &[])
+        self.laptop_with(keys, certificate, "", &[])
     }
 
-    fn laptop_with(&self, keys: &str, certificate: &str, environment: &[(&str, &str)]) -> Laptop {
+    fn laptop_with(&self, keys: &str, certificate: &str, more: &str, environment: &[(&str, &str)]) -> Laptop {
         let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
         let host = if self.network.is_some() { ROBOT } else { "127.0.0.1" };
         let config = self.files.path().join(format!("{keys}-{certificate}.toml"));
         let text = format!(
             "certificate = '{keys}/{certificate}.pem'\nkey = '{keys}/{certificate}.key'\nauthority = 'keys/ca.pem'\nroot = '{}'\n\
-             [[robots]]\nname = 'robot1'\nconnect = 'tls/{host}:{}'\n",
+             [[robots]]\nname = 'robot1'\nconnect = 'tls/{host}:{}'\n{more}",
             root.path().display(),
             self.port
         );
@@ -127,6 +129,11 @@ impl Laptop {
         wait_for("the worm is offered", PATIENCE, || self.socket.exists());
         Watcher::connect(&self.socket, name)
     }
+}
+
+fn free_port() -> u16 {
+    let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port is free");
+    free.local_addr().expect("is bound").port()
 }
 
 fn path(path: &Path) -> &str {
@@ -365,7 +372,7 @@ fn a_laptop_whose_clock_is_a_month_off_watches_and_drives() {
             ("FAKETIME", offset),
             ("FAKETIME_DONT_FAKE_MONOTONIC", "1"),
         ];
-        let laptop = robot.laptop_with("keys", "anna", &environment);
+        let laptop = robot.laptop_with("keys", "anna", "", &environment);
         let mut driver = laptop.watch("anna");
         driver.hello(PATIENCE);
         let frame = driver.frame(PATIENCE, |_| true);
