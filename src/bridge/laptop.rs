@@ -6,6 +6,7 @@ use super::offers::Offers;
 use super::pieces::{Assembled, Assembler};
 use super::settings::{Credentials, FleetSettings, Robot};
 use super::wire::{Beat, ClockStep, Down, Echo, RemoteRequest, RemoteWatcher, UP_INTERVAL_NS, Up, VERSION};
+use super::{link_log, reasons};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::relay::wire::{self, Answer, Event, Request};
@@ -33,6 +34,10 @@ const OFFER_CHECK: Duration = Duration::from_secs(1);
 const CONFIRM_BYTES: usize = 24 << 10;
 /// After so long without a word of the robot that is worth a line in the log.
 const SILENCE: Duration = Duration::from_secs(2);
+/// After so long without a word of the robot it is said why.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// After so long an attempt to connect that is in vain has failed.
+const ATTEMPT: Duration = Duration::from_secs(15);
 /// Most requests in one message.
 const MAX_REQUESTS: usize = 16;
 
@@ -82,6 +87,12 @@ pub(crate) fn run(settings: &FleetSettings, end: &Arc<AtomicBool>, ready: impl F
 /// The link to one robot.
 struct RobotLink {
     robot: String,
+    /// Where its bridge listens.
+    address: String,
+    /// Since when nothing was heard of it.
+    silent_since: Instant,
+    /// Why, as that was said last.
+    problem: Option<String>,
     party: Party,
     network: Network,
     assembler: Assembler,
@@ -132,6 +143,9 @@ impl RobotLink {
         let network = Network::open(&end).map_err(|why| Failure::unusable(format!("{}: {why}", robot.name)))?;
         Ok(Self {
             robot: robot.name.clone(),
+            address: robot.connect.clone(),
+            silent_since: Instant::now(),
+            problem: None,
             network,
             party,
             assembler: Assembler::default(),
@@ -183,7 +197,8 @@ impl RobotLink {
             if self.offers.mend() {
                 self.begin_anew();
             }
-            self.offers.list(self.received.is_some(), None);
+            self.look_for_reasons();
+            self.offers.list(self.received.is_some(), self.problem.clone());
         }
         let is_due = self
             .said
@@ -193,6 +208,26 @@ impl RobotLink {
         }
         self.offers.iter_mut().for_each(|(_, offer)| offer.write());
         Ok(())
+    }
+
+    /// Says why nothing is heard, once for each reason.
+    fn look_for_reasons(&mut self) {
+        let silence = self.silent_since.elapsed();
+        if silence < PATIENCE {
+            self.problem = None;
+            return;
+        }
+        let (robot, address, own) = (&self.robot, &self.address, &self.party.certificate);
+        let why = match link_log::of_attempt(address) {
+            Some(said) => reasons::of_silence(robot, address, own, &said),
+            None if silence >= ATTEMPT => reasons::of_silent_link(robot, address, own, self.received.is_some()),
+            // The newest attempt has not failed yet.
+            None => return,
+        };
+        if self.problem.as_ref() != Some(&why) {
+            tracing::warn!("{} is not reached: {why}", self.robot);
+            self.problem = Some(why);
+        }
     }
 
     fn wait(&self) -> Result<(), Failure> {
@@ -225,7 +260,9 @@ impl RobotLink {
         if assembled == Assembled::Useless {
             return Ok(());
         }
-        self.received = Some(Instant::now());
+        let now = Instant::now();
+        self.received = Some(now);
+        self.silent_since = now;
         let Assembled::Message(message) = assembled else {
             return Ok(());
         };

@@ -6,6 +6,7 @@
 //!
 //! - [`settings`]: `bridge.toml` and `fleet.toml`, refused when they leave anything open.
 //! - [`network`]: all that concerns Zenoh.
+//! - [`link_log`] and [`reasons`]: why a link does not come about.
 //! - [`wire`]: what both ends say; [`pieces`] cuts it, so that a laptop confirms what it has.
 //! - [`backlog`]: what waits for a laptop: bounded, the newest first, losses counted. Pure.
 //! - [`remote`]: a laptop from the robot's side: its connections to the relays, and what it may ask.
@@ -19,11 +20,15 @@
 mod backlog;
 mod clock;
 pub(crate) mod laptop;
+mod link_log;
 mod network;
 mod offer;
 mod offers;
 mod pieces;
+mod reasons;
 mod remote;
 pub(crate) mod robot;
 pub(crate) mod settings;
 mod wire;
+
+pub use link_log::LinkLog;

@@ -8,6 +8,7 @@ use super::network::{End, Network, Party, Way};
 use super::remote::{Remote, Served};
 use super::settings::BridgeSettings;
 use super::wire::{Beat, MAX_UP, Up, VERSION};
+use super::{link_log, reasons};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::syslog;
@@ -24,8 +25,10 @@ const POLL_MS: u16 = 50;
 const GATHER: Duration = Duration::from_millis(4);
 /// How often a laptop hears that the bridge is there.
 const BEAT: Duration = Duration::from_millis(200);
-/// How often the clocks are looked at.
-const CLOCK: Duration = Duration::from_secs(1);
+/// How often the clocks, and what was refused, are looked at.
+const LOOK: Duration = Duration::from_secs(1);
+/// How long after it was said why connections are refused that is said again, where the reason is the same.
+const REFUSALS: Duration = Duration::from_secs(60);
 /// A laptop that was not heard for so long has gone.
 const GONE: Duration = Duration::from_secs(5);
 /// Most processes on laptops, and most of one certificate.
@@ -52,20 +55,20 @@ pub(crate) fn run(
             arguments,
         });
     }
-    let network = Network::open(&End {
-        credentials: &settings.credentials,
-        others: &settings.all,
-        laptops: &settings.all,
-        listen: &settings.listen,
-        connect: &[],
-        way: Way::Down,
-        session: None,
-    });
-    let network = network.map_err(|why| {
-        Failure::unusable(format!(
-            "listening at {}: {why}: another bridge may run there; give another address",
-            settings.listen.join(", ")
-        ))
+    let open = || {
+        Network::open(&End {
+            credentials: &settings.credentials,
+            others: &settings.all,
+            laptops: &settings.all,
+            listen: &settings.listen,
+            connect: &[],
+            way: Way::Down,
+            session: None,
+        })
+    };
+    let network = open().map_err(|why| {
+        let why = link_log::without_places(&why);
+        Failure::unusable(reasons::of_listening(&settings.listen.join(", "), &why))
     })?;
     let mut bridge = Bridge {
         robot: settings.credentials.name,
@@ -75,6 +78,7 @@ pub(crate) fn run(
         remotes: BTreeMap::new(),
         clock: ClockWatch::new(),
         looked: Instant::now(),
+        refused: None,
         beaten: Instant::now(),
         next_stream: monotonic_ns(),
     };
@@ -99,6 +103,8 @@ struct Bridge {
     remotes: BTreeMap<Party, Remote>,
     clock: ClockWatch,
     looked: Instant,
+    /// Why a connection was refused, as that was said last.
+    refused: Option<(Instant, String)>,
     beaten: Instant,
     /// Begins elsewhere at each start, so that no stream has the number of another.
     next_stream: u64,
@@ -114,7 +120,7 @@ impl Bridge {
         for (party, bytes) in messages {
             self.take(party, &bytes, now_ns);
         }
-        self.look_at_clocks();
+        self.look_around();
         let is_beat = self.beaten.elapsed() >= BEAT;
         if is_beat {
             self.beaten = Instant::now();
@@ -214,14 +220,23 @@ impl Bridge {
         self.next_stream
     }
 
-    fn look_at_clocks(&mut self) {
-        if self.looked.elapsed() < CLOCK {
+    fn look_around(&mut self) {
+        if self.looked.elapsed() < LOOK {
             return;
         }
         self.looked = Instant::now();
         if let Some(step) = self.clock.look() {
             let text = format!("wall time was set by {:+.3} s", step.step_ns as f64 * 1e-9);
             note(&self.robot, &text);
+        }
+        if let Some(said) = link_log::take_refused() {
+            let text = reasons::of_refusal(&said);
+            let is_known = |(since, known): &(Instant, String)| *known == text && since.elapsed() < REFUSALS;
+            if !self.refused.as_ref().is_some_and(is_known) {
+                tracing::warn!("{text}");
+                syslog::write("wormd-bridge", &self.robot, &text);
+                self.refused = Some((Instant::now(), text));
+            }
         }
     }
 }
