@@ -94,6 +94,11 @@ pub(crate) fn of_listening(addresses: &str, said: &str) -> String {
     format!("listening at {addresses}: {said}: {remedy}")
 }
 
+/// Whether the address is none of this computer's, which it may become when its network is up.
+pub(crate) fn is_address_missing(said: &str) -> bool {
+    said.contains("(os error 99)")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -142,6 +147,9 @@ mod tests {
         ] {
             assert!(of_listening("tls/a:1", said).contains(part), "{said}");
         }
+        assert!(is_address_missing(
+            "10.9.9.9:17101: Cannot assign requested address (os error 99)"
+        ));
         assert!(of_refusal("invalid peer certificate: BadSignature").contains("another authority"));
     }
 }

@@ -27,6 +27,8 @@ const GATHER: Duration = Duration::from_millis(4);
 const BEAT: Duration = Duration::from_millis(200);
 /// How often the clocks, and what was refused, are looked at.
 const LOOK: Duration = Duration::from_secs(1);
+/// How often an address is tried that this computer does not have.
+const LISTEN_RETRY: Duration = Duration::from_secs(1);
 /// How long after it was said why connections are refused that is said again, where the reason is the same.
 const REFUSALS: Duration = Duration::from_secs(60);
 /// A laptop that was not heard for so long has gone.
@@ -35,7 +37,7 @@ const GONE: Duration = Duration::from_secs(5);
 const MAX_REMOTES: usize = 32;
 const MAX_OF_ONE: usize = 8;
 
-/// Serves until `end` is set. Calls `ready` once laptops can connect, and `round` at each turn.
+/// Serves until `end` is set. Calls `ready` once laptops can connect, and `round` at each turn, also while it waits for its address.
 ///
 /// # Errors
 /// [`Failure::Unusable`] when a worm's folder or an address cannot be used.
@@ -66,10 +68,10 @@ pub(crate) fn run(
             session: None,
         })
     };
-    let network = open().map_err(|why| {
-        let why = link_log::without_places(&why);
-        Failure::unusable(reasons::of_listening(&settings.listen.join(", "), &why))
-    })?;
+    let listen = settings.listen.join(", ");
+    let Some(network) = open_when_possible(&listen, open, end, &round)? else {
+        return Ok(());
+    };
     let mut bridge = Bridge {
         robot: settings.credentials.name,
         drive: settings.drive,
@@ -91,6 +93,43 @@ pub(crate) fn run(
         worm.instance.remove_folder_if_empty();
     }
     Ok(())
+}
+
+/// Opens the network, once this computer has the addresses: at power-up its network may take longer than its programs. None at the end.
+fn open_when_possible<T>(
+    listen: &str,
+    open: impl Fn() -> Result<T, String>,
+    end: &AtomicBool,
+    round: &impl Fn(),
+) -> Result<Option<T>, Failure> {
+    let mut is_told = false;
+    while !end.load(Ordering::Relaxed) {
+        let why = match open() {
+            Ok(network) => {
+                if is_told {
+                    tracing::warn!("{listen}: the address is there, and laptops can connect");
+                }
+                return Ok(Some(network));
+            }
+            Err(why) => link_log::without_places(&why),
+        };
+        if !reasons::is_address_missing(&why) {
+            return Err(Failure::unusable(reasons::of_listening(listen, &why)));
+        }
+        if !is_told {
+            is_told = true;
+            tracing::warn!(
+                "listening at {listen}: {why}: this computer does not have the address yet, and it is tried again until it has; 0.0.0.0 \
+                 means all of its addresses"
+            );
+        }
+        let begun = Instant::now();
+        while begun.elapsed() < LISTEN_RETRY && !end.load(Ordering::Relaxed) {
+            round();
+            std::thread::sleep(Duration::from_millis(POLL_MS.into()));
+        }
+    }
+    Ok(None)
 }
 
 struct Bridge {
@@ -245,4 +284,30 @@ impl Bridge {
 fn note(robot: &str, text: &str) {
     tracing::info!("{text}");
     syslog::write("wormd-bridge", robot, text);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn an_address_that_is_not_there_yet_is_waited_for_and_nothing_else() {
+        let (attempts, rounds, end) = (Cell::new(0), Cell::new(0), AtomicBool::new(false));
+        let round = || rounds.set(rounds.get() + 1);
+        let at_second = || {
+            attempts.set(attempts.get() + 1);
+            let missing = "10.9.9.9:7447: Cannot assign requested address (os error 99) at /x.rs:1.";
+            (attempts.get() > 1).then_some(()).ok_or_else(|| missing.to_owned())
+        };
+        let opened = open_when_possible("tls/10.9.9.9:7447", at_second, &end, &round);
+        assert!(matches!(opened, Ok(Some(()))));
+        assert!(rounds.get() > 1, "the watchdog hears of it meanwhile");
+
+        let taken = || Err::<(), _>("a: Address already in use (os error 98)".to_owned());
+        let failure = open_when_possible("tls/a:1", taken, &end, &round).expect_err("is taken");
+        assert!(matches!(failure, Failure::Unusable(_)), "{failure}");
+        end.store(true, Ordering::Relaxed);
+        assert!(matches!(open_when_possible("tls/a:1", taken, &end, &round), Ok(None)));
+    }
 }
