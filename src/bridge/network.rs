@@ -27,6 +27,9 @@ const SEND_BUFFER: usize = 64 << 10;
 /// without being confirmed finds room in them: on a link that loses nothing nothing is lost.
 const BATCHES: usize = 16;
 const PLACE_WAIT_US: i64 = 5000;
+/// How long a connection may take for its handshake, ms. Zenoh takes nobody for 100 ms after each one that fails: with its own 10 s, a hundred
+/// connections that say nothing and come again keep out everybody.
+const HANDSHAKE_MS: u64 = 120_000;
 /// Most links at a time.
 const MAX_LINKS: usize = 64;
 
@@ -204,9 +207,11 @@ fn configuration(end: &End<'_>) -> Value {
         authority,
         ..
     } = end.credentials;
+    let patient = |address: &String| format!("{address}#tls_handshake_timeout_ms={HANDSHAKE_MS}");
+    let listen: Vec<_> = end.listen.iter().map(patient).collect();
     json!({
         "mode": "peer",
-        "listen": { "endpoints": end.listen, "exit_on_failure": true, "timeout_ms": 0 },
+        "listen": { "endpoints": listen, "exit_on_failure": true, "timeout_ms": 0 },
         "connect": {
             "endpoints": end.connect,
             "exit_on_failure": false,

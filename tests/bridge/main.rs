@@ -16,6 +16,7 @@ mod worm;
 
 use network::{ROBOT, TwoComputers};
 use serde_json::{Value, json};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -280,6 +281,9 @@ fn strangers_get_nothing() {
     // One who may, so that it is not for want of a network.
     let anna = robot.laptop("keys", "anna");
     anna.watch("anna").hello(PATIENCE);
+    // Connections that say nothing.
+    let connect = |_| TcpStream::connect(("127.0.0.1", robot.port)).expect("the bridge listens");
+    let silent: Vec<_> = (0..200).map(connect).collect();
     // Of another authority, and of the right one but with no rule.
     let strangers = [robot.laptop("foreign", "anna"), robot.laptop("keys", "nobody")];
     // By Zenoh itself, with a certificate that has no rule, and with one that may only watch.
@@ -347,6 +351,11 @@ fn strangers_get_nothing() {
     drop(input);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("certificate required"), "{said}");
+    // By now each of the silent ones has waited for longer than Zenoh itself would let it.
+    let begun = Instant::now();
+    robot.laptop("keys", "hall").watch("hall").hello(PATIENCE);
+    assert!(begun.elapsed() < Duration::from_secs(8), "{:?}", begun.elapsed());
+    drop(silent);
 }
 
 /// A peer of Zenoh's own, at the bridge.
