@@ -62,18 +62,29 @@ fn take(text: &str) {
         .strip_prefix("Unable to connect to configured peer ")
         .and_then(|rest| rest.split_once("! "))
     {
-        let reason = without_places(rest.rsplit_once(". Retry in ").map_or(rest, |(reason, _)| reason));
+        let reason = rest.rsplit_once(". Retry in ").map_or(rest, |(reason, _)| reason);
+        // The name or address is known.
+        let reason = match reason.strip_prefix("Can not create a new TLS link bound to ") {
+            Some(rest) => rest
+                .split_once("): ")
+                .map_or(rest, |(_, reason)| reason)
+                .trim_start_matches('['),
+            None => reason,
+        };
+        let reason = essence(reason);
         if said.attempts.len() < MAX_ADDRESSES || said.attempts.contains_key(address) {
             said.attempts.insert(address.to_owned(), (Instant::now(), reason));
         }
     } else if let Some((reason, _)) = text.split_once(". Hint:") {
-        said.refused = Some(without_places(reason));
+        said.refused = Some(essence(reason));
     }
 }
 
-/// Without the places in Zenoh's own source.
-pub(crate) fn without_places(text: &str) -> String {
-    text.split(" at /").next().unwrap_or_default().trim().to_owned()
+/// Without places in Zenoh's own source, and without times, which would make each attempt's reason another one.
+pub(crate) fn essence(text: &str) -> String {
+    let ends = [" at /", ": verification time "].map(|end| text.find(end));
+    let end = ends.into_iter().flatten().min().unwrap_or(text.len());
+    text[..end].trim().to_owned()
 }
 
 /// Why no connection to an address came about of late.
@@ -100,12 +111,13 @@ mod tests {
             tracing::debug!(
                 "Unable to connect to configured peer {}! {}. Retry in {:?}.",
                 "tls/robot1:7447",
-                "invalid peer certificate: BadSignature at /root/.cargo/x/unicast.rs:378.",
+                "Can not create a new TLS link bound to IpAddress(V4(Ipv4Addr([127, 0, 0, 1]))): invalid peer certificate: BadSignature at \
+                 /root/.cargo/x/unicast.rs:378.",
                 Duration::from_secs(1)
             );
             tracing::warn!(
                 "{}. Hint: increase the system open file limit.",
-                "received fatal alert: DecryptError"
+                "invalid peer certificate: certificate expired: verification time 2 (UNIX), but certificate is not valid after 1"
             );
             tracing::warn!("something else");
         });
@@ -114,7 +126,8 @@ mod tests {
             Some("invalid peer certificate: BadSignature")
         );
         assert_eq!(of_attempt("tls/robot2:7447"), None);
-        assert_eq!(take_refused().as_deref(), Some("received fatal alert: DecryptError"));
+        let refused = "invalid peer certificate: certificate expired";
+        assert_eq!(take_refused().as_deref(), Some(refused));
         assert_eq!(take_refused(), None);
     }
 }

@@ -111,7 +111,7 @@ fn open_when_possible<T>(
                 }
                 return Ok(Some(network));
             }
-            Err(why) => link_log::without_places(&why),
+            Err(why) => link_log::essence(&why),
         };
         if !reasons::is_address_missing(&why) {
             return Err(Failure::unusable(reasons::of_listening(listen, &why)));
