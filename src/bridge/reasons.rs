@@ -24,9 +24,13 @@ pub(crate) fn of_silence(robot: &str, address: &str, own: &str, said: &str) -> S
         )
     } else if has("invalid peer certificate") {
         format!("{address} answers, and its certificate cannot be used ({said}): make it anew (make-keys)")
-    } else if has("key") && has("certificate") {
+    } else if has("keymismatch") {
         format!(
             "the certificate and the key of this computer do not belong together ({said}): name both of {own} in fleet.toml"
+        )
+    } else if has("cannot create a new tls") {
+        format!(
+            "what this computer proves itself by cannot be used ({said}): look at certificate, key and authority in fleet.toml"
         )
     } else if has("connection refused") {
         format!(
@@ -127,6 +131,10 @@ mod tests {
             (
                 "Bad certificate/key: keys may not be consistent: KeyMismatch",
                 "do not belong together",
+            ),
+            (
+                "Cannot create a new TLS listener to tls/…: Invalid TLS certificate file",
+                "certificate, key and authority",
             ),
             ("[127.0.0.1:17106: Connection refused (os error 111)", "nobody listens"),
             (

@@ -25,6 +25,8 @@ struct State {
     list: FleetList,
     /// Open and locked for as long as they are there: by that others know that this process is alive.
     files: Vec<Flock<File>>,
+    /// Whether the list is what stands in them.
+    is_written: bool,
 }
 
 impl PublishedList {
@@ -60,6 +62,7 @@ impl PublishedList {
             state: Mutex::new(State {
                 list,
                 files: Vec::new(),
+                is_written: false,
             }),
         };
         let mut state = published.state();
@@ -67,8 +70,11 @@ impl PublishedList {
         for root in &published.roots {
             for dead in read_all(root).into_iter().filter(|found| !found.is_alive()) {
                 let mut robots = dead.list.robots.keys();
-                if robots.all(|robot| state.list.robots.contains_key(robot)) {
-                    fs::remove_file(&dead.file)?;
+                if robots.all(|robot| state.list.robots.contains_key(robot))
+                    && let Err(error) = fs::remove_file(&dead.file)
+                {
+                    // Another fleet process may have done so. What stays is shown, and says what to do.
+                    tracing::debug!("{}: {error}", dead.file.display());
                 }
             }
         }
@@ -82,7 +88,8 @@ impl PublishedList {
     /// When it cannot be written.
     pub(crate) fn tell(&self, robot: &str, standing: ListedRobot) -> io::Result<()> {
         let mut state = self.state();
-        if state.list.robots.get(robot) == Some(&standing) && self.is_in_place(&state) {
+        let is_known = state.list.robots.get(robot) == Some(&standing);
+        if is_known && state.is_written && self.is_in_place(&state) {
             return Ok(());
         }
         state.list.robots.insert(robot.to_owned(), standing);
@@ -105,6 +112,7 @@ impl PublishedList {
 
     /// Each file is the old one or the new one, at any time.
     fn write(&self, state: &mut State) -> io::Result<()> {
+        state.is_written = false;
         let text = serde_json::to_vec(&state.list)?;
         let draft = format!("{}.new", self.name);
         let mut files = Vec::new();
@@ -118,6 +126,7 @@ impl PublishedList {
             files.push(file);
         }
         state.files = files;
+        state.is_written = true;
         Ok(())
     }
 }
