@@ -4,6 +4,9 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Duration;
+use tracing_subscriber::filter::filter_fn;
+use tracing_subscriber::layer::{Layer, SubscriberExt};
+use tracing_subscriber::util::SubscriberInitExt;
 use wormd::command::{self, Failure};
 
 /// How long a log that is printed in the background may take at the end; a terminal that nobody reads takes for ever.
@@ -113,25 +116,27 @@ fn main() -> ExitCode {
         2 => tracing::Level::DEBUG,
         _ => tracing::Level::TRACE,
     };
-    let subscriber = tracing_subscriber::fmt()
-        .with_max_level(level)
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(|| command::LogOutput)
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
         // It would panic when standard error is closed: the parent was killed, or the terminal closed.
         .log_internal_errors(false)
-        .compact()
-        .finish();
+        .compact();
+    // Zenoh also warns of what is meant to be so, as that gossip is off.
+    let is_of_interest = move |metadata: &tracing::Metadata<'_>| {
+        let is_quiet = metadata.target().starts_with("zenoh") && verbose < 2;
+        *metadata.level() <= if is_quiet { tracing::Level::ERROR } else { level }
+    };
+    let lines = lines.with_filter(filter_fn(is_of_interest).with_max_level_hint(level));
+    let subscriber = tracing_subscriber::registry().with(lines);
     #[cfg(feature = "bridge")]
     let subscriber = {
-        use tracing_subscriber::layer::SubscriberExt;
-        // Zenoh also warns of what is meant to be so, as that gossip is off.
-        let is_of_interest = move |metadata: &tracing::Metadata<'_>| {
-            !metadata.target().starts_with("zenoh") || verbose > 1 || *metadata.level() == tracing::Level::ERROR
-        };
-        subscriber.with(tracing_subscriber::filter::filter_fn(is_of_interest))
+        let has_links = matches!(arguments.command, Subcommands::Bridge(_) | Subcommands::Fleet(_));
+        let of_links = filter_fn(command::bridge::LinkLog::takes).with_max_level_hint(tracing::Level::DEBUG);
+        subscriber.with(has_links.then(|| command::bridge::LinkLog.with_filter(of_links)))
     };
-    tracing_subscriber::util::SubscriberInitExt::init(subscriber);
+    subscriber.init();
     let code = match run(arguments.command, verbose) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

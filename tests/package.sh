@@ -16,7 +16,7 @@ fail() {
 }
 
 [ "$(id -u)" -eq 0 ] || skip "a root of its own needs root"
-for tool in debootstrap unshare nsenter dpkg-deb cargo-deb; do
+for tool in debootstrap unshare nsenter dpkg-deb cargo-deb openssl; do
   command -v "$tool" >/dev/null || skip "$tool is not installed"
 done
 
@@ -125,7 +125,7 @@ property() { in_root systemctl show --property "$2" --value "wormd-$1@worm1.serv
 # Of the target's own stop systemctl does not wait for what it stops with it.
 stop_all() {
   in_root systemctl stop wormd@worm1.target
-  for unit in control estimate record virtual-worm; do
+  for unit in control estimate record black-box virtual-worm; do
     wait_for "the end of $unit" 30 eval '[[ $(property $unit ActiveState) =~ inactive|failed ]]'
   done
 }
@@ -160,8 +160,8 @@ in_root wormd status
 for page in wormd.1 wormd-control.1 wormd-status.1; do [ -s "$root/usr/share/man/man1/$page.gz" ] || fail "no page $page"; done
 
 step "the units: verify, and the exposure that systemd finds"
-in_root systemd-analyze verify --man=no wormd@worm1.target wormd-{control,estimate,record,crawl,virtual-worm}@worm1.service
-for unit in control estimate record crawl virtual-worm; do
+in_root systemd-analyze verify --man=no wormd@worm1.target wormd-{control,estimate,record,black-box,crawl,virtual-worm,bridge}@worm1.service
+for unit in control estimate record black-box crawl virtual-worm bridge; do
   in_root systemd-analyze security --offline=yes --threshold=20 --no-pager "wormd-$unit@worm1.service" | tail -n 1
 done
 
@@ -177,7 +177,8 @@ stop_all
 
 step "start on the virtual worm: disarmed"
 printf '[port]\npath = "/run/wormd/worm1/port"\n' | in_root tee /etc/wormd/worm1.toml >/dev/null
-in_root systemctl enable --quiet wormd-virtual-worm@worm1.service wormd-record@worm1.service wormd@worm1.target
+in_root systemctl enable --quiet wormd-virtual-worm@worm1.service wormd-record@worm1.service \
+  wormd-black-box@worm1.service wormd@worm1.target
 in_root systemctl start wormd@worm1.target
 wait_for "a worm" 20 stands disarmed
 [ "$(property control StatusText)" = disarmed ] || fail "the status is $(property control StatusText)"
@@ -186,6 +187,26 @@ estimator=$(property estimate MainPID)
 in_root grep -E '^(Uid|CapEff|CapBnd|NoNewPrivs|Seccomp):' "/proc/$pid/status"
 in_root chrt --pid "$pid"
 in_root journalctl --no-pager --output cat --unit wormd-control@worm1.service | grep -E 'REFUSED' || echo "nothing that the loop requests was refused"
+
+step "black box: with the worm, as its user"
+wait_for "the black box" 20 eval '[ "$(property black-box ActiveState)" = active ]'
+in_root test -d /var/lib/wormd/worm1/black-box || fail "the black box has no folder"
+
+step "bridge: refused in words without its file, there with it, and started again when it was killed"
+if in_root systemctl start wormd-bridge@worm1.service; then fail "a bridge without a file"; fi
+[ "$(property bridge ExecMainStatus)" = 2 ] || fail "the bridge ended with $(property bridge ExecMainStatus)"
+in_root journalctl --no-pager --output cat --unit wormd-bridge@worm1.service | grep 'worm1-bridge.toml' || fail "nothing says why"
+config/bridge/make-keys "$root/etc/wormd/keys" authority
+config/bridge/make-keys "$root/etc/wormd/keys" robot robot1 127.0.0.1
+in_root chown -R wormd:wormd /etc/wormd/keys
+printf '%s\n' 'certificate = "keys/robot1.pem"' 'key = "keys/robot1.key"' 'authority = "keys/ca.pem"' 'listen = ["tls/127.0.0.1:7447"]' \
+  '[access]' 'watch = ["anna"]' '[[worms]]' 'name = "worm1"' | in_root tee /etc/wormd/worm1-bridge.toml >/dev/null
+in_root systemctl start wormd-bridge@worm1.service
+in_root sh -c 'kill -s KILL "$0"' "$(property bridge MainPID)"
+wait_for "another bridge" 20 eval '[ "$(property bridge NRestarts)" = 1 ] && [ "$(property bridge ActiveState)" = active ]'
+in_root systemctl stop wormd-bridge@worm1.service
+[ "$(property bridge Result)" = success ] || fail "the bridge ended with $(property bridge Result)"
+in_root rm -r /etc/wormd/keys /etc/wormd/worm1-bridge.toml
 
 step "crawl"
 worm command arm --name worm1
@@ -214,7 +235,7 @@ same_process "after the refused removal"
 
 step "stop: the worm first, then estimator and recorder; no message was lost"
 stop_all
-for unit in control estimate record; do
+for unit in control estimate record black-box; do
   [ "$(property $unit Result)" = success ] || fail "$unit ended with $(property $unit Result)"
 done
 in_root journalctl --sync

@@ -1,21 +1,22 @@
-//! The process on the laptop, `wormd fleet`: for each robot a link and a thread, and for each of its worms an [`Offer`].
+//! The process on the laptop, `wormd fleet`: for each robot a link and a thread, and for each of its worms an [`Offer`](super::offer::Offer).
 
 use super::network::{End, Network, Party, Way};
-use super::offer::{Asked, Offer};
+use super::offer::Asked;
+use super::offers::Offers;
 use super::pieces::{Assembled, Assembler};
 use super::settings::{Credentials, FleetSettings, Robot};
 use super::wire::{Beat, ClockStep, Down, Echo, RemoteRequest, RemoteWatcher, UP_INTERVAL_NS, Up, VERSION};
+use super::{link_log, reasons};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
-use crate::relay::wire::{self, Answer, Event, Line, Request};
-use crate::topics::Instance;
+use crate::relay::wire::{self, Answer, Event, Request};
+use crate::topics::PublishedList;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use std::collections::BTreeMap;
 use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use worm_estimator::config::Config;
+use worm_estimator::config::Topics;
 
 /// How long a thread waits at most, ms.
 const POLL_MS: u16 = 50;
@@ -27,25 +28,36 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 const HOLD_TIMEOUT: Duration = Duration::from_secs(10);
 /// How often.
 const HOLD_RETRY: Duration = Duration::from_millis(300);
-/// How often a worm that cannot be offered is tried again.
-const OFFER_RETRY: Duration = Duration::from_secs(2);
+/// How often it is looked whether others have removed what is offered.
+const OFFER_CHECK: Duration = Duration::from_secs(1);
 /// After so many unconfirmed bytes they are confirmed at once.
 const CONFIRM_BYTES: usize = 24 << 10;
 /// After so long without a word of the robot that is worth a line in the log.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Most worms that a robot may have.
-const MAX_WORMS: usize = 256;
+/// After so long without a word of the robot it is said why.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// After so long an attempt to connect that is in vain has failed.
+const ATTEMPT: Duration = Duration::from_secs(15);
 /// Most requests in one message.
 const MAX_REQUESTS: usize = 16;
 
 /// Serves until `end` is set. Calls `ready` once the robots are being tried.
 ///
 /// # Errors
-/// [`Failure::Unusable`] when Zenoh does not take the configuration; [`Failure::Failed`] when there are no threads.
+/// [`Failure::Unusable`] when Zenoh does not take the configuration, or nothing can be left in the folder of the worms;
+/// [`Failure::Failed`] when there are no threads.
 pub(crate) fn run(settings: &FleetSettings, end: &Arc<AtomicBool>, ready: impl FnOnce()) -> Result<(), Failure> {
     let mut threads = Vec::new();
+    let robots = settings.robots.iter().map(|robot| robot.name.clone());
+    let root = settings.root.as_deref().unwrap_or(Topics::AUTO);
+    let list = PublishedList::publish(root, &settings.file, robots).map_err(|error| {
+        Failure::unusable(format!(
+            "root {root}: the list of robots cannot be written ({error}): give a folder on a tmpfs that this user may write"
+        ))
+    })?;
+    let list = Arc::new(list);
     for robot in &settings.robots {
-        let mut link = RobotLink::open(&settings.credentials, robot, settings.root.clone())?;
+        let mut link = RobotLink::open(&settings.credentials, robot, settings.root.clone(), Arc::clone(&list))?;
         let end = Arc::clone(end);
         let thread = std::thread::Builder::new()
             .name(format!("robot-{}", robot.name))
@@ -75,9 +87,14 @@ pub(crate) fn run(settings: &FleetSettings, end: &Arc<AtomicBool>, ready: impl F
 /// The link to one robot.
 struct RobotLink {
     robot: String,
+    /// Where its bridge listens.
+    address: String,
+    /// Since when nothing was heard of it.
+    silent_since: Instant,
+    /// Why, as that was said last.
+    problem: Option<String>,
     party: Party,
     network: Network,
-    root: Option<String>,
     assembler: Assembler,
     /// When the newest piece came.
     received: Option<Instant>,
@@ -85,17 +102,13 @@ struct RobotLink {
     beat: Option<Beat>,
     /// Whether the last thing that was said is that the robot is silent.
     is_silent: bool,
-    offers: BTreeMap<String, Place>,
+    offers: Offers,
+    /// When it was last looked whether they are all there.
+    checked: Instant,
     /// The step of the robot's clock that was told last.
     told_step: Option<ClockStep>,
     asked: Vec<Pending>,
     said: Option<Instant>,
-}
-
-/// A worm's place: offered, or to be tried again.
-enum Place {
-    Offered(Box<Offer>, Option<Event>),
-    Refused(Instant, String),
 }
 
 /// A request that is not answered yet.
@@ -106,7 +119,12 @@ struct Pending {
 }
 
 impl RobotLink {
-    fn open(credentials: &Credentials, robot: &Robot, root: Option<String>) -> Result<Self, Failure> {
+    fn open(
+        credentials: &Credentials,
+        robot: &Robot,
+        root: Option<String>,
+        list: Arc<PublishedList>,
+    ) -> Result<Self, Failure> {
         let session = format!("{:x}-{:x}", std::process::id(), monotonic_ns());
         let party = Party {
             certificate: credentials.name.clone(),
@@ -125,15 +143,18 @@ impl RobotLink {
         let network = Network::open(&end).map_err(|why| Failure::unusable(format!("{}: {why}", robot.name)))?;
         Ok(Self {
             robot: robot.name.clone(),
+            address: robot.connect.clone(),
+            silent_since: Instant::now(),
+            problem: None,
             network,
             party,
-            root,
             assembler: Assembler::default(),
             received: None,
             unconfirmed: 0,
             beat: None,
             is_silent: true,
-            offers: BTreeMap::new(),
+            offers: Offers::new(&robot.name, root, list),
+            checked: Instant::now(),
             told_step: None,
             asked: Vec::new(),
             said: None,
@@ -154,10 +175,9 @@ impl RobotLink {
             tracing::warn!("nothing was heard of {} for {:.0} s", self.robot, silence.as_secs_f64());
         }
         let mut is_urgent = false;
-        for (worm, place) in &mut self.offers {
-            let Place::Offered(offer, _) = place else { continue };
+        for (worm, offer) in self.offers.iter_mut() {
             for Asked { watcher, name, line } in offer.read() {
-                let worm = worm.clone();
+                let worm = worm.to_owned();
                 let request = RemoteRequest {
                     from: RemoteWatcher { worm, watcher },
                     name,
@@ -172,24 +192,47 @@ impl RobotLink {
             }
         }
         self.give_up();
+        if self.checked.elapsed() >= OFFER_CHECK {
+            self.checked = Instant::now();
+            if self.offers.mend() {
+                self.begin_anew();
+            }
+            self.look_for_reasons();
+            self.offers.list(self.received.is_some(), self.problem.clone());
+        }
         let is_due = self
             .said
             .is_none_or(|said| said.elapsed() >= Duration::from_nanos(UP_INTERVAL_NS));
         if is_urgent || is_due || self.unconfirmed >= CONFIRM_BYTES {
             self.say();
         }
-        for place in self.offers.values_mut() {
-            if let Place::Offered(offer, _) = place {
-                offer.write();
-            }
-        }
+        self.offers.iter_mut().for_each(|(_, offer)| offer.write());
         Ok(())
+    }
+
+    /// Says why nothing is heard, once for each reason.
+    fn look_for_reasons(&mut self) {
+        let silence = self.silent_since.elapsed();
+        if silence < PATIENCE {
+            self.problem = None;
+            return;
+        }
+        let (robot, address, own) = (&self.robot, &self.address, &self.party.certificate);
+        let why = match link_log::of_attempt(address) {
+            Some(said) => reasons::of_silence(robot, address, own, &said),
+            None if silence >= ATTEMPT => reasons::of_silent_link(robot, address, own, self.received.is_some()),
+            // The newest attempt has not failed yet.
+            None => return,
+        };
+        if self.problem.as_ref() != Some(&why) {
+            tracing::warn!("{} is not reached: {why}", self.robot);
+            self.problem = Some(why);
+        }
     }
 
     fn wait(&self) -> Result<(), Failure> {
         let mut waiting = vec![PollFd::new(self.network.woken().as_fd(), PollFlags::POLLIN)];
-        for place in self.offers.values() {
-            let Place::Offered(offer, _) = place else { continue };
+        for (_, offer) in self.offers.iter() {
             waiting.push(PollFd::new(offer.listener().as_fd(), PollFlags::POLLIN));
             waiting.extend(offer.streams().map(|(stream, wants_to_write)| {
                 let wants = match wants_to_write {
@@ -217,7 +260,9 @@ impl RobotLink {
         if assembled == Assembled::Useless {
             return Ok(());
         }
-        self.received = Some(Instant::now());
+        let now = Instant::now();
+        self.received = Some(now);
+        self.silent_since = now;
         let Assembled::Message(message) = assembled else {
             return Ok(());
         };
@@ -243,21 +288,14 @@ impl RobotLink {
                 let Some(network) = self.network_status() else {
                     return Ok(());
                 };
-                match self.offers.get_mut(&worm) {
-                    Some(Place::Offered(offer, event)) => {
-                        let event = event.take_if(|_| matches!(line, Line::Frame(_)));
-                        offer.take_line(line, &network, event)
-                    }
-                    // Not offered here, or not announced.
-                    _ => Ok(()),
-                }
+                self.offers.take_line(&worm, line, &network)
             }
             Down::Answer { to, answer } => {
                 let is_it = |pending: &Pending| pending.request.from == to && pending.request.line.id == answer.id;
                 if answer.id.is_some() || answer.command != "hello" {
                     self.asked.retain(|pending| !is_it(pending));
                 }
-                if let Some(Place::Offered(offer, _)) = self.offers.get_mut(&to.worm) {
+                if let Some(offer) = self.offers.get_mut(&to.worm) {
                     offer.take_answer(to.watcher, answer);
                 }
                 Ok(())
@@ -290,49 +328,22 @@ impl RobotLink {
                 self.robot,
                 step.step_ns as f64 * 1e-9
             );
-            for place in self.offers.values_mut() {
-                if let Place::Offered(_, event) = place {
-                    *event = Some(Event {
-                        time_ns: step.time_ns,
-                        text: text.clone(),
-                    });
-                }
-            }
+            self.offers.note(&Event {
+                time_ns: step.time_ns,
+                text,
+            });
         }
-        for worm in beat.worms.iter().take(MAX_WORMS) {
-            let is_due = match self.offers.get(worm) {
-                None => true,
-                Some(Place::Offered(..)) => false,
-                Some(Place::Refused(since, _)) => since.elapsed() >= OFFER_RETRY,
-            };
-            if is_due {
-                self.offer(worm);
-            }
+        if self.offers.take_worms(&beat.worms) {
+            self.begin_anew();
         }
-        // Whom the robot does not serve any more.
-        self.offers.retain(|worm, _| beat.worms.contains(worm));
         self.beat = Some(beat);
     }
 
-    fn offer(&mut self, worm: &str) {
-        let place = match open_offer(worm, self.root.as_deref()) {
-            Ok(offer) => {
-                if self.beat.is_some() {
-                    // Its history has passed before it could be taken.
-                    self.assembler = Assembler::default();
-                }
-                Place::Offered(Box::new(offer), None)
-            }
-            Err(failure) => {
-                let why = failure.to_string();
-                let is_known = matches!(self.offers.get(worm), Some(Place::Refused(_, known)) if *known == why);
-                if !is_known {
-                    tracing::warn!("{worm} of {} is not offered: {why}", self.robot);
-                }
-                Place::Refused(Instant::now(), why)
-            }
-        };
-        self.offers.insert(worm.to_owned(), place);
+    /// A worm is offered whose history may have passed before it could be taken.
+    fn begin_anew(&mut self) {
+        if self.beat.is_some() {
+            self.assembler = Assembler::default();
+        }
     }
 
     fn network_status(&self) -> Option<wire::Network> {
@@ -362,13 +373,11 @@ impl RobotLink {
                 held_ms: received.elapsed().as_millis().try_into().unwrap_or(u64::MAX),
             });
         let mut watchers = Vec::new();
-        for (worm, place) in &self.offers {
-            if let Place::Offered(offer, _) = place {
-                watchers.extend(offer.present().map(|watcher| RemoteWatcher {
-                    worm: worm.clone(),
-                    watcher,
-                }));
-            }
+        for (worm, offer) in self.offers.iter() {
+            watchers.extend(offer.present().map(|watcher| RemoteWatcher {
+                worm: worm.to_owned(),
+                watcher,
+            }));
         }
         let mut requests = Vec::new();
         for pending in &mut self.asked {
@@ -405,28 +414,10 @@ impl RobotLink {
                 self.robot,
                 pending.since.elapsed().as_secs_f64()
             );
-            if let Some(Place::Offered(offer, _)) = self.offers.get_mut(&from.worm) {
+            if let Some(offer) = self.offers.get_mut(&from.worm) {
                 let answer = Answer::own(0, line.id, line.request.name(), "no-answer", Some(refusal));
                 offer.take_answer(from.watcher, answer);
             }
         }
     }
-}
-
-fn open_offer(worm: &str, root: Option<&str>) -> Result<Offer, Failure> {
-    let mut config = Config::default();
-    config.worm.name = worm.to_owned();
-    if let Some(root) = root {
-        config.topics.root = root.to_owned();
-    }
-    // The name comes from the network, and becomes that of a folder.
-    if let Some(problem) = config.problems().first() {
-        return Err(Failure::unusable(problem.to_string()));
-    }
-    let instance = Instance::of(&config).map_err(Failure::unusable)?;
-    let outcome = Offer::open(instance.clone());
-    if outcome.is_err() {
-        instance.remove_folder_if_empty();
-    }
-    outcome
 }

@@ -6,12 +6,13 @@
 //!
 //! - [`settings`]: `bridge.toml` and `fleet.toml`, refused when they leave anything open.
 //! - [`network`]: all that concerns Zenoh.
+//! - [`link_log`] and [`reasons`]: why a link does not come about.
 //! - [`wire`]: what both ends say; [`pieces`] cuts it, so that a laptop confirms what it has.
 //! - [`backlog`]: what waits for a laptop: bounded, the newest first, losses counted. Pure.
 //! - [`remote`]: a laptop from the robot's side: its connections to the relays, and what it may ask.
 //! - [`clock`]: what the robot's clocks are worth.
 //! - [`robot`]: the process on the robot.
-//! - [`offer`]: a worm from the laptop's side; [`laptop`]: the process on the laptop.
+//! - [`offer`]: a worm from the laptop's side, [`offers`]: those of one robot; [`laptop`]: the process on the laptop.
 //!
 //! No message of a laptop is believed to be fresh because of a clock. It names the newest piece that it has received, and the bridge
 //! knows when it sent that: so much time at most has passed since the message was sent.
@@ -19,10 +20,15 @@
 mod backlog;
 mod clock;
 pub(crate) mod laptop;
+mod link_log;
 mod network;
 mod offer;
+mod offers;
 mod pieces;
+mod reasons;
 mod remote;
 pub(crate) mod robot;
 pub(crate) mod settings;
 mod wire;
+
+pub use link_log::LinkLog;

@@ -23,6 +23,13 @@ const MAX_MESSAGE: usize = 256 << 10;
 const LEASE_MS: u64 = 3000;
 /// What the kernel keeps of what is not sent yet, bytes: after an outage it comes first, and is old.
 const SEND_BUFFER: usize = 64 << 10;
+/// Batches that may wait for the kernel, as many as Zenoh takes, and how long a message waits for a place among them, µs. What may be under way
+/// without being confirmed finds room in them: on a link that loses nothing nothing is lost.
+const BATCHES: usize = 16;
+const PLACE_WAIT_US: i64 = 5000;
+/// How long a connection may take for its handshake, ms. Zenoh takes nobody for 100 ms after each one that fails: with its own 10 s, a hundred
+/// connections that say nothing and come again keep out everybody.
+const HANDSHAKE_MS: u64 = 120_000;
 /// Most links at a time.
 const MAX_LINKS: usize = 64;
 
@@ -147,7 +154,8 @@ impl Network {
             .put(party.key(self.way), ZBytes::from(message))
             .congestion_control(CongestionControl::Drop)
             .priority(Priority::InteractiveHigh)
-            .express(true);
+            // Each express message takes a batch of its own: many pieces at once would not find room.
+            .express(self.way == Way::Up);
         if let Err(error) = put.wait() {
             tracing::debug!("not sent: {error}");
         }
@@ -199,9 +207,11 @@ fn configuration(end: &End<'_>) -> Value {
         authority,
         ..
     } = end.credentials;
+    let patient = |address: &String| format!("{address}#tls_handshake_timeout_ms={HANDSHAKE_MS}");
+    let listen: Vec<_> = end.listen.iter().map(patient).collect();
     json!({
         "mode": "peer",
-        "listen": { "endpoints": end.listen, "exit_on_failure": true, "timeout_ms": 0 },
+        "listen": { "endpoints": listen, "exit_on_failure": true, "timeout_ms": 0 },
         "connect": {
             "endpoints": end.connect,
             "exit_on_failure": false,
@@ -215,7 +225,14 @@ fn configuration(end: &End<'_>) -> Value {
             "unicast": { "max_sessions": MAX_LINKS, "accept_pending": 16, "open_timeout": 5000, "accept_timeout": 5000 },
             "link": {
                 "protocols": ["tls"],
-                "tx": { "lease": LEASE_MS, "keep_alive": 4 },
+                "tx": {
+                    "lease": LEASE_MS,
+                    "keep_alive": 4,
+                    "queue": {
+                        "size": { "interactive_high": BATCHES },
+                        "congestion_control": { "drop": { "wait_before_drop": PLACE_WAIT_US } },
+                    },
+                },
                 "rx": { "max_message_size": MAX_MESSAGE },
                 "tls": {
                     "root_ca_certificate": authority,
@@ -282,7 +299,8 @@ fn access(end: &End<'_>) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::PathBuf;
+    use std::path::{Path, PathBuf};
+    use std::time::{Duration, Instant};
 
     #[test]
     fn zenoh_takes_the_configuration_and_it_is_closed() {
@@ -322,6 +340,81 @@ mod tests {
             for key in rule["key_exprs"].as_array().expect("keys") {
                 let party = Party::of(key.as_str().expect("a key")).expect("a party's key");
                 assert_eq!(party.certificate, name);
+            }
+        }
+    }
+
+    /// An end with a certificate of its own in `keys`.
+    fn open(keys: &Path, name: &str, other: &str, way: Way, port: u16) -> Network {
+        let file = |suffix: &str| keys.join(format!("{name}{suffix}"));
+        let credentials = Credentials {
+            certificate: file(".pem"),
+            key: file(".key"),
+            authority: keys.join("ca.pem"),
+            name: name.to_owned(),
+        };
+        let address = [format!("tls/127.0.0.1:{port}")];
+        let (listen, connect): (&[String], &[String]) = match way {
+            Way::Down => (&address, &[]),
+            Way::Up => (&[], &address),
+        };
+        let end = End {
+            credentials: &credentials,
+            others: &[other.to_owned()],
+            laptops: &["anna".to_owned()],
+            listen,
+            connect,
+            way,
+            session: None,
+        };
+        Network::open(&end).expect("opens")
+    }
+
+    #[test]
+    fn on_a_link_that_loses_nothing_all_that_may_be_under_way_comes() {
+        const WINDOW: usize = 96 << 10;
+        let folder = tempfile::tempdir().expect("a folder");
+        let make_keys = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/bridge/make-keys");
+        for arguments in ["keys authority", "keys robot robot1 127.0.0.1", "keys laptop anna"] {
+            let mut command = std::process::Command::new(&make_keys);
+            let output = command.args(arguments.split(' ')).current_dir(folder.path()).output();
+            assert!(output.expect("the script runs").status.success(), "{arguments}");
+        }
+        let keys = folder.path().join("keys");
+        let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port is free");
+        let port = free.local_addr().expect("is bound").port();
+        drop(free);
+        let robot = open(&keys, "robot1", "anna", Way::Down, port);
+        let laptop = open(&keys, "anna", "robot1", Way::Up, port);
+        let party = Party {
+            certificate: "anna".to_owned(),
+            session: "1".to_owned(),
+        };
+        let begun = Instant::now();
+        let patience = Duration::from_secs(20);
+        // Until both know of each other.
+        while laptop.messages().count() == 0 {
+            assert!(begun.elapsed() < patience, "no link");
+            robot.send(&party, b"first".to_vec());
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        std::thread::sleep(Duration::from_millis(200));
+        laptop.messages().for_each(drop);
+        // Pieces of a history, then of many small frames.
+        for size in [16 << 10, 600] {
+            for round in 0..100 {
+                let count = WINDOW / size;
+                (0..count).for_each(|_| robot.send(&party, vec![7; size]));
+                let begun = Instant::now();
+                let mut came = 0;
+                while came < count {
+                    assert!(
+                        begun.elapsed() < patience,
+                        "{came} of {count} of {size} bytes in round {round}"
+                    );
+                    came += laptop.messages().count();
+                    std::thread::sleep(Duration::from_millis(1));
+                }
             }
         }
     }

@@ -12,7 +12,8 @@ use crate::relay::socket::Listener;
 use crate::relay::source::Seen;
 use crate::relay::watcher::{Gone, Watcher, shared};
 use crate::relay::wire::{Answer, Event, Frame, Hello, Line, Network, Request, RequestLine, VERSION};
-use crate::topics::{Controller, Instance, Relay, RoleLock};
+use crate::topics::fleet_list;
+use crate::topics::{AlreadyRunning, Controller, Instance, Relay, RoleError, RoleLock};
 use crate::watch::picture::Picture;
 use std::collections::BTreeMap;
 use std::io;
@@ -34,7 +35,7 @@ pub(crate) struct Offer {
     /// What is known of the worm; none before its relay has been heard.
     known: Option<Known>,
     // Last, so that the socket has gone before the role is free.
-    _role: RoleLock<Relay>,
+    role: RoleLock<Relay>,
 }
 
 struct Known {
@@ -67,18 +68,18 @@ pub(crate) struct Asked {
 }
 
 impl Offer {
-    /// Offers the worm.
+    /// Offers the worm of `robot`.
     ///
     /// # Errors
     /// When a worm of this name runs here, is offered already, or the socket cannot be made.
-    pub(crate) fn open(instance: Instance) -> Result<Self, Failure> {
-        let worm = instance.worm();
-        if let Some(pid) = RoleLock::<Controller>::holder(&instance) {
-            return Err(Failure::unusable(format!(
-                "a worm {worm} runs on this computer (process {pid}): set another root in fleet.toml, or rename one of them"
-            )));
+    pub(crate) fn open(instance: Instance, robot: &str) -> Result<Self, Failure> {
+        if let Some(why) = clash(&instance) {
+            return Err(Failure::unusable(why));
         }
-        let role = RoleLock::<Relay>::take(&instance).map_err(Failure::unusable)?;
+        let role = RoleLock::<Relay>::take(&instance).map_err(|error| match error {
+            RoleError::AlreadyRunning(other) => Failure::unusable(who_has_it(&instance, robot, &other)),
+            error => Failure::unusable(error),
+        })?;
         let listener = Listener::bind(&instance)
             .map_err(|error| Failure::unusable(format!("{}: {error}", instance.relay_socket().display())))?;
         Ok(Self {
@@ -87,8 +88,18 @@ impl Offer {
             watchers: BTreeMap::new(),
             next_id: 1,
             known: None,
-            _role: role,
+            role,
         })
+    }
+
+    /// The worm of this computer that is in the way, if there is one.
+    pub(crate) fn clash(&self) -> Option<String> {
+        clash(&self.instance)
+    }
+
+    /// Whether watchers still find it: another process may have removed the socket, or the whole folder.
+    pub(crate) fn is_in_place(&self) -> bool {
+        self.listener.is_in_place() && self.role.place().is_ok_and(|place| place.is_kept())
     }
 
     /// Takes a line of the robot's relay, and passes it on.
@@ -285,6 +296,36 @@ impl Offer {
     pub(crate) fn listener(&self) -> &std::os::unix::net::UnixListener {
         &self.listener.socket
     }
+}
+
+fn clash(instance: &Instance) -> Option<String> {
+    let pid = RoleLock::<Controller>::holder(instance)?;
+    let worm = instance.worm();
+    Some(format!(
+        "a worm {worm} runs on this computer (process {pid}): set another root in fleet.toml, or give one of the two another worm.name"
+    ))
+}
+
+/// Why a worm of `robot` cannot be offered while `other` has the place of its relay.
+fn who_has_it(instance: &Instance, robot: &str, other: &AlreadyRunning) -> String {
+    let (worm, pid) = (instance.worm(), other.pid);
+    let another = match fleet_list::offered_at(instance) {
+        Some(offered) if offered.robot == robot => {
+            return format!("another `wormd fleet` (process {pid}) offers it already: end one of the two");
+        }
+        Some(offered) => offered.robot,
+        // It is not in the list yet.
+        None if pid == std::process::id() => "another robot".to_owned(),
+        None => {
+            return format!(
+                "a relay of a worm {worm} of this computer (process {pid}) is still there: it ends some seconds after its last watcher"
+            );
+        }
+    };
+    format!(
+        "{another} has a worm {worm}, too, and that one is offered here under this name (by process {pid}): give the worm of {robot} or \
+         that of {another} another worm.name, or offer {robot} by a `wormd fleet` of its own with another root in its fleet.toml"
+    )
 }
 
 impl LocalWatcher {

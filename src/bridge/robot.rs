@@ -8,6 +8,7 @@ use super::network::{End, Network, Party, Way};
 use super::remote::{Remote, Served};
 use super::settings::BridgeSettings;
 use super::wire::{Beat, MAX_UP, Up, VERSION};
+use super::{link_log, reasons};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::syslog;
@@ -24,15 +25,19 @@ const POLL_MS: u16 = 50;
 const GATHER: Duration = Duration::from_millis(4);
 /// How often a laptop hears that the bridge is there.
 const BEAT: Duration = Duration::from_millis(200);
-/// How often the clocks are looked at.
-const CLOCK: Duration = Duration::from_secs(1);
+/// How often the clocks, and what was refused, are looked at.
+const LOOK: Duration = Duration::from_secs(1);
+/// How often an address is tried that this computer does not have.
+const LISTEN_RETRY: Duration = Duration::from_secs(1);
+/// How long after it was said why connections are refused that is said again, where the reason is the same.
+const REFUSALS: Duration = Duration::from_secs(60);
 /// A laptop that was not heard for so long has gone.
 const GONE: Duration = Duration::from_secs(5);
 /// Most processes on laptops, and most of one certificate.
 const MAX_REMOTES: usize = 32;
 const MAX_OF_ONE: usize = 8;
 
-/// Serves until `end` is set. Calls `ready` once laptops can connect, and `round` at each turn.
+/// Serves until `end` is set. Calls `ready` once laptops can connect, and `round` at each turn, also while it waits for its address.
 ///
 /// # Errors
 /// [`Failure::Unusable`] when a worm's folder or an address cannot be used.
@@ -52,21 +57,21 @@ pub(crate) fn run(
             arguments,
         });
     }
-    let network = Network::open(&End {
-        credentials: &settings.credentials,
-        others: &settings.all,
-        laptops: &settings.all,
-        listen: &settings.listen,
-        connect: &[],
-        way: Way::Down,
-        session: None,
-    });
-    let network = network.map_err(|why| {
-        Failure::unusable(format!(
-            "listening at {}: {why}: another bridge may run there; give another address",
-            settings.listen.join(", ")
-        ))
-    })?;
+    let open = || {
+        Network::open(&End {
+            credentials: &settings.credentials,
+            others: &settings.all,
+            laptops: &settings.all,
+            listen: &settings.listen,
+            connect: &[],
+            way: Way::Down,
+            session: None,
+        })
+    };
+    let listen = settings.listen.join(", ");
+    let Some(network) = open_when_possible(&listen, open, end, &round)? else {
+        return Ok(());
+    };
     let mut bridge = Bridge {
         robot: settings.credentials.name,
         drive: settings.drive,
@@ -75,6 +80,7 @@ pub(crate) fn run(
         remotes: BTreeMap::new(),
         clock: ClockWatch::new(),
         looked: Instant::now(),
+        refused: None,
         beaten: Instant::now(),
         next_stream: monotonic_ns(),
     };
@@ -89,6 +95,43 @@ pub(crate) fn run(
     Ok(())
 }
 
+/// Opens the network, once this computer has the addresses: at power-up its network may take longer than its programs. None at the end.
+fn open_when_possible<T>(
+    listen: &str,
+    open: impl Fn() -> Result<T, String>,
+    end: &AtomicBool,
+    round: &impl Fn(),
+) -> Result<Option<T>, Failure> {
+    let mut is_told = false;
+    while !end.load(Ordering::Relaxed) {
+        let why = match open() {
+            Ok(network) => {
+                if is_told {
+                    tracing::warn!("{listen}: the address is there, and laptops can connect");
+                }
+                return Ok(Some(network));
+            }
+            Err(why) => link_log::essence(&why),
+        };
+        if !reasons::is_address_missing(&why) {
+            return Err(Failure::unusable(reasons::of_listening(listen, &why)));
+        }
+        if !is_told {
+            is_told = true;
+            tracing::warn!(
+                "listening at {listen}: {why}: this computer does not have the address yet, and it is tried again until it has; 0.0.0.0 \
+                 means all of its addresses"
+            );
+        }
+        let begun = Instant::now();
+        while begun.elapsed() < LISTEN_RETRY && !end.load(Ordering::Relaxed) {
+            round();
+            std::thread::sleep(Duration::from_millis(POLL_MS.into()));
+        }
+    }
+    Ok(None)
+}
+
 struct Bridge {
     /// Common name of its certificate.
     robot: String,
@@ -99,6 +142,8 @@ struct Bridge {
     remotes: BTreeMap<Party, Remote>,
     clock: ClockWatch,
     looked: Instant,
+    /// Why a connection was refused, as that was said last.
+    refused: Option<(Instant, String)>,
     beaten: Instant,
     /// Begins elsewhere at each start, so that no stream has the number of another.
     next_stream: u64,
@@ -114,7 +159,7 @@ impl Bridge {
         for (party, bytes) in messages {
             self.take(party, &bytes, now_ns);
         }
-        self.look_at_clocks();
+        self.look_around();
         let is_beat = self.beaten.elapsed() >= BEAT;
         if is_beat {
             self.beaten = Instant::now();
@@ -214,14 +259,23 @@ impl Bridge {
         self.next_stream
     }
 
-    fn look_at_clocks(&mut self) {
-        if self.looked.elapsed() < CLOCK {
+    fn look_around(&mut self) {
+        if self.looked.elapsed() < LOOK {
             return;
         }
         self.looked = Instant::now();
         if let Some(step) = self.clock.look() {
             let text = format!("wall time was set by {:+.3} s", step.step_ns as f64 * 1e-9);
             note(&self.robot, &text);
+        }
+        if let Some(said) = link_log::take_refused() {
+            let text = reasons::of_refusal(&said);
+            let is_known = |(since, known): &(Instant, String)| *known == text && since.elapsed() < REFUSALS;
+            if !self.refused.as_ref().is_some_and(is_known) {
+                tracing::warn!("{text}");
+                syslog::write("wormd-bridge", &self.robot, &text);
+                self.refused = Some((Instant::now(), text));
+            }
         }
     }
 }
@@ -230,4 +284,30 @@ impl Bridge {
 fn note(robot: &str, text: &str) {
     tracing::info!("{text}");
     syslog::write("wormd-bridge", robot, text);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn an_address_that_is_not_there_yet_is_waited_for_and_nothing_else() {
+        let (attempts, rounds, end) = (Cell::new(0), Cell::new(0), AtomicBool::new(false));
+        let round = || rounds.set(rounds.get() + 1);
+        let at_second = || {
+            attempts.set(attempts.get() + 1);
+            let missing = "10.9.9.9:7447: Cannot assign requested address (os error 99) at /x.rs:1.";
+            (attempts.get() > 1).then_some(()).ok_or_else(|| missing.to_owned())
+        };
+        let opened = open_when_possible("tls/10.9.9.9:7447", at_second, &end, &round);
+        assert!(matches!(opened, Ok(Some(()))));
+        assert!(rounds.get() > 1, "the watchdog hears of it meanwhile");
+
+        let taken = || Err::<(), _>("a: Address already in use (os error 98)".to_owned());
+        let failure = open_when_possible("tls/a:1", taken, &end, &round).expect_err("is taken");
+        assert!(matches!(failure, Failure::Unusable(_)), "{failure}");
+        end.store(true, Ordering::Relaxed);
+        assert!(matches!(open_when_possible("tls/a:1", taken, &end, &round), Ok(None)));
+    }
 }

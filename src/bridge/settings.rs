@@ -37,6 +37,8 @@ pub(crate) struct BridgeSettings {
 /// A checked `fleet.toml`.
 #[derive(Debug)]
 pub(crate) struct FleetSettings {
+    /// The file.
+    pub(crate) file: PathBuf,
     pub(crate) credentials: Credentials,
     pub(crate) robots: Vec<Robot>,
     /// `topics.root` of the worms as this computer offers them.
@@ -203,6 +205,7 @@ impl FleetSettings {
             }
         }
         Ok(Self {
+            file: file.to_path_buf(),
             credentials,
             robots: read.robots,
             root: read.root,

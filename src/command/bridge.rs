@@ -2,6 +2,7 @@
 
 use super::{Failure, end_on_signal, print};
 use crate::attendance::{RoundCounter, ServiceManager};
+pub use crate::bridge::LinkLog;
 use crate::bridge::robot;
 use crate::bridge::settings::BridgeSettings;
 use clap::Args;

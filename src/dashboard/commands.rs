@@ -3,7 +3,7 @@
 use super::access::bearer;
 use super::app::{App, Peer};
 use super::caller::Caller;
-use super::fleet::Held;
+use super::fleet_view::Held;
 use super::response::{refused, to_json};
 use crate::relay::wire::{Answer, Request};
 use crate::trip::wire::Ask;

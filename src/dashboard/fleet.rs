@@ -5,14 +5,14 @@
 //! configuration. Without anybody who looks there is no connection.
 
 use super::caller::Caller;
+use super::fleet_view::{Held, WormView};
+use super::unreached::{self, Unreached};
 use crate::attendance::{Request as StopRequest, ask};
 use crate::failure::Failure;
 use crate::relay::connection::Connection;
 use crate::relay::direct_hold;
-use crate::relay::message_json::Json;
-use crate::relay::wire::{Ages, Answer, Frame, Line, Network, Request, VERSION};
-use crate::topics::{Controller, Instance, RoleLock};
-use serde::Serialize;
+use crate::relay::wire::{Answer, Frame, Line, Request, VERSION};
+use crate::topics::{Controller, Instance, Relay, RoleLock};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
@@ -20,7 +20,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 use worm_estimator::config::Config;
-use worm_estimator::message::{Alarm, AlarmKind, Fault, Mode, Range, Severity};
+use worm_estimator::message::{Fault, Mode};
 
 /// How often the thread reads.
 const TURN: Duration = Duration::from_millis(50);
@@ -32,49 +32,6 @@ const LINGER: Duration = Duration::from_secs(5);
 const HOLD_TIMEOUT: Duration = Duration::from_secs(3);
 /// Most worms.
 const MAX_WORMS: usize = 256;
-
-/// How one worm stands.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct WormView {
-    name: String,
-    mode: Option<String>,
-    fault: Option<String>,
-    /// Alarms that are raised; none where nobody serves the worm's watchers.
-    raised: Option<Vec<RaisedAlarm>>,
-    /// How old what is said here is, ms, by this computer's clock since it came.
-    age_ms: Option<u64>,
-    estimate_age_ms: Option<u64>,
-    driver: Option<String>,
-    range: Option<Json<Range>>,
-    /// What is between here and the worm; none for a worm of this computer.
-    network: Option<Network>,
-    /// Why there is nothing newer.
-    problem: Option<String>,
-}
-
-/// An alarm.
-#[derive(Debug, Clone, Serialize)]
-struct RaisedAlarm {
-    name: &'static str,
-    is_critical: bool,
-    is_acknowledged: bool,
-}
-
-/// What became of the hold of one worm.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct Held {
-    name: String,
-    /// The verdict; `no-answer` where there was none.
-    verdict: String,
-    refusal: Option<String>,
-}
-
-impl Held {
-    /// Whether the worm has answered: then it holds, or has no torque.
-    pub(super) fn is_answered(&self) -> bool {
-        !matches!(self.verdict.as_str(), "no-answer" | "busy")
-    }
-}
 
 enum Order {
     Look(oneshot::Sender<Vec<WormView>>),
@@ -99,6 +56,7 @@ impl FleetThread {
             root: instance.root().to_path_buf(),
             topics_root: topics_root.to_owned(),
             worms: BTreeMap::new(),
+            unreached: Vec::new(),
             looked: None,
             scanned: None,
             holds: Vec::new(),
@@ -146,6 +104,8 @@ struct Fleet {
     /// The same as it is configured, by which controllers are found.
     topics_root: String,
     worms: BTreeMap<String, Watched>,
+    /// Worms of robots elsewhere that are not among them.
+    unreached: Vec<Unreached>,
     looked: Option<Instant>,
     scanned: Option<Instant>,
     holds: Vec<PendingHold>,
@@ -211,6 +171,7 @@ impl Fleet {
         }
         if self.looked.is_none() && self.holds.is_empty() {
             self.worms.clear();
+            self.unreached.clear();
             self.scanned = None;
         }
         true
@@ -244,6 +205,18 @@ impl Fleet {
                 || RoleLock::<Controller>::holder(&watched.instance).is_some()
         });
         self.worms = found;
+        let is_reached = |worm: &str, pid| {
+            let watched = self.worms.get(worm).filter(|watched| watched.connection.is_some());
+            watched.is_some_and(|watched| RoleLock::<Relay>::holder(&watched.instance) == Some(pid))
+        };
+        self.unreached = unreached::find(&self.root, is_reached);
+        // Of what a killed fleet process has left, there is not to be a second entry with older values.
+        let unreached = &self.unreached;
+        self.worms.retain(|name, watched| {
+            let robot = watched.robot();
+            let is_listed = |it: &Unreached| it.name == *name && Some(it.robot.as_str()) == robot;
+            watched.connection.is_some() || !unreached.iter().any(is_listed)
+        });
     }
 
     fn read(&mut self) {
@@ -281,7 +254,7 @@ impl Fleet {
             tell,
             since: Instant::now(),
             waiting: BTreeMap::new(),
-            held: Vec::new(),
+            held: self.unreached.iter().map(Held::not_reached).collect(),
             direct,
             reply,
         };
@@ -325,20 +298,21 @@ impl Fleet {
                 continue;
             }
             for name in hold.waiting.into_keys() {
-                hold.held.push(Held {
-                    refusal: Some(format!("{name} did not answer within {HOLD_TIMEOUT:?}")),
-                    name,
-                    verdict: "no-answer".to_owned(),
-                });
+                let refusal = format!("{name} did not answer within {HOLD_TIMEOUT:?}");
+                hold.held.push(Held::new(&name, "no-answer", Some(refusal)));
             }
-            hold.held.sort_by(|one, other| one.name.cmp(&other.name));
+            hold.held
+                .sort_by(|one, other| (&one.name, &one.robot).cmp(&(&other.name, &other.robot)));
             // Who asked may have gone.
             let _ = hold.reply.send(hold.held);
         }
     }
 
     fn view(&self) -> Vec<WormView> {
-        self.worms.iter().map(|(name, watched)| watched.view(name)).collect()
+        let reached = self.worms.iter().map(|(name, watched)| watched.view(name));
+        reached
+            .chain(self.unreached.iter().map(WormView::not_reached))
+            .collect()
     }
 }
 
@@ -346,11 +320,7 @@ impl PendingHold {
     fn take(&mut self, name: &str, answer: &Answer) {
         if answer.id.is_some() && self.waiting.get(name).copied() == answer.id {
             self.waiting.remove(name);
-            self.held.push(Held {
-                name: name.to_owned(),
-                verdict: answer.verdict.clone(),
-                refusal: answer.refusal.clone(),
-            });
+            self.held.push(Held::new(name, &answer.verdict, answer.refusal.clone()));
         }
     }
 }
@@ -409,61 +379,21 @@ impl Watched {
         }
     }
 
+    /// The robot, where it is a worm of another computer.
+    fn robot(&self) -> Option<&str> {
+        let (frame, _) = self.frame.as_ref()?;
+        frame.network.as_ref().map(|network| network.robot.as_str())
+    }
+
     fn view(&self, name: &str) -> WormView {
-        let mut view = WormView {
-            name: name.to_owned(),
-            mode: None,
-            fault: None,
-            raised: None,
-            age_ms: None,
-            estimate_age_ms: None,
-            driver: None,
-            range: None,
-            network: None,
-            problem: self.problem.clone(),
-        };
+        let mut view = WormView::unknown(name, self.robot(), self.problem.as_deref());
         if let Some((frame, came)) = &self.frame {
-            let more_ms = elapsed_ms(*came);
-            let Ages { state, estimate, .. } = frame.age_ms;
-            let now = |age: Option<u64>| age.map(|ms| ms.saturating_add(more_ms));
-            view.age_ms = now(state);
-            view.estimate_age_ms = now(estimate);
-            if let Some(Json(state)) = &frame.state {
-                view.mode = Mode::try_from(state.mode).ok().map(|mode| mode.name().to_owned());
-                view.fault = Fault::try_from(state.fault).ok().map(|fault| fault.name().to_owned());
-            }
-            let acknowledged_mask = frame.state.as_ref().map_or(0, |Json(state)| state.acknowledged_mask);
-            let raised = frame.raised.iter();
-            view.raised = Some(
-                raised
-                    .filter_map(|Json(alarm)| RaisedAlarm::of(alarm, acknowledged_mask))
-                    .collect(),
-            );
-            view.driver = frame.driver.as_ref().map(|driver| driver.name.clone());
-            view.range = frame.range;
-            view.network.clone_from(&frame.network);
+            view.take_frame(frame, *came);
         } else if let Some((mode, fault, asked)) = self.asked {
-            view.mode = Some(mode.name().to_owned());
-            view.fault = Some(fault.name().to_owned());
-            view.age_ms = Some(elapsed_ms(asked));
+            view.take_answer(mode, fault, asked);
         }
         view
     }
-}
-
-impl RaisedAlarm {
-    fn of(alarm: &Alarm, acknowledged_mask: u32) -> Option<Self> {
-        let kind = AlarmKind::try_from(alarm.kind).ok()?;
-        Some(Self {
-            name: kind.name(),
-            is_critical: alarm.severity == Severity::Critical.code(),
-            is_acknowledged: acknowledged_mask >> kind.code() & 1 == 1,
-        })
-    }
-}
-
-fn elapsed_ms(since: Instant) -> u64 {
-    since.elapsed().as_millis().try_into().unwrap_or(u64::MAX)
 }
 
 /// Makes a worm hold that no relay serves.
@@ -473,11 +403,7 @@ fn hold_directly(name: &str, instance: &Instance, sender: &str) -> Held {
         verdict @ ("accepted" | "no-answer") => verdict,
         _ => "refused",
     };
-    Held {
-        name: name.to_owned(),
-        verdict: verdict.to_owned(),
-        refusal: answer.refusal,
-    }
+    Held::new(name, verdict, answer.refusal)
 }
 
 /// The same from a thread: one that hangs must not hold up the others.

@@ -15,7 +15,8 @@
 //! - [`routes`]: what can be asked for; [`commands`]: the commands among it; [`caller`]: who commands; [`app`]: what answers are made of;
 //!   [`response`]: how they are written.
 //! - [`events`]: the stream of events.
-//! - [`fleet`]: all worms that there are here, and one hold for all of them.
+//! - [`fleet`]: all worms that there are here, and one hold for all of them; [`fleet_view`]: what is said of each; [`unreached`]: those that
+//!   cannot be held from here.
 //! - [`metrics`]: the same for Prometheus.
 //! - [`reports`]: reports of finished runs; [`boxes`]: files of the black box, whose downloads resume by [`byte_range`].
 //! - [`assets`]: the page.
@@ -30,6 +31,7 @@ mod commands;
 mod events;
 mod feed;
 mod fleet;
+mod fleet_view;
 mod listen;
 mod metrics;
 mod paced_stream;
@@ -41,6 +43,7 @@ mod routes;
 mod seat;
 pub(crate) mod server;
 mod token;
+mod unreached;
 
 pub(crate) use listen::listen;
 pub(crate) use token::Token;

@@ -3,7 +3,7 @@
 use crate::topics::Instance;
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use std::io;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
 
@@ -12,6 +12,8 @@ use std::path::PathBuf;
 pub(crate) struct Listener {
     pub(crate) socket: UnixListener,
     path: PathBuf,
+    /// Device and inode of the name.
+    identity: (u64, u64),
 }
 
 impl Listener {
@@ -25,13 +27,24 @@ impl Listener {
         let socket = UnixListener::bind(&path)?;
         std::fs::set_permissions(&path, PermissionsExt::from_mode(0o600))?;
         socket.set_nonblocking(true)?;
-        Ok(Self { socket, path })
+        let metadata = path.symlink_metadata()?;
+        let identity = (metadata.dev(), metadata.ino());
+        Ok(Self { socket, path, identity })
+    }
+
+    /// Whether the name still leads to this socket.
+    pub(crate) fn is_in_place(&self) -> bool {
+        let there = self.path.symlink_metadata();
+        there.is_ok_and(|there| (there.dev(), there.ino()) == self.identity)
     }
 }
 
 impl Drop for Listener {
     fn drop(&mut self) {
-        if let Err(error) = std::fs::remove_file(&self.path) {
+        // Somebody else's may be there by now.
+        if self.is_in_place()
+            && let Err(error) = std::fs::remove_file(&self.path)
+        {
             tracing::debug!("{}: {error}", self.path.display());
         }
     }

@@ -13,6 +13,8 @@ use std::io;
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+#[cfg(any(test, feature = "bridge"))]
+use worm_estimator::config::Topics;
 
 /// Mode of a worm's folder: its user's alone.
 const PRIVATE: u32 = 0o700;
@@ -56,7 +58,7 @@ impl WormFolder {
     /// # Errors
     /// [`InstanceError`] when the folder, or that of all worms, is somebody else's.
     pub(super) fn open(&self) -> Result<OwnedFd, InstanceError> {
-        let root = self.open_root()?;
+        let root = open_root(&self.root)?;
         let unusable = |errno: Errno| InstanceError::Unusable {
             folder: self.path(),
             source: errno.into(),
@@ -90,39 +92,39 @@ impl WormFolder {
         }
         Ok(folder)
     }
+}
 
-    /// Opens the folder of all worms, and makes sure that nobody else can exchange what lies in it.
-    fn open_root(&self) -> Result<OwnedFd, InstanceError> {
-        let unusable = |source| InstanceError::Unusable {
-            folder: self.root.clone(),
-            source,
-        };
-        let root = loop {
-            match open(&self.root, folder_flags() | OFlag::O_PATH, Mode::empty()) {
-                Ok(root) => break root,
-                // Somebody has removed it.
-                Err(Errno::ENOENT) => create_root(&self.root).map_err(unusable)?,
-                Err(errno) => return Err(unusable(errno.into())),
-            }
-        };
-        let status = fstat(&root).map_err(|errno| unusable(errno.into()))?;
-        let user = nix::unistd::geteuid().as_raw();
-        if status.st_uid != user && status.st_uid != 0 {
-            return Err(InstanceError::ForeignRoot {
-                root: self.root.clone(),
-                owner: status.st_uid,
-                user,
-            });
+/// Opens the folder of all worms, and makes sure that nobody else can exchange what lies in it.
+pub(super) fn open_root(root: &Path) -> Result<OwnedFd, InstanceError> {
+    let unusable = |source| InstanceError::Unusable {
+        folder: root.to_path_buf(),
+        source,
+    };
+    let folder = loop {
+        match open(root, folder_flags() | OFlag::O_PATH, Mode::empty()) {
+            Ok(folder) => break folder,
+            // Somebody has removed it.
+            Err(Errno::ENOENT) => create_root(root).map_err(unusable)?,
+            Err(errno) => return Err(unusable(errno.into())),
         }
-        let mode = mode_of(&status);
-        if mode & WRITABLE != 0 && mode & STICKY == 0 {
-            return Err(InstanceError::OpenRoot {
-                root: self.root.clone(),
-                mode: mode & 0o7777,
-            });
-        }
-        Ok(root)
+    };
+    let status = fstat(&folder).map_err(|errno| unusable(errno.into()))?;
+    let user = nix::unistd::geteuid().as_raw();
+    if status.st_uid != user && status.st_uid != 0 {
+        return Err(InstanceError::ForeignRoot {
+            root: root.to_path_buf(),
+            owner: status.st_uid,
+            user,
+        });
     }
+    let mode = mode_of(&status);
+    if mode & WRITABLE != 0 && mode & STICKY == 0 {
+        return Err(InstanceError::OpenRoot {
+            root: root.to_path_buf(),
+            mode: mode & 0o7777,
+        });
+    }
+    Ok(folder)
 }
 
 fn folder_flags() -> OFlag {
@@ -135,7 +137,7 @@ fn mode_of(status: &FileStat) -> u32 {
 
 /// Creates the folder of all worms. Where everybody may create folders, and remove only their own, everybody may do so in it
 /// as well: root's worm must not keep out the worms of the others.
-fn create_root(root: &Path) -> io::Result<()> {
+pub(super) fn create_root(root: &Path) -> io::Result<()> {
     const SHARED: u32 = 0o1002;
     if let Some(parent) = root.parent() {
         DirBuilder::new().recursive(true).mode(0o755).create(parent)?;
@@ -161,6 +163,15 @@ fn create_root(root: &Path) -> io::Result<()> {
 /// whichever of the two folders they are.
 pub(super) fn auto_root(worm: &str) -> PathBuf {
     running_or_first(auto_roots(worm), worm)
+}
+
+/// The folders of all worms that `topics.root` may mean.
+#[cfg(any(test, feature = "bridge"))]
+pub(super) fn all_roots(topics_root: &str) -> Vec<PathBuf> {
+    match topics_root {
+        Topics::AUTO => auto_roots(""),
+        root => vec![PathBuf::from(root)],
+    }
 }
 
 /// The folders that `topics.root = "auto"` may mean, the one for a new worm first.

@@ -90,6 +90,7 @@ mod command;
 mod configuration;
 mod error;
 mod event;
+pub(crate) mod fleet_list;
 mod folder;
 mod hub;
 mod instance;
@@ -97,6 +98,8 @@ mod kernel_locks;
 mod lock;
 mod lock_holder;
 mod open;
+#[cfg(any(test, feature = "bridge"))]
+mod published_list;
 mod publisher;
 mod role;
 mod services;
@@ -109,10 +112,13 @@ pub use command::{AnswerError, CommandClient, CommandError, CommandServer, Respo
 pub(crate) use configuration::{RunningConfiguration, SharedConfiguration};
 pub use error::{InstanceError, PortError};
 pub use event::{Listener, Notifier, NotifyError, WaitError};
+pub use fleet_list::OfferedFrom;
 pub use hub::Hub;
 pub use instance::Instance;
 pub use lock::LockError;
 pub(crate) use lock::LockPlace;
+#[cfg(any(test, feature = "bridge"))]
+pub(crate) use published_list::PublishedList;
 pub use publisher::{PublishError, Publisher};
 pub use role::{
     AlreadyRunning, BlackBox, Controller, Estimator, Recorder, Relay, Role, RoleError, RoleLock, Supervisor, Trip,

@@ -1,5 +1,6 @@
 //! Roles that only one process of a worm can have.
 
+use super::fleet_list::{self, OfferedFrom};
 use super::instance::Instance;
 use super::lock::{LockError, LockFile, LockKind, LockPlace};
 use super::lock_holder;
@@ -66,10 +67,17 @@ pub enum RoleError {
     /// Another process has it.
     #[error(transparent)]
     AlreadyRunning(#[from] AlreadyRunning),
+    /// A fleet process offers the worm of a robot under this name.
+    #[error(transparent)]
+    Offered(#[from] OfferedFrom),
     /// The lock file cannot be used.
     #[error(transparent)]
     Lock(#[from] LockError),
 }
+
+/// The roles that make a worm one of this computer. While a robot's worm is offered under its name, its watchers would drive and hold that
+/// one in its place.
+const OF_LOCAL_WORMS: [&str; 3] = [Controller::NAME, Estimator::NAME, Supervisor::NAME];
 
 /// Proof that this process has the role `R` of a worm; the role is free again when it is dropped or the process ends.
 #[derive(Debug)]
@@ -83,18 +91,26 @@ impl<R: Role> RoleLock<R> {
     /// Takes the role, without waiting for it.
     ///
     /// # Errors
-    /// [`AlreadyRunning`] with the process that has it; [`LockError`] when the lock file cannot be used.
+    /// [`AlreadyRunning`] with the process that has it; [`OfferedFrom`] when the worm would run here, and that of a robot is offered under
+    /// its name; [`LockError`] when the lock file cannot be used.
     pub fn take(instance: &Instance) -> Result<Self, RoleError> {
         let path = instance.lock_path(R::NAME);
         let begun = Instant::now();
         loop {
             if let Some(mut file) = LockFile::try_lock(instance, R::NAME, LockKind::Exclusive)? {
                 file.write(&format!("{}\n", std::process::id()))?;
-                return Ok(Self {
+                let role = Self {
                     file,
                     instance: instance.clone(),
                     _role: PhantomData,
-                });
+                };
+                // The offer looks for this lock after it has been listed: one of the two sees the other.
+                if OF_LOCAL_WORMS.contains(&R::NAME)
+                    && let Some(offered) = fleet_list::offered_at(instance)
+                {
+                    return Err(offered.into());
+                }
+                return Ok(role);
             }
             if let Some(pid) = Self::holder(instance) {
                 return Err(AlreadyRunning {

@@ -2,6 +2,7 @@
 
 use super::instance::Instance;
 use super::lock_holder::has_open;
+use super::role::{Relay, RoleLock};
 use std::fmt;
 use std::fs;
 use std::io;
@@ -126,12 +127,17 @@ fn or_empty<T>(result: io::Result<T>) -> io::Result<Option<T>> {
 /// Whether anything of an earlier life of this worm is there.
 pub(super) fn is_there(instance: &Instance) -> bool {
     ICEORYX_FOLDERS.iter().any(|name| instance.folder().join(name).exists())
-        || instance.relay_socket().exists()
+        || (instance.relay_socket().exists() && !is_served(instance))
         || instance.trip_socket().exists()
         || files(instance).is_ok_and(|files| !files.is_empty())
 }
 
-/// Removes everything of this worm but the locks. Only for one who is sure to be alone.
+/// Whether a process listens at the relay's socket: a fleet process does so for a robot's worm, and has no part in the topics.
+fn is_served(instance: &Instance) -> bool {
+    RoleLock::<Relay>::holder(instance).is_some()
+}
+
+/// Removes everything of this worm but the locks, and the socket of one who serves watchers. Only for one who is sure to be alone.
 pub(super) fn wipe(instance: &Instance) -> io::Result<()> {
     for file in files(instance)? {
         or_empty(fs::remove_file(file))?;
@@ -139,7 +145,9 @@ pub(super) fn wipe(instance: &Instance) -> io::Result<()> {
     for name in ICEORYX_FOLDERS {
         or_empty(fs::remove_dir_all(instance.folder().join(name)))?;
     }
-    or_empty(fs::remove_file(instance.relay_socket()))?;
+    if !is_served(instance) {
+        or_empty(fs::remove_file(instance.relay_socket()))?;
+    }
     or_empty(fs::remove_file(instance.trip_socket()))?;
     Ok(())
 }

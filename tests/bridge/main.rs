@@ -1,5 +1,9 @@
 //! `wormd bridge` and `wormd fleet` from outside: real processes, real certificates, and a network between them that loses and delays.
 
+mod fleet_page;
+#[path = "../dashboard/http.rs"]
+#[allow(dead_code, reason = "of another test binary, without its browser")]
+mod http;
 mod network;
 mod record;
 mod watcher;
@@ -12,6 +16,7 @@ mod worm;
 
 use network::{ROBOT, TwoComputers};
 use serde_json::{Value, json};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -49,9 +54,7 @@ impl<'a> Robot<'a> {
         ] {
             make_keys(files.path(), arguments);
         }
-        let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port is free");
-        let port = free.local_addr().expect("is bound").port();
-        drop(free);
+        let port = free_port();
         let host = if network.is_some() { ROBOT } else { "127.0.0.1" };
         let config = files.path().join("bridge.toml");
         let worm_config = worm.config(WORM_CONFIG);
@@ -78,16 +81,16 @@ impl<'a> Robot<'a> {
 
     /// A laptop with these files, whose worms are in a folder of its own.
     fn laptop(&self, keys: &str, certificate: &str) -> Laptop {
-        self.laptop_with(keys, certificate, &[])
+        self.laptop_with(keys, certificate, "", &[])
     }
 
-    fn laptop_with(&self, keys: &str, certificate: &str, environment: &[(&str, &str)]) -> Laptop {
+    fn laptop_with(&self, keys: &str, certificate: &str, more: &str, environment: &[(&str, &str)]) -> Laptop {
         let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
         let host = if self.network.is_some() { ROBOT } else { "127.0.0.1" };
         let config = self.files.path().join(format!("{keys}-{certificate}.toml"));
         let text = format!(
             "certificate = '{keys}/{certificate}.pem'\nkey = '{keys}/{certificate}.key'\nauthority = 'keys/ca.pem'\nroot = '{}'\n\
-             [[robots]]\nname = 'robot1'\nconnect = 'tls/{host}:{}'\n",
+             [[robots]]\nname = 'robot1'\nconnect = 'tls/{host}:{}'\n{more}",
             root.path().display(),
             self.port
         );
@@ -123,10 +126,23 @@ struct Laptop {
 }
 
 impl Laptop {
+    /// Why it does not hear the robot, as it leaves that for the page about all worms.
+    fn problem(&self) -> Option<String> {
+        let mut entries = std::fs::read_dir(self.root.path()).ok()?.flatten();
+        let list = entries.find(|entry| entry.file_name().as_encoded_bytes().ends_with(b".json"))?;
+        let list: Value = serde_json::from_slice(&std::fs::read(list.path()).ok()?).ok()?;
+        list["robots"]["robot1"]["problem"].as_str().map(str::to_owned)
+    }
+
     fn watch(&self, name: &str) -> Watcher {
         wait_for("the worm is offered", PATIENCE, || self.socket.exists());
         Watcher::connect(&self.socket, name)
     }
+}
+
+fn free_port() -> u16 {
+    let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port is free");
+    free.local_addr().expect("is bound").port()
 }
 
 fn path(path: &Path) -> &str {
@@ -265,6 +281,9 @@ fn strangers_get_nothing() {
     // One who may, so that it is not for want of a network.
     let anna = robot.laptop("keys", "anna");
     anna.watch("anna").hello(PATIENCE);
+    // Connections that say nothing.
+    let connect = |_| TcpStream::connect(("127.0.0.1", robot.port)).expect("the bridge listens");
+    let silent: Vec<_> = (0..200).map(connect).collect();
     // Of another authority, and of the right one but with no rule.
     let strangers = [robot.laptop("foreign", "anna"), robot.laptop("keys", "nobody")];
     // By Zenoh itself, with a certificate that has no rule, and with one that may only watch.
@@ -309,8 +328,11 @@ fn strangers_get_nothing() {
         Some(Mode::Crawling),
         "no stranger's hold has come through"
     );
-    for stranger in &strangers {
+    for (stranger, why) in strangers.iter().zip(["refuses the certificate", "[access]"]) {
         assert!(!stranger.socket.exists());
+        wait_for(why, PATIENCE, || {
+            stranger.problem().is_some_and(|problem| problem.contains(why))
+        });
     }
     // Without any certificate the handshake fails. In TLS 1.3 the server says so only after the
     // client's side of the handshake is done: the client must stay to hear it, and it stays as
@@ -329,6 +351,11 @@ fn strangers_get_nothing() {
     drop(input);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("certificate required"), "{said}");
+    // By now each of the silent ones has waited for longer than Zenoh itself would let it.
+    let begun = Instant::now();
+    robot.laptop("keys", "hall").watch("hall").hello(PATIENCE);
+    assert!(begun.elapsed() < Duration::from_secs(8), "{:?}", begun.elapsed());
+    drop(silent);
 }
 
 /// A peer of Zenoh's own, at the bridge.
@@ -365,7 +392,7 @@ fn a_laptop_whose_clock_is_a_month_off_watches_and_drives() {
             ("FAKETIME", offset),
             ("FAKETIME_DONT_FAKE_MONOTONIC", "1"),
         ];
-        let laptop = robot.laptop_with("keys", "anna", &environment);
+        let laptop = robot.laptop_with("keys", "anna", "", &environment);
         let mut driver = laptop.watch("anna");
         driver.hello(PATIENCE);
         let frame = driver.frame(PATIENCE, |_| true);

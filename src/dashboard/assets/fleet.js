@@ -70,7 +70,9 @@ function fillCard(card, worm, nowMs) {
   card.classList.toggle("stale", isStale);
   card.dataset.worm = worm.name;
   card.setAttribute("aria-label", worm.name);
-  setText(name, worm.network ? `${worm.name} on ${worm.network.robot}` : worm.name);
+  // A robot of which no worm is known stands in the place of its worms.
+  const isWorm = worm.network || worm.name !== worm.robot;
+  setText(name, worm.robot && isWorm ? `${worm.name} on ${worm.robot}` : worm.name);
   const isFault = worm.fault !== null && worm.fault !== "none";
   setText(mode, isFault ? `fault: ${worm.fault}` : (worm.mode ?? "unknown"));
   mode.dataset.mode = isFault ? "fault" : (worm.mode ?? "");
