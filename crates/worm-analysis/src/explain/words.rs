@@ -58,6 +58,7 @@ pub(super) fn sentence(
                     nearest if open_share < 0.01 => format!(
                         "{nearest} comes nearest and leaves no more than any model may be wrong by, but is not sure enough for a name"
                     ),
+                    nearest if open_share >= 1.0 => format!("{nearest} comes nearest and closes nothing of the gap"),
                     nearest => format!(
                         "{nearest} comes nearest and leaves {:.0} % of the gap open",
                         100.0 * open_share

@@ -32,7 +32,7 @@ pub(super) static VISCOUS_DRAG: Effect = Effect {
 /// Positions cannot distinguish it from tips that hold better in one direction.
 pub(super) static CONSTANT_DRAG: Effect = Effect {
     name: "constant-drag",
-    sentence: "A constant force holds the worm back.",
+    sentence: "A constant force holds the worm back, or pushes it.",
     formula: "F = const",
     signature: "all steps and all slopes alike",
     twins: &["directional-friction"],
@@ -59,11 +59,11 @@ pub(super) static CONSTANT_DRAG: Effect = Effect {
 /// Only weight over stiffness shows, unless the stiffness is known from the bench.
 pub(super) static PAYLOAD: Effect = Effect {
     name: "payload",
-    sentence: "The worm is heavier than believed.",
+    sentence: "The worm is heavier, or lighter, than believed.",
     formula: "m = m₀ + Δm",
     signature: "grows with sin λ",
     twins: &[],
-    described_twins: &["softer pads everywhere (only weight over stiffness shows)"],
+    described_twins: &["softer, or stiffer, pads everywhere (only weight over stiffness shows)"],
     separated_by: "weigh",
     scope: Scope::Worm,
     visible: Visible::Positions,

@@ -145,7 +145,7 @@ fn named_effects_are_added_with_their_twins_and_the_file_stays_as_it_was() {
     assert_eq!(
         added,
         "\n# Found by `wormd explain`; these act together.\n\
-         # A constant force holds the worm back. F = const\n\
+         # A constant force holds the worm back, or pushes it. F = const\n\
          # No cell positions can tell it from: directional-friction.\n\
          # What would tell it from its neighbours: cut the tether.\n\
          [[effect]]\nname = \"constant-drag\"\nforce_n = 0.2034 # ± 0.012 N\n\

@@ -25,7 +25,11 @@ impl Finder<'_> {
         }
         if runs_back(phase) {
             let (first, last) = (phase[0], phase[phase.len() - 1]);
-            return Err(if last < first {
+            return Err(if begins_anew(phase) {
+                GaitError::Phase(
+                    "it begins anew with every cycle: count it on, so that the second cycle runs from 1 to 2, or take the column out".to_owned(),
+                )
+            } else if last < first {
                 GaitError::Backward
             } else {
                 GaitError::Phase(
@@ -90,6 +94,13 @@ impl Finder<'_> {
             off_m * 1e3
         )))
     }
+}
+
+/// Whether a recorded phase falls from nearly 1 to nearly 0 at the end of each cycle.
+fn begins_anew(phase: &[f64]) -> bool {
+    let falls = || phase.windows(2).filter(|pair| pair[1] < pair[0] - BACKWARD);
+    let is_of_one_cycle = phase.iter().all(|phase| (0.0..=1.0).contains(phase));
+    is_of_one_cycle && falls().count() > 0 && falls().all(|pair| pair[0] - pair[1] > 0.5)
 }
 
 /// Whether a recorded phase goes back, by more than a clock may be late.

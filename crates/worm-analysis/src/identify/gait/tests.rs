@@ -286,18 +286,23 @@ fn a_phase_that_contradicts_the_positions_is_refused() {
         )
     };
     assert_eq!(of(&|phase| phase).expect("the true phase").step_order, order);
-    let table: [(&str, &dyn Fn(f64) -> f64); 7] = [
-        ("counted in steps", &|phase| 4.0 * phase),
-        ("counted in degrees", &|phase| 360.0 * phase),
-        ("of another gait", &|phase| 0.73 * phase),
-        ("wound up again each cycle", &f64::fract),
-        ("beyond all counting", &|phase| 1e13 + phase),
-        ("no number", &|_| f64::NAN),
-        ("infinite", &|phase| if phase > 3.0 { f64::INFINITY } else { phase }),
+    let table: [(&str, &dyn Fn(f64) -> f64, &str); 7] = [
+        ("counted in steps", &|phase| 4.0 * phase, "counted in cycles"),
+        ("counted in degrees", &|phase| 360.0 * phase, "counted in cycles"),
+        ("of another gait", &|phase| 0.73 * phase, "counted in cycles"),
+        ("wound up again each cycle", &f64::fract, "begins anew"),
+        ("beyond all counting", &|phase| 1e13 + phase, "count whole cycles"),
+        ("no number", &|_| f64::NAN, "count whole cycles"),
+        (
+            "infinite",
+            &|phase| if phase > 3.0 { f64::INFINITY } else { phase },
+            "count whole cycles",
+        ),
     ];
-    for (what, change) in table {
+    for (what, change, words) in table {
         let error = of(change).map(|gait| gait.step_order).expect_err(what);
-        assert!(matches!(error, GaitError::Phase(_)), "{what}: {error}");
+        let is_said = error.to_string().contains(words);
+        assert!(matches!(error, GaitError::Phase(_)) && is_said, "{what}: {error}");
     }
     assert_eq!(
         of(&|phase| -phase).map(|gait| gait.step_order).expect_err("backward"),
