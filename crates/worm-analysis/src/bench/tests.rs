@@ -68,6 +68,22 @@ fn what_is_wrong_is_said_with_place_and_remedy() {
     }
 }
 
+/// An editor counts lines the same way whatever ends them.
+#[test]
+fn a_wrong_line_has_the_same_number_with_either_line_end() {
+    let wrong = swing(COUNT_RAD, 1.0, -3).replace("\n0.5000,0.0", "\n0.5000,x");
+    let commented = wrong.replace("\n0.5000,", "\n# then it stuck\n0.5000,");
+    for (text, said) in [
+        (&wrong, "run.csv: line 102: goal_rad"),
+        (&commented, "run.csv: line 103: goal_rad"),
+    ] {
+        for text in [text.clone(), text.replace('\n', "\r\n")] {
+            let error = read(&text).expect_err(said);
+            assert!(error.starts_with(said), "{error} for {said}");
+        }
+    }
+}
+
 fn campaign(text: &str) -> Result<BenchCampaign, String> {
     BenchCampaign::from_toml(text, Path::new("here/bench.toml")).map_err(|error| error.to_string())
 }
