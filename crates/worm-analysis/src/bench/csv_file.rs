@@ -168,7 +168,8 @@ impl ServoRecording {
                 "record for some seconds",
             ));
         }
-        checks::scale(self)
+        checks::scale(self)?;
+        checks::current_of_both_signs(self)
     }
 }
 
