@@ -3,6 +3,7 @@
 //! # Modules, in reading order
 //! - `plant`: all that the search asks of a servo; `recorded_servo`: its runs with their noise.
 //! - `observed`: a recording as the search sees it; `nuisance`: what is not known exactly; `predict`: the motion that a hypothesis predicts.
+//! - `starts`: where fits start, for there are many minima.
 //! - `discrepancy`: by how much any model of a servo is wrong; `supply`: what the readings of the voltage say of the supply.
 //! - `explain`: the search on a campaign from beginning to end, and `assemble` its answer ([`answer`]).
 //! - `gap`: how far a model is off, stage by stage; `friction_map`: where, by the torque balance over speed and load (`torque_balance`).
@@ -14,6 +15,8 @@ pub mod answer;
 mod assemble;
 mod discrepancy;
 mod explain;
+#[cfg(test)]
+mod fixture;
 mod friction_map;
 mod gap;
 mod laws;
@@ -26,6 +29,7 @@ mod predict;
 mod prediction;
 mod present_current;
 mod recorded_servo;
+mod starts;
 mod supply;
 mod torque_balance;
 
