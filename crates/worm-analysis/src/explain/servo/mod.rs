@@ -6,6 +6,7 @@
 //! - `starts`: where fits start, for there are many minima.
 //! - `discrepancy`: by how much any model of a servo is wrong; `supply`: what the readings of the voltage say of the supply.
 //! - `explain`: the search on a campaign from beginning to end, and `assemble` its answer ([`answer`]).
+//! - `calibration`: the recalibrated values, and which are far from what was stated.
 //! - `gap`: how far a model is off, stage by stage; `friction_map`: where, by the torque balance over speed and load (`torque_balance`).
 //! - `laws`: what a law that nobody listed may depend on.
 //! - `present_current`: what the servo reports as its current.
@@ -13,6 +14,7 @@
 
 pub mod answer;
 mod assemble;
+mod calibration;
 mod discrepancy;
 mod explain;
 #[cfg(test)]
