@@ -19,6 +19,9 @@ const NEARLY_PERIODIC_FRACTION: f64 = 1e-7;
 const MAX_INCREMENTAL_CYCLES: u32 = 1000;
 /// Cycles from rest before the one that is reported for a crawl that never becomes periodic: as many as a recording has.
 pub const CYCLES_BEFORE: u32 = 10;
+/// Periods of a canal that repeats over which a mean is taken at least, and cycles at most.
+const PERIODS: f64 = 3.0;
+const MOST_MEAN_CYCLES: u32 = 100;
 /// Advance, as a fraction of the stroke, up to which the worm counts as standing still: well above rounding.
 const STANDSTILL_FRACTION: f64 = 1e-9;
 
@@ -129,7 +132,9 @@ pub fn steady_cycle(worm: &Worm) -> Outcome {
 /// the crawl goes on until no deformation changes over a cycle by more than 10⁻⁷ strokes, or for 1000 cycles.
 ///
 /// Wear, a tether and a patch in the canal leave no periodic crawl: their figures are those of the cycle that follows
-/// [`CYCLES_BEFORE`] cycles from rest, of a worm whose cells all begin at position 0. For the crawl in reverse use
+/// [`CYCLES_BEFORE`] cycles from rest, of a worm whose cells all begin at position 0. Where a table repeats along the canal, one cycle says
+/// where in the canal it was made, so the figures are the mean of those after these, over whole periods as nearly as whole cycles allow; of
+/// a worm that does not come through a period in a hundred cycles they are those of the one cycle. For the crawl in reverse use
 /// [`Physics::mirrored`].
 ///
 /// A worm that begins to slide down in one of these cycles does so in the [`Outcome`].
@@ -148,6 +153,12 @@ pub(super) fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<(C
     };
     let mut cycles = 0;
     loop {
+        if cycles == max_cycles
+            && let Some(period_m) = physics.period_along_canal_m()
+            && let Some((mean, motion)) = mean_cycle(worm, &motion, cycles, cycle_s, period_m)?
+        {
+            return Ok((mean, motion));
+        }
         let before = motion.clone();
         motion.advance_to(f64::from(cycles + 1), cycle_s)?;
         let closure_m = (0..worm.cells())
@@ -161,6 +172,39 @@ pub(super) fn crawl_until_periodic(physics: &Physics, cycle_s: f64) -> Result<(C
         }
         cycles += 1;
     }
+}
+
+/// The mean of the cycles that take a worm through whole periods of the canal, as nearly as whole cycles do, and the motion at their end;
+/// none where it does not come through one.
+fn mean_cycle(
+    worm: &Worm,
+    start: &Locomotion,
+    cycles_before: u32,
+    cycle_s: f64,
+    period_m: f64,
+) -> Result<Option<(Cycle, Locomotion)>, SlidesDown> {
+    let mut motion = start.clone();
+    let mut best: Option<(f64, u32, Locomotion)> = None;
+    for cycles in 1..=MOST_MEAN_CYCLES {
+        motion.advance_to(f64::from(cycles_before + cycles), cycle_s)?;
+        let periods = (motion.mean_position_m() - start.mean_position_m()).abs() / period_m;
+        // What is too much or too little of a period counts the less the more cycles there are.
+        let off = (periods - periods.round()).abs() / f64::from(cycles);
+        if periods.round() >= 1.0 && best.as_ref().is_none_or(|(least, ..)| off < *least) {
+            best = Some((off, cycles, motion.clone()));
+        }
+        if periods >= PERIODS {
+            break;
+        }
+    }
+    Ok(best.map(|(_, cycles, end)| {
+        let advance_m = (end.mean_position_m() - start.mean_position_m()) / f64::from(cycles);
+        let closure = |cell: usize| (end.deformation_m(cell) - start.deformation_m(cell)).abs();
+        let closure_m = (0..worm.cells()).map(closure).fold(0.0, f64::max);
+        let ledger = end.ledger().since(start.ledger()).mean_of(cycles);
+        let cycle = Cycle::new(worm, advance_m, &ledger, cycles_before, closure_m);
+        (cycle, end)
+    }))
 }
 
 /// Energy that the same worm on rigid contacts would take to cover a distance: n μN L + m g sin λ L, J, with μN = k δmax

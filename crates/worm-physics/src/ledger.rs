@@ -52,6 +52,23 @@ impl Ledger {
         }
     }
 
+    /// The mean of so many cycles that it holds.
+    pub(super) fn mean_of(&self, cycles: u32) -> Self {
+        let part = f64::from(cycles).recip();
+        let of = |all: &[f64; MAX_CELLS]| all.map(|one| part * one);
+        Self {
+            sliding_loss_j: of(&self.sliding_loss_j),
+            forward_slide_m: of(&self.forward_slide_m),
+            backward_slide_m: of(&self.backward_slide_m),
+            weight_work_j: part * self.weight_work_j,
+            resisting_work_j: part * self.resisting_work_j,
+            settling_loss_j: part * self.settling_loss_j,
+            actuator_net_j: part * self.actuator_net_j,
+            actuator_positive_j: part * self.actuator_positive_j,
+            deformation_integral_m: part * self.deformation_integral_m,
+        }
+    }
+
     /// Adds a slide of a tip, m with its sign, and its heat, J.
     pub(super) fn slide(&mut self, cell: usize, slide_m: f64, loss_j: f64) {
         if slide_m > 0.0 {

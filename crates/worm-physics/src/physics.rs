@@ -149,6 +149,11 @@ impl Physics {
         self.laws.are_periodic() && self.tables.are_periodic()
     }
 
+    /// The period with which the canal repeats, m, where nothing else keeps one cycle from being like the next.
+    pub(crate) fn period_along_canal_m(&self) -> Option<f64> {
+        self.tables.period_along_canal_m().filter(|_| self.laws.are_periodic())
+    }
+
     /// The paper's theory and nothing else.
     pub fn of(worm: Worm) -> Self {
         Self {

@@ -19,6 +19,13 @@ const MIN_CHANGES: usize = 30;
 const OVER_S: f64 = 0.2;
 const LAG_S: f64 = 0.02;
 const MIN_MOTION_RAD: f64 = 0.5;
+/// Distance from the goal from which the loop pulls one way, rad; readings that it must pull each way for; and the median current there that is
+/// more than noise, A.
+const PULLED_RAD: f64 = 20.0 * COUNT_RAD;
+const MIN_PULLED: usize = 30;
+const MIN_PULLED_A: f64 = 5e-3;
+/// One in so many of these readings may be negative: a motor that brakes gives current back.
+const NEGATIVE: usize = 10;
 /// Velocity over the slope of the positions that is believed.
 const RATIO: std::ops::RangeInclusive<f64> = 0.6..=1.6;
 
@@ -36,6 +43,32 @@ pub(super) fn signed_current(path: &Path, line: u64, current_ma: f64) -> Result<
         return Err(ReadError::at(path, place, problem, "give the current in mA"));
     }
     Ok(())
+}
+
+/// Refuses a current that stays positive, or nearly so, while the loop pulls both ways, as an ammeter at the supply shows it.
+pub(super) fn current_of_both_signs(recording: &ServoRecording) -> Result<(), ReadError> {
+    let pulled = |sign: f64| -> Vec<f64> {
+        let readings = (1..recording.readings()).filter(|&at| {
+            let to_goal_rad = recording.goal_rad[at - 1] - recording.position_rad[at];
+            recording.torque_enabled[at - 1] && sign * to_goal_rad > PULLED_RAD
+        });
+        readings.map(|at| recording.current_a[at]).collect()
+    };
+    let is_positive = |mut current_a: Vec<f64>| {
+        current_a.sort_by(f64::total_cmp);
+        current_a.len() >= MIN_PULLED
+            && current_a[current_a.len() / NEGATIVE] >= 0.0
+            && current_a[current_a.len() / 2] >= MIN_PULLED_A
+    };
+    if !is_positive(pulled(1.0)) || !is_positive(pulled(-1.0)) {
+        return Ok(());
+    }
+    Err(ReadError::whole(
+        &recording.source,
+        "current_ma is hardly ever negative, and the servo pulled both ways: it has no sign",
+        "give the servo's present current, which has one; an ammeter at the supply shows none, so give its current the sign of goal_rad less \
+         position_rad, and `explain` finds that it is the supply's",
+    ))
 }
 
 /// Refuses positions and velocities that are not those of a servo with 4096 counts in a turn, in rad and rad/s.

@@ -11,6 +11,7 @@
 
 use super::checks;
 use super::recording::ServoRecording;
+use crate::recording::text::Text;
 use csv::StringRecord;
 use std::fs::File;
 use std::io::Read;
@@ -55,10 +56,12 @@ impl ServoRecording {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn read(from: impl Read, path: &Path) -> Result<Self, ReadError> {
+        // It is read in a moment: nobody waits for its progress.
+        let mut progress = |_| ();
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
-            .from_reader(from);
+            .from_reader(Text::new(from, MAX_BYTES, &mut progress));
         let header = reader
             .headers()
             .map_err(|error| ReadError::at(path, "line 1", error.to_string(), REMEDY))?
@@ -78,7 +81,8 @@ impl ServoRecording {
             if !more {
                 break;
             }
-            let line = row.position().map_or(0, csv::Position::line);
+            // The reader stands behind the row; before it there may have been comments.
+            let line = reader.position().line().saturating_sub(1);
             recording.push(&row, line, &needed, &optional)?;
         }
         recording.check()?;
@@ -164,7 +168,8 @@ impl ServoRecording {
                 "record for some seconds",
             ));
         }
-        checks::scale(self)
+        checks::scale(self)?;
+        checks::current_of_both_signs(self)
     }
 }
 

@@ -68,6 +68,53 @@ fn what_is_wrong_is_said_with_place_and_remedy() {
     }
 }
 
+/// The loop of this swing pulls towards 0; a signed current follows, and one that holds an arm on one side may stay positive.
+#[test]
+fn a_current_that_is_never_negative_is_refused_where_the_servo_pulls_both_ways() {
+    let with = |goal: &str, current: &dyn Fn(f64) -> f64| {
+        let swing = swing(COUNT_RAD, 1.0, -3);
+        let rows = swing.lines().skip(1).map(|row| {
+            let mut fields: Vec<String> = row.split(',').map(str::to_owned).collect();
+            let position: f64 = fields[2].parse().expect("a number");
+            fields[1] = goal.to_owned();
+            fields[4] = format!("{:.0}", current(position));
+            fields.join(",")
+        });
+        let rows: Vec<String> = std::iter::once(HEADER.to_owned()).chain(rows).collect();
+        read(&rows.join("\n")).err()
+    };
+    let signed = |position: f64| -400.0 * position;
+    assert_eq!(with("0.0", &signed), None);
+    assert_eq!(
+        with("1.0", &|position| signed(position).abs()),
+        None,
+        "it pulls one way"
+    );
+    assert_eq!(with("0.0", &|_| 0.0), None, "nothing was measured");
+    let error = with("0.0", &|position| signed(position).abs()).expect("without a sign");
+    assert!(
+        error.contains("run.csv: current_ma is hardly ever negative")
+            && error.contains("sign of goal_rad less position_rad"),
+        "{error}"
+    );
+}
+
+/// An editor counts lines the same way whatever ends them.
+#[test]
+fn a_wrong_line_has_the_same_number_with_either_line_end() {
+    let wrong = swing(COUNT_RAD, 1.0, -3).replace("\n0.5000,0.0", "\n0.5000,x");
+    let commented = wrong.replace("\n0.5000,", "\n# then it stuck\n0.5000,");
+    for (text, said) in [
+        (&wrong, "run.csv: line 102: goal_rad"),
+        (&commented, "run.csv: line 103: goal_rad"),
+    ] {
+        for text in [text.clone(), text.replace('\n', "\r\n")] {
+            let error = read(&text).expect_err(said);
+            assert!(error.starts_with(said), "{error} for {said}");
+        }
+    }
+}
+
 fn campaign(text: &str) -> Result<BenchCampaign, String> {
     BenchCampaign::from_toml(text, Path::new("here/bench.toml")).map_err(|error| error.to_string())
 }

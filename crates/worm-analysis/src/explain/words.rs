@@ -81,6 +81,14 @@ pub(super) fn sentence(
 fn not_sure_enough(selected: &Selected) -> String {
     let beyond_none = selected.visible_probability();
     match (selected.candidates.first(), selected.probability.first()) {
+        // Chance decides first: a probability of what chance does would say too much.
+        (Some(candidate), Some(&probability)) if selected.is_within_chance => match probability >= WORTH_A_WORD {
+            true => format!(
+                " Of the library {} comes nearest to what is left, but no nearer than the best of it comes by chance where nothing is missing.",
+                of_library(candidate)
+            ),
+            false => String::new(),
+        },
         (Some(candidate), Some(&probability)) if probability > beyond_none.max(WORTH_A_WORD) => format!(
             " What is left looks like {} (probability {}), which changes nothing that matters.",
             of_library(candidate),

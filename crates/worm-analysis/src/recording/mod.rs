@@ -37,7 +37,7 @@ mod sanity_check;
 mod series;
 mod statistics;
 mod table;
-mod text;
+pub(crate) mod text;
 mod vicon;
 mod write;
 

@@ -7,7 +7,7 @@ const REPORT_EVERY: u64 = 64 * 1024;
 
 /// A reader that drops carriage returns, terminates an unterminated last line, and reports progress. Line numbers are then those
 /// that an editor shows.
-pub(super) struct Text<'a, R> {
+pub(crate) struct Text<'a, R> {
     inner: R,
     total: u64,
     read: u64,
@@ -19,7 +19,7 @@ pub(super) struct Text<'a, R> {
 
 impl<'a, R: Read> Text<'a, R> {
     /// Text of about `total` bytes; `progress` receives the fraction that was read.
-    pub(super) fn new(inner: R, total: u64, progress: &'a mut dyn FnMut(f64)) -> Self {
+    pub(crate) fn new(inner: R, total: u64, progress: &'a mut dyn FnMut(f64)) -> Self {
         Self {
             inner,
             total,

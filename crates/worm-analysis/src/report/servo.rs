@@ -168,7 +168,7 @@ fn sections(answer: &ServoAnswer) -> Vec<Section> {
     });
     sections.push(Section {
         heading: "The recalibrated model",
-        text: "What is only known so well may move within its prior; only what remains then is a gap.".to_owned(),
+        text: recalibration_in_words(answer),
         table: Some(calibration_table(answer)),
     });
     sections.push(Section {
@@ -199,6 +199,12 @@ fn sections(answer: &ServoAnswer) -> Vec<Section> {
         });
     }
     sections
+}
+
+fn recalibration_in_words(answer: &ServoAnswer) -> String {
+    let far = answer.far_off.iter().map(|far| format!(" The {}.", far.description));
+    let what = "What is only known so well may move within its prior; only what remains then is a gap.";
+    std::iter::once(what.to_owned()).chain(far).collect()
 }
 
 fn stage_name(stage: &ServoStage) -> String {
@@ -308,7 +314,12 @@ fn calibration_table(answer: &ServoAnswer) -> Table {
             value.unit.to_owned(),
             significant(value.nominal, 3),
             to_error(value.found, value.sigma),
-            if value.at_limit { "at the limit" } else { "yes" }.to_owned(),
+            match answer.far_off.iter().any(|far| far.name == value.name) {
+                _ if value.at_limit => "at the limit",
+                true => "far from the nominal one",
+                false => "yes",
+            }
+            .to_owned(),
         ]
     };
     Table {

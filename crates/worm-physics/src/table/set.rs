@@ -100,6 +100,21 @@ impl Tables {
         self.iter().all(|(table, _)| !table.axes().any(Axis::is_aperiodic))
     }
 
+    /// The period with which the canal repeats, m, where that is all that keeps one cycle from being like the next: every table that
+    /// depends on the place has it, and none depends on the time.
+    pub(crate) fn period_along_canal_m(&self) -> Option<f64> {
+        let aperiodic = self
+            .iter()
+            .map(|(table, _)| table)
+            .filter(|table| table.axes().any(Axis::is_aperiodic));
+        let mut periods = aperiodic.map(|table| {
+            let repeats = table.axes().next() == Some(Axis::Place) && !table.axes().skip(1).any(Axis::is_aperiodic);
+            table.period().filter(|_| repeats)
+        });
+        let first = periods.next()??;
+        periods.all(|period| period == Some(first)).then_some(first)
+    }
+
     /// Whether some table is a force.
     #[inline]
     pub(crate) fn have_force(&self) -> bool {

@@ -289,7 +289,7 @@ fn refine(problem: &FitProblem<'_, impl Plant>, mut fit: Fit) -> (Fit, f64) {
         ln_width = ln_sum(tried.iter().map(|chi_squared| -0.5 * (chi_squared - tried[best]))) + distance.ln();
         let hypothesis = with_onset(&fit, cycles[best]);
         let next = if distance > GRIDS[GRIDS.len() - 1].0 {
-            problem.fit_roughly(&hypothesis, fit.at.clone(), &fit)
+            problem.fit_roughly(&hypothesis, fit.at.clone(), Some(&fit))
         } else {
             problem.fit(&hypothesis, fit.at.clone(), Some(&fit))
         };

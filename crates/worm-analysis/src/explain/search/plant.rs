@@ -125,6 +125,11 @@ pub(in crate::explain) trait Plant: Recorded {
     fn settle(&mut self, hypothesis: &Hypothesis, at: &[f64]);
     /// Values from which a recalibration may reach another minimum than that at some values.
     fn another_start(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64>;
+    /// Values from which the model is recalibrated besides, wherever the nominal ones are: for residuals with many minima. They lie within the
+    /// limits.
+    fn recalibration_starts(&self, _hypothesis: &Hypothesis) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
     /// Values from which every fit is tried again, about those at which it ended: for residuals with many minima. They lie within the limits.
     fn other_starts(&self, _hypothesis: &Hypothesis, _at: &[f64]) -> Vec<Vec<f64>> {
         Vec::new()

@@ -279,9 +279,9 @@ impl<'p, P: Plant> FitProblem<'p, P> {
         self.fit_by(&TO_THE_END, hypothesis, at, known)
     }
 
-    /// A few steps of a fit with the derivatives that are there: enough to see what it is worth.
-    pub fn fit_roughly(&self, hypothesis: &Hypothesis, at: Vec<f64>, known: &Fit) -> Fit {
-        self.fit_by(&ROUGH, hypothesis, at, Some(known))
+    /// A few steps of a fit with the derivatives that are there, or those at the start: enough to see what it is worth.
+    pub fn fit_roughly(&self, hypothesis: &Hypothesis, at: Vec<f64>, known: Option<&Fit>) -> Fit {
+        self.fit_by(&ROUGH, hypothesis, at, known)
     }
 
     fn fit_by(&self, method: &Method, hypothesis: &Hypothesis, at: Vec<f64>, known: Option<&Fit>) -> Fit {

@@ -9,6 +9,8 @@ use crate::explain::error::ExplainError;
 
 /// Most recalibrations before the last one, which each give the noise of the next and judge what is assumed about the runs.
 const ROUNDS: usize = 3;
+/// Recalibrations that are made to the end, of those that came furthest in a few steps.
+const TO_THE_END: usize = 3;
 
 /// Measures the noise of a plant by its model as recalibrated with that noise. Returns the values of all nuisances.
 ///
@@ -44,11 +46,20 @@ pub(in crate::explain) fn recalibrate<'p, P: Plant>(
     };
     let fit = problem.fit(base, from, None);
     let other = problem.fit(base, plant.another_start(base, &fit.at), None);
-    let mut fit = if other.chi_squared < fit.chi_squared {
-        other
-    } else {
-        fit
-    };
+    let mut rough: Vec<Fit> = plant
+        .recalibration_starts(base)
+        .into_iter()
+        .map(|start| problem.fit_roughly(base, start, None))
+        .collect();
+    rough.sort_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
+    let promising = rough.into_iter().take(TO_THE_END);
+    let mut fit = promising
+        .map(|rough| problem.fit_from(base, rough.at, None))
+        .chain([other])
+        .fold(
+            fit,
+            |best, one| if one.chi_squared < best.chi_squared { one } else { best },
+        );
     problem.compute_jacobian(&mut fit);
     problem.repeating_excess = problem.repeating_excess(&fit);
     (problem, discrepancy, fit)

@@ -71,7 +71,7 @@ pub(in crate::explain) fn refit(
             .map(|(from, start)| (from, [&from.at[..], &start].concat()))
             .chain(about_nominal)
             .map(|(from, at)| {
-                let fit = problem.fit_roughly(&hypothesis, at.clone(), from);
+                let fit = problem.fit_roughly(&hypothesis, at.clone(), Some(from));
                 // Derivatives from elsewhere may lead nowhere from a start that is nearly as good as anything without the effect.
                 if fit.at == at && fit.chi_squared < STUCK * base.chi_squared {
                     return problem.fit(&hypothesis, at, None);

@@ -31,6 +31,8 @@ pub struct ServoAnswer {
     pub next_experiment: Option<NextRun>,
     /// The recalibrated model.
     pub calibration: Vec<Calibrated>,
+    /// What of it is far from the stated value, so that something else that was stated may be wrong.
+    pub far_off: Vec<FarOff>,
     /// The screening of the whole library, most significant first.
     pub screening: Vec<Screened>,
     /// Improvement that the best of the whole library stays below in 99 of a hundred servos without an effect, drawn for this campaign.
@@ -56,6 +58,21 @@ pub struct ServoAnswer {
     /// Series and maps for figures; not part of the JSON.
     #[serde(skip)]
     pub figures: ServoFigures,
+}
+
+/// A recalibrated value that is far from what was stated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FarOff {
+    /// What it is, as in the calibration.
+    pub name: String,
+    /// How far it is off, as a fraction of the stated value; `NaN` where that is 0.
+    pub change: f64,
+    /// The same in standard deviations of its prior.
+    pub prior_sigmas: f64,
+    /// The same in standard errors.
+    pub standard_errors: f64,
+    /// In words, with what to check.
+    pub description: String,
 }
 
 /// Where friction is not the model's: a range of speed and load.

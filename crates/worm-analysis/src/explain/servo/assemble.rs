@@ -1,15 +1,15 @@
 //! The answer on a servo, put together from what was found.
 
 use super::answer::{FrictionRemainder, RunSeries, ServoAnswer, ServoFigures, ServoRun, ServoStage, Supply};
+use super::calibration::{calibration, far_off};
 use super::friction_map::{map, places};
 use super::gap::{Stages, closed, mean_absolute, residual_rad};
 use super::next_experiment::propose;
-use super::nuisance::Nuisance;
 use super::predict::predict;
 use super::present_current::decide;
 use super::recorded_servo::{RecordedServo, ServoProblem};
 use crate::bench::ServoModel;
-use crate::explain::answer::{Calibrated, FoundOnset, NamedEffect, StageKind, Verdict};
+use crate::explain::answer::{FoundOnset, NamedEffect, StageKind, Verdict};
 use crate::explain::assemble::{law_that_outdid, named_effects, screening_of_servo};
 use crate::explain::search::cross_validation::hold_out;
 use crate::explain::search::find::Found;
@@ -135,6 +135,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
     }
     sentence = format!("{sentence} {}", current.sentence);
     let mut model = written(servo, nominal, final_fit);
+    let far_off = far_off(servo, final_fit);
     model.current = current.measures.unwrap_or(nominal.current);
     ServoAnswer {
         plant: "servo-bench",
@@ -151,6 +152,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
             _ => None,
         },
         calibration: calibration(servo, final_fit),
+        far_off: far_off.clone(),
         screening: screening_of_servo(found),
         threshold: found.threshold,
         null_probability: selected.null_probability(),
@@ -163,7 +165,11 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
             ohm: reading.ohm,
             sigma_ohm: reading.sigma_ohm,
         }),
-        warnings: warnings(servo, final_fit, &parts.folds),
+        warnings: far_off
+            .into_iter()
+            .map(|one| one.description)
+            .chain(warnings(servo, final_fit, &parts.folds))
+            .collect(),
         repairs: Vec::new(),
         figures: ServoFigures {
             map_before,
@@ -266,39 +272,6 @@ fn series(servo: &RecordedServo<'_>, recalibrated: &Fit, with_answer: Option<&Fi
         named_rad: with_answer.map_or_else(Vec::new, |fit| predict(observed, &servo.physics(fit)).angle_rad),
     };
     servo.observed.iter().map(of_run).collect()
-}
-
-/// What was recalibrated, as people read it.
-fn calibration(servo: &RecordedServo<'_>, fit: &Fit) -> Vec<Calibrated> {
-    let sigmas = fit.sigmas();
-    let motor = &servo.nominal.motor;
-    let quantities = fit.hypothesis.free.iter().enumerate();
-    let read = |(at, free): (usize, &crate::explain::search::parameter::Free)| {
-        let (value, sigma) = (fit.at[at], sigmas[at]);
-        let factor = |name: &str, nominal: f64, unit: &'static str| {
-            let found = nominal * value.exp();
-            (name.to_owned(), nominal, found, found * sigma, unit)
-        };
-        let plain = |name: &str, nominal: f64, unit: &'static str| (name.to_owned(), nominal, value, sigma, unit);
-        let (name, nominal, found, sigma, unit) = match Nuisance::of(free.what)? {
-            Nuisance::TorqueConstant => factor("torque constant", motor.torque_constant, "N m/A"),
-            Nuisance::Winding => factor("winding and bridge", motor.winding_ohm, "Ω"),
-            Nuisance::Rotor => factor("rotor inertia behind the gears", motor.rotor_inertia_kg_m2, "kg m²"),
-            Nuisance::Dry => plain("dry friction", motor.dry_n_m, "N m"),
-            Nuisance::Viscous => plain("viscous friction", motor.viscous_n_m_s, "N m s/rad"),
-            Nuisance::Zero => plain("zero angle", 0.0, "rad"),
-            Nuisance::Table(_) => return None,
-        };
-        Some(Calibrated {
-            name,
-            nominal,
-            found,
-            sigma,
-            unit,
-            at_limit: fit.would_go_beyond(at),
-        })
-    };
-    quantities.filter_map(read).collect()
 }
 
 /// The model with a fit in it.

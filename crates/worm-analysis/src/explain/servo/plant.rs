@@ -5,7 +5,7 @@ use super::laws::laws;
 use super::nuisance::Nuisance;
 use super::predict::{physics, predict};
 use super::recorded_servo::RecordedServo;
-use super::supply;
+use super::{starts, supply};
 use crate::explain::error::ExplainError;
 use crate::explain::search::fit::{Fit, FitWithout};
 use crate::explain::search::hypothesis::Hypothesis;
@@ -20,13 +20,6 @@ use worm_physics::servo::COUNT_RAD;
 
 /// Residual of a run that the servo could not have made.
 const IMPOSSIBLE: f64 = 1e3;
-/// Starts of a fit: dry friction over the nominal one, factor on the severities, fractions, and whether the other nuisances are nominal.
-const STARTS: [(f64, f64, f64, bool); 4] = [
-    (0.5, 1.0, 0.9, true),
-    (0.3, 0.5, 0.95, false),
-    (1.2, 1.3, 0.4, true),
-    (0.6, 1.0, 0.55, false),
-];
 /// Energy that changes of a run's are relative to at least, J.
 const LEAST_J: f64 = 0.5;
 /// What any model is wrong by from bin to bin, too fast for the discrepancy, as a fraction of the root mean square of the positions.
@@ -183,41 +176,16 @@ impl Plant for RecordedServo<'_> {
 
     fn settle(&mut self, _hypothesis: &Hypothesis, _at: &[f64]) {}
 
-    /// With half of the dry friction and more of the viscous one, an arm that swings does much the same.
     fn another_start(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<f64> {
-        let free = hypothesis.free.iter().zip(at);
-        free.map(|(free, &value)| match Nuisance::of(free.what) {
-            Some(Nuisance::Dry) => 0.5 * value,
-            Some(Nuisance::Viscous) => (2.0 * value).clamp(free.quantity.centre, free.quantity.max),
-            _ => value,
-        })
-        .collect()
+        starts::another(hypothesis, at)
     }
 
-    /// Where an arm comes to rest changes by leaps, so there are many minima: with little and with much dry friction, effects weaker and
-    /// stronger, and pressed gears at either end.
+    fn recalibration_starts(&self, hypothesis: &Hypothesis) -> Vec<Vec<f64>> {
+        starts::of_recalibration(hypothesis, &self.nominal.pendulum)
+    }
+
     fn other_starts(&self, hypothesis: &Hypothesis, at: &[f64]) -> Vec<Vec<f64>> {
-        let start = |&(dry, severity, fraction, is_nominal): &(f64, f64, f64, bool)| -> Vec<f64> {
-            let free = hypothesis.free.iter().zip(at);
-            free.map(|(free, &value)| {
-                let quantity = &free.quantity;
-                let start = match (free.what, Nuisance::of(free.what)) {
-                    (_, Some(Nuisance::Table(_))) => value,
-                    (_, Some(Nuisance::Dry)) => dry * quantity.centre,
-                    (_, Some(_)) if is_nominal => quantity.centre,
-                    (What::Effect { parameter: 0, .. }, _) => quantity.centre + severity * (value - quantity.centre),
-                    (What::Effect { place, parameter }, _)
-                        if hypothesis.hypothesised[place].effect.parameters[parameter].is_fraction() =>
-                    {
-                        fraction
-                    }
-                    _ => value,
-                };
-                start.clamp(quantity.min, quantity.max)
-            })
-            .collect()
-        };
-        STARTS.iter().map(start).collect()
+        starts::others(hypothesis, at, &self.nominal.pendulum)
     }
 
     fn laws(&self, recalibrated: &Fit) -> Vec<Offer> {

@@ -2,7 +2,7 @@
 
 use super::{CYCLE_S, effect, paper};
 use crate::effect::Setting;
-use crate::{ActsOn, Axis, Crawl, Cycle, Mechanics, Physics, Table, steady_cycle_of};
+use crate::{ActsOn, Axis, Crawl, Cycle, Locomotion, Mechanics, Physics, Table, steady_cycle_of};
 
 fn table(acts_on: ActsOn, axis: Axis, grid: &[f64], value: &[f64]) -> Setting {
     let table = Table::new(acts_on, &[(axis, grid.to_vec())], value.to_vec(), None).expect("a table");
@@ -94,6 +94,31 @@ fn a_table_over_place_or_time_gives_the_crawl_of_the_effect_that_it_reproduces()
             assert!(apart_m < 2e-6, "{name}, cell {cell}: {apart_m} m apart");
             assert!((named[cell] - plain[cell]).abs() > 1e-4, "{name} does something");
         }
+    }
+}
+
+/// A friction that repeats along the canal: the steady cycle is the mean over the canal, and not what happens where the tenth cycle ends.
+#[test]
+fn the_cycle_in_a_canal_that_repeats_is_the_mean_over_its_periods() {
+    let [grid, value] = [[0.0, 0.01, 0.02, 0.03], [1.0, 0.6, 1.0, 1.15]];
+    let with_period = |period_m: f64| {
+        let axes = [(Axis::Place, grid.to_vec())];
+        let table = Table::new(ActsOn::FrictionFactor, &axes, value.to_vec(), Some(period_m)).expect("a table");
+        Physics::of(paper(0.0)).with(&[Setting::of_table(table, None, 4).expect("of all cells")])
+    };
+    for period_m in [0.035, 0.041, 0.06] {
+        let physics = with_period(period_m);
+        let outcome = steady_cycle_of(&physics, CYCLE_S);
+        let cycle = outcome.cycle().expect("it holds");
+        let mut motion = Locomotion::at_rest(&physics, &[0.0; 4]).expect("it holds");
+        motion.advance_to(10.0, 10.0 * CYCLE_S).expect("it holds");
+        let begin_m = motion.mean_position_m();
+        motion.advance_to(210.0, 200.0 * CYCLE_S).expect("it holds");
+        let mean_m = (motion.mean_position_m() - begin_m) / 200.0;
+        let off = cycle.advance_m / mean_m - 1.0;
+        assert!(off.abs() < 0.01, "{period_m}: {} m for {mean_m}", cycle.advance_m);
+        let lost = cycle.energy_loss_j / cycle.energy_actuator_net_j - 1.0;
+        assert!(lost.abs() < 0.03, "{period_m}: {cycle:?}");
     }
 }
 

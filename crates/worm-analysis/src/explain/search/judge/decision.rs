@@ -102,6 +102,8 @@ pub(in crate::explain) struct Selected {
     pub candidates: Vec<Candidate>,
     /// Probability of each candidate's class.
     pub probability: Vec<f64>,
+    /// Whether the best of the library comes as near as the first candidate by chance, where there is no effect.
+    pub is_within_chance: bool,
     /// Posterior probability that nothing which matters is missing, and that something else is: of what the search can tell apart.
     pub(super) null_probability: f64,
     pub(super) other_probability: f64,
@@ -229,6 +231,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         verdict,
         candidates: chosen.iter().map(|&at| judged[at].candidate.clone()).collect(),
         probability,
+        is_within_chance: chosen.first().is_some_and(|&at| judged[at].beyond_chance <= 0.0),
         null_probability,
         other_probability,
         change: change(none, &standing),
@@ -253,6 +256,7 @@ mod tests {
     use crate::explain::search::fit::Fit;
     use crate::explain::search::hypothesis::Hypothesis;
     use crate::explain::search::parameter::Hypothesised;
+    use crate::explain::words;
     use crate::explain::worm::plant::hypotheses;
     use crate::least_squares::Estimate;
     use worm_physics::effect::named;
@@ -441,6 +445,25 @@ mod tests {
             assert_eq!(selected.verdict, Verdict::Agrees);
             assert!(selected.null_probability > 0.99);
         }
+    }
+
+    /// A probability that chance reaches would sound sure.
+    #[test]
+    fn what_is_within_chance_is_stated_without_a_probability_and_what_does_not_matter_with_it() {
+        let said = |spoil: &dyn Fn(&mut Judged)| {
+            let mut one = judged(&["pad-creep"], 40.0, 20.0);
+            spoil(&mut one);
+            let selected = verdict(0.0, vec![one]);
+            words::sentence(selected.verdict, &[], &[], &selected, 1.0, None, "cycles")
+        };
+        let small = said(&|one| one.matters = 0.0);
+        assert!(small.contains("looks like pad-creep (probability "), "{small}");
+        let by_chance = said(&|one| one.beyond_chance = -0.1);
+        let (_, of_effect) = by_chance.split_once("pad-creep").expect(&by_chance);
+        assert!(
+            of_effect.contains("by chance") && !of_effect.contains('%'),
+            "{by_chance}"
+        );
     }
 
     #[test]
