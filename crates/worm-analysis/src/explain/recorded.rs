@@ -8,6 +8,7 @@ use super::search::hypothesis::Hypothesis;
 use super::search::law::fit::LawSearch;
 use super::search::plant::{Plant, Recorded};
 use super::search::recalibrate::{measure_noise, recalibrate};
+use super::worm::misstated_slope::misstated;
 use super::worm::prepare::prepare;
 use super::worm::recorded_worm::RecordedWorm;
 use super::worm::speed_droop::speed_droop;
@@ -59,6 +60,14 @@ pub fn explain(
         law: law.flatten(),
     };
     let mut answer = assemble(&problem, config, &parts);
+    if answer.verdict != Verdict::Agrees {
+        let best = parts.found.selected.candidates.first();
+        let best = best.map_or(&parts.recalibrated, |candidate| &candidate.fit);
+        if let Some(suspicion) = misstated(&problem, &parts.recalibrated, best) {
+            answer.sentence += " A slope that is stated wrongly would explain them as well: see the warnings.";
+            answer.warnings.insert(0, suspicion);
+        }
+    }
     answer.warnings.extend(left_out(options));
     Ok(answer)
 }
