@@ -286,7 +286,8 @@ fn a_phase_that_contradicts_the_positions_is_refused() {
         )
     };
     assert_eq!(of(&|phase| phase).expect("the true phase").step_order, order);
-    let table: [(&str, &dyn Fn(f64) -> f64, &str); 7] = [
+    type Change<'c> = &'c dyn Fn(f64) -> f64;
+    let table: [(&str, Change<'_>, &str); 7] = [
         ("counted in steps", &|phase| 4.0 * phase, "counted in cycles"),
         ("counted in degrees", &|phase| 360.0 * phase, "counted in cycles"),
         ("of another gait", &|phase| 0.73 * phase, "counted in cycles"),
