@@ -64,7 +64,7 @@ pub fn explain(
         let best = parts.found.selected.candidates.first();
         let best = best.map_or(&parts.recalibrated, |candidate| &candidate.fit);
         if let Some(suspicion) = misstated(&problem, &parts.recalibrated, best) {
-            answer.sentence += " A slope that is stated wrongly would explain them as well: see the warnings.";
+            answer.sentence += &format!(" But {suspicion}.");
             answer.warnings.insert(0, suspicion);
         }
     }
