@@ -309,7 +309,7 @@ fn clash(instance: &Instance) -> Option<String> {
 /// Why a worm of `robot` cannot be offered while `other` has the place of its relay.
 fn who_has_it(instance: &Instance, robot: &str, other: &AlreadyRunning) -> String {
     let (worm, pid) = (instance.worm(), other.pid);
-    let another = match fleet_list::offered_at(instance) {
+    let another = match fleet_list::offered_by(pid, instance) {
         Some(offered) if offered.robot == robot => {
             return format!("another `wormd fleet` (process {pid}) offers it already: end one of the two");
         }

@@ -6,7 +6,6 @@
 
 use super::instance::Instance;
 use super::lock_holder::has_open;
-use super::role::{Relay, RoleLock};
 use nix::fcntl::OFlag;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -98,9 +97,8 @@ fn read(file: &Path) -> Option<FleetList> {
     serde_json::from_slice(&text).ok()
 }
 
-/// The worm of a robot that a fleet process offers under the name of this instance.
-pub(crate) fn offered_at(instance: &Instance) -> Option<OfferedFrom> {
-    let holder = RoleLock::<Relay>::holder(instance)?;
+/// The worm of a robot that a fleet process offers under the name of this instance, whose watchers process `holder` serves.
+pub(crate) fn offered_by(holder: u32, instance: &Instance) -> Option<OfferedFrom> {
     let mut lists = read_all(instance.root()).into_iter();
     let FoundList { list, .. } = lists.find(|found| found.list.pid == holder && found.is_alive())?;
     let is_offered = |robot: &ListedRobot| robot.worms.get(instance.worm()).is_some_and(Option::is_none);
@@ -115,7 +113,7 @@ pub(crate) fn offered_at(instance: &Instance) -> Option<OfferedFrom> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::topics::{Controller, Hub, PublishedList, Recorder, RoleError};
+    use crate::topics::{Controller, Hub, PublishedList, Recorder, Relay, RoleError, RoleLock};
     use std::os::unix::net::UnixListener;
 
     #[test]
@@ -133,7 +131,11 @@ mod tests {
             worms: BTreeMap::from([("w".to_owned(), Some("it runs here".to_owned()))]),
         };
         list.tell("robot1", standing.clone()).expect("can be written");
-        assert_eq!(offered_at(&instance), None, "that relay is one of this computer");
+        assert_eq!(
+            offered_by(std::process::id(), &instance),
+            None,
+            "that relay is one of this computer"
+        );
         standing.worms.insert("w".to_owned(), None);
         list.tell("robot1", standing).expect("can be written");
 

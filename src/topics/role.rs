@@ -106,7 +106,8 @@ impl<R: Role> RoleLock<R> {
                 };
                 // The offer looks for this lock after it has been listed: one of the two sees the other.
                 if OF_LOCAL_WORMS.contains(&R::NAME)
-                    && let Some(offered) = fleet_list::offered_at(instance)
+                    && let Some(holder) = RoleLock::<Relay>::holder(instance)
+                    && let Some(offered) = fleet_list::offered_by(holder, instance)
                 {
                     return Err(offered.into());
                 }
