@@ -194,7 +194,7 @@ impl RobotLink {
         self.give_up();
         if self.checked.elapsed() >= OFFER_CHECK {
             self.checked = Instant::now();
-            if self.offers.mend() {
+            if self.offers.offer_again() {
                 self.begin_anew();
             }
             self.look_for_reasons();

@@ -158,7 +158,7 @@ impl Offers {
     }
 
     /// Offers once more what another process has removed: nobody could drive or hold it. True where there was such a worm.
-    pub(crate) fn mend(&mut self) -> bool {
+    pub(crate) fn offer_again(&mut self) -> bool {
         let gone = self.iter().filter(|(_, offer)| !offer.is_in_place());
         let gone: Vec<_> = gone.map(|(worm, _)| worm.to_owned()).collect();
         for worm in &gone {
