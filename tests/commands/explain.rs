@@ -44,6 +44,7 @@ fn what_cannot_be_explained_is_named_and_ends_with_status_2() {
         &effect("name = \"unequal-clamping\"\nfriction_factor = 0.7\ncell = 5"),
     );
     let level = ("level.csv", "slope_deg = 0.0");
+    writer.write("copy.csv", &file(&writer.path("level.csv")));
     let written = |name: &str, worm: &str, runs: &[(&str, &str)]| writer.write(name, &campaign(worm, runs));
     let taken = writer.write("taken", "");
     let six = writer.path("six.toml");
@@ -71,6 +72,11 @@ fn what_cannot_be_explained_is_named_and_ends_with_status_2() {
             written("angles.toml", "worm.toml", &[level, ("level.csv", "slope_deg = 3.0")]),
             &[],
             &["angles.toml:8", "contradictory slopes", "0° and with 3°", "once"],
+        ),
+        (
+            written("copies.toml", "worm.toml", &[level, ("copy.csv", "slope_deg = 3.0")]),
+            &[],
+            &["copy.csv: it is a copy of", "level.csv", "once, with its own slope"],
         ),
         (
             written("no-worm.toml", "nobody.toml", &[level]),

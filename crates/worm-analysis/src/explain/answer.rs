@@ -96,6 +96,9 @@ pub struct Doubt {
     pub null_probability: f64,
     /// Probability that something else is missing, alone or beside an effect: the posterior one, less effects that are unlike their laws.
     pub other_probability: f64,
+    /// Probability that nothing is missing and the slopes are stated wrongly; none where no mistake that is usual explains anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub misstated_probability: Option<f64>,
     /// The measured advance of a cycle and that of the model in the answer differ on no run by more than this, m, with a probability
     /// of 95 %.
     pub agrees_within_m: f64,
@@ -113,6 +116,7 @@ impl Default for Doubt {
         Self {
             null_probability: f64::NAN,
             other_probability: f64::NAN,
+            misstated_probability: None,
             agrees_within_m: f64::NAN,
             agrees_within_j: None,
             discrepancy_m: f64::NAN,

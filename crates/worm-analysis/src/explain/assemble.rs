@@ -17,6 +17,7 @@ use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::law::find::FoundLaw;
 use crate::explain::search::parameter::{Free, Onset, What};
+use crate::explain::worm::misstated_slope::in_words;
 use crate::explain::worm::noise::RunNoise;
 use crate::explain::worm::nuisance::Nuisance;
 use crate::explain::worm::period::period;
@@ -35,6 +36,8 @@ const PLACES: usize = 12;
 const ONE_SIDED: f64 = 1.645;
 /// Standard deviation that holds an effect where it was found, in steps of its derivatives.
 const HELD: f64 = 1e-3;
+/// Share of what the best effect improves the fit by from which a wrong slope is worth a word.
+const AS_GOOD: f64 = 0.9;
 /// Improvement from which a motor that droops is named: chance reaches 4 one time in twenty, and there is one such quantity.
 const DROOPS: f64 = 16.0;
 
@@ -136,15 +139,30 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     };
     let runs = runs::runs(worm, parts, named.first());
     let written_back = as_written(problem, of_law.as_ref().map_or(final_fit, |(law, _)| &law.fit));
-    let verdict_in_words = words::sentence(
-        verdict,
-        &effects,
-        &rivals,
-        selected,
-        found.open_share,
-        change.as_ref(),
-        "cycles",
-    );
+    let misstated = found.misstated.as_ref().map(|misstated| in_words(worm, misstated));
+    let suspicion = misstated
+        .as_deref()
+        .and_then(|what| words::suspicion(what, verdict, selected, is_as_good(found)));
+    let verdict_in_words = match &misstated {
+        Some(what) if selected.is_misstated() => words::misstated(what, selected.misstated_probability),
+        _ => {
+            let sentence = words::sentence(
+                verdict,
+                &effects,
+                &rivals,
+                selected,
+                found.open_share,
+                change.as_ref(),
+                "cycles",
+            );
+            let but = suspicion.as_ref().map(|suspicion| format!(" But {suspicion}."));
+            sentence + &but.unwrap_or_default()
+        }
+    };
+    let mut warnings = words::warnings(worm, final_fit, named.first(), config.self_sensing.calibrated.is_some());
+    if let Some(suspicion) = suspicion {
+        warnings.insert(0, suspicion);
+    }
     Answer {
         verdict,
         sentence: verdict_in_words + &words::of_pads(worm, final_fit).unwrap_or_default(),
@@ -162,11 +180,12 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         doubt: Doubt {
             null_probability: selected.null_probability(),
             other_probability: selected.other_probability(),
+            misstated_probability: misstated.is_some().then_some(selected.misstated_probability),
             agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
             agrees_within_j: agrees_within_j(worm, &runs, final_fit, !named.is_empty()),
             discrepancy_m: parts.discrepancy_m,
         },
-        warnings: words::warnings(worm, final_fit, named.first(), config.self_sensing.calibrated.is_some()),
+        warnings,
         repairs: words::repairs(worm),
         runs,
         figures: Figures {
@@ -182,6 +201,19 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
             model_diff: Vec::new(),
         },
     }
+}
+
+/// Whether a mistake in the slopes improves the fit by nearly as much as the best effect: what is left may be no law's.
+fn is_as_good(found: &Found) -> bool {
+    let best = found
+        .selected
+        .candidates
+        .first()
+        .map_or(0.0, |candidate| candidate.improvement);
+    found
+        .misstated
+        .as_ref()
+        .is_some_and(|one| one.improvement >= AS_GOOD * best)
 }
 
 /// The fit of a model file: what it cannot hold keeps the values that every simulation has, and the effects stay as they were found.

@@ -50,6 +50,14 @@ pub enum ExplainError {
         /// Its order.
         expected: Vec<usize>,
     },
+    /// Two runs are one.
+    #[error("{recording}: it is a copy of {first}, sample by sample: list each recording once, with its own slope")]
+    Copy {
+        /// The recording.
+        recording: String,
+        /// The one that it is a copy of.
+        first: String,
+    },
     /// A recording is too short to distinguish scatter from cause.
     #[error(
         "{recording}: {cycles} whole gait cycles after the start, at least {needed} are needed to distinguish scatter from cause: record a longer run"

@@ -8,7 +8,6 @@ use super::search::hypothesis::Hypothesis;
 use super::search::law::fit::LawSearch;
 use super::search::plant::{Plant, Recorded};
 use super::search::recalibrate::{measure_noise, recalibrate};
-use super::worm::misstated_slope::misstated;
 use super::worm::prepare::prepare;
 use super::worm::recorded_worm::RecordedWorm;
 use super::worm::speed_droop::speed_droop;
@@ -33,7 +32,9 @@ pub fn explain(
     let at = measure_noise(&mut worm, &base)?;
     let (problem, discrepancy, recalibrated) = recalibrate(&worm, &base, at, options.discrepancy);
     let found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
-    let law = (found.selected.verdict == Verdict::OutsideLibrary).then(|| {
+    // Under wrong conditions a law would be one of theirs.
+    let is_misstated = found.selected.is_misstated();
+    let law = (found.selected.verdict == Verdict::OutsideLibrary && !is_misstated).then(|| {
         let search = LawSearch {
             problem: &problem,
             discrepancy: &discrepancy,
@@ -60,20 +61,58 @@ pub fn explain(
         law: law.flatten(),
     };
     let mut answer = assemble(&problem, config, &parts);
-    if answer.verdict != Verdict::Agrees {
-        let best = parts.found.selected.candidates.first();
-        let best = best.map_or(&parts.recalibrated, |candidate| &candidate.fit);
-        if let Some(suspicion) = misstated(&problem, &parts.recalibrated, best) {
-            answer.sentence += &format!(" But {suspicion}.");
-            answer.warnings.insert(0, suspicion);
-        }
-    }
+    answer.warnings.extend(another_order(&worm, config));
     answer.warnings.extend(left_out(options));
     Ok(answer)
+}
+
+/// That the cells step in another order than the configured one: a phase that is off by part of a cycle makes that.
+fn another_order(worm: &RecordedWorm<'_>, config: &Config) -> Option<String> {
+    let first = &worm.scene.observed[0];
+    let (seen, configured) = (&first.step_order, config.worm.step_order_from_zero());
+    let from_one = |order: &[usize]| -> Vec<usize> { order.iter().map(|cell| cell + 1).collect() };
+    (first.phase_recorded && *seen != configured).then(|| {
+        format!(
+            "from the beginning of each cycle the cells step in the order {:?}, and worm.step_order is {:?}: is the recorded phase off by part of a \
+             cycle?",
+            from_one(seen),
+            from_one(&configured)
+        )
+    })
 }
 
 /// What the search was not to know, in words.
 pub(super) fn left_out(options: &Options) -> Option<String> {
     let names = options.without.join(", ");
     (!names.is_empty()).then(|| format!("left out of the search: {names}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::fixture::{Campaign, record};
+    use crate::explain::search::find::Evidence;
+
+    #[test]
+    fn a_phase_that_begins_in_another_cell_is_told() {
+        let config = Config::default();
+        let mut recordings = record(&Campaign::default(), None, 3);
+        let said = |recordings: &[crate::recording::Recording]| {
+            let runs: Vec<RecordedRun<'_>> = recordings
+                .iter()
+                .map(|recording| RecordedRun::at_slope(recording, 0.0))
+                .collect();
+            let worm = RecordedWorm::new(prepare(&runs[..1], &config, Evidence::Positions).expect("a worm"));
+            another_order(&worm, &config)
+        };
+        assert_eq!(said(&recordings), None);
+        for phase in recordings[0].gait_phase.iter_mut().flatten() {
+            *phase += 0.3;
+        }
+        let warning = said(&recordings).expect("another order");
+        assert!(
+            warning.contains("[4, 1, 2, 3]") && warning.contains("off by part"),
+            "{warning}"
+        );
+    }
 }

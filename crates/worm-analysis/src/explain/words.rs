@@ -18,6 +18,8 @@ const SURE: f64 = 3.0;
 /// Time of a gait cycle below which the current alone overstates the work, s: at 1.8 s by a fiftieth, at 1.3 s by more.
 const FAST_GAIT_S: f64 = 1.8;
 
+const CHECK_SLOPES: &str = "check slope_deg before you believe anything else";
+
 /// The verdict in a sentence or two; `held_out` is what the effects were judged on that they were not fitted to.
 pub(super) fn sentence(
     verdict: Verdict,
@@ -75,6 +77,27 @@ pub(super) fn sentence(
             )
         }
     }
+}
+
+/// The verdict where slopes that are stated wrongly are more probable than all else.
+pub(super) fn misstated(what: &str, probability: f64) -> String {
+    format!(
+        "Model and data disagree, and no effect of the library explains it as well as {what} (probability {}): {CHECK_SLOPES}.",
+        percent(probability)
+    )
+}
+
+/// That slopes may be stated wrongly, where it is probable enough to say or explains about as much as the best effect.
+pub(super) fn suspicion(what: &str, verdict: Verdict, selected: &Selected, is_as_good: bool) -> Option<String> {
+    let probability = selected.misstated_probability;
+    let is_worth_a_word = verdict != Verdict::Agrees && (is_as_good || probability >= WORTH_A_WORD);
+    is_worth_a_word.then(|| match probability >= WORTH_A_WORD {
+        true => format!(
+            "{what} would explain these data as well (probability {}): {CHECK_SLOPES}",
+            percent(probability)
+        ),
+        false => format!("{what} would explain nearly as much: {CHECK_SLOPES}"),
+    })
 }
 
 /// What was not named though it may well be there, or is there and does not matter, as a further sentence.

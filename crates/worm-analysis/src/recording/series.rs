@@ -90,6 +90,18 @@ impl Recording {
         self.position_m.iter().flatten().any(|at_m| at_m.is_finite())
     }
 
+    /// Whether another holds the same times and positions to the last bit, which no two crawls do.
+    pub fn is_copy_of(&self, other: &Self) -> bool {
+        let same = |one: &[f64], other: &[f64]| {
+            one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.to_bits() == b.to_bits())
+        };
+        let cells = self.position_m.iter().zip(&other.position_m);
+        self.has_positions()
+            && self.cells() == other.cells()
+            && same(&self.time_s, &other.time_s)
+            && cells.into_iter().all(|(one, other)| same(one, other))
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.time_s.len()

@@ -10,6 +10,7 @@ use super::judge::prior;
 use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
 use super::law::find::FittedLaws;
 use super::law::fit::LawSearch;
+use super::misstated::{Misstated, misstated};
 use super::onset::{mean_cycles, with_onsets};
 use super::parameter::Hypothesised;
 use super::plant::Plant;
@@ -79,6 +80,8 @@ pub(in crate::explain) struct Found {
     pub threshold: f64,
     /// Laws that nobody listed, where the plant has them weighed against the library.
     pub laws: Option<FittedLaws>,
+    /// The mistake in what is stated about the recordings that explains most, where one explains something.
+    pub misstated: Option<Misstated>,
 }
 
 /// Searches for the effect that the model of a plant lacks, beside a discrepancy; the recalibrated fit has its derivatives. Reports each
@@ -203,7 +206,16 @@ pub(in crate::explain) fn find<P: Plant>(
     let gain = gains.fold(0.0, f64::max);
     let of_law = laws.as_ref().and_then(|laws| laws.ln_evidence(discrepancy, gain));
     let none = judge.none.with_law(of_law);
-    let mut selected = decide(none, judged, &unfitted);
+    let best = judged.iter().map(|one| one.candidate.improvement).fold(0.0, f64::max);
+    let misstated = misstated(&judge, best);
+    let of_misstated: Vec<f64> = misstated.iter().map(|one| one.ln_weight).collect();
+    let mut selected = decide(none, judged, &unfitted, &of_misstated);
+    // What stands beside it in the answer is judged on the same data.
+    if let Some(wrong) = &mut selected.best_wrong
+        && wrong.held_out.is_none()
+    {
+        wrong.held_out = Some(held_out(problem, &wrong.fit, &folds));
+    }
     for candidate in &mut selected.candidates {
         candidate.fit = plant.with_whole_effects(candidate.fit.clone());
     }
@@ -226,5 +238,6 @@ pub(in crate::explain) fn find<P: Plant>(
         open_share,
         threshold,
         laws,
+        misstated: misstated.into_iter().next(),
     }
 }

@@ -38,6 +38,11 @@ impl Hypothesis {
         self.free.iter().map(|free| free.quantity.centre).collect()
     }
 
+    /// The place of a quantity among the free ones.
+    pub fn place_of(&self, what: What) -> Option<usize> {
+        self.free.iter().position(|free| free.what == what)
+    }
+
     /// Priors and limits of all free quantities.
     pub fn quantities(&self) -> Vec<Quantity> {
         self.free.iter().map(|free| free.quantity).collect()

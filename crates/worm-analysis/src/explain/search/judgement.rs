@@ -8,7 +8,7 @@ use super::held_out::HeldOut;
 use super::judge::candidate::Candidate;
 use super::judge::chance::Chance;
 use super::judge::decision::{Judged, MATTERS};
-use super::judge::evidence::{Evidence, InTime, evidence};
+use super::judge::evidence::{AtValue, Evidence, InTime, evidence};
 use super::judge::prior;
 use super::parameter::{Hypothesised, What};
 use super::plant::Plant;
@@ -67,6 +67,15 @@ impl<P: Plant> Judge<'_, P> {
         at_unit_scale(candidate) - without
     }
 
+    /// The evidence of a fit with derivatives; `of_effect` gives the prior of each quantity that belongs to an effect.
+    pub fn evidence_of(&self, fit: &Fit, of_effect: &dyn Fn(usize) -> Option<AtValue>) -> Evidence {
+        let excess = 0.5 * self.problem.excess_of_repeating(self.recalibrated, fit);
+        let rhythms = self.problem.plant.ln_bayes_of_rhythms(fit);
+        evidence(self.discrepancy, self.in_time, fit, of_effect)
+            .with_rhythm(rhythms)
+            .less(excess)
+    }
+
     /// Computes the evidence of candidates, and sorts them by their odds.
     pub fn weigh(&self, candidates: &mut [Candidate], screened: &[Screening]) {
         let stretch_m = self.problem.plant.stretch_m();
@@ -92,10 +101,7 @@ impl<P: Plant> Judge<'_, P> {
                     .find(|screening| screening.hypothesised.is_same_effect(&hypothesised))?;
                 Some((mine.prior.ln_density(value), mine.prior.width(value)))
             };
-            let found = evidence(self.discrepancy, self.in_time, &candidate.fit, &of_effect);
-            let excess = 0.5 * self.problem.excess_of_repeating(self.recalibrated, &candidate.fit) - candidate.ln_onset;
-            let rhythms = self.problem.plant.ln_bayes_of_rhythms(&candidate.fit);
-            candidate.evidence = Some(found.with_rhythm(rhythms).less(excess));
+            candidate.evidence = Some(self.evidence_of(&candidate.fit, &of_effect).less(-candidate.ln_onset));
         }
         candidates.sort_by(|a, b| self.ln_odds(b).total_cmp(&self.ln_odds(a)));
     }

@@ -12,6 +12,7 @@
 //!   another; `onset`: effects that begin in mid-run.
 //! - `judge`: priors, evidence, chance and the verdict; `judgement`: weighs the candidates by them; `cross_validation`, `held_out`: held-out data,
 //!   which may veto, by `folds`; `squares`: what fraction of a gap is closed there.
+//! - `misstatement`: a mistake in what is stated about the recordings, `misstated`: weighed in place of a missing effect.
 //! - `law`: a law that nobody listed, where no effect of the library explains the data.
 
 pub(in crate::explain) mod bins;
@@ -28,6 +29,8 @@ pub(in crate::explain) mod judge;
 pub(in crate::explain) mod judgement;
 pub(in crate::explain) mod law;
 pub(in crate::explain) mod local_restart;
+pub(in crate::explain) mod misstated;
+pub(in crate::explain) mod misstatement;
 pub(in crate::explain) mod normal_probability;
 pub(in crate::explain) mod onset;
 pub(in crate::explain) mod parameter;

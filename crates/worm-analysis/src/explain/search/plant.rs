@@ -11,6 +11,7 @@ use super::hypothesis::Hypothesis;
 use super::impact::Impact;
 use super::law::fitted_law::FittedLaw;
 use super::law::offer::Offer;
+use super::misstatement::Misstatement;
 use super::parameter::{Free, Hypothesised};
 use crate::explain::error::ExplainError;
 use nalgebra::DMatrix;
@@ -132,6 +133,10 @@ pub(in crate::explain) trait Plant: Recorded {
     }
     /// Values from which every fit is tried again, about those at which it ended: for residuals with many minima. They lie within the limits.
     fn other_starts(&self, _hypothesis: &Hypothesis, _at: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+    /// Mistakes that may have been made in what is stated about the runs, each as hypotheses with these nuisances; none unless the plant says so.
+    fn misstatements(&self, _base: &Hypothesis) -> Vec<Misstatement> {
         Vec::new()
     }
     /// What a law may depend on where the library does not explain the data; nothing unless the plant says so.

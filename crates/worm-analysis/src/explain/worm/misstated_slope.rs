@@ -1,13 +1,10 @@
-//! Slopes that a campaign states wrongly.
-//!
-//! A stated slope is believed within its prior, and to see it as wrong by more is no effect of the worm. Of a slope that is far off, some effect
-//! makes the best, and then it is sure. So the usual mistakes are tried in place of an effect: one run's slope is any, radians or per cent
-//! in place of degrees, the sign, two runs exchanged. What leaves no more than the best effect is told.
+//! Slopes that a campaign states wrongly: one run's slope is any, radians or per cent in place of degrees, the sign, two runs exchanged.
 
 use super::nuisance::Nuisance;
-use super::recorded_worm::WormProblem;
-use crate::explain::search::fit::Fit;
+use super::recorded_worm::RecordedWorm;
 use crate::explain::search::hypothesis::Hypothesis;
+use crate::explain::search::misstated::Misstated;
+use crate::explain::search::misstatement::Misstatement;
 use crate::explain::search::plant::Plant;
 
 /// A free slope: standard deviation and step of derivatives, degrees.
@@ -15,14 +12,10 @@ const FREE_DEG: (f64, f64) = (30.0, 0.1);
 /// Furthest from the level that it may be, and where its fit may begin, degrees apart.
 const STEEPEST_DEG: f64 = 85.0;
 const APART_DEG: f64 = 3.4;
-/// Errors below this are within what `slope-error` is for, degrees; and in standard errors.
+/// Errors below this are within what `slope-error` is for, degrees.
 const LEAST_DEG: f64 = 2.0;
-const LEAST_SIGMAS: f64 = 5.0;
-/// Share of what the best effect improves the fit by that a mistake must reach; and the least improvement.
-const AS_GOOD: f64 = 0.9;
-const LEAST_IMPROVEMENT: f64 = 60.0;
-/// Mistakes that are fitted, of those that look best before.
-const FITTED: usize = 3;
+/// No slope is known better by a crawl, degrees.
+const LEAST_SIGMA_DEG: f64 = 0.1;
 
 /// What was done wrong, of runs counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,37 +49,40 @@ impl Mistake {
     }
 }
 
-/// A mistake that explains what an effect was to explain, in words; none where no mistake does. `best` is the best hypothesis with effects.
-pub(in crate::explain) fn misstated(problem: &WormProblem<'_, '_>, recalibrated: &Fit, best: &Fit) -> Option<String> {
-    let observed = &problem.plant.scene.observed;
-    let stated_deg: Vec<f64> = observed.iter().map(|observed| observed.run.slope_deg).collect();
+/// Slopes of the runs as they are stated, degrees.
+fn stated_deg(worm: &RecordedWorm<'_>) -> Vec<f64> {
+    worm.scene
+        .observed
+        .iter()
+        .map(|observed| observed.run.slope_deg)
+        .collect()
+}
+
+/// Every mistake as a hypothesis with the nuisances of `base`; none of a single run, of which every slope would explain something.
+pub(super) fn misstatements(worm: &RecordedWorm<'_>, base: &Hypothesis) -> Vec<Misstatement> {
+    let stated_deg = stated_deg(worm);
     if stated_deg.len() < 2 {
-        return None;
+        return Vec::new();
     }
-    let base = &recalibrated.hypothesis;
-    let mut starts: Vec<(Mistake, Fit)> = Mistake::all(stated_deg.len())
-        .into_iter()
-        .map(|mistake| {
-            let hypothesis = under(base, mistake, &stated_deg);
-            let at = match mistake {
-                Mistake::OneRun(run) => nearest(problem, &hypothesis, run),
-                _ => hypothesis.neutral(),
-            };
-            (mistake, problem.evaluate(&hypothesis, at))
-        })
-        .filter(|(_, fit)| fit.chi_squared.is_finite())
-        .collect();
-    starts.sort_by(|a, b| a.1.chi_squared.total_cmp(&b.1.chi_squared));
-    starts.truncate(FITTED);
-    let needed = LEAST_IMPROVEMENT.max(AS_GOOD * (recalibrated.chi_squared - best.chi_squared));
-    let (mistake, mut fit) = starts
-        .into_iter()
-        .map(|(mistake, start)| (mistake, problem.fit(&start.hypothesis, start.at, None)))
-        .filter(|(_, fit)| recalibrated.chi_squared - fit.chi_squared >= needed)
-        .min_by(|a, b| a.1.chi_squared.total_cmp(&b.1.chi_squared))?;
-    problem.compute_jacobian(&mut fit);
-    let name = |run: usize| observed[run].run.recording.source.display().to_string();
-    in_words(mistake, &fit, &stated_deg, name)
+    let all = Mistake::all(stated_deg.len()).into_iter().enumerate();
+    all.map(|(what, mistake)| {
+        let hypothesis = under(base, mistake, &stated_deg);
+        let of_one = match mistake {
+            Mistake::OneRun(run) => Some((run, hypothesis.place_of(Nuisance::SlopeOf(run).what()))),
+            _ => None,
+        };
+        let (start, must_differ) = match of_one {
+            Some((run, Some(slope))) => (nearest(worm, &hypothesis, run, slope), Some((slope, LEAST_DEG))),
+            _ => (hypothesis.neutral(), None),
+        };
+        Misstatement {
+            what,
+            hypothesis,
+            start,
+            must_differ,
+        }
+    })
+    .collect()
 }
 
 /// The recalibrated model with the slopes that were meant.
@@ -111,19 +107,15 @@ fn under(base: &Hypothesis, mistake: Mistake, stated_deg: &[f64]) -> Hypothesis 
 }
 
 /// The nominal values but for a run's slope, which is what comes nearest to this run.
-fn nearest(problem: &WormProblem<'_, '_>, hypothesis: &Hypothesis, run: usize) -> Vec<f64> {
+fn nearest(worm: &RecordedWorm<'_>, hypothesis: &Hypothesis, run: usize, slope: usize) -> Vec<f64> {
     let neutral = hypothesis.neutral();
-    let slope = Nuisance::SlopeOf(run).what();
-    let Some(at) = hypothesis.free.iter().position(|free| free.what == slope) else {
-        return neutral;
-    };
-    let quantity = &hypothesis.free[at].quantity;
+    let quantity = &hypothesis.free[slope].quantity;
     let trials = ((quantity.max - quantity.min) / APART_DEG) as usize;
     (0..=trials)
         .map(|trial| {
             let mut values = neutral.clone();
-            values[at] = quantity.min + APART_DEG * trial as f64;
-            let residuals = problem.plant.predict(run, hypothesis, &values).residuals;
+            values[slope] = quantity.min + APART_DEG * trial as f64;
+            let residuals = worm.predict(run, hypothesis, &values).residuals;
             (
                 residuals.iter().map(|residual| residual * residual).sum::<f64>(),
                 values,
@@ -134,39 +126,40 @@ fn nearest(problem: &WormProblem<'_, '_>, hypothesis: &Hypothesis, run: usize) -
         .map_or(neutral, |(_, values)| values)
 }
 
-fn in_words(mistake: Mistake, fit: &Fit, stated_deg: &[f64], name: impl Fn(usize) -> String) -> Option<String> {
-    let as_well = "would explain these data as well: check slope_deg before you believe anything else";
-    Some(match mistake {
+/// What was meant, in words.
+pub(in crate::explain) fn in_words(worm: &RecordedWorm<'_>, misstated: &Misstated) -> String {
+    let stated_deg = stated_deg(worm);
+    let name = |run: usize| worm.scene.observed[run].run.recording.source.display().to_string();
+    let fit = &misstated.fit;
+    match Mistake::all(stated_deg.len())[misstated.what] {
         Mistake::OneRun(run) => {
-            let slope = Nuisance::SlopeOf(run).what();
-            let at = fit.hypothesis.free.iter().position(|free| free.what == slope)?;
-            let (off_deg, sigma_deg) = (fit.at[at], fit.sigmas()[at]);
-            if off_deg.abs() < LEAST_DEG.max(LEAST_SIGMAS * sigma_deg) {
-                return None;
-            }
+            let slope = fit.hypothesis.place_of(Nuisance::SlopeOf(run).what());
+            let (off_deg, sigma_deg) = slope.map_or((f64::NAN, f64::NAN), |slope| (fit.at[slope], fit.sigmas()[slope]));
             format!(
-                "a slope of {:.1} ± {:.1}° of {}, in place of the {}° that are stated, {as_well}",
+                "a slope of {:.1} ± {:.1}° of {}, in place of the {}° that are stated",
                 stated_deg[run] + off_deg,
-                sigma_deg.max(0.1),
+                sigma_deg.max(LEAST_SIGMA_DEG),
                 name(run),
                 stated_deg[run]
             )
         }
-        Mistake::Radians => format!("slopes in radians {as_well}"),
-        Mistake::PerCent => format!("slopes in per cent {as_well}"),
-        Mistake::Sign => format!("slopes of the other sign {as_well}"),
-        Mistake::Exchanged(one, other) => {
-            format!("the slopes of {} and {} exchanged {as_well}", name(one), name(other))
-        }
-    })
+        Mistake::Radians => "slopes that are stated in radians".to_owned(),
+        Mistake::PerCent => "slopes that are stated in per cent".to_owned(),
+        Mistake::Sign => "slopes of the other sign".to_owned(),
+        Mistake::Exchanged(one, other) => format!("the slopes of {} and {} exchanged", name(one), name(other)),
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::misstated;
+    use super::in_words;
     use crate::explain::fixture::{Campaign, Truth, record};
     use crate::explain::search::find::Evidence;
     use crate::explain::search::hypothesis::Hypothesis;
+    use crate::explain::search::judge::evidence::evidence;
+    use crate::explain::search::judge::prior;
+    use crate::explain::search::judgement::Judge;
+    use crate::explain::search::misstated::misstated;
     use crate::explain::search::parameter::Hypothesised;
     use crate::explain::search::plant::Plant;
     use crate::explain::search::recalibrate::{measure_noise, recalibrate};
@@ -176,8 +169,9 @@ mod tests {
     use worm_estimator::config::Config;
     use worm_physics::effect::named;
 
-    /// What is said of a campaign that states other slopes than it has, beside the right effect where there is one.
-    fn said(truth_deg: &[f64], stated_deg: &[f64], effect: Truth<'_>) -> Option<String> {
+    /// What is most probably misstated in a campaign that states other slopes than it has, in words, and by how many nats that explains the
+    /// data better than nothing and than the right effect; none where no mistake explains anything.
+    fn found(truth_deg: &[f64], stated_deg: &[f64], effect: Truth<'_>) -> Option<(String, f64, f64)> {
         let campaign = Campaign {
             slopes_deg: truth_deg.to_vec(),
             ..Campaign::default()
@@ -191,20 +185,42 @@ mod tests {
         let mut worm = RecordedWorm::new(scene);
         let base = Hypothesis::new(&worm.nuisances(), &[]);
         let at = measure_noise(&mut worm, &base).expect("a worm");
-        let (problem, _, recalibrated) = recalibrate(&worm, &base, at, Options::default().discrepancy);
+        let (problem, discrepancy, recalibrated) = recalibrate(&worm, &base, at, Options::default().discrepancy);
+        let judge = Judge {
+            problem: &problem,
+            discrepancy: &discrepancy,
+            in_time: None,
+            recalibrated: &recalibrated,
+            none: evidence(&discrepancy, None, &recalibrated, &|_| None),
+            campaign: prior::Campaign {
+                channels: 4,
+                runs: truth_deg.len(),
+                cycles: 10.0,
+                families: 20.0,
+            },
+            limit: 0.02,
+            expected_impact: 0.06,
+        };
         let best = effect.map(|(name, cell, values)| {
             let effect = named(name).expect("of the library");
             let hypothesis = Hypothesis::new(&worm.nuisances(), &[Hypothesised::throughout(effect, cell)]);
             let mut at = hypothesis.neutral();
             let first = at.len() - values.len();
             at[first..].copy_from_slice(values);
-            problem.fit(&hypothesis, at, None)
+            problem.with_derivatives(&hypothesis, problem.fit(&hypothesis, at, None).at)
         });
-        misstated(&problem, &recalibrated, best.as_ref().unwrap_or(&recalibrated))
+        let all = misstated(&judge, f64::INFINITY);
+        let first = all.first()?;
+        let of_effect = best.map_or(f64::NAN, |best| judge.evidence_of(&best, &|_| None).usual);
+        Some((
+            in_words(&worm, first),
+            first.ln_weight - judge.none.usual,
+            first.ln_weight - of_effect,
+        ))
     }
 
     #[test]
-    fn a_wrong_slope_is_suspected_and_a_right_one_is_not() {
+    fn a_wrong_slope_explains_the_data_and_none_does_so_in_place_of_an_effect() {
         let per_cent = |slope_deg: f64| 100.0 * slope_deg.to_radians().tan();
         for (truth_deg, stated_deg, words) in [
             (
@@ -217,13 +233,19 @@ mod tests {
             ([0.0, 30.0, 20.0], [0.0, 24.0, 20.0], "a slope of 30."),
             ([0.0, 20.0, 35.0], [20.0, 0.0, 35.0], "exchanged"),
         ] {
-            let said = said(&truth_deg, &stated_deg, None);
-            assert!(
-                said.as_ref().is_some_and(|text| text.contains(words)),
-                "{words}: {said:?}"
-            );
+            let found = found(&truth_deg, &stated_deg, None);
+            let Some((said, beyond_none, _)) = &found else {
+                panic!("{words}: nothing found");
+            };
+            assert!(said.contains(words) && *beyond_none > 20.0, "{words}: {found:?}");
         }
         let clamped = Some(("unequal-clamping", Some(1), &[0.7][..]));
-        assert_eq!(said(&[0.0, 20.0, 35.0], &[0.0, 20.0, 35.0], clamped), None);
+        let found = found(&[0.0, 20.0, 35.0], &[0.0, 20.0, 35.0], clamped);
+        assert!(
+            found
+                .as_ref()
+                .is_none_or(|(_, _, beyond_effect)| *beyond_effect < -10.0),
+            "{found:?}"
+        );
     }
 }

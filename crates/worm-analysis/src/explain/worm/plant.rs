@@ -5,6 +5,7 @@ use super::gap::closed;
 use super::gears;
 use super::laws::laws;
 use super::matters::impact;
+use super::misstated_slope;
 use super::noise::RunNoise;
 use super::nuisance::Nuisance;
 use super::observed::Observed;
@@ -21,6 +22,7 @@ use crate::explain::search::fit::{Fit, FitWithout};
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::impact::Impact;
 use crate::explain::search::law::offer::Offer;
+use crate::explain::search::misstatement::Misstatement;
 use crate::explain::search::parameter::{Free, Hypothesised};
 use crate::explain::search::plant::{Plant, PredictedRun, Recorded};
 use worm_physics::Physics;
@@ -80,6 +82,10 @@ impl Plant for RecordedWorm<'_> {
         let without_twins = self.counts_current();
         all.iter_mut().for_each(|one| one.without_twins = without_twins);
         all
+    }
+
+    fn misstatements(&self, base: &Hypothesis) -> Vec<Misstatement> {
+        misstated_slope::misstatements(self, base)
     }
 
     /// The stretch of canal where tips have been, or may have been where nobody saw them.

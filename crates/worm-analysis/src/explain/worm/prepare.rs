@@ -34,7 +34,16 @@ pub(in crate::explain) fn prepare<'a>(
         observed: Vec::with_capacity(runs.len()),
         nominal: Vec::with_capacity(runs.len()),
     };
-    for run in runs {
+    for (number, run) in runs.iter().enumerate() {
+        if let Some(same) = runs[..number]
+            .iter()
+            .find(|before| run.recording.is_copy_of(before.recording))
+        {
+            return Err(ExplainError::Copy {
+                recording: run.recording.source.display().to_string(),
+                first: same.recording.source.display().to_string(),
+            });
+        }
         let mut observed = observe(*run, config, evidence)?;
         if let Some(first) = scene.observed.first() {
             same_order(first, &observed)?;

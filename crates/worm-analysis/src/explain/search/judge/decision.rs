@@ -1,7 +1,7 @@
 //! The posterior, and the verdict: agrees, explained, ambiguous, or outside the library.
 //!
 //! # The rules, in their order
-//! 1. Every hypothesis gets its posterior probability: none, each effect, each pair, and something else, which is a large discrepancy
+//! 1. Every hypothesis gets its posterior probability: none, each effect, each pair, conditions that are stated wrongly, and something else, which is a large discrepancy
 //!    alone or beside an effect or a pair, or looks exactly like one. Effects that were not fitted to the end count by their screening.
 //!    What the best effects have in common (the same effect of another cell, exact twins) is one class.
 //! 2. An effect that changes neither outcome nor energy nor positions by what matters counts as none; where no other comes into
@@ -107,12 +107,21 @@ pub(in crate::explain) struct Selected {
     /// Posterior probability that nothing which matters is missing, and that something else is: of what the search can tell apart.
     pub(super) null_probability: f64,
     pub(super) other_probability: f64,
+    /// Posterior probability that nothing is missing, and that the conditions of the recordings are stated wrongly.
+    pub misstated_probability: f64,
     /// What changes in mid-run, where that is the most probable part of something else.
     pub change: Option<Change>,
-    /// The best effect of another kind that is no candidate.
+    /// The best effect of another kind than what is named; where nothing is, the nearest.
     pub best_wrong: Option<Candidate>,
     /// Every effect and pair that was fitted.
     pub all: Vec<Candidate>,
+}
+
+impl Selected {
+    /// Whether it is more probable than everything else together that the conditions of the recordings are stated wrongly.
+    pub fn is_misstated(&self) -> bool {
+        self.misstated_probability > 0.5
+    }
 }
 
 /// A class: hypotheses that are alike up to twins and cells.
@@ -122,8 +131,8 @@ struct Class {
 }
 
 /// Reaches the verdict. `none` is the evidence without effects, `unfitted` the logarithm of the weights of effects that were only
-/// screened.
-pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: &[f64]) -> Selected {
+/// screened, `misstated` those of conditions that are stated wrongly.
+pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: &[f64], misstated: &[f64]) -> Selected {
     let singles = judged.iter().filter(|one| !one.is_pair());
     let best_single = singles.max_by(|a, b| a.ln_weight().total_cmp(&b.ln_weight()));
     // An effect whose law is a little wrong is no reason for another law.
@@ -179,6 +188,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         .iter()
         .map(|class| class.ln_weight)
         .chain(unfitted.iter().copied())
+        .chain(misstated.iter().copied())
         .chain([ln_none, ln_other])
         .collect();
     let whole = ln_sum(all.iter().copied());
@@ -194,19 +204,22 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     let (named, unnamed): (Vec<&Class>, Vec<&Class>) =
         classes.iter().partition(|class| may_be_named(&judged[class.best]));
     let other_probability = probability(ln_other) + unnamed.into_iter().map(that_counts).sum::<f64>();
+    let misstated_probability = probability(ln_sum(misstated.iter().copied()));
     let mut count = 0;
     let mut sum = 0.0;
     while sum < SURE && count < named.len() && that_counts(named[count]) > RIVAL {
         sum += that_counts(named[count]);
         count += 1;
     }
+    // No name is right where the conditions are wrong, either.
+    let wrong = other_probability + misstated_probability;
     let verdict = match count {
         1 if sum >= SURE => Verdict::Explained,
         2.. if sum >= SURE => Verdict::Ambiguous,
         // Something is there, and more probably this than what the library does not know, or what does not matter.
-        1 if nothing <= 1.0 - SURE && sum > other_probability.max(unimportant) => Verdict::Ambiguous,
-        2.. if null_probability <= 1.0 - SURE && sum > other_probability => Verdict::Ambiguous,
-        _ if other_probability > null_probability => Verdict::OutsideLibrary,
+        1 if nothing <= 1.0 - SURE && sum > wrong.max(unimportant) => Verdict::Ambiguous,
+        2.. if null_probability <= 1.0 - SURE && sum > wrong => Verdict::Ambiguous,
+        _ if wrong > null_probability => Verdict::OutsideLibrary,
         _ => Verdict::Agrees,
     };
     let is_named = matches!(verdict, Verdict::Explained | Verdict::Ambiguous);
@@ -225,7 +238,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
     let probability = chosen.iter().map(of_class).collect();
     let best_wrong = classes
         .iter()
-        .find(|class| !chosen.contains(&class.best))
+        .find(|class| !is_named || !chosen.contains(&class.best))
         .map(|class| judged[class.best].candidate.clone());
     Selected {
         verdict,
@@ -234,6 +247,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         is_within_chance: chosen.first().is_some_and(|&at| judged[at].beyond_chance <= 0.0),
         null_probability,
         other_probability,
+        misstated_probability,
         change: change(none, &standing),
         best_wrong,
         all: judged.into_iter().map(|one| one.candidate).collect(),

@@ -1,6 +1,6 @@
 //! The mean cycle of each run, measured and by each model.
 
-use super::super::view::{cells, mm, named_model};
+use super::super::view::{best_model, cells, mm};
 use super::map::steps;
 use crate::explain::Answer;
 use crate::explain::answer::{CycleSeries, ResidualMap};
@@ -41,7 +41,7 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     ];
     let is_named = cycles.iter().any(|run| !run.named_m.is_empty());
     if is_named {
-        keys.push(Key::new(Mark::Line, ACCENT, named_model(answer)));
+        keys.push(Key::new(Mark::Line, ACCENT, best_model(answer)));
     }
     Ok(Figure {
         id: "cycle",

@@ -1,6 +1,6 @@
 //! Where model and data disagree: a map for each run, cell by phase, before and after.
 
-use super::super::view::{cells, named_model};
+use super::super::view::{best_model, cells};
 use crate::explain::Answer;
 use crate::explain::answer::ResidualMap;
 use crate::report::page::{Figure, Key, Mark, Panel};
@@ -29,9 +29,10 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
     let names = names_by_slope(figures.maps_before.iter().map(|map| map.slope_deg));
     let mut panels = Vec::new();
     for (number, (name, before)) in names.into_iter().zip(&figures.maps_before).enumerate() {
-        let after = figures.maps_after.get(number);
+        let model = best_model(answer);
+        let after = figures.maps_after.get(number).map(|map| (map, &model[..]));
         let quantity = match after {
-            Some(_) => format!("above: recalibrated; below: {}", named_model(answer)),
+            Some(_) => format!("above: recalibrated; below: {model}"),
             None => "recalibrated model".to_owned(),
         };
         let svg = picture(&name, before, after, largest_m, &colours)?;
@@ -63,11 +64,11 @@ fn keys(largest_m: f64) -> Vec<Key> {
 fn picture(
     name: &str,
     before: &ResidualMap,
-    after: Option<&ResidualMap>,
+    after: Option<(&ResidualMap, &str)>,
     largest_m: f64,
     colours: &[Colour],
 ) -> Result<Svg, DrawError> {
-    let maps: Vec<&ResidualMap> = std::iter::once(before).chain(after).collect();
+    let maps: Vec<&ResidualMap> = std::iter::once(before).chain(after.map(|(map, _)| map)).collect();
     let cells = maps.iter().map(|map| map.residual_m.len()).max().unwrap_or(0).max(1);
     let height = (ROW * cells as f64).max(MIN_HEIGHT);
     let row = |label: &str| Row {
@@ -176,14 +177,12 @@ fn edges(middles: &[f64]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-fn description(name: &str, before: &ResidualMap, after: Option<&ResidualMap>) -> String {
+fn description(name: &str, before: &ResidualMap, after: Option<(&ResidualMap, &str)>) -> String {
     let standing_out = |map: &ResidualMap| {
         let sigmas = map.significance.iter().flatten();
         count(sigmas.filter(|sigma| sigma.abs() >= SIGNIFICANT).count(), "bin")
     };
-    let after = after.map_or_else(String::new, |map| {
-        format!(", with the named model {}", standing_out(map))
-    });
+    let after = after.map_or_else(String::new, |(map, model)| format!(", {model} {}", standing_out(map)));
     format!(
         "Map of the residual by cell and gait phase at {name}: with the recalibrated model {} beyond {SIGNIFICANT} standard errors{after}",
         standing_out(before)
@@ -192,9 +191,12 @@ fn description(name: &str, before: &ResidualMap, after: Option<&ResidualMap>) ->
 
 fn caption(answer: &Answer) -> String {
     let after = if answer.figures.maps_after.is_empty() {
-        " There is no map below, for no effect is named."
+        " There is no map below, for no effect is named.".to_owned()
     } else {
-        " Below, on the same scale, what the named model leaves: the paler and the less marked, the better it explains the data."
+        format!(
+            " Below, on the same scale, what the model leaves {}: the paler and the less marked, the better it explains the data.",
+            best_model(answer)
+        )
     };
     format!(
         "How much further each cell moves than the model predicts in a part of the gait cycle, mean over the cycles. Columns are \

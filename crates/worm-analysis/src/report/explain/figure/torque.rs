@@ -1,6 +1,6 @@
 //! The mean torque on the cam in each run, by the motor's current and as each model has the current show it.
 
-use super::super::view::{cells, named_model};
+use super::super::view::{best_model, cells};
 use super::cycle::shade_steps;
 use crate::explain::Answer;
 use crate::explain::answer::{ResidualMap, TorqueSeries};
@@ -34,7 +34,7 @@ pub(super) fn figure(answer: &Answer) -> Result<Figure, DrawError> {
         Key::new(Mark::Line, SHADE, "recalibrated model"),
     ];
     if runs.iter().any(|run| !run.named_n_m.is_empty()) {
-        keys.push(Key::new(Mark::Line, ACCENT, named_model(answer)));
+        keys.push(Key::new(Mark::Line, ACCENT, best_model(answer)));
     }
     Ok(Figure {
         id: "torque",

@@ -150,10 +150,13 @@ pub(super) fn names<'a>(effects: impl IntoIterator<Item = &'a NamedEffect>) -> S
     in_words(&effects.into_iter().map(NamedEffect::in_words).collect::<Vec<_>>())
 }
 
-/// The model with the named effects in it, in words; that of the best candidate where there are several.
-pub(in crate::report::explain) fn named_model(answer: &Answer) -> String {
+/// The model with the named effects in it, in words; that of the best candidate where there are several, of the nearest where none is named.
+pub(in crate::report::explain) fn best_model(answer: &Answer) -> String {
     match &answer.effects[..] {
-        [] => "the named model".to_owned(),
+        [] => {
+            let nearest = stage_of(answer, StageKind::BestWrong).and_then(|stage| stage.effect.as_deref());
+            format!("with the nearest effect, {}", nearest.unwrap_or("none"))
+        }
         effects => format!("with {}", names(effects)),
     }
 }

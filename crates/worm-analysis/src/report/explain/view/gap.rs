@@ -33,6 +33,10 @@ pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &St
         (_, 2..) => ("with the named effects", "the model with the effects named"),
         _ => ("with the named effect", "the model with the effect named"),
     };
+    let wrong = match answer.effects.is_empty() {
+        true => ("nearest effect", "the effect that comes nearest, which is not named"),
+        false => ("best rival", "the best effect of another kind"),
+    };
     let all = [
         stage_view(StageKind::Baseline, "nominal model", "the model as configured"),
         stage_view(
@@ -40,7 +44,7 @@ pub(in crate::report::explain) fn stages(answer: &Answer) -> Vec<(StageView, &St
             "recalibrated model",
             "its known quantities adjusted within their priors; what it leaves is the gap that counts",
         ),
-        stage_view(StageKind::BestWrong, "best rival", "the best effect of another kind"),
+        stage_view(StageKind::BestWrong, wrong.0, wrong.1),
         stage_view(StageKind::Named, named.0, named.1),
         stage_view(
             StageKind::Law,

@@ -13,7 +13,7 @@ mod verdict;
 
 pub(super) use distance::Distance;
 pub(in crate::report) use effects::outcome;
-pub(super) use effects::{best_of_each, is_tried, named_model, reached};
+pub(super) use effects::{best_model, best_of_each, is_tried, reached};
 pub(super) use gap::{StageView, stage_of, stages};
 pub(super) use quantity::{cells, mm};
 

@@ -37,7 +37,7 @@ pub(super) fn blocks(answer: &Answer) -> Vec<Block> {
 /// The largest disagreement in words.
 fn largest(answer: &Answer) -> String {
     let Some(first) = answer.r#where.first() else {
-        return "No place is listed where the recalibrated model and the data disagree by more than chance.".to_owned();
+        return no_place(answer);
     };
     let slope = match first.slope_deg {
         0.0 => "the level".to_owned(),
@@ -53,6 +53,28 @@ fn largest(answer: &Answer) -> String {
         mm(first.residual_m.abs()),
         fixed(first.significance.abs(), 0)
     )
+}
+
+/// Why no place is listed: with some hundred bins, each of a few cycles, chance makes one that is far off.
+fn no_place(answer: &Answer) -> String {
+    let none = "No place is listed where the recalibrated model and the data disagree by more than chance";
+    let all = answer
+        .figures
+        .maps_before
+        .iter()
+        .flat_map(|map| map.significance.iter().flatten());
+    let known: Vec<f64> = all
+        .map(|sigmas| sigmas.abs())
+        .filter(|sigmas| sigmas.is_finite())
+        .collect();
+    match known.iter().copied().reduce(f64::max) {
+        Some(largest) => format!(
+            "{none}: the clearest of {} is {} standard errors off, and of so many over so few cycles chance makes one as far off.",
+            count(known.len(), "bin"),
+            fixed(largest, 1)
+        ),
+        None => format!("{none}."),
+    }
 }
 
 /// Places of disagreement.

@@ -67,7 +67,7 @@ fn judged(names: &[&str], ln_bayes: f64, large: f64) -> Judged {
 }
 
 fn verdict(none_large: f64, all: Vec<Judged>) -> Selected {
-    decide(of(NONE_AT, NONE_AT + none_large), all, &[])
+    decide(of(NONE_AT, NONE_AT + none_large), all, &[], &[])
 }
 
 #[test]
@@ -94,6 +94,25 @@ fn the_one_that_explains_most_is_named() {
         (0.95..0.98).contains(&selected.probability[0]),
         "{}",
         selected.probability[0]
+    );
+}
+
+/// With an effect that makes the best of wrong conditions, 40 nats beyond none: conditions as probable, less and more so.
+#[test]
+fn wrong_conditions_count_as_much_as_they_are_probable() {
+    let beside = |ln_bayes: f64| {
+        let effect = judged(&["pad-creep"], 40.0, 20.0);
+        let with_prior = NONE_AT + ln_bayes + effect.ln_prior;
+        decide(of(NONE_AT, NONE_AT + 5.0), vec![effect], &[], &[with_prior])
+    };
+    let [less, equal, more] = [30.0, 40.0, 50.0].map(beside);
+    assert_eq!(less.verdict, Verdict::Explained);
+    assert_eq!((equal.verdict, equal.is_misstated()), (Verdict::Ambiguous, false));
+    assert_eq!((more.verdict, more.is_misstated()), (Verdict::OutsideLibrary, true));
+    let [first, second] = [equal.probability[0], equal.misstated_probability];
+    assert!(
+        (first - second).abs() < 0.02 && (0.95..1.0).contains(&(first + second)),
+        "{first} and {second}"
     );
 }
 
@@ -173,7 +192,7 @@ fn a_large_discrepancy_is_something_else_alone_and_beside_an_effect() {
 fn a_law_that_is_more_probable_than_every_effect_is_outside_the_library() {
     let with = |ln_law: f64, ln_bayes: f64| {
         let none = of(NONE_AT, NONE_AT - 10.0).with_law(Some(NONE_AT + ln_law));
-        decide(none, vec![judged(&["pad-creep"], ln_bayes, 20.0)], &[]).verdict
+        decide(none, vec![judged(&["pad-creep"], ln_bayes, 20.0)], &[], &[]).verdict
     };
     assert_eq!(with(80.0, 40.0), Verdict::OutsideLibrary);
     assert_eq!(with(30.0, 40.0), Verdict::Explained);
