@@ -71,7 +71,14 @@ mod tests {
     #[test]
     fn who_tries_on_and_on_is_counted_and_does_not_fill_the_log() {
         let (mut told, now) = (Told::default(), Instant::now());
-        let mut at = |ms| told.line("ben, curl", "stop", "the token is wrong", now + Duration::from_millis(ms));
+        let mut at = |ms| {
+            told.line(
+                "ben, curl",
+                "stop",
+                "the token is wrong",
+                now + Duration::from_millis(ms),
+            )
+        };
         assert_eq!(at(0).as_deref(), Some("ben, curl: stop refused: the token is wrong"));
         assert_eq!((at(1), at(999)), (None, None));
         let later = at(1_000).expect("a second later");

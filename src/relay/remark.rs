@@ -45,8 +45,13 @@ pub(crate) fn in_words(record: &CommandRecord) -> Option<String> {
     match CommandKind::try_from(record.kind) {
         Ok(CommandKind::TakeOver) => Some(format!("{sender} (user {user}) took over, and drives")),
         Ok(CommandKind::NotDriver) => {
-            let (name, command) = sender.as_str().rsplit_once(": ").unwrap_or((sender.as_str(), "a command"));
-            Some(format!("{command} from {name} (user {user}) was refused: another watcher drives"))
+            let (name, command) = sender
+                .as_str()
+                .rsplit_once(": ")
+                .unwrap_or((sender.as_str(), "a command"));
+            Some(format!(
+                "{command} from {name} (user {user}) was refused: another watcher drives"
+            ))
         }
         _ => None,
     }
@@ -101,7 +106,10 @@ mod tests {
         let words = "take_over from Ångström-Ångström (user 7) was refused: another watcher drives";
         assert_eq!(recorded(&refused).as_deref(), Some(words));
         let taken = take_over("ben", 1000);
-        assert_eq!(recorded(&taken).as_deref(), Some("ben (user 1000) took over, and drives"));
+        assert_eq!(
+            recorded(&taken).as_deref(),
+            Some("ben (user 1000) took over, and drives")
+        );
         assert_eq!(recorded(&Command::new(CommandKind::Hold)), None);
         // Who asks on and on stands there once a second, and not at the cost of others.
         let later = |ms| now + Duration::from_millis(ms);

@@ -73,7 +73,9 @@ fn record_at(reader: &mut (impl Read + Seek), at: u64, length: u64) -> io::Resul
     let end = (at + RECORD_HEAD).checked_add(content_len).filter(|end| *end <= length);
     // A footer comes after the end of the data alone.
     let is_known = (op::HEADER..=op::DATA_END).contains(&opcode) && opcode != op::FOOTER;
-    let Some(end) = end.filter(|_| is_known) else { return Ok(None) };
+    let Some(end) = end.filter(|_| is_known) else {
+        return Ok(None);
+    };
     let agrees = opcode != op::CHUNK || agrees_with_itself(reader, content_len)?;
     Ok(agrees.then_some((opcode, end)))
 }
@@ -85,7 +87,10 @@ fn next_chunk(reader: &mut (impl Read + Seek), from: u64, length: u64) -> io::Re
     while begin < length {
         block.clear();
         reader.seek(SeekFrom::Start(begin))?;
-        reader.by_ref().take((BLOCK + WHOLE_HEAD) as u64).read_to_end(&mut block)?;
+        reader
+            .by_ref()
+            .take((BLOCK + WHOLE_HEAD) as u64)
+            .read_to_end(&mut block)?;
         let bytes = block.iter().take(BLOCK).enumerate();
         for (offset, _) in bytes.filter(|(_, byte)| **byte == op::CHUNK) {
             let at = begin + offset as u64;

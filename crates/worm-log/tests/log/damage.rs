@@ -162,10 +162,17 @@ fn a_damaged_byte_in_a_log_that_was_not_finished_costs_its_chunk_too_be_it_the_f
         let log = messages(&Patient::new(&damaged).path).unwrap_or_else(|error| panic!("byte {at}: {error}"));
         // What is a chunk's own costs the chunk; what stands before all chunks costs none.
         let least = if at < first_end { 40 } else { 30 };
-        assert!(log.states.len() >= least, "byte {at} of {first_end}, {second_end}, {third_end}: {:?}", log.warnings);
+        assert!(
+            log.states.len() >= least,
+            "byte {at} of {first_end}, {second_end}, {third_end}: {:?}",
+            log.warnings
+        );
         lost_in_first += usize::from(at < first_end && log.warnings.iter().any(|it| it.contains("damaged")));
     }
-    assert!(lost_in_first > 100, "the definitions were damaged {lost_in_first} times, and that was said");
+    assert!(
+        lost_in_first > 100,
+        "the definitions were damaged {lost_in_first} times, and that was said"
+    );
 }
 
 #[test]
