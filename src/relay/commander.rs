@@ -118,9 +118,9 @@ impl Commander {
         }
     }
 
-    /// Hands over a remark, unless commands wait: those come first, and the log has it anyway.
+    /// Hands over a remark, unless much waits: commands come first, and the log has it anyway.
     pub(super) fn remark(&self, remark: Command) {
-        if let Some(jobs) = self.jobs.as_ref().filter(|jobs| jobs.is_empty())
+        if let Some(jobs) = self.jobs.as_ref().filter(|jobs| jobs.len() < QUEUE / 8)
             && jobs.try_send(Job::Remark(remark)).is_err()
         {
             tracing::debug!("nobody records what was refused or taken over");

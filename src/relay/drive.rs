@@ -337,7 +337,10 @@ mod tests {
                     (Some(Effect::Hold(why)), Some(part)) => assert!(why.to_string().contains(part), "{here}: {why}"),
                     (found, _) => panic!("{here}: {found:?}"),
                 },
-                Step::Alive(id) => drop(ask(&mut drive, id, &Request::Alive, now_ns, now_ns)),
+                Step::Alive(id) => {
+                    let heard = ask(&mut drive, id, &Request::Alive, now_ns, now_ns);
+                    assert_eq!(heard, Outcome::Done, "{here}");
+                }
                 Step::CrawlEnded => drive.crawl_ended(),
                 Step::Due(expected) => {
                     let due = match drive.due(now_ns) {

@@ -275,7 +275,7 @@ impl Server {
             }
             Decision::Refused(refusal) => {
                 let who = self.drive.name(id);
-                if let Some(record) = self.refusals.record(id, (&who, user), name, Instant::now()) {
+                if let Some(record) = self.refusals.record(id, (who.as_str(), user), name, Instant::now()) {
                     self.commander.remark(record);
                 }
                 refused("not-driver", refusal)
