@@ -282,6 +282,10 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
         if opcode != op::CHUNK {
             return self.take_plain(opcode, content);
         }
+        if self.channels.is_empty() {
+            // Should their chunk be damaged so that it is not even known for one.
+            self.take_definitions()?;
+        }
         if uncompressed_records(content).is_some_and(|records| !are_whole_records(records)) {
             self.warn_of_a_chunk(at, &McapError::UnexpectedEoc);
             return self.take_definitions();
@@ -371,13 +375,14 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
     }
 
     /// Takes the channels that are not known yet, because the chunk with their definitions is damaged.
-    fn take_channel_names(&mut self) -> Result<(), ReadError> {
+    fn take_channel_names(&mut self) {
         for (id, name) in std::mem::take(&mut self.channel_names) {
             let words: Vec<&str> = name.split(' ').collect();
             let (Ok(id), [topic, encoding, type_name]) = (id.parse(), words.as_slice()) else {
                 continue;
             };
-            if self.channels.contains_key(&id) {
+            let is_ours = Channel::ALL.iter().any(|known| known.topic() == *topic);
+            if !is_ours || self.channels.contains_key(&id) {
                 continue;
             }
             let channel = FileChannel {
@@ -387,9 +392,9 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
                 message_encoding: (*encoding).to_owned(),
                 metadata: BTreeMap::new(),
             };
-            self.take_channel(channel, type_name)?;
+            // No checksum covers this record: it is no reason to refuse a log, and the definitions overrule it where they are whole.
+            let _ = self.take_channel(channel, type_name);
         }
-        Ok(())
     }
 
     fn take_channel(&mut self, channel: FileChannel, schema: &str) -> Result<(), ReadError> {
