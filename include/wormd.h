@@ -307,6 +307,12 @@ enum wormd_command_kind {
   WORMD_COMMAND_KIND_RENEW = 6,
   /* Note that the worm is at Command::position_m, for the dead reckoning. Moves and permits nothing. */
   WORMD_COMMAND_KIND_MARK = 7,
+  /* Note that the sender drives from now on, in place of whoever did. Moves and permits nothing: who drives
+     is the relay's to say. */
+  WORMD_COMMAND_KIND_TAKE_OVER = 8,
+  /* Note that a command did not come this far, because another watcher drives. The sender is NAME: COMMAND.
+     Moves and permits nothing. */
+  WORMD_COMMAND_KIND_NOT_DRIVER = 9,
 };
 
 /* The name, as in logs; "unknown" for a code of a newer version. */
@@ -320,6 +326,8 @@ static inline const char *wormd_command_kind_name(uint32_t code) {
     case WORMD_COMMAND_KIND_ACKNOWLEDGE: return "acknowledge";
     case WORMD_COMMAND_KIND_RENEW: return "renew";
     case WORMD_COMMAND_KIND_MARK: return "mark";
+    case WORMD_COMMAND_KIND_TAKE_OVER: return "take-over";
+    case WORMD_COMMAND_KIND_NOT_DRIVER: return "not-driver";
     default: return "unknown";
   }
 }

@@ -23,7 +23,7 @@ pub(crate) use orphan::{end_after_controller, end_with_parent};
 pub use parent_pipe::{Parent, ParentPipe};
 pub(crate) use service_manager::{ProcessStatus, RoundCounter, ServiceManager, announce_ready};
 pub use standing::Standing;
-pub(crate) use stop_client::{StopError, ask};
+pub(crate) use stop_client::{StopError, ask, foreign};
 pub use stop_socket::StopSocket;
 pub(crate) use stop_socket::{Question, Request};
 pub(crate) use survey::{RunningController, running_controllers};

@@ -29,8 +29,9 @@ pub(crate) enum StopError {
     },
     /// Other users have a worm of this name, and this one has none.
     #[error(
-        "{worm} is a worm of user {}, this process runs as user {user}: only its own user may command a worm, and root may stop it",
-        users.join(", ")
+        "{worm} is a worm of user {}, this process runs as user {user}: only its own user may command a worm (sudo -u '#{}' wormd …), and \
+         root may stop it",
+        users.join(", "), users.first().map_or("", String::as_str)
     )]
     Foreign {
         /// The worm.
@@ -93,6 +94,22 @@ pub(crate) fn ask(config: &Config, question: &Question) -> Result<Answer, StopEr
             })
         }
     }
+}
+
+/// That the worm of this name is another user's, for all that root, too, may do as its own user alone; none where it is the caller's, or
+/// nobody's.
+pub(crate) fn foreign(config: &Config) -> Option<StopError> {
+    let worm = &config.worm.name;
+    let user = nix::unistd::geteuid().as_raw();
+    // Without the list nobody can tell; the topics then say whether there is a worm.
+    let sockets = sockets_of(worm, &config.topics.root).ok()?;
+    let (connected, _) = connect_all(sockets, user);
+    let users: BTreeSet<_> = connected.iter().map(|(owner, _)| *owner).collect();
+    (!users.is_empty() && !users.contains(&user)).then(|| StopError::Foreign {
+        worm: worm.clone(),
+        users: users.iter().map(u32::to_string).collect(),
+        user,
+    })
 }
 
 /// Connects to all of them, and leaves out those that are nobody's, or not their name's user's: anybody may bind any abstract name.

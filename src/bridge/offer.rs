@@ -23,8 +23,9 @@ use std::time::{Duration, Instant};
 
 /// How long a watcher may take nothing; as at the relay.
 const STALL_LIMIT: Duration = Duration::from_secs(30);
-/// A watcher that was not heard for so long is not counted as there.
-const SILENCE: Duration = Duration::from_millis(750);
+/// A watcher that was not heard for so long is not counted as there. They say so every 0.2 s; the relay's own patience comes on top, so that
+/// there is to be little of it here.
+const SILENCE: Duration = Duration::from_millis(300);
 
 /// A worm that is offered here.
 pub(crate) struct Offer {
@@ -342,12 +343,15 @@ impl LocalWatcher {
             }
         };
         // It is of this computer's clock; over the network the link says how late it is.
-        if let Some(sent_ns) = line.sent_ns.take()
-            && let Some(refusal) = lateness::refusal(&line.request, sent_ns, monotonic_ns())
-        {
+        let now_ns = monotonic_ns();
+        let sent_ns = line.sent_ns.take().unwrap_or(now_ns);
+        if let Some(refusal) = lateness::refusal(&line.request, sent_ns, now_ns) {
             let answer = Answer::own(id, line.id, line.request.name(), "stale", Some(refusal));
             return self.inner.answer(answer);
         }
+        // What lay unread says who was there then.
+        let late = Duration::from_nanos(now_ns.saturating_sub(sent_ns));
+        let heard = Instant::now().checked_sub(late);
         match &line.request {
             Request::Hello { version, .. } if *version > VERSION => {
                 let own = env!("CARGO_PKG_VERSION");
@@ -357,9 +361,9 @@ impl LocalWatcher {
             }
             // It goes to the robot with the first request.
             Request::Hello { name, .. } => self.name = Some(name.clone()),
-            Request::Alive => self.heard = Some(Instant::now()),
+            Request::Alive => self.heard = heard.max(self.heard),
             _ => {
-                self.heard = Some(Instant::now());
+                self.heard = heard.max(self.heard);
                 let name = self.name.clone();
                 asked.push(Asked {
                     watcher: id,

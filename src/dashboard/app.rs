@@ -5,6 +5,7 @@ use super::access::Hosts;
 use super::fleet::FleetThread;
 use super::places::Places;
 use super::relay_thread::{RelayThread, Shared};
+use super::strangers::Strangers;
 use crate::black_box::folder::Folder;
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -20,6 +21,7 @@ pub(super) struct App {
     pub(super) relay: RelayThread,
     pub(super) fleet: FleetThread,
     pub(super) token: Token,
+    pub(super) strangers: Strangers,
     pub(super) hosts: Hosts,
     pub(super) reports: Option<PathBuf>,
     pub(super) boxes: Folder,

@@ -78,8 +78,9 @@ pub(super) async fn command(
     body: Bytes,
 ) -> Response {
     let caller = caller(peer, &headers);
-    if let Some(refusal) = unauthorised(&app, &headers) {
-        return refusal;
+    if let Err(why) = authorised(&app, &headers) {
+        app.strangers.note(&caller, &command, why);
+        return unauthorised(why);
     }
     let details = if body.is_empty() {
         Details::default()
@@ -129,8 +130,8 @@ pub(super) async fn alive(
     Extension(peer): Extension<Peer>,
     headers: HeaderMap,
 ) -> Response {
-    if let Some(refusal) = unauthorised(&app, &headers) {
-        return refusal;
+    if let Err(why) = authorised(&app, &headers) {
+        return unauthorised(why);
     }
     match app.relay.alive(caller(peer, &headers).key).await {
         true => StatusCode::NO_CONTENT.into_response(),
@@ -139,10 +140,17 @@ pub(super) async fn alive(
 }
 
 /// `GET /api/login`: whether the token is right. Changes nothing.
-pub(super) async fn login(State(app): State<Arc<App>>, headers: HeaderMap) -> Response {
-    match unauthorised(&app, &headers) {
-        Some(refusal) => refusal,
-        None => StatusCode::NO_CONTENT.into_response(),
+pub(super) async fn login(
+    State(app): State<Arc<App>>,
+    Extension(peer): Extension<Peer>,
+    headers: HeaderMap,
+) -> Response {
+    match authorised(&app, &headers) {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(why) => {
+            app.strangers.note(&caller(peer, &headers), "login", why);
+            unauthorised(why)
+        }
     }
 }
 
@@ -170,23 +178,25 @@ fn request(command: &str, details: Details) -> Option<Request> {
     })
 }
 
-fn unauthorised(app: &App, headers: &HeaderMap) -> Option<Response> {
+/// Whether the token is there and right; else why not, in words.
+fn authorised(app: &App, headers: &HeaderMap) -> Result<(), &'static str> {
     let token = headers
         .get(AUTHORIZATION)
         .and_then(|header| header.to_str().ok())
         .and_then(bearer);
-    if token.is_some_and(|token| app.token.is(token)) {
-        return None;
+    match token {
+        Some(token) if app.token.is(token) => Ok(()),
+        Some(_) => Err("the token is wrong: it is the one with which the dashboard was started"),
+        None => Err("this needs the token, as Authorization: Bearer TOKEN (hold needs none)"),
     }
-    let why = match token {
-        Some(_) => "the token is wrong: it is the one with which the dashboard was started",
-        None => "this needs the token, as Authorization: Bearer TOKEN (hold needs none)",
-    };
+}
+
+fn unauthorised(why: &str) -> Response {
     let mut refusal = refused(StatusCode::UNAUTHORIZED, why);
     refusal
         .headers_mut()
         .insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
-    Some(refusal)
+    refusal
 }
 
 fn caller(Peer(address): Peer, headers: &HeaderMap) -> Caller {

@@ -7,7 +7,7 @@
 //! happens to the page, the network or this process, the worm holds. docs/dashboard.md has it from outside.
 //!
 //! - [`access`]: who may ask for what: hosts, origins, the token. Pure.
-//! - [`token`]: where the token comes from.
+//! - [`token`]: where the token comes from; [`strangers`]: who did not have it.
 //! - [`listen`]: the address.
 //! - [`feed`]: what is known of the worm, as events for pages. Pure.
 //! - [`relay_thread`]: the thread between relay and feed; [`seat`]: the connection of a page that drives.
@@ -42,6 +42,7 @@ mod response;
 mod routes;
 mod seat;
 pub(crate) mod server;
+mod strangers;
 mod token;
 mod unreached;
 

@@ -9,6 +9,7 @@ use super::paced_stream::PacedStream;
 use super::places::{Place, Places, Stage};
 use super::relay_thread::{RelayThread, Shared};
 use super::routes::router;
+use super::strangers::Strangers;
 use crate::black_box::folder::Folder;
 use crate::failure::Failure;
 use crate::relay::client::RelayLink;
@@ -81,6 +82,7 @@ pub(crate) fn run(settings: Settings, end: std::os::unix::net::UnixStream) -> Re
         fleet: FleetThread::start(&settings.instance, &settings.config.topics.root)?,
         shared,
         token: settings.token,
+        strangers: Strangers::new(settings.instance.worm()),
         hosts: Hosts::new(address.ip(), settings.hosts),
         reports: settings.reports,
         boxes: settings.boxes,

@@ -12,11 +12,15 @@ use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::thread::JoinHandle;
+use std::time::Duration;
 use worm_estimator::config::Config;
 use worm_estimator::message::{AlarmKind, Command, CommandKind, ShortText};
 
 /// Commands that may wait. The controller answers within a tick unless it arms or resets.
 const QUEUE: usize = 32;
+
+/// How long the controller may take for a remark: whoever commands waits behind it.
+const REMARK_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// The relay's name in the record of commands, where it acts by itself.
 const SENDER: &str = "relay";
@@ -40,6 +44,8 @@ pub(super) enum Job {
     Hold(ShortText),
     /// Go on crawling for a moment.
     Renew,
+    /// Note this in the record.
+    Remark(Command),
 }
 
 /// What came of it.
@@ -112,6 +118,15 @@ impl Commander {
         }
     }
 
+    /// Hands over a remark, unless much waits: commands come first, and the log has it anyway.
+    pub(super) fn remark(&self, remark: Command) {
+        if let Some(jobs) = self.jobs.as_ref().filter(|jobs| jobs.len() < QUEUE / 8)
+            && jobs.try_send(Job::Remark(remark)).is_err()
+        {
+            tracing::debug!("nobody records what was refused or taken over");
+        }
+    }
+
     /// What came of jobs since the last call.
     pub(super) fn outcomes(&self) -> impl Iterator<Item = Outcome> + '_ {
         // Nothing to read is no error.
@@ -177,6 +192,13 @@ fn carry_out(client: &CommandClient, config: &Config, job: Job) -> Option<Outcom
                 Err(failure) => failure.to_string(),
             };
             Some(Outcome::NotRenewed(refusal))
+        }
+        Job::Remark(remark) => {
+            // An older controller does not know it, and records that.
+            if let Err(error) = client.call(remark, REMARK_TIMEOUT) {
+                tracing::debug!("not recorded: {error}");
+            }
+            None
         }
     }
 }

@@ -1,5 +1,6 @@
 //! A driver that is gone: in the name by which the relay then makes the worm hold, so that every recording of the command says who and why.
 
+use super::remark::name_within;
 use std::fmt;
 use worm_estimator::message::{CommandKind, CommandRecord, ShortText};
 use worm_estimator::time::seconds;
@@ -45,14 +46,7 @@ impl Departure {
             Way::Silent(s) => format!(" silent {s} s"),
         };
         let room = ShortText::MAX_BYTES.saturating_sub(RELAY.len() + what.len());
-        // A page is called by its user and, after a comma, its browser.
-        let name = match self.name.split_once(',') {
-            Some((user, _)) if self.name.len() > room => user,
-            _ => &self.name,
-        };
-        // As many whole letters as there is room for.
-        let fits = |(at, letter): &(usize, char)| at + letter.len_utf8() <= room;
-        let name: String = name.char_indices().take_while(fits).map(|(_, letter)| letter).collect();
+        let name = name_within(&self.name, room);
         ShortText::new(&format!("{RELAY}{name}{what}"))
     }
 

@@ -91,13 +91,14 @@ impl Drive {
         driver.permitted_ns.map(|_| Effect::Hold(Departure::left(name)))
     }
 
-    /// A watcher was heard.
-    pub(super) fn heard(&mut self, id: WatcherId, now_ns: u64) {
+    /// A watcher was there at this time, whenever that is read.
+    fn heard(&mut self, id: WatcherId, at_ns: u64) {
         if self.watchers.contains_key(&id) {
-            self.heard_ns.insert(id, now_ns);
+            let heard_ns = self.heard_ns.entry(id).or_insert(at_ns);
+            *heard_ns = at_ns.max(*heard_ns);
         }
         if let Some(driver) = self.driver.as_mut().filter(|driver| driver.id == id) {
-            driver.heard_ns = now_ns;
+            driver.heard_ns = at_ns.max(driver.heard_ns);
         }
     }
 
@@ -109,7 +110,8 @@ impl Drive {
 
     /// Decides on a request that was asked for at `sent_ns`.
     pub(super) fn request(&mut self, id: WatcherId, request: &Request, sent_ns: u64, now_ns: u64) -> Decision {
-        self.heard(id, now_ns);
+        // What lay unread, while this process stood still or the watcher's line was slow, says who was there then, and not who is there now.
+        self.heard(id, sent_ns.min(now_ns));
         if let Some(refusal) = lateness::refusal(request, sent_ns, now_ns) {
             return Decision::Stale(refusal);
         }
@@ -335,7 +337,10 @@ mod tests {
                     (Some(Effect::Hold(why)), Some(part)) => assert!(why.to_string().contains(part), "{here}: {why}"),
                     (found, _) => panic!("{here}: {found:?}"),
                 },
-                Step::Alive(id) => drive.heard(id, now_ns),
+                Step::Alive(id) => {
+                    let heard = ask(&mut drive, id, &Request::Alive, now_ns, now_ns);
+                    assert_eq!(heard, Outcome::Done, "{here}");
+                }
                 Step::CrawlEnded => drive.crawl_ended(),
                 Step::Due(expected) => {
                     let due = match drive.due(now_ns) {
@@ -437,6 +442,18 @@ mod tests {
                 (13_010, Step::AskedAt(0, 2, Request::Hold, Sent)),
                 (13_300, due(Due::Nothing)),
                 (13_310, Leave(1, None)),
+            ],
+        );
+        assert_eq!(driver(&drive), None);
+
+        let drive = play(
+            "a word that lay unread says who was there then, and does not prolong a crawl",
+            vec![
+                (0, Ask(1, crawl(), Sent)),
+                (700, Step::AskedAt(200, 1, Request::Alive, Done)),
+                (700, Step::AskedAt(100, 1, Request::Alive, Done)),
+                (949, due(Due::Renewal)),
+                (950, due(Due::Hold)),
             ],
         );
         assert_eq!(driver(&drive), None);

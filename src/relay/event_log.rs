@@ -1,5 +1,6 @@
 //! What happened, for people: among the events of all watchers, on standard error, and in the computer's log.
 
+use super::remark;
 use super::source::Worm;
 use super::wire::Answer;
 use crate::realtime::monotonic_ns;
@@ -50,6 +51,10 @@ impl EventLog {
         let new: Vec<_> = records.since(self.commands_noted).copied().collect();
         self.commands_noted = records.total();
         for record in new {
+            // It was noted when this relay decided it.
+            if remark::in_words(&record).is_some() && record.time_ns >= self.begun_ns {
+                continue;
+            }
             let text = command_text(&record);
             if record.time_ns >= self.begun_ns {
                 self.log(&text);
@@ -67,6 +72,9 @@ impl EventLog {
 
 /// A command in words: who gave it, and what the controller made of it.
 fn command_text(record: &CommandRecord) -> String {
+    if let Some(text) = remark::in_words(record) {
+        return text;
+    }
     let who = match record.sender.as_str() {
         "" => format!("user {}", record.user),
         name => format!("{name} (user {})", record.user),

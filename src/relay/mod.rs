@@ -9,6 +9,7 @@
 //! - [`history`]: ten minutes of samples.
 //! - [`drive`]: who drives, as a pure state machine; [`lateness`]: what comes too late for it; [`departure`]: a driver
 //!   that is gone.
+//! - [`remark`]: what this process decides, for the recordings.
 //! - [`source`]: the topics, gathered into frames.
 //! - [`event_log`]: what happened, in words.
 //! - [`commander`]: the thread that waits for the controller's answers.
@@ -29,6 +30,7 @@ mod history;
 pub(crate) mod lateness;
 pub(crate) mod message_json;
 pub(crate) mod outbox;
+pub(crate) mod remark;
 pub(crate) mod server;
 pub(crate) mod socket;
 pub(crate) mod source;

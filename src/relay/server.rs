@@ -4,6 +4,7 @@ use super::commander::{Commander, Job, Outcome};
 use super::drive::{Decision, Drive, Effect, Identity, WatcherId};
 use super::event_log::EventLog;
 use super::outbox::{Outbox, SharedLine};
+use super::remark::{self, Refusals};
 use super::socket::Listener;
 use super::source::{Seen, Source};
 use super::watcher::{Gone, Watcher, shared};
@@ -60,6 +61,7 @@ pub(crate) fn run(
         source,
         drive: Drive::default(),
         event_log: EventLog::new(instance.worm()),
+        refusals: Refusals::default(),
         watchers: BTreeMap::new(),
         next_id: 1,
         frames: 0,
@@ -81,6 +83,8 @@ struct Server {
     source: Source,
     drive: Drive,
     event_log: EventLog,
+    /// The refusals that are recorded.
+    refusals: Refusals,
     watchers: BTreeMap<WatcherId, Watcher>,
     next_id: WatcherId,
     frames: u64,
@@ -265,10 +269,17 @@ impl Server {
             Decision::Done(event) => {
                 if let Some(event) = event {
                     self.note(event);
+                    self.commander.remark(remark::take_over(&self.drive.name(id), user));
                 }
                 Answer::own(id, number, name, "accepted", None)
             }
-            Decision::Refused(refusal) => refused("not-driver", refusal),
+            Decision::Refused(refusal) => {
+                let who = self.drive.name(id);
+                if let Some(record) = self.refusals.record(id, (who.as_str(), user), name, Instant::now()) {
+                    self.commander.remark(record);
+                }
+                refused("not-driver", refusal)
+            }
             Decision::Stale(refusal) => refused("stale", refusal),
             Decision::Send => {
                 let job = Job::Request {

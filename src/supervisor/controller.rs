@@ -1,6 +1,6 @@
 //! Commands to a running controller, and why it refuses one.
 
-use crate::attendance::{Question, Request, StopError, ask};
+use crate::attendance::{Question, Request, StopError, ask, foreign};
 use crate::failure::Failure;
 use crate::topics::CommandClient;
 use std::time::Duration;
@@ -76,11 +76,8 @@ pub(crate) fn stop_by_socket(config: &Config, command: &Command) -> Result<Answe
 /// # Errors
 /// [`Failure::Failed`] when only others have a worm of this name.
 pub(crate) fn refuse_foreign(config: &Config) -> Result<(), Failure> {
-    match ask(config, &Request::Status.into()) {
-        Err(error @ StopError::Foreign { .. }) => Err(Failure::failed(error)),
-        // A controller that does not answer here may do so at the topics.
-        _ => Ok(()),
-    }
+    // A controller that does not answer here may do so at the topics.
+    foreign(config).map_or(Ok(()), |error| Err(Failure::failed(error)))
 }
 
 /// How long the worm may crawl by a command that names no time, s: as long as the one who watches over it is there, if somebody

@@ -47,6 +47,8 @@ roles! {
     Relay = "relay",
     /// The process that makes a trip.
     Trip = "trip",
+    /// The process that serves laptops over a network: `wormd bridge`.
+    Bridge = "bridge",
 }
 
 /// Another process has the role.

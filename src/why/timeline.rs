@@ -1,5 +1,6 @@
 //! What happened in a log, event by event: alarms, faults, modes, commands, and what the readings show of silences and limits.
 
+use crate::relay::remark;
 use serde::Serialize;
 use worm_estimator::config::Config;
 use worm_estimator::message::{
@@ -128,6 +129,9 @@ fn of_commands(commands: &[CommandRecord]) -> impl Iterator<Item = Moment> {
 
 /// A command, who gave it, and what became of it.
 pub(crate) fn command_in_words(record: &CommandRecord) -> String {
+    if let Some(text) = remark::in_words(record) {
+        return text;
+    }
     let kind = CommandKind::try_from(record.kind).map_or("unknown", CommandKind::name);
     let outcome = CommandOutcome::try_from(record.outcome).map_or("unknown", CommandOutcome::name);
     let sender = match record.sender.as_str() {

@@ -98,5 +98,22 @@ fn all_worms_are_on_one_page_and_one_button_holds_them() {
         browser.wait_for(&format!(
             "!document.querySelector('{card}').classList.contains('stale')"
         ));
+
+        // What a killed `wormd fleet` has left, with more robots than there is room for words.
+        let standing = json!({"was_heard": false, "problem": null, "worms": {}});
+        let robots: serde_json::Map<_, _> = (1..=20).map(|it| (format!("robot{it}"), standing.clone())).collect();
+        let list = json!({"pid": 1, "config": "/etc/wormd/fleet.toml", "robots": robots});
+        std::fs::write(root.path().join("fleet-1-1.json"), list.to_string()).expect("can be written");
+        browser.wait_for("document.querySelectorAll('.card').length === 22");
+        browser.run("document.getElementById('hold').click()");
+        browser.wait_for("/NOT held.*robot20/.test(document.getElementById('message').textContent)");
+        let place = "const it = document.getElementById('hold').getBoundingClientRect(); return it.top >= 0 && it.bottom <= innerHeight";
+        assert_eq!(browser.run(place), true, "the button stays on the screen");
+        let driver = "return /driver/.test(document.querySelector('.card[data-worm=robot1]').textContent)";
+        assert_eq!(
+            browser.run(driver),
+            false,
+            "nobody knows who drives a robot that is not reached"
+        );
     }
 }

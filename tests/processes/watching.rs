@@ -379,6 +379,23 @@ fn one_drives_anyone_may_halt_and_a_driver_that_goes_leaves_a_worm_that_holds() 
         assert!(is_there, "{part:?} is not in {events:?}");
     }
 
+    // The topic that every recording has says what the relay alone decided.
+    let recorded: Vec<_> = other
+        .of("frame")
+        .filter_map(|frame| frame["commands"].as_array())
+        .flatten()
+        .collect();
+    for (kind, sender) in [
+        ("take-over", "the other"),
+        ("not-driver", "the other: crawl"),
+        ("not-driver", "the other: stop"),
+    ] {
+        let is_there = recorded
+            .iter()
+            .any(|record| record["kind"] == kind && record["sender"] == sender);
+        assert!(is_there, "{kind} of {sender} is not in {recorded:?}");
+    }
+
     // Nonsense, and a newer version, are answered in words.
     other.send(&json!({"command": "dance", "id": 1}));
     other.send(&json!({"command": "hello", "version": 99, "name": "later"}));

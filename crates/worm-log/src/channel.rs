@@ -9,6 +9,9 @@ pub(super) const PROTOBUF: &str = "protobuf";
 /// The metadata record and the attachment of a log.
 pub(super) const METADATA: &str = "wormd";
 pub(super) const CONFIG_ATTACHMENT: &str = "worm.toml";
+/// The metadata record with the channels once more: for each ID topic, encoding and type, in words. Their definitions stand in the first
+/// chunk, and in the index of a log that was finished; in one that was not, a damaged bit there would make all of it unreadable.
+pub(super) const CHANNELS: &str = "wormd channels";
 
 /// A message with a channel in a log.
 pub trait Logged: ProtobufMessage {

@@ -17,7 +17,9 @@ const RECORD_HEAD: u64 = 9;
 /// Longest metadata record or attachment that is read, bytes.
 const LARGEST_READ: u64 = 4 << 20;
 /// Longest name of a compression, bytes.
-const LONGEST_NAME: u32 = 16;
+pub(crate) const LONGEST_NAME: u32 = 16;
+/// Bytes from the beginning of a chunk's content to its records, but for the name of its compression.
+pub(crate) const CHUNK_HEAD: usize = 8 + 8 + 8 + 4 + 4 + 8;
 /// Largest first chunk that is unpacked for its schemas and channels, bytes.
 const LARGEST_UNPACKED: u64 = 1 << 26;
 /// Chunks that are unpacked in search of them.
@@ -213,7 +215,7 @@ impl Outline {
 }
 
 /// The head of a chunk; none where it contradicts itself.
-fn chunk_header(reader: &mut impl Read, content_len: u64) -> io::Result<Option<ChunkHeader>> {
+pub(crate) fn chunk_header(reader: &mut impl Read, content_len: u64) -> io::Result<Option<ChunkHeader>> {
     let message_start_time = u64::from_le_bytes(read_array(reader)?);
     let message_end_time = u64::from_le_bytes(read_array(reader)?);
     let uncompressed_size = u64::from_le_bytes(read_array(reader)?);
@@ -225,7 +227,7 @@ fn chunk_header(reader: &mut impl Read, content_len: u64) -> io::Result<Option<C
     let mut name = vec![0; name_len as usize];
     reader.read_exact(&mut name)?;
     let compressed_size = u64::from_le_bytes(read_array(reader)?);
-    let head_len = 8 + 8 + 8 + 4 + 4 + u64::from(name_len) + 8;
+    let head_len = CHUNK_HEAD as u64 + u64::from(name_len);
     let Ok(compression) = String::from_utf8(name) else {
         return Ok(None);
     };

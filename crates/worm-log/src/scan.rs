@@ -6,8 +6,9 @@
 //! of 128 kB, lz4 of 64) is read, too, up to the last whole message, and a warning says so.
 
 mod by_index;
+mod search;
 
-use super::channel::{CONFIG_ATTACHMENT, Channel, METADATA};
+use super::channel::{CHANNELS, CONFIG_ATTACHMENT, Channel, METADATA};
 use super::note::{NOTE, Note};
 use super::payload::{ENCODINGS, Encoding, Payload, PayloadError, Unknown};
 use super::shape::{are_whole_records, is_whole, uncompressed_records};
@@ -89,11 +90,20 @@ pub fn scan_from(
             };
         }
     }
-    input
-        .seek(SeekFrom::Start(MAGIC.len() as u64))
-        .map_err(|error| unreadable(path, &error))?;
     // Where the last whole record ends.
     let mut at = MAGIC.len() as u64;
+    let damaged = search::damaged_beginning(&mut input, length).map_err(|error| unreadable(path, &error))?;
+    if let Some(chunks) = damaged {
+        at = chunks.begin;
+        match scanner.take_between(&mut input, chunks) {
+            Err(Trouble::Refused(error)) => return Err(error),
+            Err(Trouble::Unreadable(error)) => return Err(unreadable(path, &error)),
+            Ok(()) | Err(Trouble::Broken(_)) => {}
+        }
+    }
+    input
+        .seek(SeekFrom::Start(at))
+        .map_err(|error| unreadable(path, &error))?;
     let framing = LinearReaderOptions::default()
         .with_emit_chunks(true)
         .with_record_length_limit(at_most(length));
@@ -104,8 +114,13 @@ pub fn scan_from(
             is_whole = true;
             return Ok(ControlFlow::Break(()));
         }
-        scanner.take_record(at, opcode, content)?;
-        at += RECORD_HEAD + content.len() as u64;
+        let end = at + RECORD_HEAD + content.len() as u64;
+        match scanner.take_record(at, opcode, content) {
+            // It costs no other.
+            Err(Trouble::Broken(error)) => scanner.warn_of_bytes(at, end, &error),
+            taken => taken?,
+        }
+        at = end;
         Ok(ControlFlow::Continue(()))
     });
     let problem = match end {
@@ -237,6 +252,8 @@ struct Scanner<'a, F> {
     foreign: Vec<String>,
     /// Schemas and channels as the summary repeats them, for when those in the first chunk are damaged.
     definitions: Vec<(u8, Vec<u8>)>,
+    /// The channels in words, for when there is no summary either.
+    channel_names: BTreeMap<String, String>,
     damaged_chunks: usize,
     contents: Contents,
     count: u64,
@@ -252,6 +269,7 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
             channels: HashMap::new(),
             foreign: Vec::new(),
             definitions: Vec::new(),
+            channel_names: BTreeMap::new(),
             damaged_chunks: 0,
             contents: Contents::default(),
             count: 0,
@@ -263,6 +281,10 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
     fn take_record(&mut self, at: u64, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
         if opcode != op::CHUNK {
             return self.take_plain(opcode, content);
+        }
+        if self.channels.is_empty() {
+            // Should their chunk be damaged so that it is not even known for one.
+            self.take_definitions()?;
         }
         if uncompressed_records(content).is_some_and(|records| !are_whole_records(records)) {
             self.warn_of_a_chunk(at, &McapError::UnexpectedEoc);
@@ -309,7 +331,10 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
             Record::Schema { header, .. } => {
                 self.schemas.insert(header.id, header.name);
             }
-            Record::Channel(channel) => self.take_channel(channel).map_err(Trouble::Refused)?,
+            Record::Channel(channel) => {
+                let schema = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                self.take_channel(channel, &schema).map_err(Trouble::Refused)?;
+            }
             Record::Message { header, data } => {
                 let channel = self
                     .channels
@@ -333,6 +358,7 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
                 self.latest_ns = self.latest_ns.max(header.log_time);
             }
             Record::Metadata(metadata) if metadata.name == METADATA => self.contents.metadata = metadata.metadata,
+            Record::Metadata(metadata) if metadata.name == CHANNELS => self.channel_names = metadata.metadata,
             Record::Metadata(metadata) if metadata.name == NOTE => {
                 self.contents.notes.push(Note::from_entries(metadata.metadata));
             }
@@ -348,7 +374,30 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
         Ok(())
     }
 
-    fn take_channel(&mut self, channel: FileChannel) -> Result<(), ReadError> {
+    /// Takes the channels that are not known yet, because the chunk with their definitions is damaged.
+    fn take_channel_names(&mut self) {
+        for (id, name) in std::mem::take(&mut self.channel_names) {
+            let words: Vec<&str> = name.split(' ').collect();
+            let (Ok(id), [topic, encoding, type_name]) = (id.parse(), words.as_slice()) else {
+                continue;
+            };
+            let is_ours = Channel::ALL.iter().any(|known| known.topic() == *topic);
+            if !is_ours || self.channels.contains_key(&id) {
+                continue;
+            }
+            let channel = FileChannel {
+                id,
+                schema_id: 0,
+                topic: (*topic).to_owned(),
+                message_encoding: (*encoding).to_owned(),
+                metadata: BTreeMap::new(),
+            };
+            // No checksum covers this record: it is no reason to refuse a log, and the definitions overrule it where they are whole.
+            let _ = self.take_channel(channel, type_name);
+        }
+    }
+
+    fn take_channel(&mut self, channel: FileChannel, schema: &str) -> Result<(), ReadError> {
         let known = Channel::ALL
             .iter()
             .copied()
@@ -359,7 +408,6 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
             }
             return Ok(());
         };
-        let schema = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
         if known == Channel::Timing && schema != known.type_name() {
             // No analysis needs the timings, so those of an older version are skipped.
             if self.channels.insert(channel.id, None).is_none() {

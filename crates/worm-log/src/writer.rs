@@ -1,6 +1,6 @@
 //! Writing a log.
 
-use super::channel::{CONFIG_ATTACHMENT, Channel, Logged, METADATA, PROTOBUF};
+use super::channel::{CHANNELS, CONFIG_ATTACHMENT, Channel, Logged, METADATA, PROTOBUF};
 use super::note::{NOTE, Note};
 use super::scan::Contents;
 use mcap::records::{MessageHeader, Metadata};
@@ -136,10 +136,17 @@ impl<W: Write> Writer<W> {
             if let Some(config) = &contents.config {
                 mcap.attach(&attachment(config, begun_ns))?;
             }
+            let numbered = || (1_u16..).zip(Channel::ALL);
+            // Before the chunk, which may be damaged so that nothing is found for a while after it.
+            let in_words = |(id, channel): (u16, &Channel)| {
+                let words = format!("{} {PROTOBUF} {}", channel.topic(), channel.type_name());
+                (id.to_string(), words)
+            };
+            mcap.write_metadata(&metadata(CHANNELS, numbered().map(in_words).collect()))?;
             let mut channels = Vec::new();
-            for channel in Channel::ALL {
+            for (id, channel) in numbered() {
                 let schema = mcap.add_schema(channel.type_name(), PROTOBUF, &channel.descriptor_set())?;
-                let id = mcap.add_channel(schema, &channel.topic(), PROTOBUF, &BTreeMap::new())?;
+                let id = mcap.add_channel_with_id(id, schema, &channel.topic(), PROTOBUF, &BTreeMap::new())?;
                 channels.push((id, 0));
             }
             mcap.flush()?;

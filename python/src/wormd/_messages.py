@@ -170,6 +170,12 @@ class CommandKind(Code):
     whoever attends to a crawl must not overrule a hold."""
     MARK = "mark", 7
     """Note that the worm is at Command.position_m, for the dead reckoning. Moves and permits nothing."""
+    TAKE_OVER = "take-over", 8
+    """Note that the sender drives from now on, in place of whoever did. Moves and permits nothing: who drives is the
+    relay's to say."""
+    NOT_DRIVER = "not-driver", 9
+    """Note that a command did not come this far, because another watcher drives. The sender is NAME: COMMAND. Moves
+    and permits nothing."""
 
 
 class CommandOutcome(Code):

@@ -13,13 +13,12 @@ const ACCEPTED: Answer = (CommandOutcome::Accepted, 0);
 
 impl Controller {
     pub(super) fn take_command(&mut self, command: &Command, now_ns: u64, inputs: &Inputs<'_>) -> Reply {
-        let (outcome, alarm_mask) = match CommandKind::try_from(command.kind) {
+        let kind = CommandKind::try_from(command.kind);
+        let (outcome, alarm_mask) = match kind {
             Err(_) => (CommandOutcome::Unknown, 0),
             Ok(kind) => self.execute(kind, command, now_ns, inputs),
         };
-        let is_remark = [CommandKind::Acknowledge, CommandKind::Mark]
-            .iter()
-            .any(|kind| command.kind == kind.code());
+        let is_remark = kind.is_ok_and(CommandKind::is_remark);
         if outcome == CommandOutcome::Accepted && !is_remark {
             // Somebody is there.
             self.idle_since_ns = None;
@@ -95,6 +94,8 @@ impl Controller {
                 }
                 None => (CommandOutcome::BadPosition, 0),
             },
+            // The record is all that they are for.
+            (CommandKind::TakeOver | CommandKind::NotDriver, _) => ACCEPTED,
             _ => (CommandOutcome::WrongMode, 0),
         }
     }

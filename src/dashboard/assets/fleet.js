@@ -41,7 +41,13 @@ async function hold() {
     const held = (await answer.json()).worms ?? [];
     const refused = held.filter((it) => it.verdict !== "accepted");
     const silent = held.filter((it) => it.verdict === "no-answer" || it.verdict === "busy");
-    const words = refused.map((it) => it.refusal ?? `${it.name}: ${it.verdict}`);
+    // Why nobody could be told stands on the card of each: here their names, so that the button keeps its place.
+    const unreached = refused.filter((it) => it.robot !== null);
+    const words = refused.filter((it) => it.robot === null).map((it) => `${it.name}: ${it.refusal ?? it.verdict}`);
+    if (unreached.length > 0) {
+      const names = unreached.map((it) => (it.name === it.robot ? it.name : `${it.name} on ${it.robot}`));
+      words.unshift(`NOT held, not reached from here: ${names.join(", ")}`);
+    }
     const count = held.length - refused.length;
     setText(message, [`hold accepted by ${count} of ${held.length}`, ...words].join("; "));
     message.classList.toggle("refused", silent.length > 0 || !answer.ok);
@@ -84,7 +90,8 @@ function fillCard(card, worm, nowMs) {
   alarms.classList.toggle("none", worm.raised !== null && raised.length === 0);
   card.classList.toggle("alarmed", raised.length > 0);
   card.classList.toggle("critical", isFault || raised.some((it) => it.is_critical));
-  const pairs = [["driver", worm.driver ?? "nobody"]];
+  // Who drives is the relay's to say, as the alarms are: without its word nobody knows that nobody does.
+  const pairs = worm.raised === null ? [] : [["driver", worm.driver ?? "nobody"]];
   if (worm.range) {
     pairs.push(["battery", `${number(worm.range.charge_share * 100, 0)} %`]);
     pairs.push(["range", `${number(worm.range.range_m, 2)} m, ${duration(worm.range.time_s)}`]);

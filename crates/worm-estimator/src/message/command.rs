@@ -27,6 +27,10 @@ coded_enum! {
         Renew = 6 => "renew",
         /// Note that the worm is at [`Command::position_m`], for the dead reckoning. Moves and permits nothing.
         Mark = 7 => "mark",
+        /// Note that the sender drives from now on, in place of whoever did. Moves and permits nothing: who drives is the relay's to say.
+        TakeOver = 8 => "take-over",
+        /// Note that a command did not come this far, because another watcher drives. The sender is `NAME: COMMAND`. Moves and permits nothing.
+        NotDriver = 9 => "not-driver",
     }
 }
 
@@ -81,6 +85,13 @@ structure! {
 
 /// Standard error of a mark whose sender gives none, m.
 const DEFAULT_MARK_SIGMA_M: f64 = 5e-3;
+
+impl CommandKind {
+    /// Whether it is for the record alone: it says what somebody has seen, knows or was refused, and not what the worm is to do.
+    pub const fn is_remark(self) -> bool {
+        matches!(self, Self::Acknowledge | Self::Mark | Self::TakeOver | Self::NotDriver)
+    }
+}
 
 impl Command {
     /// Longest distance that a mark may be away, m.

@@ -74,7 +74,7 @@ impl<F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'_, F> 
         self.take_definitions()
     }
 
-    fn warn_of_bytes(&mut self, from: u64, to: u64, error: &McapError) {
+    pub(super) fn warn_of_bytes(&mut self, from: u64, to: u64, error: &McapError) {
         self.damaged_chunks += 1;
         if self.damaged_chunks <= MAX_DAMAGED_NAMED {
             let warning = format!("bytes {from} to {to} are damaged ({error}): what stood there is left out");
@@ -82,7 +82,7 @@ impl<F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'_, F> 
         }
     }
 
-    /// Takes schemas and channels from the summary.
+    /// Takes schemas and channels from the summary; what it does not have, as they are named before all chunks.
     pub(super) fn take_definitions(&mut self) -> Result<(), Trouble> {
         for (opcode, content) in std::mem::take(&mut self.definitions) {
             match self.take_plain(opcode, &content) {
@@ -91,6 +91,7 @@ impl<F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'_, F> 
                 refused => return refused,
             }
         }
+        self.take_channel_names();
         Ok(())
     }
 }

@@ -141,6 +141,41 @@ fn a_damaged_byte_costs_its_chunk_and_no_value_is_wrong() {
 }
 
 #[test]
+fn a_damaged_byte_in_a_log_that_was_not_finished_costs_its_chunk_too_be_it_the_first() {
+    let sink = Sink::default();
+    let mut writer = Writer::new(sink.clone(), "open".as_ref(), &origin()).expect("memory takes all");
+    let first_end = sink.bytes().len();
+    let mut ends = Vec::new();
+    for (index, state) in crawl(0.04).states.iter().enumerate() {
+        writer.write(state).expect("memory takes all");
+        if index % 10 == 9 {
+            writer.flush().expect("memory takes all");
+            ends.push(sink.bytes().len());
+        }
+    }
+    let bytes = sink.bytes();
+    let [second_end, third_end] = [ends[0], ends[1]];
+    let mut lost_in_first = 0;
+    for at in (8..bytes.len()).step_by(3) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 4;
+        let log = messages(&Patient::new(&damaged).path).unwrap_or_else(|error| panic!("byte {at}: {error}"));
+        // What is a chunk's own costs the chunk; what stands before all chunks costs none.
+        let least = if at < first_end { 40 } else { 30 };
+        assert!(
+            log.states.len() >= least,
+            "byte {at} of {first_end}, {second_end}, {third_end}: {:?}",
+            log.warnings
+        );
+        lost_in_first += usize::from(at < first_end && log.warnings.iter().any(|it| it.contains("damaged")));
+    }
+    assert!(
+        lost_in_first > 100,
+        "the definitions were damaged {lost_in_first} times, and that was said"
+    );
+}
+
+#[test]
 fn a_full_disk_is_told_and_what_was_written_can_be_read() {
     let (whole, chunks) = small_log();
     let sink = Sink::with_capacity(chunks[2].0 + 100);

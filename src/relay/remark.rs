@@ -1,0 +1,121 @@
+//! What the relay decides by itself and every recording is to say all the same: who took over, and who was refused because another drives.
+
+use super::drive::WatcherId;
+use std::time::{Duration, Instant};
+use worm_estimator::message::{Command, CommandKind, CommandRecord, ShortText};
+
+/// How long the same refusal of the same watcher is not recorded again: a program that asks on and on must not fill the records.
+const SAME: Duration = Duration::from_secs(1);
+
+/// As much of a watcher's name as `room` bytes hold.
+pub(super) fn name_within(name: &str, room: usize) -> String {
+    // A page is called by its user and, after a comma, its browser.
+    let name = match name.split_once(',') {
+        Some((user, _)) if name.len() > room => user,
+        _ => name,
+    };
+    // As many whole letters as there is room for.
+    let fits = |(at, letter): &(usize, char)| at + letter.len_utf8() <= room;
+    name.char_indices().take_while(fits).map(|(_, letter)| letter).collect()
+}
+
+/// The record of a take-over.
+pub(super) fn take_over(name: &str, user: u32) -> Command {
+    Command {
+        user,
+        sender: ShortText::new(&name_within(name, ShortText::MAX_BYTES)),
+        ..Command::new(CommandKind::TakeOver)
+    }
+}
+
+/// The record of a command that was refused because another watcher drives.
+fn not_driver(name: &str, user: u32, command: &str) -> Command {
+    let what = format!(": {command}");
+    let name = name_within(name, ShortText::MAX_BYTES.saturating_sub(what.len()));
+    Command {
+        user,
+        sender: ShortText::new(&format!("{name}{what}")),
+        ..Command::new(CommandKind::NotDriver)
+    }
+}
+
+/// A recorded take-over or refusal in words; none for another command.
+pub(crate) fn in_words(record: &CommandRecord) -> Option<String> {
+    let (sender, user) = (record.sender, record.user);
+    match CommandKind::try_from(record.kind) {
+        Ok(CommandKind::TakeOver) => Some(format!("{sender} (user {user}) took over, and drives")),
+        Ok(CommandKind::NotDriver) => {
+            let (name, command) = sender
+                .as_str()
+                .rsplit_once(": ")
+                .unwrap_or((sender.as_str(), "a command"));
+            Some(format!(
+                "{command} from {name} (user {user}) was refused: another watcher drives"
+            ))
+        }
+        _ => None,
+    }
+}
+
+/// The refusals that are recorded: not each of a watcher that asks on and on.
+#[derive(Debug, Default)]
+pub(super) struct Refusals(Option<(WatcherId, String, Instant)>);
+
+impl Refusals {
+    /// The record of this refusal, where there is to be one.
+    pub(super) fn record(
+        &mut self,
+        id: WatcherId,
+        (name, user): (&str, u32),
+        command: &str,
+        now: Instant,
+    ) -> Option<Command> {
+        let is_same = |(watcher, what, since): &(WatcherId, String, Instant)| {
+            *watcher == id && what == command && now.saturating_duration_since(*since) < SAME
+        };
+        if self.0.as_ref().is_some_and(is_same) {
+            return None;
+        }
+        self.0 = Some((id, command.to_owned(), now));
+        Some(not_driver(name, user, command))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use worm_estimator::message::Reply;
+
+    fn recorded(command: &Command) -> Option<String> {
+        let reply = Reply {
+            sequence: 1,
+            verdict: 0,
+            mode: 0,
+            fault: 0,
+            alarm_mask: 0,
+        };
+        in_words(&CommandRecord::new(0, (1, 0.0), false, command, &reply))
+    }
+
+    #[test]
+    fn the_record_names_who_took_over_and_who_was_refused_what() {
+        let mut refusals = Refusals::default();
+        let now = Instant::now();
+        let long = "Ångström-Ångström-Ångström, Chrome on Windows";
+        let refused = refusals.record(2, (long, 7), "take_over", now).expect("is the first");
+        let words = "take_over from Ångström-Ångström (user 7) was refused: another watcher drives";
+        assert_eq!(recorded(&refused).as_deref(), Some(words));
+        let taken = take_over("ben", 1000);
+        assert_eq!(
+            recorded(&taken).as_deref(),
+            Some("ben (user 1000) took over, and drives")
+        );
+        assert_eq!(recorded(&Command::new(CommandKind::Hold)), None);
+        // Who asks on and on stands there once a second, and not at the cost of others.
+        let later = |ms| now + Duration::from_millis(ms);
+        assert!(refusals.record(2, (long, 7), "take_over", later(999)).is_none());
+        assert!(refusals.record(2, (long, 7), "crawl", later(999)).is_some());
+        assert!(refusals.record(3, ("ann", 7), "crawl", later(999)).is_some());
+        assert!(refusals.record(3, ("ann", 7), "crawl", later(1_999)).is_some());
+    }
+}
