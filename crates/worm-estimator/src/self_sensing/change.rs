@@ -37,6 +37,8 @@ const JAMMED_SHARE: f64 = 0.12;
 /// Share of the usual torque late in a step below which all cells together have lost friction, whatever the fit makes of it: a pull downhill that does
 /// this to every cell is hardly to be met, and neither are several jams at once.
 const SLIPPING_SHARE: f64 = 0.6;
+/// Least standard error of the share that is lost then: what the gears take of so small a torque is not known better.
+const SLIPPING_SIGMA: f64 = 0.05;
 /// What the fit of one or two cycles leaves unknown of a rise of the load, as a share of it.
 const RISE_SCATTER: f64 = 0.15;
 /// Standard deviation that is allowed for a change of ln friction, of the pull, N, and of the gears' friction, N m.
@@ -315,7 +317,12 @@ impl ChangeDetector {
             changes.more_load &= pulled_n > SHOWN_SHARE * PULL_CHANGE_N
                 || difference.by[gear_at] > SHOWN_SHARE * GEAR_CHANGE * self.gear_friction_n_m;
             let cell = reference.cell_that_lost_most(&now, self.cells);
-            changes.loss_sigma = (1.0 - changes.loss_share) * difference.sigma[cell].hypot(SCATTER);
+            let by_scatter = (1.0 - changes.loss_share) * difference.sigma[cell].hypot(SCATTER);
+            changes.loss_sigma = if reference.all_slip(&now, self.cells) {
+                by_scatter.max(SLIPPING_SIGMA)
+            } else {
+                by_scatter
+            };
             let left_n = RISE_SCATTER * changes.load_rise_n;
             changes.load_rise_sigma_n = difference.load_sigma_n.hypot(PULL_SCATTER_N).hypot(left_n);
         }
@@ -353,7 +360,7 @@ impl Reference {
 
     /// Whether every cell steps with much less torque than before.
     fn all_slip(&self, now: &Self, cells: usize) -> bool {
-        (0..cells).all(|cell| self.reach_share(now, cell) < SLIPPING_SHARE)
+        (0..cells).all(|cell| now.reach_n_m[cell] < SLIPPING_SHARE * self.reach_n_m[cell])
     }
 
     fn cell_that_lost_most(&self, now: &Self, cells: usize) -> usize {
