@@ -220,6 +220,7 @@ fn ten_cycles_of_drawn_worms() {
         ("net work", &net, 0.1, 0.6),
         ("electrical", &electrical, 0.01, 0.9),
         ("advance", &advance, 0.12, 0.7),
+        ("slides", &slides, 0.1, 0.7),
     ] {
         assert!(
             errors.within(limit) > 0.8 && errors.coverage() > coverage,
@@ -363,6 +364,7 @@ fn a_changed_worm_is_reported() {
     loss.line("share lost, %", 100.0);
     rise.line("rise of the load, %", 100.0);
     assert!(percent(right_cell, count) > 80.0 && percent(jammed, count) > 80.0);
+    assert!(of_all.iter().all(|[can, _, all, _]| 10 * all >= 9 * can), "{of_all:?}");
 }
 
 #[test]
