@@ -62,7 +62,7 @@
 #define WORMD_RECORDING_HISTORY 1
 
 #define WORMD_INFERRED_TOPIC "inferred"
-#define WORMD_INFERRED_TYPE "wormd_inferred_v2"
+#define WORMD_INFERRED_TYPE "wormd_inferred_v3"
 #define WORMD_INFERRED_BUFFER 64
 #define WORMD_INFERRED_HISTORY 1
 
@@ -1309,9 +1309,21 @@ typedef struct wormd_inferred {
   uint32_t cell_count;
   /* 1 when the inertial sensor measured the slope, 0 when it follows from the pull. */
   uint32_t slope_is_measured;
+  /* Marks that contradict the dead reckoning and each other: further off than three standard errors. */
+  uint32_t contradicting_marks;
+  /* Standard error of forward_slide_m and backward_slide_m, m: the largest of all cells'. */
+  double slide_sigma_m;
+  /* Standard error of friction_loss_share; NaN where none was lost. */
+  double friction_loss_sigma;
+  /* Standard error of load_rise_n, N; NaN while nothing has changed. */
+  double load_rise_sigma_n;
+  /* How far the last mark was ahead of the dead reckoning, m; NaN before the first. */
+  double mark_off_m;
+  /* Standard error of that by mark and dead reckoning together, m; NaN before the first. */
+  double mark_off_sigma_m;
 } wormd_inferred;
 
-static_assert(sizeof(wormd_inferred) == 1040, "wormd_inferred has another size here than in wormd");
+static_assert(sizeof(wormd_inferred) == 1080, "wormd_inferred has another size here than in wormd");
 static_assert(offsetof(wormd_inferred, sequence) == 0, "wormd_inferred.sequence lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, time_ns) == 8, "wormd_inferred.time_ns lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, end_ns) == 16, "wormd_inferred.end_ns lies elsewhere in wormd");
@@ -1357,6 +1369,12 @@ static_assert(offsetof(wormd_inferred, tracker_marks) == 1020, "wormd_inferred.t
 static_assert(offsetof(wormd_inferred, standing) == 1024, "wormd_inferred.standing lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, cell_count) == 1028, "wormd_inferred.cell_count lies elsewhere in wormd");
 static_assert(offsetof(wormd_inferred, slope_is_measured) == 1032, "wormd_inferred.slope_is_measured lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, contradicting_marks) == 1036, "wormd_inferred.contradicting_marks lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, slide_sigma_m) == 1040, "wormd_inferred.slide_sigma_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, friction_loss_sigma) == 1048, "wormd_inferred.friction_loss_sigma lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, load_rise_sigma_n) == 1056, "wormd_inferred.load_rise_sigma_n lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, mark_off_m) == 1064, "wormd_inferred.mark_off_m lies elsewhere in wormd");
+static_assert(offsetof(wormd_inferred, mark_off_sigma_m) == 1072, "wormd_inferred.mark_off_sigma_m lies elsewhere in wormd");
 
 /* The state of the worm's black box: once a second and at every change. */
 typedef struct wormd_black_box_status {

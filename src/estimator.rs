@@ -54,6 +54,7 @@ pub(crate) fn run(
         None => None,
     };
     let mut told_of_mismatch = false;
+    let mut contradicting_marks = 0;
     ready(&realtime::request(&config.realtime, PRIORITY_BELOW_LOOP));
     while !end.load(Ordering::Relaxed) {
         rounds.count();
@@ -76,7 +77,11 @@ pub(crate) fn run(
             {
                 tracing::error!("the controller's states are ignored: {error}");
             }
-            output.publish(&observer.update(&state)).map_err(Failure::failed)?;
+            let found = observer.update(&state);
+            if let Some(inferred) = &found.inferred {
+                contradicting_marks = warn_of_mark(inferred, contradicting_marks);
+            }
+            output.publish(&found).map_err(Failure::failed)?;
         }
         if output.last_published.elapsed() >= HEARTBEAT {
             output.publish_heartbeat(&observer.latest()).map_err(Failure::failed)?;
@@ -86,6 +91,19 @@ pub(crate) fn run(
         }
     }
     Ok(())
+}
+
+/// Says that a mark contradicts the dead reckoning where one more of them does than before; returns how many do.
+fn warn_of_mark(inferred: &Inferred, before: u32) -> u32 {
+    if inferred.contradicting_marks > before {
+        tracing::warn!(
+            "the mark is {:+.0} ± {:.0} mm off the dead reckoning: this mark or one before is wrong, or the worm slid or was carried; \
+             give another mark where it can be seen",
+            1e3 * inferred.mark_off_m,
+            1e3 * inferred.mark_off_sigma_m
+        );
+    }
+    inferred.contradicting_marks
 }
 
 /// Reads the reports of recorder and black box. One that cannot be read is one that did not come.

@@ -161,6 +161,7 @@ impl SourceArgs {
             to_s: self.to,
             max_gap_s: self.max_gap,
             axis: self.axis,
+            cells: None,
         }
     }
 
@@ -211,15 +212,20 @@ impl SourceArgs {
         wanted: Wanted,
         progress: &mut Progress,
     ) -> Result<Dataset, Failure> {
-        let recording = open_with_progress(path, &self.options(wanted), &mut |fraction| {
+        let configured = self.config.as_deref().map(Config::load_with_text).transpose()?;
+        let cells = configured
+            .as_ref()
+            .map_or(Config::default().worm.cells, |(config, _)| config.worm.cells);
+        let options = OpenOptions {
+            cells: Some(cells),
+            ..self.options(wanted)
+        };
+        let recording = open_with_progress(path, &options, &mut |fraction| {
             progress.tell("reading", READING * fraction);
         })
         .map_err(Failure::unusable)?;
-        let (config, config_text) = match &self.config {
-            Some(file) => {
-                let (config, text) = Config::load_with_text(file)?;
-                (config, Some(text))
-            }
+        let (config, config_text) = match configured {
+            Some((config, text)) => (config, Some(text)),
             None => stored_config(path)?,
         };
         Ok(Dataset {

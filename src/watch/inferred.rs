@@ -49,24 +49,40 @@ pub struct InferredSummary {
     pub energy_electrical_j: f64,
     /// Its standard error, J.
     pub energy_electrical_sigma_j: f64,
+    /// Distance that each tip slides forward in a cycle, m.
+    pub forward_slide_m: Vec<f64>,
+    /// Distance that each tip slides backward in a cycle, m.
+    pub backward_slide_m: Vec<f64>,
+    /// The largest of the standard errors of both, m.
+    pub slide_sigma_m: f64,
     /// Distance along the canal by dead reckoning, m.
     pub position_m: f64,
     /// Its standard error, m.
     pub position_sigma_m: f64,
     /// Marks that corrected the distance.
     pub marks: u32,
+    /// Marks that contradict the dead reckoning, and with it the marks before: further off than three standard errors.
+    pub contradicting_marks: u32,
+    /// How far the last mark was ahead of the dead reckoning, m.
+    pub mark_off_m: f64,
+    /// Its standard error, by mark and dead reckoning together, m.
+    pub mark_off_sigma_m: f64,
     /// Cycles at whose end a tracker sample corrected it.
     pub tracker_marks: u32,
     /// The cells that lost friction, from 1.
     pub friction_lost: Vec<usize>,
     /// Largest share of a cell's friction that was lost.
     pub friction_loss_share: f64,
+    /// Its standard error.
+    pub friction_loss_sigma: f64,
     /// The cells that do not move, from 1.
     pub jammed: Vec<usize>,
     /// Whether the load is larger than it was.
     pub more_load: bool,
     /// How much, as a pull on the body, N.
     pub load_rise_n: f64,
+    /// Its standard error, N.
+    pub load_rise_sigma_n: f64,
     /// Which changes would be seen.
     pub armed: ArmedChanges,
 }
@@ -91,7 +107,11 @@ impl InferredSummary {
         let place = place.map_or_else(|| "position not yet known".to_owned(), |place| format!("at {place} mm"));
         let energy = energy.map_or_else(String::new, |energy| format!(" and {energy} mJ"));
         let pull = pull.map_or_else(String::new, |pull| format!(", pull {pull} N"));
-        advance.map(|advance| format!("{place}, {advance} mm{energy} a cycle{pull}{slope}{standing}"))
+        let marks = match self.contradicting_marks {
+            0 => String::new(),
+            count => format!(", {count} of {} marks contradict it", self.marks),
+        };
+        advance.map(|advance| format!("{place}{marks}, {advance} mm{energy} a cycle{pull}{slope}{standing}"))
     }
 }
 
@@ -149,15 +169,23 @@ impl InferredSummary {
             energy_actuator_net_sigma_j: inferred.energy_actuator_net_sigma_j,
             energy_electrical_j: inferred.energy_electrical_j,
             energy_electrical_sigma_j: inferred.energy_electrical_sigma_j,
+            forward_slide_m: inferred.forward_slide_m[..cells].to_vec(),
+            backward_slide_m: inferred.backward_slide_m[..cells].to_vec(),
+            slide_sigma_m: inferred.slide_sigma_m,
             position_m: inferred.position_at_m(phase),
             position_sigma_m: inferred.position_sigma_m,
             marks: inferred.marks,
+            contradicting_marks: inferred.contradicting_marks,
+            mark_off_m: inferred.mark_off_m,
+            mark_off_sigma_m: inferred.mark_off_sigma_m,
             tracker_marks: inferred.tracker_marks,
             friction_lost: cells_of(inferred.friction_lost_mask),
             friction_loss_share: inferred.friction_loss_share,
+            friction_loss_sigma: inferred.friction_loss_sigma,
             jammed: cells_of(inferred.jammed_mask),
             more_load: inferred.more_load == 1,
             load_rise_n: inferred.load_rise_n,
+            load_rise_sigma_n: inferred.load_rise_sigma_n,
             armed: ArmedChanges {
                 friction_lost: cells_of(inferred.friction_armed_mask),
                 jammed: cells_of(inferred.jam_armed_mask),

@@ -334,7 +334,7 @@ fn draw_inferred_tips(frame: &mut Frame<'_>, area: Rect, block: Block<'_>, pictu
             },
             match [inferred.forward_slide_m[cell], inferred.backward_slide_m[cell]].map(|m| m * 1e3) {
                 [forward, backward] if forward.is_finite() && backward.is_finite() => {
-                    format!("~{forward:.1}/{backward:.1}")
+                    format!("~{forward:.1}/{backward:.1}±{:.1}", inferred.slide_sigma_m * 1e3)
                 }
                 _ => "–".to_owned(),
             },

@@ -43,6 +43,7 @@ pub(crate) fn search(log: &Log, config: &Config, until_ns: u64, report: &mut dyn
         max_gap_s: MAX_GAP_S,
         axis: None,
         wanted,
+        cells: None,
     };
     let recording = match open(Path::new(&log.file), &options) {
         Ok(recording) => recording,

@@ -195,6 +195,9 @@ fn the_running_estimator_infers_what_the_current_alone_says() {
                 position_m: 0.0,
                 position_sigma_m: 0.0,
                 marks: 0,
+                contradicting_marks: 0,
+                mark_off_m: 0.0,
+                mark_off_sigma_m: 0.0,
                 tracker_marks: 0,
                 ..*message
             })
@@ -204,6 +207,13 @@ fn the_running_estimator_infers_what_the_current_alone_says() {
     assert_eq!(text(&ends(&live)), text(&ends(&blind)));
     let (last, unseen) = (live.last().expect("messages"), blind.last().expect("messages"));
     assert_eq!((last.marks, unseen.marks), (1, 0));
+    // The mark was far from where the tracker has the worm, and that is told.
+    let off_m = 0.7 - states[9_000].position_m[..4].iter().sum::<f64>() / 4.0;
+    assert_eq!((last.contradicting_marks, unseen.contradicting_marks), (1, 0));
+    assert!(
+        (last.mark_off_m - off_m).abs() < 0.01 && last.mark_off_sigma_m < 0.01,
+        "{off_m} m: {last:?}"
+    );
     println!(
         "at {:.4} ± {:.4} m with tracker and mark, {:.4} ± {:.4} m without",
         last.position_m, last.position_sigma_m, unseen.position_m, unseen.position_sigma_m

@@ -6,9 +6,15 @@ use std::path::Path;
 use worm_analysis::recording::{Motor, OpenOptions, Recording, Wanted, read_from, write_csv};
 use worm_physics::MAX_CELLS;
 
-/// A recording as a table of named columns.
+/// A recording as a table of named columns, of positions and of the motor alone.
 pub(crate) fn recording_csv(data: &[u8]) {
     read(data, "worm.csv", &OpenOptions::default());
+    let of_motor = OpenOptions {
+        wanted: Wanted::PositionsOrMotor { window_s: 0.0 },
+        cells: Some(4),
+        ..OpenOptions::default()
+    };
+    read(data, "worm.csv", &of_motor);
 }
 
 /// Trajectories of markers as Vicon Nexus exports them, with the canal's direction found and given.

@@ -18,6 +18,16 @@ macro_rules! not_in_state_v2 {
     };
 }
 
+/// What `inferred` has since version 3.
+macro_rules! not_in_inferred_v2 {
+    () => {
+        concat!(
+            "\"contradicting_marks\":0,\"slide_sigma_m\":null,",
+            "\"friction_loss_sigma\":null,\"load_rise_sigma_n\":null,\"mark_off_m\":null,\"mark_off_sigma_m\":null,"
+        )
+    };
+}
+
 /// The members that messages of an older type lack, as JSON, with the value for "not known"; nothing if it is not an older type of the
 /// channel.
 pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'static str> {
@@ -28,7 +38,8 @@ pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'sta
         )),
         (Channel::State, "wormd_state_v2") => Some(not_in_state_v2!()),
         (Channel::State, "wormd_state_v3") => Some(not_in_state_v3!()),
-        (Channel::Inferred, "wormd_inferred_v1") => Some("\"slope_is_measured\":0,"),
+        (Channel::Inferred, "wormd_inferred_v1") => Some(concat!("\"slope_is_measured\":0,", not_in_inferred_v2!())),
+        (Channel::Inferred, "wormd_inferred_v2") => Some(not_in_inferred_v2!()),
         (Channel::Cycle, "wormd_cycle_v1") => Some("\"host_paused_s\":0.0,"),
         _ => None,
     }
@@ -39,7 +50,14 @@ pub(super) fn lacking_members(channel: Channel, type_name: &str) -> Option<&'sta
 pub(super) fn unknown_fields(channel: Channel, type_name: &str) -> Option<&'static [&'static str]> {
     match (channel, type_name) {
         (Channel::State, "wormd_state_v3") => Some(&["pitch_rad"]),
-        (Channel::Inferred, "wormd_inferred_v1") | (Channel::CommandRecord, "wormd_command_record_v1") => Some(&[]),
+        (Channel::Inferred, "wormd_inferred_v1" | "wormd_inferred_v2") => Some(&[
+            "slide_sigma_m",
+            "friction_loss_sigma",
+            "load_rise_sigma_n",
+            "mark_off_m",
+            "mark_off_sigma_m",
+        ]),
+        (Channel::CommandRecord, "wormd_command_record_v1") => Some(&[]),
         _ => None,
     }
 }

@@ -1455,11 +1455,17 @@ class _InferredMemory(Memory):
         ("standing", ctypes.c_uint32),
         ("cell_count", ctypes.c_uint32),
         ("slope_is_measured", ctypes.c_uint32),
+        ("contradicting_marks", ctypes.c_uint32),
+        ("slide_sigma_m", ctypes.c_double),
+        ("friction_loss_sigma", ctypes.c_double),
+        ("load_rise_sigma_n", ctypes.c_double),
+        ("mark_off_m", ctypes.c_double),
+        ("mark_off_sigma_m", ctypes.c_double),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "wormd_inferred_v2"
+        return "wormd_inferred_v3"
 
 
 @dataclass(frozen=True, slots=True)
@@ -1561,6 +1567,18 @@ class Inferred(Message):
     """How many cells are in use."""
     slope_is_measured: int
     """1 when the inertial sensor measured the slope, 0 when it follows from the pull."""
+    contradicting_marks: int
+    """Marks that contradict the dead reckoning and each other: further off than three standard errors."""
+    slide_sigma_m: float
+    """Standard error of forward_slide_m and backward_slide_m, m: the largest of all cells'."""
+    friction_loss_sigma: float
+    """Standard error of friction_loss_share; NaN where none was lost."""
+    load_rise_sigma_n: float
+    """Standard error of load_rise_n, N; NaN while nothing has changed."""
+    mark_off_m: float
+    """How far the last mark was ahead of the dead reckoning, m; NaN before the first."""
+    mark_off_sigma_m: float
+    """Standard error of that by mark and dead reckoning together, m; NaN before the first."""
 
     @classmethod
     def _from_memory(cls, m: _InferredMemory) -> Inferred:
@@ -1611,6 +1629,12 @@ class Inferred(Message):
             standing=InferredStanding.of(m.standing),
             cell_count=m.cell_count,
             slope_is_measured=m.slope_is_measured,
+            contradicting_marks=m.contradicting_marks,
+            slide_sigma_m=m.slide_sigma_m,
+            friction_loss_sigma=m.friction_loss_sigma,
+            load_rise_sigma_n=m.load_rise_sigma_n,
+            mark_off_m=m.mark_off_m,
+            mark_off_sigma_m=m.mark_off_sigma_m,
         )
 
 

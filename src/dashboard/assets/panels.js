@@ -252,6 +252,9 @@ export function drawInferred({ frame }) {
     ["pull", known(inferred.pull_n, inferred.pull_sigma_n, 2, "N")],
     ...(inferred.slope_is_measured ? [["slope, measured", degrees(inferred.slope_rad, inferred.slope_sigma_rad)]] : []),
     ["position", known(scaled(positionM(frame), 1e3), inferred.position_sigma_m * 1e3, inferred.position_sigma_m < 1e-3 ? 1 : 0, "mm")],
+    ...(inferred.contradicting_marks > 0
+      ? [["marks", `${inferred.contradicting_marks} of ${inferred.marks} contradict the position; the last ${known(inferred.mark_off_m * 1e3, inferred.mark_off_sigma_m * 1e3, 0, "mm ahead")}`]]
+      : []),
     ...inferred.friction_n.map((friction, cell) => [
       `friction ${cell + 1}`,
       known(friction, inferred.friction_sigma_n[cell], 2, "N"),

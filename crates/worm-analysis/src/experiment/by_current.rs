@@ -66,7 +66,7 @@ pub struct AnalysisByCurrent {
     pub mean: CycleValues,
     /// Its standard errors.
     pub sigma: CycleValues,
-    /// Mean electrical energy of a cycle, measured, J.
+    /// Mean electrical energy of a cycle, measured, J; `NaN` where voltage or duty was not recorded.
     pub energy_electrical_j: f64,
     /// Energy that rigid contacts would take over the same advance, J.
     pub rigid_energy_j: f64,
@@ -95,7 +95,7 @@ pub struct CycleByCurrent {
     pub energy_loss_j: f64,
     /// Its standard error, J.
     pub energy_loss_sigma_j: f64,
-    /// Electrical energy of this cycle, measured, J.
+    /// Electrical energy of this cycle, measured, J; `NaN` where voltage or duty was not recorded.
     pub energy_electrical_j: f64,
 }
 
@@ -138,6 +138,8 @@ fn analyze_one(run: &RecordedRun<'_>, base: &Worm, config: &Config) -> Result<An
     };
     let mut sensing = SelfSensing::new(&nominal, &known);
     let mut cycles = Vec::new();
+    let is_recorded = |series: &[f64]| series.iter().any(|value| value.is_finite());
+    let has_power = is_recorded(&motor.voltage_v) && is_recorded(&motor.duty);
     let most_turn = 1.0 / (READINGS_PER_BIN * (BINS_PER_STEP * base.cells()) as f64);
     let mut before = None;
     for reading in readings(recording, phase, motor, nominal.slope_rad()) {
@@ -153,6 +155,9 @@ fn analyze_one(run: &RecordedRun<'_>, base: &Worm, config: &Config) -> Result<An
     let Some(sensed) = sensing.sensed() else {
         return Err(AnalysisError::NoCycle { recording: name() });
     };
+    if !has_power {
+        cycles.iter_mut().for_each(|cycle| cycle.energy_electrical_j = f64::NAN);
+    }
     let cells = sensed.cells;
     let of_cells = |values: &[f64]| values[..cells].to_vec();
     let deformations = (0..cells).map(|cell| largest_deformation(sensed, cell));

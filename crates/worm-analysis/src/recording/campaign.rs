@@ -226,6 +226,10 @@ impl Campaign {
         options: &OpenOptions,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Vec<Recording>, CampaignError> {
+        let options = &OpenOptions {
+            cells: Some(self.config.worm.cells),
+            ..options.clone()
+        };
         let count = self.runs.len() as f64;
         let mut recordings: Vec<Recording> = Vec::with_capacity(self.runs.len());
         for (number, run) in self.runs.iter().enumerate() {

@@ -72,6 +72,7 @@ pub fn read_from(
             let mut recording = table::read(
                 path,
                 Text::new(Cursor::new(&head[begin..]).chain(input), length, progress),
+                options.cells.filter(|_| options.wanted != Wanted::Positions),
             )?;
             if options.axis.is_some() {
                 let note = "--axis is not used: the positions in this file lie along the canal already";

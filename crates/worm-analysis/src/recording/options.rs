@@ -15,11 +15,13 @@ pub struct OpenOptions {
     pub max_gap_s: f64,
     /// Direction up the canal in the space of the markers; `None`: found from their motion.
     pub axis: Option<Axis>,
-    /// What is wanted of a log.
+    /// What is wanted of a recording.
     pub wanted: Wanted,
+    /// Number of cells of the worm, for a table of the motor alone, which does not say it; `None`: such a table is refused.
+    pub cells: Option<usize>,
 }
 
-/// What is wanted of a log of the worm, which may be without a tracker.
+/// What is wanted of a recording: a log or a table may be of a worm without a tracker.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Wanted {
     /// Positions: a log without them is refused.
@@ -50,6 +52,7 @@ impl Default for OpenOptions {
             max_gap_s: 0.2,
             axis: None,
             wanted: Wanted::Positions,
+            cells: None,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Recordings as CSV: one row for each sample, SI units named in the header.
 //!
-//! `time_s` and `x1_m` … `xn_m` must be there, `gait_phase` and the motor's columns may. Columns come in any order, unknown
-//! ones are ignored with a warning, lines that begin with `#` are comments, and an empty field or `nan` means not seen.
+//! `time_s` and `x1_m` … `xn_m` must be there, `gait_phase` and the motor's columns may. Of a worm that nobody saw, the motor's
+//! columns with `gait_phase` will do; the worm then says how many cells it has. Columns come in any order, unknown ones are
+//! ignored with a warning, lines that begin with `#` are comments, and an empty field or `nan` means not seen.
 
 use super::repair::stamps;
 use super::series::{Motor, Recording};
@@ -19,6 +20,10 @@ const MAX_COLUMNS: usize = 1000;
 /// Most columns that are named because they are not known.
 const MAX_UNKNOWN_NAMED: usize = 20;
 
+const CELLS_REMEDY: &str = "name the cells' columns x1_m, x2_m, … without a hole, cell 1 leads";
+const MOTOR_REMEDY: &str =
+    "where nobody saw the worm, record gait_phase, motor_angle_rad, motor_velocity_rad_s and motor_current_a";
+
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Column {
@@ -31,13 +36,23 @@ enum Column {
     Unknown,
 }
 
-/// Reads all rows. Whether they can be of a worm is checked elsewhere (`sanity_check`).
+/// Columns of the motor without which a table that has no positions says nothing, as indices into [`Motor::COLUMNS`]: the angle, for the ripple of the torque,
+/// the velocity and the current.
+const NEEDED_OF_MOTOR: [usize; 3] = [0, 1, 2];
+
+/// Reads all rows. Whether they can be of a worm is checked elsewhere (`sanity_check`). `unseen_cells` is how many cells a worm has of which only the
+/// motor is wanted; none where positions are.
 ///
 /// # Errors
 /// [`ReadError`] with line and column for an invalid header or row.
-pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording, ReadError> {
+pub(super) fn read<R: Read>(
+    path: &Path,
+    text: Text<'_, R>,
+    unseen_cells: Option<usize>,
+) -> Result<Recording, ReadError> {
     let mut rows = Rows {
         path,
+        unseen_cells,
         reader: csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -85,6 +100,9 @@ pub(super) fn read<R: Read>(path: &Path, text: Text<'_, R>) -> Result<Recording,
             }
         }
     }
+    for series in &mut recording.position_m {
+        series.resize(recording.time_s.len(), f64::NAN);
+    }
     let ends_back = matches!(recording.time_s[..], [.., before_s, last_s] if last_s <= before_s);
     let is_unterminated = line > 0 && rows.reader.get_ref().is_unterminated();
     if is_unterminated && ends_back && !is_cut_off {
@@ -124,6 +142,7 @@ fn with_increasing_time(mut recording: Recording, wrong_time: Option<ReadError>)
 
 struct Rows<'p, R> {
     path: &'p Path,
+    unseen_cells: Option<usize>,
     reader: csv::Reader<R>,
     names: Vec<String>,
     columns: Vec<Column>,
@@ -268,12 +287,9 @@ impl<R: Read> Rows<'_, R> {
             .collect();
         numbers.sort_unstable();
         let missing = (1..).zip(&numbers).find(|(expected, number)| expected != *number);
-        let remedy = "name the cells' columns x1_m, x2_m, … without a hole, cell 1 leads";
+        let remedy = CELLS_REMEDY;
         match (numbers.last(), missing) {
-            (None, _) => self.refuse_line(
-                format!("there is no column x1_m; the columns are {}", quoted(&names.join(", "))),
-                remedy,
-            ),
+            (None, _) => self.count_unseen_cells(names),
             (Some(last), Some((expected, _))) => {
                 self.refuse_line(format!("x{expected}_m is missing, but there is x{last}_m"), remedy)
             }
@@ -283,6 +299,26 @@ impl<R: Read> Rows<'_, R> {
                 format!("at most {MAX_CELLS} are handled"),
             ),
             (Some(&last), None) => Ok(last),
+        }
+    }
+
+    /// Number of cells of a table without a column of positions, where the motor's will do.
+    fn count_unseen_cells(&self, names: &[String]) -> Result<usize, ReadError> {
+        let problem = format!("there is no column x1_m; the columns are {}", quoted(&names.join(", ")));
+        let needed = NEEDED_OF_MOTOR.map(|index| (Column::Motor(index), Motor::COLUMNS[index]));
+        let needed = [(Column::Phase, "gait_phase")].into_iter().chain(needed);
+        let has = |column: &Column| self.columns.contains(column);
+        let (present, missing): (Vec<_>, Vec<_>) = needed.partition(|(column, _)| has(column));
+        match (self.unseen_cells, missing.first()) {
+            (Some(cells), None) => Ok(cells),
+            (Some(_), Some((_, name))) if present.iter().any(|(column, _)| *column != Column::Phase) => {
+                self.refuse_line(format!("{problem}; and for the motor alone {name} is missing"), MOTOR_REMEDY)
+            }
+            (None, None) => self.refuse_line(
+                format!("{problem}: it is of the motor alone, and positions are needed here"),
+                "`wormd analyze` and `wormd explain --current` go by the motor's current; or name the cells' columns x1_m, x2_m, …",
+            ),
+            _ => self.refuse_line(problem, CELLS_REMEDY),
         }
     }
 

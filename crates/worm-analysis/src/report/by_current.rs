@@ -211,12 +211,8 @@ fn against_theory(runs: &[AnalysisByCurrent]) -> Table {
     let mut table = Table::new("A cycle, inferred and in theory", head).with_word_columns(2);
     for (name, decimals, of) in QUANTITIES {
         for (number, (slope, run)) in named(runs).enumerate() {
-            // The slides of the cells depend on each other, so the error of their mean does not follow from theirs.
-            let sigma = if name.starts_with("slide") {
-                f64::NAN
-            } else {
-                of(&run.sigma)
-            };
+            // The mean of the slides' errors is the most that the error of their mean can be.
+            let sigma = of(&run.sigma);
             let theory = run.theory.nominal.as_ref();
             table.rows.push(vec![
                 if number == 0 { name } else { "" }.to_owned(),
@@ -230,12 +226,16 @@ fn against_theory(runs: &[AnalysisByCurrent]) -> Table {
         table.rows.push(vec![
             if number == 0 { "electrical energy, mJ" } else { "" }.to_owned(),
             slope,
-            format!("{} (measured)", fixed(run.energy_electrical_j * 1e3, 0)),
+            if run.energy_electrical_j.is_finite() {
+                format!("{} (measured)", fixed(run.energy_electrical_j * 1e3, 0))
+            } else {
+                "not recorded".to_owned()
+            },
             NONE.to_owned(),
         ]);
     }
     table.note = Some(format!(
-        "± is one standard error; slides are means over the cells. {NONE} in theory means that there is none: the worm slides down, or the motor is \
+        "± is one standard error; slides are means over the cells, whose errors are at most that. {NONE} in theory means that there is none: the worm slides down, or the motor is \
          not part of it."
     ));
     table

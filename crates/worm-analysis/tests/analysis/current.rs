@@ -1,12 +1,15 @@
 //! The motor's current as evidence: what positions cannot tell apart, as forces over stiffness are all that they show.
 
+use std::io::Cursor;
+use std::path::Path;
 use testkit::hidden_effects::campaign::{HiddenCampaign, draw_with_phase_sized};
 use testkit::hidden_effects::effect::{Effect, SeverityRange};
 use testkit::hidden_effects::hidden::{Hidden, Twin};
 use testkit::hidden_effects::setting::CampaignSize;
-use worm_analysis::experiment::{AnalysisError, analyze, analyze_by_current};
+use worm_analysis::experiment::{AnalysisError, RecordedRun, analyze, analyze_by_current};
 use worm_analysis::explain::answer::StageKind;
 use worm_analysis::explain::{Answer, Evidence, ExplainError, Options, Verdict, explain};
+use worm_analysis::recording::{OpenOptions, Recording, Wanted, read_from, write_csv};
 use worm_analysis::report::explain::page;
 
 /// In no range of the splits.
@@ -154,6 +157,77 @@ fn analysis_by_current_finds_what_positions_show() {
     blind[0].motor = None;
     let refused = analyze_by_current(&campaign.runs(&blind), &campaign.config).expect_err("nothing was recorded");
     assert!(matches!(refused, AnalysisError::NoCurrent { .. }), "{refused}");
+}
+
+/// A table of the motor alone, as somebody writes it who has no camera: without columns of positions, or with empty ones.
+#[test]
+fn a_table_of_the_motor_alone_is_what_the_log_is() {
+    let campaign = unseen(Hidden::Clean);
+    let run = campaign.runs(&campaign.recordings)[0];
+    let mut text = Vec::new();
+    write_csv(run.recording, &mut text).expect("memory can be written");
+    let text = String::from_utf8(text).expect("text");
+    let rows: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    let columns: Vec<&str> = rows[0].split(',').collect();
+    let without = |is_left_out: &dyn Fn(&str) -> bool| -> String {
+        let row = |row: &&str| {
+            let kept = row.split(',').zip(&columns).filter(|(_, column)| !is_left_out(column));
+            kept.map(|(field, _)| field).collect::<Vec<_>>().join(",") + "\n"
+        };
+        rows.iter().map(row).collect()
+    };
+    let opened = |text: &str, cells: Option<usize>| {
+        let options = OpenOptions {
+            wanted: Wanted::PositionsOrMotor { window_s: 0.0 },
+            cells,
+            ..OpenOptions::default()
+        };
+        read_from(
+            Cursor::new(text),
+            text.len() as u64,
+            Path::new("motor.csv"),
+            &options,
+            &mut |_| (),
+        )
+    };
+    let analysed = |recording: &Recording| {
+        let analyses = analyze_by_current(&[RecordedRun { recording, ..run }], &campaign.config);
+        analyses.expect("an analysis").remove(0)
+    };
+    let is_position = |column: &str| column.starts_with('x');
+    let cells = Some(run.recording.cells());
+    let expected = analysed(run.recording);
+    for text in [without(&is_position), without(&|_| false)] {
+        let recording = opened(&text, cells).expect("a recording");
+        assert_eq!(
+            (recording.cells(), recording.has_positions()),
+            (run.recording.cells(), false)
+        );
+        let found = analysed(&recording);
+        assert_eq!(found.friction_n, expected.friction_n);
+        assert_eq!(found.energy_electrical_j, expected.energy_electrical_j);
+    }
+    // Electrical energy that nobody measured is unknown, and not 0.
+    let unpowered = without(&|column| is_position(column) || column == "bus_voltage_v");
+    let found = analysed(&opened(&unpowered, cells).expect("a recording"));
+    assert!(found.energy_electrical_j.is_nan() && found.cycles.iter().all(|cycle| cycle.energy_electrical_j.is_nan()));
+    // What is missing is named, and what else takes such a table.
+    for (text, cells, words) in [
+        (
+            without(&|column| is_position(column) || column == "motor_velocity_rad_s"),
+            cells,
+            "motor_velocity_rad_s is missing",
+        ),
+        (
+            without(&|column| is_position(column) || column.contains('_') && column != "time_s"),
+            cells,
+            "there is no column x1_m",
+        ),
+        (without(&is_position), None, "wormd explain --current"),
+    ] {
+        let refused = opened(&text, cells).expect_err(words).to_string();
+        assert!(refused.contains(words), "{refused}");
+    }
 }
 
 #[test]

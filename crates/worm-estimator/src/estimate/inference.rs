@@ -4,7 +4,8 @@
 //! that starts anew, positions and marks that correct the dead reckoning, and the message of the topic `inferred`.
 //!
 //! **Marks** come with the records of commands. When a record reaches the estimator is chance, so a mark counts from the state on that
-//! follows the command by [`MARK_DELAY_TICKS`]: live and in a replay the same one. What the worm has crawled since is added to it.
+//! follows the command by [`MARK_DELAY_TICKS`]: live and in a replay the same one. What the worm has crawled since is added to it. One that is further
+//! off than [`CONTRADICTING_SIGMAS`] is counted as contradicting, so that whoever gave it is told.
 //!
 //! **Positions** count once a cycle, at its end, where the newest sample is no older than [`FRESH_S`]: within a cycle the mean of the cells
 //! does not move evenly, and the dead reckoning does not know that. The first one says where the worm begins.
@@ -23,6 +24,9 @@ const MAX_WAITING: usize = 32;
 const FRESH_S: f64 = 0.1;
 /// Standard error of a tracker's mean position as the end of a cycle, m: its age, and cells that have not come to rest.
 const TRACKER_SIGMA_M: f64 = 3e-4;
+
+/// Standard errors from which on a mark contradicts the dead reckoning, and with it the marks before.
+const CONTRADICTING_SIGMAS: f64 = 3.0;
 
 /// A mark that waits for its state.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +57,7 @@ pub struct Inference {
     waiting: [Option<WaitingMark>; MAX_WAITING],
     made: u64,
     marks: u32,
+    contradicting_marks: u32,
     tracker_marks: u32,
     inferred: Inferred,
 }
@@ -74,6 +79,7 @@ impl Inference {
             waiting: [None; MAX_WAITING],
             made: 0,
             marks: 0,
+            contradicting_marks: 0,
             tracker_marks: 0,
             inferred: nothing_known(worm.cells()),
         })
@@ -172,6 +178,7 @@ impl Inference {
         inferred.state_sequence = last.sequence;
         inferred.phase = last.phase;
         inferred.marks = self.marks;
+        inferred.contradicting_marks = self.contradicting_marks;
         inferred.tracker_marks = self.tracker_marks;
         self.made += 1;
         inferred
@@ -227,11 +234,14 @@ impl Inference {
                 continue;
             };
             let since_m = self.sensing.crawled_m(state.phase - phase);
-            self.sensing.mark(&Mark {
+            let off = self.sensing.mark(&Mark {
                 position_m: mark.position_m + since_m,
                 sigma_m: mark.sigma_m,
             });
             self.marks = self.marks.saturating_add(1);
+            let contradicts = u32::from(off.sigmas() > CONTRADICTING_SIGMAS);
+            self.contradicting_marks = self.contradicting_marks.saturating_add(contradicts);
+            (self.inferred.mark_off_m, self.inferred.mark_off_sigma_m) = (off.ahead_m, off.sigma_m);
             is_new = true;
         }
         is_new
@@ -265,6 +275,11 @@ fn nothing_known(cells: usize) -> Inferred {
         load_rise_n: UNKNOWN,
         change_friction_sigma: UNKNOWN,
         change_pull_sigma_n: UNKNOWN,
+        slide_sigma_m: UNKNOWN,
+        friction_loss_sigma: UNKNOWN,
+        load_rise_sigma_n: UNKNOWN,
+        mark_off_m: UNKNOWN,
+        mark_off_sigma_m: UNKNOWN,
         ..Inferred::empty()
     }
 }
@@ -281,6 +296,8 @@ fn fill(inferred: &mut Inferred, sensed: &SelfSensed) {
     inferred.stiffness_sigma_n_per_m = sensed.stiffness_sigma_n_per_m;
     inferred.forward_slide_m = figures.forward_slide_m;
     inferred.backward_slide_m = figures.backward_slide_m;
+    let of_slides = sigma.forward_slide_m.iter().chain(&sigma.backward_slide_m);
+    inferred.slide_sigma_m = of_slides.copied().fold(0.0, f64::max);
     inferred.pull_n = sensed.pull_n;
     inferred.pull_sigma_n = sensed.pull_sigma_n;
     inferred.slope_rad = sensed.slope_rad;
@@ -297,7 +314,9 @@ fn fill(inferred: &mut Inferred, sensed: &SelfSensed) {
     inferred.energy_electrical_sigma_j = sensed.electrical_sigma_j;
     inferred.residual_n_m = sensed.residual_n_m;
     inferred.friction_loss_share = known(changes.friction_lost != 0, changes.loss_share);
+    inferred.friction_loss_sigma = known(changes.friction_lost != 0, changes.loss_sigma);
     inferred.load_rise_n = known(changes.any(), changes.load_rise_n);
+    inferred.load_rise_sigma_n = known(changes.any(), changes.load_rise_sigma_n);
     inferred.change_friction_sigma = known(armed.friction != 0, armed.friction_sigma);
     inferred.change_pull_sigma_n = known(armed.load, armed.pull_sigma_n);
     inferred.friction_lost_mask = changes.friction_lost.into();

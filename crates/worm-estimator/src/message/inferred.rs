@@ -34,7 +34,7 @@ impl From<Standing> for InferredStanding {
 message! {
     /// What the motor's current alone says of the worm, with standard errors: after each gait cycle crawled forward, as soon as it is
     /// fitted, and after a mark. Positions play no part in it, but for those that correct the dead reckoning.
-    Inferred = "wormd_inferred_v2", made: time_ns, cells: |inferred| inferred.cell_count, {
+    Inferred = "wormd_inferred_v3", made: time_ns, cells: |inferred| inferred.cell_count, {
         /// Number of this message since the estimator started.
         sequence: u64,
         /// When it was made, ns of `CLOCK_MONOTONIC`.
@@ -125,6 +125,18 @@ message! {
         cell_count: u32,
         /// 1 when the inertial sensor measured the slope, 0 when it follows from the pull.
         slope_is_measured: u32,
+        /// Marks that contradict the dead reckoning and each other: further off than three standard errors.
+        contradicting_marks: u32,
+        /// Standard error of `forward_slide_m` and `backward_slide_m`, m: the largest of all cells'.
+        slide_sigma_m: f64,
+        /// Standard error of `friction_loss_share`; `NaN` where none was lost.
+        friction_loss_sigma: f64,
+        /// Standard error of `load_rise_n`, N; `NaN` while nothing has changed.
+        load_rise_sigma_n: f64,
+        /// How far the last mark was ahead of the dead reckoning, m; `NaN` before the first.
+        mark_off_m: f64,
+        /// Standard error of that by mark and dead reckoning together, m; `NaN` before the first.
+        mark_off_sigma_m: f64,
     }
 }
 

@@ -6,6 +6,7 @@
 //! before, or until the fit differs no more. Where no alarm has a name for the change (less load, or what looks like it), the worm before is
 //! remembered for a while all the same: its return is no change of the other one.
 
+use super::fit::CycleChange;
 use super::parameters::{Parameters, Vector};
 use super::profile::BINS_PER_STEP;
 use std::f64::consts::TAU;
@@ -33,6 +34,13 @@ const PULL_SCATTER_N: f64 = 0.04;
 /// Share of the usual torque late in a step below which its cell does not move. Ripple leaves some of it; a cell that has lost
 /// most of its friction leaves more.
 const JAMMED_SHARE: f64 = 0.12;
+/// Share of the usual torque late in a step below which all cells together have lost friction, whatever the fit makes of it: a pull downhill that does
+/// this to every cell is hardly to be met, and neither are several jams at once.
+const SLIPPING_SHARE: f64 = 0.6;
+/// Least standard error of the share that is lost then: what the gears take of so small a torque is not known better.
+const SLIPPING_SIGMA: f64 = 0.05;
+/// What the fit of one or two cycles leaves unknown of a rise of the load, as a share of it.
+const RISE_SCATTER: f64 = 0.15;
 /// Standard deviation that is allowed for a change of ln friction, of the pull, N, and of the gears' friction, N m.
 const ALLOWED: [f64; 3] = [0.5, 0.7, 0.02];
 
@@ -49,8 +57,12 @@ pub struct Changes {
     pub more_load: bool,
     /// Largest share of a cell's friction that is lost.
     pub loss_share: f64,
+    /// Standard error of `loss_share`.
+    pub loss_sigma: f64,
     /// By how much the load is larger, as a pull on the body, N.
     pub load_rise_n: f64,
+    /// Standard error of `load_rise_n`, N.
+    pub load_rise_sigma_n: f64,
     /// Torque late in the step of the cell that moves least, as a share of the usual.
     pub reach_share: f64,
 }
@@ -113,8 +125,8 @@ pub(super) struct ComparedCycle<'a> {
     pub(super) weight_n: Option<f64>,
     /// How many cycles that was.
     pub(super) cycles: f64,
-    /// By how much the unknowns differ in this cycle, and the standard errors.
-    pub(super) change: (Vector, Vector),
+    /// By how much the unknowns differ in this cycle.
+    pub(super) change: CycleChange,
     /// Torque profile of this cycle.
     pub(super) torque_n_m: &'a [f64],
     /// Mean profile of those before.
@@ -180,7 +192,7 @@ impl ChangeDetector {
             usual,
             weight_n,
             cycles,
-            change: (change, sigma),
+            change: CycleChange { by: change, sigma, .. },
             torque_n_m,
             mean_n_m,
         } = cycle;
@@ -263,7 +275,7 @@ impl ChangeDetector {
     ///
     /// `difference` is what the cycle's profile says directly, by one step from the fit. Where a profile has two answers, the fits before and
     /// after may be at different ones, and differ although the profiles do not.
-    pub(super) fn judge(&mut self, changed: WormNow<'_>, torque_n_m: &[f64], difference: Option<&Vector>) {
+    pub(super) fn judge(&mut self, changed: WormNow<'_>, torque_n_m: &[f64], difference: Option<&CycleChange>) {
         if let Some(changes) = self.changes_of(changed, torque_n_m, difference) {
             self.changes = changes;
         }
@@ -274,7 +286,7 @@ impl ChangeDetector {
         &mut self,
         changed: WormNow<'_>,
         torque_n_m: &[f64],
-        difference: Option<&Vector>,
+        difference: Option<&CycleChange>,
     ) -> bool {
         let changes = self.changes_of(changed, torque_n_m, difference).filter(Changes::any);
         if let Some(changes) = changes {
@@ -283,19 +295,36 @@ impl ChangeDetector {
         changes.is_some()
     }
 
-    fn changes_of(&self, changed: WormNow<'_>, torque_n_m: &[f64], difference: Option<&Vector>) -> Option<Changes> {
+    fn changes_of(
+        &self,
+        changed: WormNow<'_>,
+        torque_n_m: &[f64],
+        difference: Option<&CycleChange>,
+    ) -> Option<Changes> {
         let reference = self.reference?;
         let now = Reference::of(changed, torque_n_m, reference.gear_n_m, &self.step_order[..self.cells]);
         let mut changes = reference.compare(&now, self.cells, self.gear_friction_n_m, self.pull_per_torque);
         if let Some(difference) = difference {
-            for cell in (0..self.cells).filter(|&cell| difference[cell] > -SHOWN_SHARE * FRICTION_CHANGE) {
-                changes.friction_lost &= !(1 << cell);
+            let is_shown = |cell: &usize| difference.by[*cell] <= -SHOWN_SHARE * FRICTION_CHANGE;
+            if !reference.all_slip(&now, self.cells) {
+                for cell in (0..self.cells).filter(|cell| !is_shown(cell)) {
+                    changes.friction_lost &= !(1 << cell);
+                }
             }
             changes.all_friction_lost &= changes.friction_lost.count_ones() as usize == self.cells;
             let (pull_at, gear_at) = (2 * self.cells, 2 * self.cells + 1);
-            let pulled_n = difference[pull_at] - reference.steeper_by_n(&now);
+            let pulled_n = difference.by[pull_at] - reference.steeper_by_n(&now);
             changes.more_load &= pulled_n > SHOWN_SHARE * PULL_CHANGE_N
-                || difference[gear_at] > SHOWN_SHARE * GEAR_CHANGE * self.gear_friction_n_m;
+                || difference.by[gear_at] > SHOWN_SHARE * GEAR_CHANGE * self.gear_friction_n_m;
+            let cell = reference.cell_that_lost_most(&now, self.cells);
+            let by_scatter = (1.0 - changes.loss_share) * difference.sigma[cell].hypot(SCATTER);
+            changes.loss_sigma = if reference.all_slip(&now, self.cells) {
+                by_scatter.max(SLIPPING_SIGMA)
+            } else {
+                by_scatter
+            };
+            let left_n = RISE_SCATTER * changes.load_rise_n;
+            changes.load_rise_sigma_n = difference.load_sigma_n.hypot(PULL_SCATTER_N).hypot(left_n);
         }
         Some(changes)
     }
@@ -324,16 +353,33 @@ impl Reference {
             .map_or(0.0, |(before_n, now_n)| now_n - before_n)
     }
 
+    /// Torque late in a cell's step, as a share of what it was.
+    fn reach_share(&self, now: &Self, cell: usize) -> f64 {
+        now.reach_n_m[cell] / self.reach_n_m[cell]
+    }
+
+    /// Whether every cell steps with much less torque than before.
+    fn all_slip(&self, now: &Self, cells: usize) -> bool {
+        (0..cells).all(|cell| now.reach_n_m[cell] < SLIPPING_SHARE * self.reach_n_m[cell])
+    }
+
+    fn cell_that_lost_most(&self, now: &Self, cells: usize) -> usize {
+        let kept = |cell: &usize| now.ln_friction[*cell] - self.ln_friction[*cell];
+        (0..cells).min_by(|a, b| kept(a).total_cmp(&kept(b))).unwrap_or(0)
+    }
+
     fn compare(&self, now: &Self, cells: usize, gear_friction_n_m: f64, pull_per_torque: f64) -> Changes {
         // A steeper canal is no load.
         let pulled_n = now.pull_n - self.pull_n - self.steeper_by_n(now);
         let mut changes = Changes {
             reach_share: f64::INFINITY,
             load_rise_n: pulled_n + (now.gear_n_m - self.gear_n_m) * pull_per_torque,
+            loss_sigma: f64::NAN,
+            load_rise_sigma_n: f64::NAN,
             ..Changes::default()
         };
         for cell in 0..cells {
-            changes.reach_share = changes.reach_share.min(now.reach_n_m[cell] / self.reach_n_m[cell]);
+            changes.reach_share = changes.reach_share.min(self.reach_share(now, cell));
             let lost_share = 1.0 - (now.ln_friction[cell] - self.ln_friction[cell]).exp();
             changes.loss_share = changes.loss_share.max(lost_share);
             if now.reach_n_m[cell] < JAMMED_SHARE * self.reach_n_m[cell] {
@@ -341,6 +387,12 @@ impl Reference {
             } else if now.ln_friction[cell] - self.ln_friction[cell] < -FRICTION_CHANGE {
                 changes.friction_lost |= 1 << cell;
             }
+        }
+        if self.all_slip(now, cells) {
+            changes.jammed = 0;
+            changes.friction_lost = ((1_u32 << cells) - 1) as u16;
+            let lost_share = |cell: usize| 1.0 - self.reach_share(now, cell);
+            changes.loss_share = (0..cells).map(lost_share).fold(changes.loss_share, f64::max).min(1.0);
         }
         if changes.jammed != 0 {
             // The others push a jammed cell along, so their frictions look different, too.

@@ -24,6 +24,22 @@ pub struct Reckoned {
     pub sigma_m: f64,
 }
 
+/// How far a mark was off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkOff {
+    /// How far it was ahead of the dead reckoning, m.
+    pub ahead_m: f64,
+    /// Standard error of that by both, m.
+    pub sigma_m: f64,
+}
+
+impl MarkOff {
+    /// The distance in standard errors.
+    pub fn sigmas(&self) -> f64 {
+        (self.ahead_m / self.sigma_m).abs()
+    }
+}
+
 /// Least variance of an advance, m²: below it nothing is known.
 const MIN_VARIANCE_M2: f64 = 1e-16;
 /// Standard errors of the difference from which on a mark says nothing of the advance.
@@ -91,16 +107,20 @@ impl DeadReckoning {
         self.covariance += turned * self.bias_variance;
     }
 
-    /// Corrects by a mark.
-    pub fn mark(&mut self, mark: &Mark) {
+    /// Corrects by a mark. Returns how far it was off.
+    pub fn mark(&mut self, mark: &Mark) -> MarkOff {
         let innovation_m = mark.position_m - self.position_m;
         let variance = self.position_variance + mark.sigma_m * mark.sigma_m;
+        let off = MarkOff {
+            ahead_m: innovation_m,
+            sigma_m: variance.max(0.0).sqrt(),
+        };
         if variance <= 0.0 || !innovation_m.is_finite() {
-            return;
+            return off;
         }
-        if innovation_m * innovation_m > FAR_SIGMAS * FAR_SIGMAS * variance {
+        if off.sigmas() > FAR_SIGMAS {
             self.place(mark);
-            return;
+            return off;
         }
         let (gain, bias_gain) = (self.position_variance / variance, self.covariance / variance);
         self.position_m += gain * innovation_m;
@@ -109,6 +129,7 @@ impl DeadReckoning {
         self.covariance *= 1.0 - gain;
         self.position_variance *= 1.0 - gain;
         self.mark_information = (1.0 / self.bias_variance - 1.0 / self.fit_variance).max(0.0);
+        off
     }
 
     /// The worm is here, whatever was reckoned before.
@@ -156,6 +177,30 @@ mod tests {
         }
         let end = reckoning.reckoned();
         assert!((end.position_m - 0.98).abs() < 2e-5 && end.sigma_m < 3e-4, "{end:?}");
+    }
+
+    #[test]
+    fn marks_that_contradict_each_other_are_known_by_their_distance() {
+        let mut reckoning = crawled(100);
+        let mark = |position_m| Mark {
+            position_m,
+            sigma_m: 0.01,
+        };
+        let first = reckoning.mark(&mark(0.5));
+        assert!(
+            first.sigmas() < 0.1 && (first.sigma_m - 0.01 * 2f64.sqrt()).abs() < 1e-12,
+            "{first:?}"
+        );
+        // A second one at the same place that says something else: √(0.01²/2 + 0.01²) m is the error of both.
+        let second = reckoning.mark(&mark(0.54));
+        assert!(
+            (second.ahead_m - 0.04).abs() < 1e-3 && (second.sigmas() - 3.27).abs() < 0.05,
+            "{second:?}"
+        );
+        assert!(reckoning.reckoned().position_m < 0.52, "the place is between them");
+        // One that is beyond any error is believed.
+        assert!(reckoning.mark(&mark(0.7)).sigmas() > FAR_SIGMAS);
+        assert!((reckoning.reckoned().position_m - 0.7).abs() < 1e-12);
     }
 
     #[test]

@@ -41,6 +41,8 @@ const FLOOR_N_M: f64 = 3e-4;
 /// Weight of the bins on either side of the jump from one step to the next: readings are a tick apart, the jump is not.
 const FIRST_BIN_WEIGHTS: [f64; 2] = [0.01, 0.3];
 const LAST_BIN_WEIGHT: f64 = 0.02;
+/// Standard deviation of the mean ln friction of all cells of a worm that has changed.
+const COMMON_FRICTION_SIGMA: f64 = 1.0;
 /// Finite differences: of a logarithm of friction, of stiffness, and of the pull, N.
 const STEPS: [f64; 3] = [0.01, 0.02, 0.03];
 /// Cycles after which everything is searched anew, because the mean profile has become much better.
@@ -48,6 +50,17 @@ const SEARCHED_ANEW: f64 = 3.0;
 
 /// Means of each ripple's sine and cosine over each bin.
 type Ripples = [[(f64, f64); MAX_BINS]; MAX_RIPPLES];
+
+/// By how much the unknowns differ in one cycle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CycleChange {
+    /// The differences.
+    pub(super) by: Vector,
+    /// Their standard errors by the noise of one cycle.
+    pub(super) sigma: Vector,
+    /// The same of the load: the pull, and the gears' friction as a pull on the body, N.
+    pub(super) load_sigma_n: f64,
+}
 
 /// The fit and everything that it keeps between cycles.
 #[derive(Debug, Clone)]
@@ -65,6 +78,7 @@ pub(super) struct Fit {
     force_per_torque: f64, // of the stepping cell, 1/m
     prior: Vector,
     prior_information: Vector,
+    common_freedom: f64, // information on what all cells' ln friction have in common that a changed worm does not have
     known_pull_n: Option<f64>, // by the pitch, in the mean over the cycles
     at: Parameters,
     first_answer: Option<Parameters>, // of a search under way, from where the fit was
@@ -144,6 +158,7 @@ impl Fit {
             force_per_torque: TAU / (cells as f64 * worm.stroke_m()),
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
+            common_freedom: 0.0,
             known_pull_n: None,
             at,
             first_answer: None,
@@ -224,6 +239,37 @@ impl Fit {
             }
             information[(column, column)] += self.prior_information[column];
         }
+        for column in 0..self.at.cells {
+            for row in column..self.at.cells {
+                information[(row, column)] -= self.common_freedom;
+            }
+        }
+    }
+
+    /// Λ (θ − θ₀): half the derivative of what the prior adds to what is minimised.
+    fn prior_pull(&self, at: &Parameters) -> Vector {
+        let off = at.values - self.prior;
+        let mut pull = off.component_mul(&self.prior_information);
+        let common: f64 = off.iter().take(at.cells).sum();
+        (0..at.cells).for_each(|cell| pull[cell] -= self.common_freedom * common);
+        pull
+    }
+
+    /// From now on, all tips together may hold much less, or more, than is stated: they lie in one canal, and it may be wet.
+    fn free_common_friction(&mut self) {
+        let cells = self.at.cells as f64;
+        let stated: f64 = self.prior_information.iter().take(self.at.cells).sum();
+        self.common_freedom = ((stated - COMMON_FRICTION_SIGMA.powi(-2)) / (cells * cells)).max(0.0);
+    }
+
+    /// Standard deviation of a cell's ln friction before.
+    fn friction_sigma(&self, cell: usize) -> f64 {
+        let common = if self.common_freedom > 0.0 {
+            COMMON_FRICTION_SIGMA
+        } else {
+            0.0
+        };
+        self.prior_sigma(cell).hypot(common)
     }
 
     fn bin_weight(bin: usize) -> f64 {
@@ -273,7 +319,7 @@ impl Fit {
             .map(|bin| Self::bin_weight(bin) * (self.mean_n_m[bin] - predicted[bin]).powi(2))
             .sum();
         let off = parameters.values - self.prior;
-        self.weight() / self.variance * squares + off.component_mul(&self.prior_information).dot(&off)
+        self.weight() / self.variance * squares + self.prior_pull(parameters).dot(&off)
     }
 
     /// Σ over bins of derivative × weight × (`torque` − `from`) / R.
@@ -291,8 +337,8 @@ impl Fit {
     }
 
     /// One cycle's difference to another profile, of which it has this [`score`](Self::score): by a step from the present parameters in which
-    /// each unknown may change by about `sigma` (0: not at all), and its standard errors. Uses the scratch matrices.
-    pub(super) fn change(&mut self, score: &Vector, sigma: &Vector) -> Option<(Vector, Vector)> {
+    /// each unknown may change by about `sigma` (0: not at all). Uses the scratch matrices.
+    pub(super) fn change(&mut self, score: &Vector, sigma: &Vector) -> Option<CycleChange> {
         let [information, inverse] = &mut *self.scratch;
         for column in 0..self.unknowns {
             for row in column..self.unknowns {
@@ -308,14 +354,25 @@ impl Fit {
             return None;
         }
         leading::inverse(information, self.unknowns, inverse);
-        let (mut change, mut error) = (Vector::zeros(), Vector::zeros());
+        let mut change = CycleChange {
+            by: Vector::zeros(),
+            sigma: Vector::zeros(),
+            load_sigma_n: 0.0,
+        };
         for unknown in 0..self.unknowns {
-            change[unknown] = (0..self.unknowns)
+            change.by[unknown] = (0..self.unknowns)
                 .map(|other| inverse[(unknown, other)] * score[other])
                 .sum();
-            error[unknown] = inverse[(unknown, unknown)].sqrt();
+            change.sigma[unknown] = inverse[(unknown, unknown)].sqrt();
         }
-        Some((change, error))
+        // More pull looks like less friction in the gears: their sum is much surer than either.
+        let (pull, gears) = (self.at.pull_at(), self.at.gears_at());
+        let per_torque = self.at.cells as f64 * self.force_per_torque;
+        let variance = inverse[(pull, pull)]
+            + 2.0 * per_torque * inverse[(pull, gears)]
+            + per_torque * per_torque * inverse[(gears, gears)];
+        change.load_sigma_n = variance.max(0.0).sqrt();
+        Some(change)
     }
 
     pub(super) fn parameters(&self) -> &Parameters {

@@ -38,7 +38,7 @@ mod sensed;
 pub mod twins;
 
 pub use change::{Armed, Changes};
-pub use dead_reckoning::{Mark, Reckoned};
+pub use dead_reckoning::{Mark, MarkOff, Reckoned};
 pub use gear::{CurrentSource, GearModel, Ripple};
 pub use model::CycleFigures;
 pub use pitch::PitchSensor;
@@ -49,7 +49,7 @@ pub use twins::{Blind, Twin, Unknown};
 
 use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
-use fit::Fit;
+use fit::{CycleChange, Fit};
 use parameters::{Parameters, Vector};
 use pitch::MeanPitch;
 use profile::Profile;
@@ -68,6 +68,8 @@ const LONGEST_GAP_S: f64 = 0.1;
 const ROUNDING: [f64; 2] = [0.029, 0.29e-3];
 /// Cycles below which the fit may have begun at a wrong answer.
 pub(crate) const WARM_CYCLES: f64 = 3.0;
+/// Share of their friction that all cells have lost beyond which an advance is not known: it may be any part of the stroke, either way.
+const SLIPPING_LOSS: f64 = 0.5;
 /// Gait-to-gait scatter of the advance, as a share of what compliance takes of the stroke.
 const ADVANCE_SCATTER_SHARE: f64 = 0.02;
 
@@ -278,9 +280,9 @@ impl SelfSensing {
         );
     }
 
-    /// Corrects the distance by a known position.
-    pub fn mark(&mut self, mark: &Mark) {
-        self.reckoning.mark(mark);
+    /// Corrects the distance by a known position. Returns how far it was off.
+    pub fn mark(&mut self, mark: &Mark) -> MarkOff {
+        self.reckoning.mark(mark)
     }
 
     /// The worm is here, whatever was reckoned before: nothing is learned from the difference.
@@ -399,13 +401,12 @@ impl SelfSensing {
     }
 
     /// By how much the unknowns of the newest cycle differ from those of the worm before it changed.
-    fn difference(&mut self) -> Option<Vector> {
+    fn difference(&mut self) -> Option<CycleChange> {
         if !self.detector.is_another() {
             return None;
         }
         let score = self.fit.score(self.fit.cycle_n_m(), self.fit.before_n_m());
-        let (difference, _) = self.fit.change(&score, &self.allowed)?;
-        Some(difference)
+        self.fit.change(&score, &self.allowed)
     }
 
     /// Says in what a changed worm differs before everything is searched. True when it does.
@@ -430,7 +431,7 @@ impl SelfSensing {
             let now = (self.fit.parameters(), self.fit.known_pull_n());
             self.detector.judge(now, self.fit.cycle_n_m(), difference.as_ref());
         }
-        if let Some((figures, sigma)) = self.fit.figures() {
+        if let Some((figures, sigma)) = self.figures() {
             let backward_m = self.fit.backward_advance_m().unwrap_or(figures.advance_m);
             self.advance_m = [figures.advance_m, backward_m];
             self.reckoning.know_advance(figures.advance_m, sigma.advance_m);
@@ -445,13 +446,36 @@ impl SelfSensing {
         self.show(cycle, standing);
     }
 
+    /// By how much the first errors are larger than those of the fit: it may have begun at a wrong answer, and has hardly seen what scatters.
+    fn widened(&self) -> f64 {
+        let cycles = self.fit.cycles();
+        if (1.0..WARM_CYCLES).contains(&cycles) {
+            (1.0 + 1.0 / cycles).sqrt()
+        } else {
+            1.0
+        }
+    }
+
+    /// Figures of the steady cycle with their standard errors.
+    fn figures(&self) -> Option<(CycleFigures, CycleFigures)> {
+        let (figures, sigma) = self.fit.figures().copied()?;
+        let mut sigma = CycleFigures::from_flat(&sigma.flat().map(|sigma| self.widened() * sigma));
+        let changes = self.detector.changes();
+        if changes.all_friction_lost && changes.loss_share > SLIPPING_LOSS {
+            // Tips that hardly hold slide as a whole, which the exact cycle does not know.
+            sigma.advance_m = sigma.advance_m.max(self.stroke_m);
+        }
+        Some((figures, sigma))
+    }
+
     fn show(&mut self, cycle: &ClosedCycle, standing: Standing) {
-        let Some((figures, figures_sigma)) = self.fit.figures().copied() else {
+        let Some((figures, figures_sigma)) = self.figures() else {
             return;
         };
         let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());
         let cells = parameters.cells;
-        let sigma = |unknown: usize| covariance[(unknown, unknown)].max(0.0).sqrt();
+        let widened = self.widened();
+        let sigma = |unknown: usize| widened * covariance[(unknown, unknown)].max(0.0).sqrt();
         let of_cells = |of: &dyn Fn(usize) -> f64| {
             let mut values = [0.0; MAX_CELLS];
             (0..cells).for_each(|cell| values[cell] = of(cell));

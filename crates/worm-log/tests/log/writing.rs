@@ -4,7 +4,7 @@ use super::text;
 use std::fs;
 use std::io::Cursor;
 use testkit::log_sample::{ORIGIN_CONFIG, Sink, crawl, origin, write_log};
-use worm_estimator::message::{Estimate, ProtobufMessage, State};
+use worm_estimator::message::{Estimate, FieldAccess, Inferred, ProtobufMessage, State};
 use worm_log::{Channel, Index, Note, Origin, Writer, messages, messages_from, scan};
 
 #[test]
@@ -124,6 +124,34 @@ fn states_of_an_older_version_are_read_without_what_they_lack() {
     let without_pitch = &protobuf[..protobuf.len() - PITCH_LEN];
     fs::write(&path, foreign("/state", "wormd_state_v3", "protobuf", without_pitch)).expect("can be written");
     assert_eq!(text(&messages(&path).expect("a log").states), text(&[state]));
+}
+
+#[test]
+fn what_an_older_version_did_not_infer_is_no_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("worm.mcap");
+    // Zeros are left out in Protocol Buffers, as fields are that a version does not know.
+    let mut protobuf = Vec::new();
+    Inferred::empty().write_protobuf(&mut protobuf);
+    for version in ["wormd_inferred_v1", "wormd_inferred_v2"] {
+        fs::write(&path, foreign("/inferred", version, "protobuf", &protobuf)).expect("can be written");
+        let inferred = messages(&path).expect("a log").inferred[0];
+        let new = [
+            inferred.slide_sigma_m,
+            inferred.friction_loss_sigma,
+            inferred.load_rise_sigma_n,
+        ];
+        assert!(
+            new.iter()
+                .chain(&[inferred.mark_off_m, inferred.mark_off_sigma_m])
+                .all(|value| value.is_nan())
+        );
+        assert_eq!(
+            (inferred.advance_m, inferred.contradicting_marks),
+            (0.0, 0),
+            "{version}"
+        );
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::path::Path;
 fn opened(text: &str) -> Result<Recording, String> {
     let mut ignored = |_| {};
     let text = Text::new(Cursor::new(text.as_bytes()), text.len() as u64, &mut ignored);
-    read(Path::new("worm.csv"), text).map_err(|error| error.to_string())
+    read(Path::new("worm.csv"), text, None).map_err(|error| error.to_string())
 }
 
 #[test]

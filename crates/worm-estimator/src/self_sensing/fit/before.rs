@@ -43,6 +43,7 @@ impl Fit {
         (before.cycles, before.squared_cycles) = (self.cycles, self.squared_cycles);
         *before.mean_n_m = *self.mean_n_m;
         self.before.squared_distance = self.squared_distance(torque_n_m);
+        self.free_common_friction();
     }
 
     /// Mean profile of the worm that was set aside, N m at the cam.
@@ -61,7 +62,7 @@ impl Fit {
         (self.at, self.other, self.known_pull_n) = (before.at, before.other, before.known_pull_n);
         (self.cycles, self.squared_cycles) = (before.cycles, before.squared_cycles);
         *self.mean_n_m = *before.mean_n_m;
-        self.first_answer = None;
+        (self.first_answer, self.common_freedom) = (None, 0.0);
     }
 
     /// Weighted distance of a profile from the mean of the worm that was set aside, squared, N² m².

@@ -147,7 +147,6 @@ impl Descent {
 impl Fit {
     /// The direction in which what is minimised falls, halved.
     fn gradient(&self, at: &Parameters) -> Vector {
-        self.score(&self.mean_n_m[..], &self.predicted_n_m[..]) * self.weight()
-            - (at.values - self.prior).component_mul(&self.prior_information)
+        self.score(&self.mean_n_m[..], &self.predicted_n_m[..]) * self.weight() - self.prior_pull(at)
     }
 }

@@ -17,6 +17,8 @@ const BEST: usize = 3;
 /// Gauss-Newton steps from each first place, then from each of the best. From where the fit was at once as many as these: for a worm that has
 /// changed it is mostly the answer, and a first one that others can wait for no longer.
 const ROUNDS: [usize; 2] = [2, 12];
+/// Standard deviations from what is stated up to which the swing of the torque says where a cell's friction begins.
+const FAR_SIGMAS: f64 = 2.5;
 /// Difference of two pulls, N, that makes another answer of them.
 const OTHER_PULL_N: f64 = 0.25;
 /// Difference of what is minimised up to which another answer still counts.
@@ -156,7 +158,7 @@ impl Fit {
             let (begin_n_m, end_n_m) = (mean(&step[1..3]), mean(&step[BINS_PER_STEP - 9..BINS_PER_STEP - 1]));
             let friction_n = 0.5 * (end_n_m - begin_n_m) * self.force_per_torque;
             let cell = self.model.cell_at(place);
-            let far = 2.5 / self.prior_information[cell].sqrt();
+            let far = FAR_SIGMAS * self.friction_sigma(cell);
             at.values[cell] += (friction_n.max(1e-6).ln() - self.prior[cell]).clamp(-far, far);
             offset_n_m += 0.5 * (end_n_m + begin_n_m) / cells as f64;
         }

@@ -128,6 +128,11 @@ impl Fit {
             }
             meat[(column, column)] += self.prior_information[column];
         }
+        for column in 0..self.at.cells {
+            for row in 0..self.at.cells {
+                meat[(row, column)] -= self.common_freedom;
+            }
+        }
     }
 
     /// Of two answers, at the better one: its covariance, and how far the other is, as probably as it is true.
