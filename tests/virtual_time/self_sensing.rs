@@ -174,16 +174,31 @@ fn the_running_estimator_infers_what_the_current_alone_says() {
     assert_eq!(allocated.count_total, 0);
     assert!(messages >= 3, "{messages} messages");
 
+    let unseen = |state: &State| State {
+        sample_is_new: 0,
+        position_m: [f64::NAN; worm_physics::MAX_CELLS],
+        ..*state
+    };
     let mut alone = Inference::by_current_alone(&config).expect("a valid configuration");
-    let mut blind = Vec::new();
-    for state in &states {
-        let unseen = State {
-            sample_is_new: 0,
-            position_m: [f64::NAN; worm_physics::MAX_CELLS],
-            ..*state
-        };
-        blind.extend(alone.update(&unseen).copied());
+    let mut marked = Inference::by_current_alone(&config).expect("a valid configuration");
+    let (mut blind, mut with_marks) = (Vec::new(), Vec::new());
+    for (tick, state) in states.iter().enumerate() {
+        blind.extend(alone.update(&unseen(state)).copied());
+        if let Some(place) = [9_000, 12_000].iter().position(|&at| at == tick) {
+            marked.note_command(&CommandRecord {
+                state_sequence: state.sequence,
+                time_ns: state.time_ns,
+                phase: state.phase,
+                position_m: [0.7, 0.9][place],
+                ..mark
+            });
+        }
+        with_marks.extend(marked.update(&unseen(state)).copied());
     }
+    // Nothing said where it began before the first mark, so that contradicts nothing; the second one is some 0.2 m off.
+    let last = with_marks.last().expect("messages");
+    assert_eq!((last.marks, last.contradicting_marks), (2, 1));
+    assert!((0.15..0.2).contains(&last.mark_off_m), "{last:?}");
     let ends = |messages: &[Inferred]| -> Vec<Inferred> {
         let mut last_ns = 0;
         let fitted = messages

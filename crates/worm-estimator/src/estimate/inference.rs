@@ -238,10 +238,14 @@ impl Inference {
                 position_m: mark.position_m + since_m,
                 sigma_m: mark.sigma_m,
             });
+            // Where a worm began that no tracker sees is 0 by definition, until the first mark says it.
+            let says_where_it_began = self.marks == 0 && !self.is_placed;
             self.marks = self.marks.saturating_add(1);
-            let contradicts = u32::from(off.sigmas() > CONTRADICTING_SIGMAS);
-            self.contradicting_marks = self.contradicting_marks.saturating_add(contradicts);
-            (self.inferred.mark_off_m, self.inferred.mark_off_sigma_m) = (off.ahead_m, off.sigma_m);
+            if !says_where_it_began {
+                let contradicts = u32::from(off.sigmas() > CONTRADICTING_SIGMAS);
+                self.contradicting_marks = self.contradicting_marks.saturating_add(contradicts);
+                (self.inferred.mark_off_m, self.inferred.mark_off_sigma_m) = (off.ahead_m, off.sigma_m);
+            }
             is_new = true;
         }
         is_new
