@@ -338,6 +338,7 @@ pub fn explained(cells: usize) -> Answer {
         screening: screening(),
         threshold: 14.2,
         doubt: Doubt {
+            misstated_probability: None,
             null_probability: 1e-4,
             other_probability: 0.006,
             agrees_within_m: 4.1e-5,
