@@ -17,6 +17,9 @@ pub use run::{CurrentEvidence, RunSummary};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
+/// Probability from which an answer is that the conditions of the recordings are stated wrongly.
+pub(in crate::explain) const MISSTATED: f64 = 0.5;
+
 /// The verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -81,6 +84,13 @@ impl Answer {
     /// Whether it is based on the motor's current alone: nobody saw the cells.
     pub fn is_by_current_alone(&self) -> bool {
         !self.runs.is_empty() && self.runs.iter().all(|run| !run.sees_positions)
+    }
+
+    /// Whether it is more probable than everything else together that the slopes are stated wrongly.
+    pub fn is_misstated(&self) -> bool {
+        self.doubt
+            .misstated_probability
+            .is_some_and(|probability| probability > MISSTATED)
     }
 
     /// Whether it is based on advances alone, without a recording.

@@ -189,9 +189,17 @@ pub(super) fn of_pads(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<String> {
     })
 }
 
+/// How much of the gap the nearest effect leaves.
+fn of_gap(open_share: f64) -> String {
+    match open_share < 1.0 {
+        true => format!("{:.0} % of the gap stays open", 100.0 * open_share),
+        false => "all of the gap stays open".to_owned(),
+    }
+}
+
 /// What no effect explains, in words.
 pub(super) fn remainder(open_share: f64, places: &[Place]) -> String {
-    let whole = format!("{:.0} % of the gap stays open", 100.0 * open_share);
+    let whole = of_gap(open_share);
     match places.first() {
         Some(place) => format!(
             "{whole}; it is largest at cell {} while cell {} steps, phase {:.2}, on the {}° run: {:+.3} mm in each cycle ({:.1} standard errors)",
@@ -208,7 +216,7 @@ pub(super) fn remainder(open_share: f64, places: &[Place]) -> String {
 
 /// The same of a worm that nobody sees, by the mean cycle of the torque in each run.
 pub(super) fn remainder_of_torque(worm: &RecordedWorm<'_>, open_share: f64, torque: &[TorqueSeries]) -> String {
-    let whole = format!("{:.0} % of the gap stays open", 100.0 * open_share);
+    let whole = of_gap(open_share);
     let off = torque.iter().flat_map(|run| {
         let pairs = run.phase.iter().zip(run.measured_n_m.iter().zip(&run.recalibrated_n_m));
         pairs.map(|(phase, (measured_n_m, model_n_m))| (run.slope_deg, *phase, measured_n_m - model_n_m))

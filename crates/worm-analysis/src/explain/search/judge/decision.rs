@@ -22,7 +22,7 @@ use super::evidence::Evidence;
 use super::ln_sum::ln_sum;
 use super::prior;
 use super::structural_change::Change;
-use crate::explain::answer::Verdict;
+use crate::explain::answer::{MISSTATED, Verdict};
 
 /// Probability from which an effect beside which there are others counts as one that changes what matters.
 pub(in crate::explain) const MATTERS: f64 = 0.95;
@@ -120,7 +120,7 @@ pub(in crate::explain) struct Selected {
 impl Selected {
     /// Whether it is more probable than everything else together that the conditions of the recordings are stated wrongly.
     pub fn is_misstated(&self) -> bool {
-        self.misstated_probability > 0.5
+        self.misstated_probability > MISSTATED
     }
 }
 

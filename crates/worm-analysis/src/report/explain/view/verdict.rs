@@ -81,6 +81,9 @@ pub(super) fn headline(answer: &Answer) -> String {
             "Something is missing from the model, and these {evidence} cannot tell whether it is {}.",
             alternatives(effects, &answer.rivals)
         ),
+        (Verdict::OutsideLibrary, _) if answer.is_misstated() => {
+            "The slopes seem to be stated wrongly: nothing needs to be missing from the model.".to_owned()
+        }
         (Verdict::OutsideLibrary, _) => {
             let alone = if answer.is_by_advances() { " alone" } else { "" };
             format!("Something is missing from the model, and no known effect{alone} explains it.")
