@@ -5,7 +5,7 @@
 //! conditions as they may have been meant, without any effect.
 
 use super::fit::Fit;
-use super::judge::prior::MISSTATED;
+use super::judge::prior::{MISSTATED, MISSTATED_RUN};
 use super::judgement::Judge;
 use super::misstatement::Misstatement;
 use super::plant::Plant;
@@ -36,7 +36,12 @@ pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvem
         return Vec::new();
     }
     let all = problem.plant.misstatements(&judge.recalibrated.hypothesis);
-    let ln_prior = (MISSTATED / all.len().max(1) as f64).ln();
+    // All of a kind as probable as any one.
+    let of_one_run = all.iter().filter(|one| one.must_differ.is_some()).count();
+    let priors = [
+        MISSTATED / (all.len() - of_one_run) as f64,
+        MISSTATED_RUN / of_one_run as f64,
+    ];
     let mut starts: Vec<(Misstatement, f64)> = all
         .into_iter()
         .map(|one| {
@@ -62,10 +67,11 @@ pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvem
                 let off = (fit.at[quantity] - fit.hypothesis.free[quantity].quantity.centre).abs();
                 off >= least.max(LEAST_SIGMAS * fit.sigmas()[quantity])
             });
+            let prior = priors[usize::from(one.must_differ.is_some())];
             differs.then(|| Misstated {
                 what: one.what,
                 improvement,
-                ln_weight: ln_prior + judge.evidence_of(&fit, &|_| None).usual,
+                ln_weight: prior.ln() + judge.evidence_of(&fit, &|_| None).usual,
                 fit,
             })
         })
