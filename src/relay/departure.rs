@@ -1,6 +1,5 @@
 //! A driver that is gone: in the name by which the relay then makes the worm hold, so that every recording of the command says who and why.
 
-use super::remark::name_within;
 use std::fmt;
 use worm_estimator::message::{CommandKind, CommandRecord, ShortText};
 use worm_estimator::time::seconds;
@@ -78,6 +77,18 @@ impl fmt::Display for Departure {
             Way::Silent(s) => write!(f, "nothing was heard for {s} s from {name}, who drove"),
         }
     }
+}
+
+/// As much of a watcher's name as `room` bytes hold.
+pub(super) fn name_within(name: &str, room: usize) -> String {
+    // A page is called by its user and, after a comma, its browser.
+    let name = match name.split_once(',') {
+        Some((user, _)) if name.len() > room => user,
+        _ => name,
+    };
+    // As many whole letters as there is room for.
+    let fits = |(at, letter): &(usize, char)| at + letter.len_utf8() <= room;
+    name.char_indices().take_while(fits).map(|(_, letter)| letter).collect()
 }
 
 #[cfg(test)]

@@ -1,23 +1,12 @@
 //! What the relay decides by itself and every recording is to say all the same: who took over, and who was refused because another drives.
 
+use super::departure::name_within;
 use super::drive::WatcherId;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{Command, CommandKind, CommandRecord, ShortText};
 
 /// How long the same refusal of the same watcher is not recorded again: a program that asks on and on must not fill the records.
 const SAME: Duration = Duration::from_secs(1);
-
-/// As much of a watcher's name as `room` bytes hold.
-pub(super) fn name_within(name: &str, room: usize) -> String {
-    // A page is called by its user and, after a comma, its browser.
-    let name = match name.split_once(',') {
-        Some((user, _)) if name.len() > room => user,
-        _ => name,
-    };
-    // As many whole letters as there is room for.
-    let fits = |(at, letter): &(usize, char)| at + letter.len_utf8() <= room;
-    name.char_indices().take_while(fits).map(|(_, letter)| letter).collect()
-}
 
 /// The record of a take-over.
 pub(super) fn take_over(name: &str, user: u32) -> Command {
