@@ -12,7 +12,7 @@ use super::{link_log, reasons};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::syslog;
-use crate::topics::{Bridge as BridgeRole, Instance, RoleError, RoleLock};
+use crate::topics::Instance;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use std::collections::{BTreeMap, BTreeSet};
 use std::os::fd::AsFd;
@@ -40,7 +40,7 @@ const MAX_OF_ONE: usize = 8;
 /// Serves until `end` is set. Calls `ready` once laptops can connect, and `round` at each turn, also while it waits for its address.
 ///
 /// # Errors
-/// [`Failure::Unusable`] when a worm's folder or an address cannot be used, or another bridge serves one of the worms.
+/// [`Failure::Unusable`] when a worm's folder or an address cannot be used.
 pub(crate) fn run(
     settings: BridgeSettings,
     end: &AtomicBool,
@@ -48,11 +48,9 @@ pub(crate) fn run(
     round: impl Fn(),
 ) -> Result<(), Failure> {
     let mut worms = Vec::new();
-    let mut roles = Vec::new();
     for (config, arguments) in settings.worms {
         let instance = Instance::of(&config).map_err(Failure::unusable)?;
         let name = config.worm.name;
-        roles.push(take_role(&instance)?);
         worms.push(Served {
             name,
             instance,
@@ -91,23 +89,10 @@ pub(crate) fn run(
         bridge.turn()?;
         round();
     }
-    // With the last lock goes a folder that is empty.
-    drop(roles);
+    for worm in &bridge.worms {
+        worm.instance.remove_folder_if_empty();
+    }
     Ok(())
-}
-
-/// Two bridges of a worm would offer it twice, and laptops would see it come and go with each.
-fn take_role(instance: &Instance) -> Result<RoleLock<BridgeRole>, Failure> {
-    RoleLock::take(instance).map_err(|error| match error {
-        RoleError::AlreadyRunning(other) => {
-            let (worm, pid) = (instance.worm(), other.pid);
-            Failure::unusable(format!(
-                "another `wormd bridge` (process {pid}) serves {worm} already, and one is enough for all laptops: name all addresses in the \
-                 `listen` of one bridge.toml, or end that one (kill {pid})"
-            ))
-        }
-        error => Failure::unusable(error),
-    })
 }
 
 /// Opens the network, once this computer has the addresses: at power-up its network may take longer than its programs. None at the end.

@@ -47,8 +47,6 @@ roles! {
     Relay = "relay",
     /// The process that makes a trip.
     Trip = "trip",
-    /// The process that serves laptops over a network: `wormd bridge`.
-    Bridge = "bridge",
 }
 
 /// Another process has the role.
