@@ -19,12 +19,12 @@ const MAX_AGE_TICKS: f64 = 2.0;
 /// The smallest difference is held against the samples of this long, s.
 const REVIEW_S: f64 = 1.0;
 
-/// Compares the two clocks and remembers the tick before.
+/// Compares the two clocks and remembers the last reading of the motor.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Capture {
     min_lag_s: Option<(f64, f64)>, // and when
     review: Option<Review>,
-    before: Option<(f64, f64)>, // time and phase of the tick before
+    before: Option<(f64, f64)>, // time and phase of the reading before
 }
 
 /// The samples of the present second.
@@ -35,8 +35,9 @@ struct Review {
 }
 
 impl Capture {
-    /// Records a tick, after [`place`](Self::place) has had its sample, if any.
-    pub fn note_tick(&mut self, time_s: f64, phase: f64) {
+    /// Records a tick at which the motor was read, after [`place`](Self::place) has had its sample, if any. While the motor is silent its phase
+    /// stands still in the states, and then jumps: no speed follows from that.
+    pub fn note_reading(&mut self, time_s: f64, phase: f64) {
         self.before = Some((time_s, phase));
     }
 
@@ -111,9 +112,25 @@ mod tests {
                 }
                 sample += 1;
             }
-            capture.note_tick(time_s, 0.0);
+            capture.note_reading(time_s, 0.0);
         }
         worst_ms
+    }
+
+    /// At 0.7 cycles a second, a sample 3 ms old comes with the first reading after a silence of the motor.
+    #[test]
+    fn after_a_silence_the_cam_is_where_it_was_when_the_sample_was_captured() {
+        let mut capture = Capture::default();
+        let phase = |time_s: f64| 0.7 * time_s;
+        for tick in 1..=250 {
+            let time_s = 4e-3 * f64::from(tick);
+            capture.place(time_s, time_s, phase(time_s));
+            capture.note_reading(time_s, phase(time_s));
+        }
+        let again_s = 1.064;
+        let (captured_s, placed) = capture.place(again_s - 3e-3, again_s, phase(again_s));
+        assert!((captured_s - (again_s - 3e-3)).abs() < 2e-4, "{captured_s}");
+        assert!((placed - phase(captured_s)).abs() < 1e-4, "{placed}");
     }
 
     #[test]

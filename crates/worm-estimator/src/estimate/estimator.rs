@@ -198,7 +198,9 @@ impl Estimator {
             self.take_sample(state, time_s, motor_s);
         }
         if state.phase.is_finite() {
-            self.capture.note_tick(motor_s, state.phase);
+            if state.motor_is_new == 1 {
+                self.capture.note_reading(motor_s, state.phase);
+            }
             self.detect_silence(state.phase, time_s);
             self.last = Some((state.sequence, time_s, state.phase));
         } else if let Some((sequence, ..)) = &mut self.last {
