@@ -25,6 +25,8 @@ use worm_physics::MAX_CELLS;
 const LEVEL_DEG: f64 = 0.5;
 /// Weight of the newest sample in the smoothed positions: five samples, some 40 ms.
 const SMOOTHING: f64 = 0.2;
+/// Smoothing begins anew after a silence of so many samples: the worm has moved meanwhile.
+const SILENT_SAMPLES: f64 = 6.0;
 /// Samples in a row beyond the threshold.
 const CONFIRMATIONS: u32 = 4;
 /// A displacement within this many standard deviations of the mean position is noise.
@@ -61,6 +63,8 @@ pub(super) struct SlidingDown {
     slope_sign: f64, // +1 uphill along the canal, −1 downhill, 0 level
     calibration_cycles: u32,
     smoothed: Positions,
+    smoothed_ns: u64,
+    longest_gap_ns: u64,
     crawl_state: Option<CrawlState>,
     reversals: u32,
     anchor: Positions, // where the present state of the crawl began
@@ -91,6 +95,8 @@ impl SlidingDown {
             },
             calibration_cycles: config.estimator.calibration_cycles,
             smoothed: Positions::NONE,
+            smoothed_ns: 0,
+            longest_gap_ns: (SILENT_SAMPLES / config.tracker.rate_hz * 1e9) as u64,
             crawl_state: None,
             reversals: 0,
             anchor: Positions::NONE,
@@ -127,7 +133,7 @@ impl SlidingDown {
         baseline_m: Option<f64>,
         fault_free: bool,
     ) -> DetectorOutput {
-        self.smooth(positions);
+        self.smooth(positions, tick.now_ns);
         let up = if self.slope_sign == 0.0 {
             tick.direction
         } else {
@@ -161,7 +167,10 @@ impl SlidingDown {
         }
     }
 
-    fn smooth(&mut self, positions: &Positions) {
+    fn smooth(&mut self, positions: &Positions, now_ns: u64) {
+        if now_ns.saturating_sub(std::mem::replace(&mut self.smoothed_ns, now_ns)) > self.longest_gap_ns {
+            self.smoothed = Positions::NONE;
+        }
         for cell in 0..MAX_CELLS {
             let weight = if self.smoothed.has(cell) { SMOOTHING } else { 1.0 };
             let before = if self.smoothed.has(cell) {
