@@ -120,13 +120,13 @@ fn what_is_not_reached_is_shown_and_named_and_never_counts_as_held() {
         "{whys}"
     );
 
-    // It comes, with a worm of the same name.
+    // It comes, with a worm of the same name: another computer has other folders. (A longer root is refused.)
+    let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
+    let elsewhere = robot.files.path().join("elsewhere.toml");
+    std::fs::write(&elsewhere, format!("[topics]\nroot = '{}'\n", path(root.path()))).expect("can be written");
     let config = robot.files.path().join("second.toml");
-    std::fs::write(
-        &config,
-        bridge_toml(name, "127.0.0.1", second_port).replace("robot1", "robot2"),
-    )
-    .expect("can be written");
+    let toml = bridge_toml(name, "127.0.0.1", second_port).replace("robot1", "robot2");
+    std::fs::write(&config, toml + &format!("config = '{}'\n", path(&elsewhere))).expect("can be written");
     let second = robot.worm.plain_wormd(&["bridge", "--config", path(&config)]).start();
     desk.wait_for(2, "robot2", "robot1 has a worm");
     let (status, held) = desk.hold();

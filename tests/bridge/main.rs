@@ -6,6 +6,7 @@ mod fleet_page;
 mod http;
 mod network;
 mod record;
+mod second_bridge;
 mod watcher;
 #[path = "../processes/worm.rs"]
 #[allow(
@@ -36,7 +37,7 @@ struct Robot<'a> {
     files: tempfile::TempDir,
     network: Option<&'a TwoComputers>,
     port: u16,
-    _processes: Vec<Process>,
+    processes: Vec<Process>,
 }
 
 impl<'a> Robot<'a> {
@@ -75,7 +76,7 @@ impl<'a> Robot<'a> {
             network,
             port,
             // The bridge ends first.
-            _processes: vec![bridge, controller, estimator, virtual_worm],
+            processes: vec![bridge, controller, estimator, virtual_worm],
         }
     }
 
@@ -107,6 +108,10 @@ impl<'a> Robot<'a> {
             process: fleet.start(),
             root,
         }
+    }
+
+    fn bridge(&mut self) -> &mut Process {
+        &mut self.processes[0]
     }
 
     fn mode(&self) -> Option<Mode> {
