@@ -5,6 +5,7 @@
 
 use super::clock::ClockWatch;
 use super::network::{End, Network, Party, Way};
+use super::refusals::Refusals;
 use super::remote::{Remote, Served};
 use super::settings::BridgeSettings;
 use super::wire::{Beat, MAX_UP, Up, VERSION};
@@ -80,6 +81,7 @@ pub(crate) fn run(
         worms,
         network,
         remotes: BTreeMap::new(),
+        refusals: Refusals::default(),
         clock: ClockWatch::new(),
         looked: Instant::now(),
         refused: None,
@@ -160,6 +162,8 @@ struct Bridge {
     worms: Vec<Served>,
     network: Network,
     remotes: BTreeMap<Party, Remote>,
+    /// The refused requests that the worms' records get.
+    refusals: Refusals,
     clock: ClockWatch,
     looked: Instant,
     /// Why a connection was refused, as that was said last.
@@ -256,7 +260,7 @@ impl Bridge {
         }
         let stream = self.stream();
         if let Some(remote) = self.remotes.get_mut(&party)
-            && remote.take(up, &self.worms, now_ns)
+            && remote.take(up, &self.worms, &mut self.refusals, now_ns)
         {
             remote.restart(stream, &self.worms);
         }

@@ -6,6 +6,7 @@ mod fleet_page;
 mod http;
 mod network;
 mod record;
+mod refusals;
 mod second_bridge;
 mod watcher;
 #[path = "../processes/worm.rs"]
