@@ -271,6 +271,7 @@ impl Bridge {
         Beat {
             version: VERSION,
             wormd: env!("CARGO_PKG_VERSION").to_owned(),
+            bridge: Some(format!("{}-{}", self.clock.status().boot_id, std::process::id())),
             worms: self.worms.iter().map(|worm| worm.name.clone()).collect(),
             may_drive: false,
             round_trip_ms: None,
