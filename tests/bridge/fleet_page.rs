@@ -185,7 +185,11 @@ fn what_is_not_reached_is_shown_and_named_and_never_counts_as_held() {
             "{arguments:?}: {said}"
         );
     }
-    desk.wormd_fails(&["command", "hold"]);
+    let said = desk.wormd_fails(&["command", "hold"]);
+    assert!(
+        said.contains("is a worm of robot1") && said.contains("wormd watch"),
+        "{said}"
+    );
     let offered = std::fs::symlink_metadata(&desk.laptop.socket).expect("it is still there");
 
     // Somebody removes it.

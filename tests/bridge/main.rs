@@ -440,6 +440,11 @@ fn what_is_open_or_unusable_ends_with_exit_status_2() {
         ("'anna'", "'hall'", "twice"),
         ("[access]", "scouting = true\n[access]", "unknown field"),
         ("[[worms]]", "[[worms]] #", "in use"),
+        (
+            "[[worms]]",
+            "[[worms]]\nconfig = 'none.toml'",
+            "none.toml: No such file or directory (os error 2): name the file",
+        ),
         (robot.worm.name(), "Not A Name", "worm.name"),
     ] {
         let text = good.replacen(from, to, 1);
