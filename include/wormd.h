@@ -313,6 +313,13 @@ enum wormd_command_kind {
   /* Note that a command did not come this far, because another watcher drives. The sender is NAME: COMMAND.
      Moves and permits nothing. */
   WORMD_COMMAND_KIND_NOT_DRIVER = 9,
+  /* Note that a command did not come this far, because the certificate of whoever asked over the network does
+     not permit it. The sender is NAME: COMMAND, and the name begins with that of the certificate. Moves and
+     permits nothing. */
+  WORMD_COMMAND_KIND_NOT_PERMITTED = 10,
+  /* Note that a command did not come this far, because it came too late over the network. The sender is as
+     with not-permitted. Moves and permits nothing. */
+  WORMD_COMMAND_KIND_STALE = 11,
 };
 
 /* The name, as in logs; "unknown" for a code of a newer version. */
@@ -328,6 +335,8 @@ static inline const char *wormd_command_kind_name(uint32_t code) {
     case WORMD_COMMAND_KIND_MARK: return "mark";
     case WORMD_COMMAND_KIND_TAKE_OVER: return "take-over";
     case WORMD_COMMAND_KIND_NOT_DRIVER: return "not-driver";
+    case WORMD_COMMAND_KIND_NOT_PERMITTED: return "not-permitted";
+    case WORMD_COMMAND_KIND_STALE: return "stale";
     default: return "unknown";
   }
 }

@@ -333,7 +333,7 @@ impl RobotLink {
                 text,
             });
         }
-        if self.offers.take_worms(&beat.worms) {
+        if self.offers.take_worms(&beat.worms, beat.bridge.as_deref()) {
             self.begin_anew();
         }
         self.beat = Some(beat);

@@ -10,6 +10,7 @@
 //! - [`wire`]: what both ends say; [`pieces`] cuts it, so that a laptop confirms what it has.
 //! - [`backlog`]: what waits for a laptop: bounded, the newest first, losses counted. Pure.
 //! - [`remote`]: a laptop from the robot's side: its connections to the relays, and what it may ask.
+//! - [`refusals`]: which of those that it refuses the worms' records get.
 //! - [`clock`]: what the robot's clocks are worth.
 //! - [`robot`]: the process on the robot.
 //! - [`offer`]: a worm from the laptop's side, [`offers`]: those of one robot; [`laptop`]: the process on the laptop.
@@ -26,6 +27,7 @@ mod offer;
 mod offers;
 mod pieces;
 mod reasons;
+mod refusals;
 mod remote;
 pub(crate) mod robot;
 pub(crate) mod settings;

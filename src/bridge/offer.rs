@@ -312,7 +312,10 @@ fn who_has_it(instance: &Instance, robot: &str, other: &AlreadyRunning) -> Strin
     let (worm, pid) = (instance.worm(), other.pid);
     let another = match fleet_list::offered_by(pid, instance) {
         Some(offered) if offered.robot == robot => {
-            return format!("another `wormd fleet` (process {pid}) offers it already: end one of the two");
+            return format!(
+                "another `wormd fleet` (process {pid}) offers {worm} of {robot} already: end one of the two. Where they are two computers, give \
+                 each keys of its own"
+            );
         }
         Some(offered) => offered.robot,
         // It is not in the list yet.

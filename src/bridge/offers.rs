@@ -20,6 +20,8 @@ pub(crate) struct Offers {
     robot: String,
     /// `topics.root` of the worms as they are offered.
     root: Option<String>,
+    /// The bridge that was heard last.
+    bridge: Option<String>,
     places: BTreeMap<String, Place>,
     /// Where others read how it stands.
     list: Arc<PublishedList>,
@@ -39,6 +41,7 @@ impl Offers {
         Self {
             robot: robot.to_owned(),
             root,
+            bridge: None,
             places: BTreeMap::new(),
             list,
             is_listed: true,
@@ -90,8 +93,11 @@ impl Offers {
         }
     }
 
-    /// Takes which worms the robot has, and offers those that are not offered yet. True where one is offered from now on.
-    pub(crate) fn take_worms(&mut self, worms: &[String]) -> bool {
+    /// Takes which worms the robot's bridge has, and offers those that are not offered yet. True where one is offered from now on.
+    pub(crate) fn take_worms(&mut self, worms: &[String], bridge: Option<&str>) -> bool {
+        if self.bridge.as_deref() != bridge {
+            self.bridge = bridge.map(str::to_owned);
+        }
         let mut tried = Vec::new();
         for worm in worms.iter().take(MAX_WORMS) {
             let is_due = match self.places.get(worm) {
@@ -182,6 +188,7 @@ impl Offers {
         let standing = ListedRobot {
             was_heard,
             problem,
+            bridge: self.bridge.clone(),
             worms: worms.collect(),
         };
         let told = self.list.tell(&self.robot, standing);

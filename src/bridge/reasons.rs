@@ -98,6 +98,15 @@ pub(crate) fn of_listening(addresses: &str, said: &str) -> String {
     format!("listening at {addresses}: {said}: {remedy}")
 }
 
+/// Why a worm that a bridge serves does not get another one.
+pub(crate) fn of_second_bridge(worm: &str, pid: u32, listen: Option<&str>) -> String {
+    let at = listen.map_or_else(String::new, |listen| format!(", listening at {listen}"));
+    format!(
+        "another `wormd bridge` (process {pid}{at}) serves {worm} already, and a worm has one bridge for all laptops: name all addresses, \
+         certificates and worms in one bridge.toml, or end that bridge first (kill {pid})"
+    )
+}
+
 /// Whether the address is none of this computer's, which it may become when its network is up.
 pub(crate) fn is_address_missing(said: &str) -> bool {
     said.contains("(os error 99)")

@@ -2,10 +2,11 @@
 
 use super::backlog::Backlog;
 use super::network::Party;
+use super::refusals::Refusals;
 use super::wire::{Beat, Echo, RemoteRequest, RemoteWatcher, Up};
 use crate::relay::client::{Received, RelayLink};
 use crate::relay::connection::Connection;
-use crate::relay::wire::{Answer, Line, Request, VERSION as RELAY_VERSION};
+use crate::relay::wire::{Answer, Line, NetworkRefusal, Request, VERSION as RELAY_VERSION};
 use crate::topics::Instance;
 use crate::trip::wire::Ask;
 use std::collections::BTreeMap;
@@ -101,7 +102,7 @@ impl Remote {
     }
 
     /// Takes a message. True when a new stream is needed.
-    pub(crate) fn take(&mut self, up: Up, worms: &[Served], now_ns: u64) -> bool {
+    pub(crate) fn take(&mut self, up: Up, worms: &[Served], refusals: &mut Refusals, now_ns: u64) -> bool {
         self.heard = Instant::now();
         if let Some(echo) = up.echo {
             self.backlog.confirm(echo, now_ns);
@@ -125,22 +126,43 @@ impl Remote {
                 .retain(|watcher, seat| is_there(watcher) || seat.heard.elapsed() < Duration::from_millis(500));
         }
         for request in up.requests {
-            self.request(request, is_fresh, worms);
+            self.request(request, is_fresh, worms, refusals);
         }
         (up.is_lost && self.backlog.is_read_by(up.echo)) || self.backlog.is_stuck(now_ns)
     }
 
-    fn request(&mut self, request: RemoteRequest, is_fresh: bool, worms: &[Served]) {
+    fn request(&mut self, request: RemoteRequest, is_fresh: bool, worms: &[Served], refusals: &mut Refusals) {
         let RemoteRequest { from, name, line } = request;
         let refuse =
             |verdict: &str, refusal: String| Answer::own(0, line.id, line.request.name(), verdict, Some(refusal));
-        let Some(worm) = worms.iter().find(|worm| worm.name == from.worm) else {
+        let Some((index, worm)) = worms.iter().enumerate().find(|(_, worm)| worm.name == from.worm) else {
             let refusal = format!("this bridge has no worm {}", from.worm);
             return self.backlog.add_answer(from, refuse("unusable", refusal));
+        };
+        if matches!(line.request, Request::NoteRefusal { .. }) {
+            let refusal = "a bridge alone notes what it refuses".to_owned();
+            return self.backlog.add_answer(from, refuse("unusable", refusal));
+        }
+        let given: String = name.unwrap_or_default().chars().take(MAX_NAME).collect();
+        let name = match given.as_str() {
+            "" => self.party.certificate.clone(),
+            given => format!("{} {given}", self.party.certificate),
+        };
+        let mut note = |why: NetworkRefusal| {
+            // Of the worm as it is now: where it does not run, nothing is recorded.
+            if refusals.is_due(&self.party.certificate, &worm.name, why, Instant::now()) {
+                let noted = Request::NoteRefusal {
+                    name: name.clone(),
+                    refused: line.request.name().to_owned(),
+                    verdict: why,
+                };
+                self.feeds[index].send(0, noted);
+            }
         };
         // To halt, anybody who may connect at all, however late.
         let is_halt = matches!(line.request, Request::Hold | Request::Trip { action: Ask::Pause });
         if !is_halt && !self.may_drive {
+            note(NetworkRefusal::NotPermitted);
             let refusal = format!(
                 "the certificate {} may watch and hold, and nothing else: [access] in the robot's bridge.toml says who may drive",
                 self.party.certificate
@@ -148,6 +170,7 @@ impl Remote {
             return self.backlog.add_answer(from, refuse("not-permitted", refusal));
         }
         if !is_halt && !is_fresh {
+            note(NetworkRefusal::Stale);
             let refusal = format!(
                 "it came too late: more than {:.1} s were between question and answer; on such a link only hold is taken",
                 FRESH_NS as f64 * 1e-9
@@ -161,11 +184,6 @@ impl Remote {
                 let refusal = format!("{limit} watchers of this laptop may command already: close some");
                 return self.backlog.add_answer(from, refuse("busy", refusal));
             }
-            let given: String = name.unwrap_or_default().chars().take(MAX_NAME).collect();
-            let name = match given.as_str() {
-                "" => self.party.certificate.clone(),
-                given => format!("{} {given}", self.party.certificate),
-            };
             match Connection::open(&worm.instance, &name) {
                 Ok(connection) => {
                     let heard = Instant::now();

@@ -5,6 +5,7 @@
 
 use super::clock::ClockWatch;
 use super::network::{End, Network, Party, Way};
+use super::refusals::Refusals;
 use super::remote::{Remote, Served};
 use super::settings::BridgeSettings;
 use super::wire::{Beat, MAX_UP, Up, VERSION};
@@ -12,7 +13,7 @@ use super::{link_log, reasons};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::syslog;
-use crate::topics::Instance;
+use crate::topics::{Bridge as BridgeRole, Instance, RoleError, RoleLock};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use std::collections::{BTreeMap, BTreeSet};
 use std::os::fd::AsFd;
@@ -40,7 +41,7 @@ const MAX_OF_ONE: usize = 8;
 /// Serves until `end` is set. Calls `ready` once laptops can connect, and `round` at each turn, also while it waits for its address.
 ///
 /// # Errors
-/// [`Failure::Unusable`] when a worm's folder or an address cannot be used.
+/// [`Failure::Unusable`] when a worm's folder or an address cannot be used, or another bridge serves one of the worms.
 pub(crate) fn run(
     settings: BridgeSettings,
     end: &AtomicBool,
@@ -72,12 +73,15 @@ pub(crate) fn run(
     let Some(network) = open_when_possible(&listen, open, end, &round)? else {
         return Ok(());
     };
+    // Last, so that what else is wrong is said first; and before anything is sent.
+    let roles = take_roles(&worms, &listen)?;
     let mut bridge = Bridge {
         robot: settings.credentials.name,
         drive: settings.drive,
         worms,
         network,
         remotes: BTreeMap::new(),
+        refusals: Refusals::default(),
         clock: ClockWatch::new(),
         looked: Instant::now(),
         refused: None,
@@ -89,10 +93,28 @@ pub(crate) fn run(
         bridge.turn()?;
         round();
     }
-    for worm in &bridge.worms {
-        worm.instance.remove_folder_if_empty();
-    }
+    // Laptops are let go before another bridge may have the worms. With each role goes a folder that is empty.
+    drop(bridge);
+    drop(roles);
     Ok(())
+}
+
+/// Takes the role of each worm's bridge: a second one would double what its relay serves, and two rules would say who may drive it.
+fn take_roles(worms: &[Served], listen: &str) -> Result<Vec<RoleLock<BridgeRole>>, Failure> {
+    let mut instances: Vec<&Instance> = worms.iter().map(|worm| &worm.instance).collect();
+    // In the same order in every bridge: of two that begin at once, one gets all of its worms.
+    instances.sort_by_key(|instance| instance.folder());
+    let role = |instance: &Instance| {
+        RoleLock::take_with_note(instance, listen).map_err(|error| match error {
+            RoleError::AlreadyRunning(other) => Failure::unusable(reasons::of_second_bridge(
+                instance.worm(),
+                other.pid,
+                RoleLock::<BridgeRole>::note(instance).as_deref(),
+            )),
+            error => Failure::unusable(error),
+        })
+    };
+    instances.into_iter().map(role).collect()
 }
 
 /// Opens the network, once this computer has the addresses: at power-up its network may take longer than its programs. None at the end.
@@ -140,6 +162,8 @@ struct Bridge {
     worms: Vec<Served>,
     network: Network,
     remotes: BTreeMap<Party, Remote>,
+    /// The refused requests that the worms' records get.
+    refusals: Refusals,
     clock: ClockWatch,
     looked: Instant,
     /// Why a connection was refused, as that was said last.
@@ -236,7 +260,7 @@ impl Bridge {
         }
         let stream = self.stream();
         if let Some(remote) = self.remotes.get_mut(&party)
-            && remote.take(up, &self.worms, now_ns)
+            && remote.take(up, &self.worms, &mut self.refusals, now_ns)
         {
             remote.restart(stream, &self.worms);
         }
@@ -247,6 +271,7 @@ impl Bridge {
         Beat {
             version: VERSION,
             wormd: env!("CARGO_PKG_VERSION").to_owned(),
+            bridge: Some(format!("{}-{}", self.clock.status().boot_id, std::process::id())),
             worms: self.worms.iter().map(|worm| worm.name.clone()).collect(),
             may_drive: false,
             round_trip_ms: None,

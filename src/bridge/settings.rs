@@ -5,7 +5,7 @@ use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use worm_estimator::config::Config;
+use worm_estimator::config::{Config, ConfigError};
 use x509_parser::prelude::{FromDer, X509Certificate};
 
 /// What an end of the network proves itself by.
@@ -167,7 +167,14 @@ impl WormEntry {
         let mut config = Config::default();
         if let Some(path) = self.config {
             let path = beside(file, path);
-            config = Config::load(&path)?;
+            config = Config::load(&path).map_err(|error| match error {
+                ConfigError::Read { source, .. } => Failure::unusable(format!(
+                    "{}: [[worms]]: config {}: {source}: name the file that the worm runs with, or its name alone (name = \"worm1\")",
+                    file.display(),
+                    path.display()
+                )),
+                error => error.into(),
+            })?;
             arguments.extend(["--config".into(), path.into()]);
         }
         if let Some(name) = self.name {

@@ -93,6 +93,9 @@ pub(crate) struct Beat {
     pub version: u32,
     /// Version of its `wormd`.
     pub wormd: String,
+    /// This run of it. A worm has one bridge: two that differ serve two worms, whatever their names; none of an older bridge.
+    #[serde(default)]
+    pub bridge: Option<String>,
     /// The worms that it serves.
     pub worms: Vec<String>,
     /// Whether this laptop's certificate permits to drive.

@@ -22,16 +22,16 @@ pub(super) fn find(root: &Path, is_reached: impl Fn(&str, u32) -> bool) -> Vec<U
         let lists = alive.iter().map(|found| &found.list);
         lists.flat_map(|list| list.robots.iter().map(move |(robot, standing)| (list, robot, standing)))
     };
-    // Two fleet processes may be there for one robot.
+    // Two fleet processes may be there for one robot, by whichever bridge proves itself as it.
     let mut heard = BTreeSet::new();
-    let mut reached = BTreeSet::new();
+    let mut reached = BTreeMap::new();
     for (list, robot, standing) in standings() {
         if standing.was_heard {
             heard.insert(robot);
         }
         let worms = standing.worms.iter();
         let offered = worms.filter(|(worm, problem)| problem.is_none() && is_reached(worm, list.pid));
-        reached.extend(offered.map(|(worm, _)| (robot, worm)));
+        reached.extend(offered.map(|(worm, _)| ((robot, worm), standing.bridge.as_deref())));
     }
     let mut found = BTreeMap::new();
     for (list, robot, standing) in standings() {
@@ -39,15 +39,18 @@ pub(super) fn find(root: &Path, is_reached: impl Fn(&str, u32) -> bool) -> Vec<U
             found.insert((robot, robot), never_reached(list, robot, standing));
         }
         for (worm, problem) in &standing.worms {
-            if !reached.contains(&(robot, worm)) {
-                let why = problem
+            let why = match reached.get(&(robot, worm)) {
+                Some(bridge) if is_same_bridge(*bridge, standing.bridge.as_deref()) => continue,
+                Some(_) => {
+                    "another computer, or another bridge of it, proves itself by the same certificate, and its worm of this name is \
+                            the one that is offered here: give each robot keys of its own (make-keys)"
+                }
+                None => problem
                     .as_deref()
-                    .unwrap_or("`wormd fleet` offers it in another folder, or takes nobody at its socket");
-                found.insert(
-                    (robot, worm),
-                    format!("{worm} of {robot} cannot be held from here: {why}"),
-                );
-            }
+                    .unwrap_or("`wormd fleet` offers it in another folder, or takes nobody at its socket"),
+            };
+            let why = format!("{worm} of {robot} cannot be held from here: {why}");
+            found.insert((robot, worm), why);
         }
     }
     // What a process that is there says of a robot counts, and not what a killed one has left.
@@ -66,6 +69,11 @@ pub(super) fn find(root: &Path, is_reached: impl Fn(&str, u32) -> bool) -> Vec<U
         problem,
     });
     unreached.collect()
+}
+
+/// Whether two processes hear the same bridge, as far as that is known.
+fn is_same_bridge(one: Option<&str>, other: Option<&str>) -> bool {
+    one.zip(other).is_none_or(|(one, other)| one == other)
 }
 
 fn never_reached(list: &FleetList, robot: &str, standing: &ListedRobot) -> String {
@@ -102,8 +110,8 @@ mod tests {
             .map(|(worm, problem)| ((*worm).to_owned(), problem.map(str::to_owned)));
         ListedRobot {
             was_heard: true,
-            problem: None,
             worms: worms.collect(),
+            ..ListedRobot::default()
         }
     }
 

@@ -4,6 +4,9 @@ use std::fmt;
 use worm_estimator::message::{CommandKind, CommandRecord, ShortText};
 use worm_estimator::time::seconds;
 
+/// Longest name of a watcher, characters.
+const MAX_NAME: usize = 64;
+
 /// Begins the relay's own name.
 const RELAY: &str = "relay: ";
 
@@ -77,6 +80,11 @@ impl fmt::Display for Departure {
             Way::Silent(s) => write!(f, "nothing was heard for {s} s from {name}, who drove"),
         }
     }
+}
+
+/// A watcher's name, as far as logs and terminals of others may show it.
+pub(super) fn printable(name: &str) -> String {
+    name.chars().filter(|it| !it.is_control()).take(MAX_NAME).collect()
 }
 
 /// As much of a watcher's name as `room` bytes hold.

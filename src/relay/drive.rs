@@ -6,7 +6,7 @@
 //!
 //! Pure: times are arguments, ns of one clock.
 
-use super::departure::Departure;
+use super::departure::{Departure, printable};
 use super::lateness;
 use super::wire::{self, Request};
 use crate::trip::wire::Ask;
@@ -19,9 +19,6 @@ pub(super) const LIMIT_S: f64 = 1.0;
 const RENEWAL_NS: u64 = 250_000_000;
 /// A driver that was not heard for so long is gone, ns. Watchers say several times in it that they are there.
 pub(super) const SILENCE_NS: u64 = 750_000_000;
-
-/// Longest name of a watcher, characters.
-const MAX_NAME: usize = 64;
 
 /// Number of a watcher.
 pub(super) type WatcherId = u64;
@@ -118,13 +115,13 @@ impl Drive {
         match request {
             Request::Hello { name, .. } => {
                 // It goes to logs and terminals of others.
-                let name: String = name.chars().filter(|it| !it.is_control()).take(MAX_NAME).collect();
+                let name = printable(name);
                 if let Some(identity) = self.watchers.get_mut(&id).filter(|_| !name.is_empty()) {
                     identity.name = name;
                 }
                 Decision::Done(None)
             }
-            Request::Alive => Decision::Done(None),
+            Request::Alive | Request::NoteRefusal { .. } => Decision::Done(None),
             Request::TakeOver => self.take_over(id, now_ns),
             Request::Acknowledge { .. } | Request::Mark { .. } => Decision::Send,
             Request::Trip {

@@ -19,6 +19,7 @@ pub(crate) fn refusal(request: &Request, sent_ns: u64, now_ns: u64) -> Option<St
         | Request::Hold
         | Request::Acknowledge { .. }
         | Request::Mark { .. }
+        | Request::NoteRefusal { .. }
         | Request::Trip {
             action: Ask::Alive | Ask::Status | Ask::Pause,
         } => true,

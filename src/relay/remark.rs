@@ -1,7 +1,9 @@
-//! What the relay decides by itself and every recording is to say all the same: who took over, and who was refused because another drives.
+//! What never comes as far as the controller and every recording is to say all the same: who took over, who was refused because another
+//! drives, and whom a bridge has refused.
 
-use super::departure::name_within;
+use super::departure::{name_within, printable};
 use super::drive::WatcherId;
+use super::wire::NetworkRefusal;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{Command, CommandKind, CommandRecord, ShortText};
 
@@ -17,31 +19,46 @@ pub(super) fn take_over(name: &str, user: u32) -> Command {
     }
 }
 
-/// The record of a command that was refused because another watcher drives.
-fn not_driver(name: &str, user: u32, command: &str) -> Command {
+/// What a bridge has refused: the record, and the same in words.
+pub(super) fn by_bridge(verdict: NetworkRefusal, name: &str, user: u32, command: &str) -> (Command, String) {
+    let (name, command) = (printable(name), printable(command));
+    let record = refused(verdict.kind(), &name, user, &command);
+    (record, refused_by_bridge(verdict, &name, &command))
+}
+
+fn refused_by_bridge(verdict: NetworkRefusal, name: &str, command: &str) -> String {
+    let why = match verdict {
+        NetworkRefusal::NotPermitted => "the certificate may watch and hold, and nothing else",
+        NetworkRefusal::Stale => "it came too late over the network",
+    };
+    format!("{command} from {name} was refused by the bridge: {why}")
+}
+
+/// The record of a command that was refused, for the reason that the kind is.
+fn refused(kind: CommandKind, name: &str, user: u32, command: &str) -> Command {
     let what = format!(": {command}");
     let name = name_within(name, ShortText::MAX_BYTES.saturating_sub(what.len()));
     Command {
         user,
         sender: ShortText::new(&format!("{name}{what}")),
-        ..Command::new(CommandKind::NotDriver)
+        ..Command::new(kind)
     }
 }
 
 /// A recorded take-over or refusal in words; none for another command.
 pub(crate) fn in_words(record: &CommandRecord) -> Option<String> {
     let (sender, user) = (record.sender, record.user);
+    let (name, command) = sender
+        .as_str()
+        .rsplit_once(": ")
+        .unwrap_or((sender.as_str(), "a command"));
     match CommandKind::try_from(record.kind) {
         Ok(CommandKind::TakeOver) => Some(format!("{sender} (user {user}) took over, and drives")),
-        Ok(CommandKind::NotDriver) => {
-            let (name, command) = sender
-                .as_str()
-                .rsplit_once(": ")
-                .unwrap_or((sender.as_str(), "a command"));
-            Some(format!(
-                "{command} from {name} (user {user}) was refused: another watcher drives"
-            ))
-        }
+        Ok(CommandKind::NotDriver) => Some(format!(
+            "{command} from {name} (user {user}) was refused: another watcher drives"
+        )),
+        Ok(CommandKind::NotPermitted) => Some(refused_by_bridge(NetworkRefusal::NotPermitted, name, command)),
+        Ok(CommandKind::Stale) => Some(refused_by_bridge(NetworkRefusal::Stale, name, command)),
         _ => None,
     }
 }
@@ -66,7 +83,7 @@ impl Refusals {
             return None;
         }
         self.0 = Some((id, command.to_owned(), now));
-        Some(not_driver(name, user, command))
+        Some(refused(CommandKind::NotDriver, name, user, command))
     }
 }
 
@@ -99,6 +116,17 @@ mod tests {
             recorded(&taken).as_deref(),
             Some("ben (user 1000) took over, and drives")
         );
+        for (verdict, words) in [
+            (
+                NetworkRefusal::NotPermitted,
+                "crawl from hall at the\u{fffd} was refused by the bridge: the certificate may watch",
+            ),
+            (NetworkRefusal::Stale, "was refused by the bridge: it came too late"),
+        ] {
+            let (record, said) = by_bridge(verdict, "hall at the\u{fffd}\n", 0, "crawl");
+            assert!(said.contains(words), "{said}");
+            assert_eq!(recorded(&record), Some(said));
+        }
         assert_eq!(recorded(&Command::new(CommandKind::Hold)), None);
         // Who asks on and on stands there once a second, and not at the cost of others.
         let later = |ms| now + Duration::from_millis(ms);

@@ -263,6 +263,13 @@ impl Server {
             return Ok(());
         }
         let (name, user) = (request.name(), watcher.user);
+        if let Request::NoteRefusal { name, refused, verdict } = &request {
+            // Not even a sign of life: who asked is elsewhere, and perhaps long gone.
+            let (record, text) = remark::by_bridge(*verdict, name, user, refused);
+            self.note(text);
+            self.commander.remark(record);
+            return Ok(());
+        }
         let refused = |verdict, refusal| Answer::own(id, number, name, verdict, Some(refusal));
         let answer = match self.drive.request(id, &request, sent_ns, now_ns) {
             Decision::Done(_) if request == Request::Alive => return Ok(()),

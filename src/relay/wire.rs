@@ -330,6 +330,35 @@ pub(crate) enum Request {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         sigma_m: Option<f64>,
     },
+    /// Note that a bridge has refused the command of somebody on its network. No answer.
+    NoteRefusal {
+        /// Who asked.
+        name: String,
+        /// The command.
+        refused: String,
+        /// Why, as the answer to whoever asked says it.
+        verdict: NetworkRefusal,
+    },
+}
+
+/// Why a bridge passes a command on to nobody.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum NetworkRefusal {
+    /// The certificate does not permit it.
+    NotPermitted,
+    /// It came too late.
+    Stale,
+}
+
+impl NetworkRefusal {
+    /// The remark by which it is recorded, whose name is the verdict.
+    pub(crate) fn kind(self) -> CommandKind {
+        match self {
+            Self::NotPermitted => CommandKind::NotPermitted,
+            Self::Stale => CommandKind::Stale,
+        }
+    }
 }
 
 impl Request {
@@ -341,6 +370,7 @@ impl Request {
             Self::Drive => "drive",
             Self::TakeOver => "take_over",
             Self::Trip { .. } => "trip",
+            Self::NoteRefusal { .. } => "note_refusal",
             Self::Arm
             | Self::Crawl { .. }
             | Self::Hold
@@ -354,7 +384,12 @@ impl Request {
     /// The controller's command behind it; none where the relay answers by itself.
     pub(crate) fn kind(&self) -> Option<CommandKind> {
         match self {
-            Self::Hello { .. } | Self::Alive | Self::Drive | Self::TakeOver | Self::Trip { .. } => None,
+            Self::Hello { .. }
+            | Self::Alive
+            | Self::Drive
+            | Self::TakeOver
+            | Self::Trip { .. }
+            | Self::NoteRefusal { .. } => None,
             Self::Arm => Some(CommandKind::Arm),
             Self::Crawl { .. } => Some(CommandKind::Crawl),
             Self::Hold => Some(CommandKind::Hold),

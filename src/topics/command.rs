@@ -1,8 +1,9 @@
 //! Asking the controller, and answering.
 
 use super::error::PortError;
+use super::fleet_list::{self, OfferedFrom};
 use super::instance::Instance;
-use super::role::{Controller, RoleLock};
+use super::role::{Controller, Relay, RoleLock};
 use super::services::{Ipc, MAX_READERS, MAX_WRITERS, Services};
 use super::start::Presence;
 use iceoryx2::active_request::ActiveRequest;
@@ -40,6 +41,19 @@ pub enum CommandError {
     NoController {
         /// The worm.
         worm: String,
+    },
+    /// A fleet process offers the worm of a robot under this name, and none runs here.
+    #[error(
+        "{worm} is a worm of {robot}, which `wormd fleet` (process {pid}) offers here, and `wormd command` reaches worms of this computer alone: \
+         hold or drive it by `wormd watch` or `wormd dashboard`, with the same --config"
+    )]
+    Elsewhere {
+        /// The worm.
+        worm: String,
+        /// The robot.
+        robot: String,
+        /// The fleet process.
+        pid: u32,
     },
     /// A controller is there and did not answer in time; it will not carry the command out later.
     #[error(
@@ -160,8 +174,7 @@ impl CommandClient {
                 return Ok(reply);
             }
             let Some(pid) = RoleLock::<Controller>::holder(self.instance()) else {
-                let worm = self.instance().worm().to_owned();
-                return Err(CommandError::NoController { worm });
+                return Err(self.nobody());
             };
             if begun.elapsed() >= timeout {
                 return Err(CommandError::NoAnswer {
@@ -171,6 +184,18 @@ impl CommandClient {
                 });
             }
             thread::sleep(POLL);
+        }
+    }
+
+    /// Why there is no controller.
+    fn nobody(&self) -> CommandError {
+        let instance = self.instance();
+        let offered = RoleLock::<Relay>::holder(instance).and_then(|holder| fleet_list::offered_by(holder, instance));
+        match offered {
+            Some(OfferedFrom { worm, robot, pid }) => CommandError::Elsewhere { worm, robot, pid },
+            None => CommandError::NoController {
+                worm: instance.worm().to_owned(),
+            },
         }
     }
 

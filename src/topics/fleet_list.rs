@@ -38,6 +38,9 @@ pub(crate) struct ListedRobot {
     pub(crate) was_heard: bool,
     /// Why it is not heard, as far as that is known.
     pub(crate) problem: Option<String>,
+    /// The run of its bridge that was heard last; none before, and of an older one.
+    #[serde(default)]
+    pub(crate) bridge: Option<String>,
     /// Its worms, each with the reason why it is not offered here, if it is not.
     pub(crate) worms: BTreeMap<String, Option<String>>,
 }
@@ -128,6 +131,7 @@ mod tests {
         let mut standing = ListedRobot {
             was_heard: true,
             problem: None,
+            bridge: None,
             worms: BTreeMap::from([("w".to_owned(), Some("it runs here".to_owned()))]),
         };
         list.tell("robot1", standing.clone()).expect("can be written");

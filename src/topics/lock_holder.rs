@@ -36,7 +36,13 @@ pub(super) fn holder_by(file: &Path, uses: impl Fn(u32, &Path) -> bool) -> Optio
 
 /// The process that a lock file names.
 pub(super) fn named(file: &Path) -> Option<u32> {
-    fs::read_to_string(file).ok()?.trim().parse().ok()
+    fs::read_to_string(file).ok()?.lines().next()?.trim().parse().ok()
+}
+
+/// What else stands in a lock file, in one line.
+#[cfg(any(test, feature = "bridge"))]
+pub(super) fn note(file: &Path) -> Option<String> {
+    fs::read_to_string(file).ok()?.lines().nth(1).map(str::to_owned)
 }
 
 /// Whether a process has a lock of the worm whose folder this is.

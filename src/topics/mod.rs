@@ -121,7 +121,8 @@ pub(crate) use lock::LockPlace;
 pub(crate) use published_list::PublishedList;
 pub use publisher::{PublishError, Publisher};
 pub use role::{
-    AlreadyRunning, BlackBox, Controller, Estimator, Recorder, Relay, Role, RoleError, RoleLock, Supervisor, Trip,
+    AlreadyRunning, BlackBox, Bridge, Controller, Estimator, Recorder, Relay, Role, RoleError, RoleLock, Supervisor,
+    Trip,
 };
 pub use stale_resources::Peer;
 pub use start::StartError;

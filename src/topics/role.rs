@@ -47,6 +47,8 @@ roles! {
     Relay = "relay",
     /// The process that makes a trip.
     Trip = "trip",
+    /// The process that serves laptops over a network: `wormd bridge`.
+    Bridge = "bridge",
 }
 
 /// Another process has the role.
@@ -94,11 +96,24 @@ impl<R: Role> RoleLock<R> {
     /// [`AlreadyRunning`] with the process that has it; [`OfferedFrom`] when the worm would run here, and that of a robot is offered under
     /// its name; [`LockError`] when the lock file cannot be used.
     pub fn take(instance: &Instance) -> Result<Self, RoleError> {
+        Self::take_with_note(instance, "")
+    }
+
+    /// As [`RoleLock::take`], and leaves a line for whoever finds the role taken: [`RoleLock::note`].
+    ///
+    /// # Errors
+    /// As [`RoleLock::take`].
+    pub(crate) fn take_with_note(instance: &Instance, note: &str) -> Result<Self, RoleError> {
         let path = instance.lock_path(R::NAME);
         let begun = Instant::now();
         loop {
             if let Some(mut file) = LockFile::try_lock(instance, R::NAME, LockKind::Exclusive)? {
-                file.write(&format!("{}\n", std::process::id()))?;
+                let pid = std::process::id();
+                file.write(&if note.is_empty() {
+                    format!("{pid}\n")
+                } else {
+                    format!("{pid}\n{note}\n")
+                })?;
                 let role = Self {
                     file,
                     instance: instance.clone(),
@@ -133,6 +148,12 @@ impl<R: Role> RoleLock<R> {
     /// The process that has the role now, if any. Does not disturb one that is about to take it.
     pub fn holder(instance: &Instance) -> Option<u32> {
         lock_holder::holder(&instance.lock_path(R::NAME))
+    }
+
+    /// The line that the role's holder has left.
+    #[cfg(any(test, feature = "bridge"))]
+    pub(crate) fn note(instance: &Instance) -> Option<String> {
+        lock_holder::note(&instance.lock_path(R::NAME))
     }
 
     pub(super) fn instance(&self) -> &Instance {

@@ -93,6 +93,50 @@ fn worms(reply: &Reply) -> Vec<Value> {
 }
 
 #[test]
+fn two_computers_with_one_certificate_are_not_taken_for_one_robot() {
+    let robot = Robot::start("b-same", None);
+    let name = robot.worm.name();
+    let desk = Desk::new(&robot, free_port());
+    wait_for("the worm is offered", PATIENCE, || desk.laptop.socket.exists());
+    desk.wait_for(2, "robot2", "never reached");
+    let write = |file: &str, text: &str| {
+        let file = robot.files.path().join(file);
+        std::fs::write(&file, text).expect("can be written");
+        file
+    };
+    let first = std::fs::read_to_string(robot.files.path().join("keys-anna.toml")).expect("the laptop has it");
+    let (first, _) = first.split_once("[[robots]]\nname = 'robot2'").expect("two robots");
+
+    // A second fleet process that hears the same bridge changes nothing of that.
+    let same = write("same.toml", first);
+    let again = robot.worm.plain_wormd(&["fleet", "--config", path(&same)]).start();
+    let its_list = format!("fleet-{}-", again.id());
+    wait_for("it has heard the robot", PATIENCE, || {
+        let mut entries = std::fs::read_dir(desk.laptop.root.path()).expect("is there").flatten();
+        let list = entries.find(|entry| entry.file_name().to_string_lossy().starts_with(&its_list));
+        list.and_then(|list| std::fs::read_to_string(list.path()).ok())
+            .is_some_and(|text| text.contains("offers"))
+    });
+    desk.wait_for(2, "robot2", "never reached");
+    again.end();
+
+    // Another computer with a copy of the keys, and a worm of the same name.
+    let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
+    let rooted = write("rooted.toml", &format!("[topics]\nroot = '{}'\n", path(root.path())));
+    let port = free_port();
+    let toml = bridge_toml(name, "127.0.0.1", port) + &format!("config = '{}'\n", path(&rooted));
+    let bridge = write("copy.toml", &toml);
+    let _bridge = robot.worm.plain_wormd(&["bridge", "--config", path(&bridge)]).start();
+    let to_copy = first.replace(&robot.port.to_string(), &port.to_string());
+    let to_copy = write("to-copy.toml", &to_copy);
+    let _fleet = robot.worm.plain_wormd(&["fleet", "--config", path(&to_copy)]).start();
+    desk.wait_for(3, "robot1", "by the same certificate");
+    let (status, held) = desk.hold();
+    assert_eq!(status, 503, "{held:?}");
+    assert_eq!(outcomes(&held, name), [(None, true), (Some("robot1"), false)]);
+}
+
+#[test]
 fn what_is_not_reached_is_shown_and_named_and_never_counts_as_held() {
     let robot = Robot::start("b-page", None);
     make_keys(robot.files.path(), "keys robot robot2 127.0.0.1");
@@ -120,13 +164,13 @@ fn what_is_not_reached_is_shown_and_named_and_never_counts_as_held() {
         "{whys}"
     );
 
-    // It comes, with a worm of the same name.
+    // It comes, with a worm of the same name: another computer has other folders. (A longer root is refused.)
+    let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
+    let elsewhere = robot.files.path().join("elsewhere.toml");
+    std::fs::write(&elsewhere, format!("[topics]\nroot = '{}'\n", path(root.path()))).expect("can be written");
     let config = robot.files.path().join("second.toml");
-    std::fs::write(
-        &config,
-        bridge_toml(name, "127.0.0.1", second_port).replace("robot1", "robot2"),
-    )
-    .expect("can be written");
+    let toml = bridge_toml(name, "127.0.0.1", second_port).replace("robot1", "robot2");
+    std::fs::write(&config, toml + &format!("config = '{}'\n", path(&elsewhere))).expect("can be written");
     let second = robot.worm.plain_wormd(&["bridge", "--config", path(&config)]).start();
     desk.wait_for(2, "robot2", "robot1 has a worm");
     let (status, held) = desk.hold();
@@ -141,7 +185,11 @@ fn what_is_not_reached_is_shown_and_named_and_never_counts_as_held() {
             "{arguments:?}: {said}"
         );
     }
-    desk.wormd_fails(&["command", "hold"]);
+    let said = desk.wormd_fails(&["command", "hold"]);
+    assert!(
+        said.contains("is a worm of robot1") && said.contains("wormd watch"),
+        "{said}"
+    );
     let offered = std::fs::symlink_metadata(&desk.laptop.socket).expect("it is still there");
 
     // Somebody removes it.

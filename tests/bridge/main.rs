@@ -6,6 +6,8 @@ mod fleet_page;
 mod http;
 mod network;
 mod record;
+mod refusals;
+mod second_bridge;
 mod watcher;
 #[path = "../processes/worm.rs"]
 #[allow(
@@ -36,7 +38,7 @@ struct Robot<'a> {
     files: tempfile::TempDir,
     network: Option<&'a TwoComputers>,
     port: u16,
-    _processes: Vec<Process>,
+    processes: Vec<Process>,
 }
 
 impl<'a> Robot<'a> {
@@ -75,7 +77,7 @@ impl<'a> Robot<'a> {
             network,
             port,
             // The bridge ends first.
-            _processes: vec![bridge, controller, estimator, virtual_worm],
+            processes: vec![bridge, controller, estimator, virtual_worm],
         }
     }
 
@@ -107,6 +109,10 @@ impl<'a> Robot<'a> {
             process: fleet.start(),
             root,
         }
+    }
+
+    fn bridge(&mut self) -> &mut Process {
+        &mut self.processes[0]
     }
 
     fn mode(&self) -> Option<Mode> {
@@ -434,6 +440,11 @@ fn what_is_open_or_unusable_ends_with_exit_status_2() {
         ("'anna'", "'hall'", "twice"),
         ("[access]", "scouting = true\n[access]", "unknown field"),
         ("[[worms]]", "[[worms]] #", "in use"),
+        (
+            "[[worms]]",
+            "[[worms]]\nconfig = 'none.toml'",
+            "none.toml: No such file or directory (os error 2): name the file",
+        ),
         (robot.worm.name(), "Not A Name", "worm.name"),
     ] {
         let text = good.replacen(from, to, 1);

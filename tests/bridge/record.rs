@@ -156,10 +156,18 @@ fn texts<T: JsonMessage>(messages: &[T]) -> Vec<String> {
 fn are_those_of<T: JsonMessage>(some: &[T], all: &[T]) {
     let places: BTreeMap<String, usize> = texts(all).into_iter().zip(0..).collect();
     let found: Vec<_> = texts(some).iter().map(|text| places.get(text).copied()).collect();
+    let foreign: Vec<_> = found
+        .iter()
+        .zip(0..)
+        .filter(|(place, _)| place.is_none())
+        .map(|(_, index)| index)
+        .collect();
     assert!(
-        found.iter().all(Option::is_some),
-        "{}: one that is not the robot's",
-        T::TYPE_NAME
+        foreign.is_empty(),
+        "{}: not the robot's are those at {foreign:?} of {}; it begins at {:?}",
+        T::TYPE_NAME,
+        found.len(),
+        found.iter().take(3).collect::<Vec<_>>()
     );
     assert!(found.is_sorted_by(|a, b| a < b), "{}: {found:?}", T::TYPE_NAME);
 }

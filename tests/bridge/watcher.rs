@@ -34,7 +34,8 @@ impl Watcher {
         watcher
     }
 
-    fn write(&mut self, line: &Value) {
+    /// Writes a line as it is.
+    pub fn write(&mut self, line: &Value) {
         self.stream.write_all(format!("{line}\n").as_bytes()).expect("it reads");
     }
 
@@ -92,7 +93,13 @@ impl Watcher {
     /// Asks, and waits for the answer.
     pub fn ask(&mut self, command: &str, patience: Duration) -> Value {
         let id = self.send(command);
-        self.wait(command, patience, |line| line["answer"]["id"] == json!(id))["answer"].take()
+        self.answer(id, patience)
+    }
+
+    /// The answer to the request with this number.
+    pub fn answer(&mut self, id: u64, patience: Duration) -> Value {
+        let what = format!("answer to request {id}");
+        self.wait(&what, patience, |line| line["answer"]["id"] == json!(id))["answer"].take()
     }
 
     /// Reads for a while.

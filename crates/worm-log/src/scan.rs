@@ -11,7 +11,7 @@ mod search;
 use super::channel::{CHANNELS, CONFIG_ATTACHMENT, Channel, METADATA};
 use super::note::{NOTE, Note};
 use super::payload::{ENCODINGS, Encoding, Payload, PayloadError, Unknown};
-use super::shape::{are_whole_records, is_whole, uncompressed_records};
+use super::shape::{are_whole_records, is_data_end, is_of_data, is_whole, surplus, uncompressed_records};
 use super::summary::summary;
 use super::unpack::{BoundedZstd, MAX_RATIO};
 use crate::ReadError;
@@ -109,7 +109,7 @@ pub fn scan_from(
         .with_record_length_limit(at_most(length));
     let mut is_whole = false;
     let end = each_record(BufReader::new(&mut input), framing, |opcode, content| {
-        if opcode == op::DATA_END {
+        if is_data_end(opcode, content.len() as u64) {
             // What follows is the index.
             is_whole = true;
             return Ok(ControlFlow::Break(()));
@@ -126,7 +126,7 @@ pub fn scan_from(
     let problem = match end {
         Ok(()) if is_whole => return scanner.into_contents(),
         Ok(()) => "it was not finished".to_owned(),
-        Err(Trouble::Broken(error)) => error.to_string(),
+        Err(Trouble::Broken(error)) => error,
         Err(Trouble::Unreadable(error)) => return Err(unreadable(path, &error)),
         Err(Trouble::Refused(error)) => return Err(error),
     };
@@ -203,13 +203,13 @@ fn unpacked_at_most(length: u64) -> usize {
 /// Why reading ends.
 enum Trouble {
     Unreadable(io::Error),
-    Broken(McapError),
+    Broken(String),
     Refused(ReadError),
 }
 
 impl From<McapError> for Trouble {
     fn from(error: McapError) -> Self {
-        Self::Broken(error)
+        Self::Broken(error.to_string())
     }
 }
 
@@ -241,6 +241,16 @@ fn each_record(
         }
     }
     Ok(())
+}
+
+/// An error where a record has taken in what comes after it.
+fn without_surplus(opcode: u8, content: &[u8]) -> Result<(), Trouble> {
+    match surplus(opcode, content) {
+        0 => Ok(()),
+        surplus => Err(Trouble::Broken(format!(
+            "its last {surplus} bytes do not belong to the record that claims them"
+        ))),
+    }
 }
 
 struct Scanner<'a, F> {
@@ -277,20 +287,36 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
         }
     }
 
-    /// Processes a whole record at byte `at` of the file. A damaged chunk is left out, with a warning.
+    /// Processes a whole record at byte `at` of the file. A damaged chunk is left out, with a warning; where another record
+    /// is damaged, that is the error.
     fn take_record(&mut self, at: u64, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
-        if opcode != op::CHUNK {
-            return self.take_plain(opcode, content);
+        if !is_of_data(opcode) {
+            let problem = format!("there is no such kind of record in a log, {opcode:#04x}");
+            return Err(Trouble::Broken(problem));
         }
+        match opcode {
+            op::CHUNK => return self.take_chunk(at, content),
+            // No checksum covers it: one that cannot be read is no reason to refuse the others.
+            op::MESSAGE => self.take_plain(opcode, content).map_err(|trouble| match trouble {
+                Trouble::Refused(error) => Trouble::Broken(error.problem),
+                trouble => trouble,
+            })?,
+            _ => self.take_plain(opcode, content)?,
+        }
+        without_surplus(opcode, content)
+    }
+
+    /// Processes a chunk. A damaged one is left out, with a warning.
+    fn take_chunk(&mut self, at: u64, content: &[u8]) -> Result<(), Trouble> {
         if self.channels.is_empty() {
             // Should their chunk be damaged so that it is not even known for one.
             self.take_definitions()?;
         }
         if uncompressed_records(content).is_some_and(|records| !are_whole_records(records)) {
-            self.warn_of_a_chunk(at, &McapError::UnexpectedEoc);
+            self.warn_of_a_chunk(at, &McapError::UnexpectedEoc.to_string());
             return self.take_definitions();
         }
-        let mut head = [opcode; RECORD_HEAD as usize];
+        let mut head = [op::CHUNK; RECORD_HEAD as usize];
         head[1..].copy_from_slice(&(content.len() as u64).to_le_bytes());
         let checked = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
@@ -304,11 +330,12 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
                 self.warn_of_a_chunk(at, &error);
                 self.take_definitions()
             }
+            Ok(()) => without_surplus(op::CHUNK, content),
             taken => taken,
         }
     }
 
-    fn warn_of_a_chunk(&mut self, at: u64, error: &McapError) {
+    fn warn_of_a_chunk(&mut self, at: u64, error: &str) {
         self.damaged_chunks += 1;
         if self.damaged_chunks <= MAX_DAMAGED_NAMED {
             let warning = format!("the chunk at byte {at} is damaged ({error}): its messages are left out");
@@ -320,12 +347,15 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
     fn take_plain(&mut self, opcode: u8, content: &[u8]) -> Result<(), Trouble> {
         if !matches!(
             opcode,
-            op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT
+            op::SCHEMA | op::CHANNEL | op::MESSAGE | op::MESSAGE_INDEX | op::METADATA | op::ATTACHMENT
         ) {
             return Ok(());
         }
         if !is_whole(opcode, content) {
             return Err(McapError::UnexpectedEof.into());
+        }
+        if opcode == op::MESSAGE_INDEX {
+            return Ok(());
         }
         match ::mcap::parse_record(opcode, content)? {
             Record::Schema { header, .. } => {

@@ -17,9 +17,48 @@ pub(super) fn is_whole(opcode: u8, content: &[u8]) -> bool {
             .and_then(text)
             .and_then(|rest| fixed(rest, 12)),
         op::MESSAGE => fixed(content, 22),
+        op::MESSAGE_INDEX => fixed(content, 2).and_then(text),
         _ => Some(content),
     };
     rest.is_some()
+}
+
+/// Whether a record of this kind may stand in the data of a log, before their end.
+pub(super) fn is_of_data(opcode: u8) -> bool {
+    matches!(
+        opcode,
+        op::HEADER
+            | op::SCHEMA
+            | op::CHANNEL
+            | op::MESSAGE
+            | op::CHUNK
+            | op::MESSAGE_INDEX
+            | op::ATTACHMENT
+            | op::METADATA
+    )
+}
+
+/// Whether a record is the end of the data: nothing but a checksum.
+pub(super) fn is_data_end(opcode: u8, length: u64) -> bool {
+    opcode == op::DATA_END && length == 4
+}
+
+/// How many bytes stand in a record behind what belongs to it: with a damaged length it takes in what comes after it. Zero where that cannot
+/// be known.
+pub(super) fn surplus(opcode: u8, content: &[u8]) -> usize {
+    let behind = match opcode {
+        op::HEADER => text(content).and_then(text),
+        op::MESSAGE_INDEX => fixed(content, 2).and_then(text),
+        op::METADATA => text(content).and_then(text_map),
+        op::ATTACHMENT => fixed(content, 16)
+            .and_then(text)
+            .and_then(text)
+            .and_then(long)
+            .and_then(|rest| fixed(rest, 4)),
+        op::CHUNK => fixed(content, 28).and_then(text).and_then(long),
+        _ => None,
+    };
+    behind.map_or(0, <[u8]>::len)
 }
 
 /// The records of a chunk that is not compressed; nothing if it is compressed, or shorter than its head.
@@ -63,6 +102,12 @@ fn fixed(bytes: &[u8], length: usize) -> Option<&[u8]> {
 fn text(bytes: &[u8]) -> Option<&[u8]> {
     let (length, rest) = bytes.split_first_chunk::<4>()?;
     rest.get(u32::from_le_bytes(*length) as usize..)
+}
+
+/// A length in eight bytes, and as many bytes: what comes behind.
+fn long(bytes: &[u8]) -> Option<&[u8]> {
+    let (length, rest) = bytes.split_first_chunk::<8>()?;
+    rest.get(usize::try_from(u64::from_le_bytes(*length)).ok()?..)
 }
 
 /// Pairs of texts, their length together before them.

@@ -176,6 +176,13 @@ class CommandKind(Code):
     NOT_DRIVER = "not-driver", 9
     """Note that a command did not come this far, because another watcher drives. The sender is NAME: COMMAND. Moves
     and permits nothing."""
+    NOT_PERMITTED = "not-permitted", 10
+    """Note that a command did not come this far, because the certificate of whoever asked over the network does not
+    permit it. The sender is NAME: COMMAND, and the name begins with that of the certificate. Moves and permits
+    nothing."""
+    STALE = "stale", 11
+    """Note that a command did not come this far, because it came too late over the network. The sender is as with
+    not-permitted. Moves and permits nothing."""
 
 
 class CommandOutcome(Code):

@@ -95,7 +95,9 @@ impl Controller {
                 None => (CommandOutcome::BadPosition, 0),
             },
             // The record is all that they are for.
-            (CommandKind::TakeOver | CommandKind::NotDriver, _) => ACCEPTED,
+            (CommandKind::TakeOver | CommandKind::NotDriver | CommandKind::NotPermitted | CommandKind::Stale, _) => {
+                ACCEPTED
+            }
             _ => (CommandOutcome::WrongMode, 0),
         }
     }

@@ -31,6 +31,12 @@ coded_enum! {
         TakeOver = 8 => "take-over",
         /// Note that a command did not come this far, because another watcher drives. The sender is `NAME: COMMAND`. Moves and permits nothing.
         NotDriver = 9 => "not-driver",
+        /// Note that a command did not come this far, because the certificate of whoever asked over the network does not permit it. The sender is
+        /// `NAME: COMMAND`, and the name begins with that of the certificate. Moves and permits nothing.
+        NotPermitted = 10 => "not-permitted",
+        /// Note that a command did not come this far, because it came too late over the network. The sender is as with `not-permitted`. Moves and
+        /// permits nothing.
+        Stale = 11 => "stale",
     }
 }
 
@@ -89,7 +95,10 @@ const DEFAULT_MARK_SIGMA_M: f64 = 5e-3;
 impl CommandKind {
     /// Whether it is for the record alone: it says what somebody has seen, knows or was refused, and not what the worm is to do.
     pub const fn is_remark(self) -> bool {
-        matches!(self, Self::Acknowledge | Self::Mark | Self::TakeOver | Self::NotDriver)
+        matches!(
+            self,
+            Self::Acknowledge | Self::Mark | Self::TakeOver | Self::NotDriver | Self::NotPermitted | Self::Stale
+        )
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{LARGEST_RECORD, MAX_DAMAGED_NAMED, MAX_NAME_LEN, RECORD_HEAD, Scanner, Trouble, at_most, each_record};
 use crate::channel::Channel;
 use crate::payload::{Payload, PayloadError};
+use crate::shape::is_data_end;
 use crate::summary::Summary;
 use mcap::records::op;
 use mcap::sans_io::LinearReaderOptions;
@@ -32,7 +33,10 @@ impl<F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'_, F> 
             let mut bytes = Vec::new();
             let read = input.by_ref().take(chunk.end - content).read_to_end(&mut bytes);
             read.map_err(Trouble::Unreadable)?;
-            self.take_record(chunk.start, op::CHUNK, &bytes)?;
+            match self.take_record(chunk.start, op::CHUNK, &bytes) {
+                Err(Trouble::Broken(error)) => self.warn_of_bytes(chunk.start, chunk.end, &error),
+                taken => taken?,
+            }
             at = chunk.end;
         }
         self.take_gap(input, at..end)?;
@@ -54,9 +58,9 @@ impl<F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'_, F> 
         let records = BufReader::new(input.by_ref().take(gap.end - gap.start));
         let taken = each_record(records, framing, |opcode, content| {
             match opcode {
-                op::DATA_END => return Ok(ControlFlow::Break(())),
-                // What was never written, or lost, is zeros.
-                0 => return Err(McapError::UnexpectedEof.into()),
+                _ if is_data_end(opcode, content.len() as u64) => return Ok(ControlFlow::Break(())),
+                // What was never written, or lost, is zeros; and behind a footer nothing more is read.
+                0 | op::FOOTER => return Err(McapError::UnexpectedEof.into()),
                 _ => {}
             }
             match self.take_record(at, opcode, content) {
@@ -74,7 +78,7 @@ impl<F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'_, F> 
         self.take_definitions()
     }
 
-    pub(super) fn warn_of_bytes(&mut self, from: u64, to: u64, error: &McapError) {
+    pub(super) fn warn_of_bytes(&mut self, from: u64, to: u64, error: &str) {
         self.damaged_chunks += 1;
         if self.damaged_chunks <= MAX_DAMAGED_NAMED {
             let warning = format!("bytes {from} to {to} are damaged ({error}): what stood there is left out");

@@ -4,6 +4,7 @@
 
 use super::RECORD_HEAD;
 use crate::outline::{CHUNK_HEAD, LONGEST_NAME, chunk_header};
+use crate::shape::{is_data_end, is_of_data};
 use crate::summary::Summary;
 use mcap::MAGIC;
 use mcap::records::op;
@@ -71,8 +72,7 @@ fn record_at(reader: &mut (impl Read + Seek), at: u64, length: u64) -> io::Resul
     let [opcode, content_len @ ..] = head;
     let content_len = u64::from_le_bytes(content_len);
     let end = (at + RECORD_HEAD).checked_add(content_len).filter(|end| *end <= length);
-    // A footer comes after the end of the data alone.
-    let is_known = (op::HEADER..=op::DATA_END).contains(&opcode) && opcode != op::FOOTER;
+    let is_known = is_of_data(opcode) || is_data_end(opcode, content_len);
     let Some(end) = end.filter(|_| is_known) else {
         return Ok(None);
     };

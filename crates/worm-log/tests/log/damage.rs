@@ -1,9 +1,10 @@
 //! Truncated and damaged files.
 
 use std::fs::{self, File};
+use std::io::Cursor;
 use std::path::PathBuf;
 use testkit::log_sample::{Sink, crawl, origin};
-use worm_log::{Log, ReadError, Writer, messages};
+use worm_log::{Log, ReadError, Writer, messages, messages_from};
 
 /// A log of 40 states, 10 in each chunk: its bytes, and for each chunk where it ends and how many states there are then.
 fn small_log() -> (Vec<u8>, Vec<(usize, usize)>) {
@@ -173,6 +174,47 @@ fn a_damaged_byte_in_a_log_that_was_not_finished_costs_its_chunk_too_be_it_the_f
         lost_in_first > 100,
         "the definitions were damaged {lost_in_first} times, and that was said"
     );
+}
+
+/// Reads the log with each of these bits flipped, and calls what lost states, or did so without a word.
+fn flip(bytes: &[u8], bits: impl Iterator<Item = usize>) {
+    let usual = messages_from(Cursor::new(bytes), "whole".as_ref())
+        .expect("is whole")
+        .warnings;
+    let mut damaged = bytes.to_vec();
+    for bit in bits {
+        let (at, mask) = (bit / 8, 1 << (bit % 8));
+        damaged[at] ^= mask;
+        let place = format!("bit {} of byte {at} of {}", bit % 8, bytes.len());
+        let log = messages_from(Cursor::new(&damaged), "damaged".as_ref());
+        let log = log.unwrap_or_else(|error| panic!("{place}: {error}"));
+        assert!(
+            log.states.len() >= 30,
+            "{place}: more than a chunk is lost: {:?}",
+            log.warnings
+        );
+        // Of a log that was not finished it is always said that its end is missing.
+        let is_told = log
+            .warnings
+            .iter()
+            .any(|it| !usual.contains(it) && !it.contains("it was not finished"));
+        assert!(
+            log.states.len() == 40 || is_told,
+            "{place}: not a word of what is lost: {:?}",
+            log.warnings
+        );
+        damaged[at] ^= mask;
+    }
+}
+
+#[test]
+fn no_damaged_bit_costs_more_than_a_chunk_nor_does_so_without_a_word() {
+    let (bytes, chunks) = small_log();
+    let (first, data_end) = (chunks[0].0, chunks[4].0);
+    // Of the definitions, which are many, a few.
+    let few = |bit: &usize| bit / 8 >= first || bit.is_multiple_of(7);
+    flip(&bytes[..data_end], (8 * 8..8 * data_end).filter(few));
+    flip(&bytes, (8 * 8..8 * data_end).filter(few));
 }
 
 #[test]
