@@ -40,7 +40,7 @@ pub(super) fn named(file: &Path) -> Option<u32> {
 }
 
 /// What else stands in a lock file, in one line.
-#[cfg(any(test, feature = "bridge"))]
+#[cfg(feature = "bridge")]
 pub(super) fn note(file: &Path) -> Option<String> {
     fs::read_to_string(file).ok()?.lines().nth(1).map(str::to_owned)
 }

@@ -151,7 +151,7 @@ impl<R: Role> RoleLock<R> {
     }
 
     /// The line that the role's holder has left.
-    #[cfg(any(test, feature = "bridge"))]
+    #[cfg(feature = "bridge")]
     pub(crate) fn note(instance: &Instance) -> Option<String> {
         lock_holder::note(&instance.lock_path(R::NAME))
     }
