@@ -320,7 +320,7 @@ impl Invariants {
         let state = &tick.state;
         let now_s = (state.time_ns - truth.stood_ns.min(state.time_ns)) as f64 * 1e-9;
         let powered_since_s = match self.powered_since_s {
-            Some(since_s) if truth.torque_is_on => since_s,
+            Some(since_s) if truth.torque_is_on && tick.service.is_none() => since_s,
             _ => now_s,
         };
         // Arming switches torque off and on again, and takes some tenths of a second after the reading: what counts begins with the next one.
