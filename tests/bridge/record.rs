@@ -33,9 +33,10 @@ fn a_worm_over_a_network_is_recorded_and_an_outage_costs_states_and_no_cycle() {
     let (whole, run) = (anna.root.path().join("whole.mcap"), anna.root.path().join("run.mcap"));
     let on_robot = robot.worm.wormd(&["record", "--out", path(&whole)]).start();
     // The laptop's recording must not begin before it.
-    let begun = watcher.frame(PATIENCE, |_| whole.metadata().is_ok_and(|file| file.len() > 0))["time_ns"].as_u64();
+    let frame = watcher.frame(PATIENCE, |_| whole.metadata().is_ok_and(|file| file.len() > 0));
+    let begun_ns = frame["time_ns"].as_u64().expect("when it was made");
     watcher.frame(PATIENCE, |frame| {
-        frame["time_ns"].as_u64() > begun.map(|time_ns| time_ns + 1_000_000_000)
+        frame["time_ns"].as_u64() > Some(begun_ns + 1_000_000_000)
     });
     let out = [&arguments[..], &["--out", path(&run)]].concat();
     let on_laptop = robot.worm.wormd(&out).start_with_log();

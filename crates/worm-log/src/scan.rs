@@ -6,16 +6,17 @@
 //! of 128 kB, lz4 of 64) is read, too, up to the last whole message, and a warning says so.
 
 mod by_index;
+mod definitions;
 mod search;
 
 use super::channel::{CHANNELS, CONFIG_ATTACHMENT, Channel, METADATA};
 use super::note::{NOTE, Note};
-use super::payload::{ENCODINGS, Encoding, Payload, PayloadError, Unknown};
+use super::payload::{Encoding, Payload, PayloadError};
 use super::shape::{are_whole_records, is_data_end, is_of_data, is_whole, surplus, uncompressed_records};
 use super::summary::summary;
 use super::unpack::{BoundedZstd, MAX_RATIO};
 use crate::ReadError;
-use mcap::records::{Channel as FileChannel, Record, op};
+use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{MAGIC, McapError};
 use std::collections::{BTreeMap, HashMap};
@@ -402,75 +403,6 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
             _ => {}
         }
         Ok(())
-    }
-
-    /// Takes the channels that are not known yet, because the chunk with their definitions is damaged.
-    fn take_channel_names(&mut self) {
-        for (id, name) in std::mem::take(&mut self.channel_names) {
-            let words: Vec<&str> = name.split(' ').collect();
-            let (Ok(id), [topic, encoding, type_name]) = (id.parse(), words.as_slice()) else {
-                continue;
-            };
-            let is_ours = Channel::ALL.iter().any(|known| known.topic() == *topic);
-            if !is_ours || self.channels.contains_key(&id) {
-                continue;
-            }
-            let channel = FileChannel {
-                id,
-                schema_id: 0,
-                topic: (*topic).to_owned(),
-                message_encoding: (*encoding).to_owned(),
-                metadata: BTreeMap::new(),
-            };
-            // No checksum covers this record: it is no reason to refuse a log, and the definitions overrule it where they are whole.
-            let _ = self.take_channel(channel, type_name);
-        }
-    }
-
-    fn take_channel(&mut self, channel: FileChannel, schema: &str) -> Result<(), ReadError> {
-        let known = Channel::ALL
-            .iter()
-            .copied()
-            .find(|known| known.topic() == channel.topic);
-        let Some(known) = known else {
-            if self.channels.insert(channel.id, None).is_none() {
-                self.foreign.push(channel.topic);
-            }
-            return Ok(());
-        };
-        if known == Channel::Timing && schema != known.type_name() {
-            // No analysis needs the timings, so those of an older version are skipped.
-            if self.channels.insert(channel.id, None).is_none() {
-                self.foreign
-                    .push(format!("{} ('{schema}', of another version)", channel.topic));
-            }
-            return Ok(());
-        }
-        let problem = match Encoding::of(known, &channel.message_encoding, schema) {
-            Ok(encoding) => {
-                self.channels.insert(channel.id, Some((known, encoding)));
-                return Ok(());
-            }
-            Err(Unknown::Encoding) => format!(
-                "holds messages encoded as '{}', not as {ENCODINGS}",
-                channel.message_encoding
-            ),
-            Err(Unknown::Type) => format!(
-                "holds '{schema}', and this version of wormd reads '{}'",
-                known.type_name()
-            ),
-        };
-        let writer = self.contents.metadata.get("wormd_version");
-        let remedy = match writer {
-            Some(version) => format!("read it with wormd {version}, which wrote it"),
-            None => "read it with what wrote it; `wormd record` writes logs that wormd reads".to_owned(),
-        };
-        Err(refusal(
-            self.path,
-            Some(format!("channel {}", channel.topic)),
-            problem,
-            &remedy,
-        ))
     }
 
     fn warn_of_the_end(&mut self, at: u64, length: u64, problem: &str, salvaged: u64) {

@@ -14,7 +14,7 @@
 const DRIFT: f64 = 1e-4;
 /// Age from which a clock must have jumped, s.
 const JUMP_S: f64 = 0.2;
-/// Greatest age that a sample can have, in ticks.
+/// Greatest age that a sample can have, in ticks; after a silence of the motor, in its length.
 const MAX_AGE_TICKS: f64 = 2.0;
 /// The smallest difference is held against the samples of this long, s.
 const REVIEW_S: f64 = 1.0;
@@ -51,10 +51,13 @@ impl Capture {
         let Some((before_s, before)) = self.before.filter(|(before_s, _)| *before_s < time_s) else {
             return (time_s - self.age_s(sample_time_s, time_s, f64::INFINITY), phase);
         };
-        let tick_s = time_s - before_s;
-        let max_age_s = MAX_AGE_TICKS * tick_s;
+        let since_s = time_s - before_s;
+        let max_age_s = MAX_AGE_TICKS * since_s;
         let age_s = self.age_s(sample_time_s, time_s, max_age_s);
-        (time_s - age_s, phase - (phase - before) / tick_s * age_s.min(max_age_s))
+        (
+            time_s - age_s,
+            phase - (phase - before) / since_s * age_s.min(max_age_s),
+        )
     }
 
     fn age_s(&mut self, sample_time_s: f64, time_s: f64, max_age_s: f64) -> f64 {

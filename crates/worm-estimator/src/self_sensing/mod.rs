@@ -54,7 +54,7 @@ use parameters::{Parameters, Vector};
 use pitch::MeanPitch;
 use profile::Profile;
 use std::f64::consts::TAU;
-use worm_physics::{MAX_CELLS, Worm};
+use worm_physics::Worm;
 
 /// Longest turn of the cam between two readings that is still bridged, cycles.
 const LONGEST_TURN: f64 = 0.02;
@@ -68,8 +68,6 @@ const LONGEST_GAP_S: f64 = 0.1;
 const ROUNDING: [f64; 2] = [0.029, 0.29e-3];
 /// Cycles below which the fit may have begun at a wrong answer.
 pub(crate) const WARM_CYCLES: f64 = 3.0;
-/// Share of their friction that all cells have lost beyond which an advance is not known: it may be any part of the stroke, either way.
-const SLIPPING_LOSS: f64 = 0.5;
 /// Gait-to-gait scatter of the advance, as a share of what compliance takes of the stroke.
 const ADVANCE_SCATTER_SHARE: f64 = 0.02;
 
@@ -444,76 +442,5 @@ impl SelfSensing {
             Standing::Fitted
         };
         self.show(cycle, standing);
-    }
-
-    /// By how much the first errors are larger than those of the fit: it may have begun at a wrong answer, and has hardly seen what scatters.
-    fn widened(&self) -> f64 {
-        let cycles = self.fit.cycles();
-        if (1.0..WARM_CYCLES).contains(&cycles) {
-            (1.0 + 1.0 / cycles).sqrt()
-        } else {
-            1.0
-        }
-    }
-
-    /// Figures of the steady cycle with their standard errors.
-    fn figures(&self) -> Option<(CycleFigures, CycleFigures)> {
-        let (figures, sigma) = self.fit.figures().copied()?;
-        let mut sigma = CycleFigures::from_flat(&sigma.flat().map(|sigma| self.widened() * sigma));
-        let changes = self.detector.changes();
-        if changes.all_friction_lost && changes.loss_share > SLIPPING_LOSS {
-            // Tips that hardly hold slide as a whole, which the exact cycle does not know.
-            sigma.advance_m = sigma.advance_m.max(self.stroke_m);
-        }
-        Some((figures, sigma))
-    }
-
-    fn show(&mut self, cycle: &ClosedCycle, standing: Standing) {
-        let Some((figures, figures_sigma)) = self.figures() else {
-            return;
-        };
-        let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());
-        let cells = parameters.cells;
-        let widened = self.widened();
-        let sigma = |unknown: usize| widened * covariance[(unknown, unknown)].max(0.0).sqrt();
-        let of_cells = |of: &dyn Fn(usize) -> f64| {
-            let mut values = [0.0; MAX_CELLS];
-            (0..cells).for_each(|cell| values[cell] = of(cell));
-            values
-        };
-        let pull_n = parameters.pull_n();
-        let pull_sigma_n = sigma(parameters.pull_at());
-        let pulled_rad = (pull_n / self.weight_n).clamp(-1.0, 1.0).asin();
-        let pulled = (pulled_rad, pull_sigma_n / (self.weight_n * pulled_rad.cos().max(0.05)));
-        let measured = self.fit.known_pull_n().map(|weight_n| {
-            let slope_rad = (weight_n / self.weight_n).clamp(-1.0, 1.0).asin();
-            (slope_rad, self.pitch_sensor.sigma_rad)
-        });
-        let (slope_rad, slope_sigma_rad) = measured.unwrap_or(pulled);
-        let energy = &cycle.energy;
-        self.sensed = Some(SelfSensed {
-            cells,
-            end_ns: cycle.end_ns,
-            end_phase: cycle.end_phase,
-            standing,
-            cycles: self.fit.cycles(),
-            friction_n: of_cells(&|cell| parameters.friction_n(cell)),
-            friction_sigma_n: of_cells(&|cell| parameters.friction_n(cell) * sigma(cell)),
-            stiffness_n_per_m: of_cells(&|cell| parameters.stiffness_n_per_m(cell)),
-            stiffness_sigma_n_per_m: of_cells(&|cell| parameters.stiffness_n_per_m(cell) * sigma(cells + cell)),
-            pull_n,
-            pull_sigma_n,
-            slope_rad,
-            slope_sigma_rad,
-            slope_is_measured: measured.is_some(),
-            figures,
-            figures_sigma,
-            electrical_j: energy.electrical_j,
-            electrical_sigma_j: (energy.by_voltage * ROUNDING[0]).hypot(energy.by_current * ROUNDING[1]),
-            residual_n_m: self.fit.residual_n_m(),
-            blind: Blind::of(&self.fit),
-            changes: *self.detector.changes(),
-            armed: *self.detector.armed(),
-        });
     }
 }

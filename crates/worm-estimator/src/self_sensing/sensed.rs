@@ -1,7 +1,10 @@
 //! What self-sensing says after a cycle.
 
-use super::{Armed, Blind, Changes, CycleFigures};
+use super::{Armed, Blind, Changes, ClosedCycle, CycleFigures, ROUNDING, SelfSensing, WARM_CYCLES};
 use worm_physics::MAX_CELLS;
+
+/// Share of their friction that all cells have lost beyond which an advance is not known: it may be any part of the stroke, either way.
+const SLIPPING_LOSS: f64 = 0.5;
 
 /// What the current says after a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,4 +66,78 @@ pub enum Standing {
     Odd,
     /// Fitted: the worm is another than it was, and [`SelfSensed::changes`] says in what.
     Changed,
+}
+
+impl SelfSensing {
+    /// By how much the first errors are larger than those of the fit: it may have begun at a wrong answer, and has hardly seen what scatters.
+    fn widened(&self) -> f64 {
+        let cycles = self.fit.cycles();
+        if (1.0..WARM_CYCLES).contains(&cycles) {
+            (1.0 + 1.0 / cycles).sqrt()
+        } else {
+            1.0
+        }
+    }
+
+    /// Figures of the steady cycle with their standard errors.
+    pub(super) fn figures(&self) -> Option<(CycleFigures, CycleFigures)> {
+        let (figures, sigma) = self.fit.figures().copied()?;
+        let mut sigma = CycleFigures::from_flat(&sigma.flat().map(|sigma| self.widened() * sigma));
+        let changes = self.detector.changes();
+        if changes.all_friction_lost && changes.loss_share > SLIPPING_LOSS {
+            // Tips that hardly hold slide as a whole, which the exact cycle does not know.
+            sigma.advance_m = sigma.advance_m.max(self.stroke_m);
+        }
+        Some((figures, sigma))
+    }
+
+    /// Says what is known after a cycle, where something is.
+    pub(super) fn show(&mut self, cycle: &ClosedCycle, standing: Standing) {
+        let Some((figures, figures_sigma)) = self.figures() else {
+            return;
+        };
+        let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());
+        let cells = parameters.cells;
+        let widened = self.widened();
+        let sigma = |unknown: usize| widened * covariance[(unknown, unknown)].max(0.0).sqrt();
+        let of_cells = |of: &dyn Fn(usize) -> f64| {
+            let mut values = [0.0; MAX_CELLS];
+            (0..cells).for_each(|cell| values[cell] = of(cell));
+            values
+        };
+        let pull_n = parameters.pull_n();
+        let pull_sigma_n = sigma(parameters.pull_at());
+        let pulled_rad = (pull_n / self.weight_n).clamp(-1.0, 1.0).asin();
+        let pulled = (pulled_rad, pull_sigma_n / (self.weight_n * pulled_rad.cos().max(0.05)));
+        let measured = self.fit.known_pull_n().map(|weight_n| {
+            let slope_rad = (weight_n / self.weight_n).clamp(-1.0, 1.0).asin();
+            (slope_rad, self.pitch_sensor.sigma_rad)
+        });
+        let (slope_rad, slope_sigma_rad) = measured.unwrap_or(pulled);
+        let energy = &cycle.energy;
+        self.sensed = Some(SelfSensed {
+            cells,
+            end_ns: cycle.end_ns,
+            end_phase: cycle.end_phase,
+            standing,
+            cycles: self.fit.cycles(),
+            friction_n: of_cells(&|cell| parameters.friction_n(cell)),
+            friction_sigma_n: of_cells(&|cell| parameters.friction_n(cell) * sigma(cell)),
+            stiffness_n_per_m: of_cells(&|cell| parameters.stiffness_n_per_m(cell)),
+            stiffness_sigma_n_per_m: of_cells(&|cell| parameters.stiffness_n_per_m(cell) * sigma(cells + cell)),
+            pull_n,
+            pull_sigma_n,
+            slope_rad,
+            slope_sigma_rad,
+            slope_is_measured: measured.is_some(),
+            figures,
+            figures_sigma,
+            electrical_j: energy.electrical_j,
+            electrical_sigma_j: (energy.by_voltage * ROUNDING[0]).hypot(energy.by_current * ROUNDING[1]),
+            residual_n_m: self.fit.residual_n_m(),
+            blind: Blind::of(&self.fit),
+            changes: *self.detector.changes(),
+            armed: *self.detector.armed(),
+        });
+    }
 }

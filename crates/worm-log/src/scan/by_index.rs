@@ -85,19 +85,6 @@ impl<F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'_, F> 
             self.contents.warnings.push(abridged(warning, MAX_NAME_LEN));
         }
     }
-
-    /// Takes schemas and channels from the summary; what it does not have, as they are named before all chunks.
-    pub(super) fn take_definitions(&mut self) -> Result<(), Trouble> {
-        for (opcode, content) in std::mem::take(&mut self.definitions) {
-            match self.take_plain(opcode, &content) {
-                // Then it is damaged itself.
-                Err(Trouble::Broken(_)) | Ok(()) => {}
-                refused => return refused,
-            }
-        }
-        self.take_channel_names();
-        Ok(())
-    }
 }
 
 /// Whether a chunk stands where an index says: one of its opcode and its length does, for either may be damaged.

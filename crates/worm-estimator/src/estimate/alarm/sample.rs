@@ -4,7 +4,7 @@ use crate::message::{Estimate, State};
 use worm_physics::MAX_CELLS;
 
 /// A filtered position is trusted while its cell was seen in one of this many newest samples.
-const TRUSTED_SAMPLES: u32 = 6;
+pub(super) const TRUSTED_SAMPLES: u32 = 6;
 
 /// Which cells the tracker sees, so that a position that the filter only predicts does not count as a measurement.
 #[derive(Debug, Clone)]

@@ -15,7 +15,7 @@
 
 use super::cam_motion::Tick;
 use super::latch::{DetectorOutput, Reading, ReadingState};
-use super::sample::Positions;
+use super::sample::{Positions, TRUSTED_SAMPLES};
 use super::stride::{BINS, Strides};
 use crate::config::Config;
 use crate::message::Severity;
@@ -25,8 +25,6 @@ use worm_physics::MAX_CELLS;
 const LEVEL_DEG: f64 = 0.5;
 /// Weight of the newest sample in the smoothed positions: five samples, some 40 ms.
 const SMOOTHING: f64 = 0.2;
-/// Smoothing begins anew after a silence of so many samples: the worm has moved meanwhile.
-const SILENT_SAMPLES: f64 = 6.0;
 /// Samples in a row beyond the threshold.
 const CONFIRMATIONS: u32 = 4;
 /// A displacement within this many standard deviations of the mean position is noise.
@@ -63,8 +61,8 @@ pub(super) struct SlidingDown {
     slope_sign: f64, // +1 uphill along the canal, −1 downhill, 0 level
     calibration_cycles: u32,
     smoothed: Positions,
-    smoothed_ns: u64,
-    longest_gap_ns: u64,
+    smoothed_ns: u64,    // when a sample last went into them
+    longest_gap_ns: u64, // after which smoothing begins anew, for the worm has moved meanwhile
     crawl_state: Option<CrawlState>,
     reversals: u32,
     anchor: Positions, // where the present state of the crawl began
@@ -96,7 +94,7 @@ impl SlidingDown {
             calibration_cycles: config.estimator.calibration_cycles,
             smoothed: Positions::NONE,
             smoothed_ns: 0,
-            longest_gap_ns: (SILENT_SAMPLES / config.tracker.rate_hz * 1e9) as u64,
+            longest_gap_ns: (f64::from(TRUSTED_SAMPLES) / config.tracker.rate_hz * 1e9) as u64,
             crawl_state: None,
             reversals: 0,
             anchor: Positions::NONE,
