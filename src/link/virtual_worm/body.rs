@@ -11,7 +11,7 @@ use worm_physics::effect::{Setting, SettingError};
 use worm_physics::{Contact, Ledger, Locomotion, Physics, SlidesDown, View, Worm, WormError};
 
 /// A tip's friction scatters by no more than this many standard deviations, and never to nothing.
-const SCATTER_LIMIT: f64 = 4.0;
+pub const SCATTER_LIMIT: f64 = 4.0;
 
 /// Drag of a body that slides because its tips cannot hold it, N s/m: a tenth of a newton too much makes 2 mm/s. The model
 /// is quasi-static and knows no such velocity; this makes the slide slow and finite.
@@ -37,6 +37,19 @@ pub enum BodyError {
     SlidesDown(#[from] SlidesDown),
 }
 
+/// The worm as it is, which the configuration may only guess: with the largest tip deformations of `[virtual_worm]` where it has them.
+///
+/// # Errors
+/// [`BodyError`] when the configuration was not checked and describes no worm.
+pub fn true_worm(config: &Config) -> Result<Worm, BodyError> {
+    let worm = Worm::try_from(config)?;
+    let Some(bounds_m) = &config.virtual_worm.max_deformation_m else {
+        return Ok(worm);
+    };
+    let bounds_m: Vec<f64> = (0..worm.cells()).map(|cell| bounds_m.of(cell)).collect();
+    Ok(worm.with_max_deformations_m(&bounds_m)?)
+}
+
 /// Cells, contacts and cam.
 #[derive(Debug, Clone)]
 pub struct Body {
@@ -58,11 +71,7 @@ impl Body {
     /// # Errors
     /// [`BodyError`] when the configuration was not checked and describes no worm.
     pub fn new(config: &Config) -> Result<Self, BodyError> {
-        let mut nominal = Worm::try_from(config)?;
-        if let Some(bounds_m) = &config.virtual_worm.max_deformation_m {
-            let bounds_m: Vec<f64> = (0..nominal.cells()).map(|cell| bounds_m.of(cell)).collect();
-            nominal = nominal.with_max_deformations_m(&bounds_m)?;
-        }
+        let nominal = true_worm(config)?;
         let positions_m: Vec<f64> = (0..nominal.cells())
             .rev()
             .map(|behind| behind as f64 * config.worm.cell_spacing_m)
