@@ -110,7 +110,7 @@ pub struct StepInput<'a> {
 #[derive(Debug, Clone)]
 pub struct Motion<'a> {
     worm: &'a Worm,
-    /// Those of the worm, while what is hidden is there.
+    /// Those of the worm, once what is hidden has begun.
     deviations: Deviations,
     cells: usize,
     placement: Placement,
@@ -141,25 +141,20 @@ pub struct Motion<'a> {
     pub drive_j: f64,
     /// Mean position where the run began, m.
     begin_m: f64,
-    effect_acts: bool,
+    effect_begun: bool,
     /// Displacement to which what trails behind the worm has followed, m.
     followed_m: f64,
 }
 
-/// What deviates while the hidden is there, and while it is not.
-fn deviations(worm: &Worm, acts: bool) -> Deviations {
-    if acts {
-        worm.deviations.clone()
-    } else {
-        Deviations::default()
-    }
-}
-
 impl<'a> Motion<'a> {
     /// A worm just laid down, undeformed and at rest; `step_s` is the integrator's time step.
-    /// With `begun`, what is hidden is there from the start; without, [`switch_effect`](Self::switch_effect) brings it.
+    /// With `begun`, what is hidden is there from the start; without, [`begin_effect`](Self::begin_effect) brings it.
     pub fn laid_down(worm: &'a Worm, placement: Placement, phase: f64, step_s: f64, begun: bool) -> Self {
-        let deviations = deviations(worm, begun);
+        let deviations = if begun {
+            worm.deviations.clone()
+        } else {
+            Deviations::default()
+        };
         let cam_profile = CamProfile::new(&worm.parameters, &deviations, worm.unmodelled.as_ref());
         let position_m: [f64; MAX_CELLS] =
             std::array::from_fn(|cell| placement.start_m - worm.parameters.spacing_m * cell as f64);
@@ -187,7 +182,7 @@ impl<'a> Motion<'a> {
             work_j: 0.0,
             drive_j: 0.0,
             begin_m: mean_m,
-            effect_acts: begun,
+            effect_begun: begun,
             followed_m: 0.0,
             cells,
             cam_profile,
@@ -195,11 +190,11 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// What is hidden begins or ends now: positions and momentum stay, all else may change.
-    pub fn switch_effect(&mut self, acts: bool, phase: f64) {
-        self.effect_acts = acts;
+    /// What is hidden begins now: positions and momentum stay, all else may change.
+    pub fn begin_effect(&mut self, phase: f64) {
+        self.effect_begun = true;
         let before_m = self.cam_profile.extensions_m(phase);
-        self.deviations = deviations(self.worm, acts);
+        self.deviations = self.worm.deviations.clone();
         self.cam_profile = CamProfile::new(&self.worm.parameters, &self.deviations, self.worm.unmodelled.as_ref());
         let after_m = self.cam_profile.extensions_m(phase);
         for cell in 0..self.cells {
@@ -217,9 +212,9 @@ impl<'a> Motion<'a> {
         self.begin_m = self.mean_m;
     }
 
-    /// Whether what is hidden is there.
-    pub fn effect_acts(&self) -> bool {
-        self.effect_acts
+    /// Whether what is hidden has begun.
+    pub fn has_begun(&self) -> bool {
+        self.effect_begun
     }
 
     pub fn time_s(&self) -> f64 {

@@ -65,9 +65,8 @@ impl ScoreTable<'_> {
         self.of(kind).filter(each_shows)
     }
 
-    /// Campaigns of this kind whose effect shows in each cycle in which it acts.
-    fn in_time(&self, kind: CampaignKind) -> impl Iterator<Item = &Assessment> {
-        self.of(kind)
+    fn onsets(&self) -> impl Iterator<Item = &Assessment> {
+        self.of(CampaignKind::Onset)
             .filter(|one| one.truth.sigma_per_cycle >= ONSET_SIGMA_PER_CYCLE)
     }
 
@@ -85,7 +84,7 @@ impl ScoreTable<'_> {
             proportion,
             target,
         };
-        use CampaignKind::{Onset, Pair, Single, Spell, Triple};
+        use CampaignKind::{Pair, Single, Triple};
         vec![
             row(
                 "no answer at all",
@@ -218,23 +217,13 @@ impl ScoreTable<'_> {
             ),
             row(
                 "onset: class right",
-                share(self.in_time(Onset), |one| one.right_class),
+                share(self.onsets(), |one| one.right_class),
                 ">= 85 %",
             ),
             row(
                 "onset: within one cycle",
-                share(self.in_time(Onset), |one| one.onset_right),
+                share(self.onsets(), |one| one.onset_right),
                 ">= 85 %",
-            ),
-            row(
-                "spell: class right",
-                share(self.in_time(Spell), |one| one.right_class),
-                "",
-            ),
-            row(
-                "spell: both ends within one cycle",
-                share(self.in_time(Spell), |one| one.onset_right),
-                "",
             ),
         ]
     }

@@ -71,58 +71,31 @@ impl Free {
     }
 }
 
-/// When an effect begins, ends, or does both, that does not act throughout.
+/// When an effect begins or ends that does not act throughout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::explain) struct Onset {
-    /// When it begins, cycles since the first sample of the run; it acts from the start on for none.
-    pub begins: Option<f64>,
-    /// When it ends, likewise; it acts to the end for none.
-    pub ends: Option<f64>,
+    /// Cycles since the first sample of the run.
+    pub cycle: f64,
     /// The run in which it happens, once: the runs before and after are as at its start and its end. In every run for none.
     pub run: Option<usize>,
+    /// It acts up to then, instead of from then on.
+    pub ends: bool,
 }
 
 impl Onset {
-    /// An effect that begins and stays.
-    pub fn from(cycle: f64, run: Option<usize>) -> Self {
-        Self {
-            begins: Some(cycle),
-            ends: None,
-            run,
-        }
-    }
-
-    /// An effect that acts from the start on and ends.
-    pub fn until(cycle: f64, run: Option<usize>) -> Self {
-        Self {
-            begins: None,
-            ends: Some(cycle),
-            run,
-        }
-    }
-
-    /// Whether it begins and ends again.
-    pub fn comes_and_goes(&self) -> bool {
-        self.begins.is_some() && self.ends.is_some()
-    }
-
     /// Whether the effect begins or ends in a run.
     pub fn is_in(&self, run: usize) -> bool {
         self.run.is_none_or(|of| of == run)
     }
 
-    /// Whether the effect acts so many cycles after the start of a run.
-    pub fn acts_at(&self, run: usize, cycle: f64) -> bool {
-        match self.run {
-            Some(of) if run < of => self.begins.is_none(),
-            Some(of) if run > of => self.ends.is_none(),
-            _ => self.begins.is_none_or(|begins| cycle >= begins) && self.ends.is_none_or(|ends| cycle < ends),
-        }
+    /// Whether the effect acts at the start of a run.
+    pub fn acts_at_start(&self, run: usize) -> bool {
+        self.run.is_some_and(|of| of < run) != self.ends
     }
 
-    /// Whether the effect acts at some time of a run.
-    pub fn acts_in(&self, run: usize) -> bool {
-        self.is_in(run) || self.acts_at(run, 0.0)
+    /// Whether the effect acts at the end of a run.
+    pub fn acts_at_end(&self, run: usize) -> bool {
+        self.run.is_none_or(|of| of <= run) != self.ends
     }
 }
 
@@ -187,17 +160,10 @@ mod tests {
             (None, no, [no, no, no], [yes, yes, yes]),
             (None, yes, [yes, yes, yes], [no, no, no]),
         ] {
-            let onset = [Onset::from, Onset::until][usize::from(ends)](4.0, run);
-            let found = [0, 1, 2].map(|run| (onset.acts_at(run, 0.0), onset.acts_at(run, f64::INFINITY)));
+            let onset = Onset { cycle: 4.0, run, ends };
+            let found = [0, 1, 2].map(|run| (onset.acts_at_start(run), onset.acts_at_end(run)));
             assert_eq!(found.map(|(start, _)| start), at_start, "{onset:?}");
             assert_eq!(found.map(|(_, end)| end), at_end, "{onset:?}");
         }
-        let spell = Onset {
-            ends: Some(6.0),
-            ..Onset::from(4.0, Some(1))
-        };
-        let acts = [0, 1, 2].map(|run| [0.0, 3.9, 4.0, 5.9, 6.0].map(|cycle| spell.acts_at(run, cycle)));
-        assert_eq!(acts, [[no; 5], [no, no, yes, yes, no], [no; 5]]);
-        assert_eq!([0, 1, 2].map(|run| spell.acts_in(run)), [no, yes, no]);
     }
 }

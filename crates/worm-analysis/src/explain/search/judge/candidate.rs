@@ -38,12 +38,6 @@ impl Candidate {
         }
     }
 
-    /// Whether an effect in it begins and ends again.
-    pub fn comes_and_goes(&self) -> bool {
-        let mut onsets = self.hypothesised.iter().filter_map(|one| one.onset);
-        onsets.any(|onset| onset.comes_and_goes())
-    }
-
     /// The effects that it names, each with its place in the hypothesis: all but a trace.
     pub fn named(&self) -> impl Iterator<Item = (usize, &Hypothesised)> + Clone {
         let all = self.hypothesised.iter().enumerate();

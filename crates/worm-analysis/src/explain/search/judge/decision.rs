@@ -211,18 +211,14 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         sum += that_counts(named[count]);
         count += 1;
     }
-    // What comes and goes fits a little of much that is something else, so it is named where it is sure, and not otherwise.
-    let may_be_unsure = named
-        .first()
-        .is_some_and(|class| !judged[class.best].candidate.comes_and_goes());
     // No name is right where the conditions are wrong, either.
     let wrong = other_probability + misstated_probability;
     let verdict = match count {
         1 if sum >= SURE => Verdict::Explained,
         2.. if sum >= SURE => Verdict::Ambiguous,
         // Something is there, and more probably this than what the library does not know, or what does not matter.
-        1 if may_be_unsure && nothing <= 1.0 - SURE && sum > wrong.max(unimportant) => Verdict::Ambiguous,
-        2.. if may_be_unsure && null_probability <= 1.0 - SURE && sum > wrong => Verdict::Ambiguous,
+        1 if nothing <= 1.0 - SURE && sum > wrong.max(unimportant) => Verdict::Ambiguous,
+        2.. if null_probability <= 1.0 - SURE && sum > wrong => Verdict::Ambiguous,
         _ if wrong > null_probability => Verdict::OutsideLibrary,
         _ => Verdict::Agrees,
     };
