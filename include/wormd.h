@@ -317,8 +317,8 @@ enum wormd_command_kind {
      not permit it. The sender is NAME: COMMAND, and the name begins with that of the certificate. Moves and
      permits nothing. */
   WORMD_COMMAND_KIND_NOT_PERMITTED = 10,
-  /* Note that a command did not come this far, because it came too late over the network. The sender is as
-     with not-permitted. Moves and permits nothing. */
+  /* Note that a command did not come this far, because it came too late: over the network, or to a relay that
+     stood still. The sender is NAME: COMMAND. Moves and permits nothing. */
   WORMD_COMMAND_KIND_STALE = 11,
 };
 

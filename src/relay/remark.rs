@@ -1,5 +1,5 @@
 //! What never comes as far as the controller and every recording is to say all the same: who took over, who was refused because another
-//! drives, and whom a bridge has refused.
+//! drives or because it was too late, and whom a bridge has refused.
 
 use super::departure::{name_within, printable};
 use super::drive::WatcherId;
@@ -58,32 +58,36 @@ pub(crate) fn in_words(record: &CommandRecord) -> Option<String> {
             "{command} from {name} (user {user}) was refused: another watcher drives"
         )),
         Ok(CommandKind::NotPermitted) => Some(refused_by_bridge(NetworkRefusal::NotPermitted, name, command)),
-        Ok(CommandKind::Stale) => Some(refused_by_bridge(NetworkRefusal::Stale, name, command)),
+        // By the bridge or by the relay.
+        Ok(CommandKind::Stale) => Some(format!(
+            "{command} from {name} (user {user}) was refused: it came too late"
+        )),
         _ => None,
     }
 }
 
 /// The refusals that are recorded: not each of a watcher that asks on and on.
 #[derive(Debug, Default)]
-pub(super) struct Refusals(Option<(WatcherId, String, Instant)>);
+pub(super) struct Refusals(Option<(WatcherId, CommandKind, String, Instant)>);
 
 impl Refusals {
-    /// The record of this refusal, where there is to be one.
+    /// The record of a command that was refused, for the reason that the kind is, where there is to be one.
     pub(super) fn record(
         &mut self,
+        kind: CommandKind,
         id: WatcherId,
         (name, user): (&str, u32),
         command: &str,
         now: Instant,
     ) -> Option<Command> {
-        let is_same = |(watcher, what, since): &(WatcherId, String, Instant)| {
-            *watcher == id && what == command && now.saturating_duration_since(*since) < SAME
+        let is_same = |(watcher, why, what, since): &(WatcherId, CommandKind, String, Instant)| {
+            (*watcher, *why, what.as_str()) == (id, kind, command) && now.saturating_duration_since(*since) < SAME
         };
         if self.0.as_ref().is_some_and(is_same) {
             return None;
         }
-        self.0 = Some((id, command.to_owned(), now));
-        Some(refused(CommandKind::NotDriver, name, user, command))
+        self.0 = Some((id, kind, command.to_owned(), now));
+        Some(refused(kind, name, user, command))
     }
 }
 
@@ -105,10 +109,13 @@ mod tests {
 
     #[test]
     fn the_record_names_who_took_over_and_who_was_refused_what() {
+        use CommandKind::{NotDriver, Stale};
         let mut refusals = Refusals::default();
         let now = Instant::now();
         let long = "Ångström-Ångström-Ångström, Chrome on Windows";
-        let refused = refusals.record(2, (long, 7), "take_over", now).expect("is the first");
+        let refused = refusals
+            .record(NotDriver, 2, (long, 7), "take_over", now)
+            .expect("is the first");
         let words = "take_over from Ångström-Ångström (user 7) was refused: another watcher drives";
         assert_eq!(recorded(&refused).as_deref(), Some(words));
         let taken = take_over("ben", 1000);
@@ -116,23 +123,38 @@ mod tests {
             recorded(&taken).as_deref(),
             Some("ben (user 1000) took over, and drives")
         );
-        for (verdict, words) in [
+        for (verdict, said_words, recorded_words) in [
             (
                 NetworkRefusal::NotPermitted,
                 "crawl from hall at the\u{fffd} was refused by the bridge: the certificate may watch",
+                "crawl from hall at the\u{fffd} was refused by the bridge: the certificate may watch",
             ),
-            (NetworkRefusal::Stale, "was refused by the bridge: it came too late"),
+            (
+                NetworkRefusal::Stale,
+                "crawl from hall at the\u{fffd} was refused by the bridge: it came too late over the network",
+                "crawl from hall at the\u{fffd} (user 0) was refused: it came too late",
+            ),
         ] {
             let (record, said) = by_bridge(verdict, "hall at the\u{fffd}\n", 0, "crawl");
-            assert!(said.contains(words), "{said}");
-            assert_eq!(recorded(&record), Some(said));
+            assert!(said.contains(said_words), "{said}");
+            let recorded = recorded(&record).expect("is in words");
+            assert!(recorded.contains(recorded_words), "{recorded}");
         }
         assert_eq!(recorded(&Command::new(CommandKind::Hold)), None);
         // Who asks on and on stands there once a second, and not at the cost of others.
         let later = |ms| now + Duration::from_millis(ms);
-        assert!(refusals.record(2, (long, 7), "take_over", later(999)).is_none());
-        assert!(refusals.record(2, (long, 7), "crawl", later(999)).is_some());
-        assert!(refusals.record(3, ("ann", 7), "crawl", later(999)).is_some());
-        assert!(refusals.record(3, ("ann", 7), "crawl", later(1_999)).is_some());
+        assert!(
+            refusals
+                .record(NotDriver, 2, (long, 7), "take_over", later(999))
+                .is_none()
+        );
+        assert!(refusals.record(NotDriver, 2, (long, 7), "crawl", later(999)).is_some());
+        assert!(refusals.record(NotDriver, 3, ("ann", 7), "crawl", later(999)).is_some());
+        assert!(
+            refusals
+                .record(NotDriver, 3, ("ann", 7), "crawl", later(1_999))
+                .is_some()
+        );
+        assert!(refusals.record(Stale, 3, ("ann", 7), "crawl", later(1_999)).is_some());
     }
 }

@@ -22,6 +22,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
+use worm_estimator::message::CommandKind;
 
 /// Time between frames.
 pub(crate) const FRAME: Duration = Duration::from_millis(50);
@@ -281,13 +282,13 @@ impl Server {
                 Answer::own(id, number, name, "accepted", None)
             }
             Decision::Refused(refusal) => {
-                let who = self.drive.name(id);
-                if let Some(record) = self.refusals.record(id, (who.as_str(), user), name, Instant::now()) {
-                    self.commander.remark(record);
-                }
+                self.record_refusal(CommandKind::NotDriver, id, user, name);
                 refused("not-driver", refusal)
             }
-            Decision::Stale(refusal) => refused("stale", refusal),
+            Decision::Stale(refusal) => {
+                self.record_refusal(CommandKind::Stale, id, user, name);
+                refused("stale", refusal)
+            }
             Decision::Send => {
                 let job = Job::Request {
                     watcher: id,
@@ -321,6 +322,15 @@ impl Server {
         }
     }
 
+    /// Records that a command of a watcher came no further than this, unless that was recorded just now.
+    fn record_refusal(&mut self, kind: CommandKind, id: WatcherId, user: u32, command: &str) {
+        let name = self.drive.name(id);
+        let record = self.refusals.record(kind, id, (&name, user), command, Instant::now());
+        if let Some(record) = record {
+            self.commander.remark(record);
+        }
+    }
+
     fn take_outcomes(&mut self) {
         let outcomes: Vec<_> = self.commander.outcomes().collect();
         for outcome in outcomes {
@@ -335,6 +345,11 @@ impl Server {
                             .note_answer(&mut self.source.worm, &self.drive.who(answer.watcher), &answer);
                     }
                     let id = answer.watcher;
+                    if answer.verdict == "stale"
+                        && let Some(user) = self.watchers.get(&id).map(|watcher| watcher.user)
+                    {
+                        self.record_refusal(CommandKind::Stale, id, user, &answer.command);
+                    }
                     if let Some(watcher) = self.watchers.get_mut(&id)
                         && let Err(gone) = watcher.answer(answer)
                     {

@@ -5,14 +5,19 @@ use super::worm::{Process, Worm, wait_for};
 use super::{Crawling, PATIENCE};
 use nix::pty::{OpenptyResult, Winsize, openpty};
 use nix::sys::signal::Signal;
+use std::num::NonZero;
 use std::time::{Duration, Instant};
 use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
+
+/// Size of a terminal, characters.
+pub const ROWS: NonZero<u16> = NonZero::new(50).expect("is not zero");
+pub const COLUMNS: NonZero<u16> = NonZero::new(200).expect("is not zero");
 
 /// A terminal that nobody reads: what is written to it is taken until its buffer is full, and then waits for ever.
 pub fn stalled_terminal() -> OpenptyResult {
     let size = Winsize {
-        ws_row: 50,
-        ws_col: 200,
+        ws_row: ROWS.get(),
+        ws_col: COLUMNS.get(),
         ws_xpixel: 0,
         ws_ypixel: 0,
     };

@@ -1,6 +1,6 @@
 //! A relay that is there and does nothing, as one that is suspended: anyone can still halt the worm, and nothing is done late.
 
-use super::watching::{Terminal, crawling_with_relay};
+use super::watching::{Client, Terminal, crawling_with_relay};
 use super::{PATIENCE, Process};
 use nix::sys::signal::Signal;
 use std::time::{Duration, Instant};
@@ -31,12 +31,14 @@ fn what_was_asked_of_a_frozen_relay_is_not_done_when_it_goes_on() {
     crawling.worm.order(CommandKind::Hold);
     crawling.wait_for_mode(Mode::Holding);
     let mut terminal = Terminal::watch(&crawling.worm);
+    let mut other = Client::connect(&crawling.worm);
     let frozen = Frozen::new(&relay);
     terminal.press("cc");
     std::thread::sleep(FROZEN);
     drop(frozen);
-    crawling.worm.assert_does_not_crawl();
     terminal.wait_for("ago, when nobody answered: ask again");
+    crawling.worm.assert_does_not_crawl();
+    other.wait_for_record("stale", ": crawl");
 }
 
 #[test]

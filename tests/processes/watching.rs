@@ -1,30 +1,28 @@
 //! The relay and its watchers: real processes, real sockets, a real terminal. The clients here are written from docs/relay.md alone.
 
 use super::any_order::make_crawl_again;
-use super::attending::stalled_terminal;
+use super::attending::{COLUMNS, ROWS, stalled_terminal};
 use super::worm::{Process, Worm, wait_for};
 use super::{Crawling, PATIENCE};
-use nix::pty::Winsize;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
-use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use worm_estimator::message::{CommandKind, Mode};
 
 /// A watcher that reads JSON lines.
-struct Client {
+pub struct Client {
     stream: UnixStream,
     input: Vec<u8>,
     lines: Vec<Value>,
 }
 
 impl Client {
-    fn connect(worm: &Worm) -> Self {
+    pub fn connect(worm: &Worm) -> Self {
         let socket = worm.folder().join("relay.sock");
         let mut stream = None;
         wait_for("a relay that listens", PATIENCE, || {
@@ -89,6 +87,20 @@ impl Client {
         wait_for("frames", PATIENCE, || {
             assert!(self.read(), "the relay is there");
             self.of("frame").count() >= count
+        });
+    }
+
+    /// Waits until the topic that every recording has says this of whoever asked.
+    pub fn wait_for_record(&mut self, kind: &str, sender_ends: &str) {
+        wait_for(kind, PATIENCE, || {
+            assert!(self.read(), "the relay is there");
+            let records = self.of("frame").filter_map(|frame| frame["commands"].as_array());
+            records.flatten().any(|record| {
+                record["kind"] == kind
+                    && record["sender"]
+                        .as_str()
+                        .is_some_and(|sender| sender.ends_with(sender_ends))
+            })
         });
     }
 
@@ -234,7 +246,7 @@ fn fifty_watchers_are_served_though_one_of_them_never_reads() {
 pub struct Terminal {
     process: Process,
     keyboard: File,
-    seen: Arc<Mutex<String>>,
+    screen: Arc<Mutex<vt100::Parser>>,
 }
 
 impl Terminal {
@@ -242,20 +254,19 @@ impl Terminal {
         let pty = stalled_terminal();
         let process = worm.wormd(&["watch"]).start_in(pty.slave);
         let keyboard = File::from(pty.master.try_clone().expect("a descriptor is free"));
-        let seen = Arc::new(Mutex::new(String::new()));
-        let (mut master, there) = (File::from(pty.master), Arc::clone(&seen));
+        let screen = Arc::new(Mutex::new(vt100::Parser::new(ROWS, COLUMNS, 0)));
+        let (mut master, painted) = (File::from(pty.master), Arc::clone(&screen));
         std::thread::spawn(move || {
             let mut bytes = [0; 65_536];
             // It ends with an error when the last process has left the terminal.
             while let Ok(count) = master.read(&mut bytes) {
-                let text = String::from_utf8_lossy(&bytes[..count]).into_owned();
-                there.lock().expect("no thread has panicked").push_str(&text);
+                painted.lock().expect("no thread has panicked").process(&bytes[..count]);
             }
         });
         let terminal = Self {
             process,
             keyboard,
-            seen,
+            screen,
         };
         terminal.wait_for("gait cycles");
         terminal
@@ -267,31 +278,23 @@ impl Terminal {
             .expect("the terminal takes keys");
     }
 
-    /// Waits until the words of a text are shown. Only what changes is painted, so for each look the terminal gets another size, and
-    /// with it the whole picture.
-    pub fn wait_for(&self, text: &str) {
-        let mut columns = 200;
-        wait_for(text, PATIENCE, || {
-            columns = 399 - columns;
-            self.seen.lock().expect("no thread has panicked").clear();
-            resize(&self.keyboard, columns);
-            std::thread::sleep(Duration::from_millis(250));
-            let seen = self.seen.lock().expect("no thread has panicked");
-            text.split_whitespace().all(|word| seen.contains(word))
-        });
+    /// What is shown.
+    fn picture(&self) -> String {
+        self.screen.lock().expect("no thread has panicked").screen().contents()
     }
-}
 
-fn resize(terminal: &File, columns: u16) {
-    nix::ioctl_write_ptr_bad!(set_size, libc::TIOCSWINSZ, Winsize);
-    let size = Winsize {
-        ws_row: 50,
-        ws_col: columns,
-        ws_xpixel: 0,
-        ws_ypixel: 0,
-    };
-    // SAFETY: the terminal is open, and the call only reads the size.
-    unsafe { set_size(terminal.as_raw_fd(), &raw const size) }.expect("a terminal has a size");
+    /// Waits until a text is shown.
+    pub fn wait_for(&self, text: &str) {
+        let begun = Instant::now();
+        while !self.picture().contains(text) {
+            let picture = self.picture();
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "waited in vain for {text:?}; shown is:\n{picture}"
+            );
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
 }
 
 /// Crawls by the keys of a terminal. A computer that is too busy may stop the worm: then once more.

@@ -181,8 +181,8 @@ class CommandKind(Code):
     permit it. The sender is NAME: COMMAND, and the name begins with that of the certificate. Moves and permits
     nothing."""
     STALE = "stale", 11
-    """Note that a command did not come this far, because it came too late over the network. The sender is as with
-    not-permitted. Moves and permits nothing."""
+    """Note that a command did not come this far, because it came too late: over the network, or to a relay that stood
+    still. The sender is NAME: COMMAND. Moves and permits nothing."""
 
 
 class CommandOutcome(Code):

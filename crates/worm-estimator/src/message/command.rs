@@ -34,8 +34,8 @@ coded_enum! {
         /// Note that a command did not come this far, because the certificate of whoever asked over the network does not permit it. The sender is
         /// `NAME: COMMAND`, and the name begins with that of the certificate. Moves and permits nothing.
         NotPermitted = 10 => "not-permitted",
-        /// Note that a command did not come this far, because it came too late over the network. The sender is as with `not-permitted`. Moves and
-        /// permits nothing.
+        /// Note that a command did not come this far, because it came too late: over the network, or to a relay that stood still. The sender is
+        /// `NAME: COMMAND`. Moves and permits nothing.
         Stale = 11 => "stale",
     }
 }
