@@ -33,16 +33,20 @@ class Parameter(Result):
 
 @dataclass(frozen=True)
 class Onset(Result):
-    """When an effect begins or ends that does not act throughout a run."""
+    """When an effect begins or ends, or does both, that does not act throughout a run."""
 
     cycle: float
-    """Gait cycles since the first sample of the run."""
+    """Gait cycles since the first sample of the run: where it begins or, with `ends`, where it ends."""
     time_s: float
     """Time since then, s."""
     run: str | None
     """The recording in which it happens once; None where it happens in each."""
     ends: bool
     """It acts up to then, instead of from then on."""
+    until_cycle: float | None
+    """Where it ends again in the same run, gait cycles since the first sample; None where it stays."""
+    until_s: float | None
+    """The same in time, s."""
 
 
 @dataclass(frozen=True)

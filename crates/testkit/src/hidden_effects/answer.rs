@@ -80,6 +80,8 @@ pub struct FoundOnset {
     pub run: Option<usize>,
     /// The effect ends there, instead.
     pub ends: bool,
+    /// Where it ends again, gait cycles since the recording's start; none where it stays.
+    pub until_cycle: Option<f64>,
 }
 
 /// The scored part of an explanation.
@@ -208,6 +210,7 @@ fn onset(value: &Value, runs: &Value) -> Result<Option<FoundOnset>, String> {
         time_s: value["time_s"].as_f64(),
         run,
         ends: value["ends"].as_bool().unwrap_or(false),
+        until_cycle: value["until_cycle"].as_f64(),
     };
     Ok((found.cycle.is_some() || found.time_s.is_some()).then_some(found))
 }
@@ -238,6 +241,7 @@ mod tests {
             time_s: Some(15.0),
             run: Some(1),
             ends: false,
+            until_cycle: None,
         };
         assert_eq!(answer.onset, Some(onset));
         let mut elsewhere = report.clone();

@@ -142,7 +142,7 @@ impl TrueEffect {
 pub fn compare(truth: &Truth, answer: &Answer) -> Assessment {
     let one = matches!(
         truth.kind,
-        CampaignKind::Single | CampaignKind::Twin | CampaignKind::Onset
+        CampaignKind::Single | CampaignKind::Twin | CampaignKind::Onset | CampaignKind::Spell
     );
     let several = matches!(truth.kind, CampaignKind::Pair | CampaignKind::Triple);
     let effect = truth.effects.first().filter(|_| one);
@@ -179,7 +179,7 @@ pub fn compare(truth: &Truth, answer: &Answer) -> Assessment {
             let met = |effect: &&TrueEffect| answer.names() && answer.named.iter().any(|named| effect.matches(named));
             truth.effects.iter().filter(met).count()
         }),
-        onset_right: (truth.kind == CampaignKind::Onset).then(|| has_onset(truth, answer)),
+        onset_right: matches!(truth.kind, CampaignKind::Onset | CampaignKind::Spell).then(|| has_onset(truth, answer)),
         false_onset: hit
             .filter(|_| truth.kind == CampaignKind::Single)
             .map(|_| answer.onset.is_some()),
@@ -200,7 +200,7 @@ fn is_right(truth: &Truth, answer: &Answer, top_is_true: bool) -> bool {
 }
 
 fn has_onset(truth: &Truth, answer: &Answer) -> bool {
-    // Everything hidden begins, and ends with its run.
+    // Everything hidden begins.
     let Some(found) = answer.onset.filter(|found| !found.ends) else {
         return false;
     };
@@ -209,6 +209,13 @@ fn has_onset(truth: &Truth, answer: &Answer) -> bool {
     let Some(onset) = truth.onset().filter(|_| in_right_runs) else {
         return false;
     };
+    let ends_where_it_does = match (found.until_cycle, onset.until_cycle) {
+        (Some(found), Some(truth)) => (found - truth).abs() <= 1.0,
+        (found, truth) => found.is_none() && truth.is_none(),
+    };
+    if !ends_where_it_does {
+        return false;
+    }
     match (found.time_s, found.cycle) {
         (Some(time_s), _) => (time_s - onset.time_s).abs() <= truth.cycle_s,
         (None, Some(cycle)) => (cycle - onset.cycle).abs() <= 1.0,

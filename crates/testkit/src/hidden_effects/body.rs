@@ -110,7 +110,7 @@ pub struct StepInput<'a> {
 #[derive(Debug, Clone)]
 pub struct Motion<'a> {
     worm: &'a Worm,
-    /// Those of the worm, once what is hidden has begun.
+    /// Those of the worm, while what is hidden is there.
     deviations: Deviations,
     cells: usize,
     placement: Placement,
@@ -141,20 +141,25 @@ pub struct Motion<'a> {
     pub drive_j: f64,
     /// Mean position where the run began, m.
     begin_m: f64,
-    effect_begun: bool,
+    effect_acts: bool,
     /// Displacement to which what trails behind the worm has followed, m.
     followed_m: f64,
 }
 
+/// What deviates while the hidden is there, and while it is not.
+fn deviations(worm: &Worm, acts: bool) -> Deviations {
+    if acts {
+        worm.deviations.clone()
+    } else {
+        Deviations::default()
+    }
+}
+
 impl<'a> Motion<'a> {
     /// A worm just laid down, undeformed and at rest; `step_s` is the integrator's time step.
-    /// With `begun`, what is hidden is there from the start; without, [`begin_effect`](Self::begin_effect) brings it.
+    /// With `begun`, what is hidden is there from the start; without, [`switch_effect`](Self::switch_effect) brings it.
     pub fn laid_down(worm: &'a Worm, placement: Placement, phase: f64, step_s: f64, begun: bool) -> Self {
-        let deviations = if begun {
-            worm.deviations.clone()
-        } else {
-            Deviations::default()
-        };
+        let deviations = deviations(worm, begun);
         let cam_profile = CamProfile::new(&worm.parameters, &deviations, worm.unmodelled.as_ref());
         let position_m: [f64; MAX_CELLS] =
             std::array::from_fn(|cell| placement.start_m - worm.parameters.spacing_m * cell as f64);
@@ -182,7 +187,7 @@ impl<'a> Motion<'a> {
             work_j: 0.0,
             drive_j: 0.0,
             begin_m: mean_m,
-            effect_begun: begun,
+            effect_acts: begun,
             followed_m: 0.0,
             cells,
             cam_profile,
@@ -190,11 +195,11 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// What is hidden begins now: positions and momentum stay, all else may change.
-    pub fn begin_effect(&mut self, phase: f64) {
-        self.effect_begun = true;
+    /// What is hidden begins or ends now: positions and momentum stay, all else may change.
+    pub fn switch_effect(&mut self, acts: bool, phase: f64) {
+        self.effect_acts = acts;
         let before_m = self.cam_profile.extensions_m(phase);
-        self.deviations = self.worm.deviations.clone();
+        self.deviations = deviations(self.worm, acts);
         self.cam_profile = CamProfile::new(&self.worm.parameters, &self.deviations, self.worm.unmodelled.as_ref());
         let after_m = self.cam_profile.extensions_m(phase);
         for cell in 0..self.cells {
@@ -212,9 +217,9 @@ impl<'a> Motion<'a> {
         self.begin_m = self.mean_m;
     }
 
-    /// Whether what is hidden has begun.
-    pub fn has_begun(&self) -> bool {
-        self.effect_begun
+    /// Whether what is hidden is there.
+    pub fn effect_acts(&self) -> bool {
+        self.effect_acts
     }
 
     pub fn time_s(&self) -> f64 {

@@ -43,6 +43,8 @@ pub enum Hidden {
     Twin(Twin),
     /// An effect that begins in mid-run.
     Onset(Effect, SeverityRange),
+    /// An effect that begins in mid-run and ends again.
+    Spell(Effect, SeverityRange),
     /// Nothing but a discrepancy in the law of all pads, of which recalibration leaves about so many micrometres.
     Discrepant(u32),
 }
@@ -56,6 +58,7 @@ impl Hidden {
             Self::Pair => CampaignKind::Pair,
             Self::Triple => CampaignKind::Triple,
             Self::Onset(..) => CampaignKind::Onset,
+            Self::Spell(..) => CampaignKind::Spell,
             Self::Twin(_) => CampaignKind::Twin,
         }
     }
@@ -82,7 +85,9 @@ pub fn hide(
     };
     let effects = match hidden {
         Hidden::Clean | Hidden::Discrepant(_) => Vec::new(),
-        Hidden::Single(effect, range) | Hidden::Onset(effect, range) => vec![put(rng, &one(effect, range))],
+        Hidden::Single(effect, range) | Hidden::Onset(effect, range) | Hidden::Spell(effect, range) => {
+            vec![put(rng, &one(effect, range))]
+        }
         Hidden::Outside(kind) => {
             *unmodelled = Some(UnmodelledEffect::draw(kind, cells, rng));
             Vec::new()

@@ -79,6 +79,8 @@ pub struct Scene {
     pub jump_at_cycle: f64,
     /// Cycle of the recording at which what is hidden begins: minus infinity: it is there from the start; infinity: never.
     pub begins_at_cycle: f64,
+    /// Cycle of the recording at which it ends again; infinity: it stays.
+    pub ends_at_cycle: f64,
     /// Whether the cam's phase is recorded.
     pub with_phase: bool,
     pub seed: u64,
@@ -118,6 +120,7 @@ impl Scene {
             dwell_s: 0.0,
             jump_at_cycle: f64::INFINITY,
             begins_at_cycle: f64::NEG_INFINITY,
+            ends_at_cycle: f64::INFINITY,
             with_phase: true,
             seed: 1,
             servo: 1,
@@ -201,8 +204,9 @@ impl Scene {
         let cycle = (cam.phase - self.drive.first_phase).max(0.0) as usize;
         let factors = each_of(scatter.len(), |cell| scatter[cell][cycle.min(scatter[cell].len() - 1)]);
         let cycles = cam.phase - from_phase;
-        if !motion.has_begun() && cycles >= self.begins_at_cycle {
-            motion.begin_effect(cam.phase);
+        let acts = (self.begins_at_cycle..self.ends_at_cycle).contains(&cycles);
+        if motion.effect_acts() != acts {
+            motion.switch_effect(acts, cam.phase);
         }
         motion.step(StepInput {
             phase: cam.phase,

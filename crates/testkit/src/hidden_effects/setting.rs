@@ -76,6 +76,7 @@ pub fn usual_setting(size: CampaignSize, rng: &mut Xoshiro256PlusPlus) -> Settin
             dwell_s: 0.0,
             jump_at_cycle: [f64::INFINITY, 0.5 * size.cycles, f64::NEG_INFINITY][run],
             begins_at_cycle: f64::NEG_INFINITY,
+            ends_at_cycle: f64::INFINITY,
             with_phase: phase_is_recorded,
             servo: 1,
             seed: rng.random(),

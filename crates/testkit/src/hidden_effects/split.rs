@@ -76,6 +76,7 @@ impl Split {
                 triples: 8,
                 twins: 6,
                 onsets: 16,
+                spells: 16,
             },
             Self::Test | Self::Search | Self::Sample | Self::Laws | Self::Current | Self::CurrentLibrary => Counts {
                 severities: 10,
@@ -86,6 +87,7 @@ impl Split {
                 triples: 30,
                 twins: 12,
                 onsets: 110,
+                spells: 32,
             },
         }
     }
@@ -124,7 +126,16 @@ pub struct Case {
 impl Case {
     /// All values of [`what`](Self::what).
     pub fn words() -> impl Iterator<Item = &'static str> {
-        let others = ["clean", "discrepant", "outside", "pair", "triple", "twin", "onset"];
+        let others = [
+            "clean",
+            "discrepant",
+            "outside",
+            "pair",
+            "triple",
+            "twin",
+            "onset",
+            "spell",
+        ];
         Effect::ALL.iter().map(|effect| effect.name()).chain(others)
     }
 
@@ -136,6 +147,7 @@ impl Case {
             Hidden::Outside(_) => "outside",
             Hidden::Discrepant(_) => "discrepant",
             Hidden::Onset(..) => "onset",
+            Hidden::Spell(..) => "spell",
             Hidden::Triple => "triple",
             Hidden::Pair => "pair",
             Hidden::Twin(_) => "twin",
@@ -166,6 +178,7 @@ struct Counts {
     triples: usize,
     twins: usize,
     onsets: usize,
+    spells: usize,
 }
 
 /// Sizes of the discrepancies put in, micrometres.
@@ -266,6 +279,9 @@ pub fn split(split: Split, scale: f64) -> Vec<Case> {
     });
     several(6, counts.discrepant, &|number| {
         Hidden::Discrepant(DISCREPANCIES[number % DISCREPANCIES.len()])
+    });
+    several(7, counts.spells, &|number| {
+        Hidden::Spell(WITH_ONSET[number % WITH_ONSET.len()], SeverityRange::UPPER_HALF)
     });
     cases
 }

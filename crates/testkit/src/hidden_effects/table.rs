@@ -65,8 +65,9 @@ impl ScoreTable<'_> {
         self.of(kind).filter(each_shows)
     }
 
-    fn onsets(&self) -> impl Iterator<Item = &Assessment> {
-        self.of(CampaignKind::Onset)
+    /// Campaigns of this kind whose effect shows in each cycle in which it acts.
+    fn in_time(&self, kind: CampaignKind) -> impl Iterator<Item = &Assessment> {
+        self.of(kind)
             .filter(|one| one.truth.sigma_per_cycle >= ONSET_SIGMA_PER_CYCLE)
     }
 
@@ -84,7 +85,7 @@ impl ScoreTable<'_> {
             proportion,
             target,
         };
-        use CampaignKind::{Pair, Single, Triple};
+        use CampaignKind::{Onset, Pair, Single, Spell, Triple};
         vec![
             row(
                 "no answer at all",
@@ -217,13 +218,23 @@ impl ScoreTable<'_> {
             ),
             row(
                 "onset: class right",
-                share(self.onsets(), |one| one.right_class),
+                share(self.in_time(Onset), |one| one.right_class),
                 ">= 85 %",
             ),
             row(
                 "onset: within one cycle",
-                share(self.onsets(), |one| one.onset_right),
+                share(self.in_time(Onset), |one| one.onset_right),
                 ">= 85 %",
+            ),
+            row(
+                "spell: class right",
+                share(self.in_time(Spell), |one| one.right_class),
+                "",
+            ),
+            row(
+                "spell: both ends within one cycle",
+                share(self.in_time(Spell), |one| one.onset_right),
+                "",
             ),
         ]
     }

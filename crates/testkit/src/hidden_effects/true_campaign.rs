@@ -63,7 +63,7 @@ impl RunPairs<'_> {
     pub fn affected_cycles(&self) -> usize {
         let of_run = |(scene, simulated): (&Scene, &SimulatedRun)| {
             whole_cycles(simulated)
-                .filter(|&cycle| cycle >= begins(scene, simulated))
+                .filter(|&cycle| is_affected(scene, simulated, cycle))
                 .count()
         };
         self.scenes.iter().zip(self.simulated).map(of_run).sum()
@@ -71,8 +71,9 @@ impl RunPairs<'_> {
 
     fn run(&self, run: usize, differences_m: &[Vec<f64>]) -> TrueRun {
         let (scene, with, without) = (&self.scenes[run], &self.simulated[run], &self.baseline[run]);
-        let from = begins(scene, with);
-        let counted: Vec<f64> = whole_cycles(with).filter(|&cycle| cycle >= from).collect();
+        let counted: Vec<f64> = whole_cycles(with)
+            .filter(|&cycle| is_affected(scene, with, cycle))
+            .collect();
         let per_cycle = |total: f64| total / counted.len().max(1) as f64;
         let first = first_whole(with);
         let mean_advance_m = |simulated: &SimulatedRun| {
@@ -112,15 +113,17 @@ impl RunPairs<'_> {
                     gait_phase,
                     cycle: scene.begins_at_cycle,
                     time_s: with.time_at(gait_phase),
+                    until_cycle: Some(scene.ends_at_cycle).filter(|cycle| cycle.is_finite()),
                 }
             }),
         }
     }
 }
 
-/// The phase at which what is hidden begins.
-fn begins(scene: &Scene, simulated: &SimulatedRun) -> f64 {
-    simulated.phase[0] + scene.begins_at_cycle
+/// Whether what is hidden is there in the whole of a cycle that begins at a phase.
+fn is_affected(scene: &Scene, simulated: &SimulatedRun, phase: f64) -> bool {
+    let cycle = phase - simulated.phase[0];
+    cycle >= scene.begins_at_cycle && cycle + 1.0 <= scene.ends_at_cycle
 }
 
 fn first_whole(simulated: &SimulatedRun) -> f64 {

@@ -31,6 +31,8 @@ pub enum CampaignKind {
     Twin,
     /// One effect that begins in mid-run.
     Onset,
+    /// One effect that begins in mid-run and ends again.
+    Spell,
 }
 
 /// An effect as it truly is.
@@ -93,6 +95,9 @@ pub struct TrueOnset {
     pub cycle: f64,
     /// Time in the recording, s.
     pub time_s: f64,
+    /// Where it ends again, gait cycles since the recording's start; none where it stays.
+    #[serde(default)]
+    pub until_cycle: Option<f64>,
 }
 
 /// One run of a campaign.

@@ -27,6 +27,9 @@ const MAX_CYCLES: f64 = 150.0;
 const ONSET_CYCLES: f64 = 11.0;
 /// Earliest and latest cycle of an onset.
 const ONSET: [f64; 2] = [3.0, 10.0];
+/// Earliest and latest cycle of one that ends again, and for how many it lasts.
+const SPELL: [f64; 2] = [2.0, 6.0];
+const LASTS: [f64; 2] = [2.0, 4.0];
 /// Gait cycles and samples per second of a short recording.
 const SHORT_CYCLES: f64 = 8.0;
 const SHORT_HZ: f64 = 60.0;
@@ -45,7 +48,8 @@ pub fn setting(hidden: Hidden, rng: &mut Xoshiro256PlusPlus) -> Setting {
     let mut cycles = (8.0 * (60.0_f64 / 8.0).powf(exponent))
         .min((MAX_CYCLES / runs as f64).max(8.0))
         .round();
-    let is_onset = matches!(hidden, Hidden::Onset(..));
+    let is_spell = matches!(hidden, Hidden::Spell(..));
+    let is_onset = is_spell || matches!(hidden, Hidden::Onset(..));
     if is_onset {
         cycles = cycles.max(ONSET_CYCLES);
     }
@@ -64,7 +68,13 @@ pub fn setting(hidden: Hidden, rng: &mut Xoshiro256PlusPlus) -> Setting {
     } else {
         0.0
     };
-    let begins_at_cycle = rng.random_range(ONSET[0]..ONSET[1]);
+    let [earliest, latest] = if is_spell { SPELL } else { ONSET };
+    let begins_at_cycle = rng.random_range(earliest..latest);
+    let ends_at_cycle = if is_spell {
+        begins_at_cycle + rng.random_range(LASTS[0]..LASTS[1])
+    } else {
+        f64::INFINITY
+    };
     let everywhere = rng.random::<f64>() < 0.7;
     let first_run = rng.random_range(0..runs);
     let scenes = (0..runs)
@@ -90,8 +100,10 @@ pub fn setting(hidden: Hidden, rng: &mut Xoshiro256PlusPlus) -> Setting {
                 // It happens once, in one run, and stays.
                 std::cmp::Ordering::Less => f64::INFINITY,
                 std::cmp::Ordering::Equal => begins_at_cycle,
+                std::cmp::Ordering::Greater if is_spell => f64::INFINITY,
                 std::cmp::Ordering::Greater => f64::NEG_INFINITY,
             },
+            ends_at_cycle,
             with_phase,
             servo: 1,
             seed: rng.random(),

@@ -25,7 +25,7 @@ use crate::explain::worm::recorded_worm::{RecordedWorm, WormProblem};
 use crate::explain::worm::speed_droop::SpeedDroop;
 use crate::explain::worm::torque_cycle::torque_cycles;
 pub(super) use calibration::calibration;
-pub(super) use effects::named_effects;
+pub(super) use effects::{found_onset_in, named_effects};
 pub(super) use law::law_that_outdid;
 pub(super) use screening::{add_unscreened, of_servo as screening_of_servo};
 use worm_estimator::config::Config;
@@ -107,11 +107,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     };
     let torque = torque_cycles(worm, &parts.recalibrated, named.first().map(|candidate| &candidate.fit));
     let change = selected.change.map(|change| {
-        let onset = Onset {
-            cycle: change.cycle as f64,
-            run: change.run,
-            ends: false,
-        };
+        let onset = Onset::from(change.cycle as f64, change.run);
         effects::found_onset(&worm.scene.observed, onset)
     });
     let remainder = (verdict == Verdict::OutsideLibrary).then(|| {

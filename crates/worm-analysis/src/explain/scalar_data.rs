@@ -19,8 +19,8 @@ mod model_selection;
 mod next_experiment;
 mod table;
 
-use super::answer::{Answer, Doubt, Figures, FoundOnset, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
-use super::assemble::{add_unscreened, calibration, named_effects};
+use super::answer::{Answer, Doubt, Figures, RunSummary, Screened, ScreeningOutcome, Stage, StageKind};
+use super::assemble::{add_unscreened, calibration, found_onset_in, named_effects};
 use super::error::ExplainError;
 use crate::experiment::Progress;
 use crate::explain::search::fit::Fit;
@@ -186,12 +186,7 @@ fn assemble(
     selected: &Selected,
 ) -> Answer {
     // None of these begins in mid-run, for a table has no cycles.
-    let when = |onset: Onset| FoundOnset {
-        cycle: onset.cycle,
-        time_s: f64::NAN,
-        run: None,
-        ends: onset.ends,
-    };
+    let when = |onset: Onset| found_onset_in(None, onset, |_| f64::NAN);
     let mut named = selected
         .set
         .iter()

@@ -68,16 +68,29 @@ pub(in crate::explain) fn named_effects(
 /// When something begins or ends, in cycles and seconds.
 pub(super) fn found_onset(observed: &[Observed<'_>], onset: Onset) -> FoundOnset {
     let seen = &observed[onset.run.unwrap_or(0)];
-    let phase = seen.phase[0] + onset.cycle;
-    let sample = seen.phase.partition_point(|&here| here < phase).min(seen.samples() - 1);
-    let time_s = &seen.run.recording.time_s;
+    let time_s = |cycle: f64| {
+        let phase = seen.phase[0] + cycle;
+        let sample = seen.phase.partition_point(|&here| here < phase).min(seen.samples() - 1);
+        let time_s = &seen.run.recording.time_s;
+        time_s[sample] - time_s[0]
+    };
+    let run = onset
+        .run
+        .map(|run| observed[run].run.recording.source.display().to_string());
+    found_onset_in(run, onset, time_s)
+}
+
+/// When something begins or ends in a run, with the time of a cycle, s.
+pub(in crate::explain) fn found_onset_in(run: Option<String>, onset: Onset, time_s: impl Fn(f64) -> f64) -> FoundOnset {
+    let until_cycle = onset.begins.and(onset.ends);
+    let cycle = onset.begins.or(onset.ends).unwrap_or(0.0);
     FoundOnset {
-        cycle: onset.cycle,
-        time_s: time_s[sample] - time_s[0],
-        run: onset
-            .run
-            .map(|run| observed[run].run.recording.source.display().to_string()),
-        ends: onset.ends,
+        cycle,
+        time_s: time_s(cycle),
+        run,
+        ends: onset.begins.is_none(),
+        until_cycle,
+        until_s: until_cycle.map(time_s),
     }
 }
 

@@ -110,10 +110,27 @@ fn commented_out(line: &str) -> String {
     }
 }
 
-/// One effect; an entry for each cell where its parameters are those of several.
+/// One effect; an entry for each cell where its parameters are those of several. What was over when the recordings ended is not switched
+/// on: the file is the model of the next ones.
 fn entry(named: &NamedEffect, heading: &str) -> String {
+    match &named.onset {
+        Some(onset) if onset.is_over() => switched_on(named, heading).lines().map(commented_out).collect(),
+        _ => switched_on(named, heading),
+    }
+}
+
+fn switched_on(named: &NamedEffect, heading: &str) -> String {
     let known = effect::named(&named.name).ok();
     let mut comments = vec![heading.to_owned()];
+    if let Some(onset) = &named.onset {
+        comments.push(match onset.is_over() {
+            true => format!(
+                "It acted {}, and is over. To have it act, take the comment signs away.",
+                onset.in_words()
+            ),
+            false => format!("It acts {}.", onset.in_words()),
+        });
+    }
     if let Some(effect) = known {
         comments.push(format!("{} {}", effect.sentence, effect.formula));
     }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::explain::answer::{Doubt, Figures, FoundParameter, NamedEffect, Verdict};
+use crate::explain::answer::{Doubt, Figures, FoundOnset, FoundParameter, NamedEffect, Verdict};
 
 fn calibrated(name: &str, nominal: f64, found: f64, sigma: f64) -> Calibrated {
     Calibrated {
@@ -190,6 +190,39 @@ fn named_effects_are_added_with_their_twins_and_the_file_stays_as_it_was() {
         assert_eq!(
             written("[worm]\n", &answer(verdict, &[], &effects, &[])).0.text,
             "[worm]\n"
+        );
+    }
+}
+
+#[test]
+fn what_is_over_is_not_switched_on() {
+    let onset = |until_cycle: Option<f64>| FoundOnset {
+        cycle: 3.0,
+        time_s: 7.5,
+        run: Some("run2.csv".to_owned()),
+        ends: false,
+        until_cycle,
+        until_s: until_cycle.map(|cycle| 2.5 * cycle),
+    };
+    for (until_cycle, comment) in [
+        (
+            None,
+            "# It acts from 3.0 cycles (7.5 s) after the start of run2.csv on.\n",
+        ),
+        (
+            Some(8.0),
+            "# It acted from 3.0 to 8.0 cycles (7.5 to 20.0 s) after the start of run2.csv, and is over. To have it act, take the comment \
+             signs away.\n",
+        ),
+    ] {
+        let mut drag = named("constant-drag", None, &[("force_n", 0.2, 0.01, "N")]);
+        drag.onset = Some(onset(until_cycle));
+        let (model, config) = written("", &answer(Verdict::Explained, &[], &[drag], &[]));
+        assert!(model.text.contains(comment), "{}", model.text);
+        assert_eq!(config.effect.is_empty(), until_cycle.is_some(), "{}", model.text);
+        assert_eq!(
+            model.text.contains("# [[effect]]\n# name = \"constant-drag\"\n"),
+            until_cycle.is_some()
         );
     }
 }

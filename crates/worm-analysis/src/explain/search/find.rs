@@ -20,6 +20,9 @@ use super::score_test::{self, Expected, Screening};
 
 /// Single effects from which pairs are tried.
 const PAIR_SEEDS: usize = 2;
+/// Odds of an effect that comes and goes against the best that stays: with two times to choose, it fits a little better than that where
+/// nothing comes and goes at all.
+const SPELL: f64 = 20.0;
 
 /// Options of the search.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,14 +139,16 @@ pub(in crate::explain) fn find<P: Plant>(
     judge.weigh(&mut candidates, &screened);
     let best = candidates.first().filter(|best| judge.ln_odds(best) > 0.0);
     let best = best.and_then(|best| best.evidence).unwrap_or(judge.none);
-    if judge.may_change(&best) {
+    if problem.plant.has_cycles() {
         report("onsets", 0.6);
-        candidates.extend(with_onsets(&judge, &nominal, &screened));
+        candidates.extend(with_onsets(&judge, &nominal, &screened, judge.may_change(&best)));
         candidates.sort_by(|a, b| judge.ln_odds(b).total_cmp(&judge.ln_odds(a)));
     }
     report("pairs", 0.65);
     let mut pairs: Vec<(Candidate, f64)> = Vec::new();
-    let mut seeds: Vec<Candidate> = kinds(&candidates).into_iter().take(PAIR_SEEDS).cloned().collect();
+    // What comes and goes fits a little of much that is something else; with a second effect beside it, nearly all of it.
+    let lasting: Vec<Candidate> = candidates.iter().filter(|one| !one.comes_and_goes()).cloned().collect();
+    let mut seeds: Vec<Candidate> = kinds(&lasting).into_iter().take(PAIR_SEEDS).cloned().collect();
     // What seems to begin in mid-run may be there from the start, with a second effect that hides that.
     let throughout = seeds.iter().filter_map(|seed| {
         let is_throughout = |one: &&Candidate| one.hypothesised[0].onset.is_none();
@@ -158,8 +163,8 @@ pub(in crate::explain) fn find<P: Plant>(
     seeds.extend(throughout);
     for first in &seeds {
         let beyond = judge.ln_odds_as_screened(first, None) - chance.ln_odds(FALSE_NAMES);
-        let is_near = judge.ln_odds(first) > judge.ln_odds(&seeds[0]) - WORTH_A_LOOK;
-        if beyond < 0.0 || !is_near && judge.is_closed_by(&seeds[0]) {
+        let is_near = judge.ln_odds(first) > judge.ln_odds(&candidates[0]) - WORTH_A_LOOK;
+        if beyond < 0.0 || !is_near && judge.is_closed_by(&candidates[0]) {
             continue;
         }
         let (found, chance) = pair_up(&judge, first, &hypothesised, &screened, options.seed);
@@ -170,6 +175,9 @@ pub(in crate::explain) fn find<P: Plant>(
         pairs.extend(beyond);
     }
     pairs.sort_by(|a, b| judge.ln_odds(&b.0).total_cmp(&judge.ln_odds(&a.0)));
+    let lasting = lasting.iter().chain(pairs.iter().map(|(pair, _)| pair));
+    let of_lasting = lasting.map(|one| judge.ln_odds(one)).fold(f64::NEG_INFINITY, f64::max);
+    candidates.retain(|one| !one.comes_and_goes() || judge.ln_odds(one) - of_lasting > SPELL.ln());
     if let Some((best, _)) = pairs.first()
         && let Some(single) = candidates.first()
         && let Some(alone) = alone(problem, recalibrated, single, best)

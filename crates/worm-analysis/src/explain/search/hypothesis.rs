@@ -53,14 +53,9 @@ impl Hypothesis {
         self.settings_of(at, |_| true)
     }
 
-    /// The effects that act at the start of a run.
-    pub fn settings_at_start(&self, run: usize, at: &[f64]) -> Vec<Setting> {
-        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.acts_at_start(run)))
-    }
-
-    /// The effects that act at the end of a run.
-    pub fn settings_at_end(&self, run: usize, at: &[f64]) -> Vec<Setting> {
-        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.acts_at_end(run)))
+    /// The effects that act so many cycles after the start of a run.
+    pub fn settings_at(&self, run: usize, cycle: f64, at: &[f64]) -> Vec<Setting> {
+        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.acts_at(run, cycle)))
     }
 
     fn settings_of(&self, at: &[f64], acts: impl Fn(&Hypothesised) -> bool) -> Vec<Setting> {
@@ -93,11 +88,16 @@ impl Hypothesis {
         of_law.map(|(_, &value)| value).collect()
     }
 
-    /// Where an effect of a run begins or ends after its start, cycles since then: the first of several.
-    pub fn changes_at(&self, run: usize) -> Option<f64> {
+    /// Where effects of a run begin or end after its start, cycles since then, in this order.
+    pub fn changes_at(&self, run: usize) -> Vec<f64> {
         let onsets = self.hypothesised.iter().filter_map(|one| one.onset);
-        let of_run = onsets.filter(|onset| onset.is_in(run)).map(|onset| onset.cycle);
-        of_run.min_by(f64::total_cmp)
+        let of_run = onsets.filter(|onset| onset.is_in(run));
+        let mut all: Vec<f64> = of_run
+            .flat_map(|onset| onset.begins.into_iter().chain(onset.ends))
+            .collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
     }
 
     /// The same with all effects acting throughout.

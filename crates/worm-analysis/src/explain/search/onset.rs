@@ -4,12 +4,14 @@
 //! The machine of an effect that begins at t₁ moves as without it before and about as with it throughout after, so the change of the
 //! residuals is that of the constant effect from t₁ on: its innovations are the same, and what is relative to a mean is about it again. That
 //! gives a score for every cycle from one simulation of each effect. The best are fitted with the motion predicted as it is, and t₁ by
-//! values on a grid. Those that end are the same the other way round: up to t₁ instead of from it on.
+//! values on a grid. Those that end are the same the other way round: up to t₁ instead of from it on. One that begins at t₁ and ends at t₂
+//! changes the residuals by what it does from t₁ on less what it does from t₂ on.
 
 use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::judge::candidate::Candidate;
 use super::judge::ln_sum::ln_sum;
+use super::judge::prior::NONE;
 use super::judge::structural_change::Change;
 use super::judgement::Judge;
 use super::parameter::{Hypothesised, Onset};
@@ -20,12 +22,14 @@ use super::score_test::{Screening, ln_bayes, strong};
 use crate::least_squares::{cross, dot, submatrix};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Strength at which effects are tried for an onset, in notable changes.
 const STRENGTH: f64 = 8.0;
-/// Effects that are fitted with an onset, and with an end.
-const FITTED: usize = 4;
-const FITTED_WITH_END: usize = 2;
+/// Effects that are fitted with an onset, with an end, and with both.
+const FITTED: [(Course, usize); 3] = [(Course::Begins, 4), (Course::Ends, 2), (Course::Both, 2)];
+/// Most cycles of a run between which effects that begin and end are tried: in a long run they lie some cycles apart.
+const MOST_OF_BOTH: usize = 16;
 /// Effects of which every probable onset is tried.
 const TRIED: usize = 12;
 /// Factors on the change of a trial for which its direction stands.
@@ -35,8 +39,16 @@ const STEPS_BESIDE: usize = 3;
 /// Values of the onset that are tried about the best so far: their distance, cycles, and how many to either side.
 const GRIDS: [(f64, i32); 3] = [(1.0, 6), (0.25, 5), (0.0625, 4)];
 
+/// Whether effects begin, end, or do both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Course {
+    Begins,
+    Ends,
+    Both,
+}
+
 /// Cycles since the start of each run at which an effect may begin: those that leave a whole one before and after.
-fn cycles(plant: &impl Recorded, run: usize) -> std::ops::Range<usize> {
+fn cycles(plant: &impl Recorded, run: usize) -> Range<usize> {
     let bins = plant.bins(run);
     let at = |bin: Option<&super::bins::Bin>| bin.map_or(0.0, |bin| bin.phase - bins.start_phase);
     at(bins.bins.first()).ceil() as usize + 1..at(bins.bins.last()).floor() as usize
@@ -49,46 +61,59 @@ pub(in crate::explain) fn mean_cycles(plant: &impl Recorded) -> f64 {
     (sum as f64 / runs as f64).max(1.0)
 }
 
-/// Every onset, or every end, that is tried.
-fn onsets(plant: &impl Recorded, ends: bool) -> Vec<Onset> {
+/// Every onset, or every end, that is tried; of what does both, every one between two of which it acts.
+fn onsets(plant: &impl Recorded, course: Course) -> Vec<Onset> {
     let runs = plant.runs();
-    let single = (0..runs).flat_map(|run| cycles(plant, run).map(move |cycle| (cycle, Some(run))));
+    let places = |cycles: Range<usize>| {
+        let apart = match course {
+            Course::Both => cycles.len().div_ceil(MOST_OF_BOTH).max(1),
+            Course::Begins | Course::Ends => 1,
+        };
+        cycles.step_by(apart)
+    };
+    let single = (0..runs).flat_map(|run| places(cycles(plant, run)).map(move |cycle| (cycle, Some(run))));
     let common = (0..runs)
         .map(|run| cycles(plant, run))
         .reduce(|a, b| a.start.max(b.start)..a.end.min(b.end));
     let of_all = common
         .filter(|_| runs > 1)
         .into_iter()
-        .flatten()
+        .flat_map(places)
         .map(|cycle| (cycle, None));
-    single
-        .chain(of_all)
-        .map(|(cycle, run)| Onset {
-            cycle: cycle as f64,
-            run,
-            ends,
-        })
-        .collect()
+    let onset = |(cycle, run): (usize, Option<usize>)| match course {
+        Course::Ends => Onset::until(cycle as f64, run),
+        Course::Begins | Course::Both => Onset::from(cycle as f64, run),
+    };
+    single.chain(of_all).map(onset).collect()
 }
 
 /// The effects that most probably begin or end in mid-run, fitted with the time. `screened` are those that act throughout.
+///
+/// What stays, once it has begun or ended, is looked for where the data `may_change`. What comes and goes need not show as a change that
+/// stays, so it is screened in any case, and fitted where that speaks for it.
 pub(in crate::explain) fn with_onsets(
     judge: &Judge<'_, impl Plant>,
     nominal: &Fit,
     screened: &[Screening],
+    may_change: bool,
 ) -> Vec<Candidate> {
-    let fitted = [(false, FITTED), (true, FITTED_WITH_END)].map(|(ends, count)| {
+    let courses = FITTED
+        .into_iter()
+        .filter(|&(course, _)| may_change || course == Course::Both);
+    let fitted = courses.map(|(course, count)| {
         let is_likely = judge.none.ln_bayes_of_change().is_some_and(|ln_bayes| ln_bayes > 0.0);
         let base = match judge.none.changing {
-            Some((_, change)) if is_likely => beside_change(judge.problem, nominal, change, ends),
+            Some((_, change)) if is_likely => beside_change(judge.problem, nominal, change, course),
             _ => judge.recalibrated.clone(),
         };
-        let promising = screen(judge, &base, screened, ends);
+        let mut promising = screen(judge, &base, screened, course);
+        if !may_change {
+            promising.retain(|one| one.ln_odds(judge) > 0.0);
+        }
         let promising = try_out(judge, &base, promising, count);
         refit(judge.problem, &base, nominal, &promising, count, &mut |_| ())
     });
     let mut candidates: Vec<Candidate> = fitted
-        .into_iter()
         .flatten()
         .map(|candidate| {
             let (fit, ln_onset) = refine(judge.problem, in_best_run(judge.problem, candidate.fit));
@@ -104,7 +129,8 @@ pub(in crate::explain) fn with_onsets(
 
 /// The model recalibrated on what was seen before a change, or after it where something ends there: the rest would drive the
 /// recalibration astray.
-fn beside_change(problem: &FitProblem<'_, impl Plant>, nominal: &Fit, change: Change, ends: bool) -> Fit {
+fn beside_change(problem: &FitProblem<'_, impl Plant>, nominal: &Fit, change: Change, course: Course) -> Fit {
+    let ends = course == Course::Ends;
     let rows = problem.bin_of_rows().into_iter();
     let is_beside = |(run, bin): (usize, usize)| {
         let bins = problem.plant.bins(run);
@@ -126,10 +152,55 @@ struct Promising {
     each: Vec<(f64, Onset, Vec<f64>)>,
 }
 
-/// Scores of every effect about a fit for every onset, or every end; most probable first.
-fn screen(judge: &Judge<'_, impl Plant>, fit: &Fit, screened: &[Screening], ends: bool) -> Vec<Promising> {
+impl Promising {
+    /// Log odds against none, to first order.
+    fn ln_odds(&self, judge: &Judge<'_, impl Plant>) -> f64 {
+        self.screening.ln_bayes + judge.ln_prior(&[self.screening.hypothesised]) - NONE.ln()
+    }
+}
+
+/// A time at which effects are tried: they act from one of the onsets on, or from one and not any more from another.
+#[derive(Debug, Clone, Copy)]
+struct Tried {
+    onset: Onset,
+    /// The onset, and the one from which on what it does is taken away again.
+    place: usize,
+    less: Option<usize>,
+}
+
+/// Every time between two of the onsets of a run, or of all, that is not too short.
+fn both(onsets: &[Onset]) -> Vec<Tried> {
+    let pairs = (0..onsets.len()).flat_map(|place| (place + 1..onsets.len()).map(move |less| (place, less)));
+    pairs
+        .filter(|&(place, less)| onsets[place].run == onsets[less].run)
+        .map(|(place, less)| Tried {
+            onset: Onset {
+                ends: onsets[less].begins,
+                ..onsets[place]
+            },
+            place,
+            less: Some(less),
+        })
+        .filter(|tried| !tried.onset.is_too_short())
+        .collect()
+}
+
+/// Scores of every effect about a fit for every onset, or every end, or both; most probable first.
+fn screen(judge: &Judge<'_, impl Plant>, fit: &Fit, screened: &[Screening], course: Course) -> Vec<Promising> {
     let problem = judge.problem;
-    let onsets = onsets(problem.plant, ends);
+    let onsets = onsets(problem.plant, course);
+    let tried = match course {
+        Course::Begins | Course::Ends => onsets
+            .iter()
+            .enumerate()
+            .map(|(place, &onset)| Tried {
+                onset,
+                place,
+                less: None,
+            })
+            .collect(),
+        Course::Both => both(&onsets),
+    };
     let open: Vec<usize> = (0..fit.at.len()).filter(|&quantity| !fit.at_limit(quantity)).collect();
     let jacobian = DMatrix::from_iterator(
         fit.residual.len(),
@@ -165,27 +236,31 @@ fn screen(judge: &Judge<'_, impl Plant>, fit: &Fit, screened: &[Screening], ends
             let shared = cross(&jacobian, &directions);
             let projected = normal.solve(&shared);
             let scores = -(directions.tr_mul(&residual));
-            for (number, onset) in onsets.iter().enumerate() {
-                let column = directions.column(number);
-                let square = dot(column.as_slice(), column.as_slice(), None)
-                    - shared.column(number).dot(&projected.column(number));
-                let found = ln_bayes(
-                    &screening.prior,
-                    values[0],
-                    STANDS_FOR,
-                    scores[number],
-                    square.max(1e-9),
-                );
+            let product = |a: usize, b: usize| {
+                dot(directions.column(a).as_slice(), directions.column(b).as_slice(), None)
+                    - shared.column(a).dot(&projected.column(b))
+            };
+            let squares: Vec<f64> = (0..onsets.len()).map(|place| product(place, place)).collect();
+            for &Tried { onset, place, less } in &tried {
+                let (score, square) = match less {
+                    None => (scores[place], squares[place]),
+                    Some(less) => (
+                        scores[place] - scores[less],
+                        squares[place] + squares[less] - 2.0 * product(place, less),
+                    ),
+                };
+                let square = square.max(1e-9);
+                let found = ln_bayes(&screening.prior, values[0], STANDS_FOR, score, square);
                 all.push(found);
                 let (least, most) = STANDS_FOR;
-                let strength = (scores[number] / square.max(1e-9)).clamp(least, most);
+                let strength = (score / square).clamp(least, most);
                 let neutral = hypothesised.effect.severity().neutral;
                 let mut found_at = values.clone();
                 found_at[0] = neutral + strength * (values[0] - neutral);
                 match each.iter_mut().find(|(_, other, _)| other.run == onset.run) {
-                    Some(best) if best.0 < found => *best = (found, *onset, found_at),
+                    Some(best) if best.0 < found => *best = (found, onset, found_at),
                     Some(_) => {}
-                    None => each.push((found, *onset, found_at)),
+                    None => each.push((found, onset, found_at)),
                 }
             }
         }
@@ -201,8 +276,7 @@ fn screen(judge: &Judge<'_, impl Plant>, fit: &Fit, screened: &[Screening], ends
         .par_iter()
         .filter(|screening| screening.hypothesised.effect.may_begin);
     let mut promising: Vec<Promising> = may_begin.map(of_effect).collect();
-    let ln_odds = |one: &Promising| one.screening.ln_bayes + judge.ln_prior(&[one.screening.hypothesised]);
-    promising.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
+    promising.sort_by(|a, b| b.ln_odds(judge).total_cmp(&a.ln_odds(judge)));
     promising
 }
 
@@ -255,39 +329,67 @@ fn in_best_run(problem: &FitProblem<'_, impl Plant>, fit: Fit) -> Fit {
     }
 }
 
-/// Fits the onset of the last effect of a fit. Returns the fit with derivatives, and the logarithm of the cycles that the onset may be
+/// Fits when the last effect of a fit begins and ends. Returns the fit with derivatives, and the logarithm of the cycles that these may be
 /// at by the data.
-fn refine(problem: &FitProblem<'_, impl Plant>, mut fit: Fit) -> (Fit, f64) {
-    let with_onset = |fit: &Fit, cycle: f64| {
+fn refine(problem: &FitProblem<'_, impl Plant>, fit: Fit) -> (Fit, f64) {
+    let begins: fn(&mut Onset) -> &mut Option<f64> = |onset| &mut onset.begins;
+    let ends: fn(&mut Onset) -> &mut Option<f64> = |onset| &mut onset.ends;
+    let (mut fit, mut ln_width) = (fit, 0.0);
+    for which in [begins, ends] {
+        let (refined, ln_width_of_one) = refine_one(problem, fit, which);
+        fit = refined;
+        ln_width += ln_width_of_one;
+    }
+    if fit.jacobian.is_empty() {
+        problem.compute_jacobian(&mut fit);
+    }
+    (fit, ln_width)
+}
+
+/// Fits the beginning or the end of the last effect, where it has one.
+fn refine_one(
+    problem: &FitProblem<'_, impl Plant>,
+    mut fit: Fit,
+    which: fn(&mut Onset) -> &mut Option<f64>,
+) -> (Fit, f64) {
+    let onset_of = |fit: &Fit| fit.hypothesis.hypothesised.last().and_then(|last| last.onset);
+    let end_of = |run: usize| {
+        let bins = problem.plant.bins(run);
+        bins.bins.last().map(|bin| bin.phase - bins.start_phase)
+    };
+    let last = (0..problem.plant.runs()).filter_map(end_of).fold(0.0, f64::max);
+    let is_possible = |onset: &Onset| {
+        let is_within = |cycle: f64| (0.0..last).contains(&cycle);
+        onset.begins.into_iter().chain(onset.ends).all(is_within) && !onset.is_too_short()
+    };
+    let with_onset = |fit: &Fit, onset: Onset| {
         let mut hypothesis = fit.hypothesis.clone();
-        if let Some(onset) = hypothesis.hypothesised.last_mut().and_then(|last| last.onset.as_mut()) {
-            onset.cycle = cycle;
+        if let Some(last) = hypothesis.hypothesised.last_mut() {
+            last.onset = Some(onset);
         }
         hypothesis
     };
     let mut ln_width = 0.0;
     for (distance, count) in GRIDS {
-        let Some(onset) = fit.hypothesis.hypothesised.last().and_then(|last| last.onset) else {
+        let Some(onset) = onset_of(&fit) else {
             return (fit, 0.0);
         };
-        let end_of = |run: usize| {
-            let bins = problem.plant.bins(run);
-            bins.bins.last().map(|bin| bin.phase - bins.start_phase)
+        let moved = |number: i32| {
+            let mut moved = onset;
+            let cycle = which(&mut moved).as_mut()?;
+            *cycle += distance * f64::from(number);
+            Some(moved).filter(is_possible)
         };
-        let last = (0..problem.plant.runs()).filter_map(end_of).fold(0.0, f64::max);
-        let cycles: Vec<f64> = (-count..=count)
-            .map(|number| onset.cycle + distance * f64::from(number))
-            .filter(|cycle| (0.0..last).contains(cycle))
-            .collect();
-        let tried: Vec<f64> = cycles
+        let onsets: Vec<Onset> = (-count..=count).filter_map(moved).collect();
+        let tried: Vec<f64> = onsets
             .par_iter()
-            .map(|&cycle| problem.evaluate(&with_onset(&fit, cycle), fit.at.clone()).chi_squared)
+            .map(|&onset| problem.evaluate(&with_onset(&fit, onset), fit.at.clone()).chi_squared)
             .collect();
         let Some(best) = (0..tried.len()).min_by(|&a, &b| tried[a].total_cmp(&tried[b])) else {
             return (fit, 0.0);
         };
         ln_width = ln_sum(tried.iter().map(|chi_squared| -0.5 * (chi_squared - tried[best]))) + distance.ln();
-        let hypothesis = with_onset(&fit, cycles[best]);
+        let hypothesis = with_onset(&fit, onsets[best]);
         let next = if distance > GRIDS[GRIDS.len() - 1].0 {
             problem.fit_roughly(&hypothesis, fit.at.clone(), Some(&fit))
         } else {
@@ -296,9 +398,6 @@ fn refine(problem: &FitProblem<'_, impl Plant>, mut fit: Fit) -> (Fit, f64) {
         if next.chi_squared <= fit.chi_squared {
             fit = next;
         }
-    }
-    if fit.jacobian.is_empty() {
-        problem.compute_jacobian(&mut fit);
     }
     (fit, ln_width)
 }
@@ -311,21 +410,20 @@ mod tests {
     use crate::explain::{Options, Verdict, explain};
     use worm_estimator::config::Config;
 
-    /// Half the clamping of a cell, in the second run up to the middle or from there on.
+    /// Half the clamping of a cell, in the second run up to the middle, from there on, or for some cycles.
     #[test]
-    fn what_begins_and_what_ends_are_told_apart() {
-        for ends in [false, true] {
+    fn what_begins_what_ends_and_what_does_both_are_told_apart() {
+        let spell = Onset {
+            ends: Some(5.0),
+            ..Onset::from(2.0, Some(1))
+        };
+        for onset in [Onset::from(4.0, Some(1)), Onset::until(4.0, Some(1)), spell] {
             let campaign = Campaign {
                 simulation: Simulation {
                     cycles: 8.0,
                     ..Campaign::default().simulation
                 },
                 ..Campaign::default()
-            };
-            let onset = Onset {
-                cycle: 4.0,
-                run: Some(1),
-                ends,
             };
             let truth = Some(("unequal-clamping", Some(1), &[0.5][..]));
             let recordings = record_under(&campaign, &begun(truth, onset), 5);
@@ -335,11 +433,23 @@ mod tests {
                 .map(|(recording, &slope_deg)| RecordedRun::at_slope(recording, slope_deg))
                 .collect();
             let answer = explain(&runs, &Config::default(), &Options::default(), &mut |_| ()).expect("an answer");
-            assert_eq!(answer.verdict, Verdict::Explained, "{}", answer.sentence);
+            assert_eq!(answer.verdict, Verdict::Explained, "{onset:?}: {}", answer.sentence);
             let effect = &answer.effects[0];
             assert_eq!((effect.name.as_str(), effect.cell), ("unequal-clamping", Some(2)));
             let found = effect.onset.as_ref().expect("it does not act throughout");
-            assert!(found.ends == ends && (found.cycle - 4.0).abs() < 0.5, "{found:?}");
+            assert_eq!(found.ends, onset.begins.is_none(), "{found:?}");
+            assert_eq!(
+                found.until_cycle.is_some(),
+                onset.begins.and(onset.ends).is_some(),
+                "{found:?}"
+            );
+            let is_near = |found: Option<f64>, truth: Option<f64>| {
+                found
+                    .zip(truth)
+                    .is_none_or(|(found, truth)| (found - truth).abs() < 0.5)
+            };
+            assert!(is_near(Some(found.cycle), onset.begins.or(onset.ends)), "{found:?}");
+            assert!(is_near(found.until_cycle, onset.ends), "{found:?}");
         }
     }
 }

@@ -14,6 +14,10 @@ const SEVERE: f64 = 20.0;
 /// Limit of a law's coefficient, in standard deviations.
 const MOST_OF_LAW: f64 = 12.0;
 
+/// Shortest time for which an effect acts that begins and ends, cycles: what acts in one cycle alone is seen once by every cell, and any
+/// event looks like some effect then.
+const SHORTEST_SPELL: f64 = 2.0;
+
 /// A quantity that is free in a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::explain) struct Free {
@@ -71,31 +75,73 @@ impl Free {
     }
 }
 
-/// When an effect begins or ends that does not act throughout.
+/// When an effect begins, ends, or does both, that does not act throughout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::explain) struct Onset {
-    /// Cycles since the first sample of the run.
-    pub cycle: f64,
+    /// When it begins, cycles since the first sample of the run; it acts from the start on for none.
+    pub begins: Option<f64>,
+    /// When it ends, likewise; it acts to the end for none.
+    pub ends: Option<f64>,
     /// The run in which it happens, once: the runs before and after are as at its start and its end. In every run for none.
     pub run: Option<usize>,
-    /// It acts up to then, instead of from then on.
-    pub ends: bool,
 }
 
 impl Onset {
+    /// An effect that begins and stays.
+    pub fn from(cycle: f64, run: Option<usize>) -> Self {
+        Self {
+            begins: Some(cycle),
+            ends: None,
+            run,
+        }
+    }
+
+    /// An effect that acts from the start on and ends.
+    pub fn until(cycle: f64, run: Option<usize>) -> Self {
+        Self {
+            begins: None,
+            ends: Some(cycle),
+            run,
+        }
+    }
+
+    /// Whether it begins and ends again.
+    pub fn comes_and_goes(&self) -> bool {
+        self.begins.is_some() && self.ends.is_some()
+    }
+
+    /// For how many cycles it acts, where it begins and ends again.
+    fn lasts(&self) -> Option<f64> {
+        Some(self.ends? - self.begins?)
+    }
+
+    /// Whether it ends sooner than it may.
+    pub fn is_too_short(&self) -> bool {
+        self.lasts().is_some_and(|cycles| cycles < SHORTEST_SPELL)
+    }
+
+    /// Whether it ends as soon as it may.
+    pub fn is_shortest(&self) -> bool {
+        self.lasts().is_some_and(|cycles| cycles <= SHORTEST_SPELL)
+    }
+
     /// Whether the effect begins or ends in a run.
     pub fn is_in(&self, run: usize) -> bool {
         self.run.is_none_or(|of| of == run)
     }
 
-    /// Whether the effect acts at the start of a run.
-    pub fn acts_at_start(&self, run: usize) -> bool {
-        self.run.is_some_and(|of| of < run) != self.ends
+    /// Whether the effect acts so many cycles after the start of a run.
+    pub fn acts_at(&self, run: usize, cycle: f64) -> bool {
+        match self.run {
+            Some(of) if run < of => self.begins.is_none(),
+            Some(of) if run > of => self.ends.is_none(),
+            _ => self.begins.is_none_or(|begins| cycle >= begins) && self.ends.is_none_or(|ends| cycle < ends),
+        }
     }
 
-    /// Whether the effect acts at the end of a run.
-    pub fn acts_at_end(&self, run: usize) -> bool {
-        self.run.is_none_or(|of| of <= run) != self.ends
+    /// Whether the effect acts at some time of a run.
+    pub fn acts_in(&self, run: usize) -> bool {
+        self.is_in(run) || self.acts_at(run, 0.0)
     }
 }
 
@@ -160,10 +206,17 @@ mod tests {
             (None, no, [no, no, no], [yes, yes, yes]),
             (None, yes, [yes, yes, yes], [no, no, no]),
         ] {
-            let onset = Onset { cycle: 4.0, run, ends };
-            let found = [0, 1, 2].map(|run| (onset.acts_at_start(run), onset.acts_at_end(run)));
+            let onset = [Onset::from, Onset::until][usize::from(ends)](4.0, run);
+            let found = [0, 1, 2].map(|run| (onset.acts_at(run, 0.0), onset.acts_at(run, f64::INFINITY)));
             assert_eq!(found.map(|(start, _)| start), at_start, "{onset:?}");
             assert_eq!(found.map(|(_, end)| end), at_end, "{onset:?}");
         }
+        let spell = Onset {
+            ends: Some(6.0),
+            ..Onset::from(4.0, Some(1))
+        };
+        let acts = [0, 1, 2].map(|run| [0.0, 3.9, 4.0, 5.9, 6.0].map(|cycle| spell.acts_at(run, cycle)));
+        assert_eq!(acts, [[no; 5], [no, no, yes, yes, no], [no; 5]]);
+        assert_eq!([0, 1, 2].map(|run| spell.acts_in(run)), [no, yes, no]);
     }
 }

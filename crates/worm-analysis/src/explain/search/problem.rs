@@ -195,14 +195,11 @@ impl<'p, P: Plant> FitProblem<'p, P> {
     pub fn within_onset(&self, change: &[f64], onset: &Onset) -> Vec<f64> {
         let of_run = |(run, rows): (usize, std::ops::Range<usize>)| {
             let bins = self.plant.bins(run);
-            let first = bins
-                .bins
-                .partition_point(|bin| bin.phase < bins.start_phase + onset.cycle);
-            let acts = match (onset.acts_at_start(run), onset.acts_at_end(run)) {
-                (false, false) => return vec![0.0; rows.len()],
-                (true, true) => 0..bins.len(),
-                (true, false) => 0..first,
-                (false, true) => first..bins.len(),
+            let first_after = |cycle: f64| bins.bins.partition_point(|bin| bin.phase < bins.start_phase + cycle);
+            let acts = match onset.is_in(run) {
+                true => onset.begins.map_or(0, first_after)..onset.ends.map_or(bins.len(), first_after),
+                false if onset.acts_in(run) => 0..bins.len(),
+                false => return vec![0.0; rows.len()],
             };
             self.plant.within(run, &change[rows], acts)
         };

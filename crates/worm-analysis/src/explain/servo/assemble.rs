@@ -9,8 +9,8 @@ use super::predict::predict;
 use super::present_current::decide;
 use super::recorded_servo::{RecordedServo, ServoProblem};
 use crate::bench::ServoModel;
-use crate::explain::answer::{FoundOnset, NamedEffect, StageKind, Verdict};
-use crate::explain::assemble::{law_that_outdid, named_effects, screening_of_servo};
+use crate::explain::answer::{NamedEffect, StageKind, Verdict};
+use crate::explain::assemble::{found_onset_in, law_that_outdid, named_effects, screening_of_servo};
 use crate::explain::search::cross_validation::hold_out;
 use crate::explain::search::find::Found;
 use crate::explain::search::fit::Fit;
@@ -60,12 +60,7 @@ pub(super) fn assemble(problem: &ServoProblem<'_, '_>, nominal: &ServoModel, par
         closures[place].0 - others.map(|(_, other)| other.0).fold(of_wrong, f64::max)
     };
     // No effect of a servo begins in mid-run.
-    let when = |onset: Onset| FoundOnset {
-        cycle: onset.cycle,
-        time_s: onset.cycle,
-        run: None,
-        ends: onset.ends,
-    };
+    let when = |onset: Onset| found_onset_in(None, onset, |_| f64::NAN);
     let of_each: Vec<Vec<NamedEffect>> = named
         .iter()
         .enumerate()

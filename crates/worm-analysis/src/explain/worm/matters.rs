@@ -26,7 +26,7 @@ pub(in crate::explain) fn impact(worm: &RecordedWorm<'_>, fit: &Fit, place: usiz
     let onset = fit.hypothesis.hypothesised[place].onset;
     let runs = worm.scene.observed.iter().enumerate();
     let mut impact = Impact::default();
-    let acts_in = |run: usize| onset.is_none_or(|onset| onset.acts_at_start(run) || onset.acts_at_end(run));
+    let acts_in = |run: usize| onset.is_none_or(|onset| onset.acts_in(run));
     for (run, observed) in runs.filter(|(run, _)| acts_in(*run)) {
         let predict = |at: &[f64]| worm.scene.predict(run, &hypothesis, at);
         let (Some(on), Some(off)) = (predict(&fit.at), predict(&without_at)) else {

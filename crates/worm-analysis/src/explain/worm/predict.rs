@@ -30,7 +30,9 @@ impl Scene<'_> {
     pub fn physics(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> (Physics, f64) {
         let recalibrated = self.recalibrated(run, hypothesis, at);
         (
-            recalibrated.physics.with(&hypothesis.settings_at_end(run, at)),
+            recalibrated
+                .physics
+                .with(&hypothesis.settings_at(run, f64::INFINITY, at)),
             recalibrated.damping_ratio,
         )
     }
@@ -63,7 +65,7 @@ impl Scene<'_> {
 
     /// Whether the crawl of a run is simulated for some cycles and then repeated.
     pub fn repeats(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> bool {
-        let is_steady = !hypothesis.throughout && hypothesis.changes_at(run).is_none();
+        let is_steady = !hypothesis.throughout && hypothesis.changes_at(run).is_empty();
         is_steady && !self.observed[run].pauses && self.physics(run, hypothesis, at).0.is_periodic()
     }
 
@@ -88,23 +90,25 @@ impl Scene<'_> {
     pub fn predict(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<Predicted> {
         let observed = &self.observed[run];
         let recalibrated = self.recalibrated(run, hypothesis, at);
-        let physics = recalibrated.physics.clone().with(&hypothesis.settings_at_end(run, at));
+        let from = |cycle: f64| {
+            recalibrated
+                .physics
+                .clone()
+                .with(&hypothesis.settings_at(run, cycle, at))
+        };
+        let at_start = from(f64::NEG_INFINITY);
         let damping_ratio = recalibrated.damping_ratio;
-        let clock = |physics: &Physics| Clock::new(observed, physics.view.latency_s, recalibrated.clock_drift);
-        let mut predicted = match hypothesis.changes_at(run) {
-            Some(cycle) => {
-                let before = recalibrated
-                    .physics
-                    .clone()
-                    .with(&hypothesis.settings_at_start(run, at));
-                predict_change(observed, clock(&before), &before, &physics, cycle, damping_ratio)
-            }
-            None => {
-                let repeats = self.repeats(run, hypothesis, at);
-                predict_with(observed, clock(&physics), &physics, damping_ratio, repeats)
-            }
+        let clock = Clock::new(observed, at_start.view.latency_s, recalibrated.clock_drift);
+        let changes = hypothesis.changes_at(run);
+        let mut predicted = if changes.is_empty() {
+            let repeats = self.repeats(run, hypothesis, at);
+            predict_with(observed, clock, &at_start, damping_ratio, repeats)
+        } else {
+            let changes = changes.into_iter().map(|cycle| (cycle, from(cycle)));
+            predict_changes(observed, clock, &at_start, changes, damping_ratio)
         }?;
-        predicted.gears = GearErrors::of(hypothesis, at, (&physics.worm, damping_ratio));
+        let at_end = from(f64::INFINITY);
+        predicted.gears = GearErrors::of(hypothesis, at, (&at_end.worm, damping_ratio));
         Some(predicted)
     }
 }
@@ -137,22 +141,24 @@ fn predict_with(
     Some(walk.seen_at(physics.view.scale))
 }
 
-/// Positions at every sample of a recording, by some physics and, from so many cycles after its start on, by another that differs in
+/// Positions at every sample of a recording, by some physics and, each from so many cycles after its start on, by others that differ in
 /// how the worm moves and not in how it is seen.
-fn predict_change(
+fn predict_changes(
     observed: &Observed<'_>,
     clock: Clock<'_>,
-    before: &Physics,
-    after: &Physics,
-    cycle: f64,
+    at_start: &Physics,
+    changes: impl Iterator<Item = (f64, Physics)>,
     damping: f64,
 ) -> Option<Predicted> {
-    let [before_it, after_it] = [before, after].map(Mechanics::new);
-    let mut walk = Walk::begin(observed, clock, &before_it, damping, before.is_periodic())?;
-    walk.go_to(&before_it, observed.phase[0] + cycle, before.is_periodic())?;
-    walk.take_up(&after_it);
-    walk.go_to(&after_it, f64::INFINITY, after.is_periodic())?;
-    Some(walk.seen_at(before.view.scale))
+    let (mut mechanics, mut repeats) = (Mechanics::new(at_start), at_start.is_periodic());
+    let mut walk = Walk::begin(observed, clock, &mechanics, damping, repeats)?;
+    for (cycle, physics) in changes {
+        walk.go_to(&mechanics, observed.phase[0] + cycle, repeats)?;
+        (mechanics, repeats) = (Mechanics::new(&physics), physics.is_periodic());
+        walk.take_up(&mechanics);
+    }
+    walk.go_to(&mechanics, f64::INFINITY, repeats)?;
+    Some(walk.seen_at(at_start.view.scale))
 }
 
 /// The nominal worm of a run.
@@ -177,11 +183,7 @@ mod tests {
         let recordings = record(&campaign, None, 1);
         let scene = scene(&recordings, &campaign);
         let truth = Some(("unequal-clamping", Some(1), &[0.5][..]));
-        let onset = Onset {
-            cycle: 2.0,
-            run: Some(1),
-            ends: false,
-        };
+        let onset = Onset::from(2.0, Some(1));
         let predict = |run: usize, (hypothesis, at): &(Hypothesis, Vec<f64>)| {
             scene.predict(run, hypothesis, at).expect("it holds").position_m
         };

@@ -38,14 +38,20 @@ impl Candidate {
         }
     }
 
+    /// Whether an effect in it begins and ends again.
+    pub fn comes_and_goes(&self) -> bool {
+        let mut onsets = self.hypothesised.iter().filter_map(|one| one.onset);
+        onsets.any(|onset| onset.comes_and_goes())
+    }
+
     /// The effects that it names, each with its place in the hypothesis: all but a trace.
     pub fn named(&self) -> impl Iterator<Item = (usize, &Hypothesised)> + Clone {
         let all = self.hypothesised.iter().enumerate();
         all.filter(|(place, _)| self.trace != Some(*place))
     }
 
-    /// Whether every effect in it is strong enough to matter, of a sense that it can have, with its severity and its shape off their
-    /// limits: scatter from cycle to cycle looks like a little of many effects, and what is driven to its limit fits something else.
+    /// Whether every effect in it is strong enough to matter, of a sense that it can have, with its severity, its shape and the time for
+    /// which it acts off their limits: scatter from cycle to cycle looks like a little of many effects, and what is driven to its limit fits something else.
     pub fn is_notable(&self) -> bool {
         let settings = self.fit.hypothesis.settings(&self.fit.at);
         let (sigmas, quantities) = (self.sigmas(), &self.fit.hypothesis.free);
@@ -76,7 +82,11 @@ impl Candidate {
             }
             What::Nuisance(_) | What::Law(_) => false,
         });
-        is_strong && shapes.all(|(quantity, _)| !self.fit.at_limit(quantity))
+        let lasts = || {
+            self.named()
+                .all(|(_, one)| !one.onset.is_some_and(|onset| onset.is_shortest()))
+        };
+        is_strong && lasts() && shapes.all(|(quantity, _)| !self.fit.at_limit(quantity))
     }
 
     /// Standard errors of all quantities: noise and discrepancy counted.

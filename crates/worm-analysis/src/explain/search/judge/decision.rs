@@ -13,7 +13,8 @@
 //!    Something else beside an effect must be more than the effect's own law may be wrong by, for no law is known exactly.
 //! 4. A pair needs odds of twenty against the best single effect, and its second effect must pass 2 and 3 by itself, and improve
 //!    the fit by more than the first one's law may be wrong by.
-//! 5. With nine tenths on one class the data are **explained**; where it takes several, or one is more probable than something else and
+//! 5. What comes and goes within a run counts as something else unless it has nine tenths by itself: it fits a little of much.
+//! 6. With nine tenths on one class the data are **explained**; where it takes several, or one is more probable than something else and
 //!    nothing has a tenth at most, **ambiguous**. Otherwise model and data **agree**, or the cause is **outside the library**, whichever
 //!    is more probable.
 
@@ -200,9 +201,11 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         .map(|class| probability(class.ln_weight) - that_counts(class))
         .sum();
     let null_probability = nothing + unimportant;
+    let is_sure = |class: &Class| !judged[class.best].candidate.comes_and_goes() || that_counts(class) >= SURE;
     // Something is there, and looks like an effect that it cannot be.
-    let (named, unnamed): (Vec<&Class>, Vec<&Class>) =
-        classes.iter().partition(|class| may_be_named(&judged[class.best]));
+    let (named, unnamed): (Vec<&Class>, Vec<&Class>) = classes
+        .iter()
+        .partition(|class| may_be_named(&judged[class.best]) && is_sure(class));
     let other_probability = probability(ln_other) + unnamed.into_iter().map(that_counts).sum::<f64>();
     let misstated_probability = probability(ln_sum(misstated.iter().copied()));
     let mut count = 0;

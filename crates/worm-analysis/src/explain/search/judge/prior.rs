@@ -10,8 +10,8 @@
 //!
 //! # Odds
 //! None 0.5, something else 0.1, a single effect 0.35, a pair 0.05; shared equally by families (exact twins are one), then by cells,
-//! then 0.6 to an effect that acts throughout, 0.3 to one that begins in mid-run and 0.1 to one that ends there: in every run, or once
-//! in one of them, at any cycle.
+//! then 0.55 to an effect that acts throughout, 0.3 to one that begins in mid-run, 0.1 to one that ends there and 0.05 to one that does
+//! both: in every run, or once in one of them, at any cycle.
 
 use super::super::parameter::{Hypothesised, Onset};
 use worm_physics::effect::{Effect, Parameter, Scope, Sense};
@@ -35,9 +35,10 @@ const MEASURABLE: std::ops::RangeInclusive<f64> = 2e-3..=0.8;
 const WITHOUT_IMPACT: f64 = 10.0;
 /// Mass of the sense that is hardly physical.
 const UNPHYSICAL: f64 = 0.1;
-/// Probabilities that an effect which may begin in mid-run does, and that it ends there.
+/// Probabilities that an effect which may begin in mid-run does, that it ends there, and that it does both.
 const BEGINS: f64 = 0.3;
 const ENDS: f64 = 0.1;
+const BOTH: f64 = 0.05;
 /// Nodes of the integral that normalises the density of one sense.
 const NODES: usize = 60;
 
@@ -182,10 +183,15 @@ impl Campaign {
             Scope::AnyCells => 2.0 * self.channels as f64,
         };
         let twins = 1.0 + one.effect.twins.len() as f64;
-        let at_some_cycle = |onset: Onset| if onset.ends { ENDS } else { BEGINS } / self.cycles;
+        let at_some_cycle = |onset: Onset| match (onset.begins, onset.ends) {
+            // Every pair of cycles as probable as any other.
+            (Some(_), Some(_)) => BOTH / (0.5 * self.cycles * (self.cycles - 1.0)).max(1.0),
+            (None, Some(_)) => ENDS / self.cycles,
+            _ => BEGINS / self.cycles,
+        };
         let when = match one.onset {
             _ if !one.effect.may_begin => 1.0,
-            None => 1.0 - BEGINS - ENDS,
+            None => 1.0 - BEGINS - ENDS - BOTH,
             // All runs as probable as any one.
             Some(onset) if self.runs == 1 => at_some_cycle(onset),
             Some(onset) if onset.run.is_none() => 0.5 * at_some_cycle(onset),
@@ -279,18 +285,30 @@ mod tests {
             cycles: 10.0,
             families: families(&all),
         };
-        let at_cycle_3 = |run: Option<usize>| [true, false].map(|ends| Onset { cycle: 3.0, run, ends });
+        let (cycles, pairs) = (campaign.cycles, 0.5 * campaign.cycles * (campaign.cycles - 1.0));
+        let of_run = |run: Option<usize>| {
+            let both = Onset {
+                ends: Some(5.0),
+                ..Onset::from(3.0, run)
+            };
+            [
+                (Onset::from(3.0, run), cycles),
+                (Onset::until(3.0, run), cycles),
+                (both, pairs),
+            ]
+        };
         let prior = |one: &Hypothesised| {
             let mut sum = campaign.ln_prior(&[*one]).exp();
             if one.effect.may_begin {
-                let onsets = [None, Some(0), Some(1), Some(2)].into_iter().flat_map(at_cycle_3);
-                let with_onset = onsets.map(|onset| Hypothesised {
-                    onset: Some(onset),
-                    ..*one
+                let onsets = [None, Some(0), Some(1), Some(2)].into_iter().flat_map(of_run);
+                let with_onset = onsets.map(|(onset, times)| {
+                    let one = Hypothesised {
+                        onset: Some(onset),
+                        ..*one
+                    };
+                    times * campaign.ln_prior(&[one]).exp()
                 });
-                sum += with_onset
-                    .map(|one| campaign.cycles * campaign.ln_prior(&[one]).exp())
-                    .sum::<f64>();
+                sum += with_onset.sum::<f64>();
             }
             sum
         };

@@ -143,11 +143,7 @@ mod tests {
     #[test]
     fn what_begins_in_mid_run_is_found_where_it_begins_and_nothing_elsewhere() {
         let truth = Some(("unequal-clamping", Some(1), &[0.8][..]));
-        let onset = Onset {
-            cycle: 2.0,
-            run: Some(1),
-            ends: false,
-        };
+        let onset = Onset::from(2.0, Some(1));
         let (ln_bayes, change) = found(&begun(truth, onset));
         assert!(ln_bayes > 20.0, "{ln_bayes}");
         assert_eq!(change.run, Some(1));

@@ -3,7 +3,7 @@
 use super::*;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::hypothesis::Hypothesis;
-use crate::explain::search::parameter::Hypothesised;
+use crate::explain::search::parameter::{Hypothesised, Onset};
 use crate::explain::words;
 use crate::explain::worm::plant::hypotheses;
 use crate::least_squares::Estimate;
@@ -95,6 +95,31 @@ fn the_one_that_explains_most_is_named() {
         "{}",
         selected.probability[0]
     );
+}
+
+/// Two that explain as much and would be two names if they stayed, and one that lasts for no longer than anything must.
+#[test]
+fn what_comes_and_goes_counts_as_something_else_where_it_is_not_sure() {
+    let spell = |name: &str, cycles: f64| {
+        let mut one = judged(&[name], 40.0, 20.0);
+        one.candidate.hypothesised[0].onset = Some(Onset {
+            ends: Some(3.0 + cycles),
+            ..Onset::from(3.0, None)
+        });
+        one
+    };
+    let sure = verdict(5.0, vec![spell("pad-creep", 3.0), judged(&["backlash"], 12.0, 0.0)]);
+    assert_eq!(sure.verdict, Verdict::Explained);
+    let lasting = vec![judged(&["pad-creep"], 40.0, 20.0), judged(&["backlash"], 40.0, 20.0)];
+    assert_eq!(verdict(5.0, lasting).verdict, Verdict::Ambiguous);
+    for all in [
+        vec![spell("pad-creep", 3.0), spell("backlash", 3.0)],
+        vec![spell("pad-creep", 2.0)],
+    ] {
+        let unsure = verdict(5.0, all);
+        assert_eq!(unsure.verdict, Verdict::OutsideLibrary);
+        assert!(unsure.other_probability > 0.9, "{}", unsure.other_probability);
+    }
 }
 
 /// With an effect that makes the best of wrong conditions, 40 nats beyond none: conditions that are much less probable, a little less, and
