@@ -10,7 +10,7 @@ import stat
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -110,17 +110,25 @@ def _is_any_held(folder: Path) -> bool:
 def _holder(lock: Path) -> int | None:
     """Return the process that a lock file names, if it uses the file. Creates nothing, and disturbs nobody."""
     try:
-        pid = int(lock.read_text())
+        # A role may leave a note below.
+        pid = int(lock.read_text().partition("\n")[0])
     except (OSError, ValueError):
         return None
     try:
-        opened = (os.readlink(entry.path) for entry in os.scandir(f"/proc/{pid}/fd"))
-        return pid if str(lock) in opened else None
+        return pid if str(lock) in _opened(pid) else None
     except PermissionError:
         # The kernel hides what a process with capabilities has open, but not what it has locked.
         return pid if _has_locked(pid, lock) else None
     except OSError:
         return None
+
+
+def _opened(pid: int) -> Iterator[str]:
+    """Yield what a process has open."""
+    for entry in os.scandir(f"/proc/{pid}/fd"):
+        # It may close some meanwhile, and those after them count all the same.
+        with suppress(FileNotFoundError):
+            yield os.readlink(entry.path)
 
 
 def _has_locked(pid: int, lock: Path) -> bool:
