@@ -197,8 +197,7 @@ fn other_commands_say_what_is_missing(robot: &Robot<'_>, run: &Path, until_s: f6
     let (run, until) = (path(run), until_s.to_string());
     let copy = run.replace("run.mcap", "copy.mcap");
     for arguments in [
-        // A busy computer may be silent for a while, too.
-        &["analyze", "--slope", "0", "--max-gap", "1", "--to", &until, run][..],
+        &["analyze", "--slope", "0", "--to", &until, run][..],
         &["infer", run],
         &["export", "--mcap", &copy, run],
         &["replay", run],
