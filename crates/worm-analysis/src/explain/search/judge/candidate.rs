@@ -51,7 +51,8 @@ impl Candidate {
     }
 
     /// Whether every effect in it is strong enough to matter, of a sense that it can have, with its severity, its shape and the time for
-    /// which it acts off their limits: scatter from cycle to cycle looks like a little of many effects, and what is driven to its limit fits something else.
+    /// which it acts off their limits: scatter from cycle to cycle looks like a little of many effects, and what is driven to its limit fits
+    /// something else.
     pub fn is_notable(&self) -> bool {
         let settings = self.fit.hypothesis.settings(&self.fit.at);
         let (sigmas, quantities) = (self.sigmas(), &self.fit.hypothesis.free);
@@ -82,11 +83,10 @@ impl Candidate {
             }
             What::Nuisance(_) | What::Law(_) => false,
         });
-        let lasts = || {
-            self.named()
-                .all(|(_, one)| !one.onset.is_some_and(|onset| onset.is_shortest()))
-        };
-        is_strong && lasts() && shapes.all(|(quantity, _)| !self.fit.at_limit(quantity))
+        let mut onsets = self.named().filter_map(|(_, one)| one.onset);
+        is_strong
+            && !onsets.any(|onset| onset.is_shortest())
+            && shapes.all(|(quantity, _)| !self.fit.at_limit(quantity))
     }
 
     /// Standard errors of all quantities: noise and discrepancy counted.
