@@ -330,7 +330,7 @@ class Explanation(Result):
     other_probability: float
     """Probability that something else is missing, counting effects that are unlike their laws."""
     misstated_probability: float | None
-    """Probability that nothing is missing and the slopes are stated wrongly; where a usual mistake explains anything."""
+    """Probability that nothing is missing and conditions are not as stated, where a usual mistake explains anything."""
     agrees_within_m: float
     """Measured and modelled advance differ by no more than this, m, with a probability of 95 %."""
     agrees_within_j: float | None

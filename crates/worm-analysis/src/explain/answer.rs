@@ -86,7 +86,7 @@ impl Answer {
         !self.runs.is_empty() && self.runs.iter().all(|run| !run.sees_positions)
     }
 
-    /// Whether it is more probable than everything else together that the slopes are stated wrongly.
+    /// Whether it is more probable than everything else together that conditions are stated wrongly.
     pub fn is_misstated(&self) -> bool {
         self.doubt
             .misstated_probability
@@ -106,7 +106,7 @@ pub struct Doubt {
     pub null_probability: f64,
     /// Probability that something else is missing, alone or beside an effect: the posterior one, less effects that are unlike their laws.
     pub other_probability: f64,
-    /// Probability that nothing is missing and the slopes are stated wrongly; none where no mistake that is usual explains anything.
+    /// Probability that nothing is missing and the conditions of the recordings are stated wrongly; none where no mistake that is usual explains anything.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub misstated_probability: Option<f64>,
     /// The measured advance of a cycle and that of the model in the answer differ on no run by more than this, m, with a probability

@@ -17,7 +17,7 @@ use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::law::find::FoundLaw;
 use crate::explain::search::parameter::{Free, Onset, What};
-use crate::explain::worm::misstated_slope::in_words;
+use crate::explain::worm::misstated_conditions::in_words;
 use crate::explain::worm::noise::RunNoise;
 use crate::explain::worm::nuisance::Nuisance;
 use crate::explain::worm::period::period;
@@ -98,7 +98,9 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         }
     }
     effects.extend(speed_droop.map(effects::droop_effect));
-    let final_fit = named.first().map_or(&parts.recalibrated, |candidate| &candidate.fit);
+    let meant = found.misstated.as_ref().filter(|_| selected.is_misstated());
+    let without_effects = meant.map_or(&parts.recalibrated, |misstated| &misstated.fit);
+    let final_fit = named.first().map_or(without_effects, |candidate| &candidate.fit);
     let maps_before = maps(worm, &parts.recalibrated);
     let best = selected.candidates.first().map(|candidate| &candidate.fit);
     let maps_after = match verdict {
@@ -136,10 +138,9 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     let runs = runs::runs(worm, parts, named.first());
     let written_back = as_written(problem, of_law.as_ref().map_or(final_fit, |(law, _)| &law.fit));
     let misstated = found.misstated.as_ref().map(|misstated| in_words(worm, misstated));
-    let suspicion = misstated
-        .as_deref()
-        .and_then(|what| words::suspicion(what, verdict, selected, is_as_good(found)));
-    let verdict_in_words = match &misstated {
+    let misstated = misstated.as_ref().map(|(what, what_to_do)| (&what[..], *what_to_do));
+    let suspicion = misstated.and_then(|what| words::suspicion(what, verdict, selected, is_as_good(found)));
+    let verdict_in_words = match misstated {
         Some(what) if selected.is_misstated() => words::misstated(what, selected.misstated_probability),
         _ => {
             let sentence = words::sentence(
@@ -199,7 +200,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     }
 }
 
-/// Whether a mistake in the slopes improves the fit by nearly as much as the best effect: what is left may be no law's.
+/// Whether a mistake in the conditions improves the fit by nearly as much as the best effect: what is left may be no law's.
 fn is_as_good(found: &Found) -> bool {
     let best = found
         .selected

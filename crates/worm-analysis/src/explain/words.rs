@@ -18,8 +18,6 @@ const SURE: f64 = 3.0;
 /// Time of a gait cycle below which the current alone overstates the work, s: at 1.8 s by a fiftieth, at 1.3 s by more.
 const FAST_GAIT_S: f64 = 1.8;
 
-const CHECK_SLOPES: &str = "check slope_deg before you believe anything else";
-
 /// The verdict in a sentence or two; `held_out` is what the effects were judged on that they were not fitted to.
 pub(super) fn sentence(
     verdict: Verdict,
@@ -79,24 +77,29 @@ pub(super) fn sentence(
     }
 }
 
-/// The verdict where slopes that are stated wrongly are more probable than all else.
-pub(super) fn misstated(what: &str, probability: f64) -> String {
+/// The verdict where conditions that are stated wrongly are more probable than all else, with what to do about it.
+pub(super) fn misstated((what, what_to_do): (&str, &str), probability: f64) -> String {
     format!(
-        "Model and data disagree, and no effect of the library explains it as well as {what} (probability {}): {CHECK_SLOPES}.",
+        "Model and data disagree, and no effect of the library explains it as well as {what} (probability {}): {what_to_do}.",
         percent(probability)
     )
 }
 
-/// That slopes may be stated wrongly, where it is probable enough to say or explains about as much as the best effect.
-pub(super) fn suspicion(what: &str, verdict: Verdict, selected: &Selected, is_as_good: bool) -> Option<String> {
+/// That conditions may be stated wrongly, where it is probable enough to say or explains about as much as the best effect.
+pub(super) fn suspicion(
+    (what, what_to_do): (&str, &str),
+    verdict: Verdict,
+    selected: &Selected,
+    is_as_good: bool,
+) -> Option<String> {
     let probability = selected.misstated_probability;
     let is_worth_a_word = verdict != Verdict::Agrees && (is_as_good || probability >= WORTH_A_WORD);
     is_worth_a_word.then(|| match probability >= WORTH_A_WORD {
         true => format!(
-            "{what} would explain these data as well (probability {}): {CHECK_SLOPES}",
+            "{what} would explain these data as well (probability {}): {what_to_do}",
             percent(probability)
         ),
-        false => format!("{what} would explain nearly as much: {CHECK_SLOPES}"),
+        false => format!("{what} would explain nearly as much: {what_to_do}"),
     })
 }
 

@@ -25,6 +25,7 @@ pub(in crate::explain) fn calibration(fit: &Fit, config: &Config) -> Vec<Calibra
                 Nuisance::FrictionOf(cell) => factor(format!("friction of cell {}", cell + 1)),
                 Nuisance::StiffnessOf(cell) => factor(format!("stiffness of cell {}", cell + 1)),
                 Nuisance::StrokeOf(cell) => factor(format!("stroke of cell {}", cell + 1)),
+                Nuisance::FrictionIn(run) => factor(format!("friction in run {}", run + 1)),
                 Nuisance::SlopeOf(run) => (format!("slope of run {}", run + 1), 0.0, value, sigma, "deg"),
                 Nuisance::Clock => ("clock".to_owned(), 0.0, value, sigma, "s"),
                 Nuisance::ClockDrift => ("clock drift".to_owned(), 0.0, value, sigma, "s/s"),

@@ -5,15 +5,15 @@
 //! conditions as they may have been meant, without any effect.
 
 use super::fit::Fit;
-use super::judge::prior::{MISSTATED, MISSTATED_RUN};
+use super::judge::prior::{MISSTATED, MISSTATED_RUN, UNLIKE_RUN};
 use super::judgement::Judge;
-use super::misstatement::Misstatement;
+use super::misstatement::{Misstatement, Sort};
 use super::plant::Plant;
 
 /// Improvement over the recalibrated model from which it is worth looking for a mistake, and that one must reach.
 const LEAST_IMPROVEMENT: f64 = 10.0;
-/// Mistakes that are fitted, of those that look best before.
-const FITTED: usize = 3;
+/// Mistakes of a sort that are fitted, of those that look best before.
+const FITTED: usize = 2;
 /// Standard errors by which what must differ does.
 const LEAST_SIGMAS: f64 = 2.0;
 
@@ -29,6 +29,15 @@ pub(in crate::explain) struct Misstated {
     pub ln_weight: f64,
 }
 
+/// Prior probability of all mistakes of a sort together.
+fn prior_of_all(sort: Sort) -> f64 {
+    match sort {
+        Sort::Written => MISSTATED,
+        Sort::OfOneRun => MISSTATED_RUN,
+        Sort::UnlikeOthers => UNLIKE_RUN,
+    }
+}
+
 /// The mistakes that explain something, best first; `best_improvement` is that of the best effect.
 pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvement: f64) -> Vec<Misstated> {
     let problem = judge.problem;
@@ -36,12 +45,11 @@ pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvem
         return Vec::new();
     }
     let all = problem.plant.misstatements(&judge.recalibrated.hypothesis);
-    // All of a kind as probable as any one.
-    let of_one_run = all.iter().filter(|one| one.must_differ.is_some()).count();
-    let priors = [
-        MISSTATED / (all.len() - of_one_run) as f64,
-        MISSTATED_RUN / of_one_run as f64,
-    ];
+    let sorts: Vec<Sort> = all.iter().map(|one| one.sort).collect();
+    let prior_of = |sort: Sort| {
+        let of_sort = sorts.iter().filter(|&&other| other == sort).count();
+        prior_of_all(sort) / of_sort as f64
+    };
     let mut starts: Vec<(Misstatement, f64)> = all
         .into_iter()
         .map(|one| {
@@ -50,12 +58,13 @@ pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvem
         })
         .filter(|(_, chi_squared)| chi_squared.is_finite())
         .collect();
-    starts.sort_by(|a, b| a.1.total_cmp(&b.1));
-    starts.truncate(FITTED);
-    let mut found: Vec<Misstated> = starts
-        .into_iter()
+    starts.sort_by(|a, b| a.0.sort.cmp(&b.0.sort).then(a.1.total_cmp(&b.1)));
+    let best = starts
+        .chunk_by(|a, b| a.0.sort == b.0.sort)
+        .flat_map(|of_sort| &of_sort[..of_sort.len().min(FITTED)]);
+    let mut found: Vec<Misstated> = best
         .filter_map(|(one, _)| {
-            let mut fit = problem.fit(&one.hypothesis, one.start, None);
+            let mut fit = problem.fit(&one.hypothesis, one.start.clone(), None);
             let improvement = judge.recalibrated.chi_squared
                 - fit.chi_squared
                 - problem.excess_of_repeating(judge.recalibrated, &fit);
@@ -67,11 +76,10 @@ pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvem
                 let off = (fit.at[quantity] - fit.hypothesis.free[quantity].quantity.centre).abs();
                 off >= least.max(LEAST_SIGMAS * fit.sigmas()[quantity])
             });
-            let prior = priors[usize::from(one.must_differ.is_some())];
             differs.then(|| Misstated {
                 what: one.what,
                 improvement,
-                ln_weight: prior.ln() + judge.evidence_of(&fit, &|_| None).usual,
+                ln_weight: prior_of(one.sort).ln() + judge.evidence_of(&fit, &|_| None).usual,
                 fit,
             })
         })

@@ -21,7 +21,7 @@ pub(in crate::explain) mod gap;
 pub(in crate::explain) mod gears;
 mod laws;
 pub(in crate::explain) mod matters;
-pub(in crate::explain) mod misstated_slope;
+pub(in crate::explain) mod misstated_conditions;
 pub(in crate::explain) mod noise;
 pub(in crate::explain) mod nuisance;
 pub(in crate::explain) mod observed;

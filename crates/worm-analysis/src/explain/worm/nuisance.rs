@@ -22,6 +22,8 @@ pub(in crate::explain) enum Nuisance {
     StrokeOf(usize),
     /// Error of one run's slope, degrees.
     SlopeOf(usize),
+    /// Logarithm of a factor on the friction of all tips in one run.
+    FrictionIn(usize),
     /// Delay of the positions against the recorded phase, s.
     Clock,
     /// Growth of that delay: positions and phase have two clocks, s/s.
@@ -63,11 +65,12 @@ const OF_ALL: [Nuisance; 14] = [
     Nuisance::GearLoad,
     Nuisance::PadDamping,
 ];
-const OF_EACH: [fn(usize) -> Nuisance; 4] = [
+const OF_EACH: [fn(usize) -> Nuisance; 5] = [
     Nuisance::FrictionOf,
     Nuisance::StiffnessOf,
     Nuisance::StrokeOf,
     Nuisance::SlopeOf,
+    Nuisance::FrictionIn,
 ];
 
 /// Prior of a nuisance: standard deviation, distance of the limits from the centre, step of derivatives.
@@ -173,16 +176,17 @@ impl Nuisance {
             Self::StiffnessOf(cell) => of_each(1, cell),
             Self::StrokeOf(cell) => of_each(2, cell),
             Self::SlopeOf(run) => of_each(3, run),
+            Self::FrictionIn(run) => of_each(4, run),
         };
         What::Nuisance(number)
     }
 
     /// Whether it concerns a run.
     pub fn concerns(self, run: usize) -> bool {
-        !matches!(self, Self::SlopeOf(of) if of != run)
+        !matches!(self, Self::SlopeOf(of) | Self::FrictionIn(of) if of != run)
     }
 
-    /// Whether a model file, or the campaign's, can hold it; what it cannot hold is the same in every simulation.
+    /// Whether a model file, or the campaign's, can hold it, or it is a matter of one run; what it cannot hold is the same in every simulation.
     pub fn is_of_model_file(self) -> bool {
         !matches!(
             self,
@@ -199,7 +203,7 @@ impl Nuisance {
         )
     }
 
-    fn free(self, (sigma, reach, step): (f64, f64, f64)) -> Free {
+    pub(super) fn free(self, (sigma, reach, step): (f64, f64, f64)) -> Free {
         self.free_within((0.0, sigma, -reach, reach, step))
     }
 
@@ -231,7 +235,9 @@ impl Nuisance {
             Self::StiffnessOf(cell) => worm.scale_stiffness(Some(cell), value.exp()),
             Self::StrokeOf(cell) => worm.scale_stroke(Some(cell), value.exp()),
             Self::SlopeOf(of) if of == run => worm.tilt_rad(value.to_radians()),
+            Self::FrictionIn(of) if of == run => worm.scale_friction(None, value.exp()),
             Self::SlopeOf(_)
+            | Self::FrictionIn(_)
             | Self::Clock
             | Self::ClockDrift
             | Self::Damping
@@ -266,7 +272,12 @@ mod tests {
             let nuisance = Nuisance::of(free.what).expect("it is one");
             assert_eq!(nuisance.what(), free.what);
         }
-        for nuisance in [Nuisance::FrictionOf(5), Nuisance::SlopeOf(2), Nuisance::GearLoad] {
+        for nuisance in [
+            Nuisance::FrictionOf(5),
+            Nuisance::SlopeOf(2),
+            Nuisance::FrictionIn(3),
+            Nuisance::GearLoad,
+        ] {
             assert_eq!(Nuisance::of(nuisance.what()), Some(nuisance));
         }
     }

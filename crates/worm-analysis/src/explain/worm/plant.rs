@@ -5,7 +5,7 @@ use super::gap::closed;
 use super::gears;
 use super::laws::laws;
 use super::matters::impact;
-use super::misstated_slope;
+use super::misstated_conditions;
 use super::noise::RunNoise;
 use super::nuisance::Nuisance;
 use super::observed::Observed;
@@ -85,7 +85,7 @@ impl Plant for RecordedWorm<'_> {
     }
 
     fn misstatements(&self, base: &Hypothesis) -> Vec<Misstatement> {
-        misstated_slope::misstatements(self, base)
+        misstated_conditions::misstatements(self, base)
     }
 
     /// The stretch of canal where tips have been, or may have been where nobody saw them.

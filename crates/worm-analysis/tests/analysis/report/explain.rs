@@ -165,7 +165,7 @@ fn each_verdict_has_its_own_words() {
     }
     let mut misstated = answer::outside();
     misstated.doubt.misstated_probability = Some(0.6);
-    assert!(page_of(&misstated).contains("The slopes seem to be stated wrongly"));
+    assert!(page_of(&misstated).contains("under other conditions than stated"));
 }
 
 /// The words of a page: what is between its tags.

@@ -21,10 +21,12 @@ pub(in crate::explain) const NONE: f64 = 0.5;
 pub(in crate::explain) const OTHER: f64 = 0.1;
 pub(in crate::explain) const SINGLE: f64 = 0.35;
 pub(in crate::explain) const PAIR: f64 = 0.05;
-/// The same, beside these, of conditions that are stated wrongly as a whole and nothing missing, and of one run whose condition may be any:
-/// guesses. The second is much smaller, for it can take the place of any effect that hardly differs between the other runs.
+/// The same, beside these, of conditions that are stated wrongly as a whole and nothing missing, of one run whose condition may be any, and
+/// of one run that was not made like the others: guesses. The second is much smaller, for it can take the place of any effect that hardly
+/// differs between the other runs.
 pub(in crate::explain) const MISSTATED: f64 = 0.02;
 pub(in crate::explain) const MISSTATED_RUN: f64 = 1e-4;
+pub(in crate::explain) const UNLIKE_RUN: f64 = 0.01;
 /// Part of what is something else that leaves nothing beside an effect of the library, or a pair: no data of the same kind could tell. Of
 /// 25 strangers of both test beds' development splits 6 did.
 pub(in crate::explain) const IMITATED: f64 = 0.25;

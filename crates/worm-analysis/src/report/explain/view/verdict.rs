@@ -82,7 +82,7 @@ pub(super) fn headline(answer: &Answer) -> String {
             alternatives(effects, &answer.rivals)
         ),
         (Verdict::OutsideLibrary, _) if answer.is_misstated() => {
-            "The slopes seem to be stated wrongly: nothing needs to be missing from the model.".to_owned()
+            "The recordings seem to have been made under other conditions than stated: nothing needs to be missing from the model.".to_owned()
         }
         (Verdict::OutsideLibrary, _) => {
             let alone = if answer.is_by_advances() { " alone" } else { "" };
