@@ -423,8 +423,9 @@ impl SelfSensing {
 
     /// Brings everything that follows from the fit up to date.
     fn follow(&mut self, cycle: &ClosedCycle) {
-        // While a change stands, every cycle says anew in what the worm differs, and whether it still does.
-        if self.has_changed || self.detector.changes().any() {
+        // While the worm is another, every cycle says anew in what it differs, and whether it still does. Also where the first could
+        // not say it: a change in the middle of that cycle hardly shows there, if the cycle before was odd for another reason.
+        if self.detector.is_another() {
             let difference = self.difference();
             let now = (self.fit.parameters(), self.fit.known_pull_n());
             self.detector.judge(now, self.fit.cycle_n_m(), difference.as_ref());

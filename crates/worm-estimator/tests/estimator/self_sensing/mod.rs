@@ -1,6 +1,7 @@
 //! Self-sensing on drawn worms in virtual time. `WORMD_SEEDS=200` draws as many; without it a small sample. With `WORMD_PITCH` set, every
 //! worm has an inertial sensor.
 
+mod accident;
 mod change_over;
 mod pitch;
 mod plant;
