@@ -9,9 +9,11 @@ use super::wire::{Beat, ClockStep, Down, Echo, RemoteRequest, RemoteWatcher, UP_
 use super::{link_log, reasons};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
+use crate::relay::lateness::LastHold;
 use crate::relay::wire::{self, Answer, Event, Request};
 use crate::topics::PublishedList;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use std::collections::BTreeMap;
 use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -108,6 +110,8 @@ struct RobotLink {
     /// The step of the robot's clock that was told last.
     told_step: Option<ClockStep>,
     asked: Vec<Pending>,
+    /// The last hold of each worm.
+    last_holds: BTreeMap<String, LastHold>,
     said: Option<Instant>,
 }
 
@@ -157,6 +161,7 @@ impl RobotLink {
             checked: Instant::now(),
             told_step: None,
             asked: Vec::new(),
+            last_holds: BTreeMap::new(),
             said: None,
         })
     }
@@ -178,6 +183,14 @@ impl RobotLink {
         for (worm, offer) in self.offers.iter_mut() {
             for Asked { watcher, name, line } in offer.read() {
                 let worm = worm.to_owned();
+                // Here the watchers' clock is known, and whose hold came after whose crawl.
+                let now_ns = monotonic_ns();
+                let last_hold = self.last_holds.entry(worm.clone()).or_default();
+                if let Some(refusal) = last_hold.refusal(&line.request, line.sent_ns.unwrap_or(now_ns), now_ns) {
+                    let stale = Answer::own(0, line.id, line.request.name(), "stale", Some(refusal));
+                    offer.take_answer(watcher, stale);
+                    continue;
+                }
                 let request = RemoteRequest {
                     from: RemoteWatcher { worm, watcher },
                     name,

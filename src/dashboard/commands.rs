@@ -2,9 +2,10 @@
 
 use super::access::bearer;
 use super::app::{App, Peer};
-use super::caller::Caller;
+use super::caller::{Asked, Caller};
 use super::fleet_view::Held;
 use super::response::{refused, to_json};
+use crate::realtime::monotonic_ns;
 use crate::relay::wire::{Answer, Request};
 use crate::trip::wire::Ask;
 use axum::body::{Body, Bytes};
@@ -21,6 +22,8 @@ use std::time::Duration;
 const CLIENT: &str = "x-wormd-client";
 /// The name of who uses the page, percent-encoded.
 const NAME: &str = "x-wormd-name";
+/// When the page asked for it, see [`Asked::read`].
+const ASKED: &str = "x-wormd-asked";
 
 /// How much of a body that nobody needs is read, bytes, and for how long.
 const MAX_FORGOTTEN: usize = 1 << 20;
@@ -82,6 +85,9 @@ pub(super) async fn command(
         app.strangers.note(&caller, &command, why);
         return unauthorised(why);
     }
+    if let Err(why) = asked(&headers) {
+        return refused(StatusCode::BAD_REQUEST, &why);
+    }
     let details = if body.is_empty() {
         Details::default()
     } else {
@@ -133,7 +139,10 @@ pub(super) async fn alive(
     if let Err(why) = authorised(&app, &headers) {
         return unauthorised(why);
     }
-    match app.relay.alive(caller(peer, &headers).key).await {
+    if let Err(why) = asked(&headers) {
+        return refused(StatusCode::BAD_REQUEST, &why);
+    }
+    match app.relay.alive(caller(peer, &headers)).await {
         true => StatusCode::NO_CONTENT.into_response(),
         false => refused(StatusCode::CONFLICT, "this page does not drive: give a command first"),
     }
@@ -200,8 +209,19 @@ fn unauthorised(why: &str) -> Response {
 }
 
 fn caller(Peer(address): Peer, headers: &HeaderMap) -> Caller {
-    let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok());
-    Caller::new(address, text(CLIENT), text(NAME), text(USER_AGENT.as_str()))
+    let text = |name: &str| text(headers, name);
+    // Nothing keeps anybody from a hold, and all else is refused before.
+    let asked = asked(headers).unwrap_or_else(|_| Asked::Before(monotonic_ns()));
+    Caller::new(address, text(CLIENT), text(NAME), text(USER_AGENT.as_str()), asked)
+}
+
+/// When it was asked for.
+fn asked(headers: &HeaderMap) -> Result<Asked, String> {
+    Asked::read(text(headers, ASKED), monotonic_ns())
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name).and_then(|value| value.to_str().ok())
 }
 
 /// The relay's answer, with the status that fits.

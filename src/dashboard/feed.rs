@@ -207,7 +207,7 @@ impl Feed {
                 ..newest
             };
             if self.hello_event.is_none() {
-                self.hello_event = Some(event("hello", &to_json(&self.hello(now_ns))));
+                self.hello_event = Some(event("hello", &to_json(&self.hello(now_ns)), now_ns));
             }
             return self.hello_event.clone();
         }
@@ -222,7 +222,7 @@ impl Feed {
         }
         if cursor.statuses != newest.statuses {
             cursor.statuses = newest.statuses;
-            return Some(event("status", &to_json(&self.server_status(now_ns))));
+            return Some(event("status", &to_json(&self.server_status(now_ns)), now_ns));
         }
         None
     }
@@ -343,13 +343,19 @@ impl Feed {
             events: picture.events.since(seen.events).cloned().collect(),
             ..newest.clone()
         };
-        event("frame", &with_members(&to_json(&frame), &to_json(&extra)))
+        event(
+            "frame",
+            &with_members(&to_json(&frame), &to_json(&extra)),
+            self.frame_ns,
+        )
     }
 }
 
 /// An event of the stream; the data is on one line.
-fn event(name: &str, data: &str) -> Bytes {
-    format!("event: {name}\ndata: {data}\n\n").into()
+/// Its number is when it was made, ms: by it a page says when it asks for something, see [`Asked`](super::caller::Asked).
+fn event(name: &str, data: &str, made_ns: u64) -> Bytes {
+    let number = made_ns / 1_000_000;
+    format!("id: {number}\nevent: {name}\ndata: {data}\n\n").into()
 }
 
 /// A JSON object with the members of another one.

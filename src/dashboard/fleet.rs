@@ -265,7 +265,8 @@ impl Fleet {
                 name: caller.name.clone(),
             };
             let is_sent = watched.connection.as_mut().is_some_and(|connection| {
-                connection.send(None, hello) && connection.send(Some(self.last_id), Request::Hold)
+                let asked_ns = caller.asked.at_ns();
+                connection.send(None, hello) && connection.send_asked(Some(self.last_id), Request::Hold, asked_ns)
             });
             hold.waiting.insert(name.clone(), self.last_id);
             if !is_sent {

@@ -3,13 +3,14 @@
 //! What anyone may do goes over the connection by which the worm is watched, under the name of who asks. What only the driver may do goes
 //! over a connection of that page alone ([`Seat`]).
 
-use super::caller::Caller;
+use super::caller::{Asked, Caller};
 use super::feed::Feed;
 use super::seat::{Reply, Seat};
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::relay::client::{Received, RelayLink};
 use crate::relay::direct_hold::HoldWatch;
+use crate::relay::lateness;
 use crate::relay::wire::{Answer, Line, Request, VERSION};
 use crate::topics::Instance;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
@@ -27,19 +28,19 @@ use tokio::sync::{oneshot, watch};
 const POLL_MS: u16 = 100;
 /// Most pages that may want to drive at a time.
 const MAX_SEATS: usize = 16;
-/// How long a request other than a hold may wait for this thread.
-const ORDER_PATIENCE: Duration = Duration::from_secs(1);
+/// A thread that comes to nothing for so long stood still, ns; and how long after that what says nothing of its age counts as old.
+const STOOD_STILL_NS: u64 = 1_000_000_000;
 /// How long a hold waits for a relay that is just starting.
 const HOLD_PATIENCE: Duration = Duration::from_secs(3);
 
 /// What pages want.
 enum Order {
-    /// What only the driver may do, asked for then.
-    Drive(Instant, Caller, Request, Reply),
-    /// What anyone may do, asked for then.
-    Anyone(Instant, Caller, Request, Reply),
-    /// The page with this key is there. True when it has a seat.
-    Alive(String, oneshot::Sender<bool>),
+    /// What only the driver may do.
+    Drive(Caller, Request, Reply),
+    /// What anyone may do.
+    Anyone(Caller, Request, Reply),
+    /// This page is there. True when it has a seat.
+    Alive(Caller, oneshot::Sender<bool>),
     End,
 }
 
@@ -101,6 +102,8 @@ impl RelayThread {
             holds: HoldWatch::new(instance),
             waiting: Vec::new(),
             last_id: 0,
+            turned_ns: monotonic_ns(),
+            stood_still_ns: None,
         };
         let thread = std::thread::Builder::new()
             .name("relay".to_owned())
@@ -115,20 +118,18 @@ impl RelayThread {
 
     /// Asks for what only the driver may do.
     pub(super) async fn drive(&self, caller: Caller, request: Request) -> Result<Answer, String> {
-        let asked = Instant::now();
-        self.ask(|reply| Order::Drive(asked, caller, request, reply)).await
+        self.ask(|reply| Order::Drive(caller, request, reply)).await
     }
 
     /// Asks for what anyone may do.
     pub(super) async fn anyone(&self, caller: Caller, request: Request) -> Result<Answer, String> {
-        let asked = Instant::now();
-        self.ask(|reply| Order::Anyone(asked, caller, request, reply)).await
+        self.ask(|reply| Order::Anyone(caller, request, reply)).await
     }
 
     /// Says that a page is there; false where it does not drive.
-    pub(super) async fn alive(&self, key: String) -> bool {
+    pub(super) async fn alive(&self, caller: Caller) -> bool {
         let (reply, answer) = oneshot::channel();
-        self.order(Order::Alive(key, reply));
+        self.order(Order::Alive(caller, reply));
         answer.await.unwrap_or(false)
     }
 
@@ -157,25 +158,6 @@ impl Drop for RelayThread {
     }
 }
 
-/// Gives the reply back to what is still to be done: somebody waits for it, and not for too long.
-fn still_wanted(asked: Instant, reply: Reply) -> Option<Reply> {
-    if reply.is_closed() {
-        tracing::info!("a request is dropped: whoever asked has gone");
-        return None;
-    }
-    let waited = asked.elapsed();
-    if waited <= ORDER_PATIENCE {
-        return Some(reply);
-    }
-    let refusal = format!(
-        "asked for {:.0} s ago, when the dashboard stood still: ask again",
-        waited.as_secs_f64()
-    );
-    // Who asked may have gone.
-    let _ = reply.send(Err(refusal));
-    None
-}
-
 /// What the thread has.
 struct Exchange {
     instance: Instance,
@@ -191,30 +173,37 @@ struct Exchange {
     /// Holds that wait for a connection, since when.
     waiting: Vec<(Instant, Caller, Reply)>,
     last_id: u64,
+    /// When the last turn was over, and until when the thread stood still, ns.
+    turned_ns: u64,
+    stood_still_ns: Option<u64>,
 }
 
 impl Exchange {
     /// One turn: waits, reads, passes on. False at the end.
     fn turn(&mut self) -> bool {
         self.wait();
+        let now_ns = monotonic_ns();
+        if now_ns.saturating_sub(self.turned_ns) >= STOOD_STILL_NS {
+            self.stood_still_ns = Some(now_ns);
+        }
         self.take_lines();
         let orders: Vec<_> = self.orders.try_iter().collect();
         for order in orders {
             match order {
-                Order::Drive(asked, caller, request, reply) => {
-                    if let Some(reply) = still_wanted(asked, reply) {
+                Order::Drive(caller, request, reply) => {
+                    if let Some(reply) = self.still_wanted(caller.asked, &request, reply) {
                         self.drive(&caller, request, reply);
                     }
                 }
-                Order::Anyone(_, caller, Request::Hold, reply) => self.anyone(caller, Request::Hold, reply),
-                Order::Anyone(asked, caller, request, reply) => {
-                    if let Some(reply) = still_wanted(asked, reply) {
+                Order::Anyone(caller, Request::Hold, reply) => self.anyone(caller, Request::Hold, reply),
+                Order::Anyone(caller, request, reply) => {
+                    if let Some(reply) = self.still_wanted(caller.asked, &request, reply) {
                         self.anyone(caller, request, reply);
                     }
                 }
-                Order::Alive(key, reply) => {
-                    let seat = self.seats.get_mut(&key);
-                    let _ = reply.send(seat.map(Seat::alive).is_some());
+                Order::Alive(caller, reply) => {
+                    let seat = self.seats.get_mut(&caller.key);
+                    let _ = reply.send(seat.map(|seat| seat.alive(caller.asked.at_ns())).is_some());
                 }
                 Order::End => return false,
             }
@@ -225,7 +214,29 @@ impl Exchange {
         }
         self.seats.retain(|_, seat| seat.exchange());
         self.pending.retain(|_, reply| !reply.is_closed());
+        self.turned_ns = monotonic_ns();
         true
+    }
+
+    /// Gives the reply back to what is still to be done: somebody waits for it, and did not ask long ago.
+    fn still_wanted(&self, asked: Asked, request: &Request, reply: Reply) -> Option<Reply> {
+        if reply.is_closed() {
+            tracing::info!("a request is dropped: whoever asked has gone");
+            return None;
+        }
+        let now_ns = monotonic_ns();
+        let refusal = lateness::refusal(request, asked.at_ns(), now_ns).or_else(|| {
+            let stood_still_ns = self.stood_still_ns?;
+            // Read just after the whole process stood still, it may have lain in the kernel all the time.
+            let is_doubtful = !lateness::is_always_taken(request)
+                && matches!(asked, Asked::Before(ns) if ns.saturating_sub(stood_still_ns) < STOOD_STILL_NS);
+            is_doubtful
+                .then(|| "the dashboard stood still, and when this was asked for is not known: ask again".to_owned())
+        });
+        let Some(refusal) = refusal else { return Some(reply) };
+        // Who asked may have gone.
+        let _ = reply.send(Ok(Answer::own(0, None, request.name(), "stale", Some(refusal))));
+        None
     }
 
     fn reply(&mut self, answer: Answer) {
@@ -309,7 +320,7 @@ impl Exchange {
         }
         self.last_id += 1;
         if let Some(seat) = self.seats.get_mut(&caller.key) {
-            seat.ask(self.last_id, &caller.name, request, reply);
+            seat.ask(self.last_id, caller, request, reply);
         }
     }
 
@@ -331,7 +342,7 @@ impl Exchange {
             self.holds.asked(self.last_id, &caller.name);
         }
         // The name first: the relay records the request under it.
-        let is_sent = self.link.send(0, hello) && self.link.send(self.last_id, request);
+        let is_sent = self.link.send(0, hello) && self.link.send_asked(self.last_id, request, caller.asked.at_ns());
         // A hold that the relay does not take goes past it.
         match is_sent || is_hold {
             true => drop(self.pending.insert(self.last_id, reply)),

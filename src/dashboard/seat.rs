@@ -1,5 +1,6 @@
 //! The connection of a page that drives: a watcher of its own, which is heard when the page is.
 
+use super::caller::Caller;
 use crate::relay::connection::Connection;
 use crate::relay::wire::{Answer, Line, Request, VERSION};
 use crate::topics::Instance;
@@ -35,26 +36,27 @@ impl Seat {
     }
 
     /// Passes on a request of the page.
-    pub(super) fn ask(&mut self, id: u64, name: &str, request: Request, reply: Reply) {
+    pub(super) fn ask(&mut self, id: u64, caller: &Caller, request: Request, reply: Reply) {
+        let name = &caller.name;
         self.heard = Instant::now();
-        if name != self.name {
+        if *name != self.name {
             name.clone_into(&mut self.name);
             let hello = Request::Hello {
                 version: VERSION,
-                name: name.to_owned(),
+                name: name.clone(),
             };
             self.connection.send(None, hello);
         }
-        match self.connection.send(Some(id), request) {
+        match self.connection.send_asked(Some(id), request, caller.asked.at_ns()) {
             true => drop(self.pending.insert(id, reply)),
             false => drop(reply.send(Err("the relay does not read: try again".to_owned()))),
         }
     }
 
-    /// Passes on that the page is there.
-    pub(super) fn alive(&mut self) {
+    /// Passes on that the page was there at this time, ns.
+    pub(super) fn alive(&mut self, at_ns: u64) {
         self.heard = Instant::now();
-        self.connection.send(None, Request::Alive);
+        self.connection.send_asked(None, Request::Alive, at_ns);
     }
 
     /// Writes and reads; false when the connection is over.

@@ -3,6 +3,7 @@
 use super::connection::Connection;
 use super::wire::{Line, Request};
 use crate::failure::Failure;
+use crate::realtime::monotonic_ns;
 use crate::topics::{Controller, Instance, Relay, RoleLock};
 use crossbeam::channel::{Receiver, bounded};
 use std::ffi::OsString;
@@ -147,8 +148,13 @@ impl RelayLink {
 
     /// Asks for something; false without a connection.
     pub(crate) fn send(&mut self, id: u64, request: Request) -> bool {
+        self.send_asked(id, request, monotonic_ns())
+    }
+
+    /// The same for what was asked for at this time, ns of `CLOCK_MONOTONIC`.
+    pub(crate) fn send_asked(&mut self, id: u64, request: Request, asked_ns: u64) -> bool {
         match &mut self.connection {
-            Some(connection) => connection.send(Some(id), request),
+            Some(connection) => connection.send_asked(Some(id), request, asked_ns),
             None => false,
         }
     }

@@ -47,10 +47,15 @@ impl Connection {
 
     /// Queues a request; false when the relay does not read.
     pub(crate) fn send(&mut self, id: Option<u64>, request: Request) -> bool {
+        // Now, and not when it is written: the relay may read it much later.
+        self.send_asked(id, request, monotonic_ns())
+    }
+
+    /// Queues a request that was asked for at this time, ns of `CLOCK_MONOTONIC`; false when the relay does not read.
+    pub(crate) fn send_asked(&mut self, id: Option<u64>, request: Request, asked_ns: u64) -> bool {
         let line = RequestLine {
             id,
-            // Now, and not when it is written: the relay may read it much later.
-            sent_ns: Some(monotonic_ns()),
+            sent_ns: Some(asked_ns),
             request,
         };
         let Ok(line) = to_bytes(&line) else {

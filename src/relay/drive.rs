@@ -7,7 +7,7 @@
 //! Pure: times are arguments, ns of one clock.
 
 use super::departure::{Departure, printable};
-use super::lateness;
+use super::lateness::LastHold;
 use super::wire::{self, Request};
 use crate::trip::wire::Ask;
 use std::collections::BTreeMap;
@@ -43,7 +43,7 @@ pub(super) enum Decision {
     Done(Option<String>),
     /// Not the driver.
     Refused(String),
-    /// It came too late.
+    /// It came too late, or after a hold that was asked for later.
     Stale(String),
 }
 
@@ -63,6 +63,7 @@ pub(super) struct Drive {
     /// When each was last heard; not those that never said that they are there.
     heard_ns: BTreeMap<WatcherId, u64>,
     driver: Option<Driver>,
+    last_hold: LastHold,
 }
 
 #[derive(Debug)]
@@ -109,7 +110,7 @@ impl Drive {
     pub(super) fn request(&mut self, id: WatcherId, request: &Request, sent_ns: u64, now_ns: u64) -> Decision {
         // What lay unread, while this process stood still or the watcher's line was slow, says who was there then, and not who is there now.
         self.heard(id, sent_ns.min(now_ns));
-        if let Some(refusal) = lateness::refusal(request, sent_ns, now_ns) {
+        if let Some(refusal) = self.last_hold.refusal(request, sent_ns, now_ns) {
             return Decision::Stale(refusal);
         }
         match request {

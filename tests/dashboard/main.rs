@@ -4,6 +4,7 @@ mod boxes;
 mod crowd;
 mod fleet;
 mod frozen;
+mod held_up;
 mod http;
 mod watched;
 mod without_tracker;

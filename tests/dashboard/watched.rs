@@ -117,6 +117,16 @@ pub fn events(state: &Watched) -> Vec<String> {
 
 /// The history, which comes first in the stream.
 pub fn first_event(address: SocketAddr) -> Value {
+    let data = first_hello(address).1;
+    serde_json::from_str(&data).expect("JSON on one line")
+}
+
+/// The number of the first event of the stream: when it was made, ms of the computer's clock.
+pub fn first_id(address: SocketAddr) -> u64 {
+    first_hello(address).0
+}
+
+fn first_hello(address: SocketAddr) -> (u64, String) {
     let mut stream = TcpStream::connect(address).expect("listens");
     stream.set_read_timeout(Some(PATIENCE)).expect("can be set");
     stream
@@ -129,12 +139,13 @@ pub fn first_event(address: SocketAddr) -> Value {
         assert!(count > 0, "the stream goes on");
         bytes.extend_from_slice(&piece[..count]);
         let text = String::from_utf8_lossy(&bytes);
-        let Some((_, rest)) = text.split_once("event: hello\ndata: ") else {
+        let Some((before, rest)) = text.split_once("\nevent: hello\ndata: ") else {
             continue;
         };
         // Each event is a chunk of its own.
         if let Some((data, _)) = rest.split_once("\n\n") {
-            return serde_json::from_str(data).expect("JSON on one line");
+            let id = before.rsplit_once("id: ").and_then(|(_, id)| id.parse().ok());
+            return (id.expect("a number"), data.to_owned());
         }
     }
 }

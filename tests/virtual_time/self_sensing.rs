@@ -91,6 +91,33 @@ fn no_tick_of_a_slow_cycle_loses_its_electrical_energy() {
     }
 }
 
+/// Cycles backward are not fitted, and the worm's place goes back with them all the same.
+#[test]
+fn a_worm_that_crawls_backward_is_not_where_it_began() {
+    let config = config("gait.direction = \"backward\"\n");
+    let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
+    let mut inference = Inference::by_current_alone(&config).expect("a valid configuration");
+    let mut messages = Vec::new();
+    session.run_s(8.5 * config.gait.cycle_s, |tick| {
+        messages.extend(inference.update(&tick.state).copied());
+    });
+    let cycles = session.machine.plant().ledger().cycles();
+    let crawled_m: f64 = cycles.iter().map(|cycle| cycle.advance_m).sum();
+    let last = messages.last().expect("messages");
+    println!(
+        "{} messages; at {:.4} ± {:.4} m, {crawled_m:.4} m after {} cycles",
+        messages.len(),
+        last.position_m,
+        last.position_sigma_m,
+        cycles.len()
+    );
+    assert!(messages.len() >= 8 && crawled_m.abs() > 0.04);
+    assert!(last.position_m < 0.0 && last.advance_m.is_nan());
+    let off_m = last.position_m.abs() - crawled_m.abs();
+    assert!(off_m.abs() < 1.645 * last.position_sigma_m.max(0.01), "{off_m} m off");
+    assert!(last.position_sigma_m > 1e-3);
+}
+
 /// Nothing is 0 before it is known, and what is left at the end of a recording is known where the recording ends.
 #[test]
 fn what_is_not_known_yet_is_no_number_and_the_last_message_is_of_the_last_state() {

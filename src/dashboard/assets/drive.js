@@ -3,6 +3,10 @@
 // While this page drives it says five times a second that it is there, as long as it is visible and what it shows is fresh: who cannot
 // see the worm does not drive it. When it ceases to, for whatever reason, the worm holds within a second.
 //
+// Each request says when the button was pressed, so that none is done late: a line that was down brings what was pressed meanwhile when it
+// is back. A hold is the last word: what this page asked for before it, and has no answer yet, is given up, and the server takes
+// nothing any more that was pressed before it.
+//
 // The token stays in sessionStorage: it survives a reload and a switch of apps, ends with the tab, and no other page can make the browser
 // send it, as it could a cookie. A page has a key of its own in memory, so that two tabs are two drivers.
 
@@ -25,11 +29,15 @@ export class Driver {
   #commandedMs = -Infinity;
   #aliveOnWay = 0;
   #changed;
+  #asked;
+  /** What gives up the commands that have no answer yet. */
+  #onWay = new Set();
 
-  /** `changed` is called when somebody has logged in or out. */
-  constructor(store, changed) {
+  /** `changed` is called when somebody has logged in or out; `asked` says when something is asked for, in the server's time. */
+  constructor(store, changed, asked) {
     this.#store = store;
     this.#changed = changed;
+    this.#asked = asked;
     takeTokenOfAddress();
     setInterval(() => this.#sayAlive(), ALIVE_MS);
   }
@@ -72,7 +80,11 @@ export class Driver {
   async command(name, details = null) {
     const isAnyones = name === "hold";
     const token = isAnyones ? null : sessionStorage.getItem(TOKEN);
-    const answer = await this.#request("POST", `/api/command/${name}`, details, token);
+    const givenUp = new AbortController();
+    if (isAnyones) this.#onWay.forEach((earlier) => earlier.abort(new Error("a hold came after it")));
+    else this.#onWay.add(givenUp);
+    const answer = await this.#request("POST", `/api/command/${name}`, details, token, givenUp.signal);
+    this.#onWay.delete(givenUp);
     const { watcher } = answer.body;
     if (!isAnyones && name !== "acknowledge" && watcher !== undefined && answer.ok) {
       this.#watcher = watcher;
@@ -82,8 +94,10 @@ export class Driver {
     return answer;
   }
 
-  async #request(method, path, details, token) {
+  async #request(method, path, details, token, givenUp = null) {
     const headers = { "X-Wormd-Client": this.#key, "X-Wormd-Name": encodeURIComponent(this.name) };
+    const asked = this.#asked();
+    if (asked) headers["X-Wormd-Asked"] = asked;
     if (token) headers.Authorization = `Bearer ${token}`;
     if (details) headers["Content-Type"] = "application/json";
     try {
@@ -93,7 +107,7 @@ export class Driver {
         body: details && JSON.stringify(details),
         cache: "no-store",
         priority: "high",
-        signal: AbortSignal.timeout(PATIENCE_MS),
+        signal: AbortSignal.any([AbortSignal.timeout(PATIENCE_MS), givenUp].filter(Boolean)),
       });
       const text = await response.text();
       const body = text.startsWith("{") ? JSON.parse(text) : {};

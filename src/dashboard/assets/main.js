@@ -7,7 +7,7 @@ import { Driver } from "./drive.js";
 import * as panels from "./panels.js";
 import { loadReports } from "./reports.js";
 import { Store } from "./store.js";
-import { Stream } from "./stream.js";
+import { STALE_MS, Stream } from "./stream.js";
 import { WormPicture } from "./worm.js";
 
 /** How often what grows old is looked at, ms. */
@@ -16,9 +16,11 @@ const AGE_MS = 200;
 const SLOW_MS = 200;
 /** How long a message stands, ms. */
 const MESSAGE_MS = 8000;
+/** What nobody can press while the server is silent: it would come too late, and be refused. */
+const MOVING = ["arm", "crawl", "reset", "take_over", "trip_resume", "trip_return"];
 
 const store = new Store();
-const driver = new Driver(store, drawControls);
+const driver = new Driver(store, drawControls, () => stream.asked());
 const picture = new WormPicture();
 const charts = new Charts(store);
 const boxes = new Boxes();
@@ -83,6 +85,7 @@ function drawOld() {
   const why = panels.staleness(store, stream);
   panels.drawAges(store, why);
   panels.drawTitle(store, why);
+  for (const name of MOVING) byId(name).disabled = stream.silentMs() >= STALE_MS;
   boxes.drawAge();
 }
 
@@ -133,7 +136,7 @@ async function logIn(event) {
   say("logged in: nothing has moved yet", false);
 }
 
-for (const name of ["hold", "arm", "crawl", "stop", "reset", "take_over", "trip_pause", "trip_resume", "trip_return"]) {
+for (const name of ["hold", "stop", "trip_pause", ...MOVING]) {
   byId(name).addEventListener("click", () => command(name));
 }
 // An open dialogue covers the page's own.

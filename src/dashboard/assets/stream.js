@@ -42,6 +42,7 @@ export class Stream {
   #source = null;
   #heardMs = -Infinity;
   #triedMs = -Infinity;
+  #newestId = "";
   #hiddenSinceMs = null;
 
   /** `handlers` has a function for each kind of event: hello, frame, status. */
@@ -60,6 +61,11 @@ export class Stream {
     return performance.now() - this.#heardMs;
   }
 
+  /** When something is asked for now, in the server's time: the newest event's number, and for how long it has been here. */
+  asked() {
+    return this.#newestId && `${this.#newestId}+${Math.round(this.silentMs())}`;
+  }
+
   #connect() {
     this.#triedMs = performance.now();
     this.#source?.close();
@@ -69,6 +75,7 @@ export class Stream {
       source.addEventListener(kind, (event) => {
         if (source !== this.#source) return;
         this.#heardMs = performance.now();
+        this.#newestId = event.lastEventId;
         take(JSON.parse(event.data));
       });
     }

@@ -116,8 +116,8 @@ impl Inference {
         }
     }
 
-    /// Takes the controller's next state. Returns what is known where something new is: after a cycle once it is fitted, after a mark, and
-    /// with the first state.
+    /// Takes the controller's next state. Returns what is known where something new is: after a cycle once it is fitted, or at its end where it
+    /// is not, after a mark, and with the first state.
     pub fn update(&mut self, state: &State) -> Option<&Inferred> {
         let is_first = self.first_sequence.is_none();
         let has_restarted = self.last.is_some_and(|last| state.sequence <= last.sequence);
@@ -140,10 +140,15 @@ impl Inference {
             fill(&mut self.inferred, sensed);
             is_new = true;
         }
+        let ends_cycle = self
+            .last
+            .is_some_and(|last| state.phase.is_finite() && last.phase.floor() != state.phase.floor());
         if self.uses_positions {
-            self.take_position(state);
+            self.take_position(state, ends_cycle);
         }
         is_new |= self.take_marks(state);
+        // One backward, or one with a rest: where the worm is now is known all the same.
+        is_new |= ends_cycle && !self.sensing.is_at_work();
         let phase = if state.phase.is_finite() {
             state.phase
         } else {
@@ -194,7 +199,7 @@ impl Inference {
         &self.sensing
     }
 
-    fn take_position(&mut self, state: &State) {
+    fn take_position(&mut self, state: &State, ends_cycle: bool) {
         let cells = state.cell_count as usize;
         if state.sample_is_new == 1 {
             let positions_m = state.position_m.get(..cells).unwrap_or_default();
@@ -213,9 +218,6 @@ impl Inference {
             self.sensing.place(&mark);
             return;
         }
-        let ends_cycle = self
-            .last
-            .is_some_and(|last| state.phase.is_finite() && last.phase.floor() != state.phase.floor());
         let age_s = state.time_ns.saturating_sub(time_ns) as f64 * 1e-9;
         if ends_cycle && age_s < FRESH_S {
             self.tracker_marks = self.tracker_marks.saturating_add(1);

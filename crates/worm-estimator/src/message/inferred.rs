@@ -33,7 +33,7 @@ impl From<Standing> for InferredStanding {
 
 message! {
     /// What the motor's current alone says of the worm, with standard errors: after each gait cycle crawled forward, as soon as it is
-    /// fitted, and after a mark. Positions play no part in it, but for those that correct the dead reckoning.
+    /// fitted, at the end of every other cycle, when only the place is new, and after a mark. Positions play no part in it, but for those that correct the dead reckoning.
     Inferred = "wormd_inferred_v3", made: time_ns, cells: |inferred| inferred.cell_count, {
         /// Number of this message since the estimator started.
         sequence: u64,

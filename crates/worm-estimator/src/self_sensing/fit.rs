@@ -25,6 +25,7 @@ use super::gear::{GearModel, MAX_RIPPLES};
 use super::leading;
 use super::model::{CycleFigures, CycleModel, FIGURES};
 use super::parameters::{MAX_UNKNOWNS, Matrix, Parameters, Vector};
+use super::pitch::MeasuredPull;
 use super::profile::{BINS_PER_STEP, MAX_BINS};
 use before::Before;
 use linearise::{Linearisation, dot};
@@ -79,7 +80,8 @@ pub(super) struct Fit {
     prior: Vector,
     prior_information: Vector,
     common_freedom: f64, // information on what all cells' ln friction have in common that a changed worm does not have
-    known_pull_n: Option<f64>, // by the pitch, in the mean over the cycles
+    stated_pull_n: (f64, f64), // by the configured slope, with its standard deviation
+    measured: MeasuredPull,
     at: Parameters,
     first_answer: Option<Parameters>, // of a search under way, from where the fit was
     other: Option<Parameters>,        // another answer, with another pull
@@ -159,7 +161,8 @@ impl Fit {
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
             common_freedom: 0.0,
-            known_pull_n: None,
+            stated_pull_n: (at.values[pull_at], config.pull_sigma_n),
+            measured: MeasuredPull::default(),
             at,
             first_answer: None,
             other: None,
@@ -196,6 +199,7 @@ impl Fit {
     pub(super) fn forget(&mut self) {
         (self.cycles, self.squared_cycles, self.scatter_count) = (0.0, 0.0, 0.0);
         self.scatter.fill(0.0);
+        self.measured.forget();
     }
 
     /// Takes a cycle's profile, and the variance of its means by the noise within bins; where the slope was measured, the pull that follows
@@ -208,14 +212,11 @@ impl Fit {
         for (mean, torque) in self.mean_n_m.iter_mut().zip(torque_n_m) {
             *mean += share * (torque - *mean);
         }
-        if let Some((pull_n, sigma_n)) = pull_n {
-            let before_n = self.known_pull_n.filter(|_| self.cycles > 1.0).unwrap_or(pull_n);
-            let mean_n = before_n + share * (pull_n - before_n);
-            let pull_at = self.at.pull_at();
-            self.known_pull_n = Some(mean_n);
-            self.prior[pull_at] = mean_n;
-            self.prior_information[pull_at] = sigma_n.powi(-2);
-        }
+        self.measured.take(pull_n, self.forgetting);
+        let (pull_n, sigma_n) = self.measured.prior_n(self.cycles, self.stated_pull_n);
+        let pull_at = self.at.pull_at();
+        self.prior[pull_at] = pull_n;
+        self.prior_information[pull_at] = sigma_n.powi(-2);
         self.cycle_n_m[..torque_n_m.len()].copy_from_slice(torque_n_m);
         self.work = if self.cycles == 1.0 || (self.cycles - SEARCHED_ANEW).abs() < 0.5 {
             Work::Search(self.search_everywhere())
@@ -418,9 +419,14 @@ impl Fit {
         1.0 / self.prior_information[unknown].sqrt()
     }
 
-    /// The pull that follows from the slope as it was measured, in the mean over the cycles, N.
+    /// The pull that follows from the slope, N, in the mean over the cycles in which that was measured; none where it was not in the newest.
     pub(super) fn known_pull_n(&self) -> Option<f64> {
-        self.known_pull_n
+        self.measured.newest_n.and(self.measured.mean_n())
+    }
+
+    /// The same in the newest cycle alone.
+    pub(super) fn newest_pull_n(&self) -> Option<f64> {
+        self.measured.newest_n
     }
 
     /// Effective number of cycles.

@@ -130,7 +130,8 @@ pub struct SelfSensing {
     evaluations: u32,             // with each reading
     waiting: Option<ClosedCycle>, // its profile is in `profile`
     fitting: Option<ClosedCycle>,
-    has_changed: bool, // the worm that is being fitted is another than before
+    has_changed: bool,                    // the worm that is being fitted is another than before
+    figures_before: Option<CycleFigures>, // of the worm before it changed
     sensed: Option<SelfSensed>,
 }
 
@@ -188,6 +189,7 @@ impl SelfSensing {
             waiting: None,
             fitting: None,
             has_changed: false,
+            figures_before: None,
             sensed: None,
         }
     }
@@ -317,6 +319,11 @@ impl SelfSensing {
         self.fit.profiles_n_m()
     }
 
+    /// Whether a cycle that has ended is still to be fitted.
+    pub(crate) fn is_at_work(&self) -> bool {
+        self.waiting.is_some() || self.fitting.is_some()
+    }
+
     fn reckon(&mut self, turned: f64) {
         let advance_m = if turned > 0.0 {
             self.advance_m[0]
@@ -373,6 +380,7 @@ impl SelfSensing {
         self.has_changed = matches!(seen, Seen::FirstChanged | Seen::Changed);
         if matches!(seen, Seen::FirstChanged) {
             self.fit.set_aside(torque_n_m);
+            self.figures_before = self.fit.figures().map(|(figures, _)| *figures);
         }
         match seen {
             Seen::Usual => {}

@@ -31,11 +31,11 @@ pub struct SelfSensed {
     pub pull_n: f64,
     /// Its standard error, N.
     pub pull_sigma_n: f64,
-    /// The slope, rad: as measured, or if all the pull is the stated mass's weight.
+    /// The slope, rad: as measured in the newest cycle, or if all the pull is the stated mass's weight.
     pub slope_rad: f64,
     /// Its standard error, rad.
     pub slope_sigma_rad: f64,
-    /// Whether a pitch sensor measured it.
+    /// Whether a pitch sensor measured it in that cycle.
     pub slope_is_measured: bool,
     /// Figures of the cycle by the model.
     pub figures: CycleFigures,
@@ -84,9 +84,20 @@ impl SelfSensing {
         let (figures, sigma) = self.fit.figures().copied()?;
         let mut sigma = CycleFigures::from_flat(&sigma.flat().map(|sigma| self.widened() * sigma));
         let changes = self.detector.changes();
-        if changes.all_friction_lost && changes.loss_share > SLIPPING_LOSS {
-            // Tips that hardly hold slide as a whole, which the exact cycle does not know.
+        let slips = changes.all_friction_lost && changes.loss_share > SLIPPING_LOSS;
+        if slips || changes.jammed != 0 {
+            // Tips that hardly hold slide as a whole, and in the exact cycle every cell moves.
             sigma.advance_m = sigma.advance_m.max(self.stroke_m);
+        }
+        if changes.jammed != 0 {
+            sigma.energy_loss_j = sigma.energy_loss_j.max(figures.energy_loss_j.abs());
+            sigma.energy_net_j = sigma.energy_net_j.max(figures.energy_net_j.abs());
+        }
+        if let Some(before) = self.figures_before.filter(|_| changes.more_load) {
+            // A pull or stiffer gears, which leave the cycle as it was: the current hardly says which.
+            let [sigmas, now, before] = [sigma.flat(), figures.flat(), before.flat()];
+            let between = |index: usize| sigmas[index].hypot(now[index] - before[index]);
+            sigma = CycleFigures::from_flat(&std::array::from_fn(between));
         }
         Some((figures, sigma))
     }
@@ -106,10 +117,14 @@ impl SelfSensing {
             values
         };
         let pull_n = parameters.pull_n();
-        let pull_sigma_n = sigma(parameters.pull_at());
+        let changes = *self.detector.changes();
+        let mut pull_sigma_n = sigma(parameters.pull_at());
+        if changes.more_load {
+            pull_sigma_n = pull_sigma_n.hypot(changes.load_rise_n);
+        }
         let pulled_rad = (pull_n / self.weight_n).clamp(-1.0, 1.0).asin();
         let pulled = (pulled_rad, pull_sigma_n / (self.weight_n * pulled_rad.cos().max(0.05)));
-        let measured = self.fit.known_pull_n().map(|weight_n| {
+        let measured = self.fit.newest_pull_n().map(|weight_n| {
             let slope_rad = (weight_n / self.weight_n).clamp(-1.0, 1.0).asin();
             (slope_rad, self.pitch_sensor.sigma_rad)
         });
@@ -136,7 +151,7 @@ impl SelfSensing {
             electrical_sigma_j: (energy.by_voltage * ROUNDING[0]).hypot(energy.by_current * ROUNDING[1]),
             residual_n_m: self.fit.residual_n_m(),
             blind: Blind::of(&self.fit),
-            changes: *self.detector.changes(),
+            changes,
             armed: *self.detector.armed(),
         });
     }

@@ -5,6 +5,7 @@
 
 use super::Fit;
 use crate::self_sensing::parameters::Parameters;
+use crate::self_sensing::pitch::MeasuredPull;
 use crate::self_sensing::profile::MAX_BINS;
 
 /// Distance from the mean profile of before, as a share of the changed worm's, below which a cycle is one of before.
@@ -17,7 +18,7 @@ pub(super) struct Before {
     mean_n_m: Box<[f64; MAX_BINS]>,
     cycles: f64,
     squared_cycles: f64,
-    known_pull_n: Option<f64>,
+    measured: MeasuredPull,
     squared_distance: f64, // of the cycle that showed the change, weighted, N² m²
 }
 
@@ -29,7 +30,7 @@ impl Before {
             mean_n_m: Box::new([0.0; MAX_BINS]),
             cycles: 0.0,
             squared_cycles: 0.0,
-            known_pull_n: None,
+            measured: MeasuredPull::default(),
             squared_distance: 0.0,
         }
     }
@@ -39,7 +40,7 @@ impl Fit {
     /// Sets aside what is known, because the worm has become another, as a cycle's profile shows.
     pub(in super::super) fn set_aside(&mut self, torque_n_m: &[f64]) {
         let before = &mut self.before;
-        (before.at, before.other, before.known_pull_n) = (self.at, self.other, self.known_pull_n);
+        (before.at, before.other, before.measured) = (self.at, self.other, self.measured);
         (before.cycles, before.squared_cycles) = (self.cycles, self.squared_cycles);
         *before.mean_n_m = *self.mean_n_m;
         self.before.squared_distance = self.squared_distance(torque_n_m);
@@ -59,7 +60,7 @@ impl Fit {
     /// Goes on with the worm that was set aside.
     pub(in super::super) fn go_on_as_before(&mut self) {
         let before = &self.before;
-        (self.at, self.other, self.known_pull_n) = (before.at, before.other, before.known_pull_n);
+        (self.at, self.other, self.measured) = (before.at, before.other, before.measured);
         (self.cycles, self.squared_cycles) = (before.cycles, before.squared_cycles);
         *self.mean_n_m = *before.mean_n_m;
         (self.first_answer, self.common_freedom) = (None, 0.0);

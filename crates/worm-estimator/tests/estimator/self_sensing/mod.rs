@@ -2,6 +2,7 @@
 //! worm has an inertial sensor.
 
 mod accident;
+mod cannot_tell;
 mod change_over;
 mod pitch;
 mod plant;

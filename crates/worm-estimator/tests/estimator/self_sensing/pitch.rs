@@ -76,3 +76,42 @@ fn a_steeper_canal_is_no_load() {
     );
     assert!(count > 0 && 5 * steeper <= count && 2 * dragged > count);
 }
+
+/// While the sensor is silent nothing is measured, and a new slope counts with the first cycle on it.
+#[test]
+fn a_silent_sensor_measures_nothing_and_a_new_slope_counts_at_once() {
+    for seed in seeds(4) {
+        let drawn = Drawn::new(seed).with_pitch();
+        let mut plant = Plant::new(&drawn);
+        let mut sensing = SelfSensing::new(&drawn.told, &drawn.config());
+        crawl(&mut plant, &mut sensing, 15, |_, _| {});
+        let before = *sensing.sensed().expect("cycles were seen");
+        assert!(before.slope_is_measured);
+        let end = plant.cycles() + 8;
+        while plant.cycles() < end {
+            let mut sample = plant.tick();
+            sample.pitch_rad = f64::NAN;
+            sensing.update(&sample);
+        }
+        sensing.finish();
+        let silent = *sensing.sensed().expect("cycles were seen");
+        let [sigma_deg, before_deg] = [silent, before].map(|sensed| sensed.slope_sigma_rad.to_degrees());
+        println!("seed {seed}: slope ± {before_deg:.1}°, without the sensor ± {sigma_deg:.1}°");
+        assert!(!silent.slope_is_measured && sigma_deg > before_deg, "seed {seed}");
+
+        let (steeper_deg, worm) = (4.0, drawn.worm.clone());
+        let slope_rad = worm.slope_rad() + f64::to_radians(steeper_deg);
+        let steeper = worm.with_slope_rad(slope_rad).expect("a slope in range");
+        if steady_cycle(&steeper).cycle().is_none() {
+            continue;
+        }
+        crawl(&mut plant, &mut sensing, 3, |_, _| {});
+        plant.change(steeper);
+        // The cycle under way ends on the new slope.
+        crawl(&mut plant, &mut sensing, 2, |_, _| {});
+        let after = sensing.sensed().expect("cycles were seen");
+        let off_deg = after.slope_rad.to_degrees() - slope_rad.to_degrees();
+        println!("seed {seed}: {off_deg:+.2}° off after a rise of {steeper_deg}°");
+        assert!(after.slope_is_measured && off_deg.abs() < 1.5, "seed {seed}");
+    }
+}

@@ -224,6 +224,12 @@ impl Plant {
         self.scatter();
     }
 
+    /// The gears take so many times the torque without load from now on.
+    pub fn stiffen_gears(&mut self, factor: f64) {
+        self.drawn.gear.dry_n_m *= factor;
+        self.drawn.gear.viscous_n_m_s_per_rad *= factor;
+    }
+
     pub fn cycles(&self) -> usize {
         self.milestones.len() - 1
     }
