@@ -6,6 +6,7 @@
 use super::caller::{Asked, Caller};
 use super::feed::Feed;
 use super::seat::{Reply, Seat};
+use super::unreached;
 use crate::failure::Failure;
 use crate::realtime::monotonic_ns;
 use crate::relay::client::{Received, RelayLink};
@@ -262,6 +263,7 @@ impl Exchange {
 
     fn take_lines(&mut self) {
         let received = self.link.poll();
+        let problem = self.link.problem().map(|problem| self.explained(problem));
         let now_ns = monotonic_ns();
         let mut feed = self.shared.feed();
         let mut is_new = false;
@@ -293,8 +295,8 @@ impl Exchange {
                 Received::Log(line) => tracing::info!("{line}"),
             }
         }
-        if let Some(problem) = self.link.problem() {
-            is_new |= feed.lose(problem, now_ns);
+        if let Some(problem) = problem {
+            is_new |= feed.lose(&problem, now_ns);
         }
         is_new |= feed.is_silent(now_ns);
         drop(feed);
@@ -367,7 +369,13 @@ impl Exchange {
     }
 
     fn problem(&self) -> String {
-        let problem = self.link.problem().unwrap_or("there is no connection to the relay");
-        problem.to_owned()
+        self.explained(self.link.problem().unwrap_or("there is no connection to the relay"))
+    }
+
+    /// Of a worm that was offered here from elsewhere only the lists of the fleet processes say why it is not reached: it may be crawling.
+    fn explained(&self, problem: &str) -> String {
+        let unreached = unreached::find(self.instance.root(), |_, _| false);
+        let own = unreached.into_iter().find(|it| it.name == self.instance.worm());
+        own.map_or_else(|| problem.to_owned(), |own| own.problem)
     }
 }

@@ -215,4 +215,8 @@ fn what_is_not_reached_is_shown_and_named_and_never_counts_as_held() {
         outcomes(&held, name),
         [(Some("robot1"), false), (Some("robot2"), false)]
     );
+    // Neither does the page of that worm: it may be crawling.
+    let held = request(desk.address, "POST", "/api/command/hold", &[], "");
+    assert_eq!(held.status, 503, "{held:?}");
+    assert!(held.body.contains("cannot be held from here"), "{held:?}");
 }
