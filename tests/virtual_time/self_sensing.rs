@@ -283,3 +283,46 @@ fn lost_friction_raises_its_alarm() {
         assert_eq!(alarm.cell + 1, cell);
     }
 }
+
+/// A servo that reports the duty of its bridge as its current, and an estimator that is told so: what the motor takes is what it takes, in
+/// self-sensing and in the account of every cycle.
+#[test]
+fn a_servo_that_reports_its_duty_takes_as_much_energy_as_it_does() {
+    let config = config(
+        "worm.cells = 5\nworm.step_order = [1, 2, 3, 4, 5]\ngait.cycle_s = 2.0\ncanal.slope_deg = 20.0\n\
+         virtual_worm.present_current = \"duty\"\nself_sensing.current = \"duty\"\n",
+    );
+    let worm = Worm::try_from(&config).expect("a worm of five cells");
+    let mut sensing = SelfSensing::new(&worm, &config.self_sensing());
+    let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
+    session.cycles = Some(Vec::new());
+    session.run_s(6.5 * config.gait.cycle_s, |tick| {
+        if tick.state.motor_is_new == 1 {
+            sensing.update(&MotorSample::from(&tick.state));
+        }
+    });
+    let truth = session.machine.plant().ledger().cycles().back().expect("cycles");
+    let cycle = session.cycles.iter().flatten().last().expect("cycles");
+    let sensed = sensing.sensed().expect("cycles were fitted");
+    for (what, joules, sigma_j, truth_j) in [
+        (
+            "electrical",
+            cycle.energy_electrical_j,
+            cycle.energy_electrical_sigma_j,
+            truth.electrical_j,
+        ),
+        (
+            "inferred electrical",
+            sensed.electrical_j,
+            sensed.electrical_sigma_j,
+            truth.electrical_j,
+        ),
+        ("copper", cycle.energy_copper_j, 0.1 * truth.copper_j, truth.copper_j),
+    ] {
+        println!("{what}: {joules:.4} ± {sigma_j:.4} J of {truth_j:.4}");
+        assert!(
+            (joules - truth_j).abs() < 2.0 * sigma_j && sigma_j < 0.12 * truth_j,
+            "{what}: {joules} ± {sigma_j} of {truth_j} J"
+        );
+    }
+}

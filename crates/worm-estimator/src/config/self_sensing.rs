@@ -4,9 +4,10 @@ use super::Config;
 use super::check::Checker;
 use crate::self_sensing::gear::MAX_RIPPLES;
 use crate::self_sensing::{CurrentSource, GearModel, PitchSensor, Ripple, SelfSensingConfig};
+use crate::winding::Winding;
 use serde::{Deserialize, Serialize};
-use worm_physics::servo::identified::{XL330_EFFECTS, XL330_IDENTIFIED};
 use toml::value::Datetime;
+use worm_physics::servo::identified::{XL330_EFFECTS, XL330_IDENTIFIED};
 
 /// What the servo reports as its current.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -80,7 +81,7 @@ pub struct SelfSensing {
     pub enabled: bool,
     /// What the servo reports as its current.
     pub current: ReportedCurrent,
-    /// Standard deviation of `servo.torque_constant_n_m_per_a`, as a share.
+    /// Standard deviation of `servo.torque_constant_n_m_per_a`, as a share; where the duty is reported that of the resistance, too.
     pub torque_constant_sigma_share: f64,
     /// Inertia of rotor and cam, at the cam, kg m².
     pub inertia_kg_m2: f64,
@@ -181,13 +182,13 @@ impl SelfSensing {
             checker.range(&format!("self_sensing.{key}"), value, range, unit);
         }
         if let Some(calibrated) = &self.calibrated {
-            for (key, value, range, unit) in [
             checker.require(
                 is_moment(&calibrated.date),
                 "self_sensing.calibrated.date",
                 format!("{:?}", calibrated.date),
                 "must be a date with time and zone, as `wormd calibrate` writes it: \"2026-11-25T11:15:05Z\"",
             );
+            for (key, value, range, unit) in [
                 ("temperature_c", calibrated.temperature_c, -40.0..=120.0, "degrees C"),
                 ("supply_v", calibrated.supply_v, 0.0..=60.0, "V"),
                 (
@@ -215,13 +216,13 @@ impl SelfSensing {
     }
 }
 
-/// Evaluations of the model in a gait cycle that leave the search everywhere some room.
 /// Whether a text is a moment by RFC 3339: a day of the calendar, a time, and a zone.
 fn is_moment(text: &str) -> bool {
     text.parse::<Datetime>()
         .is_ok_and(|moment| moment.date.is_some() && moment.time.is_some() && moment.offset.is_some())
 }
 
+/// Evaluations of the model in a gait cycle that leave the search everywhere some room.
 const EVALUATIONS_PER_CYCLE: f64 = 2_500.0;
 
 impl Config {
@@ -229,6 +230,11 @@ impl Config {
     fn evaluations_per_tick(&self) -> u32 {
         let ticks_per_cycle = self.control.rate_hz * self.gait.cycle_s;
         (EVALUATIONS_PER_CYCLE / ticks_per_cycle).ceil().clamp(1.0, 100.0) as u32
+    }
+
+    /// The motor's winding, and what the servo reports of it: the one answer to what its current is.
+    pub fn winding(&self) -> Winding {
+        self.self_sensing().gear.winding()
     }
 
     /// What self-sensing is told of this worm.

@@ -15,6 +15,7 @@ use worm_physics::Worm;
 const BEGIN_CYCLES: f64 = 0.25;
 /// Parts of a turn whose means are compared.
 const BLOCKS_PER_TURN: usize = 16;
+use crate::winding::Reported;
 /// Friction that no turn is surer of, N m: rounding of the current.
 const FLOOR_N_M: f64 = 2e-4;
 /// Standard deviation of the gears' friction that the fit of a profile begins with here, N m: it is what is sought.
@@ -163,12 +164,7 @@ pub fn fit(points: &[FrictionAt], gear: &GearModel, sigma: [f64; 2], usual_rad_p
 
 /// Friction of the gears that drive nothing, without what their own load adds, N m.
 fn friction_n_m(sample: &MotorSample, gear: &GearModel) -> f64 {
-    let winding_a = gear.winding_current_a(
-        sample.current_a,
-        sample.bus_voltage_v * sample.duty,
-        sample.velocity_rad_per_s,
-        sample.temperature_c,
-    );
+    let winding_a = gear.winding_current_a(&Reported::from(sample));
     let motor_n_m = gear.torque_constant_n_m_per_a * winding_a * sample.velocity_rad_per_s.signum();
     motor_n_m - gear.load_friction_n_m(motor_n_m, 0.0)
 }
