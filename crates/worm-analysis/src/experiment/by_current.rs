@@ -332,7 +332,7 @@ fn warnings(
 ) -> Vec<String> {
     let mut warnings = recording.warnings.clone();
     warnings.push(
-        "nobody saw this worm: its advance, slides and losses are the model's for the worm that explains the motor's torque best, and what the \
+        "no positions are in this: advance, slides and losses are the model's for the worm that explains the motor's torque best, and what the \
          model does not know is not in their errors"
             .to_owned(),
     );
