@@ -371,11 +371,7 @@ fn a_worm_that_lies_in_its_canal_is_not_taken_for_a_lifted_one() {
             false,
         ),
         ("level".to_owned(), String::new(), true),
-        (
-            "level, soft".to_owned(),
-            "max_deformation_m = 0.0007\n".to_owned(),
-            true,
-        ),
+        ("level, soft".to_owned(), "max_deformation_m = 0.001\n".to_owned(), true),
         ("15°".to_owned(), "[canal]\nslope_deg = 15.0\n".to_owned(), true),
         ("−15°".to_owned(), "[canal]\nslope_deg = -15.0\n".to_owned(), true),
     ];

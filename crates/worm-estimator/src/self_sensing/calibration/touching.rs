@@ -7,7 +7,7 @@ use std::fmt::{self, Display};
 use worm_physics::Worm;
 
 /// Rise of the torque in a step from which tips hold something, as a share of what the configured tips would let it rise by: a worm in its
-/// canal shows some 0.7, one whose tips have lost two thirds of their friction 0.25.
+/// canal shows some 0.9, one whose tips hold two fifths of that hides below 0.2, as a ripple of 2.5 mN m with each step would.
 const TOUCHING_SHARE: f64 = 0.2;
 /// Rise that a ripple of the gears may look like, as a multiple of its standard deviation: one that returns with each step, at its worst.
 const RIPPLE_SIGMAS: f64 = 4.0;
@@ -144,7 +144,7 @@ mod tests {
                 "rises by 17.0 mN m in the step",
             ),
             (
-                "in the canal with a third of the friction",
+                "in the canal with half of the friction",
                 gear,
                 [0.014, 0.014],
                 6e-3,
