@@ -13,7 +13,7 @@ use std::time::Duration;
 use worm_estimator::config::{CalibrationMode, Config};
 use worm_estimator::message::{CommandKind, Mode, State};
 use worm_estimator::self_sensing::MotorSample;
-use worm_estimator::self_sensing::calibration::{FrictionAt, GearFriction, fit, level, lifted};
+use worm_estimator::self_sensing::calibration::{FrictionAt, GearFriction, LiftedTurns, fit, level, lifted, touches};
 use worm_physics::Worm;
 
 /// Its name in the record of commands.
@@ -84,7 +84,8 @@ pub(crate) fn duration_s(stages: &[Stage]) -> f64 {
 /// each stretch before it begins.
 ///
 /// # Errors
-/// [`Failure::Failed`] when the worm refuses, does not say anything, is stopped by somebody, or did not turn evenly, and after a signal.
+/// [`Failure::Failed`] when the worm refuses, does not say anything, is stopped by somebody, or did not turn evenly, and after a signal;
+/// [`Failure::Unusable`] when one that should be lifted is not.
 pub(crate) fn calibrate(
     instance: &Instance,
     config: &Config,
@@ -97,18 +98,25 @@ pub(crate) fn calibrate(
     let worm = Worm::try_from(config).map_err(Failure::unusable)?;
     let known = config.self_sensing();
     let (mut at, mut all) = (Vec::new(), Vec::new());
+    let mut turns: Vec<LiftedTurns> = Vec::new();
     for stage in stages(mode, config) {
         tell(&stage);
         let samples = turn(instance, &hub, &stage, end)?;
         if !stage.counts {
             continue;
         }
-        at.extend(match mode {
-            CalibrationMode::Lifted => lifted(&samples, &known.gear),
-            CalibrationMode::Level => level(&samples, &worm, &known),
-        });
+        match mode {
+            CalibrationMode::Lifted => turns.extend(lifted(&samples, &known.gear, worm.cells())),
+            CalibrationMode::Level => at.extend(level(&samples, &worm, &known)),
+        }
         all.extend(samples);
     }
+    if let Some(touching) = touches(&turns, &worm, &known.gear) {
+        return Err(Failure::unusable(format!(
+            "the worm is not lifted: {touching}: hold it so that no tip touches anything, or lay it on the level and give --level; nothing was written"
+        )));
+    }
+    at.extend(turns.iter().map(|turns| turns.friction));
     if at.is_empty() {
         return Err(Failure::failed(
             "at no speed was there a whole even turn with the motor's current: does the servo report its current, and does nothing stop the worm?",

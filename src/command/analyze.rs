@@ -3,7 +3,7 @@
 use super::dataset::{Dataset, READING, SourceArgs, has_extension};
 use super::progress::Progress;
 use super::{Failure, log_line, print};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use worm_analysis::experiment::{Analysis, TorqueProfile, analyze, analyze_by_current};
@@ -21,12 +21,22 @@ pub struct AnalyzeArgs {
     recording: PathBuf,
     #[command(flatten)]
     source: SourceArgs,
+    /// Go by the motor's current, as where nobody saw the worm: the positions of a log are not looked at. For logs whose tracker died on the way
+    #[arg(long, value_name = "EVIDENCE", value_enum, require_equals = true)]
+    current: Option<Current>,
     /// Folder for report.html and a CSV of every series
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object instead of tables
     #[arg(long)]
     json: bool,
+}
+
+/// How the motor's current is evidence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Current {
+    /// Instead of positions
+    Alone,
 }
 
 /// Runs `wormd analyze`.
@@ -36,7 +46,10 @@ pub struct AnalyzeArgs {
 /// cannot be written.
 pub fn run(args: &AnalyzeArgs) -> Result<(), Failure> {
     let mut progress = Progress::begin();
-    let wanted = Wanted::PositionsOrMotor { window_s: 0.0 };
+    let wanted = match args.current {
+        None => Wanted::PositionsOrMotor { window_s: 0.0 },
+        Some(Current::Alone) => Wanted::Motor { window_s: 0.0 },
+    };
     let dataset = args.source.read(&args.recording, wanted, &mut progress)?;
     if let Some(dir) = &args.out {
         report::prepare(dir).map_err(Failure::unusable)?;
@@ -44,7 +57,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), Failure> {
     let unseen: Vec<bool> = dataset
         .runs()
         .iter()
-        .map(|run| !run.recording.has_positions())
+        .map(|run| args.current.is_some() || !run.recording.has_positions())
         .collect();
     if unseen.iter().all(|is_unseen| *is_unseen) {
         return args.analyze_unseen(&dataset, progress);

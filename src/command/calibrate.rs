@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 use toml_edit::{DocumentMut, Item, Table, value};
 use worm_estimator::config::{CalibrationMode, Config};
-use worm_estimator::self_sensing::calibration::GearFriction;
+use worm_estimator::self_sensing::calibration::{GearFriction, direction_difference};
 
 /// What a motor that warms up, by some 10 K, changes of its gears' friction, as a share: it is in the standard deviation that is written.
 const WARMING_SHARE: f64 = 0.03;
@@ -42,8 +42,9 @@ pub struct CalibrateArgs {
 /// Runs `wormd calibrate`.
 ///
 /// # Errors
-/// [`Failure::Unusable`] for arguments or a configuration that cannot be used, and where no such worm runs; [`Failure::Failed`] when the worm
-/// refuses, is stopped by somebody or does not turn evenly, after a signal, and when the file cannot be written. The worm holds then.
+/// [`Failure::Unusable`] for arguments or a configuration that cannot be used, where no such worm runs, and where one that should be lifted
+/// is not; [`Failure::Failed`] when the worm refuses, is stopped by somebody or does not turn evenly, after a signal, and when the file cannot
+/// be written. The worm holds then.
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     print::log_in_background()?;
     let (config, text) = args.worm.load_with_text()?;
@@ -269,7 +270,7 @@ impl Report {
                 friction.sigma_n_m,
                 at_usual(known.dry_friction_n_m, known.viscous_friction_n_m_s_per_rad),
             ),
-            direction_difference_n_m: direction_difference_n_m(found),
+            direction_difference_n_m: direction_difference(&found.at).map(|(difference_n_m, _)| difference_n_m),
             cannot_tell: cannot_tell(mode),
             config: out.to_owned(),
         }
@@ -309,16 +310,6 @@ impl Report {
         ));
         lines.join("\n")
     }
-}
-
-/// Mean friction forward less that backward, N m; none where one of them was not measured.
-fn direction_difference_n_m(found: &Found) -> Option<f64> {
-    let mean = |sign: f64| {
-        let of_sign = found.at.iter().filter(|at| at.velocity_rad_per_s * sign > 0.0);
-        let all: Vec<f64> = of_sign.map(|at| at.friction_n_m).collect();
-        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
-    };
-    Some(mean(1.0)? - mean(-1.0)?)
 }
 
 fn cannot_tell(mode: CalibrationMode) -> Vec<&'static str> {

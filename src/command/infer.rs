@@ -3,7 +3,7 @@
 //! A log that was recorded over a network has too few ticks of a cycle for that; but it has what the running estimator inferred of all of
 //! them, and that is told instead.
 
-use super::{Failure, print};
+use super::{Failure, print, refuse_another_worm};
 use crate::watch::InferredSummary;
 use clap::Args;
 use serde::Serialize;
@@ -42,6 +42,7 @@ pub fn run(args: &InferArgs) -> Result<(), Failure> {
         Some(file) => Config::load(file)?,
         None => log.config()?,
     };
+    refuse_another_worm(&log, &args.log, &config, args.config.as_deref())?;
     let mut inference = Inference::by_current_alone(&config).map_err(Failure::unusable)?;
     let mut marks = log.commands.iter().peekable();
     let mut inferred = Vec::new();

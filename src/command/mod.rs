@@ -60,6 +60,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use worm_estimator::config::{Config, ConfigError};
+use worm_estimator::message::State;
+use worm_log::Log;
 
 /// Which worm to use: the arguments that most subcommands share.
 #[derive(Debug, Clone, Args)]
@@ -221,6 +223,31 @@ fn is_ignored(signal: libc::c_int) -> bool {
     let read = unsafe { libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr()) };
     // SAFETY: the call has filled it in where it returned zero.
     read == 0 && unsafe { action.assume_init() }.sa_sigaction == libc::SIG_IGN
+}
+
+/// Refuses the log of another worm than the configured one. `worm.cells` of the log cannot be corrected, but another configuration given.
+///
+/// # Errors
+/// [`Failure::Unusable`] with both numbers of cells; `given` is the file of a configuration that is not the log's own.
+fn refuse_another_worm(log: &Log, file: &Path, config: &Config, given: Option<&Path>) -> Result<(), Failure> {
+    let configured = config.worm.cells;
+    let is_other = |state: &&State| state.cell_count as usize != configured;
+    let Some(state) = log.states.iter().find(is_other) else {
+        return Ok(());
+    };
+    let (file, which) = match given {
+        Some(given) => (given, "this configuration"),
+        None if log.config.is_some() => (file, "its configuration"),
+        None => (
+            file,
+            "the worm of the paper, assumed because the log has no configuration,",
+        ),
+    };
+    Err(Failure::unusable(format!(
+        "{}: the recorded worm has {} cells, and {which} has {configured}: give the configuration that it ran with by --config",
+        file.display(),
+        state.cell_count
+    )))
 }
 
 /// Logs what is valid but inadvisable in the configuration.

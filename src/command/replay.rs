@@ -1,11 +1,10 @@
 //! `wormd replay`: runs a log through the estimator again, and compares the results.
 
-use super::{Failure, print};
+use super::{Failure, print, refuse_another_worm};
 use clap::Args;
 use std::path::PathBuf;
 use worm_estimator::config::Config;
-use worm_estimator::estimate::EstimatorError;
-use worm_log::{Comparison, Log, compare, messages, replay};
+use worm_log::{Comparison, compare, messages, replay};
 
 /// Arguments of `wormd replay`.
 #[derive(Debug, Args)]
@@ -38,7 +37,8 @@ pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
         Some(file) => Config::load(file)?,
         None => log.config()?,
     };
-    let replayed = replay(&log, &config).map_err(|error| refused(args, &log, error))?;
+    refuse_another_worm(&log, &args.log, &config, args.config.as_deref())?;
+    let replayed = replay(&log, &config).map_err(Failure::unusable)?;
     let comparison = compare(&log, &replayed);
     if args.json {
         print::line(serde_json::to_string(&comparison).map_err(Failure::failed)?)?;
@@ -51,24 +51,6 @@ pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
         ));
     }
     Ok(())
-}
-
-/// Where another worm than the configured one made the log, `worm.cells` of the log cannot be corrected, but another configuration given.
-fn refused(args: &ReplayArgs, log: &Log, error: EstimatorError) -> Failure {
-    let EstimatorError::CellCount { states, configured } = error else {
-        return Failure::unusable(error);
-    };
-    let (which, file) = match &args.config {
-        Some(file) => ("this configuration", file.display()),
-        None if log.config.is_some() => ("its configuration", args.log.display()),
-        None => (
-            "the worm of the paper, assumed because the log has no configuration,",
-            args.log.display(),
-        ),
-    };
-    Failure::unusable(format!(
-        "{file}: the recorded worm has {states} cells, and {which} has {configured}: give the configuration that it ran with by --config"
-    ))
 }
 
 fn in_words(comparison: &Comparison) -> String {

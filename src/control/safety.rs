@@ -9,6 +9,7 @@ use crate::link::ServoReading;
 use worm_estimator::config::{Config, Limits};
 use worm_estimator::message::Fault;
 use worm_estimator::time::seconds;
+use worm_estimator::winding::{Reported, Winding};
 
 /// How much faster the time above the current limit is forgotten than it is counted: a motor that is above it for more than four
 /// fifths of the time is stopped, and one that is below it in single readings is not excused.
@@ -21,6 +22,7 @@ const VOLTAGE_AVERAGING_S: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub(super) struct Safety {
     limits: Limits,
+    winding: Winding,
     link_timeout_ns: u64,
     /// None where the worm may crawl without positions.
     tracker_timeout_ns: Option<u64>,
@@ -53,6 +55,7 @@ impl Safety {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             limits: config.limits.clone(),
+            winding: config.winding(),
             link_timeout_ns: seconds_to_ns(config.control.link_timeout_s),
             tracker_timeout_ns: (!config.position_source().may_be_missing())
                 .then(|| seconds_to_ns(config.control.tracker_timeout_s)),
@@ -124,7 +127,14 @@ impl Safety {
         }
         let read_ns = self.current_read_ns.replace(inputs.now_ns).unwrap_or(inputs.now_ns);
         let elapsed_s = seconds(inputs.now_ns.saturating_sub(read_ns));
-        if servo.current_a.abs() <= self.limits.current_a {
+        let current_a = self.winding.current_a(&Reported {
+            current_a: servo.current_a,
+            bus_voltage_v: servo.voltage_v,
+            duty: servo.duty,
+            velocity_rad_per_s: servo.velocity_rad_s,
+            temperature_c: servo.temperature_c,
+        });
+        if current_a.abs() <= self.limits.current_a {
             self.over_current_s = (self.over_current_s - CURRENT_FORGETTING * elapsed_s).max(0.0);
             return None;
         }

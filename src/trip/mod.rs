@@ -208,6 +208,7 @@ impl Traveller {
         }
         if now || is_change || self.told_at.elapsed() >= REPORT {
             self.publisher.publish(&status).map_err(Failure::failed)?;
+            self.guide.note_published();
             (self.told, self.told_at) = (Some(status), Instant::now());
         }
         Ok(status)

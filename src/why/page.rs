@@ -11,6 +11,7 @@ use worm_analysis::report::plot::{
 use worm_analysis::report::{ReportError, file};
 use worm_estimator::config::Config;
 use worm_estimator::message::{State, Timing};
+use worm_estimator::winding::Reported;
 use worm_log::Log;
 
 /// What the pictures show before the stop and after it, s.
@@ -174,7 +175,8 @@ fn worm_figure(window: &Window<'_>, config: &Config) -> Result<Figure, DrawError
 
 fn motor_figure(window: &Window<'_>, explanation: &Explanation, config: &Config) -> Result<Figure, DrawError> {
     let limit_a = config.limits.current_a;
-    let current = window.of_states(|state| state.motor_current_a);
+    let winding = config.winding();
+    let current = window.of_states(|state| winding.current_a(&Reported::from(state)));
     let measured = window.of_states(|state| state.motor_velocity_rad_s);
     let commanded = window.of_states(|state| state.goal_velocity_rad_s);
     let voltage = window.of_states(|state| state.bus_voltage_v);

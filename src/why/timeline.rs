@@ -7,6 +7,7 @@ use worm_estimator::message::{
     Alarm, AlarmKind, CommandKind, CommandOutcome, CommandRecord, Fault, HoldReason, Mode, Severity, State,
 };
 use worm_estimator::number::significant;
+use worm_estimator::winding::Reported;
 use worm_log::Log;
 
 /// Failed exchanges less than this apart are one event, ns.
@@ -275,7 +276,8 @@ fn silences_of_tracker(states: &[State], rate_hz: f64) -> Vec<Moment> {
 /// Readings beyond the configured limits, from when to how far.
 fn limits(states: &[State], config: &Config) -> Vec<Moment> {
     let limits = &config.limits;
-    let current = |state: &State| state.motor_current_a.abs() - limits.current_a;
+    let winding = config.winding();
+    let current = |state: &State| winding.current_a(&Reported::from(state)).abs() - limits.current_a;
     let heat = |state: &State| state.motor_temperature_c - limits.temperature_c;
     let voltage = |state: &State| limits.voltage_v - state.bus_voltage_v;
     let mut moments = beyond(states, current, |by| {

@@ -73,3 +73,33 @@ fn a_lifted_worm_gives_the_friction_of_its_gears_into_a_configuration_and_holds(
     up.signal(Signal::SIGINT);
     up.ends_within(PATIENCE);
 }
+
+#[test]
+fn a_worm_in_its_canal_is_not_calibrated_as_a_lifted_one() {
+    let worm = Worm::on_a_steady_computer("not-lifted");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("calibrated.toml");
+    let out = path.to_string_lossy().into_owned();
+    let config = worm.config("[gait]\ncycle_s = 1.25\n[canal]\nslope_deg = 15\n");
+    let up = worm.wormd(&["up", "--config", &config]).start_silent();
+    wait_for("a worm that crawls", PATIENCE, || {
+        worm.state().is_some_and(|state| state.mode == Mode::Crawling.code())
+    });
+    let calibrate = ["calibrate", "--lifted", "--config", &config, "--out", &out];
+    let output = worm.wormd(&calibrate).output();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{error}");
+    for part in [
+        "is not lifted: the torque rises by",
+        "in the step of each cell",
+        "give --level",
+        "nothing was written",
+    ] {
+        assert!(error.contains(part), "{error}");
+    }
+    assert!(!path.exists());
+    let state = worm.state().expect("it runs");
+    assert_eq!(state.mode, Mode::Holding.code());
+    up.signal(Signal::SIGINT);
+    up.ends_within(PATIENCE);
+}

@@ -72,6 +72,28 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
     // Three cycles; twice that where the computer was busy in one of them.
     assert!((0.0..7.5).contains(&(raised_s - WET_FROM_S)), "{lost}");
 
+    // Its positions are there, and are not looked at.
+    let analyze = ["analyze", &file, "--slope", "0", "--current=alone", "--json"];
+    let by_current = json(&worm.wormd(&analyze).output());
+    assert_eq!(by_current["evidence"], "current", "{by_current}");
+    assert!(
+        by_current["cycles"].as_array().map(Vec::len) >= Some(15),
+        "{by_current}"
+    );
+    // A configuration of another worm.
+    let three = folder.path().join("three.toml");
+    std::fs::write(&three, "[worm]\ncells = 3\nstep_order = [1, 2, 3]\n").expect("it can be written");
+    let three = three.to_string_lossy().into_owned();
+    for command in ["infer", "replay"] {
+        let refused = worm.wormd(&[command, &file, "--config", &three]).output();
+        let error = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(2), "{command}: {error}");
+        assert!(
+            error.contains("the recorded worm has 4 cells, and this configuration has 3"),
+            "{command}: {error}"
+        );
+    }
+
     let replay = json(&worm.replay(&file));
     for what in ["estimates", "alarms", "inferred"] {
         assert_eq!(

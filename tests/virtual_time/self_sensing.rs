@@ -1,9 +1,10 @@
 //! Self-sensing on the virtual worm: through the servo's registers and the controller, with tips and a slope that it is not told.
 
-use super::harness::{config, crawling, wired};
+use super::harness::{Obeying, config, crawling, session, wired};
 use worm_estimator::config::Config;
 use worm_estimator::estimate::{Inference, Observer};
 use worm_estimator::message::{AlarmKind, CommandKind, CommandRecord, FieldAccess, Inferred, JsonMessage, State};
+use worm_estimator::self_sensing::calibration::{LiftedTurns, lifted, touches};
 use worm_estimator::self_sensing::{MotorSample, SelfSensed, SelfSensing};
 use worm_physics::Worm;
 use wormd::link::virtual_worm::{Options, PlantLedger};
@@ -308,5 +309,110 @@ fn lost_friction_raises_its_alarm() {
         );
         assert!(cycles < 3.2);
         assert_eq!(alarm.cell + 1, cell);
+    }
+}
+
+/// A servo that reports the duty of its bridge as its current, and an estimator that is told so: what the motor takes is what it takes, in
+/// self-sensing and in the account of every cycle.
+#[test]
+fn a_servo_that_reports_its_duty_takes_as_much_energy_as_it_does() {
+    let config = config(
+        "worm.cells = 5\nworm.step_order = [1, 2, 3, 4, 5]\ngait.cycle_s = 2.0\ncanal.slope_deg = 20.0\n\
+         virtual_worm.present_current = \"duty\"\nself_sensing.current = \"duty\"\n",
+    );
+    let worm = Worm::try_from(&config).expect("a worm of five cells");
+    let mut sensing = SelfSensing::new(&worm, &config.self_sensing());
+    let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
+    session.cycles = Some(Vec::new());
+    session.run_s(6.5 * config.gait.cycle_s, |tick| {
+        if tick.state.motor_is_new == 1 {
+            sensing.update(&MotorSample::from(&tick.state));
+        }
+    });
+    let truth = session.machine.plant().ledger().cycles().back().expect("cycles");
+    let cycle = session.cycles.iter().flatten().last().expect("cycles");
+    let sensed = sensing.sensed().expect("cycles were fitted");
+    for (what, joules, sigma_j, truth_j) in [
+        (
+            "electrical",
+            cycle.energy_electrical_j,
+            cycle.energy_electrical_sigma_j,
+            truth.electrical_j,
+        ),
+        (
+            "inferred electrical",
+            sensed.electrical_j,
+            sensed.electrical_sigma_j,
+            truth.electrical_j,
+        ),
+        ("copper", cycle.energy_copper_j, 0.1 * truth.copper_j, truth.copper_j),
+    ] {
+        println!("{what}: {joules:.4} ± {sigma_j:.4} J of {truth_j:.4}");
+        assert!(
+            (joules - truth_j).abs() < 2.0 * sigma_j && sigma_j < 0.12 * truth_j,
+            "{what}: {joules} ± {sigma_j} of {truth_j} J"
+        );
+    }
+}
+
+/// The turns of `wormd calibrate --lifted` on a worm that is like this, as the estimator knows a worm of the paper.
+fn lifted_turns(toml: &str, seed: u64) -> Vec<LiftedTurns> {
+    let config = config(&format!("gait.cycle_s = 1.25\n[virtual_worm]\nseed = {seed}\n{toml}"));
+    let gear = Config::default().self_sensing().gear;
+    let mut session = session(&config, wired(&config, &Options::default()), 1000.0);
+    session.begin();
+    let speeds = [0.25, 0.5, 1.0].map(|speed| [speed / 1.25, -speed / 1.25]);
+    let turns = speeds.concat().into_iter().map(|cycles_per_s| {
+        session.command(CommandKind::Crawl, cycles_per_s);
+        let mut samples = Vec::new();
+        session.run_s(1.4 / cycles_per_s.abs() + 1.0, |tick| {
+            if tick.state.motor_is_new == 1 && tick.state.motor_velocity_rad_s * cycles_per_s > 0.0 {
+                samples.push(MotorSample::from(&tick.state));
+            }
+        });
+        lifted(&samples, &gear, 4).expect("a whole turn")
+    });
+    turns.collect()
+}
+
+/// `wormd calibrate --lifted` on a worm that lies in its canal gives the tips' friction as the gears'. That is seen, whatever the slope; gears
+/// with a ripple, and gears that are worn, are not taken for tips.
+#[test]
+fn a_worm_that_lies_in_its_canal_is_not_taken_for_a_lifted_one() {
+    const LIFTED: &str = "max_deformation_m = 0.00001\n";
+    let ripple = |waves: u32, phase: f64| {
+        format!(
+            "{LIFTED}[[virtual_worm.servo_effect]]\nname = \"gear-ripple\"\namplitude_n_m = 0.001\nwaves_per_turn = {waves}\nphase = {phase}\n"
+        )
+    };
+    let mut table = vec![
+        ("lifted".to_owned(), LIFTED.to_owned(), false),
+        (
+            "worn gears".to_owned(),
+            format!("{LIFTED}inner_friction_n_m = 0.03\n"),
+            false,
+        ),
+        (
+            "new gears".to_owned(),
+            format!("{LIFTED}inner_friction_n_m = 0.003\n"),
+            false,
+        ),
+        ("level".to_owned(), String::new(), true),
+        ("level, soft".to_owned(), "max_deformation_m = 0.001\n".to_owned(), true),
+        ("15°".to_owned(), "[canal]\nslope_deg = 15.0\n".to_owned(), true),
+        ("−15°".to_owned(), "[canal]\nslope_deg = -15.0\n".to_owned(), true),
+    ];
+    // With the step of a cell a ripple returns with four waves, and with eight.
+    for (waves, phase) in [(4, 0.0), (4, 0.25), (4, 0.5), (4, 0.75), (7, 0.4), (8, 0.25)] {
+        table.push((format!("ripple, {waves} waves at {phase}"), ripple(waves, phase), false));
+    }
+    let told = Config::default();
+    let worm = Worm::try_from(&told).expect("the worm of the paper");
+    for (seed, (name, toml, lies)) in (1..).zip(table) {
+        let turns = lifted_turns(&toml, seed);
+        let touching = touches(&turns, &worm, &told.self_sensing().gear);
+        let rises: Vec<f64> = turns.iter().map(|turns| 1e3 * turns.step_rise_n_m).collect();
+        println!("{name}: rises {rises:.2?} mN m, {touching:?}");
+        assert_eq!(touching.is_some(), lies, "{name}");
     }
 }

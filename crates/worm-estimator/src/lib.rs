@@ -20,5 +20,6 @@ pub mod message;
 pub mod number;
 pub mod self_sensing;
 pub mod time;
+pub mod winding;
 
 pub use worm_physics::MAX_CELLS;

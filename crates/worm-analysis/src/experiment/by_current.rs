@@ -10,7 +10,7 @@ use crate::recording::{Motor, Recording};
 use serde::Serialize;
 use worm_estimator::config::Config;
 use worm_estimator::self_sensing::{
-    BINS_PER_STEP, CycleFigures, MotorSample, SelfSensed, SelfSensing, SelfSensingConfig, Standing,
+    BINS_PER_STEP, CurrentSource, CycleFigures, MotorSample, SelfSensed, SelfSensing, SelfSensingConfig, Standing,
 };
 use worm_physics::{Physics, Worm};
 
@@ -191,7 +191,7 @@ fn analyze_one(run: &RecordedRun<'_>, base: &Worm, config: &Config) -> Result<An
         theory: NominalTheory {
             nominal: theory(&Physics::of(nominal).with(&effects), pace.cycle_s),
         },
-        warnings: warnings(recording, sensed, &cycles),
+        warnings: warnings(recording, known.gear.source, sensed, &cycles),
         torque_profile: TorqueProfile::of(&sensing),
         cycles,
     })
@@ -324,13 +324,25 @@ impl Pace {
     }
 }
 
-fn warnings(recording: &Recording, sensed: &SelfSensed, cycles: &[CycleByCurrent]) -> Vec<String> {
+fn warnings(
+    recording: &Recording,
+    source: CurrentSource,
+    sensed: &SelfSensed,
+    cycles: &[CycleByCurrent],
+) -> Vec<String> {
     let mut warnings = recording.warnings.clone();
     warnings.push(
-        "nobody saw this worm: its advance, slides and losses are the model's for the worm that explains the motor's torque best, and what the \
+        "no positions are in this: advance, slides and losses are the model's for the worm that explains the motor's torque best, and what the \
          model does not know is not in their errors"
             .to_owned(),
     );
+    if source == CurrentSource::Duty {
+        warnings.push(
+            "the servo reports the duty of its bridge as its current: torque and electrical energy follow from voltage, duty, velocity and the \
+             winding's resistance, and are as uncertain as servo.winding_resistance_ohm and servo.torque_constant_n_m_per_a"
+                .to_owned(),
+        );
+    }
     if cycles.len() < FEW_CYCLES {
         warnings.push(format!(
             "{} cycles after the first are few: the errors may be too small; record for longer",

@@ -7,6 +7,9 @@ use worm_log::ReadError;
 /// Times computed from frame numbers differ by rounding; a gap that exceeds the limit by less than this is within it, s.
 const TIME_ROUNDING_S: f64 = 1e-9;
 
+/// Time of a step of the paper's worm, s.
+const USUAL_STEP_S: f64 = 0.625;
+
 impl Recording {
     /// Positions with their gaps bridged by straight lines, `[cell][sample]`, m. What lies before a cell was first seen or
     /// after it was last seen stays `NaN`. The recording itself stays as it was measured.
@@ -34,6 +37,35 @@ impl Recording {
         Ok(())
     }
 
+    /// What to do about a gap. To bridge one over more than a step of the gait would invent the step, so that is not proposed.
+    pub(super) fn remedy_of_gap(&self, from_s: f64, to_s: f64, at_edge: bool) -> String {
+        let cut = if at_edge { "cut it off" } else { "leave it out" };
+        if !self.is_longer_than_a_step(from_s, to_s) {
+            let proposed_s = round_up(to_s - from_s);
+            return format!("give --max-gap {proposed_s:.1} to accept it, or {cut} with --from or --to");
+        }
+        let by_current = match (&self.motor, &self.gait_phase) {
+            (Some(_), Some(_)) => {
+                "; by the motor's current, `wormd analyze` and `wormd explain` take it whole with --current=alone"
+            }
+            _ => "",
+        };
+        format!("{cut} with --from or --to: it is longer than a step of the gait{by_current}")
+    }
+
+    /// Whether more than a step of the gait is made between two times: by the phase, or where that is not known by the usual time of a step.
+    fn is_longer_than_a_step(&self, from_s: f64, to_s: f64) -> bool {
+        let phase_at = |time_s: f64| {
+            let phase = self.gait_phase.as_ref()?;
+            let sample = self.time_s.partition_point(|&at_s| at_s < time_s);
+            phase.get(sample).copied().filter(|phase| phase.is_finite())
+        };
+        match (phase_at(from_s), phase_at(to_s)) {
+            (Some(from), Some(to)) => (to - from).abs() * self.cells() as f64 > 1.0,
+            _ => is_longer(to_s - from_s, USUAL_STEP_S),
+        }
+    }
+
     fn gap(&self, run: &Range<usize>) -> Gap {
         Gap {
             from_s: self.time_s[run.start.saturating_sub(1)],
@@ -55,17 +87,13 @@ impl Gap {
     fn refusal(&self, recording: &Recording, cell: usize, max_gap_s: f64) -> ReadError {
         let Self { from_s, to_s, at_edge } = self;
         let length_s = to_s - from_s;
-        let cut = if *at_edge { "cut it off" } else { "leave it out" };
         ReadError::whole(
             &recording.source,
             format!(
                 "{} is not seen from {from_s:.3} s to {to_s:.3} s, for {length_s:.3} s, and {max_gap_s} s may be bridged",
                 recording.name_of(cell)
             ),
-            format!(
-                "give --max-gap {:.1} to accept it, or {cut} with --from or --to",
-                round_up(length_s)
-            ),
+            recording.remedy_of_gap(*from_s, *to_s, *at_edge),
         )
     }
 }

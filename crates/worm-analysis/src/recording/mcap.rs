@@ -13,6 +13,7 @@ use std::io::{Read, Seek};
 use std::path::Path;
 use worm_estimator::estimate::{Capture, MotorTime};
 use worm_estimator::message::State;
+use worm_estimator::number::count;
 use worm_log::{Channel, Contents, ReadError, nothing, scan_from};
 
 /// Reads a log's states as a recording: one sample for each new sample of the tracker.
@@ -283,6 +284,22 @@ impl ControllerRun {
         }
     }
 
+    /// What is to be known of a worm that crawled on after its tracker had fallen silent.
+    fn unseen_note(&self) -> Option<String> {
+        let last = self.samples.last()?;
+        let turned = |pair: &[(f64, f64)]| (pair[1].1 - pair[0].1).abs();
+        let after = self.phases.partition_point(|(time_s, _)| *time_s < last.captured_s);
+        let cycles: f64 = self.phases[after..].windows(2).map(turned).sum();
+        (cycles >= 1.0).then(|| {
+            format!(
+                "the tracker gave its last sample at {:.1} s, and nobody saw the {} after it: `wormd infer` and `wormd analyze \
+                 --current=alone` have them by the motor's current",
+                last.time_s,
+                count(cycles.floor() as usize, "gait cycle")
+            )
+        })
+    }
+
     fn into_recording(mut self, path: &Path, mut warnings: Vec<String>) -> Recording {
         if self.without_time > 0 {
             let count = self.without_time;
@@ -307,6 +324,7 @@ impl ControllerRun {
         if missed > 0 {
             warnings.push(format!("the controller missed {missed} samples of the tracker"));
         }
+        warnings.extend(self.unseen_note());
         let has_motor = self.samples.iter().any(|sample| sample.state.motor_is_new == 1);
         let of_each = |value: fn(&State) -> f64| self.samples.iter().map(|sample| value(&sample.state)).collect();
         let seen = |cell: usize| {

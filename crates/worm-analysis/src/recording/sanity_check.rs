@@ -1,6 +1,6 @@
 //! What every recording must satisfy, whatever its format.
 
-use super::gaps::{bridge, is_longer, round_up, unseen_runs};
+use super::gaps::{bridge, is_longer, unseen_runs};
 use super::options::{OpenOptions, Wanted};
 use super::projection::MAX_POSITION_M;
 use super::repair::repair;
@@ -134,10 +134,7 @@ fn check_time(recording: &Recording, max_gap_s: f64) -> Result<(), ReadError> {
                 "there is no sample from {:.3} s to {:.3} s, while one comes every {period_s:.4} s otherwise",
                 pair[0], pair[1]
             ),
-            format!(
-                "give --max-gap {:.1} to accept it, or leave it out with --from or --to",
-                round_up(pair[1] - pair[0])
-            ),
+            recording.remedy_of_gap(pair[0], pair[1], false),
         )),
     }
 }

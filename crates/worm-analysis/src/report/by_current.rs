@@ -98,7 +98,7 @@ fn lead(runs: &[AnalysisByCurrent]) -> String {
         Some(format!("{cycles} of {} s", fixed(run.cycle_s, 2)))
     });
     format!(
-        "{} of a worm of {} cells that nobody saw: {}. From the current of its motor alone: friction and stiffness of each cell, and by the exact \
+        "{} of a worm of {} cells, whose positions nobody saw or looked at: {}. From the current of its motor alone: friction and stiffness of each cell, and by the exact \
          model how far the worm gets with them and what a cycle of the gait costs.",
         count(runs.len(), "recording"),
         runs.first().map_or(0, |run| run.cells),

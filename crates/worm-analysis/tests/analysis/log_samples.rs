@@ -245,3 +245,33 @@ fn a_recording_written_is_read_back() {
         }
     }
 }
+
+/// The tracker is silent from a time on, until another; a step of the gait takes half a second.
+#[test]
+fn what_a_tracker_that_died_did_not_see_is_told_and_not_proposed_to_be_bridged() {
+    let opened = |from_s: f64, to_s: f64| {
+        let (_, mut states) = states(8.3);
+        let mut last = (0, f64::NAN);
+        for (tick, state) in states.iter_mut().enumerate() {
+            let time_s = tick as f64 / 200.0;
+            if time_s < from_s {
+                last = (state.sample, state.sample_time_s);
+            } else if time_s < to_s {
+                (state.sample, state.sample_time_s) = last;
+                state.sample_is_new = 0;
+            }
+        }
+        in_a_log(states, |path| open(path, &OpenOptions::default()))
+    };
+    let died = opened(3.0, 9.0).expect("a recording").warnings;
+    let note = "nobody saw the 2 gait cycles after it: `wormd infer` and `wormd analyze --current=alone` have them";
+    assert!(died.iter().any(|warning| warning.contains(note)), "{died:?}");
+    let at_the_end = opened(8.0, 9.0).expect("a recording").warnings;
+    assert!(at_the_end.is_empty(), "{at_the_end:?}");
+    for (to_s, proposes_to_bridge) in [(3.4, true), (3.7, false), (6.0, false)] {
+        let refused = opened(3.0, to_s).expect_err("a gap").to_string();
+        assert_eq!(refused.contains("give --max-gap"), proposes_to_bridge, "{refused}");
+        assert_eq!(refused.contains("--current=alone"), !proposes_to_bridge, "{refused}");
+        assert!(refused.contains("leave it out with --from or --to"), "{refused}");
+    }
+}

@@ -4,7 +4,9 @@ use super::Config;
 use super::check::Checker;
 use crate::self_sensing::gear::MAX_RIPPLES;
 use crate::self_sensing::{CurrentSource, GearModel, PitchSensor, Ripple, SelfSensingConfig};
+use crate::winding::Winding;
 use serde::{Deserialize, Serialize};
+use toml::value::Datetime;
 use worm_physics::servo::identified::{XL330_EFFECTS, XL330_IDENTIFIED};
 
 /// What the servo reports as its current.
@@ -79,7 +81,7 @@ pub struct SelfSensing {
     pub enabled: bool,
     /// What the servo reports as its current.
     pub current: ReportedCurrent,
-    /// Standard deviation of `servo.torque_constant_n_m_per_a`, as a share.
+    /// Standard deviation of `servo.torque_constant_n_m_per_a`, as a share; where the duty is reported that of the resistance, too.
     pub torque_constant_sigma_share: f64,
     /// Inertia of rotor and cam, at the cam, kg m².
     pub inertia_kg_m2: f64,
@@ -180,6 +182,12 @@ impl SelfSensing {
             checker.range(&format!("self_sensing.{key}"), value, range, unit);
         }
         if let Some(calibrated) = &self.calibrated {
+            checker.require(
+                is_moment(&calibrated.date),
+                "self_sensing.calibrated.date",
+                format!("{:?}", calibrated.date),
+                "must be a date with time and zone, as `wormd calibrate` writes it: \"2026-11-25T11:15:05Z\"",
+            );
             for (key, value, range, unit) in [
                 ("temperature_c", calibrated.temperature_c, -40.0..=120.0, "degrees C"),
                 ("supply_v", calibrated.supply_v, 0.0..=60.0, "V"),
@@ -208,6 +216,12 @@ impl SelfSensing {
     }
 }
 
+/// Whether a text is a moment by RFC 3339: a day of the calendar, a time, and a zone.
+fn is_moment(text: &str) -> bool {
+    text.parse::<Datetime>()
+        .is_ok_and(|moment| moment.date.is_some() && moment.time.is_some() && moment.offset.is_some())
+}
+
 /// Evaluations of the model in a gait cycle that leave the search everywhere some room.
 const EVALUATIONS_PER_CYCLE: f64 = 2_500.0;
 
@@ -216,6 +230,11 @@ impl Config {
     fn evaluations_per_tick(&self) -> u32 {
         let ticks_per_cycle = self.control.rate_hz * self.gait.cycle_s;
         (EVALUATIONS_PER_CYCLE / ticks_per_cycle).ceil().clamp(1.0, 100.0) as u32
+    }
+
+    /// The motor's winding, and what the servo reports of it: the one answer to what its current is.
+    pub fn winding(&self) -> Winding {
+        self.self_sensing().gear.winding()
     }
 
     /// What self-sensing is told of this worm.
@@ -260,6 +279,38 @@ impl Config {
             memory_cycles: known.memory_cycles,
             evaluations_per_reading: self.evaluations_per_tick(),
             ..SelfSensingConfig::new(gear)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_date_of_a_calibration_is_a_moment() {
+        let table = [
+            ("2026-11-25T11:15:05Z", true),
+            ("2028-02-29T23:59:59.5+01:00", true),
+            ("2026-11-25T11:15:05", false),
+            ("2026-11-25", false),
+            ("11:15:05", false),
+            ("2026-02-30T11:15:05Z", false),
+            ("2026-13-01T11:15:05Z", false),
+            ("yesterday", false),
+            ("", false),
+        ];
+        for (date, is_valid) in table {
+            let toml = format!(
+                "[self_sensing.calibrated]\ndate = {date:?}\nmode = \"lifted\"\ntemperature_c = 31.0\nsupply_v = 5.0\nservo_model = 1200\n\
+                 servo_id = 1\ndry_friction_sigma_n_m = 0.0003\nviscous_friction_sigma_n_m_s_per_rad = 0.0002\n"
+            );
+            let error = Config::from_toml(&toml, "test".as_ref())
+                .err()
+                .map(|error| error.to_string());
+            let expected = format!("self_sensing.calibrated.date = {date:?}: must be a date with time and zone");
+            assert_eq!(error.is_none(), is_valid, "{date}: {error:?}");
+            assert!(error.is_none_or(|error| error.contains(&expected)), "{date}");
         }
     }
 }

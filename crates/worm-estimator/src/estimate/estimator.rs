@@ -101,7 +101,7 @@ impl Estimator {
             pace: Pace::new(config),
             host_paused_ns: 0,
             cycles: Cycles::new(config.gait.direction.sign() as i32),
-            electrical: Electrical::new(config.servo.winding_resistance_ohm),
+            electrical: Electrical::new(config.winding()),
             window: Window::new(cells),
             window_contact_m: [f64::NAN; MAX_CELLS],
             window_is_complete: false,

@@ -5,9 +5,17 @@
 //! the gears is taken as it is known; a lifted worm puts hardly any load on them.
 //!
 //! Every value scales with the torque constant, which no turn of the cam can tell.
+//!
+//! A worm that is said to be lifted, and lies in its canal, would give the friction of its tips as that of the gears. Its torque rises in the
+//! step of every cell, and what pulls at it helps one way: [`touches`] looks for both.
+
+mod touching;
+
+pub use touching::{Touching, direction_difference, touches};
 
 use super::gear::GearModel;
 use super::{MotorSample, SelfSensing, SelfSensingConfig};
+use crate::winding::Reported;
 use std::f64::consts::TAU;
 use worm_physics::Worm;
 
@@ -50,8 +58,17 @@ pub struct GearFriction {
     pub sigma_n_m: f64,
 }
 
-/// Friction in whole turns of a lifted worm at one velocity; none where there is no whole turn.
-pub fn lifted(samples: &[MotorSample], gear: &GearModel) -> Option<FrictionAt> {
+/// What whole turns at one velocity say of a worm that should be lifted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LiftedTurns {
+    /// The gears' friction, if it is lifted.
+    pub friction: FrictionAt,
+    /// By how much the torque rises in the step of a cell, in the mean of all steps, N m: by nothing, if it is lifted.
+    pub step_rise_n_m: f64,
+}
+
+/// Friction in whole turns of a lifted worm at one velocity; none where there is no whole turn. `cells` is its number of cells.
+pub fn lifted(samples: &[MotorSample], gear: &GearModel, cells: usize) -> Option<LiftedTurns> {
     let first = samples.first()?;
     let begin = first.phase;
     let mut blocks = Vec::new();
@@ -68,8 +85,11 @@ pub fn lifted(samples: &[MotorSample], gear: &GearModel) -> Option<FrictionAt> {
         if (since * BLOCKS_PER_TURN as f64) as usize > blocks.len() {
             blocks.push(std::mem::take(&mut block));
         }
-        block.add(turned, friction_n_m);
-        velocity.add(turned, to.velocity_rad_per_s);
+        // How far the cell that moves has come in its step, from its middle, in the direction of the crawl.
+        let middle = 0.5 * (to.phase + from.phase) * cells as f64;
+        let since_middle = (middle - middle.floor() - 0.5) * (to.phase - from.phase).signum();
+        block.add(turned, friction_n_m, since_middle);
+        velocity.add(turned, to.velocity_rad_per_s, 0.0);
     }
     // A ripple of the torque averages out over whole turns alone.
     blocks.truncate(blocks.len() / BLOCKS_PER_TURN * BLOCKS_PER_TURN);
@@ -83,10 +103,13 @@ pub fn lifted(samples: &[MotorSample], gear: &GearModel) -> Option<FrictionAt> {
     let friction_n_m = mean(turns.iter().copied());
     let apart = blocks.iter().map(|block| (block.mean() - friction_n_m).powi(2));
     let sigma_n_m = (apart.sum::<f64>() / (blocks.len() * (blocks.len() - 1)) as f64).sqrt();
-    Some(FrictionAt {
-        velocity_rad_per_s: velocity.mean(),
-        friction_n_m,
-        sigma_n_m: sigma_n_m.hypot(FLOOR_N_M),
+    Some(LiftedTurns {
+        friction: FrictionAt {
+            velocity_rad_per_s: velocity.mean(),
+            friction_n_m,
+            sigma_n_m: sigma_n_m.hypot(FLOOR_N_M),
+        },
+        step_rise_n_m: Block::rise(&blocks),
     })
 }
 
@@ -163,12 +186,7 @@ pub fn fit(points: &[FrictionAt], gear: &GearModel, sigma: [f64; 2], usual_rad_p
 
 /// Friction of the gears that drive nothing, without what their own load adds, N m.
 fn friction_n_m(sample: &MotorSample, gear: &GearModel) -> f64 {
-    let winding_a = gear.winding_current_a(
-        sample.current_a,
-        sample.bus_voltage_v * sample.duty,
-        sample.velocity_rad_per_s,
-        sample.temperature_c,
-    );
+    let winding_a = gear.winding_current_a(&Reported::from(sample));
     let motor_n_m = gear.torque_constant_n_m_per_a * winding_a * sample.velocity_rad_per_s.signum();
     motor_n_m - gear.load_friction_n_m(motor_n_m, 0.0)
 }
@@ -178,12 +196,25 @@ fn friction_n_m(sample: &MotorSample, gear: &GearModel) -> f64 {
 struct Block {
     turned: f64,
     sum: f64,
+    of_step: [f64; 3], // place in the step, its square, and place × value
 }
 
 impl Block {
-    fn add(&mut self, turned: f64, value: f64) {
+    fn add(&mut self, turned: f64, value: f64, place: f64) {
         self.turned += turned;
         self.sum += turned * value;
+        for (sum, term) in self.of_step.iter_mut().zip([place, place * place, place * value]) {
+            *sum += turned * term;
+        }
+    }
+
+    /// Slope of the straight line through all values over their places in a step: from its beginning to its end.
+    fn rise(blocks: &[Self]) -> f64 {
+        let total = |of: fn(&Self) -> f64| blocks.iter().map(of).sum::<f64>();
+        let turned = total(|block| block.turned);
+        let [place, square, product] =
+            [0, 1, 2].map(|at| blocks.iter().map(|block| block.of_step[at]).sum::<f64>() / turned);
+        (product - place * total(|block| block.sum) / turned) / (square - place * place)
     }
 
     fn mean(&self) -> f64 {
@@ -254,7 +285,10 @@ mod tests {
         assert_eq!(known.source, CurrentSource::Winding);
         let points: Vec<FrictionAt> = [0.6, 1.25, 2.5, -0.6, -1.25, -2.5]
             .into_iter()
-            .map(|velocity| lifted(&turns(&real, velocity, 2.3), &known).expect("two whole turns"))
+            .map(|velocity| {
+                let turns = lifted(&turns(&real, velocity, 2.3), &known, 4).expect("two whole turns");
+                turns.friction
+            })
             .collect();
         for point in &points {
             let truth = real.dry_n_m + real.viscous_n_m_s_per_rad * point.velocity_rad_per_s.abs();
@@ -273,11 +307,11 @@ mod tests {
     #[test]
     fn a_part_of_a_turn_says_nothing() {
         let [known, real] = gears();
-        assert_eq!(lifted(&turns(&real, 2.5, 1.2), &known), None);
-        assert_eq!(lifted(&[], &known), None);
+        assert_eq!(lifted(&turns(&real, 2.5, 1.2), &known, 4), None);
+        assert_eq!(lifted(&[], &known, 4), None);
         let mut unknown = turns(&real, 2.5, 2.3);
         unknown.iter_mut().for_each(|sample| sample.current_a = f64::NAN);
-        assert_eq!(lifted(&unknown, &known), None);
+        assert_eq!(lifted(&unknown, &known, 4), None);
     }
 
     /// With one velocity the sum is known, and the two keep what was known of them.

@@ -7,29 +7,17 @@
 //!
 //! The inertia's part is left to `profile`: averaged over a bin it is a difference of two velocities.
 
+pub use crate::winding::CurrentSource;
+use crate::winding::{Reported, Winding};
 use std::f64::consts::TAU;
 
 /// Most harmonics of the torque ripple.
 pub const MAX_RIPPLES: usize = 4;
-/// Resistance of copper grows by this fraction per kelvin …
-const COPPER_PER_K: f64 = 0.00393;
-/// … from the temperature at which the stated resistance holds, °C.
-const RESISTANCE_AT_C: f64 = 25.0;
 /// Iterations of the implicit balance: each leaves at most a fifth of the error, so the last is below a thousandth of the friction by
 /// load.
 const ITERATIONS: usize = 5;
 /// Newton's steps for its inverse: the law is nearly linear, so the third leaves only rounding.
 const NEWTON_STEPS: usize = 3;
-
-/// What the servo reports as its current.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CurrentSource {
-    /// The current in the winding.
-    Winding,
-    /// Nothing that is one: the duty of the bridge, as a real XL330 in position mode does. The current then follows from voltage, duty,
-    /// velocity and the resistance of the winding, and is as uncertain as that.
-    Duty,
-}
 
 /// A torque that returns with the angle of the servo.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -49,7 +37,7 @@ pub struct GearModel {
     pub source: CurrentSource,
     /// Torque per current, N m/A, and back EMF per velocity, V s/rad.
     pub torque_constant_n_m_per_a: f64,
-    /// Standard deviation of what is known of it, as a share.
+    /// Standard deviation of what is known of it, as a share; for [`CurrentSource::Duty`] that of the resistance, too.
     pub torque_constant_sigma: f64,
     /// Resistance of winding and bridge at 25 °C, Ω; used for [`CurrentSource::Duty`] alone.
     pub winding_resistance_ohm: f64,
@@ -99,20 +87,21 @@ impl GearModel {
         }
     }
 
-    /// Current in the winding, A, from one reading; `NaN` stays `NaN`.
-    pub fn winding_current_a(&self, current_a: f64, winding_v: f64, velocity_rad_per_s: f64, celsius: f64) -> f64 {
-        match self.source {
-            CurrentSource::Winding => current_a,
-            CurrentSource::Duty => {
-                let warmer_k = if celsius.is_finite() {
-                    celsius - RESISTANCE_AT_C
-                } else {
-                    0.0
-                };
-                let resistance_ohm = self.winding_resistance_ohm * (1.0 + COPPER_PER_K * warmer_k);
-                (winding_v - self.torque_constant_n_m_per_a * velocity_rad_per_s) / resistance_ohm
-            }
+    /// The motor's winding, and what is reported of it.
+    #[inline]
+    pub fn winding(&self) -> Winding {
+        Winding {
+            source: self.source,
+            torque_constant_n_m_per_a: self.torque_constant_n_m_per_a,
+            torque_constant_sigma: self.torque_constant_sigma,
+            resistance_ohm: self.winding_resistance_ohm,
         }
+    }
+
+    /// Current in the winding, A, from one reading; `NaN` where a value that it needs is.
+    #[inline]
+    pub fn winding_current_a(&self, reported: &Reported) -> f64 {
+        self.winding().current_a(reported)
     }
 
     /// Torque on the cam, N m, and on the gears, at a current in the winding; inertia is not subtracted.
@@ -198,16 +187,5 @@ mod tests {
             let left = motor - gear.ripple_n_m(1.0) - friction - cam;
             assert!(left.abs() < 2e-5, "{left} N m are left at {current_a} A");
         }
-    }
-
-    #[test]
-    fn a_duty_for_a_current_needs_the_warm_resistance() {
-        let gear = GearModel {
-            source: CurrentSource::Duty,
-            ..GearModel::plain(0.39, 3.4, 2e-4)
-        };
-        let current = |celsius| gear.winding_current_a(9.9, 1.5, 2.0, celsius);
-        assert!((current(25.0) - 0.72 / 3.4).abs() < 1e-12 && (current(f64::NAN) - 0.72 / 3.4).abs() < 1e-12);
-        assert!((current(45.0) * 1.0786 - 0.72 / 3.4).abs() < 1e-12);
     }
 }

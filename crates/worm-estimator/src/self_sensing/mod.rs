@@ -47,6 +47,7 @@ pub use sample::MotorSample;
 pub use sensed::{SelfSensed, Standing};
 pub use twins::{Blind, Twin, Unknown};
 
+use crate::winding::{MotorPower, Reported};
 use change::{ChangeDetector, ComparedCycle, Seen};
 use dead_reckoning::DeadReckoning;
 use fit::{CycleChange, Fit};
@@ -153,8 +154,8 @@ struct Reading {
 #[derive(Debug, Clone, Copy, Default)]
 struct Energy {
     electrical_j: f64,
-    by_voltage: f64,
-    by_current: f64,
+    by_voltage: f64, // J/V
+    by_current: f64, // J/A, had the current no error but its rounding
 }
 
 impl SelfSensing {
@@ -222,12 +223,7 @@ impl SelfSensing {
     }
 
     fn take(&mut self, sample: &MotorSample) {
-        let winding_a = self.gear.winding_current_a(
-            sample.current_a,
-            sample.bus_voltage_v * sample.duty,
-            sample.velocity_rad_per_s,
-            sample.temperature_c,
-        );
+        let winding_a = self.gear.winding_current_a(&Reported::from(sample));
         let torque_n_m = self
             .gear
             .cam_torque_n_m(winding_a, sample.velocity_rad_per_s, sample.angle_rad);
@@ -340,12 +336,13 @@ impl SelfSensing {
             self.whole = false;
             return;
         }
-        let mean = |of: fn(&MotorSample) -> f64| 0.5 * dt_s * (of(from) + of(to));
-        let electrical_j = mean(|sample| sample.bus_voltage_v * sample.duty * sample.current_a);
+        let powers = [from, to].map(|sample| self.gear.winding().power(&Reported::from(sample)));
+        let mean = |of: fn(&MotorPower) -> f64| 0.5 * dt_s * powers.iter().map(of).sum::<f64>();
+        let electrical_j = mean(|power| power.power_w);
         if electrical_j.is_finite() {
             self.energy.electrical_j += electrical_j;
-            self.energy.by_voltage += mean(|sample| sample.duty * sample.current_a);
-            self.energy.by_current += mean(|sample| (sample.bus_voltage_v * sample.duty).abs());
+            self.energy.by_voltage += mean(|power| power.by_voltage_a);
+            self.energy.by_current += mean(|power| power.current_sigma_w) / ROUNDING[1];
         }
     }
 

@@ -1,6 +1,7 @@
 //! A reading of the motor, as self-sensing needs it.
 
 use crate::message::State;
+use crate::winding::Reported;
 
 /// A reading of the motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +42,18 @@ impl From<&State> for MotorSample {
             temperature_c: state.motor_temperature_c,
             pitch_rad: state.pitch_rad,
             stamp_ns: state.time_ns,
+        }
+    }
+}
+
+impl From<&MotorSample> for Reported {
+    fn from(sample: &MotorSample) -> Self {
+        Self {
+            current_a: sample.current_a,
+            bus_voltage_v: sample.bus_voltage_v,
+            duty: sample.duty,
+            velocity_rad_per_s: sample.velocity_rad_per_s,
+            temperature_c: sample.temperature_c,
         }
     }
 }

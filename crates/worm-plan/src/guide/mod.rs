@@ -155,7 +155,7 @@ pub struct Guide {
     /// Advance of the newest cycles over the planned one.
     progress: VecDeque<f64>,
     started_ns: u64,
-    sequence: u64,
+    published: u64,
 }
 
 impl Guide {
@@ -213,7 +213,7 @@ impl Guide {
             hold_again_ns: (0.5e9 * config.control.idle_disarm_s) as u64,
             progress: VecDeque::new(),
             started_ns: now_ns,
-            sequence: 0,
+            published: 0,
             settings,
         })
     }

@@ -58,9 +58,13 @@ impl Guide {
         }
     }
 
-    /// How the trip stands.
-    pub fn status(&mut self, now_ns: u64) -> TripStatus {
-        self.sequence += 1;
+    /// A status was published: the next one is another message, and has the next number.
+    pub const fn note_published(&mut self) {
+        self.published += 1;
+    }
+
+    /// How the trip stands. It is looked at more often than it is published, so looking does not count.
+    pub fn status(&self, now_ns: u64) -> TripStatus {
         let place_m = self.place.m;
         let leg = self.itinerary.leg_at(place_m, self.heading);
         let [start_m, end_m] = self.itinerary.ends_of(leg);
@@ -86,7 +90,7 @@ impl Guide {
         let [home_low_s, home_high_s] = home_time.bounds_s();
         let [left_low_s, left_high_s] = left_time.bounds_s();
         TripStatus {
-            sequence: self.sequence,
+            sequence: self.published + 1,
             time_ns: now_ns,
             started_ns: self.started_ns,
             since_ns: self.why.since_ns,

@@ -457,3 +457,19 @@ fn a_mark_at_home_says_where_home_is_and_a_worm_that_is_seen_needs_none() {
     bench.mark(7.0, 1e-5);
     assert_eq!(bench.guide.place.m, place_m);
 }
+
+/// Whoever reads the topic counts the gaps in these numbers as lost messages.
+#[test]
+fn only_what_is_published_has_a_number_of_its_own() {
+    let mut bench = Bench::new(Trip::default(), true);
+    let numbers: Vec<u64> = (0..9)
+        .map(|look| {
+            let status = bench.guide.status(bench.now_ns);
+            if look % 3 == 2 {
+                bench.guide.note_published();
+            }
+            status.sequence
+        })
+        .collect();
+    assert_eq!(numbers, [1, 1, 1, 2, 2, 2, 3, 3, 3]);
+}

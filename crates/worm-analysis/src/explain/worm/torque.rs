@@ -7,6 +7,7 @@ use crate::recording::{Motor, Recording};
 use std::f64::consts::TAU;
 use std::ops::Range;
 use worm_estimator::self_sensing::GearModel;
+use worm_estimator::winding::Reported;
 
 /// Samples on either side over which the velocity is averaged: servos report it in coarse steps.
 const BESIDE: usize = 1;
@@ -69,13 +70,13 @@ impl MeasuredTorque {
 /// Torque that the cam takes at a sample, and that the inertia takes, N m.
 fn cam_torque_n_m(motor: &Motor, gear: &GearModel, sample: usize) -> f64 {
     let velocity = motor.velocity_rad_s[sample];
-    let winding_v = motor.voltage_v[sample] * motor.duty[sample];
-    let winding_a = gear.winding_current_a(
-        motor.current_a[sample],
-        winding_v,
-        velocity,
-        motor.temperature_c[sample],
-    );
+    let winding_a = gear.winding_current_a(&Reported {
+        current_a: motor.current_a[sample],
+        bus_voltage_v: motor.voltage_v[sample],
+        duty: motor.duty[sample],
+        velocity_rad_per_s: velocity,
+        temperature_c: motor.temperature_c[sample],
+    });
     gear.cam_torque_n_m(winding_a, velocity, motor.angle_rad[sample])
 }
 

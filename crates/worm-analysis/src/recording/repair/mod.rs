@@ -15,7 +15,7 @@ mod jumps;
 mod labels;
 pub(super) mod stamps;
 
-use super::gaps::{is_longer, round_up};
+use super::gaps::is_longer;
 use super::options::OpenOptions;
 use super::repair_note::{Repair, RepairKind};
 use super::series::Recording;
@@ -96,10 +96,7 @@ fn check_lengths_left_out(recording: &Recording, options: &OpenOptions) -> Resul
         Some(repair) => Err(ReadError::whole(
             &recording.source,
             format!("{repair}, and {} s may be bridged", options.max_gap_s),
-            format!(
-                "give --max-gap {:.1} to accept it, or leave it out with --from or --to",
-                round_up(bridged_s(repair))
-            ),
+            recording.remedy_of_gap(repair.from_s, repair.from_s + bridged_s(repair), false),
         )),
     }
 }

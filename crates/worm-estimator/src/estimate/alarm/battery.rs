@@ -1,6 +1,6 @@
 //! Battery low: the remaining charge is needed for the way home.
 //!
-//! **Charge.** Between corrections the charge falls by the energy drawn: the motor's power (duty × bus voltage × current), the hotel power,
+//! **Charge.** Between corrections the charge falls by the energy drawn: the motor's power (duty × bus voltage × winding current), the hotel power,
 //! and the loss in the battery's internal resistance. The open-circuit voltage, bus voltage + current × internal resistance, which
 //! the battery's curve turns into a charge, corrects it: at first with the weight of a mean over the time since the start, so a usable value is there
 //! after a second; later with a time constant of [`CORRECTION_S`], so that neither a start of the motor nor the 0.1 V steps of the
@@ -21,6 +21,7 @@ use super::sample::Positions;
 use crate::battery::OpenCircuit;
 use crate::config::{Battery, Config};
 use crate::message::{Cycle, Severity, State};
+use crate::winding::{Reported, Winding};
 
 /// Time constant of the correction by voltage once the charge is known, s.
 const CORRECTION_S: f64 = 600.0;
@@ -41,6 +42,7 @@ const LARGEST_RATIO: f64 = 1000.0;
 pub(super) struct BatteryLow {
     battery: Option<Battery>,
     curve: Option<OpenCircuit>,
+    winding: Winding,
     threshold: f64,
     stroke_m: f64,
     fraction: f64,
@@ -57,6 +59,7 @@ impl BatteryLow {
         Self {
             battery: config.battery.clone(),
             curve: config.battery.as_ref().map(OpenCircuit::new),
+            winding: config.winding(),
             threshold: config.alarms.battery_low.threshold,
             stroke_m: config.worm.stroke_m,
             fraction: f64::NAN,
@@ -108,7 +111,7 @@ impl BatteryLow {
         };
         let volts = state.bus_voltage_v;
         if volts.is_finite() && volts > 0.5 * battery.empty_v && volts < 2.0 * battery.full_v {
-            let motor_w = finite_or_zero(state.motor_duty * state.motor_current_a) * volts;
+            let motor_w = finite_or_zero(self.winding.power(&Reported::from(state)).power_w);
             let load_w = motor_w.clamp(0.0, 1e3) + battery.hotel_power_w;
             let amperes = load_w / volts;
             let drawn_w = load_w + amperes * amperes * battery.internal_resistance_ohm;

@@ -17,6 +17,7 @@ use super::cam_motion::{GOAL_UNIT_TURNS_PER_S, Tick, finite_or_zero};
 use super::latch::{DetectorOutput, Reading, ReadingState};
 use crate::config::Config;
 use crate::message::{Severity, State};
+use crate::winding::{Reported, Winding};
 
 /// Travel over which lag is forgotten, in thresholds.
 const MEMORY: f64 = 5.0;
@@ -45,6 +46,7 @@ const IMPLAUSIBLE_TURNS_PER_S: f64 = 50.0;
 #[derive(Debug, Clone)]
 pub(super) struct MotorStall {
     threshold_turns: f64,
+    winding: Winding,
     hard_work_a: f64,
     longest_gap_s: f64,
     reference: f64, // the speed that a healthy servo must have reached by now, turns/s
@@ -62,6 +64,7 @@ impl MotorStall {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             threshold_turns: config.alarms.motor_stall.threshold,
+            winding: config.winding(),
             hard_work_a: HARD_WORK_FRACTION * config.servo.current_limit_a,
             longest_gap_s: LONGEST_GAP_S.max(3.0 / config.control.rate_hz),
             reference: 0.0,
@@ -91,7 +94,7 @@ impl MotorStall {
             self.beyond = 0;
             return DetectorOutput::Idle;
         }
-        let works_hard = finite_or_zero(state.motor_current_a).abs() >= self.hard_work_a;
+        let works_hard = finite_or_zero(self.winding.current_a(&Reported::from(state))).abs() >= self.hard_work_a;
         let baseline = self.threshold_at(tick.goal_turns_per_s);
         let threshold = if tick.steady || works_hard {
             baseline

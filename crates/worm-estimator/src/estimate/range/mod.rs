@@ -20,6 +20,7 @@ use crate::battery::{ChargeEstimate, Spread};
 use crate::config::{Battery, Config, PhysicsError};
 use crate::message::{Cycle, Range, State};
 use crate::time::seconds;
+use crate::winding::{Reported, Winding};
 use running_mean::RunningMean;
 use std::f64::consts::TAU;
 use worm_physics::{DriveLoad, Motor};
@@ -53,6 +54,7 @@ pub const INTERVAL_SIGMAS: f64 = 1.645;
 pub struct RangeEstimator {
     battery: Battery,
     motor: Motor,
+    winding: Winding,
     lowest_bus_v: f64,
     may_lack_positions: bool,
     charge: ChargeEstimate,
@@ -101,6 +103,7 @@ impl RangeEstimator {
             may_lack_positions: config.position_source().may_be_missing(),
             battery,
             motor,
+            winding: config.winding(),
             window: Window::default(),
             load_a: 0.0,
             last_ns: None,
@@ -122,7 +125,7 @@ impl RangeEstimator {
         if step_s <= 0.0 || !bus_v.is_finite() || bus_v < 0.5 * battery.empty_v || bus_v > 2.0 * battery.full_v {
             return;
         }
-        let motor_w = state.motor_duty * state.motor_current_a * bus_v;
+        let motor_w = self.winding.power(&Reported::from(state)).power_w;
         let motor_w = if motor_w.is_finite() {
             motor_w.clamp(0.0, 1e3)
         } else {
