@@ -1,6 +1,6 @@
 //! `wormd why`: why a worm stopped, from a box or any other log.
 
-use super::black_box::{PlaceArgs, no_box};
+use super::black_box::PlaceArgs;
 #[cfg(feature = "analysis")]
 use super::progress::Progress;
 use super::{Failure, log_line, print};
@@ -84,7 +84,8 @@ pub fn run(args: &WhyArgs) -> Result<(), Failure> {
 fn stop_box(place: &PlaceArgs) -> Result<PathBuf, Failure> {
     let folder = place.folder()?;
     let found = newest_stop::newest_stop(&folder).map_err(Failure::unusable)?;
-    let found = found.ok_or_else(|| no_box(&folder))?;
+    let found = found.ok_or_else(|| place.no_box(&folder))?;
+    place.tell_what_is_missing(&folder);
     for later in &found.later {
         let reason = later.reason.as_deref().unwrap_or("its beginning is not known");
         log_line(format_args!(
