@@ -36,7 +36,7 @@ pub struct WhyArgs {
 /// Runs `wormd why`.
 ///
 /// # Errors
-/// [`Failure::Unusable`] for a log or configuration that cannot be used; [`Failure::Failed`] when a file cannot be written.
+/// [`Failure::Unusable`] for a log, configuration or folder that cannot be used; [`Failure::Failed`] when a file cannot be written.
 pub fn run(args: &WhyArgs) -> Result<(), Failure> {
     let path = match &args.log {
         Some(log) => log.clone(),
@@ -63,6 +63,10 @@ pub fn run(args: &WhyArgs) -> Result<(), Failure> {
             path.display(),
             explanation.stops
         )));
+    }
+    // Before the search, which takes its time.
+    if let Some(dir) = &args.out {
+        prepare(dir)?;
     }
     explain_last_cycles(args, &log, &config, &mut explanation);
     let written = args.out.as_deref().map(|dir| write(dir, &explanation, &log, &config));
@@ -122,6 +126,22 @@ fn explain_last_cycles(args: &WhyArgs, _log: &Log, _config: &Config, explanation
     explanation.last_cycles.why_not = Some(why_not.to_owned());
 }
 
+/// Makes the folder, if need be, and sees whether it can be written in.
+#[cfg(feature = "analysis")]
+fn prepare(dir: &Path) -> Result<(), Failure> {
+    worm_analysis::report::prepare(dir).map_err(Failure::unusable)
+}
+
+#[cfg(not(feature = "analysis"))]
+fn prepare(dir: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(dir).map_err(|error| {
+        Failure::unusable(format!(
+            "{}: the folder cannot be made: {error}: name another one with --out",
+            dir.display()
+        ))
+    })
+}
+
 #[cfg(feature = "analysis")]
 fn write(dir: &Path, explanation: &Explanation, log: &Log, config: &Config) -> Result<PathBuf, Failure> {
     crate::why::page::write(dir, explanation, log, config).map_err(Failure::failed)
@@ -130,7 +150,6 @@ fn write(dir: &Path, explanation: &Explanation, log: &Log, config: &Config) -> R
 #[cfg(not(feature = "analysis"))]
 fn write(dir: &Path, explanation: &Explanation, _log: &Log, _config: &Config) -> Result<PathBuf, Failure> {
     let failed = |error: std::io::Error| Failure::failed(format!("{}: cannot be written: {error}", dir.display()));
-    std::fs::create_dir_all(dir).map_err(failed)?;
     let path = dir.join("why.json");
     let text = serde_json::to_string_pretty(explanation).map_err(Failure::failed)?;
     std::fs::write(&path, text + "\n").map_err(failed)?;
