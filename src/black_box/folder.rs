@@ -132,7 +132,8 @@ impl Folder {
         &self.path
     }
 
-    /// Everything in it, the oldest first. A file that cannot be read is left out, with a warning in the log.
+    /// Everything in it, the oldest first. A file that cannot be read is left out, with a warning in the log; a box of which nothing could be
+    /// written yet is among the [`unwritten`](Self::unwritten).
     ///
     /// # Errors
     /// [`FolderError::Folder`] when the folder cannot be read.
@@ -153,12 +154,22 @@ impl Folder {
     fn entries(&self, files: &[Named]) -> Vec<Entry> {
         let entry = |named: &Named| match self.entry(named) {
             Ok(entry) => Some(entry),
+            Err(_) if named.is_part && named.kind == FileKind::Box => None,
             Err(error) => {
                 tracing::warn!("{}: cannot be read: {error}", named.path.display());
                 None
             }
         };
         files.iter().filter_map(entry).collect()
+    }
+
+    /// The names of the boxes under way of which nothing is in the file: what they hold waits in the memory of the black box, or is lost with it.
+    pub(crate) fn unwritten(&self) -> Vec<String> {
+        let files = self.files().unwrap_or_default();
+        let parts = files.iter().filter(|file| file.is_part && file.kind == FileKind::Box);
+        let unwritten = parts.filter(|file| self.entry(file).is_err());
+        let names = unwritten.filter_map(|file| Some(file.path.file_name()?.to_string_lossy().into_owned()));
+        names.collect()
     }
 
     /// The newest box that is complete, or else the newest there is.

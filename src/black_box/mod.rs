@@ -14,6 +14,7 @@
 //! - [`copy`]: copies that can be broken off at any byte.
 //! - [`keeper`]: messages in, files out.
 //! - [`run`]: the process around it; [`status`]: its reports.
+//! - [`standing`]: what its folder does not show, for whoever looks for a box.
 
 pub(crate) mod copy;
 mod events;
@@ -22,6 +23,7 @@ mod keeper;
 mod part_file;
 mod ring;
 mod run;
+pub(crate) mod standing;
 mod status;
 pub(crate) mod utc;
 

@@ -99,6 +99,22 @@ pub(crate) fn run(
     Ok(())
 }
 
+/// What other bridges serve of these worms now, in words: while they do, this one would not start.
+///
+/// # Errors
+/// [`Failure::Unusable`] for a worm that cannot be one of this computer.
+pub(crate) fn served_already(settings: &BridgeSettings) -> Result<Vec<String>, Failure> {
+    let mut remarks = Vec::new();
+    for (config, _) in &settings.worms {
+        let instance = Instance::of(config).map_err(Failure::unusable)?;
+        if let Some(pid) = RoleLock::<BridgeRole>::holder(&instance) {
+            let note = RoleLock::<BridgeRole>::note(&instance);
+            remarks.push(reasons::of_second_bridge(instance.worm(), pid, note.as_deref()));
+        }
+    }
+    Ok(remarks)
+}
+
 /// Takes the role of each worm's bridge: a second one would double what its relay serves, and two rules would say who may drive it.
 fn take_roles(worms: &[Served], listen: &str) -> Result<Vec<RoleLock<BridgeRole>>, Failure> {
     let mut instances: Vec<&Instance> = worms.iter().map(|worm| &worm.instance).collect();

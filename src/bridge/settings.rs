@@ -1,5 +1,6 @@
 //! `bridge.toml` and `fleet.toml`: read, checked, and refused with a reason when they leave anything open.
 
+use super::proof::{self, Side};
 use crate::failure::Failure;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -103,7 +104,7 @@ impl BridgeSettings {
     pub(crate) fn load(file: &Path) -> Result<Self, Failure> {
         let read: BridgeFile = read(file)?;
         let wrong = |text: String| Failure::unusable(format!("{}: {text}", file.display()));
-        let credentials = Credentials::load(file, read.certificate, read.key, read.authority)?;
+        let credentials = Credentials::load(file, read.certificate, read.key, read.authority, Side::Robot)?;
         if read.listen.is_empty() {
             return Err(wrong(
                 "listen is missing: name the addresses to listen at, as in listen = [\"tls/0.0.0.0:7447\"]".to_owned(),
@@ -196,7 +197,7 @@ impl FleetSettings {
     pub(crate) fn load(file: &Path) -> Result<Self, Failure> {
         let read: FleetFile = read(file)?;
         let wrong = |text: String| Failure::unusable(format!("{}: {text}", file.display()));
-        let credentials = Credentials::load(file, read.certificate, read.key, read.authority)?;
+        let credentials = Credentials::load(file, read.certificate, read.key, read.authority, Side::Laptop)?;
         if read.robots.is_empty() {
             return Err(wrong(
                 "no [[robots]]: name at least one, with name (that of its certificate) and connect (as in \"tls/robot1.local:7447\")"
@@ -226,6 +227,7 @@ impl Credentials {
         certificate: Option<PathBuf>,
         key: Option<PathBuf>,
         authority: Option<PathBuf>,
+        side: Side,
     ) -> Result<Self, Failure> {
         let wrong = |text: String| Failure::unusable(format!("{}: {text}", file.display()));
         let given = |what: &str, path: Option<PathBuf>| {
@@ -245,12 +247,14 @@ impl Credentials {
         check_name("the certificate's common name", &name).map_err(wrong)?;
         common_name(&authority).map_err(|why| wrong(format!("authority {}: {why}", authority.display())))?;
         check_key(&key).map_err(|why| wrong(format!("key {}: {why}", key.display())))?;
-        Ok(Self {
+        let credentials = Self {
             certificate,
             key,
             authority,
             name,
-        })
+        };
+        proof::check(&credentials, side).map_err(wrong)?;
+        Ok(credentials)
     }
 }
 
@@ -295,10 +299,18 @@ fn check_name(place: &str, name: &str) -> Result<(), String> {
     }
 }
 
+/// Why a file cannot be read, and what to do.
+fn unreadable(error: &std::io::Error) -> String {
+    format!(
+        "{error}: give its path, which counts from this file's folder, and let this user read it; docs/bridge.md says how to make it"
+    )
+}
+
 /// The common name of the first certificate in a file.
 fn common_name(file: &Path) -> Result<String, String> {
-    let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
-    let (_, pem) = x509_parser::pem::parse_x509_pem(&bytes).map_err(|_| "it has no certificate in PEM".to_owned())?;
+    let bytes = std::fs::read(file).map_err(|error| unreadable(&error))?;
+    let (_, pem) = x509_parser::pem::parse_x509_pem(&bytes)
+        .map_err(|_| "it has no certificate in PEM: name a .pem that `make-keys` made".to_owned())?;
     let (_, certificate) =
         X509Certificate::from_der(&pem.contents).map_err(|_| "it has no certificate that can be read".to_owned())?;
     let mut names = certificate.subject().iter_common_name();
@@ -309,10 +321,14 @@ fn common_name(file: &Path) -> Result<String, String> {
 
 /// A key that others can read proves nothing.
 fn check_key(file: &Path) -> Result<(), String> {
-    let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
-    let mode = file.metadata().map_err(|error| error.to_string())?.permissions().mode();
+    let bytes = std::fs::read(file).map_err(|error| unreadable(&error))?;
+    let mode = file
+        .metadata()
+        .map_err(|error| unreadable(&error))?
+        .permissions()
+        .mode();
     if !bytes.windows(11).any(|it| it == b"PRIVATE KEY") {
-        return Err("it has no private key in PEM".to_owned());
+        return Err("it has no private key in PEM: name the .key that `make-keys` made".to_owned());
     }
     if mode & 0o007 != 0 {
         return Err(format!(

@@ -3,6 +3,7 @@
 use super::archive::Archive;
 use super::redact::redacted;
 use crate::black_box::folder::{FileKind, Folder};
+use crate::black_box::standing::{Standing, remarks, why_no_box};
 use crate::preflight::{CheckReport, Trials};
 use crate::topics::{Controller, Hub, Instance, RoleLock};
 use crate::why::newest_stop::newest_stop;
@@ -36,6 +37,15 @@ pub(crate) struct Subject {
     pub config: Result<Config, String>,
     /// The folder of the black box.
     pub black_box: PathBuf,
+}
+
+impl Subject {
+    /// The configuration as far as it can be used, with the worm's name.
+    fn worm_config(&self) -> Config {
+        let mut config = self.config.clone().unwrap_or_default();
+        config.worm.name.clone_from(&self.worm);
+        config
+    }
 }
 
 /// Adds all parts.
@@ -130,8 +140,7 @@ fn check(subject: &Subject) -> Result<Vec<u8>, String> {
 
 /// The newest state of a running worm, and the alarms that stand.
 fn in_force(subject: &Subject) -> Result<Vec<u8>, String> {
-    let mut config = subject.config.clone().unwrap_or_default();
-    config.worm.name.clone_from(&subject.worm);
+    let config = subject.worm_config();
     let instance = Instance::of(&config).map_err(|error| error.to_string())?;
     if RoleLock::<Controller>::holder(&instance).is_none() {
         return Err(format!("no controller of {} runs for this user", subject.worm));
@@ -284,14 +293,21 @@ fn add_black_box(archive: &mut Archive, subject: &Subject) -> io::Result<()> {
         "black-box/list.json",
         serde_json::to_vec_pretty(&entries).map_err(|error| error.to_string()),
     )?;
+    let standing = Standing::ask(&subject.worm_config());
     match newest_stop(&folder).map_err(io::Error::other)? {
         Some(found) => {
             for entry in std::iter::once(&found.entry).chain(found.later.last()) {
                 archive.add_file(&format!("black-box/{}", entry.name), &folder.path().join(&entry.name))?;
             }
             archive.add("black-box/why.txt", why(&folder.path().join(&found.entry.name)))?;
+            let missing = remarks(&folder, standing.as_ref());
+            if !missing.is_empty() {
+                archive.add("black-box/newer", Err(missing.join("; ")))?;
+            }
         }
-        None => archive.add("black-box/box", Err("there is no box: nothing has happened".to_owned()))?,
+        None => {
+            archive.add("black-box/box", Err(why_no_box(&folder, standing.as_ref())))?;
+        }
     }
     let mut bytes = 0;
     let thin = entries.iter().rev().filter(|entry| entry.kind == FileKind::Thin);

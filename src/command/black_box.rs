@@ -1,8 +1,9 @@
 //! `wormd black-box`: the boxes of a worm: which there are, and copies of them over any link.
 
-use super::{Failure, WormArgs, print};
+use super::{Failure, WormArgs, log_line, print};
 use crate::black_box::copy::{Checksum, Source, checksum, copy};
 use crate::black_box::folder::{Entry, FileKind, Folder, open_from};
+use crate::black_box::standing::{Standing, remarks, why_no_box};
 use clap::{Args, Subcommand};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -114,17 +115,31 @@ impl PlaceArgs {
             return folder.find(name).map_err(Failure::unusable);
         }
         let newest = folder.newest_box().map_err(Failure::unusable)?;
-        let newest = newest.ok_or_else(|| no_box(&folder))?;
+        let newest = newest.ok_or_else(|| self.no_box(&folder))?;
         Ok(folder.path().join(newest.name))
     }
-}
 
-/// There is no box to speak of.
-pub(super) fn no_box(folder: &Folder) -> Failure {
-    Failure::unusable(format!(
-        "{}: there is no box yet: nothing has happened",
-        folder.path().display()
-    ))
+    /// There is no box to speak of, and why.
+    pub(super) fn no_box(&self, folder: &Folder) -> Failure {
+        Failure::unusable(self.why_no_box(folder))
+    }
+
+    fn why_no_box(&self, folder: &Folder) -> String {
+        let why = why_no_box(folder, self.standing().as_ref());
+        format!("{}: {why}", folder.path().display())
+    }
+
+    /// Says what a folder with boxes does not show.
+    pub(super) fn tell_what_is_missing(&self, folder: &Folder) {
+        for remark in remarks(folder, self.standing().as_ref()) {
+            log_line(format_args!("note: {remark}"));
+        }
+    }
+
+    /// What stands at the worm, if it runs here. With a folder alone its configuration may be unusable: then nothing is known of it.
+    fn standing(&self) -> Option<Standing> {
+        Standing::ask(&self.worm.load().ok()?)
+    }
 }
 
 fn list(args: &ListArgs) -> Result<(), Failure> {
@@ -135,17 +150,16 @@ fn list(args: &ListArgs) -> Result<(), Failure> {
         return print::line(serde_json::to_string(&entries).map_err(Failure::failed)?);
     }
     if entries.is_empty() {
-        return print::line(format_args!(
-            "{}: no box: nothing has happened",
-            folder.path().display()
-        ));
+        return print::line(args.place.why_no_box(&folder));
     }
     let mut text = String::new();
     for entry in &entries {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{}", in_words(entry));
     }
-    print::line(text.trim_end())
+    print::line(text.trim_end())?;
+    args.place.tell_what_is_missing(&folder);
+    Ok(())
 }
 
 fn in_words(entry: &Entry) -> String {

@@ -17,7 +17,7 @@ pub struct BridgeArgs {
     /// What to listen at, which certificates may do what, and which worms: docs/bridge.md
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// Check the file and what it names, and end
+    /// Check the file and what it names, say which worms another bridge serves now, and end
     #[arg(long)]
     check: bool,
 }
@@ -31,6 +31,9 @@ pub fn run(args: &BridgeArgs) -> Result<(), Failure> {
     let settings = BridgeSettings::load(&args.config)?;
     if args.check {
         print::announce(format!("{} can be used", args.config.display()));
+        for remark in robot::served_already(&settings)? {
+            print::log_line(format_args!("note: {remark}"));
+        }
         return Ok(());
     }
     print::log_in_background()?;

@@ -35,7 +35,8 @@ pub struct ExportArgs {
 /// Runs `wormd export`. Prints each file that it wrote.
 ///
 /// # Errors
-/// [`Failure::Unusable`] for a log that cannot be read, and a file that exists already; [`Failure::Failed`] when one cannot be written.
+/// [`Failure::Unusable`] for a log that cannot be read, a file that exists already, and a place where there can be none; [`Failure::Failed`] when
+/// one cannot be written.
 pub fn run(args: &ExportArgs) -> Result<(), Failure> {
     // Those of each form are the same.
     let mut warnings = Vec::new();
@@ -73,7 +74,9 @@ pub fn run(args: &ExportArgs) -> Result<(), Failure> {
 
 fn failure(error: ExportError) -> Failure {
     match error {
-        ExportError::Read(_) | ExportError::Output(OutputError::Exists(_)) => Failure::unusable(error),
+        ExportError::Read(_) | ExportError::Output(OutputError::Exists(_) | OutputError::Place { .. }) => {
+            Failure::unusable(error)
+        }
         ExportError::Output(_) => Failure::failed(error),
     }
 }

@@ -49,7 +49,7 @@ pub struct TripArgs {
     /// Go on without this terminal, in a session of its own; what happens is in the computer's log
     #[arg(long)]
     detach: bool,
-    /// Print one JSON object at the end instead of text
+    /// Print one JSON object at the end instead of text; with --detach, the trip's process once the worm crawls
     #[arg(long)]
     json: bool,
 }
@@ -221,6 +221,9 @@ fn detach(args: &TripArgs, route: &Path) -> Result<(), Failure> {
         let mut lines = BufReader::new(out).lines().map_while(Result::ok);
         lines.any(|line| line == "ready")
     });
+    if is_ready && args.json {
+        return print::line(serde_json::json!({ "process": process.id() }));
+    }
     if is_ready {
         print::log_line(format_args!(
             "the trip goes on as process {}: `wormd trip status` says how it stands",

@@ -1,6 +1,6 @@
 //! `wormd why`: why a worm stopped, from a box or any other log.
 
-use super::black_box::{PlaceArgs, no_box};
+use super::black_box::PlaceArgs;
 #[cfg(feature = "analysis")]
 use super::progress::Progress;
 use super::{Failure, log_line, print};
@@ -36,7 +36,7 @@ pub struct WhyArgs {
 /// Runs `wormd why`.
 ///
 /// # Errors
-/// [`Failure::Unusable`] for a log or configuration that cannot be used; [`Failure::Failed`] when a file cannot be written.
+/// [`Failure::Unusable`] for a log, configuration or folder that cannot be used; [`Failure::Failed`] when a file cannot be written.
 pub fn run(args: &WhyArgs) -> Result<(), Failure> {
     let path = match &args.log {
         Some(log) => log.clone(),
@@ -64,6 +64,10 @@ pub fn run(args: &WhyArgs) -> Result<(), Failure> {
             explanation.stops
         )));
     }
+    // Before the search, which takes its time.
+    if let Some(dir) = &args.out {
+        prepare(dir)?;
+    }
     explain_last_cycles(args, &log, &config, &mut explanation);
     let written = args.out.as_deref().map(|dir| write(dir, &explanation, &log, &config));
     for warning in &explanation.warnings {
@@ -84,7 +88,8 @@ pub fn run(args: &WhyArgs) -> Result<(), Failure> {
 fn stop_box(place: &PlaceArgs) -> Result<PathBuf, Failure> {
     let folder = place.folder()?;
     let found = newest_stop::newest_stop(&folder).map_err(Failure::unusable)?;
-    let found = found.ok_or_else(|| no_box(&folder))?;
+    let found = found.ok_or_else(|| place.no_box(&folder))?;
+    place.tell_what_is_missing(&folder);
     for later in &found.later {
         let reason = later.reason.as_deref().unwrap_or("its beginning is not known");
         log_line(format_args!(
@@ -121,6 +126,22 @@ fn explain_last_cycles(args: &WhyArgs, _log: &Log, _config: &Config, explanation
     explanation.last_cycles.why_not = Some(why_not.to_owned());
 }
 
+/// Makes the folder, if need be, and sees whether it can be written in.
+#[cfg(feature = "analysis")]
+fn prepare(dir: &Path) -> Result<(), Failure> {
+    worm_analysis::report::prepare(dir).map_err(Failure::unusable)
+}
+
+#[cfg(not(feature = "analysis"))]
+fn prepare(dir: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(dir).map_err(|error| {
+        Failure::unusable(format!(
+            "{}: the folder cannot be made: {error}: name another one with --out",
+            dir.display()
+        ))
+    })
+}
+
 #[cfg(feature = "analysis")]
 fn write(dir: &Path, explanation: &Explanation, log: &Log, config: &Config) -> Result<PathBuf, Failure> {
     crate::why::page::write(dir, explanation, log, config).map_err(Failure::failed)
@@ -129,7 +150,6 @@ fn write(dir: &Path, explanation: &Explanation, log: &Log, config: &Config) -> R
 #[cfg(not(feature = "analysis"))]
 fn write(dir: &Path, explanation: &Explanation, _log: &Log, _config: &Config) -> Result<PathBuf, Failure> {
     let failed = |error: std::io::Error| Failure::failed(format!("{}: cannot be written: {error}", dir.display()));
-    std::fs::create_dir_all(dir).map_err(failed)?;
     let path = dir.join("why.json");
     let text = serde_json::to_string_pretty(explanation).map_err(Failure::failed)?;
     std::fs::write(&path, text + "\n").map_err(failed)?;

@@ -99,6 +99,11 @@ pub(super) async fn command(
             }
         }
     };
+    // As everywhere else: a crawl that stands still would be taken for one.
+    if command == "crawl" && details.cycles_per_s == Some(0.0) {
+        let why = "cycles_per_s 0 is no speed: give gait cycles per second other than 0; hold stands still";
+        return refused(StatusCode::BAD_REQUEST, why);
+    }
     let Some(request) = request(&command, details) else {
         return refused(
             StatusCode::NOT_FOUND,

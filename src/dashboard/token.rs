@@ -89,7 +89,12 @@ impl fmt::Debug for Token {
 }
 
 fn read(file: &Path) -> Result<String, Failure> {
-    let cannot = |error| Failure::unusable(format!("the token's file {}: {error}", file.display()));
+    let cannot = |error| {
+        Failure::unusable(format!(
+            "the token's file {}: {error}: give the path of a file with the token alone, which this user may read; `openssl rand -hex 16` makes one",
+            file.display()
+        ))
+    };
     let mut text = String::new();
     // One byte more than fits is enough to see that it does not.
     let limit = MAX_LENGTH as u64 + 16;

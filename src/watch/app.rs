@@ -95,9 +95,10 @@ impl App {
                 self.hear(now_ns);
             }
             Received::Answer(answer) => self.take_answer(answer, now_ns),
-            Received::Lost { frames } => {
-                self.note(format!("{frames} frames were left out: this screen did not take them"))
-            }
+            Received::Lost { frames } => self.note(match &self.picture.network {
+                None => format!("{frames} frames were left out: this screen did not take them"),
+                Some(network) => format!("{frames} frames were lost on the way from {}", network.robot),
+            }),
             Received::Refused { reason } => self.say(reason, true, now_ns),
         }
     }

@@ -4,8 +4,8 @@ mod words;
 use super::app::Seat;
 use super::*;
 use crate::relay::source::{Seen, Worm as RelayedWorm};
-use crate::relay::wire::{Driver, Line, Request, Subject};
-use fixture::{NOW_NS, alarm, drawn, inferred, painted, received, screen};
+use crate::relay::wire::{Driver, Line, Network, Request, Subject};
+use fixture::{NOW_NS, alarm, drawn, inferred, painted, received, screen, screen_over};
 use ratatui::style::Color;
 use worm_estimator::config::Config;
 use worm_estimator::message::{
@@ -151,6 +151,27 @@ proptest::proptest! {
             app.key(key, NOW_NS);
             drawn(80, 24, &app, NOW_NS);
         }
+    }
+}
+
+#[test]
+fn frames_that_a_network_lost_are_not_laid_to_the_screen() {
+    let network = Network {
+        robot: "robot1".to_owned(),
+        may_drive: true,
+        frames_lost: 3,
+        round_trip_ms: Some(20),
+        boot_id: String::new(),
+        synchronised: None,
+        wall_offset_ns: 0,
+    };
+    for (network, words) in [
+        (None, "3 frames were left out: this screen did not take them"),
+        (Some(network), "3 frames were lost on the way"),
+    ] {
+        let mut app = screen_over(network, Seat::Watch, &received(3.4), None);
+        app.take(Line::Lost { frames: 3 }, NOW_NS);
+        assert!(app.take_log().any(|line| line.starts_with(words)), "{words}");
     }
 }
 

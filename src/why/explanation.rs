@@ -1,11 +1,12 @@
 //! Why the worm stopped: one answer from all that the log holds. The JSON names are a contract.
 
+use super::alarm::{Then, alarm_of, mode_at, of_alarm, of_nothing};
 use super::stops::{Cause, Stop, standing, stops};
-use super::timeline::{Moment, MomentKind, command_in_words, figure, moments};
+use super::timeline::{Moment, MomentKind, command_in_words, moments};
 use crate::relay::departure::{Departure, Way};
 use crate::remedy;
 use serde::Serialize;
-use worm_estimator::config::{Config, Policy};
+use worm_estimator::config::Config;
 use worm_estimator::message::{Alarm, AlarmKind, CommandKind, Mode, Severity};
 use worm_estimator::time::seconds;
 use worm_log::Log;
@@ -155,14 +156,17 @@ pub fn explain_stop(log: &Log, config: &Config, trigger: Option<&Trigger>, wante
         },
     };
     let time_ns = subject.time_ns();
-    let reason = reason(&subject, config);
+    let reason = reason(&subject, log, config);
     let (from, to) = match &subject {
         Subject::Stop(stop) => (Some(stop.from.name()), stop.to.map(Mode::name)),
         _ => (None, None),
     };
     let mut warnings = log.warnings.clone();
     if log.commands.is_empty() {
-        warnings.push("the log holds no command: it is of an older version, or none was given".to_owned());
+        warnings.push(
+            "the log holds no command: none was given while it was recorded, or the topic `command` was not recorded"
+                .to_owned(),
+        );
     }
     if log.alarms.is_empty() && log.estimates.is_empty() {
         warnings
@@ -220,17 +224,7 @@ fn choose(stops: &[Stop], log: &Log, trigger: Option<&Trigger>) -> Option<usize>
     stops.iter().position(is_near).or(last)
 }
 
-/// The alarm that a log without a stop is about: that of the box's event, or else the last.
-fn alarm_of(log: &Log, trigger: Option<&Trigger>) -> Option<Alarm> {
-    let is_one = |alarm: &&Alarm| alarm.raised == 1 && alarm.kind != AlarmKind::RecordingStopped.code();
-    let mut raised = log.alarms.iter().filter(is_one);
-    match trigger {
-        Some(trigger) => raised.find(|alarm| alarm.time_ns == trigger.time_ns).copied(),
-        None => raised.next_back().copied(),
-    }
-}
-
-fn reason(subject: &Subject, config: &Config) -> Reason {
+fn reason(subject: &Subject, log: &Log, config: &Config) -> Reason {
     let plain = |kind, name: &str, sentence: String| Reason {
         kind,
         name: name.to_owned(),
@@ -244,16 +238,16 @@ fn reason(subject: &Subject, config: &Config) -> Reason {
         sentence,
     };
     let stop = match subject {
-        Subject::Alarm(alarm) => return of_alarm(alarm, alarm.time_ns, false, config),
-        Subject::Nothing(_) => {
-            let sentence = "Nothing in this log stopped the worm, and no alarm was raised.".to_owned();
-            return plain("none", "none", sentence);
+        Subject::Alarm(alarm) => {
+            let then = Then::WentOn(mode_at(log, alarm.time_ns));
+            return of_alarm(alarm, alarm.time_ns, then, config);
         }
+        Subject::Nothing(_) => return plain("none", "none", of_nothing(log)),
         Subject::Stop(stop) => stop,
     };
     match &stop.cause {
         Cause::Alarm(kind) => match &stop.alarm {
-            Some(alarm) => of_alarm(alarm, stop.time_ns, true, config),
+            Some(alarm) => of_alarm(alarm, stop.time_ns, Then::Stopped, config),
             None => plain(
                 "alarm",
                 kind.name(),
@@ -324,42 +318,6 @@ fn reason(subject: &Subject, config: &Config) -> Reason {
     }
 }
 
-fn of_alarm(alarm: &Alarm, time_ns: u64, stopped: bool, config: &Config) -> Reason {
-    let kind = AlarmKind::try_from(alarm.kind);
-    let name = kind.map_or("unknown", AlarmKind::name);
-    let cell = (alarm.cell != u32::MAX).then(|| alarm.cell + 1);
-    let since_s = relative_s(alarm.since_ns, time_ns);
-    let (meaning, policy) = match kind {
-        Ok(kind) => (lower_first(&remedy::meaning(kind)), config.alarms.of(kind).policy),
-        Err(_) => ("it is of another version".to_owned(), Policy::Warn),
-    };
-    let of_cell = cell.map_or_else(String::new, |cell| format!(" of cell {cell}"));
-    let did = match (stopped, policy) {
-        (true, Policy::Stop) => "its policy is to stop",
-        (true, Policy::BackOff) => "its policy is to go back and hold",
-        (true, _) => "its policy is to hold",
-        (false, Policy::Warn) => "its policy is to warn, so the worm went on",
-        (false, _) => "the worm did not crawl then",
-    };
-    let sentence = format!(
-        "The alarm {name}{of_cell}: {meaning}. {} against a threshold of {}, since {since_s:.3} s; {did}.",
-        figure(alarm.value),
-        figure(alarm.threshold)
-    );
-    Reason {
-        kind: "alarm",
-        name: name.to_owned(),
-        time_s: relative_s(alarm.time_ns, time_ns),
-        since_s: Some(since_s),
-        cell,
-        value: Some(alarm.value).filter(|value| value.is_finite()),
-        threshold: Some(alarm.threshold).filter(|threshold| threshold.is_finite()),
-        sender: None,
-        user: None,
-        sentence,
-    }
-}
-
 fn signs(log: &Log, subject: &Subject, time_ns: u64) -> Vec<Sign> {
     let reason = match subject {
         Subject::Stop(stop) => stop.alarm,
@@ -427,7 +385,7 @@ fn unix_ns(log: &Log, time_ns: u64) -> Option<u64> {
 }
 
 /// From one moment to another, s; negative before it.
-fn relative_s(time_ns: u64, zero_ns: u64) -> f64 {
+pub(super) fn relative_s(time_ns: u64, zero_ns: u64) -> f64 {
     if time_ns < zero_ns {
         -seconds(zero_ns - time_ns)
     } else {
@@ -435,7 +393,7 @@ fn relative_s(time_ns: u64, zero_ns: u64) -> f64 {
     }
 }
 
-fn lower_first(text: &str) -> String {
+pub(super) fn lower_first(text: &str) -> String {
     let mut letters = text.chars();
     match letters.next() {
         Some(first) => first.to_lowercase().collect::<String>() + letters.as_str(),

@@ -5,10 +5,12 @@
 //! # Modules, in reading order
 //! - [`timeline`]: what happened in a log, event by event. Pure.
 //! - [`stops`]: where the worm stopped, and by what. Pure.
+//! - `alarm`: the alarm that a log is about. Pure.
 //! - [`explanation`]: both together, with the remedy. Its JSON names are a contract.
 //! - `newest_stop`: which box has one. `text`: for the terminal; `page`: for a browser, with the feature `analysis`.
 //! - `last_cycles`: what `explain` makes of the gait cycles before it, with the feature `analysis`.
 
+mod alarm;
 pub mod explanation;
 #[cfg(feature = "analysis")]
 pub(crate) mod last_cycles;

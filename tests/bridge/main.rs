@@ -8,6 +8,7 @@ mod network;
 mod record;
 mod refusals;
 mod second_bridge;
+mod unusable;
 mod watcher;
 #[path = "../processes/worm.rs"]
 #[allow(
@@ -56,6 +57,10 @@ impl<'a> Robot<'a> {
         ] {
             make_keys(files.path(), arguments);
         }
+        // A stranger trusts both, or would refuse its own certificate.
+        let authorities = ["keys", "foreign"].map(|folder| std::fs::read(files.path().join(folder).join("ca.pem")));
+        let authorities = authorities.map(|text| text.expect("was made")).concat();
+        std::fs::write(files.path().join("foreign/both.pem"), authorities).expect("can be written");
         let port = free_port();
         let host = if network.is_some() { ROBOT } else { "127.0.0.1" };
         let config = files.path().join("bridge.toml");
@@ -90,8 +95,13 @@ impl<'a> Robot<'a> {
         let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
         let host = if self.network.is_some() { ROBOT } else { "127.0.0.1" };
         let config = self.files.path().join(format!("{keys}-{certificate}.toml"));
+        let authority = if keys == "keys" {
+            "keys/ca.pem"
+        } else {
+            "foreign/both.pem"
+        };
         let text = format!(
-            "certificate = '{keys}/{certificate}.pem'\nkey = '{keys}/{certificate}.key'\nauthority = 'keys/ca.pem'\nroot = '{}'\n\
+            "certificate = '{keys}/{certificate}.pem'\nkey = '{keys}/{certificate}.key'\nauthority = '{authority}'\nroot = '{}'\n\
              [[robots]]\nname = 'robot1'\nconnect = 'tls/{host}:{}'\n{more}",
             root.path().display(),
             self.port
@@ -413,58 +423,4 @@ fn a_laptop_whose_clock_is_a_month_off_watches_and_drives() {
         assert_eq!(driver.ask("stop", PATIENCE)["verdict"], "accepted");
         robot.wait_for_mode(Mode::Disarmed);
     }
-}
-
-#[test]
-fn what_is_open_or_unusable_ends_with_exit_status_2() {
-    let robot = Robot::start("b-args", None);
-    let good = bridge_toml(robot.worm.name(), "127.0.0.1", robot.port);
-    let folder = robot.files.path();
-    std::fs::write(folder.join("empty.pem"), "").expect("can be written");
-    std::fs::copy(folder.join("keys/robot1.key"), folder.join("open.key")).expect("can be copied");
-    let open = std::os::unix::fs::PermissionsExt::from_mode(0o644);
-    std::fs::set_permissions(folder.join("open.key"), open).expect("can be set");
-    for (from, to, part) in [
-        ("authority = 'keys/ca.pem'", "", "authority is missing"),
-        ("certificate = 'keys/robot1.pem'", "", "certificate is missing"),
-        ("key = 'keys/robot1.key'", "", "key is missing"),
-        ("keys/ca.pem", "keys/none.pem", "No such file"),
-        ("keys/ca.pem", "empty.pem", "no certificate in PEM"),
-        ("keys/robot1.key", "keys/robot1.pem", "no private key"),
-        ("keys/robot1.key", "open.key", "chmod 600"),
-        ("listen = [", "listen = [] #", "listen is missing"),
-        ("tls/127", "tcp/127", "no address of TLS"),
-        ("drive = ['anna']\nwatch = ['hall']", "", "nobody could connect"),
-        ("'anna'", "'*'", "no usable name"),
-        ("'anna'", "'robot1'", "own certificate"),
-        ("'anna'", "'hall'", "twice"),
-        ("[access]", "scouting = true\n[access]", "unknown field"),
-        ("[[worms]]", "[[worms]] #", "in use"),
-        (
-            "[[worms]]",
-            "[[worms]]\nconfig = 'none.toml'",
-            "none.toml: No such file or directory (os error 2): name the file",
-        ),
-        (robot.worm.name(), "Not A Name", "worm.name"),
-    ] {
-        let text = good.replacen(from, to, 1);
-        let file = folder.join("wrong.toml");
-        std::fs::write(&file, &text).expect("can be written");
-        let output = robot.worm.plain_wormd(&["bridge", "--config", path(&file)]).output();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{to:?}: {said}");
-        assert!(said.contains(part), "{to:?}: {said}");
-    }
-    for (arguments, part) in [
-        (["bridge", "--config", "/nonexistent.toml"], "/nonexistent.toml"),
-        (["fleet", "--config", "/nonexistent.toml"], "/nonexistent.toml"),
-    ] {
-        let output = robot.worm.plain_wormd(&arguments).output();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains(part), "{said}");
-    }
-    // And the bridge that was there has noticed nothing.
-    let anna = robot.laptop("keys", "anna");
-    anna.watch("anna").hello(PATIENCE);
 }

@@ -35,6 +35,15 @@ fn a_second_bridge_of_a_worm_is_refused_and_the_first_goes_on() {
             assert!(said.contains(&part), "{part}: {said}");
         }
     }
+    // A check may be made beside it, and says so.
+    let check = ["bridge", "--check", "--config", path(&second)];
+    let output = robot.worm.plain_wormd(&check).output();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(
+        said.contains(&format!("note: another `wormd bridge` (process {first_pid}, ")),
+        "{said}"
+    );
     watcher.frame(PATIENCE, |frame| {
         frame["number"].as_u64() > before["number"].as_u64().map(|number| number + 20)
     });

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
+use testkit::log_sample::{crawl, write_log};
 
 fn wormd(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_wormd"))
@@ -23,6 +24,9 @@ fn unusable_input_is_named_and_ends_with_status_2() {
     let out_of_range = config(folder.path(), "range.toml", "[gait]\ncycle_s = 0.0\n");
     let not_toml = config(folder.path(), "not.toml", "worm = [\n");
     let wrong_model = config(folder.path(), "model.toml", "[servo]\nmodel_number = 1190\n");
+    let log = folder.path().join("log.mcap");
+    write_log(&log, &crawl(0.2));
+    let log = log.to_string_lossy().into_owned();
     let table: &[(&[&str], &[&str])] = &[
         (&["up", "--config", "no/such.toml"], &["no/such.toml", "--config"]),
         (&["up", "--config", &unknown_key], &["unknown.toml:2:1", "legs"]),
@@ -74,6 +78,30 @@ fn unusable_input_is_named_and_ends_with_status_2() {
         (
             &["export", &not_toml, "--mcap", &not_toml, "--force"],
             &["not.toml is the log itself", "choose another name"],
+        ),
+        (
+            &["export", &log, "--csv", "/dev/null"],
+            &["/dev/null: it is no folder", "choose another place"],
+        ),
+        (
+            &["export", &log, "--parquet", &not_toml],
+            &["not.toml: it is no folder", "choose another place"],
+        ),
+        (
+            &["export", &log, "--mcap", "/no/such/folder/x.mcap"],
+            &["x.mcap: cannot be made", "choose another place"],
+        ),
+        (
+            &["export", &log, "--mcap", "/dev/null", "--force"],
+            &["/dev/null: it is no file that can be replaced", "choose another place"],
+        ),
+        (
+            &["why", &log, "--no-explain", "--out", "/dev/null"],
+            &["/dev/null: the directory cannot be made", "name a directory"],
+        ),
+        (
+            &["dashboard", "--token-file", "/no/such/token"],
+            &["/no/such/token", "openssl rand"],
         ),
         (
             &["record", "--out", "x.mcap", "--max-total", "9MB"],

@@ -49,8 +49,10 @@ fn one_drives_with_the_token_and_anyone_may_halt() {
         );
     }
     assert_eq!(watched.post("dance", &[BEARER]).status, 404);
-    let list = request(watched.address, "POST", "/api/command/crawl", &[BEARER, ANN], "[0.1]");
-    assert_eq!(list.status, 400, "{list:?}");
+    for body in ["[0.1]", "{\"cycles_per_s\":0}", "{\"cycles_per_s\":-0.0}"] {
+        let refused = request(watched.address, "POST", "/api/command/crawl", &[BEARER, ANN], body);
+        assert_eq!(refused.status, 400, "{body}: {refused:?}");
+    }
     let asked_wrongly = watched.get("/api/command/hold");
     assert_eq!(asked_wrongly.status, 405, "{asked_wrongly:?}");
     assert!(asked_wrongly.json()["error"].is_string() && asked_wrongly.head.to_lowercase().contains("allow: post"));

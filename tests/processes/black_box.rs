@@ -192,3 +192,76 @@ fn a_black_box_that_cannot_write_raises_an_alarm_and_goes_on() {
         "{list}"
     );
 }
+
+/// A file system without room for a single byte, but for names.
+struct FullDisk(PathBuf);
+
+impl FullDisk {
+    fn mount(folder: &std::path::Path) -> Option<Self> {
+        std::fs::create_dir_all(folder).expect("a folder");
+        let mut mount = std::process::Command::new("mount");
+        let mounted = mount
+            .args(["-t", "tmpfs", "-o", "size=4k", "tmpfs"])
+            .arg(folder)
+            .status();
+        if !mounted.is_ok_and(|status| status.success()) {
+            return None;
+        }
+        std::fs::write(folder.join("full"), [0; 4096]).expect("its only page");
+        Some(Self(folder.to_owned()))
+    }
+}
+
+impl Drop for FullDisk {
+    fn drop(&mut self) {
+        // A process may be ending there still.
+        let _ = std::process::Command::new("umount").arg("--lazy").arg(&self.0).status();
+    }
+}
+
+#[test]
+fn a_box_that_waits_for_room_is_said_and_the_fault_it_is_of() {
+    let worm = Worm::new("waitbox");
+    let config = worm.config(CONFIG);
+    let folder = tempfile::tempdir().expect("a folder");
+    let Some(full) = FullDisk::mount(&folder.path().join("boxes")) else {
+        println!("SKIPPED: a disk that is full needs root");
+        return;
+    };
+    let boxes = full.0.to_string_lossy().into_owned();
+    let mut crawling = Crawling::at_rest(worm, &["--config", &config]);
+    crawling.make_crawl();
+    let record = ["record", "--config", &config, "--black-box", &boxes];
+    let mut black_box = crawling.worm.wormd(&record).start();
+    crawling.kill_virtual_worm();
+    crawling.wait_for_mode(Mode::Fault);
+    let worm = &crawling.worm;
+    let part = || {
+        let mut found = std::fs::read_dir(&boxes).expect("a folder").flatten();
+        found.any(|entry| entry.file_name().to_string_lossy().ends_with("link-lost.mcap.part"))
+    };
+    wait_for("the file of the box", PATIENCE, part);
+    let bundle = folder.path().join("bundle.tar.zst").to_string_lossy().into_owned();
+    for (arguments, code) in [
+        (&["why"][..], 2),
+        (&["black-box", "list"], 0),
+        (&["bundle", "--out", &bundle], 0),
+    ] {
+        let place = ["--config", &config, "--folder", &boxes];
+        let output = worm.wormd(&[arguments, &place].concat()).output();
+        let said = [output.stdout.as_slice(), &output.stderr].concat();
+        let said = String::from_utf8_lossy(&said);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
+        for part in [
+            "the fault link-lost is latched",
+            "link-lost.mcap.part could not be written yet",
+            "cannot write (disk-full)",
+        ] {
+            assert!(said.contains(part), "{arguments:?} does not say {part:?}: {said}");
+        }
+        for wrong in ["nothing has happened", "no MCAP file"] {
+            assert!(!said.contains(wrong), "{arguments:?}: {said}");
+        }
+    }
+    black_box.kill();
+}

@@ -4,7 +4,7 @@ use super::super::app::{App, Seat};
 use super::super::*;
 use crate::relay::connection::read_line;
 use crate::relay::source::{Seen, Worm as RelayedWorm};
-use crate::relay::wire::{Answer, Driver, Line, Subject, to_bytes};
+use crate::relay::wire::{Answer, Driver, Line, Network, Subject, to_bytes};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use worm_estimator::message::{
@@ -135,6 +135,11 @@ pub(super) const NOW_NS: u64 = 20_000_000_000;
 
 /// The screen of a watcher to whom the relay has sent this telemetry.
 pub(super) fn screen(seat: Seat, telemetry: &Telemetry, driver: Option<Driver>) -> App {
+    screen_over(None, seat, telemetry, driver)
+}
+
+/// The same over a network, if there is one.
+pub(super) fn screen_over(network: Option<Network>, seat: Seat, telemetry: &Telemetry, driver: Option<Driver>) -> App {
     let subject = Subject {
         name: "worm1".to_owned(),
         cells: 4,
@@ -158,13 +163,9 @@ pub(super) fn screen(seat: Seat, telemetry: &Telemetry, driver: Option<Driver>) 
     worm.telemetry = telemetry.clone();
     let time_ns = telemetry.state.map_or(NOW_NS, |state| state.time_ns);
     worm.update(time_ns);
-    send(Line::Frame(Box::new(worm.frame(
-        1,
-        time_ns,
-        Seen::default(),
-        1,
-        driver,
-    ))));
+    let mut frame = worm.frame(1, time_ns, Seen::default(), 1, driver);
+    frame.network = network;
+    send(Line::Frame(Box::new(frame)));
     app.note("[control] a line of the log".to_owned());
     app
 }

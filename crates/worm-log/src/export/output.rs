@@ -11,6 +11,14 @@ pub enum OutputError {
     /// There is one of this name.
     #[error("{} exists already: choose another name, or overwrite it with --force", .0.display())]
     Exists(PathBuf),
+    /// There can be no file in this place, whatever room there is.
+    #[error("{}: {problem}: choose another place", file.display())]
+    Place {
+        /// The file or folder.
+        file: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// The file cannot be written.
     #[error("{}: cannot be written: {problem}: make room or choose another place", file.display())]
     Refused {
@@ -26,6 +34,20 @@ impl OutputError {
         Self::Refused {
             file: file.to_owned(),
             problem: problem.to_string(),
+        }
+    }
+
+    /// A folder or file could not be made, of which nothing was there before.
+    pub(super) fn of_making(file: &Path, error: &io::Error) -> Self {
+        use io::ErrorKind::{AlreadyExists, QuotaExceeded, StorageFull};
+        let problem = match error.kind() {
+            StorageFull | QuotaExceeded => return Self::of(file, error),
+            AlreadyExists => "it is no folder".to_owned(),
+            _ => format!("cannot be made: {error}"),
+        };
+        Self::Place {
+            file: file.to_owned(),
+            problem,
         }
     }
 }
@@ -46,10 +68,17 @@ impl Output {
     /// # Errors
     /// [`OutputError`] when there is one already and `overwrite` is not set, or it cannot be made.
     pub(super) fn create(target: &Path, overwrite: bool) -> Result<Self, OutputError> {
+        // A folder, and a device such as /dev/null, are never replaced.
+        if target.metadata().is_ok_and(|found| !found.is_file()) {
+            return Err(OutputError::Place {
+                file: target.to_owned(),
+                problem: "it is no file that can be replaced".to_owned(),
+            });
+        }
         if !overwrite && target.symlink_metadata().is_ok() {
             return Err(OutputError::Exists(target.to_owned()));
         }
-        let (file, part) = create_part(target).map_err(|error| OutputError::of(target, error))?;
+        let (file, part) = create_part(target).map_err(|error| OutputError::of_making(target, &error))?;
         Ok(Self {
             file: BufWriter::new(file),
             part,

@@ -69,7 +69,7 @@ pub fn tables(
         size.cells = size.cells.max(cells(channel, payload)?);
         Ok(())
     })?;
-    std::fs::create_dir_all(folder).map_err(|error| OutputError::of(folder, error))?;
+    std::fs::create_dir_all(folder).map_err(|error| OutputError::of_making(folder, &error))?;
     let clock = WallClock::of(&contents);
     let mut open: Vec<Option<OpenTable>> = Vec::new();
     for (&channel, size) in Channel::ALL.iter().zip(&sizes) {
