@@ -1224,8 +1224,8 @@ static_assert(offsetof(wormd_recording_status, state) == 48, "wormd_recording_st
 static_assert(offsetof(wormd_recording_status, problem) == 52, "wormd_recording_status.problem lies elsewhere in wormd");
 
 /* What the motor's current alone says of the worm, with standard errors: after each gait cycle crawled
-   forward, as soon as it is fitted, and after a mark. Positions play no part in it, but for those that
-   correct the dead reckoning. */
+   forward, as soon as it is fitted, at the end of every other cycle, when only the place is new, and after a
+   mark. Positions play no part in it, but for those that correct the dead reckoning. */
 typedef struct wormd_inferred {
   /* Number of this message since the estimator started. */
   uint64_t sequence;

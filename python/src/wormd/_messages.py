@@ -1478,8 +1478,8 @@ class _InferredMemory(Memory):
 @dataclass(frozen=True, slots=True)
 class Inferred(Message):
     """What the motor's current alone says of the worm, with standard errors: after each gait cycle crawled forward,
-    as soon as it is fitted, and after a mark. Positions play no part in it, but for those that correct the dead
-    reckoning."""
+    as soon as it is fitted, at the end of every other cycle, when only the place is new, and after a mark. Positions
+    play no part in it, but for those that correct the dead reckoning."""
 
     TOPIC: ClassVar[Topic[Inferred]]
 
