@@ -83,7 +83,7 @@ export class Driver {
     const givenUp = new AbortController();
     if (isAnyones) this.#onWay.forEach((earlier) => earlier.abort(new Error("a hold came after it")));
     else this.#onWay.add(givenUp);
-    const answer = await this.#request("POST", `/api/command/${name}`, details, token, givenUp.signal);
+    const answer = await this.#request("POST", `/api/command/${name}`, details, token, givenUp);
     this.#onWay.delete(givenUp);
     const { watcher } = answer.body;
     if (!isAnyones && name !== "acknowledge" && watcher !== undefined && answer.ok) {
@@ -94,12 +94,13 @@ export class Driver {
     return answer;
   }
 
-  async #request(method, path, details, token, givenUp = null) {
+  async #request(method, path, details, token, givenUp = new AbortController()) {
     const headers = { "X-Wormd-Client": this.#key, "X-Wormd-Name": encodeURIComponent(this.name) };
     const asked = this.#asked();
     if (asked) headers["X-Wormd-Asked"] = asked;
     if (token) headers.Authorization = `Bearer ${token}`;
     if (details) headers["Content-Type"] = "application/json";
+    const patience = setTimeout(() => givenUp.abort(new Error(`no answer for ${PATIENCE_MS / 1000} s`)), PATIENCE_MS);
     try {
       const response = await fetch(path, {
         method,
@@ -107,13 +108,15 @@ export class Driver {
         body: details && JSON.stringify(details),
         cache: "no-store",
         priority: "high",
-        signal: AbortSignal.any([AbortSignal.timeout(PATIENCE_MS), givenUp].filter(Boolean)),
+        signal: givenUp.signal,
       });
       const text = await response.text();
       const body = text.startsWith("{") ? JSON.parse(text) : {};
       return { ok: response.ok, status: response.status, body, text: body.refusal ?? body.error ?? body.verdict ?? text };
     } catch (error) {
       return { ok: false, status: 0, body: {}, text: `not sent: the server does not answer (${error.message})` };
+    } finally {
+      clearTimeout(patience);
     }
   }
 
