@@ -7,8 +7,8 @@ use worm_log::ReadError;
 /// Times computed from frame numbers differ by rounding; a gap that exceeds the limit by less than this is within it, s.
 const TIME_ROUNDING_S: f64 = 1e-9;
 
-/// Time of a step of the paper's worm, s.
-const USUAL_STEP_S: f64 = 0.625;
+/// Time of a gait cycle of the paper's worm, s.
+const USUAL_CYCLE_S: f64 = 2.5;
 
 impl Recording {
     /// Positions with their gaps bridged by straight lines, `[cell][sample]`, m. What lies before a cell was first seen or
@@ -37,10 +37,10 @@ impl Recording {
         Ok(())
     }
 
-    /// What to do about a gap. To bridge one over more than a step of the gait would invent the step, so that is not proposed.
+    /// What to do about a gap. To bridge one over more than a gait cycle would invent the cycle, so that is not proposed.
     pub(super) fn remedy_of_gap(&self, from_s: f64, to_s: f64, at_edge: bool) -> String {
         let cut = if at_edge { "cut it off" } else { "leave it out" };
-        if !self.is_longer_than_a_step(from_s, to_s) {
+        if !self.is_longer_than_a_cycle(from_s, to_s) {
             let proposed_s = round_up(to_s - from_s);
             return format!("give --max-gap {proposed_s:.1} to accept it, or {cut} with --from or --to");
         }
@@ -50,19 +50,19 @@ impl Recording {
             }
             _ => "",
         };
-        format!("{cut} with --from or --to: it is longer than a step of the gait{by_current}")
+        format!("{cut} with --from or --to: it is longer than a gait cycle{by_current}")
     }
 
-    /// Whether more than a step of the gait is made between two times: by the phase, or where that is not known by the usual time of a step.
-    fn is_longer_than_a_step(&self, from_s: f64, to_s: f64) -> bool {
+    /// Whether more than a gait cycle is made between two times: by the phase, or where that is not known by the usual time of one.
+    fn is_longer_than_a_cycle(&self, from_s: f64, to_s: f64) -> bool {
         let phase_at = |time_s: f64| {
             let phase = self.gait_phase.as_ref()?;
             let sample = self.time_s.partition_point(|&at_s| at_s < time_s);
             phase.get(sample).copied().filter(|phase| phase.is_finite())
         };
         match (phase_at(from_s), phase_at(to_s)) {
-            (Some(from), Some(to)) => (to - from).abs() * self.cells() as f64 > 1.0,
-            _ => is_longer(to_s - from_s, USUAL_STEP_S),
+            (Some(from), Some(to)) => (to - from).abs() > 1.0,
+            _ => is_longer(to_s - from_s, USUAL_CYCLE_S),
         }
     }
 

@@ -246,7 +246,7 @@ fn a_recording_written_is_read_back() {
     }
 }
 
-/// The tracker is silent from a time on, until another; a step of the gait takes half a second.
+/// The tracker is silent from a time on, until another; a gait cycle takes two seconds.
 #[test]
 fn what_a_tracker_that_died_did_not_see_is_told_and_not_proposed_to_be_bridged() {
     let opened = |from_s: f64, to_s: f64| {
@@ -268,7 +268,7 @@ fn what_a_tracker_that_died_did_not_see_is_told_and_not_proposed_to_be_bridged()
     assert!(died.iter().any(|warning| warning.contains(note)), "{died:?}");
     let at_the_end = opened(8.0, 9.0).expect("a recording").warnings;
     assert!(at_the_end.is_empty(), "{at_the_end:?}");
-    for (to_s, proposes_to_bridge) in [(3.4, true), (3.7, false), (6.0, false)] {
+    for (to_s, proposes_to_bridge) in [(3.4, true), (4.8, true), (5.2, false), (6.0, false)] {
         let refused = opened(3.0, to_s).expect_err("a gap").to_string();
         assert_eq!(refused.contains("give --max-gap"), proposes_to_bridge, "{refused}");
         assert_eq!(refused.contains("--current=alone"), !proposes_to_bridge, "{refused}");
