@@ -284,6 +284,15 @@ impl ChangeDetector {
         }
     }
 
+    /// The same of a later cycle, where the first could not say it: a loss of friction that began in the middle of that one hardly shows there,
+    /// if the cycle before it was odd for another reason. A load would show in the first one.
+    pub(super) fn judge_late(&mut self, changed: WormNow<'_>, torque_n_m: &[f64], difference: Option<&CycleChange>) {
+        let changes = self.changes_of(changed, torque_n_m, difference);
+        if let Some(changes) = changes.filter(|changes| changes.friction_lost != 0) {
+            self.changes = changes;
+        }
+    }
+
     /// The same by a first answer, which only counts where it shows a change. True when it does.
     pub(super) fn judge_early(
         &mut self,

@@ -428,12 +428,15 @@ impl SelfSensing {
 
     /// Brings everything that follows from the fit up to date.
     fn follow(&mut self, cycle: &ClosedCycle) {
-        // While the worm is another, every cycle says anew in what it differs, and whether it still does. Also where the first could
-        // not say it: a change in the middle of that cycle hardly shows there, if the cycle before was odd for another reason.
+        // While the worm is another, every cycle says anew in what it differs, and whether it still does.
         if self.detector.is_another() {
             let difference = self.difference();
             let now = (self.fit.parameters(), self.fit.known_pull_n());
-            self.detector.judge(now, self.fit.cycle_n_m(), difference.as_ref());
+            if self.has_changed || self.detector.changes().any() {
+                self.detector.judge(now, self.fit.cycle_n_m(), difference.as_ref());
+            } else {
+                self.detector.judge_late(now, self.fit.cycle_n_m(), difference.as_ref());
+            }
         }
         if let Some((figures, sigma)) = self.figures() {
             let backward_m = self.fit.backward_advance_m().unwrap_or(figures.advance_m);
