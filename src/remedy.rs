@@ -108,7 +108,7 @@ mod tests {
                 continue;
             }
             assert!(meaning.len() > 15, "{fault}: {meaning:?}");
-            let first = remedy.split(' ').next().unwrap_or_default();
+            let first = remedy.split([' ', ';', ',']).next().unwrap_or_default();
             assert!(
                 IMPERATIVES.contains(&first) && is_followed(&remedy),
                 "{fault}: {remedy:?}"

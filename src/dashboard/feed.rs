@@ -397,9 +397,14 @@ mod tests {
         std::iter::from_fn(|| feed.next_event(cursor, now_ns))
             .map(|event| {
                 let text = String::from_utf8(event.to_vec()).expect("is text");
-                let (name, data) = text
-                    .strip_prefix("event: ")
-                    .and_then(|rest| rest.strip_suffix("\n\n"))
+                let (number, rest) = text
+                    .strip_prefix("id: ")
+                    .and_then(|rest| rest.split_once("\nevent: "))
+                    .unwrap_or_else(|| panic!("{text}"));
+                let made_ms: u64 = number.parse().expect("when it was made");
+                assert!(made_ms <= now_ns / 1_000_000, "{text}");
+                let (name, data) = rest
+                    .strip_suffix("\n\n")
                     .and_then(|rest| rest.split_once("\ndata: "))
                     .unwrap_or_else(|| panic!("{text}"));
                 assert!(!data.contains('\n'), "{data}");

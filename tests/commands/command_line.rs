@@ -89,7 +89,7 @@ fn unusable_input_is_named_and_ends_with_status_2() {
         ),
         (
             &["export", &log, "--mcap", "/no/such/folder/x.mcap"],
-            &["x.mcap: cannot be made", "choose another place"],
+            &["x.mcap: cannot be written", "choose another place"],
         ),
         (
             &["export", &log, "--mcap", "/dev/null", "--force"],

@@ -43,7 +43,7 @@ impl OutputError {
         let problem = match error.kind() {
             StorageFull | QuotaExceeded => return Self::of(file, error),
             AlreadyExists => "it is no folder".to_owned(),
-            _ => format!("cannot be made: {error}"),
+            _ => format!("cannot be written: {error}"),
         };
         Self::Place {
             file: file.to_owned(),
