@@ -132,8 +132,8 @@ impl Folder {
         &self.path
     }
 
-    /// Everything in it, the oldest first. A file that cannot be read is left out, with a warning in the log; a box of which nothing could be
-    /// written yet is among the [`unwritten`](Self::unwritten).
+    /// Everything in it, the oldest first. A file that cannot be read is left out, with a warning in the log, but for one under way; a box of which nothing
+    /// could be written yet is among the [`unwritten`](Self::unwritten).
     ///
     /// # Errors
     /// [`FolderError::Folder`] when the folder cannot be read.
@@ -154,7 +154,7 @@ impl Folder {
     fn entries(&self, files: &[Named]) -> Vec<Entry> {
         let entry = |named: &Named| match self.entry(named) {
             Ok(entry) => Some(entry),
-            Err(_) if named.is_part && named.kind == FileKind::Box => None,
+            Err(_) if named.is_part => None,
             Err(error) => {
                 tracing::warn!("{}: cannot be read: {error}", named.path.display());
                 None

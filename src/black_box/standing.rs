@@ -42,6 +42,8 @@ impl Standing {
         let estimates = RoleLock::<Estimator>::holder(&instance).is_some();
         let keeps = RoleLock::<BlackBox>::holder(&instance).is_some();
         if !controls && !keeps {
+            // To look for it makes its folder.
+            instance.remove_folder_if_empty();
             return None;
         }
         let hub = Hub::open(&instance).ok()?;
