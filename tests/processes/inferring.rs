@@ -74,7 +74,7 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
 
     // Its positions are there, and are not looked at.
     let analyze = ["analyze", &file, "--slope", "0", "--current=alone", "--json"];
-    let by_current = json(&worm.wormd(&analyze).output());
+    let by_current = json(&worm.plain_wormd(&analyze).output());
     assert_eq!(by_current["evidence"], "current", "{by_current}");
     assert!(
         by_current["cycles"].as_array().map(Vec::len) >= Some(15),
@@ -85,7 +85,7 @@ fn the_main_job_infers_takes_a_mark_and_reports_lost_friction() {
     std::fs::write(&three, "[worm]\ncells = 3\nstep_order = [1, 2, 3]\n").expect("it can be written");
     let three = three.to_string_lossy().into_owned();
     for command in ["infer", "replay"] {
-        let refused = worm.wormd(&[command, &file, "--config", &three]).output();
+        let refused = worm.plain_wormd(&[command, &file, "--config", &three]).output();
         let error = String::from_utf8_lossy(&refused.stderr);
         assert_eq!(refused.status.code(), Some(2), "{command}: {error}");
         assert!(
