@@ -2,7 +2,8 @@
 //!
 //! A bin holds the mean over its stretch of the phase (each reading counts by how far the cam turned), so that torque times angle stays
 //! the work. At the end of the cycle the torque of the inertia is taken out, J/2 (ω₂² − ω₁²) over the bin's angle: the velocities at its
-//! edges are means over the quarter bins on either side, for the servo's velocity is read in coarse steps.
+//! edges are means over the quarter bins on either side, for the servo's velocity is read in coarse steps. Where a fast cam leaves an edge
+//! without readings, ω² is linear between the edges around it, so that no work of the inertia stays in the profile.
 
 use std::f64::consts::TAU;
 use worm_physics::MAX_CELLS;
@@ -80,6 +81,7 @@ impl Profile {
             return false;
         }
         let bin_rad = TAU / self.bins as f64;
+        let squares = self.squared_velocity_at_edges();
         let (mut last_n_m, mut variance, mut counted) = (0.0, 0.0, 0.0);
         for at in 0..self.bins {
             let bin = &self.bin[at];
@@ -87,10 +89,7 @@ impl Profile {
                 self.torque_n_m[at] = last_n_m;
                 continue;
             }
-            let inertia_n_m = match (self.velocity_at(at), self.velocity_at(at + 1)) {
-                (Some(before), Some(after)) => 0.5 * inertia_kg_m2 * (after * after - before * before) / bin_rad,
-                _ => 0.0,
-            };
+            let inertia_n_m = 0.5 * inertia_kg_m2 * (squares[at + 1] - squares[at]) / bin_rad;
             let mean_n_m = bin.torque / bin.turned;
             last_n_m = mean_n_m - inertia_n_m;
             self.torque_n_m[at] = last_n_m;
@@ -99,6 +98,34 @@ impl Profile {
         }
         self.variance = variance / counted;
         true
+    }
+
+    /// Square of the velocity at the edge before each bin, and after the last one, rad²/s²; 0 where no edge has readings.
+    fn squared_velocity_at_edges(&self) -> [f64; MAX_BINS + 1] {
+        let mut squares = [0.0; MAX_BINS + 1];
+        let mut last: Option<usize> = None;
+        for edge in 0..=self.bins {
+            let Some(velocity) = self.velocity_at(edge) else {
+                continue;
+            };
+            let square = velocity * velocity;
+            match last {
+                Some(before) => {
+                    let rise = (square - squares[before]) / (edge - before) as f64;
+                    for between in before + 1..edge {
+                        squares[between] = squares[before] + (between - before) as f64 * rise;
+                    }
+                }
+                None => squares[..edge].fill(square),
+            }
+            squares[edge] = square;
+            last = Some(edge);
+        }
+        if let Some(last) = last {
+            let known = squares[last];
+            squares[last + 1..].fill(known);
+        }
+        squares
     }
 
     /// Velocity at the edge before a bin.
@@ -150,5 +177,26 @@ mod tests {
         assert!(mean < 2e-5 && furthest < 1.5e-4, "{mean}, {furthest}");
         profile.clear();
         assert!(!profile.close(1e-3));
+    }
+
+    /// Six cells in 1.1 s, of which a loop of 250 Hz sees 1.5 readings in a bin, and between them no reading at every fourth edge.
+    #[test]
+    fn the_inertia_is_taken_out_where_readings_are_few() {
+        let mut profile = Profile::new(6);
+        let ticks = 279;
+        for tick in 0..ticks {
+            let fraction = (f64::from(tick) + 0.5) / f64::from(ticks);
+            let velocity = 5.6 + 0.15 * (6.0 * TAU * fraction).sin();
+            let acceleration = 0.15 * 6.0 * (6.0 * TAU * fraction).cos() * velocity;
+            profile.add(fraction, 1.0 / f64::from(ticks), 0.01 + 2e-3 * acceleration, velocity);
+        }
+        let edges = 0..=profile.bins;
+        let without = edges.filter(|edge| profile.velocity_at(*edge).is_none()).count();
+        assert!(without > 40, "{without} edges without readings");
+        assert!(profile.close(2e-3));
+        let squares = |torque_n_m: &[f64]| torque_n_m.iter().map(|torque| (torque - 0.01).powi(2)).sum::<f64>();
+        let rms_n_m = (squares(profile.torque_n_m()) / profile.bins as f64).sqrt();
+        // Of 7.1 mN m: readings lie beside the edges that they stand for. Without what is put between them 5.3 would be left.
+        assert!((rms_n_m - 2.04e-3).abs() < 0.1e-3, "{rms_n_m}");
     }
 }
