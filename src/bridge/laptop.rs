@@ -1,10 +1,11 @@
 //! The process on the laptop, `wormd fleet`: for each robot a link and a thread, and for each of its worms an [`Offer`](super::offer::Offer).
 
+use super::credentials::Credentials;
 use super::network::{End, Network, Party, Way};
 use super::offer::Asked;
 use super::offers::Offers;
 use super::pieces::{Assembled, Assembler};
-use super::settings::{Credentials, FleetSettings, Robot};
+use super::settings::{FleetSettings, Robot};
 use super::wire::{Beat, ClockStep, Down, Echo, RemoteRequest, RemoteWatcher, UP_INTERVAL_NS, Up, VERSION};
 use super::{link_log, reasons};
 use crate::failure::Failure;

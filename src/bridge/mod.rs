@@ -5,7 +5,7 @@
 //! does. So `wormd watch` and `wormd dashboard` know nothing of any of this.
 //!
 //! - [`settings`]: `bridge.toml` and `fleet.toml`, refused when they leave anything open.
-//! - [`proof`]: whether certificate, key and authority belong together and serve the end that has them.
+//! - [`credentials`]: certificate, key and authority, whether they belong together and serve the end that has them.
 //! - [`network`]: all that concerns Zenoh.
 //! - [`link_log`] and [`reasons`]: why a link does not come about.
 //! - [`wire`]: what both ends say; [`pieces`] cuts it, so that a laptop confirms what it has.
@@ -21,13 +21,13 @@
 
 mod backlog;
 mod clock;
+mod credentials;
 pub(crate) mod laptop;
 mod link_log;
 mod network;
 mod offer;
 mod offers;
 mod pieces;
-mod proof;
 mod reasons;
 mod refusals;
 mod remote;

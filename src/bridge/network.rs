@@ -4,7 +4,7 @@
 //! name of its certificate. The rules permit to each certificate its own keys and nothing else, in both directions and at both ends, so a
 //! key says who has sent a message, and nobody hears what is meant for another.
 
-use super::settings::Credentials;
+use super::credentials::Credentials;
 use crossbeam::channel::{Receiver, Sender, bounded};
 use serde_json::{Value, json};
 use std::io::{self, Read, Write};

@@ -1,26 +1,11 @@
 //! `bridge.toml` and `fleet.toml`: read, checked, and refused with a reason when they leave anything open.
 
-use super::proof::{self, Side};
+use super::credentials::{Credentials, Side, beside, check_name};
 use crate::failure::Failure;
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use worm_estimator::config::{Config, ConfigError};
-use x509_parser::prelude::{FromDer, X509Certificate};
-
-/// What an end of the network proves itself by.
-#[derive(Debug, Clone)]
-pub(crate) struct Credentials {
-    /// Its certificate, PEM.
-    pub(crate) certificate: PathBuf,
-    /// The key of it, PEM.
-    pub(crate) key: PathBuf,
-    /// The authority that signs for both ends, PEM.
-    pub(crate) authority: PathBuf,
-    /// Common name of the certificate.
-    pub(crate) name: String,
-}
 
 /// A checked `bridge.toml`.
 #[derive(Debug)]
@@ -221,55 +206,10 @@ impl FleetSettings {
     }
 }
 
-impl Credentials {
-    fn load(
-        file: &Path,
-        certificate: Option<PathBuf>,
-        key: Option<PathBuf>,
-        authority: Option<PathBuf>,
-        side: Side,
-    ) -> Result<Self, Failure> {
-        let wrong = |text: String| Failure::unusable(format!("{}: {text}", file.display()));
-        let given = |what: &str, path: Option<PathBuf>| {
-            let path = path.ok_or_else(|| {
-                wrong(format!(
-                    "{what} is missing: both ends prove who they are, so certificate, key and authority are needed; docs/bridge.md says how \
-                     to make them"
-                ))
-            })?;
-            Ok::<_, Failure>(beside(file, path))
-        };
-        let certificate = given("certificate", certificate)?;
-        let key = given("key", key)?;
-        let authority = given("authority", authority)?;
-        let name =
-            common_name(&certificate).map_err(|why| wrong(format!("certificate {}: {why}", certificate.display())))?;
-        check_name("the certificate's common name", &name).map_err(wrong)?;
-        common_name(&authority).map_err(|why| wrong(format!("authority {}: {why}", authority.display())))?;
-        check_key(&key).map_err(|why| wrong(format!("key {}: {why}", key.display())))?;
-        let credentials = Self {
-            certificate,
-            key,
-            authority,
-            name,
-        };
-        proof::check(&credentials, side).map_err(wrong)?;
-        Ok(credentials)
-    }
-}
-
 fn read<T: for<'de> Deserialize<'de>>(file: &Path) -> Result<T, Failure> {
     let text = std::fs::read_to_string(file)
         .map_err(|error| Failure::unusable(format!("{}: {error}: docs/bridge.md has an example", file.display())))?;
     toml::from_str(&text).map_err(|error| Failure::unusable(format!("{}: {error}", file.display())))
-}
-
-/// A path in a file means one beside that file.
-fn beside(file: &Path, path: PathBuf) -> PathBuf {
-    match file.parent() {
-        Some(folder) => folder.join(path),
-        None => path,
-    }
 }
 
 fn check_endpoint(endpoint: &str) -> Result<(), String> {
@@ -285,59 +225,6 @@ fn check_endpoint(endpoint: &str) -> Result<(), String> {
             "\"{endpoint}\" is no address of TLS: give tls/HOST:PORT, as in \"tls/robot1.local:7447\"; nothing else is spoken"
         )),
     }
-}
-
-/// Names of certificates stand in keys, and no public authority signs for a name without a dot.
-fn check_name(place: &str, name: &str) -> Result<(), String> {
-    let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-    let is_usable = (1..=32).contains(&name.len()) && name.chars().all(is_plain) && !name.starts_with('-');
-    match is_usable {
-        true => Ok(()),
-        false => Err(format!(
-            "{place}: \"{name}\" is no usable name of a certificate: 1 to 32 of a-z, 0-9 and -, no dots"
-        )),
-    }
-}
-
-/// Why a file cannot be read, and what to do.
-fn unreadable(error: &std::io::Error) -> String {
-    format!(
-        "{error}: give its path, which counts from this file's folder, and let this user read it; docs/bridge.md says how to make it"
-    )
-}
-
-/// The common name of the first certificate in a file.
-fn common_name(file: &Path) -> Result<String, String> {
-    let bytes = std::fs::read(file).map_err(|error| unreadable(&error))?;
-    let (_, pem) = x509_parser::pem::parse_x509_pem(&bytes)
-        .map_err(|_| "it has no certificate in PEM: name a .pem that `make-keys` made".to_owned())?;
-    let (_, certificate) =
-        X509Certificate::from_der(&pem.contents).map_err(|_| "it has no certificate that can be read".to_owned())?;
-    let mut names = certificate.subject().iter_common_name();
-    let name = names.next().and_then(|name| name.as_str().ok());
-    name.map(str::to_owned)
-        .ok_or_else(|| "it has no common name".to_owned())
-}
-
-/// A key that others can read proves nothing.
-fn check_key(file: &Path) -> Result<(), String> {
-    let bytes = std::fs::read(file).map_err(|error| unreadable(&error))?;
-    let mode = file
-        .metadata()
-        .map_err(|error| unreadable(&error))?
-        .permissions()
-        .mode();
-    if !bytes.windows(11).any(|it| it == b"PRIVATE KEY") {
-        return Err("it has no private key in PEM: name the .key that `make-keys` made".to_owned());
-    }
-    if mode & 0o007 != 0 {
-        return Err(format!(
-            "everybody on this computer may use it (mode {:o}): chmod 600 {}",
-            mode & 0o777,
-            file.display()
-        ));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

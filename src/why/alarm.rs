@@ -1,6 +1,6 @@
 //! The alarm that a log is about, and what is said of it: also where none was raised.
 
-use super::explanation::{Reason, Trigger, lower_first, relative_s};
+use super::answer::{Reason, Trigger, lower_first, relative_s};
 use super::timeline::{fault_name, figure};
 use crate::remedy;
 use worm_estimator::config::{Config, Policy};

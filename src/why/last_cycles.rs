@@ -1,6 +1,6 @@
 //! What `wormd explain` makes of the gait cycles before a stop: the search for an effect that the model misses, on that part of the log.
 
-use super::explanation::LastCycles;
+use super::answer::LastCycles;
 use std::path::Path;
 use worm_analysis::experiment::{Progress, RecordedRun};
 use worm_analysis::explain::{Evidence, Options, explain};

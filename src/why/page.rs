@@ -1,6 +1,6 @@
 //! An explanation as one self-contained page: the reason, the remedy, the last seconds in pictures, and every event.
 
-use super::explanation::Explanation;
+use super::answer::Explanation;
 use super::text::{headline, last_cycles, lead, signs};
 use super::timeline::{MomentKind, figure as number};
 use std::path::{Path, PathBuf};

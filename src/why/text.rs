@@ -1,6 +1,6 @@
 //! An explanation for the terminal.
 
-use super::explanation::Explanation;
+use super::answer::Explanation;
 use crate::black_box::utc;
 use std::fmt::Write as _;
 use std::time::{Duration, UNIX_EPOCH};
